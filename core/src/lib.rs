@@ -5,6 +5,7 @@
 //! (see [`plugin::registry`]); the binary links the crate that holds them.
 
 pub mod data;
+pub mod diagnose;
 pub mod math;
 pub mod plugin;
 pub mod run;
