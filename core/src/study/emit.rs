@@ -77,7 +77,11 @@ struct Writer {
 
 impl Writer {
     /// The entries of a table: values first, then the tables that have headers.
-    fn table(&mut self, path: &mut Vec<String>, table: &Map<String, Value>) -> Result<(), Unwritable> {
+    fn table(
+        &mut self,
+        path: &mut Vec<String>,
+        table: &Map<String, Value>,
+    ) -> Result<(), Unwritable> {
         let mut sections = Vec::new();
         for (name, value) in table.iter().filter(|(_, value)| !value.is_null()) {
             path.push(key(name));
