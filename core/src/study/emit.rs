@@ -71,6 +71,11 @@ pub fn key(name: &str) -> String {
     if !name.is_empty() && name.chars().all(bare) { name.to_owned() } else { string(name) }
 }
 
+/// A value on one line, tables in braces.
+pub fn inline_value(value: &Value) -> Result<String, Unwritable> {
+    inline(&[], value)
+}
+
 struct Writer {
     text: String,
 }

@@ -8,6 +8,7 @@ pub mod node;
 pub mod overrides;
 pub mod problem;
 pub mod read;
+pub mod schema;
 pub mod source;
 pub mod values;
 
