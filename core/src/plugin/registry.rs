@@ -346,4 +346,4 @@ fn duplicates(plugins: &[Listing]) -> Vec<Problem> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
