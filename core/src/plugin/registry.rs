@@ -167,13 +167,20 @@ pub fn find<K: Kind + ?Sized>(name: &str) -> Result<&'static Entry<K>, Problem> 
     if let Some(entry) = entries.iter().find(|entry| entry.name == name) {
         return Ok(entry);
     }
-    let names = || entries.iter().map(|entry| entry.name);
+    let names = || names_of(&entries);
     let mut problem = Problem::new(format!("there is no {} `{name}`", K::NAME));
     problem.expected(one_of(names()));
     if let Some(near) = nearest(name, names()) {
         problem.help(format!("did you mean `{near}`?"));
     }
     Err(problem)
+}
+
+/// The names of sorted entries, each once.
+fn names_of<K: ?Sized>(entries: &[&'static Entry<K>]) -> impl Iterator<Item = &'static str> {
+    let mut names: Vec<&'static str> = entries.iter().map(|entry| entry.name).collect();
+    names.dedup();
+    names.into_iter()
 }
 
 /// A section of a study, taken apart.
@@ -242,7 +249,7 @@ pub fn section<K: Kind + ?Sized, C: DeserializeOwned>(
         (None, None) => {
             problems
                 .report(Some(node.place.clone()), "missing key `use`")
-                .expected(one_of(entries::<K>().iter().map(|entry| entry.name)));
+                .expected(one_of(names_of(&entries::<K>())));
             None
         }
     }?;

@@ -213,7 +213,7 @@ s.toml:2:7: there is no instrument `wistle`
   |
 2 | use = 'wistle'
   |       ^^^^^^^^
-  = expected `drum`, `drum` or `whistle`
+  = expected `drum` or `whistle`
   = help: did you mean `whistle`?
 ";
     assert_eq!(shown, expected);
