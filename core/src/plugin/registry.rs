@@ -10,7 +10,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::manual::Manual;
+use super::manual::{Manual, generator, resolve};
 use crate::study::decode::{decode, decode_beside, fields};
 use crate::study::nearest::{nearest, one_of};
 use crate::study::{Node, Place, Problem, Problems};
@@ -63,9 +63,9 @@ impl<K: Kind + ?Sized> Entry<K> {
 
     /// The plugin's page of the manual, from the documentation of its options.
     pub fn documentation(&self) -> Manual {
-        let mut generator = super::manual::generator();
+        let mut generator = generator();
         let schema = (self.schema)(&mut generator);
-        Manual::new(&self.full_name(), K::SECTIONS, self.name, &schema, &mut generator)
+        Manual::of_schema(&self.full_name(), &resolve(&schema, &generator), &generator)
     }
 }
 
