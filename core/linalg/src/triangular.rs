@@ -87,6 +87,8 @@ mod tests {
     use super::*;
     use crate::{multiply, multiply_vector};
 
+    type Solve = fn(&Matrix, &mut [f64]);
+
     #[test]
     fn solutions_give_back_the_right_hand_sides() {
         let n = 37;
@@ -100,7 +102,6 @@ mod tests {
             Matrix::from_fn(n, n, |i, j| if m[(i, j)].is_nan() { 0.0 } else { m[(i, j)] })
         };
         let b: Vec<f64> = (0..n).map(|i| (i as f64 * 0.4).sin()).collect();
-        type Solve = fn(&Matrix, &mut [f64]);
         let cases: [(Solve, &Matrix, Matrix); 4] = [
             (solve_lower, &lower, clean(&lower)),
             (solve_lower_transposed, &lower, clean(&lower).transposed()),

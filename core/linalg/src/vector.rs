@@ -22,6 +22,8 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     )
 }
 
+// Only code inlined into the dispatched closure is compiled for the machine's widest vectors.
+#[expect(clippy::inline_always)]
 #[inline(always)]
 fn dot_in_lanes(a: &[f64], b: &[f64]) -> f64 {
     let mut lanes = [0.0; LANES];
