@@ -20,9 +20,15 @@ use crate::math::distribution::Distribution;
 pub struct StudySection {
     /// One line that says what the study is about.
     pub title: String,
+    /// The study's name, used for its run directory; the name of its file when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// The seed of all random numbers.
     #[serde(default)]
     pub seed: u64,
+    /// Where relative paths start; the folder of the study file when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub directory: Option<std::path::PathBuf>,
     /// What a reader of the report must know about the model and the data, such as that they are a stand-in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
@@ -317,22 +323,18 @@ pub enum Start {
 }
 
 /// What is checked after the calibration.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ValidateSection {
-    /// Whether the model itself is run again at the calibrated parameters; the emulator answers when not.
-    pub rerun_model: bool,
+    /// Whether the model itself is run again at the calibrated parameters (the emulator answers when not); when
+    /// left out, it is if the study has a model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rerun_model: Option<bool>,
     /// What the calibrated parameters are compared with.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub against: Option<Against>,
     /// Number of posterior draws at which the model is run to measure the emulator's error there.
     pub emulator_check: usize,
-}
-
-impl Default for ValidateSection {
-    fn default() -> Self {
-        Self { rerun_model: true, against: None, emulator_check: 0 }
-    }
 }
 
 /// What calibrated parameters are compared with.
