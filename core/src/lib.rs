@@ -8,6 +8,8 @@ pub mod data;
 pub mod diagnose;
 pub mod math;
 pub mod plugin;
+pub mod posterior;
+pub mod report;
 pub mod run;
 pub mod study;
 
