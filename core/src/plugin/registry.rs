@@ -162,7 +162,7 @@ pub fn entries<K: Kind + ?Sized>() -> Vec<&'static Entry<K>> {
 }
 
 /// The plugin of a kind with this name, or the complaint that there is none.
-pub fn find<K: Kind + ?Sized>(name: &str) -> Result<&'static Entry<K>, Problem> {
+pub fn find<K: Kind + ?Sized>(name: &str) -> Result<&'static Entry<K>, Box<Problem>> {
     let entries = entries::<K>();
     if let Some(entry) = entries.iter().find(|entry| entry.name == name) {
         return Ok(entry);
@@ -173,7 +173,7 @@ pub fn find<K: Kind + ?Sized>(name: &str) -> Result<&'static Entry<K>, Problem> 
     if let Some(near) = nearest(name, names()) {
         problem.help(format!("did you mean `{near}`?"));
     }
-    Err(problem)
+    Err(Box::new(problem))
 }
 
 /// The names of sorted entries, each once.
@@ -266,7 +266,7 @@ fn located<K: Kind + ?Sized>(
     find::<K>(name)
         .map_err(|problem| {
             let path = problems.path("use");
-            problems.push(Problem { place: Some(place), path, ..problem });
+            problems.push(Problem { place: Some(place), path, ..*problem });
         })
         .ok()
 }
