@@ -20,9 +20,15 @@ use crate::math::distribution::Distribution;
 pub struct StudySection {
     /// One line that says what the study is about.
     pub title: String,
+    /// The study's name, used for its run directory; the name of its file when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// The seed of all random numbers.
     #[serde(default)]
     pub seed: u64,
+    /// Where relative paths start; the folder of the study file when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub directory: Option<std::path::PathBuf>,
     /// What a reader of the report must know about the model and the data, such as that they are a stand-in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
@@ -107,11 +113,16 @@ impl GridSection {
             (Some(first), Some(last), Some(count), None) => evenly(first, last, count.get()),
             _ => return Err("expected `first`, `last` and `count`, or `values`".to_owned()),
         };
-        match numbers.windows(2).find(|pair| pair[0].partial_cmp(&pair[1]) != Some(std::cmp::Ordering::Less)) {
+        match numbers
+            .windows(2)
+            .find(|pair| pair[0].partial_cmp(&pair[1]) != Some(std::cmp::Ordering::Less))
+        {
             Some(pair) => {
                 Err(format!("expected increasing numbers, found {} before {}", pair[0], pair[1]))
             }
-            None if numbers.is_empty() => Err("expected at least one number, found none".to_owned()),
+            None if numbers.is_empty() => {
+                Err("expected at least one number, found none".to_owned())
+            }
             None => Ok(numbers),
         }
     }
@@ -137,7 +148,9 @@ impl AxisSection {
                     return Err("expected at least one label, found none".to_owned());
                 }
                 match labels.iter().enumerate().find(|(i, label)| labels[..*i].contains(label)) {
-                    Some((_, twice)) => Err(format!("expected different labels, found `{twice}` twice")),
+                    Some((_, twice)) => {
+                        Err(format!("expected different labels, found `{twice}` twice"))
+                    }
                     None => Ok(Axis::labels(name, labels.iter().cloned())),
                 }
             }
@@ -317,22 +330,18 @@ pub enum Start {
 }
 
 /// What is checked after the calibration.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ValidateSection {
-    /// Whether the model itself is run again at the calibrated parameters; the emulator answers when not.
-    pub rerun_model: bool,
+    /// Whether the model itself is run again at the calibrated parameters (the emulator answers when not); when
+    /// left out, it is if the study has a model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rerun_model: Option<bool>,
     /// What the calibrated parameters are compared with.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub against: Option<Against>,
     /// Number of posterior draws at which the model is run to measure the emulator's error there.
     pub emulator_check: usize,
-}
-
-impl Default for ValidateSection {
-    fn default() -> Self {
-        Self { rerun_model: true, against: None, emulator_check: 0 }
-    }
 }
 
 /// What calibrated parameters are compared with.

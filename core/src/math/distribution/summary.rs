@@ -28,7 +28,7 @@ impl Distribution {
     pub fn mean(&self) -> f64 {
         match *self {
             Self::Uniform([lo, hi]) => lo + 0.5 * (hi - lo),
-            Self::Normal([mean, _]) => mean,
+            Self::Normal([mean, _]) | Self::Exponential(mean) => mean,
             Self::HalfNormal(scale) => scale * FRAC_2_PI.sqrt(),
             Self::LogNormal([mu, sigma]) => (mu + 0.5 * sigma * sigma).exp(),
             Self::LogUniform([lo, hi]) => lo * (hi / lo - 1.0) / (hi / lo).ln(),
@@ -36,7 +36,6 @@ impl Distribution {
             Self::InverseGamma([shape, scale]) if shape > 1.0 => scale / (shape - 1.0),
             Self::InverseGamma(_) => f64::INFINITY,
             Self::Beta([a, b, lo, hi]) => lo + (hi - lo) * a / (a + b),
-            Self::Exponential(mean) => mean,
             Self::StudentT([dof, location, _]) if dof > 1.0 => location,
             Self::StudentT(_) => f64::NAN,
             Self::TruncatedNormal([mean, sd, lo, hi]) => {
@@ -89,14 +88,15 @@ impl Distribution {
     /// without limit at both.
     pub fn mode(&self) -> f64 {
         match *self {
-            Self::Uniform([lo, hi]) => lo + 0.5 * (hi - lo),
-            Self::Normal([mode, _]) | Self::StudentT([_, mode, _]) => mode,
+            Self::Uniform([lo, hi]) | Self::Beta([1.0, 1.0, lo, hi]) => lo + 0.5 * (hi - lo),
+            Self::Normal([mode, _])
+            | Self::StudentT([_, mode, _])
+            | Self::Triangular([_, mode, _]) => mode,
             Self::HalfNormal(_) | Self::Exponential(_) => 0.0,
             Self::LogNormal([mu, sigma]) => (mu - sigma * sigma).exp(),
             Self::LogUniform([lo, _]) => lo,
             Self::Gamma([shape, scale]) => (shape - 1.0).max(0.0) * scale,
             Self::InverseGamma([shape, scale]) => scale / (shape + 1.0),
-            Self::Beta([1.0, 1.0, lo, hi]) => lo + 0.5 * (hi - lo),
             Self::Beta([a, b, lo, hi]) if a > 1.0 && b > 1.0 => {
                 lo + (hi - lo) * (a - 1.0) / (a + b - 2.0)
             }
@@ -108,7 +108,6 @@ impl Distribution {
                 }
             }
             Self::TruncatedNormal([mean, _, lo, hi]) => mean.clamp(lo, hi),
-            Self::Triangular([_, mode, _]) => mode,
         }
     }
 }

@@ -94,6 +94,9 @@
 //!         print(",".join([name, numbers, repr(p), num(x), num(ln(x)), num(cdf(x))]))
 //! ```
 
+// Tables keep the digits as the programs print them.
+#![allow(clippy::unreadable_literal)]
+
 use super::Distribution;
 use crate::math::random::Stream;
 
@@ -214,7 +217,7 @@ fn the_mode_has_the_largest_density() {
 #[test]
 fn draws_follow_the_distribution_function() {
     // Kolmogorov and Smirnov: with probability 0.999 the distance is below 1.95 / sqrt(n).
-    let n = 2000;
+    let n = 2000_usize;
     for (i, (text, _, _)) in MOMENTS.into_iter().enumerate() {
         let law = read(text);
         let mut rng = Stream::root(5).at(i as u64).generator();

@@ -118,6 +118,9 @@ fn ln_normal_on(a: f64, b: f64, width: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    // Tables keep the digits as the programs print them.
+    #![allow(clippy::unreadable_literal)]
+
     use super::*;
 
     /// `(z, log(ncdf(z)))`.
