@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::manual::{Manual, generator, resolve};
 use crate::study::decode::{decode, decode_beside, fields};
+use crate::study::emit;
 use crate::study::nearest::{nearest, one_of};
 use crate::study::{Node, Place, Problem, Problems};
 
@@ -52,7 +53,7 @@ pub struct Built<K: ?Sized> {
     /// The plugin.
     pub plugin: Box<K>,
     /// All its options, the defaults filled in.
-    pub options: serde_json::Value,
+    pub options: toml::Table,
 }
 
 impl<K: Kind + ?Sized> Entry<K> {
@@ -143,11 +144,10 @@ pub fn build<K: ?Sized, O: DeserializeOwned + Serialize>(
     into_plugin: fn(O) -> Box<K>,
 ) -> Option<Built<K>> {
     let options: O = decode_beside(node, beside, problems)?;
-    let written = serde_json::to_value(&options);
-    match written {
+    match emit::to_table(&options) {
         Ok(written) => Some(Built { name, plugin: into_plugin(options), options: written }),
         Err(error) => {
-            let message = format!("the options of `{name}` cannot be written down: {error}");
+            let message = format!("the options of `{name}` {error}");
             problems.report(Some(node.place.clone()), message);
             None
         }
@@ -162,7 +162,7 @@ pub fn entries<K: Kind + ?Sized>() -> Vec<&'static Entry<K>> {
 }
 
 /// The plugin of a kind with this name, or the complaint that there is none.
-pub fn find<K: Kind + ?Sized>(name: &str) -> Result<&'static Entry<K>, Problem> {
+pub fn find<K: Kind + ?Sized>(name: &str) -> Result<&'static Entry<K>, Box<Problem>> {
     let entries = entries::<K>();
     if let Some(entry) = entries.iter().find(|entry| entry.name == name) {
         return Ok(entry);
@@ -173,7 +173,7 @@ pub fn find<K: Kind + ?Sized>(name: &str) -> Result<&'static Entry<K>, Problem> 
     if let Some(near) = nearest(name, names()) {
         problem.help(format!("did you mean `{near}`?"));
     }
-    Err(problem)
+    Err(Box::new(problem))
 }
 
 /// The names of sorted entries, each once.
@@ -266,7 +266,7 @@ fn located<K: Kind + ?Sized>(
     find::<K>(name)
         .map_err(|problem| {
             let path = problems.path("use");
-            problems.push(Problem { place: Some(place), path, ..problem });
+            problems.push(Problem { place: Some(place), path, ..*problem });
         })
         .ok()
 }
