@@ -1,1 +1,3 @@
-//! .
+//! The components a Lacuna study can name.
+
+pub mod models;
