@@ -211,7 +211,9 @@ impl Link {
 fn inverse_masses(mass: &Field, held: &Held) -> Field {
     let mut inverse = mass.clone();
     for part in inverse.parts_mut() {
-        part.iter_mut().for_each(|m| *m = 1.0 / *m);
+        for m in part {
+            *m = 1.0 / *m;
+        }
     }
     for (n, &[r, z]) in held.fluid.iter().enumerate() {
         if r {

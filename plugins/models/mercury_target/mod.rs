@@ -16,6 +16,7 @@ use std::fmt;
 pub use coupling::{Contact, Field, Held, Joints};
 pub use eos::{EquationOfState, TensileCutoff};
 pub use fluid::{Fluid, FluidConstants};
+pub use gauges::Sensor;
 pub use mesh::Mesh;
 pub use settings::{
     Cells, Gauge, Gauges, Geometry, Load, NamedMesh, Numerics, Place, Pulse, Rear, Sampling,

@@ -1,10 +1,11 @@
-//! The wall: two-node conical frustum shells (Mindlin), one integration point.
+//! The wall: two-node conical frustum shells (Mindlin) with reduced integration.
 //!
 //! Unknowns are the mid-surface displacements `u_r`, `u_z` and the rotation `β`. With the
 //! meridian's tangent `t`, outward normal `n`, element length `l` and mean radius `r`:
 //! `e_s = Δu·t/l`, `e_t = u_r/r`, `k_s = Δβ/l`, `k_t = β t_r/r`, `γ = β + Δu·n/l`;
 //! `N = C(e + νe')`, `M = D(k + νk')`, `Q = 5/6 G h γ`, `C = Eh/(1-ν²)`, `D = Ch²/12`.
-//! One point under-integrates shear and so avoids locking (Zienkiewicz et al. 1977).
+//! One point under-integrates shear and so avoids locking (Zienkiewicz et al. 1977); only the
+//! hoop membrane strain is taken at both ends, which keeps short waves from being too soft.
 
 use std::f64::consts::PI;
 
@@ -35,6 +36,8 @@ pub struct WallStrain {
     /// Hoop curvature `k_t`, 1/m.
     pub hoop_bend: f64,
     shear: f64,
+    /// Hoop membrane strain at both ends.
+    ends: [f64; 2],
 }
 
 /// An element between two neighbouring wall nodes.
@@ -46,6 +49,8 @@ pub struct Element {
     pub thickness: f64,
     tangent: [f64; 2],
     radius: f64,
+    /// Radius and share of the area of both ends.
+    ends: [(f64, f64); 2],
     membrane: f64,
     bending: f64,
     shear: f64,
@@ -75,19 +80,22 @@ impl Element {
         let length = dr.hypot(dz);
         let Steel { young_modulus, poisson_ratio: nu, density } = steel;
         let membrane = young_modulus * thickness / (1.0 - nu * nu);
+        let bending = membrane * thickness * thickness / 12.0;
         let lump = |near: f64, far: f64| {
             density * thickness * 2.0 * PI * length * (2.0 * near + far) / 6.0
         };
         let mass = [lump(a[0], b[0]), lump(b[0], a[0])];
         // The rotary inertia is raised on coarse meshes so that it does not limit the time step.
-        let gyration2 = (thickness * thickness / 12.0).max(length * length / 6.0);
+        let gyration2 = (thickness * thickness / 12.0).max(length * length / 10.0);
         Self {
             length,
             thickness,
             tangent: [dr / length, dz / length],
             radius: 0.5 * (a[0] + b[0]),
+            ends: [(a[0], b[0]), (b[0], a[0])]
+                .map(|(near, far)| (near, (2.0 * near + far) / (3.0 * (near + far)))),
             membrane,
-            bending: membrane * thickness * thickness / 12.0,
+            bending,
             shear: 5.0 / 6.0 * young_modulus / (2.0 * (1.0 + nu)) * thickness,
             poisson: nu,
             eigenstrain,
@@ -96,17 +104,24 @@ impl Element {
         }
     }
 
-    /// Strains of displacements (u_r, u_z, β) at both ends.
+    /// Strains of displacements and rotation `(u_r, u_z, β)` at both ends.
     fn strain(&self, a: [f64; 3], b: [f64; 3]) -> WallStrain {
         let ([tr, tz], l) = (self.tangent, self.length);
         let (du_r, du_z) = (b[0] - a[0], b[1] - a[1]);
         let turn = 0.5 * (a[2] + b[2]);
+        let mean = 0.5 * (a[0] + b[0]) / self.radius;
+        let ends = if self.ends[0].0 == 0.0 {
+            [mean; 2]
+        } else {
+            [a[0] / self.ends[0].0, b[0] / self.ends[1].0]
+        };
         WallStrain {
             meridional: (du_r * tr + du_z * tz) / l,
-            hoop: 0.5 * (a[0] + b[0]) / self.radius,
+            hoop: ends[0] * self.ends[0].1 + ends[1] * self.ends[1].1,
             meridional_bend: (b[2] - a[2]) / l,
             hoop_bend: turn * tr / self.radius,
             shear: turn + (du_r * tz - du_z * tr) / l,
+            ends,
         }
     }
 
@@ -121,23 +136,40 @@ impl Element {
         let (k_s, k_t) = (strain.meridional_bend, strain.hoop_bend);
         let area = self.area();
         let n_s = area * self.membrane * (e_s + nu * e_t) / l;
-        let n_t = area * self.membrane * (e_t + nu * e_s) * 0.5 / self.radius;
+        let n_t = self.hoop_forces(strain, e_s);
         let m_s = area * self.bending * (k_s + nu * k_t) / l;
         let m_t = area * self.bending * (k_t + nu * k_s) * 0.5 * tr / self.radius;
         let q = area * self.shear * strain.shear;
         let (along_r, along_z) = (n_s * tr + q * tz / l, n_s * tz - q * tr / l);
         [
-            [along_r - n_t, along_z, m_s - m_t - 0.5 * q],
-            [-along_r - n_t, -along_z, -m_s - m_t - 0.5 * q],
+            [along_r - n_t[0], along_z, m_s - m_t - 0.5 * q],
+            [-along_r - n_t[1], -along_z, -m_s - m_t - 0.5 * q],
         ]
+    }
+
+    /// Radial forces of the hoop stress, taken at each end by itself: the mean over an element
+    /// would make short waves too soft. At the axis the strain is that of the element.
+    fn hoop_forces(&self, strain: &WallStrain, e_s: f64) -> [f64; 2] {
+        let stress = |e_t: f64| self.membrane * (e_t - self.eigenstrain + self.poisson * e_s);
+        let area = self.area();
+        if self.ends[0].0 == 0.0 {
+            return [area * stress(strain.hoop) * 0.5 / self.radius; 2];
+        }
+        std::array::from_fn(|end| {
+            let (radius, share) = self.ends[end];
+            area * share * stress(strain.ends[end]) / radius
+        })
     }
 
     fn energy(&self, strain: &WallStrain) -> f64 {
         let (e_s, e_t) = (strain.meridional - self.eigenstrain, strain.hoop - self.eigenstrain);
         let (k_s, k_t) = (strain.meridional_bend, strain.hoop_bend);
         let quadratic = |x: f64, y: f64| x * x + y * y + 2.0 * self.poisson * x * y;
+        let spread: f64 = (strain.ends.iter().zip(self.ends))
+            .map(|(e, (_, share))| share * (e - strain.hoop).powi(2))
+            .sum();
         0.5 * self.area()
-            * (self.membrane * quadratic(e_s, e_t)
+            * (self.membrane * (quadratic(e_s, e_t) + spread)
                 + self.bending * quadratic(k_s, k_t)
                 + self.shear * strain.shear.powi(2))
     }

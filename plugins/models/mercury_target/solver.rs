@@ -31,7 +31,7 @@ impl Vessel {
 /// Where the energy is, in J.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct EnergyBalance {
-    /// Energy stored in fluid and wall at the start.
+    /// Energy at the start: stored in fluid and wall, and kinetic.
     pub start: f64,
     /// Kinetic energy.
     pub kinetic: f64,
@@ -85,7 +85,9 @@ impl<'a, E: EquationOfState + Clone> Solver<'a, E> {
         let mut mass = Field::zeros(mesh.r.len(), shell.nodes());
         for part in [&mut mass.fluid_r, &mut mass.fluid_z] {
             part.clone_from(&mesh.node_volume);
-            part.iter_mut().for_each(|m| *m *= constants.density);
+            for m in part {
+                *m *= constants.density;
+            }
         }
         shell.add_masses(&mut mass);
         let motion = Motion::new(mass, &mesh.area(), held, joints, impedance);
@@ -108,12 +110,35 @@ impl<'a, E: EquationOfState + Clone> Solver<'a, E> {
 
     /// One time step.
     pub fn step(&mut self) {
-        let dt = if self.steps == 0 { 0.5 * self.dt } else { self.dt };
-        self.radiated += self.motion.kick(&mut self.velocity, &self.force, dt);
+        if self.steps == 0 {
+            self.first_kick();
+        } else {
+            self.radiated += self.motion.kick(&mut self.velocity, &self.force, self.dt);
+        }
+        self.drift();
+        self.steps += 1;
+    }
+
+    /// Positions one step on with the present velocities, and the forces there.
+    pub fn drift(&mut self) {
         self.fluid.advance(&self.vessel.mesh, &self.velocity, self.dt);
         self.shell.advance(&self.velocity, self.dt);
         self.update_forces();
-        self.steps += 1;
+    }
+
+    /// From the start to half a step later. The energy that the leapfrog conserves counts the
+    /// product of the velocities half a step before and after the start.
+    fn first_kick(&mut self) {
+        let mut before = self.velocity.clone();
+        self.motion.kick(&mut self.velocity, &self.force, 0.5 * self.dt);
+        let power = self.motion.radiated_power(&self.velocity, &before);
+        self.radiated += 0.5 * self.dt * power;
+        for (v, after) in before.parts_mut().into_iter().zip(self.velocity.parts()) {
+            for (v, after) in v.iter_mut().zip(after) {
+                *v = 2.0 * *v - after;
+            }
+        }
+        self.start += self.motion.kinetic(&before, &self.velocity);
     }
 
     fn update_forces(&mut self) {
@@ -142,12 +167,10 @@ impl<'a, E: EquationOfState + Clone> Solver<'a, E> {
     /// as long as the pressure is linear in the strain.
     pub fn energy(&self) -> EnergyBalance {
         let mut after = self.velocity.clone();
-        let kinetic = if self.steps == 0 {
-            self.motion.kinetic(&self.velocity, &after)
-        } else {
+        if self.steps > 0 {
             self.motion.kick(&mut after, &self.force, self.dt);
-            self.motion.kinetic(&self.velocity, &after)
-        };
+        }
+        let kinetic = self.motion.kinetic(&self.velocity, &after);
         let mesh = &self.vessel.mesh;
         let now = 0.5 * self.dt * self.motion.radiated_power(&self.velocity, &after);
         EnergyBalance {

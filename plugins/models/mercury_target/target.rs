@@ -55,6 +55,11 @@ impl Target {
         &self.vessel
     }
 
+    /// The gauges, in the order of the gauge table.
+    pub fn sensors(&self) -> &[Sensor] {
+        &self.sensors
+    }
+
     /// The strain traces of one pulse in the given mercury.
     pub fn simulate(&self, mercury: &Mercury) -> Result<Outcome, SimulationError> {
         mercury.validate()?;
