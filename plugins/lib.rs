@@ -3,4 +3,5 @@
 pub mod designs;
 pub mod discrepancies;
 pub mod executors;
+pub mod models;
 pub mod surrogates;
