@@ -1,0 +1,7 @@
+//! Sierra's output: Exodus II results and history files, and heartbeat text.
+
+pub mod container;
+pub mod exodus;
+pub mod locate;
+pub mod parts;
+pub mod probe;
