@@ -1,1 +1,14 @@
-//! .
+//! Lacuna closes the gap between simulation and measurement.
+//!
+//! This crate is the engine: it reads a *study* (one TOML file), runs its stages from plain data to
+//! plain data, keeps every artifact, and names no plugin. Plugins register themselves
+//! (see [`plugin::registry`]); the binary links the crate that holds them.
+
+pub mod data;
+pub mod math;
+pub mod plugin;
+pub mod report;
+pub mod run;
+pub mod study;
+
+pub use lacuna_linalg as linalg;

@@ -1,0 +1,142 @@
+//! A dense matrix as plain data.
+
+use serde::{Deserialize, Serialize};
+
+/// A dense matrix of `f64`, stored row by row.
+///
+/// Rows are what stages pass about: one run, one draw, one replicate. A row is a slice.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Matrix {
+    rows: usize,
+    columns: usize,
+    data: Vec<f64>,
+}
+
+impl Matrix {
+    /// A matrix of zeros.
+    pub fn zeros(rows: usize, columns: usize) -> Self {
+        Self { rows, columns, data: vec![0.0; rows * columns] }
+    }
+
+    /// A matrix whose entry `(i, j)` is `entry(i, j)`.
+    pub fn from_fn(
+        rows: usize,
+        columns: usize,
+        mut entry: impl FnMut(usize, usize) -> f64,
+    ) -> Self {
+        let mut data = Vec::with_capacity(rows * columns);
+        for i in 0..rows {
+            for j in 0..columns {
+                data.push(entry(i, j));
+            }
+        }
+        Self { rows, columns, data }
+    }
+
+    /// A matrix from its entries row by row.
+    ///
+    /// # Panics
+    /// When `data` does not hold `rows * columns` numbers.
+    pub fn from_vec(rows: usize, columns: usize, data: Vec<f64>) -> Self {
+        assert_eq!(data.len(), rows * columns, "a matrix needs rows x columns entries");
+        Self { rows, columns, data }
+    }
+
+    /// A matrix from rows of equal length; no rows give a matrix of `0 x columns`.
+    ///
+    /// # Panics
+    /// When a row has another length than `columns`.
+    pub fn from_rows<R: AsRef<[f64]>>(columns: usize, rows: impl IntoIterator<Item = R>) -> Self {
+        let mut data = Vec::new();
+        let mut count = 0;
+        for row in rows {
+            assert_eq!(row.as_ref().len(), columns, "all rows of a matrix have one length");
+            data.extend_from_slice(row.as_ref());
+            count += 1;
+        }
+        Self { rows: count, columns, data }
+    }
+
+    /// The number of rows.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// The number of columns.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// Row `i`.
+    pub fn row(&self, i: usize) -> &[f64] {
+        &self.data[i * self.columns..(i + 1) * self.columns]
+    }
+
+    /// Row `i`, to be written.
+    pub fn row_mut(&mut self, i: usize) -> &mut [f64] {
+        &mut self.data[i * self.columns..(i + 1) * self.columns]
+    }
+
+    /// The rows in order.
+    pub fn iter_rows(&self) -> impl ExactSizeIterator<Item = &[f64]> + Clone {
+        (0..self.rows).map(|i| self.row(i))
+    }
+
+    /// Column `j`, copied.
+    pub fn column(&self, j: usize) -> Vec<f64> {
+        (0..self.rows).map(|i| self[(i, j)]).collect()
+    }
+
+    /// All entries, row by row.
+    pub fn as_slice(&self) -> &[f64] {
+        &self.data
+    }
+
+    /// All entries, row by row, to be written.
+    pub fn as_mut_slice(&mut self) -> &mut [f64] {
+        &mut self.data
+    }
+
+    /// All entries, row by row, without a copy.
+    pub fn into_vec(self) -> Vec<f64> {
+        self.data
+    }
+
+    /// The transposed matrix.
+    pub fn transposed(&self) -> Self {
+        Self::from_fn(self.columns, self.rows, |i, j| self[(j, i)])
+    }
+
+    /// The rows named by `indices`, in that order.
+    pub fn select_rows(&self, indices: &[usize]) -> Self {
+        Self::from_rows(self.columns, indices.iter().map(|&i| self.row(i)))
+    }
+
+    /// The columns named by `indices`, in that order.
+    pub fn select_columns(&self, indices: &[usize]) -> Self {
+        Self::from_fn(self.rows, indices.len(), |i, j| self[(i, indices[j])])
+    }
+
+    /// Appends a row.
+    ///
+    /// # Panics
+    /// When the row has another length than the matrix has columns.
+    pub fn push_row(&mut self, row: &[f64]) {
+        assert_eq!(row.len(), self.columns, "all rows of a matrix have one length");
+        self.data.extend_from_slice(row);
+        self.rows += 1;
+    }
+}
+
+impl std::ops::Index<(usize, usize)> for Matrix {
+    type Output = f64;
+    fn index(&self, (i, j): (usize, usize)) -> &f64 {
+        &self.data[i * self.columns + j]
+    }
+}
+
+impl std::ops::IndexMut<(usize, usize)> for Matrix {
+    fn index_mut(&mut self, (i, j): (usize, usize)) -> &mut f64 {
+        &mut self.data[i * self.columns + j]
+    }
+}

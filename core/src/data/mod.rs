@@ -1,0 +1,17 @@
+//! Plain data that stages pass to each other: named axes with units, runs, replicates, tables.
+
+pub mod ensemble;
+pub mod layout;
+pub mod measurements;
+pub mod parameter;
+pub mod scenario;
+pub mod table;
+pub mod unit;
+
+pub use ensemble::{Ensemble, FailedRun};
+pub use layout::{Axis, Coordinates, Layout};
+pub use measurements::{Measurements, Replicate};
+pub use parameter::Parameter;
+pub use scenario::Scenario;
+pub use table::Table;
+pub use unit::Unit;

@@ -1,0 +1,97 @@
+//! Discrepancies: the statistical model of what separates model and data.
+
+use serde::{Deserialize, Serialize};
+
+use super::surrogate::Linear;
+use super::{Component, Fact};
+use crate::data::{Measurements, Unit};
+use crate::linalg::Matrix;
+use crate::math::distribution::Distribution;
+use crate::math::random::Stream;
+use crate::run::Stop;
+
+/// A statistical model of the difference between model and data.
+pub trait Discrepancy: Component {
+    /// The likelihood of these measurements.
+    ///
+    /// `emulator_error` is the covariance of the emulator's error, common to all replicates; it is
+    /// added once to the covariance of the mean curve, never divided by the number of replicates.
+    fn likelihood(
+        &self,
+        data: &Measurements,
+        emulator_error: Option<&LowRank>,
+    ) -> Result<Box<dyn Likelihood>, Stop>;
+}
+
+/// An unknown of a discrepancy or an effect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Hyperparameter {
+    /// Its name, unique in the study, such as `variance`.
+    pub name: String,
+    /// The symbol used in figures.
+    pub symbol: String,
+    /// Its unit.
+    pub unit: Unit,
+    /// Its prior.
+    pub prior: Distribution,
+    /// Whether it is sampled as its logarithm (the prior keeps its meaning: the Jacobian is added).
+    pub log: bool,
+    /// A value to start from.
+    pub start: f64,
+}
+
+/// A covariance `F F'` of rank at most the number of columns of `F` (`outputs x rank`).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LowRank {
+    /// The factor `F`, `outputs x rank`, in the response's unit.
+    pub factor: Matrix,
+}
+
+/// The likelihood of fixed measurements as a function of the model's response.
+pub trait Likelihood: Send + Sync {
+    /// The unknowns beside the model's parameters.
+    fn hyperparameters(&self) -> &[Hyperparameter];
+
+    /// The log-likelihood of the data given the model's response (one value an output) and the
+    /// hyperparameters; minus infinity outside their support.
+    fn log_likelihood(&self, response: &[f64], hyper: &[f64]) -> f64;
+
+    /// The derivatives of the log-likelihood by the response and by the hyperparameters.
+    fn gradient(&self, response: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>);
+
+    /// The same likelihood as a function of the basis functions of a linear emulator, at the
+    /// cost of the information and not of the data; `None` when the discrepancy has no such form.
+    fn compress(&self, _linear: &dyn Linear) -> Option<Box<dyn Compressed>> {
+        None
+    }
+
+    /// The covariance of one new replicate around the model's response: the variance of each output,
+    /// split by origin.
+    fn predictive(&self, response: &[f64], hyper: &[f64]) -> Vec<VariancePart>;
+
+    /// Data as this discrepancy would have made them: the gaps and replicates of the measurements, new values.
+    fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Measurements;
+
+    /// What is worth telling.
+    fn facts(&self) -> Vec<Fact> {
+        Vec::new()
+    }
+}
+
+/// A part of the variance of a new replicate.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct VariancePart {
+    /// Its origin: `discrepancy`, `emulator`, `measurement`.
+    pub origin: String,
+    /// One variance an output.
+    pub variance: Vec<f64>,
+}
+
+/// A likelihood reduced to a small form in the basis functions of a linear emulator.
+pub trait Compressed: Send + Sync {
+    /// The log-likelihood for each row of `basis` (`points x terms`) and `hyper` (`points x hyperparameters`).
+    fn log_likelihood(&self, basis: &Matrix, hyper: &Matrix) -> Vec<f64>;
+
+    /// The derivatives at one point by the basis functions and by the hyperparameters.
+    fn gradient(&self, basis: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>);
+}

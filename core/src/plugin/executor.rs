@@ -1,0 +1,54 @@
+//! Executors: where many model evaluations run.
+
+use std::path::Path;
+
+use super::Component;
+use super::model::{Model, Response};
+use crate::data::{Layout, Scenario};
+use crate::run::Stop;
+
+/// Runs many model evaluations somewhere.
+pub trait Executor: Component {
+    /// Runs the jobs and hands over each as it finishes, in any order. A job that fails is data; an error
+    /// means that the executor itself cannot go on (jobs handed over before stay done).
+    fn submit(
+        &self,
+        batch: &Batch<'_>,
+        finished: &mut dyn FnMut(Finished) -> Result<(), Stop>,
+    ) -> Result<(), Stop>;
+}
+
+/// Jobs that belong together.
+#[derive(Clone, Copy)]
+pub struct Batch<'a> {
+    /// The model that all jobs evaluate.
+    pub model: &'a dyn Model,
+    /// The jobs.
+    pub jobs: &'a [Job],
+    /// The shape of the response that is wanted.
+    pub layout: &'a Layout,
+    /// The conditions of all jobs.
+    pub scenario: &'a Scenario,
+    /// The folder into which result files are written.
+    pub directory: &'a Path,
+}
+
+/// One evaluation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Job {
+    /// Its name, which is also the stem of its result file.
+    pub name: String,
+    /// One value an input of the model.
+    pub inputs: Vec<f64>,
+}
+
+/// A job that has ended.
+#[derive(Debug)]
+pub struct Finished {
+    /// Its index in the batch.
+    pub index: usize,
+    /// The response with the name of the file that holds it, or why there is none.
+    pub outcome: Result<(Response, String), String>,
+    /// How long it took, in seconds.
+    pub seconds: f64,
+}

@@ -1,0 +1,25 @@
+//! What a plugin of each kind must do: one trait a file, in the order in which a study meets them.
+//!
+//! A plugin is a struct of options that deserialises from its section of the study and implements
+//! the trait of its kind; one `register!` line at the end of its file lists it.
+
+pub mod component;
+pub mod design;
+pub mod discrepancy;
+pub mod effect;
+pub mod executor;
+pub mod model;
+pub mod reader;
+pub mod registry;
+pub mod sampler;
+pub mod surrogate;
+
+pub use component::{Component, Context, Fact};
+pub use design::Design;
+pub use discrepancy::{Discrepancy, Hyperparameter, Likelihood};
+pub use effect::Effect;
+pub use executor::Executor;
+pub use model::{EvalError, Model};
+pub use reader::Reader;
+pub use sampler::{Sampler, Target};
+pub use surrogate::{Emulator, Surrogate};

@@ -1,0 +1,102 @@
+//! Models: from parameters to a response.
+
+use std::path::Path;
+
+use thiserror::Error;
+
+use super::{Component, Fact};
+use crate::data::{Layout, Scenario, Unit};
+use crate::linalg::Matrix;
+
+/// A simulator.
+pub trait Model: Component {
+    /// What goes in and what comes out.
+    fn signature(&self) -> Signature;
+
+    /// Runs the simulator once.
+    fn predict(&self, call: &Call<'_>) -> Result<Response, EvalError>;
+
+    /// Derivatives of the response, where the model knows them.
+    fn gradient(&self) -> Option<&dyn Gradient> {
+        None
+    }
+
+    /// Writes a finished run in the simulator's own file format into `directory` and returns the
+    /// file's name; `None` when the model has no format of its own (the engine then writes NetCDF).
+    fn write(
+        &self,
+        _run: &str,
+        _call: &Call<'_>,
+        _response: &Response,
+        _directory: &Path,
+    ) -> Result<Option<String>, EvalError> {
+        Ok(None)
+    }
+}
+
+/// Derivatives of a model's response.
+pub trait Gradient: Send + Sync {
+    /// The derivatives of each value of the response (rows) by each input (columns).
+    fn jacobian(&self, call: &Call<'_>) -> Result<Matrix, EvalError>;
+}
+
+/// What goes into a model and what comes out of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Signature {
+    /// The inputs, in the order in which [`Call::inputs`] gives them.
+    pub inputs: Vec<Input>,
+    /// The response at its natural layout; a study may ask for another (see [`Call::layout`]).
+    pub layout: Layout,
+    /// Whether the model can answer on another grid or subset of labels than `layout`.
+    pub resamples: bool,
+}
+
+/// One input of a model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Input {
+    /// The name by which a study's parameter sets it.
+    pub name: String,
+    /// The unit in which the model takes it.
+    pub unit: Unit,
+    /// The value when no parameter of the study sets it; `None` when a parameter must.
+    pub default: Option<f64>,
+    /// The closed range in which the model answers.
+    pub range: (f64, f64),
+    /// What it is, in words.
+    pub description: String,
+}
+
+/// One evaluation that is asked of a model.
+#[derive(Debug, Clone, Copy)]
+pub struct Call<'a> {
+    /// One value an input, in the units of the signature.
+    pub inputs: &'a [f64],
+    /// The shape of the response that is wanted.
+    pub layout: &'a Layout,
+    /// The conditions of the run.
+    pub scenario: &'a Scenario,
+    /// A folder of the run's own for files, where the model needs one.
+    pub directory: Option<&'a Path>,
+}
+
+/// What a model answers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Response {
+    /// The values on the layout of the call.
+    pub values: Vec<f64>,
+    /// Whether the run stayed inside the model's range of validity.
+    pub valid: bool,
+    /// Further figures of the run, for people.
+    pub facts: Vec<Fact>,
+}
+
+/// No answer from a model.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum EvalError {
+    /// No answer for these inputs; others may do.
+    #[error("{0}")]
+    Rejected(String),
+    /// No answer for any inputs: the study must stop.
+    #[error("{0}")]
+    Fatal(String),
+}

@@ -1,0 +1,137 @@
+//! Readers: from files to data.
+
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+use super::Component;
+use crate::data::{Ensemble, Layout, Measurements, Parameter, Table, Unit};
+
+/// Reads files of one family of formats.
+///
+/// A reader offers what its formats can hold; the other methods say so in their error.
+pub trait Reader: Component {
+    /// Whether this reader understands a file, judged by its first bytes (at most 4096) and its name.
+    fn recognises(&self, path: &Path, head: &[u8]) -> bool;
+
+    /// What is in a file, for `lacuna inspect`.
+    fn inspect(&self, path: &Path) -> Result<Contents, ReadError>;
+
+    /// Whether the options name files of the user's own; if not, [`Reader::ensemble`] reads the files
+    /// that the study's simulate stage wrote.
+    fn names_files(&self) -> bool;
+
+    /// Simulation runs with their parameters.
+    fn ensemble(&self, source: &EnsembleSource<'_>) -> Result<Ensemble, ReadError> {
+        Err(ReadError::new(source.directory, "this reader does not read simulation runs"))
+    }
+
+    /// Replicated measurements.
+    fn measurements(&self, source: &MeasurementSource<'_>) -> Result<Measurements, ReadError> {
+        Err(ReadError::new(source.directory, "this reader does not read measurements"))
+    }
+
+    /// One response from one file, such as the output of an external simulator.
+    fn response(&self, path: &Path, _layout: &Layout) -> Result<Vec<f64>, ReadError> {
+        Err(ReadError::new(path, "this reader does not read a single response"))
+    }
+
+    /// The files that the options name (for the hash of a stage's inputs), relative paths resolved
+    /// against `directory`. Folders stand for all files directly in them.
+    fn files(&self, directory: &Path) -> Vec<PathBuf>;
+}
+
+/// Where an ensemble comes from.
+#[derive(Debug, Clone, Copy)]
+pub struct EnsembleSource<'a> {
+    /// The folder of the study file; relative paths in the options start here.
+    pub directory: &'a Path,
+    /// The folder that the simulate stage filled, if the study simulates: a table `runs.csv` with the columns
+    /// `run`, `file`, `status` (`done` or `failed`), `valid` (`true` or `false`), `reason` and one a parameter,
+    /// and the result files it names.
+    pub simulated: Option<&'a Path>,
+    /// The study's parameters, in the order of the ensemble's columns.
+    pub parameters: &'a [Parameter],
+    /// The shape that each response must have.
+    pub layout: &'a Layout,
+}
+
+/// Where measurements come from.
+#[derive(Debug, Clone, Copy)]
+pub struct MeasurementSource<'a> {
+    /// The folder of the study file; relative paths in the options start here.
+    pub directory: &'a Path,
+    /// The shape that a complete measurement has.
+    pub layout: &'a Layout,
+}
+
+/// What a reader sees in a file.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Contents {
+    /// The format in words, such as `Exodus II history, 64-bit offset netCDF`.
+    pub format: String,
+    /// Facts about the whole file: name and value.
+    pub facts: Vec<(String, String)>,
+    /// What can be read.
+    pub variables: Vec<Variable>,
+}
+
+/// A variable in a file.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Variable {
+    /// Its name.
+    pub name: String,
+    /// What it belongs to, such as `global`, `element block 3`, `column`.
+    pub on: String,
+    /// The lengths of its axes with their names.
+    pub axes: Vec<(String, usize)>,
+    /// Its unit, where the file says.
+    pub unit: Option<Unit>,
+    /// Its smallest and largest finite value, where it is numeric.
+    pub range: Option<(f64, f64)>,
+    /// How many of its values are not finite.
+    pub not_finite: usize,
+    /// The variable as columns (time or another axis first), for `--variable NAME --csv OUT`.
+    pub signals: Table,
+}
+
+/// A file that cannot be read, or does not hold what the study needs.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("{}", self.render())]
+pub struct ReadError {
+    /// The file or folder.
+    pub path: PathBuf,
+    /// Where in it, such as `line 3, column 2` or ``variable `strain_B` ``; empty for the whole.
+    pub place: String,
+    /// What is wrong, with the value found and what would be right.
+    pub message: String,
+    /// What to do about it.
+    pub help: Option<String>,
+}
+
+impl ReadError {
+    /// An error about a whole file.
+    pub fn new(path: impl Into<PathBuf>, message: impl Into<String>) -> Self {
+        Self { path: path.into(), place: String::new(), message: message.into(), help: None }
+    }
+
+    /// The same error at a place in the file.
+    #[must_use]
+    pub fn at(mut self, place: impl Into<String>) -> Self {
+        self.place = place.into();
+        self
+    }
+
+    /// The same error with advice.
+    #[must_use]
+    pub fn help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+
+    fn render(&self) -> String {
+        let place = if self.place.is_empty() { String::new() } else { format!(", {}", self.place) };
+        let help = self.help.as_ref().map_or(String::new(), |h| format!("\nhelp: {h}"));
+        format!("{}{place}: {}{help}", self.path.display(), self.message)
+    }
+}

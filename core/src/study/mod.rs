@@ -1,0 +1,2 @@
+//! The study language.
+pub mod problem;

@@ -1,0 +1,3 @@
+//! Complaints.
+/// A view handed to plugins.
+pub struct Complaints<'a>(pub &'a ());
