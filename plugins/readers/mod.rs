@@ -1,6 +1,14 @@
 //! Readers: files in, data with names, units and axes out.
 
-pub mod error;
 pub mod sierra;
 
-pub use error::ReadError;
+/// Shows names to a user: all of a short list, the beginning of a long one.
+pub(crate) fn listed<S: AsRef<str>>(names: &[S]) -> String {
+    const SHOWN: usize = 12;
+    let mut text: Vec<String> =
+        names.iter().take(SHOWN).map(|name| format!("`{}`", name.as_ref())).collect();
+    if names.len() > SHOWN {
+        text.push(format!("and {} more", names.len() - SHOWN));
+    }
+    if text.is_empty() { "none".to_owned() } else { text.join(", ") }
+}

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use hdf5_reader::{BytesStorage, Dataset, Datatype, FileStorage, Hdf5File, OpenOptions, Storage};
 use netcdf_reader::{NcFile, NcFormat, NcSliceInfo, NcSliceInfoElem};
 
-use crate::readers::ReadError;
+use lacuna::plugin::reader::ReadError;
 
 /// Deflate cannot shrink data more than 1032 times, so no honest chunked variable is longer than
 /// this many times the file: a larger extent is a damaged one and must not be allocated.
@@ -70,7 +70,9 @@ impl Container {
             open_classic(storage)
         } else {
             let start: String = head.iter().map(|b| b.escape_ascii().to_string()).collect();
-            Err(format!("is not a netCDF file: it starts with `{start}`, not with `CDF` or `\\x89HDF`"))
+            Err(format!(
+                "is not a netCDF file: it starts with `{start}`, not with `CDF` or `\\x89HDF`"
+            ))
         };
         let (shapes, source) = opened.map_err(|message| ReadError::new(path, message))?;
         Ok(Self { path: path.to_owned(), bytes, shapes, source })
@@ -264,9 +266,7 @@ fn hdf5_reals(dataset: &Dataset, picks: &[Pick]) -> Result<Vec<f64>, String> {
     match dataset.dtype() {
         Datatype::FloatingPoint { size: 4, .. } => read::<f32>(dataset, picks, f64::from),
         Datatype::FloatingPoint { size: 8, .. } => read::<f64>(dataset, picks, |x| x),
-        Datatype::FixedPoint { size: 1, signed: true, .. } => {
-            read::<i8>(dataset, picks, f64::from)
-        }
+        Datatype::FixedPoint { size: 1, signed: true, .. } => read::<i8>(dataset, picks, f64::from),
         Datatype::FixedPoint { size: 1, signed: false, .. } => {
             read::<u8>(dataset, picks, f64::from)
         }

@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::container::{Container, Pick};
-use crate::readers::ReadError;
+use lacuna::plugin::reader::ReadError;
 
 /// What an Exodus variable is attached to.
 #[derive(
@@ -144,16 +144,8 @@ impl Exodus {
         let blocks = groups(&container, &BLOCKS, count(Kind::Element))?;
         let node_sets = groups(&container, &NODE_SETS, count(Kind::NodeSet))?;
         let side_sets = groups(&container, &SIDE_SETS, count(Kind::SideSet))?;
-        let file = Self {
-            container,
-            times,
-            incomplete_steps,
-            nodes,
-            blocks,
-            node_sets,
-            side_sets,
-            names,
-        };
+        let file =
+            Self { container, times, incomplete_steps, nodes, blocks, node_sets, side_sets, names };
         file.check_extents()?;
         Ok(file)
     }
@@ -218,8 +210,11 @@ impl Exodus {
         }
         match self.container.shape(&name) {
             None => {
-                let text = format!("is incomplete: it lists {} variable `{}` but has no `{name}`",
-                    kind.label(), self.names(kind)[variable]);
+                let text = format!(
+                    "is incomplete: it lists {} variable `{}` but has no `{name}`",
+                    kind.label(),
+                    self.names(kind)[variable]
+                );
                 return Err(ReadError::new(self.path(), text));
             }
             Some(shape) if shape.len() != picks.len() => {
@@ -245,8 +240,7 @@ impl Exodus {
     fn check_extents(&self) -> Result<(), ReadError> {
         for name in ["node_num_map", "elem_num_map"] {
             if let Some(&[size]) = self.container.shape(name) {
-                let expected =
-                    if name == "node_num_map" { self.nodes } else { self.elements() };
+                let expected = if name == "node_num_map" { self.nodes } else { self.elements() };
                 if size != expected {
                     let text = format!(
                         "is damaged: `{name}` has {size} entries for {expected} {}s",

@@ -3,8 +3,8 @@
 use super::container::Pick;
 use super::exodus::{Exodus, Group, Kind};
 use super::probe::Probe;
-use crate::readers::ReadError;
-use crate::readers::error::listed;
+use crate::readers::listed;
+use lacuna::plugin::reader::ReadError;
 
 /// One entity that carries a value, by positions counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -127,8 +127,7 @@ impl Exodus {
         probe: &Probe,
         found: &mut Found,
     ) -> Result<(), ReadError> {
-        let mut offer =
-            |position, distance| found.offer(Entity { group, position, distance });
+        let mut offer = |position, distance| found.offer(Entity { group, position, distance });
         if let Some(id) = probe.id {
             let ids = self.ids(kind)?;
             let mut chosen: Vec<usize> =

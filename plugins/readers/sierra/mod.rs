@@ -2,6 +2,9 @@
 
 pub mod container;
 pub mod exodus;
+pub mod heartbeat;
 pub mod locate;
 pub mod parts;
 pub mod probe;
+pub mod signal;
+pub mod write;

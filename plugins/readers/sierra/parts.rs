@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use super::exodus::{Exodus, Kind};
 use super::locate::Entity;
 use super::probe::Probe;
-use crate::readers::ReadError;
-use crate::readers::error::listed;
+use crate::readers::listed;
+use lacuna::plugin::reader::ReadError;
 
 /// The files of one run. A node or element lies in one part, or in several with equal values if
 /// it is shared; globals are in all.
@@ -127,7 +127,8 @@ impl Results {
                 listed(&without)
             ))),
             None => {
-                let what = probe.id.map_or(format!("no {carrier}"), |id| format!("no {carrier} {id}"));
+                let what =
+                    probe.id.map_or(format!("no {carrier}"), |id| format!("no {carrier} {id}"));
                 Err(self.complain(format!("has {what} with `{name}`{absent}")))
             }
             Some(_) if probe.nearest.is_some() && missing > 0 => Err(self.complain(format!(
@@ -184,12 +185,7 @@ pub(super) fn part_name(name: &str) -> Option<(&str, usize, usize)> {
     (number < count && count <= 1_000_000).then_some((stem, count, part.len()))
 }
 
-fn existing(
-    path: &Path,
-    stem: &str,
-    count: usize,
-    width: usize,
-) -> Option<(Vec<PathBuf>, usize)> {
+fn existing(path: &Path, stem: &str, count: usize, width: usize) -> Option<(Vec<PathBuf>, usize)> {
     let paths: Vec<PathBuf> = (0..count)
         .map(|part| path.with_file_name(format!("{stem}.{count}.{part:0width$}")))
         .filter(|part| part.exists())
