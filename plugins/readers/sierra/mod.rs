@@ -8,3 +8,6 @@ pub mod parts;
 pub mod probe;
 pub mod signal;
 pub mod write;
+
+#[cfg(test)]
+mod tests;

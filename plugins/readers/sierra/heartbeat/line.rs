@@ -58,7 +58,7 @@ pub(super) fn parse(line: &str, separator: Option<&Separator>, columns: Option<u
         Some((&"", rest)) if !rest.is_empty() => rest,
         _ => &fields[..],
     };
-    let stamped = line.starts_with('+') && number(fields[0]).is_none();
+    let stamped = line.starts_with('+');
     let parsed = if fields.iter().any(|field| label(field).is_some()) {
         labelled(fields, stamped)
     } else if separator == Some(&Separator::Blank) {
@@ -119,7 +119,8 @@ fn stamp_removed<'a>(fields: &[&'a str]) -> Vec<&'a str> {
 /// long as it is not known, all fields at the end that are alike.
 fn blank_stamp_removed<'a>(fields: &[&'a str], columns: Option<usize>) -> Vec<&'a str> {
     let numeric = fields.last().is_some_and(|field| number(field).is_some());
-    let alike = fields[1..].iter().rev().take_while(|f| number(f).is_some() == numeric).count();
+    let like_last = |field: &&&str| if numeric { number(field).is_some() } else { is_name(field) };
+    let alike = fields.iter().rev().take_while(like_last).count();
     let kept = columns.map_or(alike, |n| n.min(alike));
     fields[fields.len() - kept..].to_vec()
 }

@@ -57,7 +57,7 @@ impl<'a> Parser<'a> {
             .map(|(i, line)| (i + 1, line))
             .filter(|(_, line)| !line.trim().is_empty())
             .collect();
-        let whole = text.ends_with(['\n', '\r']);
+        let whole = text[text.trim_end().len()..].contains('\n');
         for (i, &(number, line)) in lines.iter().enumerate() {
             let previous = i.checked_sub(1).map(|i| lines[i].1);
             let next = lines.get(i + 1).map(|&(_, next)| next);
