@@ -14,4 +14,4 @@ pub use measurements::{Measurements, Replicate};
 pub use parameter::Parameter;
 pub use scenario::Scenario;
 pub use table::Table;
-pub use unit::Unit;
+pub use unit::{Unit, UnitError};

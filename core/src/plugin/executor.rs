@@ -52,3 +52,5 @@ pub struct Finished {
     /// How long it took, in seconds.
     pub seconds: f64,
 }
+
+crate::kind!(Executor, "executor", ["executor"]);

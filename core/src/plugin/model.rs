@@ -100,3 +100,5 @@ pub enum EvalError {
     #[error("{0}")]
     Fatal(String),
 }
+
+crate::kind!(Model, "model", ["model"]);

@@ -135,3 +135,5 @@ impl ReadError {
         format!("{}{place}: {}{help}", self.path.display(), self.message)
     }
 }
+
+crate::kind!(Reader, "reader", ["simulations", "measurements"]);

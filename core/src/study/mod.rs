@@ -1,2 +1,15 @@
-//! The study language.
+//! The study language: from TOML text to decoded, checked options.
+
+pub mod decode;
+pub mod emit;
+pub mod nearest;
+pub mod node;
 pub mod problem;
+pub mod read;
+pub mod source;
+pub mod values;
+
+pub use decode::{decode, decode_beside};
+pub use node::{Key, Node, Value};
+pub use problem::{Complaints, Problem, Problems};
+pub use source::{Place, SourceId, Sources};
