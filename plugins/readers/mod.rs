@@ -1,5 +1,10 @@
 //! Readers: files in, data with names, units and axes out.
 
+pub mod cells;
+pub mod contents;
+pub mod csv;
+pub mod runs;
+pub mod sheet;
 pub mod sierra;
 
 /// Shows names to a user: all of a short list, the beginning of a long one.

@@ -79,3 +79,16 @@ impl Heartbeat {
         Ok((self.columns[time].clone(), self.columns[column].clone()))
     }
 }
+
+/// Whether a file that begins so is heartbeat output: by Sierra's own first line, by labels, or by
+/// a padded legend that begins with the time.
+pub fn recognised(head: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(head);
+    let Some(line) = text.lines().find(|line| !line.trim().is_empty()) else { return false };
+    let first = line.split([',', '\t', ';', '|']).next().unwrap_or_default();
+    let labelled = first
+        .split_once('=')
+        .is_some_and(|(name, value)| !name.trim().is_empty() && line::number(value).is_some());
+    let padded = first.len() > first.trim().len() && first.trim().eq_ignore_ascii_case("time");
+    line.starts_with("% Sierra") || labelled || padded || line.starts_with("+[")
+}
