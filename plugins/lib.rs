@@ -1,3 +1,6 @@
-//! The components a Lacuna study can name: one folder a kind, one file a plugin.
+//! The components that a study can name: one folder a kind, one file a plugin.
 
+pub mod designs;
+pub mod discrepancies;
+pub mod executors;
 pub mod readers;

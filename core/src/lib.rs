@@ -7,6 +7,7 @@
 pub mod data;
 pub mod math;
 pub mod plugin;
+pub mod posterior;
 pub mod report;
 pub mod run;
 pub mod study;

@@ -158,9 +158,7 @@ impl Products {
     /// The sum of squared correlations of column `j` with the others.
     fn column_badness(&self, j: usize) -> f64 {
         let others = (0..self.mean.len()).filter(|&k| k != j);
-        others
-            .map(|k| self.cross[(j, k)].powi(2) / (self.cross[(j, j)] * self.cross[(k, k)]))
-            .sum()
+        others.map(|k| self.cross[(j, k)].powi(2) / (self.cross[(j, j)] * self.cross[(k, k)])).sum()
     }
 
     /// Exchanging entry `j` of runs `a` and `b` changes each product with column `k` by
@@ -209,7 +207,8 @@ mod tests {
 
     #[test]
     fn maximin_moves_the_closest_pair_apart() {
-        let (plain, spread) = (closest(&design(Optimise::None)), closest(&design(Optimise::Maximin)));
+        let (plain, spread) =
+            (closest(&design(Optimise::None)), closest(&design(Optimise::Maximin)));
         assert!(spread > 2.0 * plain, "{plain} against {spread}");
     }
 

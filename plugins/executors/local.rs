@@ -93,7 +93,10 @@ fn evaluate(batch: &Batch<'_>, job: &Job) -> Result<(Response, String), EvalErro
     let response = batch.model.predict(&call)?;
     if let Some(i) = response.values.iter().position(|y| !y.is_finite()) {
         let place = batch.layout.describe(i);
-        return Err(EvalError::Rejected(format!("the response is {} at {place}", response.values[i])));
+        return Err(EvalError::Rejected(format!(
+            "the response is {} at {place}",
+            response.values[i]
+        )));
     }
     let file = match batch.model.write(&job.name, &call, &response, batch.directory)? {
         Some(file) => file,

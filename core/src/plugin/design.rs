@@ -10,5 +10,3 @@ pub trait Design: Component {
     /// `count` points in the open unit cube of `dimension` axes, one a row.
     fn points(&self, count: usize, dimension: usize, stream: &Stream) -> Result<Matrix, Stop>;
 }
-
-crate::kind!(Design, "design", ["design"]);

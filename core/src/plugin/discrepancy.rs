@@ -95,5 +95,3 @@ pub trait Compressed: Send + Sync {
     /// The derivatives at one point by the basis functions and by the hyperparameters.
     fn gradient(&self, basis: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>);
 }
-
-crate::kind!(Discrepancy, "discrepancy", ["discrepancy"]);

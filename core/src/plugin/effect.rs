@@ -54,5 +54,3 @@ pub struct Description {
     /// Where it comes from in the literature.
     pub source: String,
 }
-
-crate::kind!(Effect, "effect", ["effect"]);

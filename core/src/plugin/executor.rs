@@ -52,5 +52,3 @@ pub struct Finished {
     /// How long it took, in seconds.
     pub seconds: f64,
 }
-
-crate::kind!(Executor, "executor", ["executor"]);

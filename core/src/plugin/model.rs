@@ -100,5 +100,3 @@ pub enum EvalError {
     #[error("{0}")]
     Fatal(String),
 }
-
-crate::kind!(Model, "model", ["model"]);

@@ -135,5 +135,3 @@ impl ReadError {
         format!("{}{place}: {}{help}", self.path.display(), self.message)
     }
 }
-
-crate::kind!(Reader, "reader", ["simulations", "measurements"]);

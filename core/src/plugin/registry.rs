@@ -10,7 +10,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::manual::Manual;
+use super::manual::{Manual, generator, resolve};
 use crate::study::decode::{decode, decode_beside, fields};
 use crate::study::nearest::{nearest, one_of};
 use crate::study::{Node, Place, Problem, Problems};
@@ -63,9 +63,9 @@ impl<K: Kind + ?Sized> Entry<K> {
 
     /// The plugin's page of the manual, from the documentation of its options.
     pub fn documentation(&self) -> Manual {
-        let mut generator = super::manual::generator();
+        let mut generator = generator();
         let schema = (self.schema)(&mut generator);
-        Manual::new(&self.full_name(), K::SECTIONS, self.name, &schema, &mut generator)
+        Manual::of_schema(&self.full_name(), &resolve(&schema, &generator), &generator)
     }
 }
 
@@ -167,13 +167,20 @@ pub fn find<K: Kind + ?Sized>(name: &str) -> Result<&'static Entry<K>, Problem> 
     if let Some(entry) = entries.iter().find(|entry| entry.name == name) {
         return Ok(entry);
     }
-    let names = || entries.iter().map(|entry| entry.name);
+    let names = || names_of(&entries);
     let mut problem = Problem::new(format!("there is no {} `{name}`", K::NAME));
     problem.expected(one_of(names()));
     if let Some(near) = nearest(name, names()) {
         problem.help(format!("did you mean `{near}`?"));
     }
     Err(problem)
+}
+
+/// The names of sorted entries, each once.
+fn names_of<K: ?Sized>(entries: &[&'static Entry<K>]) -> impl Iterator<Item = &'static str> {
+    let mut names: Vec<&'static str> = entries.iter().map(|entry| entry.name).collect();
+    names.dedup();
+    names.into_iter()
 }
 
 /// A section of a study, taken apart.
@@ -242,7 +249,7 @@ pub fn section<K: Kind + ?Sized, C: DeserializeOwned>(
         (None, None) => {
             problems
                 .report(Some(node.place.clone()), "missing key `use`")
-                .expected(one_of(entries::<K>().iter().map(|entry| entry.name)));
+                .expected(one_of(names_of(&entries::<K>())));
             None
         }
     }?;
@@ -346,4 +353,4 @@ fn duplicates(plugins: &[Listing]) -> Vec<Problem> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -70,5 +70,3 @@ pub struct State {
     /// Whatever else the sampler keeps (an adapted covariance, a step size).
     pub memory: serde_json::Value,
 }
-
-crate::kind!(Sampler, "sampler", ["sampler"]);

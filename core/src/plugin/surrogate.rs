@@ -90,5 +90,3 @@ pub struct FitError {
     /// The leave-one-out residual of each run and output, `runs x outputs`, in the response's unit.
     pub residuals: Matrix,
 }
-
-crate::kind!(Surrogate, "surrogate", ["surrogate"]);

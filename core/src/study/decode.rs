@@ -57,6 +57,8 @@ pub fn decode_beside<T: DeserializeOwned>(
 struct Repairs {
     removed: Vec<*const Node>,
     holes: Vec<(*const Node, String)>,
+    /// Keys that were written, but misspelt.
+    misspelt: Vec<(*const Node, String)>,
 }
 
 impl Repairs {
@@ -92,7 +94,8 @@ impl Repairs {
                 let removed = find(root, culprit)
                     .and_then(|table| table.get(key))
                     .is_some_and(|node| self.is_removed(node));
-                if !removed {
+                let misspelt = self.misspelt.contains(&(culprit, key.clone()));
+                if !removed && !misspelt {
                     problems.push(problem(&fault, problems, culprit == root, beside));
                 }
                 let hole = (culprit, key.clone());
@@ -102,13 +105,12 @@ impl Repairs {
                 }
             }
             Cause::Hole => {}
-            Cause::UnknownKey { .. } => {
-                problems.push(problem(
-                    &fault,
-                    problems,
-                    parents == [std::ptr::from_ref(root)],
-                    beside,
-                ));
+            Cause::UnknownKey { key, known } => {
+                let at_root = parents == [std::ptr::from_ref(root)];
+                problems.push(problem(&fault, problems, at_root, beside));
+                let meant = nearest(key, known.iter().map(String::as_str));
+                let owner = parents.first().copied();
+                self.misspelt.extend(owner.zip(meant.map(str::to_owned)));
             }
             _ if consequence => {}
             _ => {

@@ -71,13 +71,22 @@ pub fn key(name: &str) -> String {
     if !name.is_empty() && name.chars().all(bare) { name.to_owned() } else { string(name) }
 }
 
+/// A value on one line, tables in braces.
+pub fn inline_value(value: &Value) -> Result<String, Unwritable> {
+    inline(&[], value)
+}
+
 struct Writer {
     text: String,
 }
 
 impl Writer {
     /// The entries of a table: values first, then the tables that have headers.
-    fn table(&mut self, path: &mut Vec<String>, table: &Map<String, Value>) -> Result<(), Unwritable> {
+    fn table(
+        &mut self,
+        path: &mut Vec<String>,
+        table: &Map<String, Value>,
+    ) -> Result<(), Unwritable> {
         let mut sections = Vec::new();
         for (name, value) in table.iter().filter(|(_, value)| !value.is_null()) {
             path.push(key(name));

@@ -120,7 +120,7 @@ impl Merge<'_> {
         let place = over.place.clone();
         let mut merged = Node { value: base.value, place };
         for (key, node) in into_entries(over) {
-            let merged_node = match merged.remove_for_merge(&key.name) {
+            let merged_node = match merged.take(&key.name) {
                 Some(mut old) => {
                     if plugin(&old) != plugin(&node) && plugin(&node).is_some() {
                         self.drop_options(&key.name, &mut old);
@@ -139,7 +139,7 @@ impl Merge<'_> {
             (Value::Table(_), Value::Table(_)) if !self.in_braces(&over) => {
                 let mut merged = Node { value: base.value, place: over.place.clone() };
                 for (key, node) in into_entries(over) {
-                    let node = match merged.remove_for_merge(&key.name) {
+                    let node = match merged.take(&key.name) {
                         Some(old) => self.value(old, node),
                         None => node,
                     };

@@ -2,10 +2,13 @@
 
 pub mod decode;
 pub mod emit;
+pub mod inherit;
 pub mod nearest;
 pub mod node;
+pub mod overrides;
 pub mod problem;
 pub mod read;
+pub mod schema;
 pub mod source;
 pub mod values;
 

@@ -94,6 +94,13 @@ impl Node {
         }
     }
 
+    /// Takes a value out of this table and leaves an empty table under its key.
+    pub(crate) fn take(&mut self, key: &str) -> Option<Node> {
+        let node = self.get_mut(key)?;
+        let empty = Node::table(node.place.clone());
+        Some(std::mem::replace(node, empty))
+    }
+
     /// Takes a key out of this table.
     pub fn remove(&mut self, key: &str) -> Option<(Key, Node)> {
         match &mut self.value {

@@ -38,9 +38,24 @@ pub(crate) fn report(errors: &[Error], source: SourceId, offset: usize, problems
             || Place::whole(source),
             |span| Place { source, span: span.start + offset..span.end + offset },
         );
-        match error.message().split_once(", expected ") {
-            Some((message, expected)) => problems.report(Some(place), message).expected(expected),
-            None => problems.report(Some(place), error.message()),
+        let nothing_there = place.span.is_empty();
+        let (message, expected) = match error.message().split_once(", expected ") {
+            Some((message, expected)) => (message, Some(expected)),
+            None => (error.message(), None),
+        };
+        // The parser speaks of strings because an unquoted word is the most frequent mistake.
+        match message {
+            "string values must be quoted" if nothing_there => {
+                problems.report(Some(place), "a value is missing")
+            }
+            "string values must be quoted" => {
+                problems.report(Some(place), "this is not a value").help("a string needs quotes")
+            }
+            _ => {
+                let problem = problems.report(Some(place), message);
+                problem.expected = expected.map(str::to_owned);
+                problem
+            }
         };
     }
 }

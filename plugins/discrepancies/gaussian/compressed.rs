@@ -5,10 +5,12 @@
 //! `(I - U U') B = Q R` gives `|z_rest| = |R (psi, 1)|` with `R` upper triangular of the basis' size: exact, since
 //! an orthogonal factor does not change a length.
 
-use lacuna::linalg::{self, LinalgError, Matrix};
+use lacuna::linalg::{self, Matrix};
 use lacuna::plugin::discrepancy::Compressed;
 
-use super::likelihood::{Spread, Statistics, dot};
+use lacuna::linalg::vector::dot;
+
+use super::likelihood::{Spread, Statistics};
 
 /// See the module.
 pub(super) struct CompressedGaussian {
@@ -23,7 +25,7 @@ impl CompressedGaussian {
     pub(super) fn new(
         statistics: &Statistics,
         coefficients: &Matrix,
-    ) -> Result<Self, LinalgError> {
+    ) -> Result<Self, linalg::Error> {
         let terms = coefficients.rows();
         let s = statistics;
         let mut b = Matrix::from_fn(s.measured.len(), terms + 1, |i, j| {
@@ -34,11 +36,11 @@ impl CompressedGaussian {
             }
         });
         let along = linalg::multiply(&s.directions, &b);
-        let explained = linalg::multiply_transposed_left(&s.directions, &along);
+        let explained = linalg::transposed_multiply(&s.directions, &along);
         for (entry, part) in b.as_mut_slice().iter_mut().zip(explained.as_slice()) {
             *entry -= part;
         }
-        let outside = if b.rows() > b.columns() { linalg::triangular_factor(&b)? } else { b };
+        let outside = if b.rows() > b.columns() { linalg::thin_qr(&b)?.r } else { b };
         Ok(Self { spread: s.spread.clone(), along, outside })
     }
 }
@@ -57,8 +59,8 @@ fn with_one(basis: &Matrix) -> Matrix {
 impl Compressed for CompressedGaussian {
     fn log_likelihood(&self, basis: &Matrix, hyper: &Matrix) -> Vec<f64> {
         let extended = with_one(basis);
-        let along = linalg::multiply_transposed_right(&extended, &self.along);
-        let outside = linalg::multiply_transposed_right(&extended, &self.outside);
+        let along = linalg::multiply_transposed(&extended, &self.along);
+        let outside = linalg::multiply_transposed(&extended, &self.outside);
         (0..basis.rows())
             .map(|i| {
                 let v = hyper[(i, 0)];
@@ -86,9 +88,7 @@ impl Compressed for CompressedGaussian {
         for (row, r) in self.outside.iter_rows().zip(&outside) {
             subtract(row, r / v);
         }
-        for ((row, a), lambda) in
-            self.along.iter_rows().zip(&along).zip(&self.spread.eigenvalues)
-        {
+        for ((row, a), lambda) in self.along.iter_rows().zip(&along).zip(&self.spread.eigenvalues) {
             subtract(row, a / (v + lambda));
         }
         let by_variance = self.spread.by_variance(v, dot(&outside, &outside), &along);

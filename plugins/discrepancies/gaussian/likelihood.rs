@@ -11,13 +11,12 @@
 //! thin singular value decomposition `W F = U diag(s) V'` diagonalises `K` once for all `v`.
 
 use lacuna::data::{Measurements, Unit};
+use lacuna::linalg::vector::dot;
 use lacuna::linalg::{self, Matrix};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::Fact;
-use lacuna::plugin::discrepancy::{
-    Compressed, Hyperparameter, Likelihood, LowRank, VariancePart,
-};
+use lacuna::plugin::discrepancy::{Compressed, Hyperparameter, Likelihood, LowRank, VariancePart};
 use lacuna::plugin::surrogate::Linear;
 use lacuna::run::Stop;
 
@@ -61,7 +60,8 @@ impl Spread {
     /// The log-likelihood given the squared residual outside the directions of the emulator's error and
     /// the residual along each of them.
     pub fn log_likelihood(&self, v: f64, outside: f64, along: &[f64]) -> f64 {
-        let mut twice = self.count * (std::f64::consts::TAU * v).ln() + (self.scatter + outside) / v;
+        let mut twice =
+            self.count * (std::f64::consts::TAU * v).ln() + (self.scatter + outside) / v;
         for (&a, &lambda) in along.iter().zip(&self.eigenvalues) {
             twice += (lambda / v).ln_1p() + a * a / (v + lambda);
         }
@@ -122,11 +122,13 @@ impl GaussianLikelihood {
 impl Statistics {
     fn of(data: &Measurements, emulator_error: Option<&LowRank>) -> Result<Self, Stop> {
         let summaries = data.summaries();
-        let measured: Vec<usize> = (0..summaries.len()).filter(|&i| summaries[i].count > 0).collect();
+        let measured: Vec<usize> =
+            (0..summaries.len()).filter(|&i| summaries[i].count > 0).collect();
         if measured.is_empty() {
             return Err(Stop::new("the measurements hold no value"));
         }
-        let weight: Vec<f64> = measured.iter().map(|&i| (summaries[i].count as f64).sqrt()).collect();
+        let weight: Vec<f64> =
+            measured.iter().map(|&i| (summaries[i].count as f64).sqrt()).collect();
         let weighted_mean =
             measured.iter().zip(&weight).map(|(&i, w)| w * summaries[i].mean).collect();
         let count = data.count() as f64;
@@ -184,10 +186,6 @@ fn starting_variance(spread: &Spread, means: &[f64], prior: &Distribution) -> f6
     }
 }
 
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
 impl Likelihood for GaussianLikelihood {
     fn hyperparameters(&self) -> &[Hyperparameter] {
         &self.hyper
@@ -242,8 +240,7 @@ impl Likelihood for GaussianLikelihood {
         let mut mean = response.to_vec();
         if let Some(error) = &self.emulator_error {
             let mut rng = stream.named("emulator").generator();
-            let weights: Vec<f64> =
-                (0..error.factor.columns()).map(|_| normal(&mut rng)).collect();
+            let weights: Vec<f64> = (0..error.factor.columns()).map(|_| normal(&mut rng)).collect();
             for (m, row) in mean.iter_mut().zip(error.factor.iter_rows()) {
                 *m += dot(row, &weights);
             }

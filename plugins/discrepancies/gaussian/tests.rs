@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use lacuna::data::{Axis, Layout, Measurements, Replicate, Scenario, Unit};
-use lacuna::linalg::{self, Matrix};
+use lacuna::linalg::{self, Cholesky, Matrix};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal, uniform};
 use lacuna::plugin::discrepancy::{Likelihood, LowRank};
@@ -59,7 +59,7 @@ fn random_matrix(rows: usize, columns: usize, seed: u64) -> Matrix {
 }
 
 fn likelihood(data: &Measurements, error: Option<&LowRank>) -> GaussianLikelihood {
-    GaussianLikelihood::new(data, error, Distribution::uniform(0.0, 10.0).unwrap()).unwrap()
+    GaussianLikelihood::new(data, error, Distribution::Uniform([0.0, 10.0])).unwrap()
 }
 
 /// The log density of all data as one normal vector with covariance `v I + E F F' E'`, where `E` repeats each
@@ -83,9 +83,8 @@ fn naive(data: &Measurements, error: Option<&LowRank>, response: &[f64], v: f64)
         });
         common + if a == b { v } else { 0.0 }
     });
-    let factor = linalg::cholesky(&covariance).unwrap();
-    let solved = factor.solve(&residual);
-    let quadratic: f64 = residual.iter().zip(&solved).map(|(a, b)| a * b).sum();
+    let factor = Cholesky::new(&covariance).unwrap();
+    let quadratic = factor.quadratic(&residual);
     -0.5 * (n as f64 * std::f64::consts::TAU.ln() + factor.log_determinant() + quadratic)
 }
 
@@ -148,7 +147,8 @@ fn gradients_are_the_derivatives() {
     let slope = (at(response.row(0), v + h) - at(response.row(0), v - h)) / (2.0 * h);
     assert!((slope - by_hyper[0]).abs() < 1e-6 * (1.0 + slope.abs()));
     let (by_basis, by_variance) = compressed.gradient(basis.row(0), &[v]);
-    let chained = linalg::multiply(&emulated.coefficients, &Matrix::from_vec(OUTPUTS, 1, by_response));
+    let chained =
+        linalg::multiply(&emulated.coefficients, &Matrix::from_vec(OUTPUTS, 1, by_response));
     for j in 0..TERMS {
         assert!((by_basis[j] - chained[(j, 0)]).abs() < 1e-10 * (1.0 + by_basis[j].abs()));
     }

@@ -353,6 +353,11 @@ impl<'de> VariantAccess<'de> for Choice<'_> {
         // The name alone stands for the defaults.
         let empty = Node::table(self.decoder.node.place.clone());
         let nothing = Repairs::default();
-        Decoder::new(&empty, &nothing).structure(fields, visitor)
+        Decoder::new(&empty, &nothing).structure(fields, visitor).map_err(|fault| {
+            let Cause::Missing(key) = &fault.cause else { return fault };
+            let expected = format!("`{}` with its keys", self.name);
+            let help = format!("write `{{ {} = {{ {key} = … }} }}`", self.name);
+            Fault::wrong(expected, "the name alone").help(help)
+        })
     }
 }
