@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::{Value as Json, json};
+use toml::{Table, Value as Toml};
 
 use super::context;
 use super::decode::{decode, fields};
@@ -55,7 +55,7 @@ pub struct Study {
     /// `[validate]`.
     pub validate: ValidateSection,
     /// The whole study with every default filled in, for `resolved.toml`.
-    pub resolved: Json,
+    pub resolved: Table,
 }
 
 /// The sections of the study language, in the order in which a study is written.
@@ -191,7 +191,7 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
         sampler,
         effects: effects?,
         validate: validate?,
-        resolved: Json::Null,
+        resolved: Table::new(),
     };
     study.resolved = resolved(&study, root, response.as_ref());
     Some(study)
@@ -367,54 +367,46 @@ impl Study {
 }
 
 /// The study with every default filled in.
-fn resolved(study: &Study, root: &Node, response: Option<&ResponseSection>) -> Json {
-    let mut whole = serde_json::Map::new();
-    let mut about = json!(study.about);
-    about["name"] = json!(study.name);
+fn resolved(study: &Study, root: &Node, response: Option<&ResponseSection>) -> Table {
+    let mut whole = Table::new();
+    let mut about = as_table(&study.about);
+    about.insert("name".to_owned(), study.name.clone().into());
     let directory = std::path::absolute(&study.directory).unwrap_or(study.directory.clone());
-    about["directory"] = json!(directory);
-    whole.insert("study".to_owned(), about);
-    let parameters: Vec<Json> = study
-        .parameters
-        .iter()
-        .map(|p| {
-            let mut table = json!({ "name": p.name, "symbol": p.symbol, "unit": p.unit,
-                "design": p.design, "prior": p.prior });
-            if let Some(reference) = p.reference {
-                table["reference"] = json!(reference);
-            }
-            table
-        })
-        .collect();
-    whole.insert("parameter".to_owned(), Json::Array(parameters));
-    whole.insert("response".to_owned(), json!(response));
+    about.insert("directory".to_owned(), directory.to_string_lossy().into_owned().into());
+    whole.insert("study".to_owned(), about.into());
+    let parameters = study.parameters.iter().map(|p| as_table(p).into()).collect();
+    whole.insert("parameter".to_owned(), Toml::Array(parameters));
+    whole.insert("response".to_owned(), as_table(&response).into());
     macro_rules! sections {
         ($($field:ident),+) => {
             $(if let Some(section) = &study.$field {
-                whole.insert(stringify!($field).to_owned(), merged(section));
+                whole.insert(stringify!($field).to_owned(), merged(section).into());
             })+
         };
     }
     sections!(model, design, executor, simulations, measurements, surrogate, discrepancy);
     if !study.effects.is_empty() {
-        whole.insert("effect".to_owned(), study.effects.iter().map(merged).collect());
+        let effects = study.effects.iter().map(|effect| merged(effect).into()).collect();
+        whole.insert("effect".to_owned(), Toml::Array(effects));
     }
     if let Some(section) = &study.sampler {
-        whole.insert("sampler".to_owned(), merged(section));
+        whole.insert("sampler".to_owned(), merged(section).into());
     }
-    whole.insert("validate".to_owned(), json!(study.validate));
+    whole.insert("validate".to_owned(), as_table(&study.validate).into());
     debug_assert!(root.entries().iter().all(|(key, _)| whole.contains_key(&key.name)));
-    Json::Object(whole)
+    whole
 }
 
 /// One table of `use`, the engine's keys and the plugin's.
-fn merged<K: ?Sized, C: serde::Serialize>(section: &Section<K, C>) -> Json {
-    let mut table = serde_json::Map::new();
-    table.insert("use".to_owned(), json!(section.built.name));
-    for part in [json!(section.common), section.built.options.clone()] {
-        if let Json::Object(entries) = part {
-            table.extend(entries.into_iter().filter(|(_, value)| !value.is_null()));
-        }
-    }
-    Json::Object(table)
+fn merged<K: ?Sized, C: serde::Serialize>(section: &Section<K, C>) -> Table {
+    let mut table = Table::new();
+    table.insert("use".to_owned(), section.built.name.into());
+    table.extend(as_table(&section.common));
+    table.extend(section.built.options.clone());
+    table
+}
+
+/// A section as TOML; what has no value is left out.
+fn as_table<T: serde::Serialize>(section: &T) -> Table {
+    Table::try_from(section).unwrap_or_default()
 }
