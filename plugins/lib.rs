@@ -3,3 +3,6 @@
 pub mod designs;
 pub mod discrepancies;
 pub mod executors;
+pub mod models;
+pub mod readers;
+pub mod surrogates;
