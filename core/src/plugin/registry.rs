@@ -14,7 +14,8 @@ use super::manual::{Manual, generator, resolve};
 use crate::study::decode::{decode, decode_beside, fields};
 use crate::study::emit;
 use crate::study::nearest::{nearest, one_of};
-use crate::study::{Node, Place, Problem, Problems};
+use crate::study::read::read;
+use crate::study::{Node, Place, Problem, Problems, Sources};
 
 #[doc(hidden)]
 pub use inventory;
@@ -269,6 +270,19 @@ fn located<K: Kind + ?Sized>(
             problems.push(Problem { place: Some(place), path, ..*problem });
         })
         .ok()
+}
+
+/// A plugin from its options alone, as TOML text; the error is every problem as it is shown.
+///
+/// For tests, contracts and programs that have no study.
+pub fn from_text<K: Kind + ?Sized>(name: &str, options: &str) -> Result<Built<K>, String> {
+    let mut sources = Sources::default();
+    let mut problems = Problems::new();
+    let source = sources.add_argument(&format!("{}.{name}", K::NAME), options.to_owned());
+    let entry = located::<K>(name, Place::whole(source), &mut problems);
+    let node = read(source, &sources, &mut problems);
+    let built = entry.zip(node).and_then(|(entry, node)| (entry.build)(&node, &[], &mut problems));
+    built.ok_or_else(|| problems.render(&sources))
 }
 
 /// One kind of plugin, as data.

@@ -5,10 +5,11 @@
 
 use std::path::{Path, PathBuf};
 
-use toml::{Table, Value as Toml};
+use toml::Table;
 
 use super::context;
 use super::decode::{decode, fields};
+use super::emit::{Unwritable, to_table};
 use super::file::{
     DesignKeys, DiscrepancyKeys, MeasurementKeys, ModelKeys, ParameterSection, ResponseSection,
     SamplerKeys, StudySection, SurrogateKeys, ValidateSection,
@@ -193,7 +194,13 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
         validate: validate?,
         resolved: Table::new(),
     };
-    study.resolved = resolved(&study, root, response.as_ref());
+    match resolved(&study, &response?) {
+        Ok(resolved) => study.resolved = resolved,
+        Err(error) => {
+            problems.report(None, format!("the study with its defaults {error}"));
+            return None;
+        }
+    }
     Some(study)
 }
 
@@ -367,46 +374,38 @@ impl Study {
 }
 
 /// The study with every default filled in.
-fn resolved(study: &Study, root: &Node, response: Option<&ResponseSection>) -> Table {
-    let mut whole = Table::new();
-    let mut about = as_table(&study.about);
+fn resolved(study: &Study, response: &ResponseSection) -> Result<Table, Unwritable> {
+    let mut about = to_table(&study.about)?;
     about.insert("name".to_owned(), study.name.clone().into());
     let directory = std::path::absolute(&study.directory).unwrap_or(study.directory.clone());
-    about.insert("directory".to_owned(), directory.to_string_lossy().into_owned().into());
+    about.insert("directory".to_owned(), directory.display().to_string().into());
+    let parameters: Result<Vec<Table>, _> = study.parameters.iter().map(to_table).collect();
+    let mut whole = Table::new();
     whole.insert("study".to_owned(), about.into());
-    let parameters = study.parameters.iter().map(|p| as_table(p).into()).collect();
-    whole.insert("parameter".to_owned(), Toml::Array(parameters));
-    whole.insert("response".to_owned(), as_table(&response).into());
+    whole.insert("parameter".to_owned(), parameters?.into());
+    whole.insert("response".to_owned(), to_table(response)?.into());
     macro_rules! sections {
         ($($field:ident),+) => {
             $(if let Some(section) = &study.$field {
-                whole.insert(stringify!($field).to_owned(), merged(section).into());
+                whole.insert(stringify!($field).to_owned(), merged(section)?.into());
             })+
         };
     }
     sections!(model, design, executor, simulations, measurements, surrogate, discrepancy);
     if !study.effects.is_empty() {
-        let effects = study.effects.iter().map(|effect| merged(effect).into()).collect();
-        whole.insert("effect".to_owned(), Toml::Array(effects));
+        let effects: Result<Vec<Table>, _> = study.effects.iter().map(merged).collect();
+        whole.insert("effect".to_owned(), effects?.into());
     }
-    if let Some(section) = &study.sampler {
-        whole.insert("sampler".to_owned(), merged(section).into());
-    }
-    whole.insert("validate".to_owned(), as_table(&study.validate).into());
-    debug_assert!(root.entries().iter().all(|(key, _)| whole.contains_key(&key.name)));
-    whole
+    sections!(sampler);
+    whole.insert("validate".to_owned(), to_table(&study.validate)?.into());
+    Ok(whole)
 }
 
 /// One table of `use`, the engine's keys and the plugin's.
-fn merged<K: ?Sized, C: serde::Serialize>(section: &Section<K, C>) -> Table {
+fn merged<K: ?Sized, C: serde::Serialize>(section: &Section<K, C>) -> Result<Table, Unwritable> {
     let mut table = Table::new();
     table.insert("use".to_owned(), section.built.name.into());
-    table.extend(as_table(&section.common));
+    table.extend(to_table(&section.common)?);
     table.extend(section.built.options.clone());
-    table
-}
-
-/// A section as TOML; what has no value is left out.
-fn as_table<T: serde::Serialize>(section: &T) -> Table {
-    Table::try_from(section).unwrap_or_default()
+    Ok(table)
 }

@@ -205,6 +205,16 @@ s.toml:5:9: wrong value for `holes`
 }
 
 #[test]
+fn a_plugin_can_be_made_without_a_study() {
+    let whistle = from_text::<dyn Instrument>("whistle", "volume = 1").unwrap();
+    assert_eq!(whistle.plugin.sound(), "fweet at 1.0");
+    let said = from_text::<dyn Instrument>("whistle", "volume = 2").map(|built| built.name);
+    assert!(said.unwrap_err().starts_with("instrument.whistle: wrong value for `volume`\n"));
+    let said = from_text::<dyn Instrument>("wistle", "volume = 2").map(|built| built.name);
+    assert!(said.unwrap_err().starts_with("instrument.wistle: there is no instrument `wistle`\n"));
+}
+
+#[test]
 fn a_missing_or_unknown_plugin_is_shown() {
     let shown = section_of("[instrument]\nuse = 'wistle'\n", None).shown;
     let expected = "\

@@ -264,6 +264,23 @@ fn buffered_types_are_placed_at_the_value_that_holds_them() {
     assert!(shown.starts_with("s.toml:3:5: "), "{shown}");
 }
 
+/// A right text with one byte taken out, doubled or replaced is decoded or complained about, with
+/// every complaint inside the text; it never panics or runs for ever.
+#[test]
+fn spoilt_texts_are_complained_about() {
+    let text = "walkers = 12\nprior = { normal = { mean = 0, sd = 1 } }\nburn_in = 0.5\n\
+                names = ['a', 'b']\nunit = 'm/s2'\n[degree]\nmax = 20\n[scale]\nx = 1\n";
+    assert!(decoded::<Options>(text).is_ok());
+    let mut complaints = 0;
+    for at in 0..text.len() {
+        for byte in ["", "x", "1", "-", ".", "'", "{", "]", "=", "\n", "µ", "#"] {
+            let spoilt = format!("{}{byte}{}", &text[..at], &text[at + 1..]);
+            complaints += usize::from(decoded::<Options>(&spoilt).is_err());
+        }
+    }
+    assert!(complaints > 1000, "{complaints}");
+}
+
 #[test]
 fn syntax_errors_come_together() {
     let heads = heads::<BTreeMap<String, f64>>("a = \nb = 1\nc = [1, \nd = = 2\nb = 3\n");
