@@ -1,1 +1,8 @@
-//! .
+//! The components that a study can name: one folder a kind, one file a plugin.
+
+pub mod designs;
+pub mod discrepancies;
+pub mod executors;
+pub mod models;
+pub mod readers;
+pub mod surrogates;

@@ -5,10 +5,13 @@
 //! (see [`plugin::registry`]); the binary links the crate that holds them.
 
 pub mod data;
+pub mod diagnose;
 pub mod math;
 pub mod plugin;
+pub mod posterior;
 pub mod report;
 pub mod run;
+pub mod stage;
 pub mod study;
 
 pub use lacuna_linalg as linalg;

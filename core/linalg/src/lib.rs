@@ -4,7 +4,32 @@
 //! profile can compile it optimised: generic code is compiled where it is used, and unoptimised
 //! factorisations are hundreds of times slower. Every routine runs on one thread, because
 //! results must not depend on the number of threads; parallelism belongs to chains, outputs and runs.
+//!
+//! Shapes are the caller's promise: a routine panics when they do not fit, as slices do. Numbers are
+//! not: a matrix that is not finite or not positive definite gives an [`Error`].
 
+mod cholesky;
+mod eigen;
+mod error;
+mod faer_view;
 mod matrix;
+mod product;
+mod qr;
+mod svd;
+mod triangular;
+pub mod vector;
 
+pub use cholesky::Cholesky;
+pub use eigen::{SymmetricEigen, symmetric_eigen};
+pub use error::Error;
 pub use matrix::Matrix;
+pub use product::{
+    gram, multiply, multiply_transposed, multiply_vector, transposed_multiply,
+    transposed_multiply_vector,
+};
+pub use qr::{LeastSquares, Qr, least_squares, thin_qr};
+pub use svd::{Svd, thin_svd};
+pub use triangular::{
+    solve_lower, solve_lower_matrix, solve_lower_transposed, solve_upper, solve_upper_matrix,
+    solve_upper_transposed,
+};

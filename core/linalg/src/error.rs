@@ -1,0 +1,48 @@
+//! Why a factorisation has no answer.
+
+use std::fmt;
+
+use crate::Matrix;
+
+/// Why a factorisation has no answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Error {
+    /// An entry of the input is NaN or infinite.
+    NotFinite {
+        /// The row of the first such entry.
+        row: usize,
+        /// Its column.
+        column: usize,
+    },
+    /// A Cholesky factorisation met a pivot that is not positive.
+    NotPositiveDefinite {
+        /// The row of that pivot.
+        pivot: usize,
+    },
+    /// An iterative factorisation did not converge.
+    NotConverged,
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotFinite { row, column } => {
+                write!(f, "the matrix has no finite number at row {row}, column {column}")
+            }
+            Self::NotPositiveDefinite { pivot } => {
+                write!(f, "the matrix is not positive definite (pivot {pivot})")
+            }
+            Self::NotConverged => f.write_str("the factorisation did not converge"),
+        }
+    }
+}
+
+impl std::error::Error for Error {}
+
+/// Fails at the first entry that is NaN or infinite.
+pub(crate) fn finite(a: &Matrix) -> Result<(), Error> {
+    match a.as_slice().iter().position(|x| !x.is_finite()) {
+        Some(flat) => Err(Error::NotFinite { row: flat / a.columns(), column: flat % a.columns() }),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,127 @@
+//! Products.
+
+use faer::linalg::matmul::matmul;
+use faer::linalg::matmul::triangular::{self, BlockStructure};
+use faer::{Accum, Par};
+
+use crate::faer_view::{view, view_mut};
+use crate::{Matrix, vector};
+
+/// `A B`: `m x k` by `k x n` gives `m x n`.
+///
+/// # Panics
+/// When the inner sizes differ.
+pub fn multiply(a: &Matrix, b: &Matrix) -> Matrix {
+    assert_eq!(a.columns(), b.rows(), "inner sizes of a product");
+    let mut product = Matrix::zeros(a.rows(), b.columns());
+    matmul(view_mut(&mut product), Accum::Replace, view(a), view(b), 1.0, Par::Seq);
+    product
+}
+
+/// `A' B`: `k x m` by `k x n` gives `m x n`.
+///
+/// # Panics
+/// When the inner sizes differ.
+pub fn transposed_multiply(a: &Matrix, b: &Matrix) -> Matrix {
+    assert_eq!(a.rows(), b.rows(), "inner sizes of a product");
+    let mut product = Matrix::zeros(a.columns(), b.columns());
+    matmul(view_mut(&mut product), Accum::Replace, view(a).transpose(), view(b), 1.0, Par::Seq);
+    product
+}
+
+/// `A B'`: `m x k` by `n x k` gives `m x n`.
+///
+/// # Panics
+/// When the inner sizes differ.
+pub fn multiply_transposed(a: &Matrix, b: &Matrix) -> Matrix {
+    assert_eq!(a.columns(), b.columns(), "inner sizes of a product");
+    let mut product = Matrix::zeros(a.rows(), b.rows());
+    matmul(view_mut(&mut product), Accum::Replace, view(a), view(b).transpose(), 1.0, Par::Seq);
+    product
+}
+
+/// `A' A`: `m x n` gives a symmetric `n x n`, exactly symmetric.
+pub fn gram(a: &Matrix) -> Matrix {
+    let n = a.columns();
+    let mut product = Matrix::zeros(n, n);
+    triangular::matmul(
+        view_mut(&mut product),
+        BlockStructure::TriangularLower,
+        Accum::Replace,
+        view(a).transpose(),
+        BlockStructure::Rectangular,
+        view(a),
+        BlockStructure::Rectangular,
+        1.0,
+        Par::Seq,
+    );
+    for i in 0..n {
+        for j in 0..i {
+            product[(j, i)] = product[(i, j)];
+        }
+    }
+    product
+}
+
+/// `A x`: `m x n` by `n` gives `m`.
+///
+/// # Panics
+/// When the inner sizes differ.
+pub fn multiply_vector(a: &Matrix, x: &[f64]) -> Vec<f64> {
+    assert_eq!(a.columns(), x.len(), "inner sizes of a product");
+    a.iter_rows().map(|row| vector::dot(row, x)).collect()
+}
+
+/// `A' x`: `m x n` by `m` gives `n`.
+///
+/// # Panics
+/// When the inner sizes differ.
+pub fn transposed_multiply_vector(a: &Matrix, x: &[f64]) -> Vec<f64> {
+    assert_eq!(a.rows(), x.len(), "inner sizes of a product");
+    let mut product = vec![0.0; a.columns()];
+    for (row, &weight) in a.iter_rows().zip(x) {
+        vector::add_scaled(&mut product, weight, row);
+    }
+    product
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The definition, entry by entry.
+    fn plain(a: &Matrix, b: &Matrix) -> Matrix {
+        Matrix::from_fn(a.rows(), b.columns(), |i, j| {
+            (0..a.columns()).map(|k| a[(i, k)] * b[(k, j)]).sum()
+        })
+    }
+
+    fn wavy(rows: usize, columns: usize, phase: f64) -> Matrix {
+        Matrix::from_fn(rows, columns, |i, j| ((i * columns + j) as f64 * 0.7 + phase).sin())
+    }
+
+    fn close(a: &Matrix, b: &Matrix) {
+        assert_eq!((a.rows(), a.columns()), (b.rows(), b.columns()));
+        let worst =
+            a.as_slice().iter().zip(b.as_slice()).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
+        assert!(worst < 1e-12, "{worst}");
+    }
+
+    #[test]
+    fn products_agree_with_their_definition() {
+        for (m, k, n) in [(1, 1, 1), (3, 5, 2), (40, 17, 33), (0, 3, 2), (2, 0, 3)] {
+            let (a, b) = (wavy(m, k, 0.1), wavy(k, n, 0.9));
+            close(&multiply(&a, &b), &plain(&a, &b));
+            close(&transposed_multiply(&a.transposed(), &b), &plain(&a, &b));
+            close(&multiply_transposed(&a, &b.transposed()), &plain(&a, &b));
+            close(&gram(&a), &plain(&a.transposed(), &a));
+            let x = wavy(k, 1, 0.3);
+            close(&Matrix::from_vec(m, 1, multiply_vector(&a, x.as_slice())), &plain(&a, &x));
+            let z = wavy(m, 1, 0.2);
+            close(
+                &Matrix::from_vec(k, 1, transposed_multiply_vector(&a, z.as_slice())),
+                &plain(&a.transposed(), &z),
+            );
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! Singular values.
+
+use crate::Matrix;
+use crate::eigen::{column_signs, scale_column};
+use crate::error::{Error, finite};
+use crate::faer_view::{copied, on_one_thread, view};
+
+/// `A = U diag(values) V'` with `A` `m x n`, `U` `m x k` and `V` `n x k` with orthonormal columns,
+/// `k = min(m, n)`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Svd {
+    /// `U`, its columns signed so that those of `V` have a positive largest entry.
+    pub u: Matrix,
+    /// The singular values, decreasing.
+    pub values: Vec<f64>,
+    /// `V`.
+    pub v: Matrix,
+}
+
+/// The thin singular value decomposition.
+pub fn thin_svd(a: &Matrix) -> Result<Svd, Error> {
+    finite(a)?;
+    on_one_thread();
+    let svd = view(a).thin_svd().map_err(|_| Error::NotConverged)?;
+    let values = (0..a.rows().min(a.columns())).map(|i| svd.S().column_vector()[i]).collect();
+    let (mut u, mut v) = (copied(svd.U()), copied(svd.V()));
+    for (j, sign) in column_signs(&v).into_iter().enumerate() {
+        scale_column(&mut u, j, sign);
+        scale_column(&mut v, j, sign);
+    }
+    Ok(Svd { u, values, v })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::{gram, multiply_transposed, symmetric_eigen};
+
+    #[test]
+    fn factors_are_orthonormal_and_multiply_to_the_matrix() {
+        for (m, n) in [(20, 6), (6, 20), (1, 3)] {
+            let a = Matrix::from_fn(m, n, |i, j| ((i * i + 5 * j) as f64).sin());
+            let Svd { u, values, v } = thin_svd(&a).unwrap();
+            let k = m.min(n);
+            assert_eq!((u.columns(), values.len(), v.columns()), (k, k, k));
+            let scaled = Matrix::from_fn(m, k, |i, j| u[(i, j)] * values[j]);
+            let back = multiply_transposed(&scaled, &v);
+            assert!(back.as_slice().iter().zip(a.as_slice()).all(|(x, y)| (x - y).abs() < 1e-12));
+            for factor in [u, v] {
+                let g = gram(&factor);
+                let unit = |i, j| f64::from(u8::from(i == j));
+                assert!((0..k).all(|i| (0..k).all(|j| (g[(i, j)] - unit(i, j)).abs() < 1e-13)));
+            }
+        }
+    }
+
+    #[test]
+    fn squares_are_the_eigenvalues_of_the_gram_matrix() {
+        let a = Matrix::from_fn(15, 7, |i, j| 1.0 / (i + j + 1) as f64);
+        let values = thin_svd(&a).unwrap().values;
+        let squares = symmetric_eigen(&gram(&a)).unwrap().values;
+        for (s, e) in values.iter().zip(squares.iter().rev()) {
+            assert!((s * s - e).abs() < 1e-14);
+        }
+        assert!(values.is_sorted_by(|a, b| a >= b));
+    }
+
+    #[test]
+    fn what_is_not_finite_is_refused() {
+        let a = Matrix::from_rows(2, [[1.0, f64::NEG_INFINITY]]);
+        assert_eq!(thin_svd(&a), Err(Error::NotFinite { row: 0, column: 1 }));
+    }
+}
