@@ -3,3 +3,4 @@
 pub mod designs;
 pub mod discrepancies;
 pub mod executors;
+pub mod samplers;

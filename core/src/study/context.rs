@@ -28,10 +28,9 @@ fn sections(study: &Study, complaints: &mut Complaints<'_>) {
     let imported = study.simulations.as_ref().is_some_and(|s| s.built.plugin.names_files());
     let simulated = study.model.is_some() && study.design.is_some();
     if !imported && !simulated {
-        complaints
-            .at("")
-            .say("the study has no simulation runs")
-            .expected("`[model]` and `[design]`, or `[simulations]` with the files of finished runs");
+        complaints.at("").say("the study has no simulation runs").expected(
+            "`[model]` and `[design]`, or `[simulations]` with the files of finished runs",
+        );
     }
     if study.surrogate.is_none() {
         complaints
@@ -174,7 +173,10 @@ fn inputs(study: &Study, signature: &Signature, complaints: &mut Complaints<'_>)
         complaints
             .at("model")
             .say(format!("nothing sets the model's input `{}`", input.name))
-            .help(format!("add a `[[parameter]]` of that name, or `fixed = {{ {} = … }}`", input.name));
+            .help(format!(
+                "add a `[[parameter]]` of that name, or `fixed = {{ {} = … }}`",
+                input.name
+            ));
     }
 }
 
@@ -237,7 +239,11 @@ fn outputs(study: &Study, signature: &Signature, complaints: &mut Complaints<'_>
         complaints
             .at("response.axes")
             .say("the model's response has other axes")
-            .expected(if theirs.axes.is_empty() { "no axes".to_owned() } else { names(&theirs.axes) })
+            .expected(if theirs.axes.is_empty() {
+                "no axes".to_owned()
+            } else {
+                names(&theirs.axes)
+            })
             .found(if ours.axes.is_empty() { "none".to_owned() } else { names(&ours.axes) });
         return;
     }

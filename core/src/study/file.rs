@@ -113,11 +113,16 @@ impl GridSection {
             (Some(first), Some(last), Some(count), None) => evenly(first, last, count.get()),
             _ => return Err("expected `first`, `last` and `count`, or `values`".to_owned()),
         };
-        match numbers.windows(2).find(|pair| pair[0].partial_cmp(&pair[1]) != Some(std::cmp::Ordering::Less)) {
+        match numbers
+            .windows(2)
+            .find(|pair| pair[0].partial_cmp(&pair[1]) != Some(std::cmp::Ordering::Less))
+        {
             Some(pair) => {
                 Err(format!("expected increasing numbers, found {} before {}", pair[0], pair[1]))
             }
-            None if numbers.is_empty() => Err("expected at least one number, found none".to_owned()),
+            None if numbers.is_empty() => {
+                Err("expected at least one number, found none".to_owned())
+            }
             None => Ok(numbers),
         }
     }
@@ -143,7 +148,9 @@ impl AxisSection {
                     return Err("expected at least one label, found none".to_owned());
                 }
                 match labels.iter().enumerate().find(|(i, label)| labels[..*i].contains(label)) {
-                    Some((_, twice)) => Err(format!("expected different labels, found `{twice}` twice")),
+                    Some((_, twice)) => {
+                        Err(format!("expected different labels, found `{twice}` twice"))
+                    }
                     None => Ok(Axis::labels(name, labels.iter().cloned())),
                 }
             }

@@ -8,9 +8,7 @@ use super::file::{
 };
 use super::schema::Language;
 use crate::plugin::registry::NoKeys;
-use crate::plugin::{
-    Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate,
-};
+use crate::plugin::{Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate};
 
 /// The schema, for editors that complete and check a study (`lacuna schema`).
 pub fn schema() -> Value {

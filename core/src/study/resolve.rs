@@ -106,8 +106,7 @@ pub fn load(path: &Path, arguments: &[String]) -> Checked {
 pub fn load_text(path: &Path, text: &str, arguments: &[String]) -> Checked {
     let mut sources = Sources::default();
     let mut problems = Problems::new();
-    let root =
-        inherit::load_text(path, text.to_owned(), &common_keys, &mut sources, &mut problems);
+    let root = inherit::load_text(path, text.to_owned(), &common_keys, &mut sources, &mut problems);
     finish(path, text.to_owned(), root, arguments, sources, problems)
 }
 
@@ -335,13 +334,14 @@ impl Study {
         look: impl Fn(&dyn crate::plugin::Component, &Context<'_>, &mut Complaints<'_>),
     ) {
         let context = self.context();
-        let mut visit = |name: &str, node: Option<&Node>, component: &dyn crate::plugin::Component| {
-            let unwritten = Node::table(root.place.clone());
-            let node = node.unwrap_or(&unwritten);
-            problems.within(name, |problems| {
-                look(component, &context, &mut Complaints::new(node, problems));
-            });
-        };
+        let mut visit =
+            |name: &str, node: Option<&Node>, component: &dyn crate::plugin::Component| {
+                let unwritten = Node::table(root.place.clone());
+                let node = node.unwrap_or(&unwritten);
+                problems.within(name, |problems| {
+                    look(component, &context, &mut Complaints::new(node, problems));
+                });
+            };
         macro_rules! visit_sections {
             ($($field:ident),+) => {
                 $(if let Some(section) = &self.$field {
@@ -350,7 +350,14 @@ impl Study {
             };
         }
         visit_sections!(
-            model, design, executor, simulations, measurements, surrogate, discrepancy, sampler
+            model,
+            design,
+            executor,
+            simulations,
+            measurements,
+            surrogate,
+            discrepancy,
+            sampler
         );
         let nodes = root.get("effect").map(Node::elements).unwrap_or_default();
         for (section, node) in self.effects.iter().zip(nodes) {
