@@ -63,7 +63,8 @@ impl Sampler for Walk {
             if self.fault == Fault::NarrowDensity {
                 ratio *= 1.2;
             }
-            state.accepted[chain] = self.fault == Fault::AcceptsAll || uniform(&mut rng).ln() < ratio;
+            state.accepted[chain] =
+                self.fault == Fault::AcceptsAll || uniform(&mut rng).ln() < ratio;
             if state.accepted[chain] {
                 state.points.row_mut(chain).copy_from_slice(next.row(0));
                 if self.fault != Fault::StaleDensity {
