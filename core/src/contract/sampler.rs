@@ -246,3 +246,6 @@ fn draws_a_normal_law(sampler: &dyn Sampler) -> Result<(), String> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests;
