@@ -41,7 +41,7 @@
 //! # Limits
 //!
 //! - Closing cavities make the traces sensitive: changing a parameter by 0.1 % scatters them by
-//!   about 0.8 microstrain rms, refining the mesh twice changes them by about 9 (no surrogate can
+//!   about 1 microstrain rms, refining the mesh twice changes them by about 9 (no surrogate can
 //!   be better than that). The linear viscosity decides this noise floor.
 //! - `valid` is false when any volumetric strain reaches 0.1: displacements are then no longer
 //!   small. The largest values are on the axis, where cavities gather.

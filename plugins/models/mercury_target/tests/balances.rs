@@ -65,9 +65,7 @@ fn by_hand(target: &Target, constants: FluidConstants, cutoff: f64) -> Solver<'_
 
 #[test]
 fn axial_momentum_changes_by_the_reactions_of_the_rear() {
-    let mut settings = undamped(0.7);
-    settings.numerics.rear = Rear::Rigid;
-    let target = Target::new(&settings).unwrap();
+    let target = Target::new(&undamped(0.7)).unwrap();
     let constants = FluidConstants {
         linear_viscosity: 0.25,
         quadratic_viscosity: 1.2,
