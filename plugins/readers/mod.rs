@@ -3,6 +3,7 @@
 pub mod cells;
 pub mod contents;
 pub mod csv;
+pub mod netcdf;
 pub mod runs;
 pub mod sheet;
 pub mod sierra;

@@ -33,6 +33,8 @@ pub struct Sheet {
     pub path: PathBuf,
     /// The columns.
     pub headings: Vec<Heading>,
+    /// The line of the headings, counted from 1.
+    pub heading_line: usize,
     /// The rows.
     pub records: Vec<Record>,
 }
@@ -58,14 +60,16 @@ impl Sheet {
         if names.is_empty() {
             return Err(ReadError::new(path, "is empty: expected a line of column names"));
         }
+        let heading_line = names.position().map_or(1, |p| p.line() as usize);
         let mut headings: Vec<Heading> = Vec::with_capacity(names.len());
         for (column, text) in names.iter().enumerate() {
             let heading = heading(text).map_err(|message| {
-                ReadError::new(path, message).at(format!("line 1, column {}", column + 1))
+                ReadError::new(path, message)
+                    .at(format!("line {heading_line}, column {}", column + 1))
             })?;
             if headings.iter().any(|h| h.name == heading.name) {
                 let message = format!("two columns are called `{}`", heading.name);
-                return Err(ReadError::new(path, message).at("line 1"));
+                return Err(ReadError::new(path, message).at(format!("line {heading_line}")));
             }
             headings.push(heading);
         }
@@ -75,7 +79,7 @@ impl Sheet {
             let line = record.position().map_or(0, |p| p.line() as usize);
             records.push(Record { line, cells: record.iter().map(str::to_owned).collect() });
         }
-        Ok(Self { path: path.to_owned(), headings, records })
+        Ok(Self { path: path.to_owned(), headings, heading_line, records })
     }
 
     /// The position of a column, if there is one of this name.
@@ -125,7 +129,7 @@ impl Sheet {
                 "expected a unit that converts to `{to}`, found `{}` in `{from}`",
                 heading.name
             );
-            return Err(ReadError::new(&self.path, text).at("line 1"));
+            return Err(ReadError::new(&self.path, text).at(format!("line {}", self.heading_line)));
         }
         Ok(conversion)
     }

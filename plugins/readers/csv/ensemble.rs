@@ -69,7 +69,11 @@ fn wide_table(sheet: &Sheet, names: &Names<'_>, layout: &Layout) -> Result<Vec<V
     let mut headed: Vec<Option<usize>> = vec![None; layout.len()];
     for column in (0..sheet.headings.len()).filter(|&c| c != names.column) {
         let at = |text: String| {
-            ReadError::new(&sheet.path, text).at(format!("line 1, column {}", column + 1))
+            ReadError::new(&sheet.path, text).at(format!(
+                "line {}, column {}",
+                sheet.heading_line,
+                column + 1
+            ))
         };
         let heading = &sheet.headings[column].name;
         let place = headed_place(layout, heading).map_err(|text| {

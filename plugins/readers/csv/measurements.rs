@@ -115,7 +115,7 @@ fn reject_unknown(
     let Some(column) = unknown else { return Ok(()) };
     let text = format!("column `{}` has no meaning here", sheet.headings[column].name);
     Err(ReadError::new(&sheet.path, text)
-        .at(format!("line 1, column {}", column + 1))
+        .at(format!("line {}, column {}", sheet.heading_line, column + 1))
         .help("list it under `scenario` if it is a condition, else under `ignore`"))
 }
 

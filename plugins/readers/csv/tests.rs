@@ -22,7 +22,7 @@ fn layout() -> Layout {
 }
 
 fn parameters() -> Vec<Parameter> {
-    let uniform = || Distribution::uniform(0.0, 1.0).unwrap();
+    let uniform = || Distribution::Uniform([0.0, 1.0]);
     vec![Parameter {
         name: "density".into(),
         symbol: "rho".into(),

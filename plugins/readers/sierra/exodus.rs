@@ -194,16 +194,42 @@ impl Exodus {
         group: usize,
         entity: usize,
     ) -> Result<Vec<f64>, ReadError> {
+        let mut values = self.slab(kind, variable, group, Pick::At(entity))?;
+        if values.len() < self.times.len() {
+            let text = format!("is incomplete: {} of {} steps", values.len(), self.times.len());
+            return Err(ReadError::new(self.path(), text));
+        }
+        values.truncate(self.times.len());
+        Ok(values)
+    }
+
+    /// Values of one variable at all entities of a group, over all steps, entities fastest.
+    pub fn all_values(
+        &self,
+        kind: Kind,
+        variable: usize,
+        group: usize,
+    ) -> Result<Vec<f64>, ReadError> {
+        self.slab(kind, variable, group, Pick::All)
+    }
+
+    fn slab(
+        &self,
+        kind: Kind,
+        variable: usize,
+        group: usize,
+        entity: Pick,
+    ) -> Result<Vec<f64>, ReadError> {
         let (v, g) = (variable + 1, group + 1);
         let (name, picks) = match kind {
             Kind::Global => ("vals_glo_var".to_owned(), vec![Pick::All, Pick::At(variable)]),
             Kind::Nodal if self.container.shape("vals_nod_var").is_some() => {
-                ("vals_nod_var".to_owned(), vec![Pick::All, Pick::At(variable), Pick::At(entity)])
+                ("vals_nod_var".to_owned(), vec![Pick::All, Pick::At(variable), entity])
             }
-            Kind::Nodal => (format!("vals_nod_var{v}"), vec![Pick::All, Pick::At(entity)]),
-            Kind::Element => (format!("vals_elem_var{v}eb{g}"), vec![Pick::All, Pick::At(entity)]),
-            Kind::NodeSet => (format!("vals_nset_var{v}ns{g}"), vec![Pick::All, Pick::At(entity)]),
-            Kind::SideSet => (format!("vals_sset_var{v}ss{g}"), vec![Pick::All, Pick::At(entity)]),
+            Kind::Nodal => (format!("vals_nod_var{v}"), vec![Pick::All, entity]),
+            Kind::Element => (format!("vals_elem_var{v}eb{g}"), vec![Pick::All, entity]),
+            Kind::NodeSet => (format!("vals_nset_var{v}ns{g}"), vec![Pick::All, entity]),
+            Kind::SideSet => (format!("vals_sset_var{v}ss{g}"), vec![Pick::All, entity]),
         };
         if self.times.is_empty() {
             return Err(ReadError::new(self.path(), "has no complete time step"));
@@ -223,17 +249,7 @@ impl Exodus {
             }
             Some(_) => {}
         }
-        let mut values = self.container.part(&name, &picks)?;
-        if values.len() < self.times.len() {
-            let text = format!(
-                "is incomplete: `{name}` has {} of {} steps",
-                values.len(),
-                self.times.len()
-            );
-            return Err(ReadError::new(self.path(), text));
-        }
-        values.truncate(self.times.len());
-        Ok(values)
+        self.container.part(&name, &picks)
     }
 
     /// Maps as long as the mesh: every look-up by id relies on it.

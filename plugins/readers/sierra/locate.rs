@@ -90,7 +90,7 @@ impl Exodus {
     }
 
     /// The nodes or elements of a group, by position in the file counted from 0.
-    fn members(&self, kind: Kind, group: &Group) -> Result<Vec<usize>, ReadError> {
+    pub(super) fn members(&self, kind: Kind, group: &Group) -> Result<Vec<usize>, ReadError> {
         let (name, count) = match kind {
             Kind::NodeSet => (format!("node_ns{}", group.position + 1), self.nodes),
             Kind::SideSet => (format!("elem_ss{}", group.position + 1), self.elements()),

@@ -146,7 +146,7 @@ impl Results {
 }
 
 /// The existing parts that belong to `path`, in order, and how many the run wrote.
-fn part_paths(path: &Path) -> (Vec<PathBuf>, usize) {
+pub(super) fn part_paths(path: &Path) -> (Vec<PathBuf>, usize) {
     let alone = (vec![path.to_owned()], 1);
     let Some(name) = path.file_name().and_then(|name| name.to_str()) else { return alone };
     if let Some((stem, count, width)) = part_name(name) {

@@ -103,7 +103,7 @@ impl Output {
 }
 
 /// Whether a file that begins so is a netCDF container.
-pub(super) fn is_exodus(head: &[u8]) -> bool {
+pub(crate) fn is_exodus(head: &[u8]) -> bool {
     head.starts_with(b"CDF") || head.starts_with(b"\x89HDF")
 }
 

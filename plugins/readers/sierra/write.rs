@@ -4,10 +4,10 @@
 //! signals as global variables in alphabetical order, 64-bit offset container. The Exodus tools
 //! and any netCDF reader open it.
 
-use std::io::Write as _;
 use std::path::Path;
 
-use lacuna::plugin::reader::ReadError;
+use lacuna::run::Stop;
+use lacuna::run::files::write_atomic;
 use netcdf_writer::{DimensionId, Error, NcAttrValue, NcFileBuilder, NcWriteOptions};
 
 /// Version of the Exodus library whose files these are.
@@ -42,23 +42,11 @@ pub struct History {
 }
 
 /// Writes a history file. The file appears under its name only when it is complete.
-pub fn write_history(path: &Path, origin: &Origin, history: &History) -> Result<(), ReadError> {
-    check(history).map_err(|text| ReadError::new(path, text))?;
-    let failed =
-        |e: &dyn std::fmt::Display| ReadError::new(path, format!("cannot be written: {e}"));
-    let bytes = encode(origin, history).map_err(|e| failed(&e))?;
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(format!(".{}.partial", std::process::id()));
-    let partial = path.with_file_name(name);
-    let written = std::fs::File::create(&partial).and_then(|mut file| {
-        file.write_all(&bytes)?;
-        file.sync_all()
-    });
-    written.and_then(|()| std::fs::rename(&partial, path)).map_err(|e| {
-        // The error reported is that of the write; a second one while tidying up adds nothing.
-        let _ = std::fs::remove_file(&partial);
-        failed(&e)
-    })
+pub fn write_history(path: &Path, origin: &Origin, history: &History) -> Result<(), Stop> {
+    let failed = |reason: String| Stop::new(format!("cannot write {}: {reason}", path.display()));
+    check(history).map_err(failed)?;
+    let bytes = encode(origin, history).map_err(|e| failed(e.to_string()))?;
+    write_atomic(path, &bytes)
 }
 
 fn check(history: &History) -> Result<(), String> {

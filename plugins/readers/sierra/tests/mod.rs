@@ -5,6 +5,7 @@
 mod exodus;
 mod heartbeat;
 mod hostile;
+mod plugin;
 mod synthetic;
 mod write;
 
