@@ -324,5 +324,5 @@ fn a_type_may_name_unknown_and_missing_keys_itself() {
     }
     assert_eq!(heads::<Picky>("a = 1"), ["unknown key `a`"]);
     assert_eq!(heads::<Picky>("c = 1"), ["missing key `b`"]);
-    assert_eq!(heads::<BTreeMap<String, Picky>>("x = { a = 1 }\ny = 2").len(), 2);
+    assert_eq!(heads::<BTreeMap<String, Box<Picky>>>("x = { a = 1 }\ny = 2").len(), 2);
 }
