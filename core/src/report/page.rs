@@ -138,7 +138,7 @@ pub fn render(findings: &Findings) -> String {
                 }
                 footer {
                     "Made by Lacuna " (findings.version) " from study " code { (findings.study) }
-                    ". The same inputs and seed give the same page."
+                    ", seed " code { (findings.seed) } "."
                 }
                 script { (PreEscaped(SCRIPT)) }
             }

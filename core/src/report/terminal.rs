@@ -1,7 +1,7 @@
 //! The closing summary that a terminal shows after a run.
 
 use super::findings::Findings;
-use super::section::{accuracy_table, headline, posterior_table};
+use super::section::{accuracy_table, group_word, headline, posterior_table};
 
 /// The result of a run in plain text: warnings, what came out, the posterior, the accuracy.
 pub fn summary_text(findings: &Findings) -> String {
@@ -17,7 +17,10 @@ pub fn summary_text(findings: &Findings) -> String {
     }
     if let Some(validation) = findings.validation.as_ref().filter(|v| !v.cases.is_empty()) {
         let title = "points inside the replicates' 95 % interval";
-        parts.push(format!("{title}\n{}", accuracy_table(&validation.cases).text()));
+        parts.push(format!(
+            "{title}\n{}",
+            accuracy_table(group_word(&findings.layout), &validation.cases).text()
+        ));
     }
     parts.join("\n")
 }

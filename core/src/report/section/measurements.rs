@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::{CurvePanel, Curves, response_label, response_unit};
+use super::{CurvePanel, Curves, group_word, response_label, response_unit};
 use crate::report::chart::{Axis, Band, Curve, Key, Panel, small_multiples};
 use crate::report::findings::{Findings, MeasuredFindings};
 use crate::report::number::{count, significant};
@@ -28,7 +28,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
             }
         }
         @if replicates > 0 { (figure(findings, measured, numbers)) }
-        @if !measured.flagged.is_empty() { (flagged(measured, numbers)) }
+        @if !measured.flagged.is_empty() { (flagged(findings, measured, numbers)) }
     };
     Some(Section { id: "measurements", title: "Measurements", content })
 }
@@ -107,8 +107,11 @@ fn panel(measured: &MeasuredFindings, outline: &CurvePanel, unit: &ShownUnit) ->
     }
 }
 
-fn flagged(measured: &MeasuredFindings, numbers: &mut Numbers) -> Markup {
-    let mut table = Table::new(&["replicate", "group", "fate"], &["distance", "threshold"]);
+fn flagged(findings: &Findings, measured: &MeasuredFindings, numbers: &mut Numbers) -> Markup {
+    let mut table = Table::new(
+        &["replicate", group_word(&findings.layout), "fate"],
+        &["distance", "threshold"],
+    );
     for curve in &measured.flagged {
         let fate = if curve.left_out { "left out" } else { "kept" };
         table.row([

@@ -16,6 +16,7 @@ pub use validation::accuracy_table;
 use super::findings::{CoordinateFindings, Findings};
 use super::page::{Numbers, Section};
 use super::scale::ShownUnit;
+use crate::data::{Coordinates, Layout};
 use crate::plugin::Fact;
 
 /// All sections that have something to show, in order.
@@ -62,6 +63,16 @@ pub fn response_label(findings: &Findings) -> String {
 /// The name with the symbol behind it, where the study gives one.
 pub fn titled(name: &str, symbol: &str) -> String {
     if symbol.is_empty() || symbol == name { name.to_owned() } else { format!("{name} ({symbol})") }
+}
+
+/// What the study calls the groups that figures and tables show one by one, such as `sensor`.
+pub fn group_word(layout: &Layout) -> &str {
+    let mut labels =
+        layout.axes.iter().filter(|axis| matches!(axis.coordinates, Coordinates::Labels(_)));
+    match (labels.next(), labels.next()) {
+        (Some(axis), None) => &axis.name,
+        _ => "group",
+    }
 }
 
 /// Facts as a list of terms.

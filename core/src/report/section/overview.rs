@@ -5,7 +5,7 @@ use maud::html;
 use super::{fact_list, titled};
 use crate::plugin::Fact;
 use crate::report::findings::Findings;
-use crate::report::number::{count, exact};
+use crate::report::number::{count, exact, rounded};
 use crate::report::page::{Caption, Numbers, Section, paragraph};
 use crate::report::table::Table;
 
@@ -17,8 +17,8 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Section {
         parameters.row([
             titled(&p.name, &p.symbol),
             p.unit.to_string(),
-            p.design.to_string(),
-            p.prior.to_string(),
+            rounded(&p.design.to_string(), 6),
+            rounded(&p.prior.to_string(), 6),
             p.reference.map_or_else(|| String::from("–"), |r| exact(r)),
         ]);
     }

@@ -9,7 +9,7 @@ use crate::report::chart::{
 };
 use crate::report::curve::named_density;
 use crate::report::findings::{CalibrationFindings, CoordinateFindings, Findings};
-use crate::report::number::{decimals, fixed, significant, typeset};
+use crate::report::number::{decimals, fixed, rounded, significant};
 use crate::report::page::{Caption, Numbers, Section};
 use crate::report::scale::extent;
 use crate::report::table::Table;
@@ -225,14 +225,14 @@ fn pair_marks(c: &CoordinateFindings, unit: &crate::report::scale::ShownUnit) ->
 }
 
 fn fits(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
-    let heads = ["KS distance", "p-value", "ΔAIC"];
+    let heads = ["KS distance", "p", "ΔAIC"];
     let mut table = Table::new(&["parameter", "unit", "distribution"], &heads);
     for c in &calibration.coordinates {
         for fit in &c.fits {
             table.row([
                 c.name.clone(),
                 c.unit.to_string(),
-                typeset(&fit.distribution.to_string()),
+                rounded(&fit.distribution.to_string(), 5),
                 fixed(fit.ks, 4),
                 significant(fit.p_value, 2),
                 fixed(fit.delta_aic, 1),
