@@ -7,11 +7,11 @@ use super::section::{accuracy_table, group_word, headline, posterior_table};
 pub fn summary_text(findings: &Findings) -> String {
     let mut parts = Vec::new();
     if !findings.warnings.is_empty() {
-        let lines = findings.warnings.iter().map(|warning| format!("warning: {warning}\n"));
-        parts.push(lines.collect::<String>());
+        let lines: Vec<String> =
+            findings.warnings.iter().map(|warning| format!("warning: {warning}")).collect();
+        parts.push(lines.join("\n") + "\n");
     }
-    let sentences = headline::sentences(findings);
-    parts.push(sentences.iter().map(|sentence| format!("{sentence}\n")).collect());
+    parts.push(headline::sentences(findings).join("\n") + "\n");
     if let Some(calibration) = &findings.calibration {
         parts.push(posterior_table(calibration).text());
     }

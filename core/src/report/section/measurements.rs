@@ -51,18 +51,17 @@ fn figure(findings: &Findings, measured: &MeasuredFindings, numbers: &mut Number
     if measured.flagged.iter().any(|f| !f.left_out) {
         keys.insert(1, Key::line("s-flagged", "replicate flagged by the screen"));
     }
-    let mut shows = String::from("Measured curves of every group, all panels on the same axes.");
     let replicates = measured.used.replicates.len();
-    if replicates > MOST_DRAWN {
-        shows.push_str(&format!(
-            " Of {} replicates {} are drawn, evenly chosen; mean and band are of all.",
-            count(replicates),
-            MOST_DRAWN
-        ));
-    }
-    if curves.left_out > 0 {
-        shows.push_str(&format!(" {} further groups found no room.", curves.left_out));
-    }
+    let thinned = if replicates > MOST_DRAWN {
+        let (all, most) = (count(replicates), MOST_DRAWN);
+        format!(" Of {all} replicates at most {most} are drawn; mean and band are of all.")
+    } else {
+        String::new()
+    };
+    let shows = format!(
+        "Measured curves of every group, all panels on the same axes.{thinned}{}",
+        curves.left_out_sentence()
+    );
     let caption = Caption::new(
         shows,
         "the replicates: the band is where single repetitions fall, not the error of their mean.",

@@ -110,6 +110,14 @@ pub struct CurvePanel {
 const MOST_PANELS: usize = 24;
 
 impl Curves {
+    /// How many groups the figure does not show, as a sentence; empty when it shows all.
+    pub fn left_out_sentence(&self) -> String {
+        match self.left_out {
+            0 => String::new(),
+            left_out => format!(" {left_out} further groups found no room."),
+        }
+    }
+
     /// The curves of the study's response; responses without a numeric axis share one panel.
     pub fn of(findings: &Findings) -> Self {
         let layout = &findings.layout;

@@ -107,8 +107,11 @@ fn curves(findings: &Findings, validation: &ValidationFindings, numbers: &mut Nu
         keys.push(Key::line("s-predictive", "posterior predictive 95 %"));
     }
     let caption = Caption::new(
-        "Each group's mean of the replicates with their 95 % interval, and the responses at the \
-         compared parameters; accuracies (share of points inside the interval) above each panel.",
+        format!(
+            "Each group's mean of the replicates with their 95 % interval, and the responses at the \
+             compared parameters; accuracies (share of points inside the interval) above each panel.{}",
+            outlines.left_out_sentence()
+        ),
         "the grey band is of the replicates; the dotted lines enclose the posterior predictive of a new \
          replicate.",
         "stretches where the calibrated curve leaves the band on one side: structured disagreement \
