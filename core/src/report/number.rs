@@ -37,6 +37,24 @@ pub fn exact(value: f64) -> String {
     if plain.len() <= scientific.len() + 3 { plain } else { scientific }
 }
 
+/// A text in which every number is rounded to this many significant digits.
+pub fn rounded(text: &str, digits: usize) -> String {
+    let ends = |c: char| matches!(c, ' ' | ',' | '[' | ']' | '(' | ')');
+    let word = |word: &str| match word.parse::<f64>() {
+        Ok(value) if word.starts_with(|c: char| c.is_ascii_digit() || c == '-') => {
+            let short = significant(value, digits);
+            typeset(if short.len() < word.len() { &short } else { word })
+        }
+        _ => word.to_owned(),
+    };
+    text.split_inclusive(ends)
+        .map(|part| match part.strip_suffix(ends) {
+            Some(inner) => word(inner) + &part[inner.len()..],
+            None => word(part),
+        })
+        .collect()
+}
+
 /// How many decimals a number deserves whose standard error is `error`: the last digit printed is
 /// that of the error's leading digit. `spread` stands in where the error is not known.
 pub fn decimals(error: f64, spread: f64) -> usize {
@@ -61,7 +79,7 @@ pub fn count(value: usize) -> String {
     }
     let mut text = String::new();
     for (i, c) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i) % 3 == 0 {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
             text.push('\u{2009}');
         }
         text.push(c);
@@ -142,6 +160,7 @@ mod tests {
         assert_eq!(typeset("sensor-e"), "sensor-e");
         assert_eq!(count(1_234_567), "1\u{2009}234\u{2009}567");
         assert_eq!(fixed(-0.0001, 2), "0.00");
+        assert_eq!(rounded("uniform on [-20.703463, 1.5e6]", 4), "uniform on [−20.70, 1.5×10⁶]");
         assert_eq!(
             (exact(1456.0), exact(1.5e5), exact(2.5e-9)),
             ("1456".into(), "150000".into(), "2.5e-9".into())

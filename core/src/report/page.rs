@@ -5,7 +5,6 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use super::chart::{Key, Swatch};
 use super::findings::Findings;
 use super::section;
-use super::svg::escape;
 use super::table::Table;
 
 /// A chapter of the page.
@@ -138,7 +137,7 @@ pub fn render(findings: &Findings) -> String {
                 }
                 footer {
                     "Made by Lacuna " (findings.version) " from study " code { (findings.study) }
-                    ". The same inputs and seed give the same page."
+                    ", seed " code { (findings.seed) } "."
                 }
                 script { (PreEscaped(SCRIPT)) }
             }
@@ -147,15 +146,11 @@ pub fn render(findings: &Findings) -> String {
     page.into_string()
 }
 
-/// A paragraph in which words between backticks are set as code.
+/// A text in which words between backticks are set as code.
 pub fn paragraph(text: &str) -> Markup {
-    let mut markup = String::new();
-    for (i, part) in text.split('`').enumerate() {
-        if i % 2 == 1 {
-            markup.push_str(&format!("<code>{}</code>", escape(part)));
-        } else {
-            markup.push_str(&escape(part));
+    html! {
+        @for (i, part) in text.split('`').enumerate() {
+            @if i % 2 == 1 { code { (part) } } @else { (part) }
         }
     }
-    html! { (PreEscaped(markup)) }
 }

@@ -1,6 +1,6 @@
 //! Marginals: a histogram with its prior, a fitted distribution, and marks.
 
-use super::{Axis, Frame, WIDTH};
+use super::{Axis, Curve, Frame, WIDTH};
 use crate::report::curve::Histogram;
 use crate::report::scale::{Scale, extent, padded};
 use crate::report::svg::{Anchor, Area, Path, Svg};
@@ -42,8 +42,8 @@ pub struct Marginal {
     pub density_label: String,
     /// The draws.
     pub draws: Vec<f64>,
-    /// Density curves with their classes and names.
-    pub curves: Vec<(&'static str, String, Vec<(f64, f64)>)>,
+    /// Density curves.
+    pub curves: Vec<Curve>,
     /// Marks; one outside the axis is told at the edge instead.
     pub marks: Vec<Mark>,
     /// Another reading of the horizontal axis.
@@ -93,9 +93,9 @@ fn draw(svg: &mut Svg, panel: &Marginal, area: Area) {
             let (x1, y1) = frame.at((right, 0.0));
             svg.rectangle("s-histogram", Area::new(x0, y0, x1 - x0, y1 - y0), "");
         }
-        for (class, name, points) in &panel.curves {
-            let path = Path::through(frame.along(points));
-            svg.path(&format!("line {class}"), &path, name);
+        for curve in &panel.curves {
+            let path = Path::through(frame.along(&curve.points));
+            svg.path(&format!("line {}", curve.class), &path, &curve.name);
         }
     });
     if let Some(second) = &panel.second {

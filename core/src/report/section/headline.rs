@@ -64,23 +64,18 @@ fn agreement(findings: &Findings, validation: &ValidationFindings) -> Option<Str
     let unit = response_unit(findings);
     let (first, others) = validation.cases.split_first()?;
     let how = if first.simulated { "simulated" } else { "emulated" };
-    let mut text = format!(
+    let map = format!(
         "{} of the {how} points at the {} lie inside the replicates' 95 % interval (mean over \
          groups) and differ from the replicates' mean by {} root mean square",
         percent(first.average),
         case_title(&first.name),
         unit.text(first.rmse, 3),
     );
-    for other in others {
-        text.push_str(&format!(
-            "; at the {} {} and {}",
-            case_title(&other.name),
-            percent(other.average),
-            unit.text(other.rmse, 3)
-        ));
-    }
-    text.push('.');
-    Some(text)
+    let others = others.iter().map(|other| {
+        let (share, rmse) = (percent(other.average), unit.text(other.rmse, 3));
+        format!("; at the {} {share} and {rmse}", case_title(&other.name))
+    });
+    Some(format!("{map}{}.", others.collect::<String>()))
 }
 
 /// The name of a case as people say it.

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::{CurvePanel, Curves, response_label, response_unit};
+use super::{CurvePanel, Curves, group_word, response_label, response_unit};
 use crate::report::chart::{Axis, Band, Curve, Key, Panel, small_multiples};
 use crate::report::findings::{Findings, MeasuredFindings};
 use crate::report::number::{count, significant};
@@ -28,7 +28,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
             }
         }
         @if replicates > 0 { (figure(findings, measured, numbers)) }
-        @if !measured.flagged.is_empty() { (flagged(measured, numbers)) }
+        @if !measured.flagged.is_empty() { (flagged(findings, measured, numbers)) }
     };
     Some(Section { id: "measurements", title: "Measurements", content })
 }
@@ -51,18 +51,17 @@ fn figure(findings: &Findings, measured: &MeasuredFindings, numbers: &mut Number
     if measured.flagged.iter().any(|f| !f.left_out) {
         keys.insert(1, Key::line("s-flagged", "replicate flagged by the screen"));
     }
-    let mut shows = String::from("Measured curves of every group, all panels on the same axes.");
     let replicates = measured.used.replicates.len();
-    if replicates > MOST_DRAWN {
-        shows.push_str(&format!(
-            " Of {} replicates {} are drawn, evenly chosen; mean and band are of all.",
-            count(replicates),
-            MOST_DRAWN
-        ));
-    }
-    if curves.left_out > 0 {
-        shows.push_str(&format!(" {} further groups found no room.", curves.left_out));
-    }
+    let thinned = if replicates > MOST_DRAWN {
+        let (all, most) = (count(replicates), MOST_DRAWN);
+        format!(" Of {all} replicates at most {most} are drawn; mean and band are of all.")
+    } else {
+        String::new()
+    };
+    let shows = format!(
+        "Measured curves of every group, all panels on the same axes.{thinned}{}",
+        curves.left_out_sentence()
+    );
     let caption = Caption::new(
         shows,
         "the replicates: the band is where single repetitions fall, not the error of their mean.",
@@ -107,8 +106,11 @@ fn panel(measured: &MeasuredFindings, outline: &CurvePanel, unit: &ShownUnit) ->
     }
 }
 
-fn flagged(measured: &MeasuredFindings, numbers: &mut Numbers) -> Markup {
-    let mut table = Table::new(&["replicate", "group", "fate"], &["distance", "threshold"]);
+fn flagged(findings: &Findings, measured: &MeasuredFindings, numbers: &mut Numbers) -> Markup {
+    let mut table = Table::new(
+        &["replicate", group_word(&findings.layout), "fate"],
+        &["distance", "threshold"],
+    );
     for curve in &measured.flagged {
         let fate = if curve.left_out { "left out" } else { "kept" };
         table.row([

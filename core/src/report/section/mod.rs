@@ -16,6 +16,7 @@ pub use validation::accuracy_table;
 use super::findings::{CoordinateFindings, Findings};
 use super::page::{Numbers, Section};
 use super::scale::ShownUnit;
+use crate::data::{Coordinates, Layout};
 use crate::plugin::Fact;
 
 /// All sections that have something to show, in order.
@@ -64,6 +65,16 @@ pub fn titled(name: &str, symbol: &str) -> String {
     if symbol.is_empty() || symbol == name { name.to_owned() } else { format!("{name} ({symbol})") }
 }
 
+/// What the study calls the groups that figures and tables show one by one, such as `sensor`.
+pub fn group_word(layout: &Layout) -> &str {
+    let mut labels =
+        layout.axes.iter().filter(|axis| matches!(axis.coordinates, Coordinates::Labels(_)));
+    match (labels.next(), labels.next()) {
+        (Some(axis), None) => &axis.name,
+        _ => "group",
+    }
+}
+
 /// Facts as a list of terms.
 pub fn fact_list(facts: &[Fact]) -> maud::Markup {
     maud::html! {
@@ -99,6 +110,14 @@ pub struct CurvePanel {
 const MOST_PANELS: usize = 24;
 
 impl Curves {
+    /// How many groups the figure does not show, as a sentence; empty when it shows all.
+    pub fn left_out_sentence(&self) -> String {
+        match self.left_out {
+            0 => String::new(),
+            left_out => format!(" {left_out} further groups found no room."),
+        }
+    }
+
     /// The curves of the study's response; responses without a numeric axis share one panel.
     pub fn of(findings: &Findings) -> Self {
         let layout = &findings.layout;

@@ -5,7 +5,7 @@ use maud::html;
 use super::{fact_list, titled};
 use crate::plugin::Fact;
 use crate::report::findings::Findings;
-use crate::report::number::{count, exact};
+use crate::report::number::{count, exact, rounded};
 use crate::report::page::{Caption, Numbers, Section, paragraph};
 use crate::report::table::Table;
 
@@ -17,9 +17,9 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Section {
         parameters.row([
             titled(&p.name, &p.symbol),
             p.unit.to_string(),
-            p.design.to_string(),
-            p.prior.to_string(),
-            p.reference.map_or_else(|| String::from("–"), |r| exact(r)),
+            rounded(&p.design.to_string(), 6),
+            rounded(&p.prior.to_string(), 6),
+            p.reference.map_or_else(|| String::from("–"), exact),
         ]);
     }
     let caption = Caption::new(
@@ -42,7 +42,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Section {
 fn response(findings: &Findings) -> String {
     let layout = &findings.layout;
     let axes: Vec<String> =
-        layout.axes.iter().map(|axis| format!("{} {}", count(axis.len()), axis.name)).collect();
+        layout.axes.iter().map(|axis| format!("{} ({})", axis.name, count(axis.len()))).collect();
     let shape = if axes.is_empty() { String::from("one number") } else { axes.join(" × ") };
     let (name, unit, outputs) = (&layout.name, &layout.unit, count(layout.len()));
     format!("The model's response is `{name}` in the unit `{unit}`: {shape}, {outputs} outputs.")

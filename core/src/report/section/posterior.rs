@@ -5,11 +5,11 @@ use maud::{Markup, html};
 use super::sampling::{kept_draws, marks};
 use super::{coordinate_unit, response_unit, titled};
 use crate::report::chart::{
-    Key, Marginal, Mark, PairColumn, SecondAxis, correlation_map, marginals, pair_matrix,
+    Curve, Key, Marginal, Mark, PairColumn, SecondAxis, correlation_map, marginals, pair_matrix,
 };
 use crate::report::curve::named_density;
 use crate::report::findings::{CalibrationFindings, CoordinateFindings, Findings};
-use crate::report::number::{decimals, fixed, significant, typeset};
+use crate::report::number::{decimals, fixed, rounded, significant};
 use crate::report::page::{Caption, Numbers, Section};
 use crate::report::scale::extent;
 use crate::report::table::Table;
@@ -142,10 +142,11 @@ fn marginal(
     let mut curves = Vec::new();
     if let Some(span) = span.filter(|(low, high)| high > low) {
         let prior = shown(named_density(&c.prior, span, 160));
-        curves.push(("s-prior", String::from("prior"), prior));
+        curves.push(Curve { class: "s-prior", name: String::from("prior"), points: prior });
         if let Some(fit) = c.fits.first() {
             let name = fit.distribution.name().replace('_', "-");
-            curves.push(("s-fit", name, shown(named_density(&fit.distribution, span, 160))));
+            let points = shown(named_density(&fit.distribution, span, 160));
+            curves.push(Curve { class: "s-fit", name, points });
         }
     }
     let remark = c.fits.first().map_or_else(String::new, |fit| {
@@ -225,14 +226,14 @@ fn pair_marks(c: &CoordinateFindings, unit: &crate::report::scale::ShownUnit) ->
 }
 
 fn fits(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
-    let heads = ["KS distance", "p-value", "ΔAIC"];
+    let heads = ["KS distance", "p", "ΔAIC"];
     let mut table = Table::new(&["parameter", "unit", "distribution"], &heads);
     for c in &calibration.coordinates {
         for fit in &c.fits {
             table.row([
                 c.name.clone(),
                 c.unit.to_string(),
-                typeset(&fit.distribution.to_string()),
+                rounded(&fit.distribution.to_string(), 5),
                 fixed(fit.ks, 4),
                 significant(fit.p_value, 2),
                 fixed(fit.delta_aic, 1),

@@ -19,7 +19,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
     let content = html! {
         p.verdict.good[calibration.converged] {
             b { @if calibration.converged { "Converged. " } @else { "Not converged. " } }
-            (paragraph(&calibration.verdict))
+            (paragraph(calibration.verdict.trim_end_matches('.'))) "."
         }
         (fact_list(&facts(calibration)))
         @if !calibration.acceptance.is_empty() { (acceptance(calibration, numbers)) }

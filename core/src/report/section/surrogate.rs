@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::{fact_list, response_label, response_unit};
+use super::{fact_list, group_word, response_label, response_unit};
 use crate::report::chart::{Axis, BarChart, BarSeries, Key, agreement};
 use crate::report::findings::{Findings, SurrogateFindings};
 use crate::report::number::{count, significant};
@@ -34,7 +34,8 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
 fn errors(findings: &Findings, surrogate: &SurrogateFindings, numbers: &mut Numbers) -> Markup {
     let unit = response_unit(findings);
     let (mae, rmse) = (unit.label("MAE"), unit.label("RMSE"));
-    let mut table = Table::new(&["group"], &[&mae, &rmse, "LOO [share of variance]"]);
+    let mut table =
+        Table::new(&[group_word(&findings.layout)], &[&mae, &rmse, "LOO [share of variance]"]);
     let cells = |name: &str, mae: f64, rmse: f64, loo: f64| {
         [
             name.to_owned(),

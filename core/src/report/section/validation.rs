@@ -3,12 +3,12 @@
 use maud::{Markup, html};
 
 use super::headline::case_title;
-use super::{CurvePanel, Curves, coordinate_unit, response_label, response_unit};
+use super::{CurvePanel, Curves, coordinate_unit, group_word, response_label, response_unit};
 use crate::report::chart::{
     Axis, Band, BarChart, BarSeries, Curve, Key, Panel, Row, row_chart, small_multiples,
 };
 use crate::report::findings::{Findings, ValidationCase, ValidationFindings};
-use crate::report::number::{fixed, percent, significant};
+use crate::report::number::{decimals, fixed, percent, significant};
 use crate::report::page::{Caption, Numbers, Section};
 use crate::report::scale::{ShownUnit, extent, padded};
 use crate::report::table::Table;
@@ -20,7 +20,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
         @if !validation.cases.is_empty() {
             (points(findings, validation, numbers))
             (curves(findings, validation, numbers))
-            (accuracy(validation, numbers))
+            (accuracy(findings, validation, numbers))
         }
         @if !validation.spread.is_empty() { (spread(findings, validation, numbers)) }
     };
@@ -40,26 +40,17 @@ fn classes(i: usize) -> (&'static str, &'static str) {
 }
 
 fn points(findings: &Findings, validation: &ValidationFindings, numbers: &mut Numbers) -> Markup {
-    let names: Vec<&str> = findings.parameters.iter().map(|p| p.name.as_str()).collect();
-    let units: Vec<ShownUnit> = findings
-        .parameters
-        .iter()
-        .enumerate()
-        .map(|(i, p)| {
-            let coordinate = findings.calibration.as_ref().and_then(|c| c.coordinates.get(i));
-            let values = validation.cases.iter().filter_map(|case| case.point.get(i).copied());
-            coordinate.map_or_else(|| ShownUnit::for_values(&p.unit, values), coordinate_unit)
-        })
-        .collect();
-    let heads: Vec<String> = names.iter().zip(&units).map(|(n, u)| u.label(n)).collect();
-    let mut heads: Vec<&str> = heads.iter().map(String::as_str).collect();
+    let columns: Vec<(String, ShownUnit, usize)> =
+        (0..findings.parameters.len()).map(|i| point_column(findings, validation, i)).collect();
     let difference = response_unit(findings).label("RMSE");
+    let mut heads: Vec<&str> = columns.iter().map(|(label, ..)| label.as_str()).collect();
     heads.push(&difference);
     let mut table = Table::new(&["parameters", "response"], &heads);
     for case in &validation.cases {
         let how = if case.simulated { "simulated" } else { "emulated" };
         let mut cells = vec![case_title(&case.name).to_owned(), how.to_owned()];
-        cells.extend(case.point.iter().zip(&units).map(|(&v, u)| significant(u.show(v), 6)));
+        let values = case.point.iter().zip(&columns);
+        cells.extend(values.map(|(&v, (_, unit, decimals))| fixed(unit.show(v), *decimals)));
         cells.push(significant(response_unit(findings).show(case.rmse), 3));
         table.row(cells);
     }
@@ -70,6 +61,27 @@ fn points(findings: &Findings, validation: &ValidationFindings, numbers: &mut Nu
         "an emulated response: the model itself was not run there.",
     );
     numbers.table(&table, &caption)
+}
+
+/// Label, unit and decimals of one parameter, those of the posterior where there is one.
+fn point_column(
+    findings: &Findings,
+    validation: &ValidationFindings,
+    i: usize,
+) -> (String, ShownUnit, usize) {
+    let parameter = &findings.parameters[i];
+    let coordinate = findings.calibration.as_ref().and_then(|c| c.coordinates.get(i));
+    let values = validation.cases.iter().filter_map(|case| case.point.get(i).copied());
+    let (unit, places) = if let Some(c) = coordinate {
+        let unit = coordinate_unit(c);
+        let places = decimals(unit.show(c.mcse_mean), unit.show(c.sd));
+        (unit, places)
+    } else {
+        let unit = ShownUnit::for_values(&parameter.unit, values.clone());
+        let spread = extent(values.map(|v| unit.show(v))).map_or(0.0, |(low, high)| high - low);
+        (unit, decimals(f64::NAN, spread))
+    };
+    (unit.label(&parameter.name), unit, places)
 }
 
 fn curves(findings: &Findings, validation: &ValidationFindings, numbers: &mut Numbers) -> Markup {
@@ -95,8 +107,11 @@ fn curves(findings: &Findings, validation: &ValidationFindings, numbers: &mut Nu
         keys.push(Key::line("s-predictive", "posterior predictive 95 %"));
     }
     let caption = Caption::new(
-        "Each group's mean of the replicates with their 95 % interval, and the responses at the \
-         compared parameters; accuracies (share of points inside the interval) above each panel.",
+        format!(
+            "Each group's mean of the replicates with their 95 % interval, and the responses at the \
+             compared parameters; accuracies (share of points inside the interval) above each panel.{}",
+            outlines.left_out_sentence()
+        ),
         "the grey band is of the replicates; the dotted lines enclose the posterior predictive of a new \
          replicate.",
         "stretches where the calibrated curve leaves the band on one side: structured disagreement \
@@ -141,11 +156,11 @@ fn panel(validation: &ValidationFindings, outline: &CurvePanel, unit: &ShownUnit
 }
 
 /// The accuracy of every case in every group, in percent.
-pub fn accuracy_table(cases: &[ValidationCase]) -> Table {
+pub fn accuracy_table(group: &str, cases: &[ValidationCase]) -> Table {
     let heads: Vec<String> =
         cases.iter().map(|case| format!("{} [%]", case_title(&case.name))).collect();
     let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
-    let mut table = Table::new(&["group"], &heads);
+    let mut table = Table::new(&[group], &heads);
     for group in group_names(cases) {
         let shares = cases.iter().map(|case| share(case, &group));
         let cells = shares.map(|s| fixed(100.0 * s, 1)).collect::<Vec<_>>();
@@ -171,7 +186,7 @@ fn share(case: &ValidationCase, group: &str) -> f64 {
     case.accuracy.iter().find(|(name, _)| name == group).map_or(f64::NAN, |(_, share)| *share)
 }
 
-fn accuracy(validation: &ValidationFindings, numbers: &mut Numbers) -> Markup {
+fn accuracy(findings: &Findings, validation: &ValidationFindings, numbers: &mut Numbers) -> Markup {
     let cases = &validation.cases;
     let names = group_names(cases);
     let series = cases.iter().enumerate().map(|(i, case)| BarSeries {
@@ -182,7 +197,7 @@ fn accuracy(validation: &ValidationFindings, numbers: &mut Numbers) -> Markup {
     let chart = BarChart {
         series: series.collect(),
         levels: Vec::new(),
-        x_label: String::from("group"),
+        x_label: group_word(&findings.layout).to_owned(),
         y: Axis::new("points inside the interval [%]", (0.0, 108.0)).ticks(6),
         outstanding: Vec::new(),
         numbers: names.len() * cases.len() <= 30,
@@ -203,7 +218,7 @@ fn accuracy(validation: &ValidationFindings, numbers: &mut Numbers) -> Markup {
         Caption::new("The same accuracies as numbers, with their mean over the groups.", "", "");
     html! {
         (numbers.figure(chart.draw("accuracy of every group"), &keys, &caption))
-        (numbers.table(&accuracy_table(cases), &table_caption))
+        (numbers.table(&accuracy_table(group_word(&findings.layout), cases), &table_caption))
     }
 }
 

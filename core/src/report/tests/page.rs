@@ -2,7 +2,8 @@ use super::fixture::{bare, findings, unit};
 use super::xml::{self, Element};
 use crate::data::{Axis, Layout, Measurements};
 use crate::linalg::Matrix;
-use crate::report::findings::Findings;
+use crate::math::distribution::Distribution;
+use crate::report::findings::{CoordinateFindings, Findings};
 use crate::report::{render, summary_text};
 
 /// Reads the page, and checks that every place in a drawing is a number.
@@ -203,4 +204,37 @@ fn a_response_without_a_numeric_axis_is_drawn_as_points() {
     findings.validation = None;
     let elements = elements(&findings);
     assert!(elements.iter().filter(|e| e.name == "circle").count() >= 3);
+}
+
+#[test]
+fn a_design_even_in_the_logarithm_is_drawn_on_logarithmic_axes() {
+    let mut findings = findings();
+    let parameter = &mut findings.parameters[0];
+    parameter.design = Distribution::LogUniform([1e2, 1e7]);
+    parameter.prior = Distribution::LogUniform([1e3, 1e6]);
+    let points = &mut findings.ensemble.as_mut().unwrap().points;
+    for i in 0..points.rows() {
+        points[(i, 0)] = 10.0_f64.powf(2.0 + 5.0 * points[(i, 0)] / 1.5e7);
+    }
+    let elements = elements(&findings);
+    // 100 Pa to 10 MPa, shown in MPa.
+    for label in ["10⁻⁴", "0.01", "1"] {
+        assert!(has_text(&elements, label), "no `{label}`");
+    }
+}
+
+#[test]
+fn a_variance_for_every_sensor_finds_room() {
+    let mut findings = findings();
+    let calibration = findings.calibration.as_mut().unwrap();
+    let variance = calibration.coordinates[3].clone();
+    let draws = std::mem::take(&mut calibration.draws);
+    calibration.coordinates.extend((1..10).map(|i| {
+        let name = format!("variance_{i}");
+        CoordinateFindings { name, ..variance.clone() }
+    }));
+    calibration.draws = draws.chunks(4).flat_map(|d| d.iter().copied().chain([d[3]; 9])).collect();
+    calibration.correlation = Matrix::from_fn(13, 13, |i, j| if i == j { 1.0 } else { 0.1 });
+    elements(&findings);
+    assert!(render(&findings).len() < 3_000_000);
 }
