@@ -341,7 +341,7 @@ fn groups(
 ) -> Result<Vec<Group>, ReadError> {
     let ids = match container.shape(spelling.ids) {
         Some(_) => container.integers(spelling.ids)?,
-        None => (1..).take_while(|k| exists(container, spelling, *k)).collect(),
+        None => (1..=i64::MAX).take_while(|k| exists(container, spelling, *k)).collect(),
     };
     let names = match container.shape(spelling.names) {
         Some(_) => container.texts(spelling.names)?,
