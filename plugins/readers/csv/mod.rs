@@ -130,14 +130,14 @@ impl Reader for Csv {
         let sheet = Sheet::read(path)?;
         let columns = LongColumns::find(&sheet, layout)?;
         let mut values = vec![None; layout.len()];
+        let mut seen = vec![false; layout.len()];
         for record in &sheet.records {
             let place = columns.place(&sheet, record)?;
-            let value = columns.number(&sheet, record)?;
-            if values[place].is_some() {
+            if std::mem::replace(&mut seen[place], true) {
                 let text = format!("a second value for {}", layout.describe(place));
                 return Err(sheet.complain(record, columns.value, text));
             }
-            values[place] = value;
+            values[place] = columns.number(&sheet, record)?;
         }
         complete(path, layout, &values)
     }
