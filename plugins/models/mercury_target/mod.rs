@@ -6,6 +6,7 @@ mod fluid;
 mod gauges;
 mod load;
 mod mesh;
+mod model;
 mod settings;
 mod shell;
 mod solver;
@@ -18,6 +19,7 @@ pub use eos::{EquationOfState, TensileCutoff};
 pub use fluid::{Fluid, FluidConstants};
 pub use gauges::Sensor;
 pub use mesh::Mesh;
+pub use model::MercuryTarget;
 pub use settings::{
     Cells, Gauge, Gauges, Geometry, Load, NamedMesh, Numerics, Place, Pulse, Rear, Sampling,
     Settings, Wall,
