@@ -89,9 +89,8 @@ impl Observer for Terminal {
 }
 
 fn bar(stage: &str, unit: &str, total: u64) -> ProgressBar {
-    let template = format!(
-        "{stage:<10} [{{bar:30}}] {{pos}}/{{len}} {unit}s, {{per_sec}}, {{eta}} left"
-    );
+    let template =
+        format!("{stage:<10} [{{bar:30}}] {{pos}}/{{len}} {unit}s, {{per_sec}}, {{eta}} left");
     let style = ProgressStyle::with_template(&template)
         .unwrap_or_else(|_| ProgressStyle::default_bar())
         .progress_chars("=> ");

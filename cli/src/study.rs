@@ -48,7 +48,9 @@ pub fn report(folder: &Path) -> Result<(), Failure> {
     let study = kept_study(folder)?;
     if !folder.join("manifest.json").exists() {
         let stop = Stop::new(format!("the run in {} is not finished", folder.display()));
-        return Err(stop.help(format!("`lacuna resume {}` goes on with it", folder.display())).into());
+        return Err(stop
+            .help(format!("`lacuna resume {}` goes on with it", folder.display()))
+            .into());
     }
     execute(&study, folder)
 }
@@ -61,7 +63,10 @@ fn load(path: &Path, settings: &Settings) -> Result<Study, Failure> {
         None => {
             let count = checked.problems.sorted().len();
             let plural = if count == 1 { "" } else { "s" };
-            Err(Failure::wrong(format!("{complaints}\n{count} problem{plural} in {}", path.display())))
+            Err(Failure::wrong(format!(
+                "{complaints}\n{count} problem{plural} in {}",
+                path.display()
+            )))
         }
     }
 }
@@ -70,7 +75,8 @@ fn load(path: &Path, settings: &Settings) -> Result<Study, Failure> {
 fn kept_study(folder: &Path) -> Result<Study, Failure> {
     let resolved = folder.join("resolved.toml");
     if !resolved.exists() {
-        let text = format!("error: {} is no run directory: it has no resolved.toml", folder.display());
+        let text =
+            format!("error: {} is no run directory: it has no resolved.toml", folder.display());
         return Err(Failure::wrong(text));
     }
     let mut study = load(&resolved, &Settings { set: Vec::new() })?;

@@ -128,8 +128,7 @@ impl File {
                 Coordinates::Labels(labels) => self.labels(group, &axis.name, labels)?,
                 Coordinates::Grid { values, unit } => {
                     let path = format!("{group}/{}", axis.name);
-                    let dimension =
-                        self.builder.add_dimension_path(&path, values.len() as u64)?;
+                    let dimension = self.builder.add_dimension_path(&path, values.len() as u64)?;
                     self.numbers(&path, &[dimension], values, Some(&unit.to_string()))?;
                     dimension
                 }

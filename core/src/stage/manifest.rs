@@ -11,7 +11,9 @@ pub fn begin(study: &Study, run: &RunDirectory) -> Result<(), Stop> {
     let resolved = emit::to_toml(&study.resolved)
         .map_err(|error| Stop::new(format!("cannot write resolved.toml: {error}")))?;
     let version = env!("CARGO_PKG_VERSION");
-    let head = format!("# Written by lacuna {version}: every default filled in. It runs as it stands.\n\n");
+    let head = format!(
+        "# Written by lacuna {version}: every default filled in. It runs as it stands.\n\n"
+    );
     files::write_atomic(&run.root().join("resolved.toml"), (head + &resolved).as_bytes())
 }
 

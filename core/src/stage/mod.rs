@@ -20,7 +20,11 @@ use crate::run::{Observer, RunDirectory, Stop};
 use crate::study::Study;
 
 /// Runs a study: what is kept and unchanged is taken, the rest is made.
-pub fn run(study: &Study, run: &mut RunDirectory, observer: &dyn Observer) -> Result<Findings, Stop> {
+pub fn run(
+    study: &Study,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Findings, Stop> {
     manifest::begin(study, run)?;
     let design = design::stage(study, run, observer)?;
     let simulated = simulate::stage(study, design.as_ref(), run, observer)?;

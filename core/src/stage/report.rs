@@ -3,8 +3,8 @@
 use crate::data::Draws;
 use crate::diagnose::Diagnosis;
 use crate::linalg::Matrix;
-use crate::math::moments::{self, Moments};
 use crate::math::fit;
+use crate::math::moments::{self, Moments};
 use crate::plugin::Emulator;
 use crate::report::findings::{
     CalibrationFindings, CoordinateFindings, EnsembleFindings, Findings, FittedDistribution,
@@ -108,7 +108,8 @@ fn ensemble(study: &Study, data: &Data) -> EnsembleFindings {
 }
 
 fn measurements(study: &Study, measured: &Measured) -> MeasuredFindings {
-    let added = study.measurements.as_ref().map(|s| s.common.added_curves.len()).unwrap_or_default();
+    let added =
+        study.measurements.as_ref().map(|s| s.common.added_curves.len()).unwrap_or_default();
     let curves = measured.likelihood.replicates.iter().rev().take(added).rev();
     MeasuredFindings {
         used: measured.used.clone(),
