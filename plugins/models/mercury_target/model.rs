@@ -66,10 +66,11 @@ impl MercuryTarget {
             sound_speed: call.inputs[1],
             tensile_cutoff: call.inputs[2],
         };
-        let outcome = simulate(&self.settings(sampling), &mercury).map_err(|error| match error {
-            SimulationError::Settings(_) => EvalError::Fatal(error.to_string()),
-            other => EvalError::Rejected(other.to_string()),
-        })?;
+        let outcome =
+            simulate(&self.settings(sampling), &mercury).map_err(|error| match error {
+                SimulationError::Settings(_) => EvalError::Fatal(error.to_string()),
+                other => EvalError::Rejected(other.to_string()),
+            })?;
         let mut values = Vec::with_capacity(call.layout.len());
         for gauge in self.asked(call.layout)? {
             values.extend(steps.iter().map(|&step| outcome.strain[gauge][step - 1]));
@@ -133,7 +134,9 @@ impl Component for MercuryTarget {
             complaints.at("").say(error.to_string());
         }
         let names = || self.gauges.0.iter().map(|gauge| &gauge.name);
-        if let Some((_, twice)) = names().enumerate().find(|(i, n)| names().take(*i).any(|m| m == *n)) {
+        if let Some((_, twice)) =
+            names().enumerate().find(|(i, n)| names().take(*i).any(|m| m == *n))
+        {
             complaints.at("gauges").say(format!("two gauges are called `{twice}`"));
         }
     }
@@ -153,7 +156,13 @@ impl Model for MercuryTarget {
         let grid = (1..=count).map(|i| i as f64 * interval).collect();
         Signature {
             inputs: vec![
-                input("density", "kg/m3", (smallest, f64::INFINITY), 13_500.0, "density of mercury"),
+                input(
+                    "density",
+                    "kg/m3",
+                    (smallest, f64::INFINITY),
+                    13_500.0,
+                    "density of mercury",
+                ),
                 input("sound_speed", "m/s", (0.0, f64::INFINITY), 1456.0, "sound speed of mercury"),
                 input(
                     "tensile_cutoff",
