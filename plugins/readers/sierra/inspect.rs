@@ -78,7 +78,7 @@ fn heartbeat(table: &Heartbeat) -> Contents {
     Contents { format: format!("Sierra heartbeat: {}", table.layout), facts, variables }
 }
 
-fn exodus(file: &Exodus) -> Result<Contents, ReadError> {
+pub(super) fn exodus(file: &Exodus) -> Result<Contents, ReadError> {
     let history = file.elements() == 1 && file.names(Kind::Element).is_empty();
     let what = if history { "history" } else { "results" };
     let mut variables = Vec::new();

@@ -13,6 +13,7 @@ use lacuna::study::{Problems, Sources};
 use super::super::Sierra;
 use super::super::probe::Probe;
 use super::super::signal::Signal;
+use super::super::write::{History, Origin, write_history};
 use super::{base, largest_difference, reference, sample};
 use crate::readers::runs::AllowFailed;
 
@@ -38,15 +39,19 @@ fn reader() -> Sierra {
     }
 }
 
-fn ensemble(folder: &Path, reader: &Sierra, layout: &Layout) -> Result<Ensemble, String> {
-    let parameters = [Parameter {
+fn parameters() -> [Parameter; 1] {
+    [Parameter {
         name: "density".into(),
         symbol: "rho".into(),
         unit: Unit::parse("kg/m3").unwrap(),
         design: Distribution::Uniform([0.0, 1.0]),
         prior: Distribution::Uniform([0.0, 1.0]),
         reference: None,
-    }];
+    }]
+}
+
+fn ensemble(folder: &Path, reader: &Sierra, layout: &Layout) -> Result<Ensemble, String> {
+    let parameters = parameters();
     let source =
         EnsembleSource { directory: folder, simulated: None, parameters: &parameters, layout };
     reader.ensemble(&source).map_err(|e| e.to_string())
@@ -121,6 +126,30 @@ fn unfinished_and_damaged_runs_are_named() {
     let ensemble = ensemble(folder.path(), &allowed, &layout).unwrap();
     assert_eq!((&ensemble.runs[..], ensemble.failed.len()), (&["good".to_owned()][..], 4));
     assert_eq!(reader.files(folder.path()).len(), 6);
+}
+
+#[test]
+fn what_the_simulate_stage_wrote_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, times, values) = base();
+    let names = GAUGES.map(|gauge| format!("strain_{gauge}")).to_vec();
+    let history = History { times: times.clone(), names, values: values.clone() };
+    write_history(&folder.path().join("run-1.h"), &Origin::default(), &history).unwrap();
+    let table = "run,file,status,valid,reason,density\nrun-1,run-1.h,done,false,,13500\n\
+                 run-2,,failed,,no steps,12000\n";
+    std::fs::write(folder.path().join("runs.csv"), table).unwrap();
+    let reader = Sierra { runs: None, ..reader() };
+    let layout = layout(times, "1");
+    let source = EnsembleSource {
+        directory: Path::new("elsewhere"),
+        simulated: Some(folder.path()),
+        parameters: &parameters(),
+        layout: &layout,
+    };
+    let ensemble = reader.ensemble(&source).unwrap();
+    assert_eq!((ensemble.responses.row(0), ensemble.valid[0]), (&values.concat()[..], false));
+    assert_eq!((ensemble.points.row(0), ensemble.failed.len()), (&[13_500.0][..], 1));
+    assert!(!reader.names_files());
 }
 
 #[test]
