@@ -5,4 +5,5 @@ pub mod discrepancies;
 pub mod executors;
 pub mod models;
 pub mod readers;
+pub mod samplers;
 pub mod surrogates;

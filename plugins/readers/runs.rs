@@ -6,7 +6,11 @@ use std::path::{Path, PathBuf};
 use lacuna::data::{Ensemble, FailedRun, Parameter};
 use lacuna::linalg::Matrix;
 use lacuna::plugin::reader::{EnsembleSource, ReadError};
+use lacuna::study::values::Unfit;
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::de::{self, Deserializer};
+use serde::{Deserialize, Serialize};
 
 use super::sheet::{Record, Sheet};
 
@@ -14,6 +18,33 @@ use super::sheet::{Record, Sheet};
 const SIMULATED: &str = "runs.csv";
 /// How many failed runs an error names.
 const NAMED: usize = 10;
+
+/// How many runs may be left out: below 1 a fraction of them, from 1 on a count.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
+#[serde(transparent)]
+pub struct AllowFailed(#[schemars(range(min = 0.0))] f64);
+
+impl AllowFailed {
+    /// Checks that a number is a fraction or a count.
+    pub fn new(number: f64) -> Result<Self, Unfit> {
+        if (0.0..1.0).contains(&number) || (number >= 1.0 && number.fract() == 0.0) {
+            Ok(Self(number))
+        } else {
+            Err(Unfit::new("a fraction from 0 to 1 or a whole number of runs", number))
+        }
+    }
+
+    /// How many of a number of runs.
+    pub fn of(self, runs: usize) -> usize {
+        if self.0 < 1.0 { (self.0 * runs as f64) as usize } else { self.0 as usize }
+    }
+}
+
+impl<'de> Deserialize<'de> for AllowFailed {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Self::new(f64::deserialize(deserializer)?).map_err(de::Error::custom)
+    }
+}
 
 /// One run of the table.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,7 +159,7 @@ pub fn ensemble(
     source: &EnsembleSource<'_>,
     table: &Path,
     runs: &[Run],
-    allow_failed: f64,
+    allow_failed: AllowFailed,
     response: impl Fn(&Run) -> Result<Vec<f64>, ReadError> + Sync,
 ) -> Result<Ensemble, ReadError> {
     let outcomes: Vec<Result<Vec<f64>, ReadError>> = runs
@@ -152,7 +183,7 @@ pub fn ensemble(
         };
         failed.push(FailedRun { run: run.name.clone(), reason });
     }
-    let allowed = allowed(allow_failed, runs.len());
+    let allowed = allow_failed.of(runs.len());
     if unreadable.len() > allowed || kept.is_empty() {
         let count = unreadable.len();
         let more = count.saturating_sub(NAMED);
@@ -176,20 +207,6 @@ pub fn ensemble(
         valid: kept.iter().map(|(run, _)| run.valid).collect(),
         failed,
     })
-}
-
-/// How many of a number of runs may fail: below 1 a fraction of them, from 1 on a count.
-pub fn allowed(allow_failed: f64, runs: usize) -> usize {
-    let count = if allow_failed < 1.0 { allow_failed * runs as f64 } else { allow_failed };
-    // NaN and negative numbers allow nothing.
-    count.floor() as usize
-}
-
-/// What is wrong with a value of `allow_failed`, if anything.
-pub fn check_allowed(allow_failed: f64) -> Option<&'static str> {
-    let fraction = (0.0..1.0).contains(&allow_failed);
-    let count = allow_failed >= 1.0 && allow_failed.fract() == 0.0;
-    (!fraction && !count).then_some("a fraction from 0 to 1 or a whole number of runs")
 }
 
 /// First complaint about a response that is not finite.

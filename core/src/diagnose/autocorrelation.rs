@@ -1,6 +1,7 @@
 //! Integrated autocorrelation time of ensembles of walkers.
 
-use crate::math::moments::mean;
+use crate::linalg::vector::dot;
+use crate::math::moments::{mean, variance};
 
 /// The integrated autocorrelation time, in steps: the variance of a mean over time is as large as
 /// if only every `tau`-th step had been drawn.
@@ -19,7 +20,7 @@ pub fn integrated_time(walkers: &[Vec<f64>]) -> f64 {
             w.iter().map(|x| x - centre).collect()
         })
         .collect();
-    let lagged = |w: &[f64], lag: usize| w.iter().zip(&w[lag..]).map(|(a, b)| a * b).sum::<f64>();
+    let lagged = |w: &[f64], lag: usize| dot(&w[..w.len() - lag], &w[lag..]);
     let moving: Vec<(&Vec<f64>, f64)> =
         centred.iter().map(|w| (w, lagged(w, 0))).filter(|(_, power)| *power > 0.0).collect();
     if moving.is_empty() {
@@ -50,7 +51,7 @@ pub fn ensemble_error(walkers: &[Vec<f64>]) -> f64 {
     let series: Vec<f64> = (0..steps)
         .map(|t| walkers.iter().map(|w| w[t]).sum::<f64>() / walkers.len() as f64)
         .collect();
-    let spread = crate::math::moments::variance(&series);
+    let spread = variance(&series);
     if spread == 0.0 {
         return 0.0;
     }

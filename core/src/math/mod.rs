@@ -3,5 +3,6 @@
 pub mod distribution;
 pub mod fit;
 pub mod moments;
+pub mod optimise;
 pub mod random;
 pub mod special;

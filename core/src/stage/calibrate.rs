@@ -7,10 +7,10 @@ use serde_json::json;
 
 use crate::data::{Draws, Unit};
 use crate::diagnose::Diagnosis;
-use crate::linalg::{Cholesky, Matrix};
+use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::math::optimise;
-use crate::math::random::{Stream, normal};
+use crate::math::random::Stream;
 use crate::plugin::{Effect, Emulator, Fact, Likelihood, Target};
 use crate::posterior::Posterior;
 use crate::run::arrays::{self, Array};
@@ -121,7 +121,8 @@ impl Parts {
     pub fn of(study: &Study, measured: &Measured, fitted: &Fitted) -> Result<Self, Stop> {
         let section =
             study.discrepancy.as_ref().ok_or_else(|| Stop::new("the study has no discrepancy"))?;
-        let error = if section.common.emulator_error { Some(fitted.covariance(study)?) } else { None };
+        let error =
+            if section.common.emulator_error { Some(fitted.covariance(study)?) } else { None };
         let likelihood = section.built.plugin.likelihood(&measured.likelihood, error.as_ref())?;
         Ok(Self { likelihood })
     }
@@ -193,7 +194,11 @@ fn calibrate(
     let plan = section.built.plugin.plan(posterior.dimension());
     let start = || match section.common.start {
         Start::Prior => Ok(from_prior(posterior, plan.chains, &random.named("start"))),
-        Start::Map => Ok(around(posterior, best, plan.chains, &random.named("start"))),
+        Start::Map => {
+            let laplace = optimise::laplace(posterior, &best.point)?;
+            let random = random.named("start");
+            optimise::scatter(posterior, &best.point, &laplace, plan.chains, &random)
+        }
     };
     let coordinates = coordinates(study, posterior);
     let names = coordinates.iter().map(|c| c.name.clone()).collect();
@@ -289,51 +294,6 @@ fn from_prior(posterior: &Posterior<'_>, chains: usize, stream: &Stream) -> Matr
     let finite: Vec<usize> =
         (0..draws.rows()).filter(|&i| density[i].is_finite()).take(chains).collect();
     draws.select_rows(&finite)
-}
-
-/// Points scattered about a maximum by the curvature there, kept inside the support.
-fn around(
-    posterior: &Posterior<'_>,
-    optimum: &optimise::Optimum,
-    chains: usize,
-    stream: &Stream,
-) -> Matrix {
-    let d = posterior.dimension();
-    let factor = scatter(posterior, optimum, stream);
-    let mut points = Matrix::zeros(0, d);
-    for chain in 0..chains {
-        let mut rng = stream.at(chain as u64).generator();
-        // Draws that leave the support are pulled towards the maximum, which lies in it.
-        let z: Vec<f64> = (0..d).map(|_| normal(&mut rng)).collect();
-        let step = factor.colour(&z);
-        let mut shrink = 1.0;
-        let point = loop {
-            let moved: Vec<f64> =
-                optimum.point.iter().zip(&step).map(|(x, s)| x + shrink * s).collect();
-            let row = Matrix::from_vec(1, d, moved.clone());
-            if posterior.log_density(&row)[0].is_finite() || shrink < 1e-6 {
-                break moved;
-            }
-            shrink *= 0.7;
-        };
-        points.push_row(&point);
-    }
-    points
-}
-
-/// A factor of the covariance about a maximum: Laplace's, or a hundredth of the prior's spread where the density
-/// is not curved downwards in every direction (at a bound, on a ridge).
-fn scatter(posterior: &Posterior<'_>, optimum: &optimise::Optimum, stream: &Stream) -> Cholesky {
-    let curved = optimise::laplace(posterior, optimum).and_then(|c| Cholesky::new(&c).ok());
-    curved.unwrap_or_else(|| {
-        let draws = posterior.prior_draws(200, &stream.named("spread"));
-        let d = posterior.dimension();
-        let diagonal = Matrix::from_fn(d, d, |i, j| {
-            let sd = crate::math::moments::variance(&draws.column(i)).sqrt();
-            if i == j { 0.01 * sd } else { 0.0 }
-        });
-        Cholesky::from_lower(diagonal)
-    })
 }
 
 fn best_draw(posterior: &Posterior<'_>, sampled: &Sampled) -> (Vec<f64>, f64) {

@@ -152,8 +152,7 @@ impl Log {
                 *count += u32::from(bytes[from + 8 * chains * (d + 1) + c]);
             }
         }
-        let acceptance =
-            moves.iter().map(|&m| f64::from(m) / plan.steps.max(1) as f64).collect();
+        let acceptance = moves.iter().map(|&m| f64::from(m) / plan.steps.max(1) as f64).collect();
         Ok((Draws::from_steps(names, &steps), acceptance))
     }
 }

@@ -20,8 +20,8 @@ use super::calibrate::{Calibrated, Parts};
 use super::read::{Data, Measured};
 use super::screen::Z975;
 use super::simulator::Simulator;
-use super::surrogate::Fitted;
 use super::stream;
+use super::surrogate::Fitted;
 
 /// What the validation found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -76,7 +76,8 @@ pub fn stage(
     observer.begin("validate", "run", cases + study.validate.emulator_check as u64);
     let kept = run.keep("6-validate", &inputs, observer, |_| {
         let parts = Parts::of(study, measured, &fitted.value)?;
-        let work = Work { study, measured, emulator, simulator, rerun, progress: Progress::new(observer) };
+        let work =
+            Work { study, measured, emulator, simulator, rerun, progress: Progress::new(observer) };
         work.validate(&calibrated.value, parts.likelihood())
     })?;
     for failure in &kept.value.failed {
@@ -133,7 +134,9 @@ impl Work<'_> {
             (Some(simulator), true) => match simulator.respond(point) {
                 Ok(response) => Some(response.values),
                 Err(EvalError::Rejected(reason)) => {
-                    failed.push(format!("the model gave no answer at the {name} parameters: {reason}"));
+                    failed.push(format!(
+                        "the model gave no answer at the {name} parameters: {reason}"
+                    ));
                     None
                 }
                 Err(EvalError::Fatal(reason)) => return Err(Stop::new(reason)),
@@ -186,7 +189,8 @@ impl Work<'_> {
             self.progress.add(1);
         }
         let outputs = self.study.layout.len() as f64;
-        Ok((checked > 0).then(|| ((squares / (f64::from(checked) * outputs)).sqrt(), checked as usize)))
+        Ok((checked > 0)
+            .then(|| ((squares / (f64::from(checked) * outputs)).sqrt(), checked as usize)))
     }
 
     /// The 95 % band of a new replicate from data simulated at posterior draws, and its spread by origin.
@@ -204,7 +208,8 @@ impl Work<'_> {
         }
         let points = draws.points();
         let count = PREDICTED.min(draws.len());
-        let rows: Vec<usize> = (0..count).map(|k| (2 * k + 1) * draws.len() / (2 * count)).collect();
+        let rows: Vec<usize> =
+            (0..count).map(|k| (2 * k + 1) * draws.len() / (2 * count)).collect();
         let chosen = points.select_rows(&rows);
         let mut responses = self.responses(&chosen);
         for (i, response) in responses.iter_mut().enumerate() {
@@ -227,8 +232,13 @@ impl Work<'_> {
             .iter()
             .map(|part| (part.origin.clone(), moments::mean(&part.variance).sqrt()))
             .collect();
-        let sds: Vec<f64> =
-            self.measured.used.summaries().iter().filter_map(|s| s.sd().map(|sd| sd * sd)).collect();
+        let sds: Vec<f64> = self
+            .measured
+            .used
+            .summaries()
+            .iter()
+            .filter_map(|s| s.sd().map(|sd| sd * sd))
+            .collect();
         if !sds.is_empty() {
             spread.push(("replicates".to_owned(), moments::mean(&sds).sqrt()));
         }
@@ -299,7 +309,10 @@ impl Validated {
         let replicates = measured.used.summaries();
         ValidationFindings {
             cases: self.cases.clone(),
-            replicates: replicates.iter().map(|s| (s.count, s.mean, s.sd().unwrap_or(0.0))).collect(),
+            replicates: replicates
+                .iter()
+                .map(|s| (s.count, s.mean, s.sd().unwrap_or(0.0)))
+                .collect(),
             predictive: self.predictive.clone(),
             spread: self.spread.clone(),
         }

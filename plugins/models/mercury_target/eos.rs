@@ -6,7 +6,8 @@
 pub trait EquationOfState {
     /// Advances the cells `first..first + strain.len()` by `dt` to the given volumetric strains
     /// (total since the pulse); writes their pressures (Pa, relative to the static state) and 1
-    /// where the fluid is whole, 0 where it is cavitated.
+    /// where the fluid is whole, 0 where it is cavitated. The solver calls it once with no strain
+    /// and `dt = 0` for the state just after the pulse.
     fn update(
         &mut self,
         first: usize,

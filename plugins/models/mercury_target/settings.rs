@@ -288,7 +288,18 @@ impl Settings {
     pub fn validate(&self) -> Result<(), SimulationError> {
         self.validate_vessel()?;
         self.validate_numerics()?;
-        self.gauges.0.iter().try_for_each(|gauge| self.validate_gauge(gauge))
+        let gauges = &self.gauges.0;
+        for (k, gauge) in gauges.iter().enumerate() {
+            self.validate_gauge(gauge)?;
+            if gauges[..k].iter().any(|other| other.name == gauge.name) {
+                let name = &gauge.name;
+                return Err(SimulationError::Settings(format!("two gauges are named `{name}`")));
+            }
+        }
+        if gauges.is_empty() {
+            return Err(SimulationError::Settings("`gauges` is empty; name at least one".into()));
+        }
+        Ok(())
     }
 
     fn validate_vessel(&self) -> Result<(), SimulationError> {

@@ -63,10 +63,15 @@ impl Target {
     /// The strain traces of one pulse in the given mercury.
     pub fn simulate(&self, mercury: &Mercury) -> Result<Outcome, SimulationError> {
         mercury.validate()?;
-        let peak = self.settings.pulse.pressure(mercury);
-        let initial = self.shapes.iter().map(|shape| peak * shape).collect();
+        let initial = self.initial_pressure(mercury);
         let Mercury { density, sound_speed, tensile_cutoff } = *mercury;
         self.run(density, TensileCutoff::new(density, sound_speed, tensile_cutoff, initial))
+    }
+
+    /// Pressure that the pulse leaves in each cell of the given mercury, Pa.
+    pub fn initial_pressure(&self, mercury: &Mercury) -> Vec<f64> {
+        let peak = self.settings.pulse.pressure(mercury);
+        self.shapes.iter().map(|shape| peak * shape).collect()
     }
 
     /// A run with any equation of state.

@@ -14,7 +14,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::cells::LongColumns;
-use super::runs;
+use super::runs::{self, AllowFailed};
 use super::sheet::Sheet;
 use super::sierra::heartbeat;
 
@@ -51,7 +51,7 @@ pub struct Csv {
     pub responses: Option<PathBuf>,
     /// How many runs without a complete response may be left out: below 1 a fraction, from 1 on a
     /// count.
-    pub allow_failed: f64,
+    pub allow_failed: AllowFailed,
     /// Columns of a table of measurements that hold conditions, as numbers.
     pub scenario: Vec<String>,
     /// Columns of a table of measurements that mean nothing to the study. Any other column that
@@ -61,13 +61,6 @@ pub struct Csv {
 
 impl Component for Csv {
     fn check(&self, _context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        if let Some(expected) = runs::check_allowed(self.allow_failed) {
-            complaints
-                .at("allow_failed")
-                .say("`allow_failed` is no number of runs")
-                .expected(expected)
-                .found(self.allow_failed.to_string());
-        }
         if self.responses.is_some() && self.parameters.is_none() {
             complaints
                 .at("responses")
@@ -137,14 +130,14 @@ impl Reader for Csv {
         let sheet = Sheet::read(path)?;
         let columns = LongColumns::find(&sheet, layout)?;
         let mut values = vec![None; layout.len()];
+        let mut seen = vec![false; layout.len()];
         for record in &sheet.records {
             let place = columns.place(&sheet, record)?;
-            let value = columns.number(&sheet, record)?;
-            if values[place].is_some() {
+            if std::mem::replace(&mut seen[place], true) {
                 let text = format!("a second value for {}", layout.describe(place));
                 return Err(sheet.complain(record, columns.value, text));
             }
-            values[place] = value;
+            values[place] = columns.number(&sheet, record)?;
         }
         complete(path, layout, &values)
     }

@@ -9,6 +9,7 @@ use lacuna::plugin::Reader;
 use lacuna::plugin::reader::{EnsembleSource, MeasurementSource};
 
 use super::Csv;
+use crate::readers::runs::AllowFailed;
 
 fn layout() -> Layout {
     Layout {
@@ -105,11 +106,13 @@ fn incomplete_runs_are_named_and_left_out_only_if_allowed() {
     assert!(
         text.contains("`b`") && text.contains("2 of 4 values are missing, first at sensor `B`")
     );
-    for allow_failed in [1.0, 0.5] {
+    for allow_failed in [1.0, 0.5].map(|n| AllowFailed::new(n).unwrap()) {
         let ensemble = folder.ensemble(&Csv { allow_failed, ..tables() }).unwrap();
         assert_eq!((ensemble.runs.len(), ensemble.failed[0].run.as_str()), (1, "b"));
     }
-    assert!(folder.ensemble(&Csv { allow_failed: 0.4, ..tables() }).is_err());
+    assert!(
+        folder.ensemble(&Csv { allow_failed: AllowFailed::new(0.4).unwrap(), ..tables() }).is_err()
+    );
 }
 
 #[test]

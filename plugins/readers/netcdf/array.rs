@@ -3,13 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use hdf5_reader::FileStorage;
+use hdf5_reader::{FileStorage, Storage};
 use lacuna::data::{Axis, Coordinates, Layout, Unit};
 use lacuna::plugin::reader::ReadError;
-use netcdf_reader::{NcFile, NcType, NcVariable};
+use netcdf_reader::{NcFile, NcOpenOptions, NcType, NcVariable};
 
 use crate::readers::cells::{grid_places, on_axis};
 use crate::readers::listed;
+use crate::readers::sierra::container::read_limit;
 
 /// An open netCDF file.
 pub(super) struct File {
@@ -22,7 +23,15 @@ impl File {
     pub(super) fn open(path: &Path) -> Result<Self, ReadError> {
         let storage = FileStorage::open(path)
             .map_err(|e| ReadError::new(path, format!("cannot be opened: {e}")))?;
-        let file = NcFile::from_storage(Arc::new(storage))
+        Self::from_storage(path, Arc::new(storage))
+    }
+
+    pub(super) fn from_storage(path: &Path, storage: Arc<dyn Storage>) -> Result<Self, ReadError> {
+        let options = NcOpenOptions {
+            max_read_bytes: read_limit(storage.len()) as usize,
+            ..NcOpenOptions::default()
+        };
+        let file = NcFile::from_storage_with_options(storage, options)
             .map_err(|e| ReadError::new(path, format!("is not a whole netCDF file: {e}")))?;
         Ok(Self { path: path.to_owned(), file })
     }
@@ -142,23 +151,21 @@ impl File {
                 format!("expected dimensions {}, found {}", listed(&expected), listed(&found));
             return Err(self.complain(text).at(format!("variable `{name}`")));
         }
+        // Read first: a damaged file must not ask for memory by its dimensions alone.
+        let numbers = self.converted(name, Some(&layout.unit))?;
         // How far a step along each dimension goes in the result, for each place on it.
         let mut count = 1;
         let mut offsets: Vec<Vec<usize>> = Vec::new();
         for dimension in dimensions {
             let length = dimension.size as usize;
-            offsets.push(match layout.axis(&dimension.name) {
-                Some((position, axis)) => {
-                    let stride: usize = layout.axes[position + 1..].iter().map(Axis::len).product();
-                    self.places(axis, length)?.into_iter().map(|i| i * stride).collect()
-                }
-                None => {
-                    count = length;
-                    (0..length).map(|i| i * layout.len()).collect()
-                }
+            offsets.push(if let Some((position, axis)) = layout.axis(&dimension.name) {
+                let stride: usize = layout.axes[position + 1..].iter().map(Axis::len).product();
+                self.places(axis, length)?.into_iter().map(|i| i * stride).collect()
+            } else {
+                count = length;
+                (0..length).map(|i| i * layout.len()).collect()
             });
         }
-        let numbers = self.converted(name, Some(&layout.unit))?;
         let mut responses = vec![0.0; count * layout.len()];
         for (flat, y) in numbers.into_iter().enumerate() {
             let mut rest = flat;

@@ -13,7 +13,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use self::array::File;
-use super::runs::{self, Run};
+use super::runs::{self, AllowFailed, Run};
 use super::sierra;
 
 /// Reads netCDF files (classic, 64-bit offset, 64-bit data, netCDF-4) whose dimensions are named
@@ -44,18 +44,11 @@ pub struct NetCdf {
     pub variable: Option<String>,
     /// How many runs without a complete response may be left out: below 1 a fraction, from 1 on a
     /// count.
-    pub allow_failed: f64,
+    pub allow_failed: AllowFailed,
 }
 
 impl Component for NetCdf {
     fn check(&self, _context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        if let Some(expected) = runs::check_allowed(self.allow_failed) {
-            complaints
-                .at("allow_failed")
-                .say("`allow_failed` is no number of runs")
-                .expected(expected)
-                .found(self.allow_failed.to_string());
-        }
         if self.path.is_some() && self.runs.is_some() {
             complaints.at("runs").say("`path` and `runs` exclude each other");
         }
@@ -91,9 +84,10 @@ impl NetCdf {
             .iter()
             .map(|p| file.along(&p.name, "run", values.len(), Some(&p.unit)))
             .collect::<Result<Vec<_>, _>>()?;
-        let valid = match file.has("valid") {
-            true => file.along("valid", "run", values.len(), None)?,
-            false => vec![1.0; values.len()],
+        let valid = if file.has("valid") {
+            file.along("valid", "run", values.len(), None)?
+        } else {
+            vec![1.0; values.len()]
         };
         let runs: Vec<Run> = names
             .into_iter()

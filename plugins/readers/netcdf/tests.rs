@@ -2,15 +2,20 @@
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
+use std::sync::Arc;
 
+use hdf5_reader::BytesStorage;
 use lacuna::data::{Axis, Layout, Parameter, Unit};
 use lacuna::math::distribution::Distribution;
+use lacuna::math::random::{Stream, below};
 use lacuna::plugin::Reader;
 use lacuna::plugin::model::Response;
 use lacuna::plugin::reader::{EnsembleSource, MeasurementSource};
 use netcdf_writer::{NcAttrValue, NcFileBuilder, NcWriteFormat, NcWriteOptions};
 
 use super::NetCdf;
+use super::array::File;
+use crate::readers::runs::AllowFailed;
 
 fn unit(text: &str) -> Unit {
     Unit::parse(text).unwrap()
@@ -61,7 +66,11 @@ fn write(path: &Path, outer: &str, format: NcWriteFormat, times: &[f64]) {
 #[test]
 fn dimensions_are_found_by_name_in_any_order() {
     let folder = tempfile::tempdir().unwrap();
-    let reader = NetCdf { path: Some("a.nc".into()), allow_failed: 1.0, ..NetCdf::default() };
+    let reader = NetCdf {
+        path: Some("a.nc".into()),
+        allow_failed: AllowFailed::new(1.0).unwrap(),
+        ..NetCdf::default()
+    };
     let parameters = [Parameter {
         name: "density".into(),
         symbol: "rho".into(),
@@ -135,4 +144,29 @@ fn mismatched_axes_are_named() {
     std::fs::write(&path, b"CDF\x01").unwrap();
     let text = NetCdf::default().response(&path, &layout).unwrap_err().to_string();
     assert!(text.contains("is not a whole netCDF file"), "{text}");
+}
+
+#[test]
+fn damaged_files_do_no_harm() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.nc");
+    let layout = layout();
+    for (number, format) in [NcWriteFormat::Cdf5, NcWriteFormat::Nc4].into_iter().enumerate() {
+        write(&path, "run", format, &[0.01, 0.02, 0.03]);
+        let bytes = std::fs::read(&path).unwrap();
+        let mut random = Stream::root(7).at(number as u64).generator();
+        for round in 0..300 {
+            let mut damaged = bytes.clone();
+            for _ in 0..=round % 3 {
+                let at = below(&mut random, damaged.len());
+                damaged[at] = below(&mut random, 256) as u8;
+            }
+            damaged.truncate(bytes.len() - round % 2 * below(&mut random, bytes.len()));
+            let storage = Arc::new(BytesStorage::new(damaged));
+            if let Ok(file) = File::from_storage(&path, storage) {
+                let _ = file.responses("strain", &layout, Some("run"));
+                let _ = super::inspect::contents(&file);
+            }
+        }
+    }
 }

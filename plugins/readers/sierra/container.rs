@@ -230,7 +230,8 @@ fn open_hdf5(storage: Arc<dyn Storage>) -> Result<Opened, String> {
     Ok((shapes, Source::Hdf5 { file: Box::new(file), datasets }))
 }
 
-fn read_limit(bytes: u64) -> u64 {
+/// The most bytes that one read of an HDF5 file of this length may ask for.
+pub(crate) fn read_limit(bytes: u64) -> u64 {
     bytes.saturating_mul(LARGEST_EXPANSION).max(SMALLEST_LIMIT)
 }
 

@@ -11,6 +11,10 @@ use serde::{Deserialize, Serialize};
 use super::container::{Container, Pick};
 use lacuna::plugin::reader::ReadError;
 
+/// What the netCDF library puts where nothing was written: `NC_FILL_DOUBLE`, in single precision
+/// the same number.
+const NEVER_WRITTEN: f64 = 9.969_209_968_386_869e36;
+
 /// What an Exodus variable is attached to.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
@@ -185,7 +189,8 @@ impl Exodus {
         })
     }
 
-    /// Values of one variable at one entity, over the complete steps. `group` and `entity` are
+    /// Values of one variable at one entity, over the complete steps, NaN where the run never wrote
+    /// one. `group` and `entity` are
     /// positions counted from 0; both are ignored for globals, `group` for nodal variables.
     pub fn values(
         &self,
@@ -195,11 +200,11 @@ impl Exodus {
         entity: usize,
     ) -> Result<Vec<f64>, ReadError> {
         let mut values = self.slab(kind, variable, group, Pick::At(entity))?;
-        if values.len() < self.times.len() {
-            let text = format!("is incomplete: {} of {} steps", values.len(), self.times.len());
-            return Err(ReadError::new(self.path(), text));
+        // In netCDF-4 a variable can lack the last steps.
+        values.resize(self.times.len(), f64::NAN);
+        for value in values.iter_mut().filter(|value| **value == NEVER_WRITTEN) {
+            *value = f64::NAN;
         }
-        values.truncate(self.times.len());
         Ok(values)
     }
 
@@ -270,23 +275,22 @@ impl Exodus {
     }
 }
 
-/// Times of the steps up to `last_written_time`, and how many come after it. A file without that
-/// attribute (written before 2016, or by other codes) is taken whole.
+/// Times of the steps up to `last_written_time`, and how many come after it. Of a file without
+/// that attribute every step that has a time is taken.
 fn complete_steps(container: &Container) -> Result<(Vec<f64>, usize), ReadError> {
     if container.shape("time_whole").is_none() {
         return Ok((Vec::new(), 0));
     }
     let mut times = container.reals("time_whole")?;
     let single = container.real("floating_point_word_size") == Some(4.0);
-    if let Some(last) = container.real("last_written_time") {
-        // The attribute is double precision even where times are stored in single.
-        let complete = |t: f64| t <= last || (single && t as f32 <= last as f32);
-        let steps = times.iter().take_while(|&&t| complete(t)).count();
-        let dropped = times.len() - steps;
-        times.truncate(steps);
-        return finite(container, times).map(|times| (times, dropped));
-    }
-    finite(container, times).map(|times| (times, 0))
+    let last = container.real("last_written_time").unwrap_or(f64::INFINITY);
+    // The attribute is double precision even where times are stored in single.
+    let complete =
+        |t: f64| t != NEVER_WRITTEN && (t <= last || (single && t as f32 <= last as f32));
+    let steps = times.iter().take_while(|&&t| complete(t) || t.is_nan()).count();
+    let dropped = times.len() - steps;
+    times.truncate(steps);
+    Ok((finite(container, times)?, dropped))
 }
 
 fn finite(container: &Container, times: Vec<f64>) -> Result<Vec<f64>, ReadError> {
@@ -341,7 +345,7 @@ fn groups(
 ) -> Result<Vec<Group>, ReadError> {
     let ids = match container.shape(spelling.ids) {
         Some(_) => container.integers(spelling.ids)?,
-        None => (1..).take_while(|k| exists(container, spelling, *k)).collect(),
+        None => (1..=i64::MAX).take_while(|k| exists(container, spelling, *k)).collect(),
     };
     let names = match container.shape(spelling.names) {
         Some(_) => container.texts(spelling.names)?,

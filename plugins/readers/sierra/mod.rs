@@ -20,12 +20,13 @@ use lacuna::data::{Axis, Coordinates, Ensemble, Layout, Unit};
 use lacuna::plugin::reader::{Contents, EnsembleSource, ReadError};
 use lacuna::plugin::{Component, Context, Reader};
 use lacuna::study::problem::Complaints;
+use lacuna::study::values::Fraction;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use self::probe::Probe;
 use self::signal::Output;
-use super::runs::{self, Run};
+use super::runs::{self, AllowFailed, Run};
 
 /// Reads what Sierra wrote for each run: Exodus II results or history files, in any netCDF
 /// container and in one file or one a processor, and heartbeat text in any of its formats.
@@ -74,9 +75,9 @@ pub struct Sierra {
     pub time_unit: Option<Unit>,
     /// How much of the response's time axis a file may lack at either end, as a fraction of the
     /// axis' spacing; there the first or last value holds.
-    pub tolerance: f64,
+    pub tolerance: Fraction,
     /// How many runs without a usable file may be left out: below 1 a fraction, from 1 on a count.
-    pub allow_failed: f64,
+    pub allow_failed: AllowFailed,
 }
 
 impl Default for Sierra {
@@ -88,28 +89,14 @@ impl Default for Sierra {
             sensors: BTreeMap::new(),
             unit: None,
             time_unit: None,
-            tolerance: 0.01,
-            allow_failed: 0.0,
+            tolerance: Fraction::new(0.01).expect("0.01 is a fraction"),
+            allow_failed: AllowFailed::default(),
         }
     }
 }
 
 impl Component for Sierra {
     fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        if let Some(expected) = runs::check_allowed(self.allow_failed) {
-            complaints
-                .at("allow_failed")
-                .say("`allow_failed` is no number of runs")
-                .expected(expected)
-                .found(self.allow_failed.to_string());
-        }
-        if !(0.0..=1.0).contains(&self.tolerance) {
-            complaints
-                .at("tolerance")
-                .say("`tolerance` is no fraction of the time axis' spacing")
-                .expected("a number from 0 to 1")
-                .found(self.tolerance.to_string());
-        }
         match Curves::new(context.layout) {
             Err(text) => {
                 complaints.at("").say(text);
@@ -147,7 +134,7 @@ impl Component for Sierra {
 
 impl Sierra {
     fn check_sensors(&self, curves: &Curves<'_>, complaints: &mut Complaints<'_>) {
-        let names: Vec<&str> = curves.curves.iter().map(|curve| curve.name.as_str()).collect();
+        let names: Vec<&str> = curves.list.iter().map(|curve| curve.name.as_str()).collect();
         for sensor in self.sensors.keys().filter(|sensor| !names.contains(&sensor.as_str())) {
             complaints
                 .at(&format!("sensors.{sensor}"))
@@ -238,11 +225,11 @@ impl Reader for Sierra {
         let time_scale = factor(&self.time_unit, curves.time_unit)?;
         let output = Output::open(path)?;
         let mut response = vec![0.0; layout.len()];
-        for curve in &curves.curves {
+        for curve in &curves.list {
             let probe = self.probe(curve).map_err(complain)?;
             let mut signal = output.signal(&probe)?;
             signal.times.iter_mut().for_each(|t| *t *= time_scale);
-            let values = signal.resampled(curves.times, self.tolerance).map_err(|text| {
+            let values = signal.resampled(curves.times, self.tolerance.get()).map_err(|text| {
                 complain(text).at(format!("sensor `{}`, variable `{}`", curve.name, probe.variable))
             })?;
             for (&place, value) in curve.places.iter().zip(values) {
@@ -272,7 +259,7 @@ struct Curves<'a> {
     times: &'a [f64],
     time_unit: &'a Unit,
     labels: Vec<&'a str>,
-    curves: Vec<Curve>,
+    list: Vec<Curve>,
 }
 
 struct Curve {
@@ -301,7 +288,7 @@ impl<'a> Curves<'a> {
         };
         let is_label = |axis: &&Axis| matches!(axis.coordinates, Coordinates::Labels(_));
         let labels = layout.axes.iter().filter(is_label).map(|axis| axis.name.as_str()).collect();
-        let curves = layout.groups().into_iter().map(|group| {
+        let list = layout.groups().into_iter().map(|group| {
             let place = layout.place(group.indices[0]);
             let labels = layout
                 .axes
@@ -312,7 +299,7 @@ impl<'a> Curves<'a> {
                 .collect();
             Curve { name: group.name, labels, places: group.indices }
         });
-        Ok(Self { times, time_unit, labels, curves: curves.collect() })
+        Ok(Self { times, time_unit, labels, list: list.collect() })
     }
 }
 

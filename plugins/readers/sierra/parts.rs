@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::exodus::{Exodus, Kind};
-use super::locate::Entity;
+use super::locate::{Entity, Found};
 use super::probe::Probe;
 use crate::readers::listed;
 use lacuna::plugin::reader::ReadError;
@@ -98,50 +98,59 @@ impl Results {
             return Ok((0, Entity { group: 0, position: 0, distance: 0.0 }));
         }
         let mut best: Option<(usize, Entity)> = None;
-        let mut count = 0;
-        let mut without = Vec::new();
+        let mut all = Found::default();
         for (number, part) in self.parts.iter().enumerate() {
             let variable = part.variable(kind, name).ok_or_else(|| {
                 ReadError::new(part.path(), format!("has no {} variable `{name}`", kind.label()))
             })?;
             let found = part.locate(kind, variable, probe)?;
-            count += found.count;
-            without.extend(found.without_variable);
+            all.count += found.count;
+            all.without_variable.extend(found.without_variable);
             if let Some(entity) = found.entity
                 && best.is_none_or(|(_, nearest)| entity.distance < nearest.distance)
             {
                 best = Some((number, entity));
             }
         }
-        let missing = self.expected - self.parts.len();
+        match self.objection(kind, name, probe, &all) {
+            Some(text) => Err(self.complain(text)),
+            None => best.ok_or_else(|| self.complain(format!("has no `{name}`"))),
+        }
+    }
+
+    /// Why what was found in all parts together is not the one entity that the probe means.
+    fn objection(&self, kind: Kind, name: &str, probe: &Probe, found: &Found) -> Option<String> {
         let carrier = kind.carrier();
+        let missing = self.expected - self.parts.len();
         let absent = if missing == 0 {
             String::new()
         } else {
             format!(" ({missing} of the run's {} files are missing)", self.expected)
         };
-        match best {
-            None if !without.is_empty() => Err(self.complain(format!(
+        if found.count == 0 && !found.without_variable.is_empty() {
+            return Some(format!(
                 "{} variable `{name}` does not exist on {}: the file's truth table says so",
                 kind.label(),
-                listed(&without)
-            ))),
-            None => {
-                let what =
-                    probe.id.map_or(format!("no {carrier}"), |id| format!("no {carrier} {id}"));
-                Err(self.complain(format!("has {what} with `{name}`{absent}")))
-            }
-            Some(_) if probe.nearest.is_some() && missing > 0 => Err(self.complain(format!(
+                listed(&found.without_variable)
+            ));
+        }
+        if found.count == 0 {
+            let id = probe.id.map_or(String::new(), |id| format!(" {id}"));
+            return Some(format!("has no {carrier}{id} with `{name}`{absent}"));
+        }
+        if probe.nearest.is_some() && probe.id.is_none() && missing > 0 {
+            return Some(format!(
                 "the nearest {carrier} cannot be known{absent}: choose by `id` or join the files \
                  with `epu`"
-            ))),
-            Some(_) if probe.id.is_none() && probe.nearest.is_none() && count > 1 => {
-                let text =
-                    format!("`{name}` has a value at {count} {carrier}s: give `id` or `nearest`");
-                Err(self.complain(text))
-            }
-            Some(found) => Ok(found),
+            ));
         }
+        if probe.id.is_none() && probe.nearest.is_none() && found.count > 1 {
+            let count = found.count;
+            return Some(format!(
+                "`{name}` has a value at {count} {carrier}s: give `id` or `nearest`"
+            ));
+        }
+        None
     }
 }
 

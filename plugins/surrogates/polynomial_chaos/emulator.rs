@@ -72,6 +72,11 @@ impl Expansion {
         self.basis.terms()
     }
 
+    /// Where the parameters sit in their families.
+    pub fn basis_coordinates(&self) -> Vec<Coordinate> {
+        self.basis.coordinates().to_vec()
+    }
+
     fn moments(&self) -> Sensitivity {
         sensitivity::sensitivity(self.basis.terms(), &self.coefficients, self.dimension())
     }

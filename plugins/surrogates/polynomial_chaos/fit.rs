@@ -23,8 +23,9 @@ const USELESS: f64 = 0.5;
 
 /// One output over the runs.
 struct Output {
-    values: Vec<f64>,
     mean: f64,
+    /// The values less their mean.
+    centred: Vec<f64>,
     /// Divided by the number of runs; zero for outputs that do not vary.
     variance: f64,
 }
@@ -125,9 +126,10 @@ fn outputs(responses: &Matrix) -> Vec<Output> {
     let columns = responses.transposed();
     let output = |values: &[f64]| {
         let mean = values.iter().sum::<f64>() / runs;
-        let variance = values.iter().map(|y| (y - mean) * (y - mean)).sum::<f64>() / runs;
+        let centred: Vec<f64> = values.iter().map(|y| y - mean).collect();
+        let variance = centred.iter().map(|y| y * y).sum::<f64>() / runs;
         let varies = variance.sqrt() > ROUND_OFF * largest;
-        Output { values: values.to_vec(), mean, variance: if varies { variance } else { 0.0 } }
+        Output { mean, centred, variance: if varies { variance } else { 0.0 } }
     };
     columns.iter_rows().map(output).collect()
 }
@@ -203,7 +205,8 @@ impl Degrees<'_> {
                 let regression = Regression::new(&basis).ok_or_else(|| dependent(degree))?;
                 let terms: Vec<usize> = (0..basis.columns()).collect();
                 let best = |&o: &usize| {
-                    let error = regression.fit(&outputs[o].values, outputs[o].variance).relative;
+                    let Output { mean, centred, variance } = &outputs[o];
+                    let error = regression.fit(*mean, centred, *variance).relative;
                     Some(Best { error, degree, terms: terms.clone() })
                 };
                 Ok(active.par_iter().map(best).collect())
@@ -219,12 +222,7 @@ impl Degrees<'_> {
         active: &[usize],
     ) -> Vec<Option<Best>> {
         let dictionary = Dictionary::new(basis);
-        let centred = Matrix::from_rows(
-            basis.rows(),
-            active.iter().map(|&o| {
-                outputs[o].values.iter().map(|y| y - outputs[o].mean).collect::<Vec<_>>()
-            }),
-        );
+        let centred = Matrix::from_rows(basis.rows(), active.iter().map(|&o| &outputs[o].centred));
         let correlations = multiply_transposed(&centred, dictionary.columns());
         let window = self.options.early_stop.window(basis.columns() - 1);
         let best = |i: usize| {
@@ -240,9 +238,8 @@ impl Degrees<'_> {
     /// The least-squares fit of an output on its chosen terms; on the constant alone without any.
     fn refit(&self, output: &Output, best: Option<&Best>) -> Result<Refit, Stop> {
         let Some(best) = best else {
-            let n = output.values.len() as f64;
-            let residuals =
-                output.values.iter().map(|y| (y - output.mean) / (1.0 - 1.0 / n)).collect();
+            let n = output.centred.len() as f64;
+            let residuals = output.centred.iter().map(|y| y / (1.0 - 1.0 / n)).collect();
             return Ok(Refit {
                 terms: vec![0],
                 degree: 0,
@@ -254,7 +251,7 @@ impl Degrees<'_> {
         let terms = self.nested.terms.select(&best.terms);
         let basis = Basis::new(self.coordinates.to_vec(), terms).values(self.training.points);
         let regression = Regression::new(&basis).ok_or_else(|| dependent(best.degree))?;
-        let fit = regression.fit(&output.values, output.variance);
+        let fit = regression.fit(output.mean, &output.centred, output.variance);
         Ok(Refit {
             terms: best.terms.clone(),
             degree: best.degree,

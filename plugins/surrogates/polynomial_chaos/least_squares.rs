@@ -51,15 +51,18 @@ impl Regression {
         Some(Self { q: qr.q, r: qr.r, leverage, correction: correction(n, p, trace) })
     }
 
-    /// Fits one output; `variance` is that of its values, divided by `N`.
-    pub fn fit(&self, values: &[f64], variance: f64) -> Fit {
-        let mut coefficients = transposed_multiply_vector(&self.q, values);
+    /// Fits one output, given as its mean and what is left; `variance` is that of its values, divided
+    /// by `N`. The first basis function must be the constant 1: it takes the mean, so that a large one
+    /// costs no digits.
+    pub fn fit(&self, mean: f64, centred: &[f64], variance: f64) -> Fit {
+        let mut coefficients = transposed_multiply_vector(&self.q, centred);
         let model = multiply_vector(&self.q, &coefficients);
         solve_upper(&self.r, &mut coefficients);
-        let residuals: Vec<f64> = (values.iter().zip(&model).zip(&self.leverage))
+        coefficients[0] += mean;
+        let residuals: Vec<f64> = (centred.iter().zip(&model).zip(&self.leverage))
             .map(|((y, m), h)| (y - m) / (1.0 - h))
             .collect();
-        let squares = residuals.iter().map(|r| r * r).sum::<f64>() / values.len() as f64;
+        let squares = residuals.iter().map(|r| r * r).sum::<f64>() / centred.len() as f64;
         let relative = squares / variance * self.correction;
         Fit {
             coefficients,

@@ -191,6 +191,13 @@ fn what_follows_from_a_problem_is_not_reported() {
 }
 
 #[test]
+fn an_unknown_key_hides_no_other_problem() {
+    let text = "walkers = 1\nstepz = 2\nprior = { uniform = [2, 1] }\n[degree]\nx = 1\nmax = 0";
+    let heads = heads::<Options>(text);
+    assert_eq!(heads.len(), 4, "{heads:?}");
+}
+
+#[test]
 fn choices_say_how_they_are_written() {
     let shown = decoded::<BTreeMap<String, Prior>>(
         "a = 'uniform'\nb = { flat = 1 }\nc = {}\nd = { flat = {}, normal = {} }\ne = 1\nf = 'normal'",
@@ -299,4 +306,23 @@ fn keys_that_belong_to_the_engine_are_known() {
     assert!(shown.contains("did you mean `training`?"), "{shown}");
     assert_eq!(fields::<Degree>(), ["max", "interaction"]);
     assert!(fields::<f64>().is_empty());
+}
+
+#[test]
+fn a_type_may_name_unknown_and_missing_keys_itself() {
+    #[derive(Debug)]
+    struct Picky;
+    impl<'de> Deserialize<'de> for Picky {
+        fn deserialize<D: serde::Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+            use serde::de::Error;
+            let keys = BTreeMap::<String, f64>::deserialize(d)?;
+            if keys.contains_key("a") {
+                return Err(D::Error::unknown_field("a", &["b"]));
+            }
+            Err(D::Error::missing_field("b"))
+        }
+    }
+    assert_eq!(heads::<Picky>("a = 1"), ["unknown key `a`"]);
+    assert_eq!(heads::<Picky>("c = 1"), ["missing key `b`"]);
+    assert_eq!(heads::<BTreeMap<String, Box<Picky>>>("x = { a = 1 }\ny = 2").len(), 2);
 }

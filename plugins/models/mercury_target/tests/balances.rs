@@ -65,9 +65,7 @@ fn by_hand(target: &Target, constants: FluidConstants, cutoff: f64) -> Solver<'_
 
 #[test]
 fn axial_momentum_changes_by_the_reactions_of_the_rear() {
-    let mut settings = undamped(0.7);
-    settings.numerics.rear = Rear::Rigid;
-    let target = Target::new(&settings).unwrap();
+    let target = Target::new(&undamped(0.7)).unwrap();
     let constants = FluidConstants {
         linear_viscosity: 0.25,
         quadratic_viscosity: 1.2,
@@ -93,7 +91,7 @@ fn axial_momentum_changes_by_the_reactions_of_the_rear() {
     let part = |m: &[f64], v: &[f64]| m.iter().zip(v).map(|(m, v)| m * v).sum::<f64>();
     let momentum = part(&mass.fluid_z, &solver.velocity.fluid_z)
         + part(&mass.shell_z, &solver.velocity.shell_z);
-    assert!(solver.fluid.cavitated_fraction(mesh) > 0.1);
+    assert!(solver.fluid.longest_saturation.iter().any(|&time| time > 1e-4));
     assert!((momentum - impulse).abs() < 1e-10 * size, "{momentum} {impulse}");
 }
 
@@ -107,7 +105,9 @@ fn undamped_uncavitated_motion_runs_backwards() {
     let moved = solver.fluid.strain.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     // After a step the velocity is half a step old: turning it leads one step back at once.
     for part in solver.velocity.parts_mut() {
-        part.iter_mut().for_each(|v| *v = -*v);
+        for v in part {
+            *v = -*v;
+        }
     }
     solver.drift();
     for _ in 1..500 {
@@ -219,4 +219,31 @@ fn tiny_changes_of_the_mercury_change_the_traces_little() {
         let change = rms_difference(&base, &target.simulate(&mercury).unwrap());
         assert!(change < 3e-6, "{change}");
     }
+}
+
+/// The production law behind another type.
+#[derive(Clone)]
+struct Wrapped(TensileCutoff);
+
+impl EquationOfState for Wrapped {
+    fn update(&mut self, first: usize, strain: &[f64], dt: f64, p: &mut [f64], whole: &mut [f64]) {
+        self.0.update(first, strain, dt, p, whole);
+    }
+
+    fn sound_speed(&self) -> f64 {
+        self.0.sound_speed()
+    }
+
+    fn stored_energy(&self, cell: usize, strain: f64) -> f64 {
+        self.0.stored_energy(cell, strain)
+    }
+}
+
+#[test]
+fn another_equation_of_state_shares_the_solver() {
+    let target = Target::new(&coarse()).unwrap();
+    let Mercury { density, sound_speed, tensile_cutoff } = RIEMER;
+    let initial = target.initial_pressure(&RIEMER);
+    let law = Wrapped(TensileCutoff::new(density, sound_speed, tensile_cutoff, initial));
+    assert_eq!(target.run(density, law).unwrap(), target.simulate(&RIEMER).unwrap());
 }

@@ -96,7 +96,7 @@ fn a_plate_takes_up_an_exponential_wave_and_leaves_the_fluid() {
         if t < leaves {
             worst = worst.max((v - velocity(t)).abs());
         }
-        if solver.fluid.whole.iter().any(|&whole| whole == 0.0) {
+        if solver.fluid.whole.contains(&0.0) {
             first = first.min(t);
         }
     });
@@ -263,26 +263,31 @@ fn cavitation_under_a_floating_plate_opens_and_closes_as_computed_by_characteris
     let exact = Characteristics::new(&plate, end);
     let wave = |z: f64| WAVE.0 * (-z / plate.sound_speed / WAVE.1).exp();
     let cell = plate.depth / plate.cells as f64;
-    let (mut velocity, mut closure, mut opening) = (0.0_f64, 0.0_f64, 0.0_f64);
-    plate.run((0.25, 1.2), wave, true, end, |t, v, solver| {
-        velocity = velocity.max((v - exact.velocity(t)).abs());
-        let cavitated = |whole: &f64| *whole == 0.0;
-        if t > 5e-4 {
-            let top = solver.fluid.whole.iter().position(cavitated).unwrap() as f64 * cell;
-            let bottom = solver.fluid.whole.iter().rposition(cavitated).unwrap() as f64 * cell;
-            closure = closure.max((top - exact.closure(t)).abs());
-            opening = opening.max((bottom - exact.opening(t)).abs());
-        }
-    });
     // Taylor's plate peaks at (2P/ρc) b^{1/(1-b)}, b = 10, while still in touch.
     let peak = exact.velocity.iter().copied().fold(0.0, f64::max);
     let taylor = 2.0 * WAVE.0 / (plate.density * plate.sound_speed) * 10.0_f64.powf(-1.0 / 9.0);
     assert!((peak / taylor - 1.0).abs() < 1e-3, "{peak} {taylor}");
-    assert!(velocity < 0.02 * peak, "{velocity}");
-    assert!(closure < 8.0 * cell, "{closure}");
-    assert!(opening < 20.0 * cell, "{opening}");
-    let by_the_end = exact.velocity(end);
-    assert!(by_the_end < 0.0, "the atmosphere has turned the plate back: {by_the_end}");
+    assert!(exact.velocity(end) < 0.0, "the atmosphere turns the plate back");
+    // Without linear viscosity the layer at the plate rings from the jump at the start and tears
+    // anew; with it, the weak wave that opens the depths is smoothed and so delayed in proportion.
+    let any = f64::INFINITY;
+    for (linear, limits) in
+        [(0.0, [any, any, 10.0]), (0.06, [0.02, any, 40.0]), (0.25, [0.02, 8.0, 90.0])]
+    {
+        let (mut velocity, mut closure, mut opening) = (0.0_f64, 0.0_f64, 0.0_f64);
+        plate.run((linear, 1.2), wave, true, end, |t, v, solver| {
+            velocity = velocity.max((v - exact.velocity(t)).abs());
+            let cavitated = |whole: &f64| *whole == 0.0;
+            if t > 5e-4 {
+                let top = solver.fluid.whole.iter().position(cavitated).unwrap() as f64;
+                let bottom = solver.fluid.whole.iter().rposition(cavitated).unwrap() as f64;
+                closure = closure.max((top - exact.closure(t) / cell).abs());
+                opening = opening.max((bottom - exact.opening(t) / cell).abs());
+            }
+        });
+        let errors = [velocity / peak, closure, opening];
+        assert!(errors.iter().zip(limits).all(|(e, l)| *e < l), "{linear} {errors:?}");
+    }
 }
 
 #[test]

@@ -107,6 +107,8 @@ fn input_without_meaning_is_refused_by_name() {
     assert!(message(|s| s.geometry.length = 0.04).starts_with("`geometry.length`"));
     assert!(message(|s| s.numerics.mesh = Cells::Explicit([1, 90])).contains("[1, 90]"));
     assert!(message(|s| s.gauges.0[1].position = 0.6).contains("position of gauge C"));
+    assert_eq!(message(|s| s.gauges.0[1].name = "B".into()), "two gauges are named `B`");
+    assert!(message(|s| s.gauges.0.clear()).starts_with("`gauges` is empty"));
     assert!(message(|s| s.sampling.count = 0).contains("sampling.count"));
     assert!(message(|s| s.sampling.interval = 1e3).contains("time steps"));
     let refused = |mercury: Mercury| simulate(&Settings::default(), &mercury).unwrap_err();
@@ -137,6 +139,8 @@ fn settings_read_from_text() {
     assert!(wrong.unwrap_err().to_string().contains("[radial cells, axial cells]"));
     let unknown = serde_json::from_str::<Settings>(r#"{"gauge": []}"#);
     assert!(unknown.unwrap_err().to_string().contains("unknown field `gauge`"));
+    let schema = serde_json::to_string(&schemars::schema_for!(Settings)).unwrap();
+    assert!(schema.contains("Peak initial pressure"));
     let default = serde_json::to_string(&Settings::default()).unwrap();
     assert_eq!(serde_json::from_str::<Settings>(&default).unwrap(), Settings::default());
 }

@@ -2,6 +2,7 @@
 //! printed layout.
 #![allow(clippy::unwrap_used)]
 
+mod c_library;
 mod exodus;
 mod heartbeat;
 mod hostile;

@@ -6,11 +6,15 @@ use lacuna::data::{Axis, Ensemble, Layout, Parameter, Unit};
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::Reader;
 use lacuna::plugin::reader::EnsembleSource;
+use lacuna::plugin::registry::{self, NoKeys};
+use lacuna::study::read::read;
+use lacuna::study::{Problems, Sources};
 
 use super::super::Sierra;
 use super::super::probe::Probe;
 use super::super::signal::Signal;
 use super::{base, largest_difference, reference, sample};
+use crate::readers::runs::AllowFailed;
 
 const GAUGES: [&str; 10] = ["B", "C", "G", "M", "R", "T", "U", "V", "Y", "Z"];
 
@@ -93,11 +97,11 @@ fn unfinished_and_damaged_runs_are_named() {
     let layout = layout(times, "1");
     let whole = std::fs::read(sample("hist_cdf2.h")).unwrap();
     let text = std::fs::read_to_string(sample("hb_default.txt")).unwrap();
-    let half: String = text.lines().take(50).map(|line| format!("{line}\n")).collect();
+    let half: Vec<&str> = text.lines().take(50).collect();
     let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
     write("good.h", &whole);
     write("cut.h", &whole[..whole.len() / 2]);
-    write("half.h", half.as_bytes());
+    write("half.h", (half.join("\n") + "\n").as_bytes());
     write("nan.h", text.replace("strain_T=1.33600e-06", "strain_T=-nan").as_bytes());
     write("runs.csv", b"run,density\ngood,1\ncut,2\nhalf,3\nnan,4\ngone,5\n");
     let reader = Sierra { file: Some("{run}.h".into()), ..reader() };
@@ -113,7 +117,7 @@ fn unfinished_and_damaged_runs_are_named() {
     ] {
         assert!(complaint.contains(expected), "expected `{expected}` in `{complaint}`");
     }
-    let allowed = Sierra { allow_failed: 0.8, ..reader.clone() };
+    let allowed = Sierra { allow_failed: AllowFailed::new(0.8).unwrap(), ..reader.clone() };
     let ensemble = ensemble(folder.path(), &allowed, &layout).unwrap();
     assert_eq!((&ensemble.runs[..], ensemble.failed.len()), (&["good".to_owned()][..], 4));
     assert_eq!(reader.files(folder.path()).len(), 6);
@@ -159,4 +163,49 @@ fn inspect_shows_variables_and_their_signals() {
     let stress = contents.variables.iter().find(|v| v.on == "element block `block_2`").unwrap();
     let column = stress.signals.column("stress_xx element 81").unwrap();
     assert_eq!(column.values[1], -30_413.428_418_187_406);
+}
+
+#[test]
+fn options_decode_from_a_study() {
+    let text = r#"
+        use = "sierra"
+        runs = "runs.csv"
+        file = "run_{run}/strain.h"
+        variable = "strain_{sensor}"
+        unit = "microstrain"
+        allow_failed = 3
+        [sensors.B]
+        variable = "log_strain"
+        kind = "element"
+        block = "nose"
+        nearest = [0.055, 0, 0.0]
+        direction = [1.0, 1.0, 0.0]
+        [sensors.C]
+        variable = "surface_strain"
+        kind = "side_set"
+        block = 12
+        id = 117
+        side = 3
+    "#;
+    let decode = |text: &str| {
+        let (mut sources, mut problems) = (Sources::default(), Problems::default());
+        let source = sources.add_argument("test", text.to_owned());
+        let node = read(source, &sources, &mut problems).unwrap();
+        let section = registry::section::<dyn Reader, NoKeys>(&node, None, &mut problems);
+        section.map(|section| section.built.options).ok_or_else(|| format!("{problems:?}"))
+    };
+    let options = decode(text).unwrap();
+    assert_eq!(options["sensors"]["B"]["block"], "nose".into());
+    assert_eq!(options["sensors"]["C"]["block"], 12.into());
+    assert_eq!((&options["tolerance"], &options["allow_failed"]), (&0.01.into(), &3.0.into()));
+    for (wrong, expected) in [
+        ("allow_failed = 1.5", "a fraction from 0 to 1 or a whole number of runs"),
+        ("tolerance = 2", "a fraction between 0 and 1"),
+        ("unit = 'furlongs'", "a unit such as"),
+        ("sensors.B.at = 3", "at"),
+        ("sensors.B = {}", "variable"),
+    ] {
+        let text = decode(&format!("use = 'sierra'\n{wrong}")).unwrap_err();
+        assert!(text.contains(expected), "expected `{expected}` in `{text}`");
+    }
 }

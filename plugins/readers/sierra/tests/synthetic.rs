@@ -45,7 +45,7 @@ impl Mesh {
         let v = file.add_variable::<f32>("vals_nod_var", &[step, count, nodes]).unwrap();
         let numbers: Vec<f32> = (0..18).map(|i| i as f32).collect();
         file.write_variable(v, &numbers).unwrap();
-        self.sets(&mut file, step, length);
+        Self::sets(&mut file, step, length);
         let (_, bytes) = file.to_vec(NcWriteOptions::classic()).unwrap();
         std::fs::write(path, bytes).unwrap();
     }
@@ -66,7 +66,7 @@ impl Mesh {
     }
 
     /// A variable of the second block only, one of a node set and one of a side set.
-    fn sets(&self, file: &mut NcFileBuilder, step: DimensionId, length: DimensionId) {
+    fn sets(file: &mut NcFileBuilder, step: DimensionId, length: DimensionId) {
         let two = file.add_dimension("two", 2).unwrap();
         names(file, "elem", length, &["heat", "damage"]);
         let blocks = file.add_dimension("table_rows", 2).unwrap();
