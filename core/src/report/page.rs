@@ -55,14 +55,14 @@ pub struct Numbers {
 }
 
 impl Numbers {
-    /// A numbered figure: a drawing, its legend, its caption.
-    pub fn figure(&mut self, drawing: String, keys: &[Key], caption: &Caption) -> Markup {
+    /// A numbered figure: its legend, its drawings below each other, its caption.
+    pub fn figure(&mut self, drawings: &[String], keys: &[Key], caption: &Caption) -> Markup {
         self.figures += 1;
         let number = self.figures;
         html! {
             figure id=(format!("figure-{number}")) {
                 @if !keys.is_empty() { div.legend { @for key in keys { (legend_key(key)) } } }
-                div.scroll { (PreEscaped(drawing)) }
+                @for drawing in drawings { div.scroll { (PreEscaped(drawing)) } }
                 figcaption { b { "Figure " (number) ". " } (caption.html()) }
             }
         }

@@ -3,6 +3,7 @@
 use maud::{Markup, html};
 
 use super::number::typeset;
+use super::page::paragraph;
 
 /// On which side the cells of a column stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,7 +66,12 @@ impl Table {
                     @for row in &self.rows {
                         tr.emphasis[row.emphasis] {
                             @for (cell, (_, side)) in row.cells.iter().zip(&self.heads) {
-                                td.(class(*side)) { (typeset(cell)) }
+                                td.(class(*side)) {
+                                @match side {
+                                    Side::Left => (paragraph(cell)),
+                                    Side::Right => (typeset(cell)),
+                                }
+                            }
                             }
                         }
                     }

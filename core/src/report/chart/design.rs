@@ -23,7 +23,7 @@ pub struct DesignColumn {
 pub type DesignPoints = Vec<(&'static str, Vec<usize>)>;
 
 /// The largest number of parameters that a page has room for.
-const MOST: usize = 6;
+pub const MOST_CROSSED: usize = 6;
 
 /// Scatter plots of every pair below the diagonal, histograms on it.
 pub fn design_matrix(
@@ -31,7 +31,7 @@ pub fn design_matrix(
     classes: &DesignPoints,
     description: &str,
 ) -> String {
-    let n = columns.len().min(MOST);
+    let n = columns.len().min(MOST_CROSSED);
     let grid = Grid::new(n);
     let mut svg = Svg::new(WIDTH, grid.height());
     let axes: Vec<Axis> = columns.iter().map(axis).collect();

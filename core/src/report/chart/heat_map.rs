@@ -5,30 +5,44 @@ use crate::linalg::Matrix;
 use crate::report::number::{fixed, typeset};
 use crate::report::svg::{Anchor, Area, Svg};
 
-/// A correlation matrix; blue is positive, red negative, and every square carries its number.
+/// The room for names beside the squares.
+const NAMES: f64 = 210.0;
+/// Smaller squares have no room for their number, which then shows when they are pointed at.
+const SMALLEST_WITH_NUMBER: f64 = 34.0;
+/// Smaller squares have no room for a name below them: columns are numbered instead.
+const SMALLEST_WITH_NAME: f64 = 60.0;
+
+/// A correlation matrix; blue is positive, red negative.
 pub fn correlation_map(names: &[String], correlation: &Matrix, description: &str) -> String {
     let n = names.len().min(correlation.rows()).min(correlation.columns());
-    let side = (560.0 / n.max(1) as f64).clamp(26.0, 96.0);
-    let width = side * n as f64;
-    let left = 200.0_f64.max((WIDTH - width) / 2.0).min(WIDTH - width);
+    let side = ((WIDTH - NAMES) / n.max(1) as f64).min(96.0);
+    let left = NAMES.max((WIDTH - side * n as f64) / 2.0);
     let mut svg = Svg::new(WIDTH, side * n as f64 + 34.0);
     for (i, name) in names.iter().take(n).enumerate() {
         let top = i as f64 * side + 4.0;
-        svg.text("cell-name", (left - 10.0, top + 0.5 * side + 4.0), Anchor::End, name);
+        let is_named = side >= SMALLEST_WITH_NAME;
+        let beside = if is_named { name.clone() } else { format!("{name} · {}", i + 1) };
+        svg.text("cell-name", (left - 10.0, top + 0.5 * side + 4.0), Anchor::End, &beside);
         let below = (left + (i as f64 + 0.5) * side, side * n as f64 + 22.0);
-        svg.text("cell-name", below, Anchor::Middle, &shortened(name, side));
+        let label = if is_named { shortened(name, side) } else { (i + 1).to_string() };
+        svg.text("cell-name", below, Anchor::Middle, &label);
         for j in 0..n {
-            let value = correlation[(i, j)];
             let cell = Area::new(left + j as f64 * side, top, side - 2.0, side - 2.0);
-            let text = typeset(&fixed(value, 2));
-            let hint = format!("{name}, {}: {text}", names[j]);
-            svg.rectangle(&format!("cell {}", shade(value)), cell, &hint);
-            let middle = (cell.x + 0.5 * cell.width, cell.y + 0.5 * cell.height + 4.5);
-            let class = if value.abs() > 0.6 { "cell-light" } else { "cell-dark" };
-            svg.text(class, middle, Anchor::Middle, &text);
+            draw_cell(&mut svg, cell, (name, &names[j]), correlation[(i, j)]);
         }
     }
     svg.finish(description)
+}
+
+fn draw_cell(svg: &mut Svg, cell: Area, names: (&str, &str), value: f64) {
+    let text = typeset(&fixed(value, 2));
+    let hint = format!("{}, {}: {text}", names.0, names.1);
+    svg.rectangle(&format!("cell {}", shade(value)), cell, &hint);
+    if cell.width >= SMALLEST_WITH_NUMBER {
+        let middle = (cell.x + 0.5 * cell.width, cell.y + 0.5 * cell.height + 4.5);
+        let class = if value.abs() > 0.6 { "cell-light" } else { "cell-dark" };
+        svg.text(class, middle, Anchor::Middle, &text);
+    }
 }
 
 /// The class of a colour: five steps on either side of zero.

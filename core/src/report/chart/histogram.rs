@@ -58,8 +58,15 @@ const SECOND: f64 = 32.0;
 const ROW: f64 = 236.0;
 const BOTTOM: f64 = 44.0;
 
+/// Rows of one drawing; more rows make another, so that each fits on a sheet of paper.
+const SHEET_ROWS: usize = 3;
+
 /// Panels of marginals, two a row, each on its own axes.
-pub fn marginals(panels: &[Marginal], description: &str) -> String {
+pub fn marginals(panels: &[Marginal], description: &str) -> Vec<String> {
+    panels.chunks(2 * SHEET_ROWS).map(|panels| sheet(panels, description)).collect()
+}
+
+fn sheet(panels: &[Marginal], description: &str) -> String {
     let columns = panels.len().clamp(1, 2);
     let rows = panels.len().div_ceil(columns);
     let width = (WIDTH - LEFT - 10.0 - (columns - 1) as f64 * GAP) / columns as f64;
@@ -110,6 +117,8 @@ fn draw_marks(svg: &mut Svg, frame: &Frame, marks: &[Mark]) {
     let area = frame.area;
     for (i, mark) in marks.iter().filter(|m| m.value.is_finite()).enumerate() {
         let text_y = area.y + 13.0 + 14.0 * i as f64;
+        // Of two marks near each other the left one is labelled on its left.
+        let is_left = marks.iter().any(|other| other.value > mark.value);
         let label = format!("label {}", mark.class);
         if mark.value < low {
             svg.text(&label, (area.x + 4.0, text_y), Anchor::Start, &format!("◂ {}", mark.label));
@@ -119,9 +128,13 @@ fn draw_marks(svg: &mut Svg, frame: &Frame, marks: &[Mark]) {
         } else {
             let place = frame.x.place(mark.value);
             svg.line(&format!("line {}", mark.class), (place, area.y), (place, area.bottom()));
-            let on_the_right = place < area.x + 0.6 * area.width;
-            let (shift, anchor) =
-                if on_the_right { (4.0, Anchor::Start) } else { (-4.0, Anchor::End) };
+            let width = 7.0 * mark.label.chars().count() as f64;
+            let (before, after) = (place - area.x > width, area.right() - place > width);
+            let (shift, anchor) = if before && (is_left || !after) {
+                (-4.0, Anchor::End)
+            } else {
+                (4.0, Anchor::Start)
+            };
             svg.text(&label, (place + shift, text_y), anchor, &mark.label);
         }
     }

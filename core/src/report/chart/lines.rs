@@ -41,8 +41,15 @@ const GAP: f64 = 20.0;
 const TOP: f64 = 22.0;
 const BOTTOM: f64 = 34.0;
 
+/// Rows of one drawing; more rows make another, so that each fits on a sheet of paper.
+const SHEET_ROWS: usize = 6;
+
 /// Panels beside and below each other, on the same axes, so that their sizes can be compared.
-pub fn small_multiples(panels: &[Panel], x: &Axis, y: &Axis, description: &str) -> String {
+pub fn small_multiples(panels: &[Panel], x: &Axis, y: &Axis, description: &str) -> Vec<String> {
+    panels.chunks(2 * SHEET_ROWS).map(|panels| sheet(panels, x, y, description)).collect()
+}
+
+fn sheet(panels: &[Panel], x: &Axis, y: &Axis, description: &str) -> String {
     let columns = if panels.len() == 1 { 1 } else { 2 };
     let rows = panels.len().div_ceil(columns);
     let row_height = if rows == 1 { 250.0 } else { 142.0 };

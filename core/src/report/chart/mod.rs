@@ -11,11 +11,11 @@ mod scatter;
 mod trace;
 
 pub use bars::{BarChart, BarSeries, Level};
-pub use design::{DesignColumn, design_matrix};
+pub use design::{DesignColumn, MOST_CROSSED, design_matrix};
 pub use heat_map::correlation_map;
 pub use histogram::{Marginal, Mark, SecondAxis, marginals};
 pub use lines::{Band, Curve, Panel, small_multiples};
-pub use pairs::{PairColumn, pair_matrix};
+pub use pairs::{MOST_PAIRED, PairColumn, pair_matrix};
 pub use rows::{Row, row_chart};
 pub use scatter::agreement;
 pub use trace::{Trace, traces};

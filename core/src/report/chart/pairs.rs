@@ -22,14 +22,14 @@ pub struct PairColumn {
 }
 
 /// The largest number of coordinates that a page has room for.
-const MOST: usize = 6;
+pub const MOST_PAIRED: usize = 6;
 
 /// Shades of the hexagons, from rare to frequent.
 const SHADES: usize = 6;
 
 /// Every pair of coordinates below the diagonal.
 pub fn pair_matrix(columns: &[PairColumn], description: &str) -> String {
-    let n = columns.len().min(MOST);
+    let n = columns.len().min(MOST_PAIRED);
     let grid = Grid::new(n);
     let mut svg = Svg::new(WIDTH, grid.height());
     let axes: Vec<Axis> = columns.iter().map(axis).collect();

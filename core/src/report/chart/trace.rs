@@ -35,8 +35,15 @@ const BOTTOM: f64 = 38.0;
 const SIDE: f64 = 150.0;
 const GAP: f64 = 12.0;
 
+/// Rows of one drawing; more rows make another, so that each fits on a sheet of paper.
+const SHEET_ROWS: usize = 5;
+
 /// One row a coordinate: the trace, and the density of what is kept.
-pub fn traces(rows: &[Trace], last_step: usize, description: &str) -> String {
+pub fn traces(rows: &[Trace], last_step: usize, description: &str) -> Vec<String> {
+    rows.chunks(SHEET_ROWS).map(|rows| sheet(rows, last_step, description)).collect()
+}
+
+fn sheet(rows: &[Trace], last_step: usize, description: &str) -> String {
     let mut svg = Svg::new(WIDTH, rows.len() as f64 * ROW + BOTTOM - 8.0);
     for (i, row) in rows.iter().enumerate() {
         let top = i as f64 * ROW + TOP;

@@ -2,8 +2,8 @@
 
 use maud::html;
 
-use super::titled;
-use crate::report::chart::{DesignColumn, Key, design_matrix};
+use super::{first_of, titled};
+use crate::report::chart::{DesignColumn, Key, MOST_CROSSED, design_matrix};
 use crate::report::findings::{EnsembleFindings, Findings};
 use crate::report::number::count;
 use crate::report::page::{Caption, Numbers, Section};
@@ -48,13 +48,16 @@ fn figure(findings: &Findings, ensemble: &EnsembleFindings, numbers: &mut Number
         "scatter plots of the design, one for each pair of parameters",
     );
     let caption = Caption::new(
-        "The design: every run in each pair of parameters, with histograms on the diagonal.",
+        format!(
+            "The design: every run in each pair of parameters, with histograms on the diagonal.{}",
+            first_of(columns.len(), MOST_CROSSED)
+        ),
         "the design's points are where the simulator was run and stand for no belief; the box holds \
          the central 99.8 % of the prior.",
         "runs inside the prior's box, for only there the surrogate's training bears on the posterior; \
          a box with few runs wants a second design.",
     );
-    numbers.figure(drawing, &keys, &caption)
+    numbers.figure(&[drawing], &keys, &caption)
 }
 
 fn column(findings: &Findings, ensemble: &EnsembleFindings, j: usize) -> DesignColumn {

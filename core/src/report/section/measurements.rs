@@ -67,7 +67,7 @@ fn figure(findings: &Findings, measured: &MeasuredFindings, numbers: &mut Number
         "the replicates: the band is where single repetitions fall, not the error of their mean.",
         "curves apart from the others, bands that widen late, gaps.",
     );
-    numbers.figure(drawing, &keys, &caption)
+    numbers.figure(&drawing, &keys, &caption)
 }
 
 fn panel(measured: &MeasuredFindings, outline: &CurvePanel, unit: &ShownUnit) -> Panel {

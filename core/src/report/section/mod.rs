@@ -75,6 +75,14 @@ pub fn group_word(layout: &Layout) -> &str {
     }
 }
 
+/// That a figure shows the first `most` of `all` coordinates, as a sentence; empty when it shows all.
+pub fn first_of(all: usize, most: usize) -> String {
+    if all <= most {
+        return String::new();
+    }
+    format!(" Of {all} coordinates the first {most} are shown.")
+}
+
 /// Facts as a list of terms.
 pub fn fact_list(facts: &[Fact]) -> maud::Markup {
     maud::html! {

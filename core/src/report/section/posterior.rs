@@ -3,9 +3,10 @@
 use maud::{Markup, html};
 
 use super::sampling::{kept_draws, marks};
-use super::{coordinate_unit, response_unit, titled};
+use super::{coordinate_unit, first_of, response_unit, titled};
 use crate::report::chart::{
-    Curve, Key, Marginal, Mark, PairColumn, SecondAxis, correlation_map, marginals, pair_matrix,
+    Curve, Key, MOST_PAIRED, Marginal, Mark, PairColumn, SecondAxis, correlation_map, marginals,
+    pair_matrix,
 };
 use crate::report::curve::named_density;
 use crate::report::findings::{CalibrationFindings, CoordinateFindings, Findings};
@@ -22,7 +23,8 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
         (summary(calibration, numbers))
         @if several { (correlation(calibration, numbers)) }
         @if !calibration.draws.is_empty() {
-            (marginal_figures(findings, calibration, numbers))
+            (parameter_marginals(findings, calibration, numbers))
+            (hyperparameter_marginals(findings, calibration, numbers))
             @if several { (pairs(calibration, numbers)) }
         }
         (fits(calibration, numbers))
@@ -54,7 +56,7 @@ fn summary(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
         "Posterior of the parameters and of the hyperparameters. Mean, sd and quantiles are those of \
          the draws after the burn-in; the MAP is the optimised maximum of the density. Numbers end \
          at the first digit of the Monte Carlo standard error (MCSE) of the mean.",
-        "posterior, given this model and this discrepancy; it holds no doubt about the model's form.",
+        "posterior, given this model and this discrepancy: doubt about the form of either is not in it.",
         "R-hat above 1.01, effective sample sizes (ESS) below some hundreds.",
     );
     numbers.table(&posterior_table(calibration), &caption)
@@ -68,67 +70,82 @@ fn correlation(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Mark
         "the posterior.",
         "numbers near ±1: the data fix a combination of the two and not each of them.",
     );
-    numbers.figure(drawing, &[], &caption)
+    numbers.figure(&[drawing], &[], &caption)
 }
 
-fn marginal_figures(
+/// More coordinates of one kind than this have no histogram.
+const MOST_SHOWN: usize = 16;
+
+fn parameter_marginals(
     findings: &Findings,
     calibration: &CalibrationFindings,
     numbers: &mut Numbers,
 ) -> Markup {
-    let split = findings.parameters.len().min(calibration.coordinates.len());
-    let (parameters, hyper): (Vec<_>, Vec<_>) = calibration
-        .coordinates
-        .iter()
-        .enumerate()
-        .map(|(i, c)| (i, marginal(findings, calibration, i, c)))
-        .partition(|(i, _)| *i < split);
-    let panels = |pairs: Vec<(usize, Marginal)>| pairs.into_iter().map(|p| p.1).collect::<Vec<_>>();
-    let (parameters, hyper) = (panels(parameters), panels(hyper));
-    let mut keys = vec![
+    let all = findings.parameters.len().min(calibration.coordinates.len());
+    let shown = 0..all.min(MOST_SHOWN);
+    let panels: Vec<Marginal> = shown.map(|i| marginal(findings, calibration, i)).collect();
+    let mut keys = marginal_keys().to_vec();
+    if calibration.coordinates[..all].iter().any(|c| c.reference.is_some()) {
+        keys.push(Key::line("m-reference", "reference"));
+    }
+    let caption = Caption::new(
+        format!(
+            "Marginals of the parameters, scaled to area one. An arrow at the edge points to a mark \
+             beyond the axis.{}",
+            first_of(all, MOST_SHOWN)
+        ),
+        "histogram and fitted curve the posterior, grey dots the prior.",
+        "a histogram cut off at the prior's bound; a posterior as wide as the prior, which means that \
+         the data said nothing; a reference in the tail.",
+    );
+    numbers.figure(&marginals(&panels, "marginals of the parameters"), &keys, &caption)
+}
+
+fn hyperparameter_marginals(
+    findings: &Findings,
+    calibration: &CalibrationFindings,
+    numbers: &mut Numbers,
+) -> Markup {
+    let first = findings.parameters.len().min(calibration.coordinates.len());
+    let all = calibration.coordinates.len() - first;
+    if all == 0 {
+        return html! {};
+    }
+    let shown = first..first + all.min(MOST_SHOWN);
+    let panels: Vec<Marginal> = shown.map(|i| marginal(findings, calibration, i)).collect();
+    let second = if panels.iter().any(|m| m.second.is_some()) {
+        " Where there is an upper axis, the lower one is the variance and the upper one its square \
+         root, the standard deviation in the response's unit; the density is that of the variance."
+    } else {
+        ""
+    };
+    let caption = Caption::new(
+        format!(
+            "Marginals of the hyperparameters, scaled to area one.{second}{}",
+            first_of(all, MOST_SHOWN)
+        ),
+        "histogram and fitted curve the posterior, grey dots the prior. A discrepancy's standard \
+         deviation is that of single data around the model, not an uncertainty of the parameters.",
+        "a standard deviation far above the spread of the replicates: the model misses something.",
+    );
+    numbers.figure(
+        &marginals(&panels, "marginals of the hyperparameters"),
+        &marginal_keys(),
+        &caption,
+    )
+}
+
+fn marginal_keys() -> [Key; 4] {
+    [
         Key::area("s-histogram", "draws"),
         Key::line("s-fit", "best-fitting named distribution"),
         Key::line("s-prior", "prior"),
         Key::line("m-map", "MAP"),
-    ];
-    let hyper_keys = keys.clone();
-    if calibration.coordinates.iter().any(|c| c.reference.is_some()) {
-        keys.push(Key::line("m-reference", "reference"));
-    }
-    let second = hyper.iter().any(|m| m.second.is_some());
-    html! {
-        @if !parameters.is_empty() {
-            (numbers.figure(marginals(&parameters, "marginals of the parameters"), &keys, &Caption::new(
-                "Marginals of the parameters, scaled to area one. An arrow at the edge points to a \
-                 mark beyond the axis.",
-                "histogram and fitted curve the posterior, grey dashes the prior.",
-                "a histogram cut off at the prior's bound; a posterior as wide as the prior, which \
-                 means that the data said nothing; a reference in the tail.",
-            )))
-        }
-        @if !hyper.is_empty() {
-            (numbers.figure(marginals(&hyper, "marginals of the hyperparameters"), &hyper_keys, &Caption::new(
-                format!(
-                    "Marginals of the hyperparameters, scaled to area one.{}",
-                    if second {
-                        " The lower axis is the variance, the upper axis its square root: the \
-                         standard deviation, in the response's unit. The density is that of the variance."
-                    } else { "" }
-                ),
-                "histogram and fitted curve the posterior, grey dashes the prior. A discrepancy's sd is \
-                 that of single data around the model, not an uncertainty of the parameters.",
-                "an sd far above the spread of the replicates: the model misses something.",
-            )))
-        }
-    }
+    ]
 }
 
-fn marginal(
-    findings: &Findings,
-    calibration: &CalibrationFindings,
-    i: usize,
-    c: &CoordinateFindings,
-) -> Marginal {
+fn marginal(findings: &Findings, calibration: &CalibrationFindings, i: usize) -> Marginal {
+    let c = &calibration.coordinates[i];
     let unit = coordinate_unit(c);
     let draws = kept_draws(calibration, i, &unit);
     let natural = extent(draws.iter().map(|d| d * unit.factor));
@@ -188,6 +205,7 @@ fn pairs(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
         .coordinates
         .iter()
         .enumerate()
+        .take(MOST_PAIRED)
         .map(|(i, c)| {
             let unit = coordinate_unit(c);
             PairColumn {
@@ -203,13 +221,16 @@ fn pairs(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
         keys.push(Key::line("m-reference", "reference"));
     }
     let caption = Caption::new(
-        "The coordinates in pairs: counts of draws in hexagons, shaded by the root of the count, with \
-         densities on the diagonal. The axes hold 99.9 % of the draws; crosses mark the MAP and, \
-         where it is that near, the reference.",
+        format!(
+            "The coordinates in pairs: counts of draws in hexagons, shaded by the root of the count, \
+             with densities on the diagonal. The axes hold 99.9 % of the draws; crosses mark the MAP \
+             and, where it is that near, the reference.{}",
+            first_of(calibration.coordinates.len(), MOST_PAIRED)
+        ),
         "the posterior.",
         "narrow ridges, bananas, several islands.",
     );
-    numbers.figure(pair_matrix(&columns, "the posterior in pairs"), &keys, &caption)
+    numbers.figure(&[pair_matrix(&columns, "the posterior in pairs")], &keys, &caption)
 }
 
 /// The MAP and the reference, both in every column, so that they pair up.

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::{coordinate_unit, fact_list, titled};
+use super::{coordinate_unit, fact_list, first_of, titled};
 use crate::plugin::Fact;
 use crate::report::chart::{Axis, BarChart, BarSeries, Key, Level, Mark, Trace, traces};
 use crate::report::findings::{CalibrationFindings, CoordinateFindings, Findings};
@@ -12,6 +12,15 @@ use crate::report::scale::ShownUnit;
 
 /// About how many points all traces have together.
 const MOST_POINTS: usize = 70_000;
+
+/// About how many chains are drawn.
+const MOST_CHAINS: usize = 200;
+
+/// More coordinates than this have no trace.
+const MOST_ROWS: usize = 16;
+
+/// About how many draws a histogram or a density is made of: more change no pixel.
+const MOST_DRAWS: usize = 200_000;
 
 /// The sampler, where there is a calibration.
 pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
@@ -72,15 +81,17 @@ fn acceptance(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Marku
         "none: each bar is one chain.",
         "chains that hardly move. For ensembles of walkers 0.2 to 0.5 is usual.",
     );
-    numbers.figure(chart.draw("share of accepted moves of every chain"), &keys, &caption)
+    numbers.figure(&[chart.draw("share of accepted moves of every chain")], &keys, &caption)
 }
 
 fn walkers(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
-    let points = calibration.steps * calibration.chains * calibration.coordinates.len();
+    let chains = drawn_chains(calibration);
+    let all = calibration.coordinates.len();
+    let points = calibration.steps * chains.len() * all.min(MOST_ROWS);
     let stride = points.div_ceil(MOST_POINTS).max(1);
     let steps: Vec<usize> = (0..calibration.steps).step_by(stride).collect();
-    let coordinates = calibration.coordinates.iter().enumerate();
-    let rows: Vec<Trace> = coordinates.map(|(i, c)| trace(calibration, (i, c), &steps)).collect();
+    let rows: Vec<Trace> =
+        (0..all.min(MOST_ROWS)).map(|i| trace(calibration, i, &chains, &steps)).collect();
     let last = calibration.steps.saturating_sub(1);
     let drawing = traces(&rows, last, "traces of all chains with the density of the kept draws");
     let mut keys = vec![
@@ -95,27 +106,30 @@ fn walkers(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
     if !calibration.stranded.is_empty() {
         keys.insert(1, Key::line("s-stranded", "stranded chain"));
     }
-    let every = match stride {
-        1 => String::from("every step"),
-        stride => format!("one step in {stride}"),
-    };
     let caption = Caption::new(
         format!(
-            "Every chain against the step ({every} is drawn), and beside it the density of the kept \
-             draws on the same axis. The axis reaches 0.7 of the kept draws' range beyond them; what \
-             starts farther out is cut off.",
+            "Chains against the step, and beside them the density of the kept draws on the same axis. \
+             Drawn are {} of {} chains at one step in {stride}. The axis reaches 0.7 of the kept draws' \
+             range beyond them; what starts farther out is cut off.{}",
+            chains.len(),
+            calibration.chains,
+            first_of(all, MOST_ROWS),
         ),
         "the posterior, after the burn-in.",
         "after the burn-in a band of constant middle and width, without drift and without lonely lines.",
     );
-    numbers.figure(drawing, &keys, &caption)
+    numbers.figure(&drawing, &keys, &caption)
 }
 
-fn trace(
-    calibration: &CalibrationFindings,
-    (i, coordinate): (usize, &CoordinateFindings),
-    steps: &[usize],
-) -> Trace {
+/// Evenly chosen chains, and all stranded ones.
+fn drawn_chains(calibration: &CalibrationFindings) -> Vec<usize> {
+    let stride = calibration.chains.div_ceil(MOST_CHAINS).max(1);
+    let is_drawn = |c: &usize| c.is_multiple_of(stride) || calibration.stranded.contains(c);
+    (0..calibration.chains).filter(is_drawn).collect()
+}
+
+fn trace(calibration: &CalibrationFindings, i: usize, chains: &[usize], steps: &[usize]) -> Trace {
+    let coordinate = &calibration.coordinates[i];
     let unit = coordinate_unit(coordinate);
     let value =
         |chain: usize, step: usize| unit.show(calibration.draw(chain, step, i).unwrap_or(f64::NAN));
@@ -123,8 +137,8 @@ fn trace(
     Trace {
         title: titled(&coordinate.name, &coordinate.symbol),
         label: unit.label(&coordinate.name),
-        chains: (0..calibration.chains).map(chain).collect(),
-        stranded: (0..calibration.chains).map(|c| calibration.stranded.contains(&c)).collect(),
+        chains: chains.iter().map(|&c| chain(c)).collect(),
+        stranded: chains.iter().map(|c| calibration.stranded.contains(c)).collect(),
         steps: steps.to_vec(),
         burn_in: calibration.burn_in,
         kept: kept_draws(calibration, i, &unit),
@@ -133,9 +147,12 @@ fn trace(
     }
 }
 
-/// The draws after the burn-in of one coordinate, in the shown unit, chain after chain.
+/// The draws after the burn-in of one coordinate, in the shown unit, chain after chain; of very many
+/// draws every second, third or further step.
 pub fn kept_draws(calibration: &CalibrationFindings, i: usize, unit: &ShownUnit) -> Vec<f64> {
-    let steps = calibration.burn_in..calibration.steps;
+    let kept = calibration.steps.saturating_sub(calibration.burn_in);
+    let stride = (kept * calibration.chains).div_ceil(MOST_DRAWS).max(1);
+    let steps = (calibration.burn_in..calibration.steps).step_by(stride);
     (0..calibration.chains)
         .flat_map(|chain| steps.clone().map(move |step| (chain, step)))
         .filter_map(|(chain, step)| calibration.draw(chain, step, i))

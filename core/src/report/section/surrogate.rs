@@ -71,7 +71,7 @@ fn pairs(findings: &Findings, surrogate: &SurrogateFindings, numbers: &mut Numbe
         "none is drawn: each dot is one output of one run.",
         "dots off the line, above all a bend at the ends.",
     );
-    numbers.figure(drawing, &keys, &caption)
+    numbers.figure(&[drawing], &keys, &caption)
 }
 
 fn sensitivity(findings: &Findings, sobol: &[(f64, f64)], numbers: &mut Numbers) -> Markup {
@@ -107,5 +107,5 @@ fn sensitivity(findings: &Findings, sobol: &[(f64, f64)], numbers: &mut Numbers)
         "a small total index: the data can say little about that parameter. A total far above the \
          first order: it acts through the others.",
     );
-    numbers.figure(chart.draw("Sobol indices of every parameter"), &keys, &caption)
+    numbers.figure(&[chart.draw("Sobol indices of every parameter")], &keys, &caption)
 }

@@ -28,5 +28,9 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
         "",
     );
     let drawing = row_chart(&rows, "bar s-time", "time of every stage");
-    Some(Section { id: "timing", title: "Time", content: numbers.figure(drawing, &[], &caption) })
+    Some(Section {
+        id: "timing",
+        title: "Time",
+        content: numbers.figure(&[drawing], &[], &caption),
+    })
 }

@@ -118,7 +118,7 @@ fn curves(findings: &Findings, validation: &ValidationFindings, numbers: &mut Nu
          that no choice of these parameters removes.",
     );
     let drawing = small_multiples(&panels, &x, &y, "calibrated simulation against measurements");
-    numbers.figure(drawing, &keys, &caption)
+    numbers.figure(&drawing, &keys, &caption)
 }
 
 fn panel(validation: &ValidationFindings, outline: &CurvePanel, unit: &ShownUnit) -> Panel {
@@ -217,7 +217,7 @@ fn accuracy(findings: &Findings, validation: &ValidationFindings, numbers: &mut 
     let table_caption =
         Caption::new("The same accuracies as numbers, with their mean over the groups.", "", "");
     html! {
-        (numbers.figure(chart.draw("accuracy of every group"), &keys, &caption))
+        (numbers.figure(&[chart.draw("accuracy of every group")], &keys, &caption))
         (numbers.table(&accuracy_table(group_word(&findings.layout), cases), &table_caption))
     }
 }
@@ -251,5 +251,5 @@ fn spread(findings: &Findings, validation: &ValidationFindings, numbers: &mut Nu
          more runs would help.",
     );
     let drawing = row_chart(&rows, "bar s-part", "variance of a new replicate by origin");
-    numbers.figure(drawing, &[], &caption)
+    numbers.figure(&[drawing], &[], &caption)
 }

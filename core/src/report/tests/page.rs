@@ -238,3 +238,22 @@ fn a_variance_for_every_sensor_finds_room() {
     elements(&findings);
     assert!(render(&findings).len() < 3_000_000);
 }
+
+#[test]
+fn very_many_chains_and_coordinates_keep_the_page_small() {
+    let mut findings = findings();
+    let calibration = findings.calibration.as_mut().unwrap();
+    let (chains, steps, width) = (1000, 30, 40);
+    let variance = calibration.coordinates[3].clone();
+    calibration.coordinates.extend((4..width).map(|i| {
+        let name = format!("variance_{i}");
+        CoordinateFindings { name, ..variance.clone() }
+    }));
+    calibration.draws =
+        (0..chains * steps * width).map(|i| ((i * 7919) % 1009) as f64 * 1e-12).collect();
+    (calibration.chains, calibration.steps, calibration.burn_in) = (chains, steps, 10);
+    calibration.acceptance = vec![0.3; chains];
+    calibration.correlation = Matrix::from_fn(width, width, |i, j| f64::from(i == j));
+    elements(&findings);
+    assert!(render(&findings).len() < 3_000_000, "{}", render(&findings).len());
+}
