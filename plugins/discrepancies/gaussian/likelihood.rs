@@ -84,6 +84,7 @@ impl GaussianLikelihood {
         emulator_error: Option<&LowRank>,
         prior: Distribution,
     ) -> Result<Self, Stop> {
+        check(data, emulator_error)?;
         let statistics = Statistics::of(data, emulator_error)?;
         let hyper = vec![Hyperparameter {
             name: "variance".to_owned(),
@@ -142,12 +143,37 @@ impl Statistics {
     }
 }
 
+/// Refuses data and errors that are not on the layout, and values that no normal law gives.
+fn check(data: &Measurements, emulator_error: Option<&LowRank>) -> Result<(), Stop> {
+    let outputs = data.layout.len();
+    for replicate in &data.replicates {
+        let (name, count) = (&replicate.name, replicate.values.len());
+        if count != outputs {
+            let text = format!("replicate `{name}` has {count} values and not {outputs}");
+            return Err(Stop::new(text));
+        }
+        let bad = |value: &Option<f64>| value.is_some_and(|y| !y.is_finite());
+        if let Some(i) = replicate.values.iter().position(bad) {
+            let place = data.layout.describe(i);
+            return Err(Stop::new(format!("replicate `{name}` is not finite at {place}")));
+        }
+    }
+    if let Some(rows) = emulator_error.map(|e| e.factor.rows()).filter(|&rows| rows != outputs) {
+        let text = format!("the emulator's error has {rows} outputs and not {outputs}");
+        return Err(Stop::new(text));
+    }
+    Ok(())
+}
+
 fn error_directions(
     error: &LowRank,
     measured: &[usize],
     weight: &[f64],
 ) -> Result<(Matrix, Vec<f64>), Stop> {
     let factor = &error.factor;
+    if factor.columns() == 0 {
+        return Ok((Matrix::zeros(0, measured.len()), Vec::new()));
+    }
     let weighted = Matrix::from_fn(measured.len(), factor.columns(), |i, j| {
         weight[i] * factor[(measured[i], j)]
     });
