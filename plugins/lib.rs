@@ -3,4 +3,7 @@
 pub mod designs;
 pub mod discrepancies;
 pub mod executors;
+pub mod models;
+pub mod readers;
 pub mod samplers;
+pub mod surrogates;

@@ -6,15 +6,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use lacuna::study::inherit::load_text;
-use lacuna::study::{Problems, Sources};
+use lacuna::study::resolve::load_text;
+// Without this line the linker leaves the plugins out.
+use lacuna_plugins as _;
 
 /// What `lacuna check` says about a study; `name` is its path from the folder of the tests.
 fn check_text(name: &str, text: &str) -> String {
-    let mut sources = Sources::default();
-    let mut problems = Problems::new();
-    load_text(Path::new(name), text.to_owned(), &|_| &[], &mut sources, &mut problems);
-    problems.render(&sources)
+    let checked = load_text(Path::new(name), text, &[]);
+    checked.problems.render(&checked.sources)
 }
 
 fn folder() -> PathBuf {

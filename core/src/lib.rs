@@ -12,6 +12,7 @@ pub mod plugin;
 pub mod posterior;
 pub mod report;
 pub mod run;
+pub mod stage;
 pub mod study;
 
 pub use lacuna_linalg as linalg;

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Local {
-    /// Number of runs at a time; all cores when left out.
+    /// Number of runs at a time; those of `lacuna --threads`, or all cores, when left out.
     pub threads: Option<std::num::NonZeroUsize>,
 }
 
@@ -31,8 +31,7 @@ impl Executor for Local {
         batch: &Batch<'_>,
         finished: &mut dyn FnMut(Finished) -> Result<(), Stop>,
     ) -> Result<(), Stop> {
-        let cores = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-        let threads = self.threads.map_or_else(cores, std::num::NonZero::get);
+        let threads = self.threads.map_or_else(rayon::current_num_threads, std::num::NonZero::get);
         let next = AtomicUsize::new(0);
         let halt = AtomicBool::new(false);
         std::thread::scope(|scope| {

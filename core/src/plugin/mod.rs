@@ -24,4 +24,4 @@ pub use executor::Executor;
 pub use model::{EvalError, Model};
 pub use reader::Reader;
 pub use sampler::{Sampler, Target};
-pub use surrogate::{Emulator, Surrogate};
+pub use surrogate::{Emulator, Sensitivity, Surrogate};

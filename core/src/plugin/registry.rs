@@ -12,8 +12,10 @@ use serde::{Deserialize, Serialize};
 
 use super::manual::{Manual, generator, resolve};
 use crate::study::decode::{decode, decode_beside, fields};
+use crate::study::emit;
 use crate::study::nearest::{nearest, one_of};
-use crate::study::{Node, Place, Problem, Problems};
+use crate::study::read::read;
+use crate::study::{Node, Place, Problem, Problems, Sources};
 
 #[doc(hidden)]
 pub use inventory;
@@ -52,7 +54,7 @@ pub struct Built<K: ?Sized> {
     /// The plugin.
     pub plugin: Box<K>,
     /// All its options, the defaults filled in.
-    pub options: serde_json::Value,
+    pub options: toml::Table,
 }
 
 impl<K: Kind + ?Sized> Entry<K> {
@@ -143,11 +145,10 @@ pub fn build<K: ?Sized, O: DeserializeOwned + Serialize>(
     into_plugin: fn(O) -> Box<K>,
 ) -> Option<Built<K>> {
     let options: O = decode_beside(node, beside, problems)?;
-    let written = serde_json::to_value(&options);
-    match written {
+    match emit::to_table(&options) {
         Ok(written) => Some(Built { name, plugin: into_plugin(options), options: written }),
         Err(error) => {
-            let message = format!("the options of `{name}` cannot be written down: {error}");
+            let message = format!("the options of `{name}` {error}");
             problems.report(Some(node.place.clone()), message);
             None
         }
@@ -162,7 +163,7 @@ pub fn entries<K: Kind + ?Sized>() -> Vec<&'static Entry<K>> {
 }
 
 /// The plugin of a kind with this name, or the complaint that there is none.
-pub fn find<K: Kind + ?Sized>(name: &str) -> Result<&'static Entry<K>, Problem> {
+pub fn find<K: Kind + ?Sized>(name: &str) -> Result<&'static Entry<K>, Box<Problem>> {
     let entries = entries::<K>();
     if let Some(entry) = entries.iter().find(|entry| entry.name == name) {
         return Ok(entry);
@@ -173,7 +174,7 @@ pub fn find<K: Kind + ?Sized>(name: &str) -> Result<&'static Entry<K>, Problem> 
     if let Some(near) = nearest(name, names()) {
         problem.help(format!("did you mean `{near}`?"));
     }
-    Err(problem)
+    Err(Box::new(problem))
 }
 
 /// The names of sorted entries, each once.
@@ -266,9 +267,22 @@ fn located<K: Kind + ?Sized>(
     find::<K>(name)
         .map_err(|problem| {
             let path = problems.path("use");
-            problems.push(Problem { place: Some(place), path, ..problem });
+            problems.push(Problem { place: Some(place), path, ..*problem });
         })
         .ok()
+}
+
+/// A plugin from its options alone, as TOML text; the error is every problem as it is shown.
+///
+/// For tests, contracts and programs that have no study.
+pub fn from_text<K: Kind + ?Sized>(name: &str, options: &str) -> Result<Built<K>, String> {
+    let mut sources = Sources::default();
+    let mut problems = Problems::new();
+    let source = sources.add_argument(&format!("{}.{name}", K::NAME), options.to_owned());
+    let entry = located::<K>(name, Place::whole(source), &mut problems);
+    let node = read(source, &sources, &mut problems);
+    let built = entry.zip(node).and_then(|(entry, node)| (entry.build)(&node, &[], &mut problems));
+    built.ok_or_else(|| problems.render(&sources))
 }
 
 /// One kind of plugin, as data.

@@ -59,6 +59,11 @@ pub trait Emulator: Send + Sync {
         None
     }
 
+    /// Which parameters matter under the design's distribution, where the method knows it exactly.
+    fn sensitivity(&self) -> Option<Sensitivity> {
+        None
+    }
+
     /// How well it fits, judged on its own training runs.
     fn fit_error(&self) -> &FitError;
 
@@ -89,4 +94,32 @@ pub struct FitError {
     pub relative: Vec<f64>,
     /// The leave-one-out residual of each run and output, `runs x outputs`, in the response's unit.
     pub residuals: Matrix,
+}
+
+/// The moments of each output under the design's distribution and Sobol' indices: shares of its
+/// variance. An output without variance has zero indices.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Sensitivity {
+    /// The mean of each output.
+    pub mean: Vec<f64>,
+    /// The variance of each output.
+    pub variance: Vec<f64>,
+    /// The pairs of parameters to which the columns of [`Indices::pairs`] belong.
+    pub pairs: Vec<[usize; 2]>,
+    /// The indices of each output, one a row.
+    pub outputs: Indices,
+    /// The indices of all outputs together, weighted by their variances: one row (Gamboa, Janon,
+    /// Klein and Lagnoux 2014).
+    pub aggregated: Indices,
+}
+
+/// Sobol' indices, one row an output.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Indices {
+    /// The share due to each parameter alone, `outputs x parameters`.
+    pub first: Matrix,
+    /// The share in which each parameter takes part, `outputs x parameters`.
+    pub total: Matrix,
+    /// The share due to each pair's interaction beyond the first-order shares, `outputs x pairs`.
+    pub pairs: Matrix,
 }

@@ -55,7 +55,10 @@ pub fn decode_beside<T: DeserializeOwned>(
 /// What is left out of a tree, and what is filled in, so that decoding can go on.
 #[derive(Default)]
 struct Repairs {
+    /// Values that were wrong.
     removed: Vec<*const Node>,
+    /// Values of keys that are not known; nothing follows from their absence.
+    ignored: Vec<*const Node>,
     holes: Vec<(*const Node, String)>,
     /// Keys that were written, but misspelt.
     misspelt: Vec<(*const Node, String)>,
@@ -63,7 +66,8 @@ struct Repairs {
 
 impl Repairs {
     fn is_removed(&self, node: &Node) -> bool {
-        self.removed.contains(&std::ptr::from_ref(node))
+        let node = std::ptr::from_ref(node);
+        self.removed.contains(&node) || self.ignored.contains(&node)
     }
 
     fn holes_of(&self, node: &Node) -> impl Iterator<Item = &str> {
@@ -73,9 +77,12 @@ impl Repairs {
 
     /// True when an error at `node` may follow from an earlier repair inside it.
     fn touched(&self, node: &Node) -> bool {
+        let inside_tables = node.entries().iter().map(|(_, child)| child);
+        let mut children = inside_tables.chain(node.elements());
         self.holes_of(node).next().is_some()
-            || node.entries().iter().any(|(_, child)| self.is_removed(child))
-            || node.elements().iter().any(|child| self.is_removed(child))
+            || children.any(|child| {
+                self.removed.contains(&std::ptr::from_ref(child)) || self.touched(child)
+            })
     }
 
     /// Reports the fault and repairs the tree; false when nothing is left to decode.
@@ -111,6 +118,8 @@ impl Repairs {
                 let meant = nearest(key, known.iter().map(String::as_str));
                 let owner = parents.first().copied();
                 self.misspelt.extend(owner.zip(meant.map(str::to_owned)));
+                self.ignored.push(culprit);
+                return !parents.is_empty();
             }
             _ if consequence => {}
             _ => {

@@ -3,32 +3,32 @@
 use std::fmt::Write as _;
 
 use serde::Serialize;
-use serde_json::{Map, Value};
+use toml::{Table, Value};
 
 /// Lines are kept below this many characters where braces can be avoided.
 const WIDTH: usize = 90;
 
-/// What TOML cannot say.
+/// What TOML cannot say, such as an array with an empty place.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{path}` cannot be written as TOML: {reason}")]
-pub struct Unwritable {
-    /// Dotted path of the value.
-    pub path: String,
-    /// Why it cannot be written.
-    pub reason: String,
+#[error("cannot be written as TOML: {0}")]
+pub struct Unwritable(String);
+
+/// A tree as a table; fields that are `None` are left out.
+pub fn to_table<T: Serialize>(tree: &T) -> Result<Table, Unwritable> {
+    Table::try_from(tree).map_err(|error| Unwritable(error.to_string().trim_end().to_owned()))
 }
 
-/// Writes a tree, whose root must be a table; keys without a value are left out.
+/// Writes a tree, whose root must be a table; fields that are `None` are left out.
 pub fn to_toml<T: Serialize>(tree: &T) -> Result<String, Unwritable> {
-    let unwritable = |reason: String| Unwritable { path: String::new(), reason };
-    match serde_json::to_value(tree).map_err(|error| unwritable(error.to_string()))? {
-        Value::Object(root) => {
-            let mut writer = Writer { text: String::new() };
-            writer.table(&mut Vec::new(), &root)?;
-            Ok(writer.text)
-        }
-        other => Err(unwritable(format!("the root is no table but {other}"))),
-    }
+    let mut writer = Writer { text: String::new() };
+    writer.table(&mut Vec::new(), &to_table(tree)?);
+    Ok(writer.text)
+}
+
+/// A value on one line, tables in braces.
+pub fn to_line<T: Serialize>(value: &T) -> Result<String, Unwritable> {
+    let value = Value::try_from(value);
+    value.map(|value| inline(&value)).map_err(|error| Unwritable(error.to_string()))
 }
 
 /// A number as TOML writes it: the shortest text that reads back to the same bits.
@@ -71,56 +71,42 @@ pub fn key(name: &str) -> String {
     if !name.is_empty() && name.chars().all(bare) { name.to_owned() } else { string(name) }
 }
 
-/// A value on one line, tables in braces.
-pub fn inline_value(value: &Value) -> Result<String, Unwritable> {
-    inline(&[], value)
-}
-
 struct Writer {
     text: String,
 }
 
 impl Writer {
     /// The entries of a table: values first, then the tables that have headers.
-    fn table(
-        &mut self,
-        path: &mut Vec<String>,
-        table: &Map<String, Value>,
-    ) -> Result<(), Unwritable> {
-        let mut sections = Vec::new();
-        for (name, value) in table.iter().filter(|(_, value)| !value.is_null()) {
-            path.push(key(name));
-            if wants_header(path, value)? {
-                sections.push((name, value));
-            } else {
-                let written = inline(path, value)?;
-                let line = format!("{} = {written}", key(name));
-                if line.chars().count() > WIDTH && value.is_array() {
-                    self.long_array(path, name, value)?;
-                } else {
-                    self.line(&line);
+    fn table(&mut self, path: &mut Vec<String>, table: &Table) {
+        let depth = path.len();
+        let (sections, values): (Vec<_>, Vec<_>) =
+            table.iter().partition(|(name, value)| wants_header(depth, name, value));
+        for (name, value) in values {
+            let line = format!("{} = {}", key(name), inline(value));
+            match value {
+                Value::Array(elements) if line.chars().count() > WIDTH => {
+                    self.long_array(name, elements);
                 }
+                _ => self.line(&line),
             }
-            path.pop();
         }
         for (name, value) in sections {
             path.push(key(name));
             match value {
                 Value::Array(tables) => {
-                    for table in tables.iter().filter_map(Value::as_object) {
+                    for table in tables.iter().filter_map(Value::as_table) {
                         self.header(&format!("[[{}]]", path.join(".")));
-                        self.table(path, table)?;
+                        self.table(path, table);
                     }
                 }
-                Value::Object(table) => {
+                Value::Table(table) => {
                     self.header(&format!("[{}]", path.join(".")));
-                    self.table(path, table)?;
+                    self.table(path, table);
                 }
                 _ => {}
             }
             path.pop();
         }
-        Ok(())
     }
 
     fn line(&mut self, line: &str) {
@@ -136,11 +122,11 @@ impl Writer {
     }
 
     /// An array with as many elements a line as fit.
-    fn long_array(&mut self, path: &[String], name: &str, array: &Value) -> Result<(), Unwritable> {
+    fn long_array(&mut self, name: &str, elements: &[Value]) {
         self.line(&format!("{} = [", key(name)));
         let mut line = String::new();
-        for element in array.as_array().into_iter().flatten() {
-            let written = inline(path, element)?;
+        for element in elements {
+            let written = inline(element);
             if !line.is_empty() && line.chars().count() + written.chars().count() + 6 > WIDTH {
                 self.line(&format!("   {line}"));
                 line.clear();
@@ -149,68 +135,52 @@ impl Writer {
         }
         self.line(&format!("   {line}"));
         self.line("]");
-        Ok(())
     }
 }
 
 /// True for what is clearer under a header: sections, lists of named tables, all that is long.
-fn wants_header(path: &[String], value: &Value) -> Result<bool, Unwritable> {
-    let long = || -> Result<bool, Unwritable> {
-        let name = path.last().map_or(0, |name| name.chars().count());
-        Ok(name + 3 + inline(path, value)?.chars().count() > WIDTH)
+fn wants_header(depth: usize, name: &str, value: &Value) -> bool {
+    let table = match value {
+        Value::Table(_) => true,
+        Value::Array(elements) => !elements.is_empty() && elements.iter().all(Value::is_table),
+        _ => false,
     };
-    match value {
-        Value::Object(_) => Ok(path.len() == 1 || long()?),
-        Value::Array(elements) => {
-            let tables = !elements.is_empty() && elements.iter().all(Value::is_object);
-            Ok(tables && (path.len() == 1 || long()?))
-        }
-        _ => Ok(false),
-    }
+    table && (depth == 0 || name.chars().count() + 3 + inline(value).chars().count() > WIDTH)
 }
 
-/// A value on one line.
-fn inline(path: &[String], value: &Value) -> Result<String, Unwritable> {
-    let unwritable = |reason: &str| Unwritable { path: path.join("."), reason: reason.to_owned() };
-    Ok(match value {
-        Value::Null => return Err(unwritable("an array has an element without a value")),
-        Value::Bool(b) => b.to_string(),
-        Value::Number(number) => match (number.as_i64(), number.as_u64(), number.as_f64()) {
-            (Some(i), ..) => i.to_string(),
-            (None, Some(_), _) => return Err(unwritable("the whole number is too large")),
-            (None, None, x) => float(x.unwrap_or(f64::NAN)),
-        },
+fn inline(value: &Value) -> String {
+    match value {
+        Value::Boolean(b) => b.to_string(),
+        Value::Integer(i) => i.to_string(),
+        Value::Float(x) => float(*x),
         Value::String(text) => string(text),
+        Value::Datetime(date) => date.to_string(),
         Value::Array(elements) => {
-            let written: Result<Vec<String>, _> =
-                elements.iter().map(|element| inline(path, element)).collect();
-            format!("[{}]", written?.join(", "))
+            let written: Vec<String> = elements.iter().map(inline).collect();
+            format!("[{}]", written.join(", "))
         }
-        Value::Object(table) => {
-            let entries = table.iter().filter(|(_, value)| !value.is_null());
-            let written: Result<Vec<String>, _> = entries
-                .map(|(name, value)| Ok(format!("{} = {}", key(name), inline(path, value)?)))
-                .collect();
-            match written?.join(", ") {
-                entries if entries.is_empty() => "{}".to_owned(),
-                entries => format!("{{ {entries} }}"),
-            }
+        Value::Table(table) if table.is_empty() => "{}".to_owned(),
+        Value::Table(table) => {
+            let entry =
+                |(name, value): (&String, &Value)| format!("{} = {}", key(name), inline(value));
+            let written: Vec<String> = table.iter().map(entry).collect();
+            format!("{{ {} }}", written.join(", "))
         }
-    })
+    }
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use serde_json::json;
+    use serde_json::{Value as Json, json};
 
     use super::*;
 
-    fn tree() -> Value {
+    fn tree() -> Json {
         let long: Vec<f64> = (1..40).map(|i| 1.0 / f64::from(i)).collect();
         json!({
-            "study": { "title": "a \"quoted\" \\ line\nand µ\u{1}", "seed": 7, "note": null },
+            "study": { "title": "a \"quoted\" \\ line\nand µ\u{1}", "seed": 7 },
             "parameter": [
                 { "name": "density", "prior": { "uniform": [1.0, 1.5e7] }, "reference": 1e-6 },
                 { "name": "speed", "prior": { "normal": { "mean": 0.0, "sd": 1e300 } } },
@@ -228,10 +198,8 @@ mod tests {
     #[test]
     fn what_is_written_reads_back() {
         let text = to_toml(&tree()).unwrap();
-        let read: Value = serde_json::to_value(text.parse::<toml::Table>().unwrap()).unwrap();
-        let mut expected = tree();
-        expected["study"].as_object_mut().unwrap().remove("note");
-        assert_eq!(read, expected, "{text}");
+        let read = serde_json::to_value(text.parse::<Table>().unwrap()).unwrap();
+        assert_eq!(read, tree(), "{text}");
         assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
     }
 
@@ -262,9 +230,20 @@ mod tests {
     }
 
     #[test]
+    fn infinities_are_kept_and_what_is_absent_is_left_out() {
+        #[derive(Serialize)]
+        struct Law {
+            bounds: [f64; 2],
+            note: Option<u8>,
+        }
+        let law = Law { bounds: [f64::NEG_INFINITY, f64::INFINITY], note: None };
+        assert_eq!(to_toml(&law).unwrap(), "bounds = [-inf, inf]\n");
+        assert_eq!(to_line(&law).unwrap(), "{ bounds = [-inf, inf] }");
+    }
+
+    #[test]
     fn what_toml_cannot_say_is_refused() {
-        let error = to_toml(&json!({ "a": { "b": [null] } })).unwrap_err();
-        assert_eq!(error.path, "a.b");
+        assert!(to_toml(&json!({ "a": { "b": [null] } })).is_err());
         assert!(to_toml(&json!({ "a": u64::MAX })).is_err());
         assert!(to_toml(&json!([1])).is_err());
     }

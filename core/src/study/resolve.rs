@@ -5,10 +5,11 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::{Value as Json, json};
+use toml::Table;
 
 use super::context;
 use super::decode::{decode, fields};
+use super::emit::{Unwritable, to_table};
 use super::file::{
     DesignKeys, DiscrepancyKeys, MeasurementKeys, ModelKeys, ParameterSection, ResponseSection,
     SamplerKeys, StudySection, SurrogateKeys, ValidateSection,
@@ -55,7 +56,7 @@ pub struct Study {
     /// `[validate]`.
     pub validate: ValidateSection,
     /// The whole study with every default filled in, for `resolved.toml`.
-    pub resolved: Json,
+    pub resolved: Table,
 }
 
 /// The sections of the study language, in the order in which a study is written.
@@ -191,9 +192,15 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
         sampler,
         effects: effects?,
         validate: validate?,
-        resolved: Json::Null,
+        resolved: Table::new(),
     };
-    study.resolved = resolved(&study, root, response.as_ref());
+    match resolved(&study, &response?) {
+        Ok(resolved) => study.resolved = resolved,
+        Err(error) => {
+            problems.report(None, format!("the study with its defaults {error}"));
+            return None;
+        }
+    }
     Some(study)
 }
 
@@ -367,54 +374,38 @@ impl Study {
 }
 
 /// The study with every default filled in.
-fn resolved(study: &Study, root: &Node, response: Option<&ResponseSection>) -> Json {
-    let mut whole = serde_json::Map::new();
-    let mut about = json!(study.about);
-    about["name"] = json!(study.name);
+fn resolved(study: &Study, response: &ResponseSection) -> Result<Table, Unwritable> {
+    let mut about = to_table(&study.about)?;
+    about.insert("name".to_owned(), study.name.clone().into());
     let directory = std::path::absolute(&study.directory).unwrap_or(study.directory.clone());
-    about["directory"] = json!(directory);
-    whole.insert("study".to_owned(), about);
-    let parameters: Vec<Json> = study
-        .parameters
-        .iter()
-        .map(|p| {
-            let mut table = json!({ "name": p.name, "symbol": p.symbol, "unit": p.unit,
-                "design": p.design, "prior": p.prior });
-            if let Some(reference) = p.reference {
-                table["reference"] = json!(reference);
-            }
-            table
-        })
-        .collect();
-    whole.insert("parameter".to_owned(), Json::Array(parameters));
-    whole.insert("response".to_owned(), json!(response));
+    about.insert("directory".to_owned(), directory.display().to_string().into());
+    let parameters: Result<Vec<Table>, _> = study.parameters.iter().map(to_table).collect();
+    let mut whole = Table::new();
+    whole.insert("study".to_owned(), about.into());
+    whole.insert("parameter".to_owned(), parameters?.into());
+    whole.insert("response".to_owned(), to_table(response)?.into());
     macro_rules! sections {
         ($($field:ident),+) => {
             $(if let Some(section) = &study.$field {
-                whole.insert(stringify!($field).to_owned(), merged(section));
+                whole.insert(stringify!($field).to_owned(), merged(section)?.into());
             })+
         };
     }
     sections!(model, design, executor, simulations, measurements, surrogate, discrepancy);
     if !study.effects.is_empty() {
-        whole.insert("effect".to_owned(), study.effects.iter().map(merged).collect());
+        let effects: Result<Vec<Table>, _> = study.effects.iter().map(merged).collect();
+        whole.insert("effect".to_owned(), effects?.into());
     }
-    if let Some(section) = &study.sampler {
-        whole.insert("sampler".to_owned(), merged(section));
-    }
-    whole.insert("validate".to_owned(), json!(study.validate));
-    debug_assert!(root.entries().iter().all(|(key, _)| whole.contains_key(&key.name)));
-    Json::Object(whole)
+    sections!(sampler);
+    whole.insert("validate".to_owned(), to_table(&study.validate)?.into());
+    Ok(whole)
 }
 
 /// One table of `use`, the engine's keys and the plugin's.
-fn merged<K: ?Sized, C: serde::Serialize>(section: &Section<K, C>) -> Json {
-    let mut table = serde_json::Map::new();
-    table.insert("use".to_owned(), json!(section.built.name));
-    for part in [json!(section.common), section.built.options.clone()] {
-        if let Json::Object(entries) = part {
-            table.extend(entries.into_iter().filter(|(_, value)| !value.is_null()));
-        }
-    }
-    Json::Object(table)
+fn merged<K: ?Sized, C: serde::Serialize>(section: &Section<K, C>) -> Result<Table, Unwritable> {
+    let mut table = Table::new();
+    table.insert("use".to_owned(), section.built.name.into());
+    table.extend(to_table(&section.common)?);
+    table.extend(section.built.options.clone());
+    Ok(table)
 }

@@ -1,5 +1,7 @@
 //! The JSON Schema (2020-12) of the study language, installed plugins included, for editors.
 
+use std::collections::BTreeSet;
+
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde_json::{Map, Value, json};
 
@@ -117,7 +119,7 @@ impl Language {
 
     /// The whole schema.
     pub fn finish(mut self) -> Value {
-        let definitions = self.generator.take_definitions(true);
+        let mut definitions = self.generator.take_definitions(true);
         let mut whole = json!({
             "$schema": "https://json-schema.org/draft/2020-12/schema",
             "title": "Lacuna study",
@@ -129,10 +131,50 @@ impl Language {
             // A study that extends another may leave out what the other has.
             whole["anyOf"] = json!([{ "required": ["extends"] }, { "required": self.required }]);
         }
+        let used = used(&whole, &definitions);
+        definitions.retain(|name, _| used.contains(name));
         if !definitions.is_empty() {
             whole["$defs"] = Value::Object(definitions);
         }
+        without_machine_formats(&mut whole);
         whole
+    }
+}
+
+/// The definitions that are referred to, directly or by another that is.
+fn used(whole: &Value, definitions: &Map<String, Value>) -> BTreeSet<String> {
+    let mut used = BTreeSet::new();
+    let mut unread = vec![whole];
+    while let Some(schema) = unread.pop() {
+        let name = schema.get("$ref").and_then(Value::as_str).and_then(|r| r.rsplit('/').next());
+        if let Some(name) = name.filter(|name| used.insert((*name).to_owned())) {
+            unread.extend(definitions.get(name));
+        }
+        match schema {
+            Value::Object(object) => unread.extend(object.values()),
+            Value::Array(array) => unread.extend(array),
+            _ => {}
+        }
+    }
+    used
+}
+
+/// Removes `"format": "uint"` and the like, which no editor knows.
+fn without_machine_formats(schema: &mut Value) {
+    const FORMATS: [&str; 12] = [
+        "uint", "uint8", "uint16", "uint32", "uint64", "int", "int8", "int16", "int32", "int64",
+        "float", "double",
+    ];
+    match schema {
+        Value::Object(object) => {
+            let format = object.get("format").and_then(Value::as_str);
+            if format.is_some_and(|format| FORMATS.contains(&format)) {
+                object.remove("format");
+            }
+            object.values_mut().for_each(without_machine_formats);
+        }
+        Value::Array(array) => array.iter_mut().for_each(without_machine_formats),
+        _ => {}
     }
 }
 

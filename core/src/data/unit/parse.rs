@@ -17,7 +17,8 @@ pub(super) fn parse(text: &str) -> Result<Meaning, UnitError> {
     match parser.affine.clone() {
         Some((offset, _)) if parser.factors == 1 => Ok(Meaning { offset, ..meaning }),
         Some((_, range)) => {
-            let message = "in a product or power, write a temperature difference in `K`";
+            let symbol = &text[range.clone()];
+            let message = format!("`{symbol}`, with its own zero, cannot be in a product or power");
             let mut error = parser.wrong(range, message);
             error.nearest = Some("K".to_owned());
             Err(error)

@@ -1,5 +1,7 @@
 //! The page as plain text for a terminal and as Markdown for the book.
 
+use std::fmt::Write as _;
+
 use super::{Manual, OptionManual};
 
 /// Lines of plain text are kept below this many characters.
@@ -36,7 +38,7 @@ impl Manual {
     pub fn markdown(&self) -> String {
         let mut page = format!("# `{}`\n\n{}\n", self.name, self.title);
         if !self.prose.is_empty() {
-            page.push_str(&format!("\n{}\n", self.prose));
+            let _ = writeln!(page, "\n{}", self.prose);
         }
         if self.options.is_empty() {
             return page;
@@ -58,7 +60,7 @@ impl Manual {
             let cells = [format!("`{}`", option.key), option.kind.clone(), default];
             let cells = cells.map(|cell| cell.replace('|', "\\|")).join(" | ");
             let meaning = meaning.join("<br>").replace('|', "\\|");
-            page.push_str(&format!("| {cells} | {meaning} |\n"));
+            let _ = writeln!(page, "| {cells} | {meaning} |");
         }
         page
     }
@@ -115,7 +117,7 @@ fn paragraph_plain(paragraph: &str, indent: &str) -> String {
     let lines = paragraph.lines().filter(|line| !line.trim_start().starts_with("```"));
     let code = paragraph.starts_with("```");
     let deeper = if code { "    " } else { "" };
-    lines.map(|line| format!("{indent}{deeper}{line}\n")).collect()
+    lines.fold(String::new(), |text, line| text + indent + deeper + line + "\n")
 }
 
 /// Words on lines of limited width; lines after the first are indented further.

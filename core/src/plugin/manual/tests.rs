@@ -36,7 +36,7 @@ options
   tuning: a choice, default \"equal\"
       How it is tuned.
       - \"equal\": As the piano is.
-      - { just = a table }: As the ear likes it.
+      - { just = { root = … } }: As the ear likes it.
 
   tuning.just.root: a number, required
       The lowest note.
@@ -65,6 +65,6 @@ Drums need no options but one.
     assert_eq!(manual("drum").markdown(), expected);
     let page = manual("whistle").markdown();
     let row = "| `tuning` | a choice | `\"equal\"` | How it is tuned.<br>\
-               • `\"equal\"`: As the piano is.<br>• `{ just = a table }`: As the ear likes it. |";
+               • `\"equal\"`: As the piano is.<br>• `{ just = { root = … } }`: As the ear likes it. |";
     assert!(page.lines().any(|line| line == row), "{page}");
 }

@@ -83,8 +83,7 @@ pub(super) fn choices(schema: &Map<String, Value>, generator: &SchemaGenerator) 
         } else if case.contains_key("enum") {
             choices.extend(names(&case, description));
         } else if let Some((name, content)) = variant(&case, generator) {
-            let inside = kind(&content, generator);
-            let written = format!("{{ {} = {inside} }}", emit::key(name));
+            let written = format!("{{ {} = {} }}", emit::key(name), shape(&content));
             choices.push(Choice { written, text: description.to_owned() });
         } else {
             let written = kind(&case, generator);
@@ -92,6 +91,23 @@ pub(super) fn choices(schema: &Map<String, Value>, generator: &SchemaGenerator) 
         }
     }
     choices
+}
+
+/// What a value looks like, its numbers and strings left open.
+fn shape(schema: &Map<String, Value>) -> String {
+    let count = |key: &str| schema.get(key).and_then(Value::as_u64);
+    match (text(schema, "type"), count("minItems"), count("maxItems")) {
+        ("array", Some(low), Some(high)) if low == high => {
+            format!("[{}]", vec!["…"; low as usize].join(", "))
+        }
+        ("array", ..) => "[…]".to_owned(),
+        ("object", ..) => {
+            let keys = schema.get("properties").and_then(Value::as_object);
+            let keys = keys.into_iter().flatten().map(|(key, _)| format!("{} = …", emit::key(key)));
+            format!("{{ {} }}", keys.collect::<Vec<_>>().join(", "))
+        }
+        _ => "…".to_owned(),
+    }
 }
 
 /// The names of an enum whose variants hold nothing.
@@ -161,5 +177,5 @@ fn array(schema: &Map<String, Value>, generator: &SchemaGenerator) -> String {
 
 /// A default as a study would write it.
 pub(super) fn as_toml(value: &Value) -> String {
-    emit::inline_value(value).unwrap_or_else(|_| value.to_string())
+    emit::to_line(value).unwrap_or_else(|_| value.to_string())
 }

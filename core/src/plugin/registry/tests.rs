@@ -169,10 +169,9 @@ fn a_section_is_decoded_in_two_parts() {
     assert_eq!(common.audience, 7);
     assert_eq!(built.name, "whistle");
     assert_eq!(built.plugin.sound(), "fweet at 0.25");
-    let defaults = serde_json::json!({
-        "volume": 0.25, "holes": null, "tuning": "equal", "case": { "material": "wood" },
-    });
-    assert_eq!(built.options, defaults);
+    // A default of `None` is an absent key.
+    let defaults = "volume = 0.25\ntuning = \"equal\"\n\n[case]\nmaterial = \"wood\"\n";
+    assert_eq!(emit::to_toml(&built.options).unwrap(), defaults);
     let by_default = section_of("[instrument]\nvolume = 1", Some("whistle"));
     assert_eq!(by_default.section.unwrap().built.plugin.sound(), "fweet at 1.0");
 }
@@ -203,6 +202,16 @@ s.toml:5:9: wrong value for `holes`
   = expected a whole number of 1 or more, found 0
 ";
     assert_eq!(outcome.shown, expected);
+}
+
+#[test]
+fn a_plugin_can_be_made_without_a_study() {
+    let whistle = from_text::<dyn Instrument>("whistle", "volume = 1").unwrap();
+    assert_eq!(whistle.plugin.sound(), "fweet at 1.0");
+    let said = from_text::<dyn Instrument>("whistle", "volume = 2").map(|built| built.name);
+    assert!(said.unwrap_err().starts_with("instrument.whistle: wrong value for `volume`\n"));
+    let said = from_text::<dyn Instrument>("wistle", "volume = 2").map(|built| built.name);
+    assert!(said.unwrap_err().starts_with("instrument.wistle: there is no instrument `wistle`\n"));
 }
 
 #[test]

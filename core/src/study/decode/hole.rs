@@ -110,7 +110,7 @@ impl<'de> Deserializer<'de> for Hole {
 #[derive(Clone, Copy)]
 struct HoleValue(Hole);
 
-impl<'de> serde::de::IntoDeserializer<'de, Fault> for HoleValue {
+impl serde::de::IntoDeserializer<'_, Fault> for HoleValue {
     type Deserializer = Hole;
 
     fn into_deserializer(self) -> Hole {

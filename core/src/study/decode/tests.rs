@@ -191,6 +191,13 @@ fn what_follows_from_a_problem_is_not_reported() {
 }
 
 #[test]
+fn an_unknown_key_hides_no_other_problem() {
+    let text = "walkers = 1\nstepz = 2\nprior = { uniform = [2, 1] }\n[degree]\nx = 1\nmax = 0";
+    let heads = heads::<Options>(text);
+    assert_eq!(heads.len(), 4, "{heads:?}");
+}
+
+#[test]
 fn choices_say_how_they_are_written() {
     let shown = decoded::<BTreeMap<String, Prior>>(
         "a = 'uniform'\nb = { flat = 1 }\nc = {}\nd = { flat = {}, normal = {} }\ne = 1\nf = 'normal'",
@@ -264,6 +271,23 @@ fn buffered_types_are_placed_at_the_value_that_holds_them() {
     assert!(shown.starts_with("s.toml:3:5: "), "{shown}");
 }
 
+/// A right text with one byte taken out, doubled or replaced is decoded or complained about, with
+/// every complaint inside the text; it never panics or runs for ever.
+#[test]
+fn spoilt_texts_are_complained_about() {
+    let text = "walkers = 12\nprior = { normal = { mean = 0, sd = 1 } }\nburn_in = 0.5\n\
+                names = ['a', 'b']\nunit = 'm/s2'\n[degree]\nmax = 20\n[scale]\nx = 1\n";
+    assert!(decoded::<Options>(text).is_ok());
+    let mut complaints = 0;
+    for at in 0..text.len() {
+        for byte in ["", "x", "1", "-", ".", "'", "{", "]", "=", "\n", "µ", "#"] {
+            let spoilt = format!("{}{byte}{}", &text[..at], &text[at + 1..]);
+            complaints += usize::from(decoded::<Options>(&spoilt).is_err());
+        }
+    }
+    assert!(complaints > 1000, "{complaints}");
+}
+
 #[test]
 fn syntax_errors_come_together() {
     let heads = heads::<BTreeMap<String, f64>>("a = \nb = 1\nc = [1, \nd = = 2\nb = 3\n");
@@ -282,4 +306,23 @@ fn keys_that_belong_to_the_engine_are_known() {
     assert!(shown.contains("did you mean `training`?"), "{shown}");
     assert_eq!(fields::<Degree>(), ["max", "interaction"]);
     assert!(fields::<f64>().is_empty());
+}
+
+#[test]
+fn a_type_may_name_unknown_and_missing_keys_itself() {
+    #[derive(Debug)]
+    struct Picky;
+    impl<'de> Deserialize<'de> for Picky {
+        fn deserialize<D: serde::Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+            use serde::de::Error;
+            let keys = BTreeMap::<String, f64>::deserialize(d)?;
+            if keys.contains_key("a") {
+                return Err(D::Error::unknown_field("a", &["b"]));
+            }
+            Err(D::Error::missing_field("b"))
+        }
+    }
+    assert_eq!(heads::<Picky>("a = 1"), ["unknown key `a`"]);
+    assert_eq!(heads::<Picky>("c = 1"), ["missing key `b`"]);
+    assert_eq!(heads::<BTreeMap<String, Box<Picky>>>("x = { a = 1 }\ny = 2").len(), 2);
 }

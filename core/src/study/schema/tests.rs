@@ -31,6 +31,8 @@ fn the_whole_language_is_one_schema() {
     let unknown = &schema["$defs"]["Unknown"];
     assert_eq!(unknown["required"], json!(["name"]));
     assert_eq!(unknown["properties"]["name"]["pattern"], "^[A-Za-z_][A-Za-z0-9_]*$");
+    assert_eq!(schema["$defs"].as_object().unwrap().len(), 1);
+    assert!(!schema.to_string().contains("\"format\""));
     // The engine alone has no design.
     assert_eq!(schema["properties"]["design"]["oneOf"], json!([false]));
 }

@@ -1,0 +1,3 @@
+//! Surrogates.
+
+pub mod polynomial_chaos;

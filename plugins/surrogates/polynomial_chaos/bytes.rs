@@ -1,0 +1,42 @@
+//! A file of one JSON header and raw numbers, which keeps every bit.
+
+use lacuna::run::Stop;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// The first bytes of a file; the last one is the version of its layout.
+const MAGIC: &[u8] = b"lacuna polynomial_chaos 1\n";
+
+/// The magic, the header's length (8 bytes, little-endian), the header, the numbers (little-endian).
+pub(super) fn write(header: &impl Serialize, numbers: &[&[f64]]) -> Result<Vec<u8>, Stop> {
+    let header = serde_json::to_vec(header)
+        .map_err(|error| Stop::new(format!("the surrogate cannot be saved: {error}")))?;
+    let mut bytes = MAGIC.to_vec();
+    bytes.extend((header.len() as u64).to_le_bytes());
+    bytes.extend(header);
+    bytes.extend(numbers.iter().copied().flatten().flat_map(|x| x.to_le_bytes()));
+    Ok(bytes)
+}
+
+/// The header and the numbers of what [`write`] wrote.
+pub(super) fn read<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Vec<f64>), Stop> {
+    let rest = bytes.strip_prefix(MAGIC).ok_or_else(|| {
+        Stop::new("the saved surrogate is no `polynomial_chaos` surrogate of this version")
+            .help("remove it, so that it is fitted again")
+    })?;
+    let (length, rest) = rest.split_first_chunk::<8>().ok_or_else(damaged)?;
+    let length = usize::try_from(u64::from_le_bytes(*length)).map_err(|_| damaged())?;
+    let (header, numbers) = rest.split_at_checked(length).ok_or_else(damaged)?;
+    let header = serde_json::from_slice(header).map_err(|_| damaged())?;
+    let (numbers, tail) = numbers.as_chunks::<8>();
+    if !tail.is_empty() {
+        return Err(damaged());
+    }
+    Ok((header, numbers.iter().map(|x| f64::from_le_bytes(*x)).collect()))
+}
+
+/// The file is not whole.
+pub(super) fn damaged() -> Stop {
+    Stop::new("the saved `polynomial_chaos` surrogate is damaged")
+        .help("remove it, so that it is fitted again")
+}

@@ -1,0 +1,73 @@
+//! Ordinary least squares with its leave-one-out error.
+
+use lacuna::linalg::{
+    Matrix, multiply_vector, solve_upper, solve_upper_matrix, thin_qr, transposed_multiply_vector,
+};
+
+/// Regression on a fixed set of basis functions, factored once for any number of outputs.
+pub(super) struct Regression {
+    q: Matrix,
+    r: Matrix,
+    /// The diagonal of the hat matrix.
+    leverage: Vec<f64>,
+    /// The correction for the number of terms.
+    correction: f64,
+}
+
+/// One output's regression.
+pub(super) struct Fit {
+    /// One coefficient a basis function.
+    pub coefficients: Vec<f64>,
+    /// The corrected leave-one-out error relative to the output's variance.
+    pub relative: f64,
+    /// The leave-one-out residuals `r_i / (1 - h_i)`.
+    pub residuals: Vec<f64>,
+}
+
+/// `N / (N - P) (1 + tr (Psi' Psi)^-1)`: corrects the leave-one-out error for the number of terms
+/// (Chapelle, Vapnik and Bengio 2002; Blatman and Sudret 2011). Infinite when `P >= N`.
+pub(super) fn correction(runs: usize, terms: usize, trace: f64) -> f64 {
+    if terms >= runs {
+        return f64::INFINITY;
+    }
+    runs as f64 / (runs - terms) as f64 * (1.0 + trace)
+}
+
+impl Regression {
+    /// Factors the basis functions at the runs (`runs x terms`); none when they are linearly dependent
+    /// to working precision.
+    pub fn new(basis: &Matrix) -> Option<Self> {
+        let (n, p) = (basis.rows(), basis.columns());
+        let qr = thin_qr(basis).ok()?;
+        let largest = (0..p).map(|i| qr.r[(i, i)].abs()).fold(0.0, f64::max);
+        let floor = largest * f64::EPSILON * n as f64;
+        if p > n || (0..p).any(|i| qr.r[(i, i)].abs() <= floor) {
+            return None;
+        }
+        let mut inverse = Matrix::from_fn(p, p, |i, j| f64::from(u8::from(i == j)));
+        solve_upper_matrix(&qr.r, &mut inverse);
+        let trace = inverse.as_slice().iter().map(|x| x * x).sum();
+        let leverage = qr.q.iter_rows().map(|row| row.iter().map(|x| x * x).sum()).collect();
+        Some(Self { q: qr.q, r: qr.r, leverage, correction: correction(n, p, trace) })
+    }
+
+    /// Fits one output, given as its mean and what is left; `variance` is that of its values, divided
+    /// by `N`. The first basis function must be the constant 1: it takes the mean, so that a large one
+    /// costs no digits.
+    pub fn fit(&self, mean: f64, centred: &[f64], variance: f64) -> Fit {
+        let mut coefficients = transposed_multiply_vector(&self.q, centred);
+        let model = multiply_vector(&self.q, &coefficients);
+        solve_upper(&self.r, &mut coefficients);
+        coefficients[0] += mean;
+        let residuals: Vec<f64> = (centred.iter().zip(&model).zip(&self.leverage))
+            .map(|((y, m), h)| (y - m) / (1.0 - h))
+            .collect();
+        let squares = residuals.iter().map(|r| r * r).sum::<f64>() / centred.len() as f64;
+        let relative = squares / variance * self.correction;
+        Fit {
+            coefficients,
+            relative: if relative.is_nan() { f64::INFINITY } else { relative },
+            residuals,
+        }
+    }
+}

@@ -1,0 +1,277 @@
+//! The multi-indices of an expansion, ordered so that each degree's set is a prefix of the next.
+
+use lacuna::linalg::Matrix;
+
+use super::family::Coordinate;
+
+/// One multi-index after the other: the degree of each parameter's polynomial.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Terms {
+    dimension: usize,
+    exponents: Vec<u16>,
+}
+
+/// Which multi-indices belong to degree `p`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Truncation {
+    /// `q` of the hyperbolic norm `(sum_i alpha_i^q)^(1/q) <= p` (Blatman and Sudret 2011); 1 is the
+    /// total degree.
+    pub q_norm: f64,
+    /// The most parameters that may appear together.
+    pub max_interaction: usize,
+}
+
+/// A nested family of multi-index sets.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Nested {
+    /// All of them, lower degrees first.
+    pub terms: Terms,
+    /// How many belong to each degree `0..=largest`.
+    pub counts: Vec<usize>,
+}
+
+impl Nested {
+    /// The sets of degree `0..=degree`; ends before the first set of more than `limit` members.
+    pub fn new(dimension: usize, degree: usize, truncation: Truncation, limit: usize) -> Self {
+        let mut terms = Terms { dimension, exponents: vec![0; dimension] };
+        let mut counts = vec![1];
+        for p in 1..=degree {
+            let mut shell =
+                Shell { truncation, p, exponents: vec![0; dimension], found: Vec::new() };
+            // A shell above the limit is abandoned half-way: large sets must not even be listed.
+            let room = limit.saturating_sub(terms.len());
+            if !shell.fill(0, 0.0, 0, room * dimension) {
+                break;
+            }
+            terms.exponents.extend(shell.found);
+            counts.push(terms.len());
+        }
+        Self { terms, counts }
+    }
+}
+
+/// The members of degree `p` that are not of degree `p - 1`.
+struct Shell {
+    truncation: Truncation,
+    p: usize,
+    exponents: Vec<u16>,
+    found: Vec<u16>,
+}
+
+impl Shell {
+    /// Chooses exponents from parameter `i` on; false when more than `room` numbers were found.
+    fn fill(&mut self, i: usize, norm: f64, active: usize, room: usize) -> bool {
+        let q = self.truncation.q_norm;
+        // Sums of q-th powers carry round-off; a member on the boundary belongs to the set.
+        let bound = |p: usize| (p as f64).powf(q) * (1.0 + 1e-12);
+        if i == self.exponents.len() {
+            if norm > bound(self.p - 1) {
+                self.found.extend(&self.exponents);
+            }
+            return self.found.len() <= room;
+        }
+        let allowed = if active < self.truncation.max_interaction { self.p } else { 0 };
+        // High exponents of early parameters first: x1, x2, ... within degree 1.
+        for e in (0..=allowed).rev() {
+            let sum = norm + if e == 0 { 0.0 } else { (e as f64).powf(q) };
+            if sum > bound(self.p) {
+                continue;
+            }
+            self.exponents[i] = e as u16;
+            if !self.fill(i + 1, sum, active + usize::from(e > 0), room) {
+                return false;
+            }
+        }
+        self.exponents[i] = 0;
+        true
+    }
+}
+
+impl Terms {
+    /// The terms with these exponents, `dimension` numbers each.
+    pub fn from_exponents(dimension: usize, exponents: Vec<u16>) -> Self {
+        Self { dimension, exponents }
+    }
+
+    /// The exponents of all terms, one after the other.
+    pub fn exponents(&self) -> &[u16] {
+        &self.exponents
+    }
+
+    /// The number of terms.
+    pub fn len(&self) -> usize {
+        self.exponents.len() / self.dimension
+    }
+
+    /// The exponents of term `t`.
+    pub fn term(&self, t: usize) -> &[u16] {
+        &self.exponents[t * self.dimension..(t + 1) * self.dimension]
+    }
+
+    /// The first `count` terms.
+    pub fn prefix(&self, count: usize) -> Self {
+        let exponents = self.exponents[..count * self.dimension].to_vec();
+        Self { dimension: self.dimension, exponents }
+    }
+
+    /// The terms named by `indices`.
+    pub fn select(&self, indices: &[usize]) -> Self {
+        let exponents = indices.iter().flat_map(|&t| self.term(t)).copied().collect();
+        Self { dimension: self.dimension, exponents }
+    }
+}
+
+/// The product polynomials of a set of terms, ready to be evaluated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Basis {
+    coordinates: Vec<Coordinate>,
+    terms: Terms,
+    /// One more than the largest exponent: the length of each parameter's table of values.
+    stride: usize,
+    /// The entries of the tables that each term multiplies, and where each term's entries end.
+    factors: Vec<u32>,
+    ends: Vec<usize>,
+}
+
+impl Basis {
+    /// The product polynomials of `terms` in these coordinates.
+    pub fn new(coordinates: Vec<Coordinate>, terms: Terms) -> Self {
+        let stride = terms.exponents.iter().max().map_or(1, |&e| usize::from(e) + 1);
+        let (mut factors, mut ends) = (Vec::new(), Vec::new());
+        for t in 0..terms.len() {
+            for (i, &e) in terms.term(t).iter().enumerate().filter(|(_, e)| **e > 0) {
+                factors.push((i * stride + usize::from(e)) as u32);
+            }
+            ends.push(factors.len());
+        }
+        Self { coordinates, terms, stride, factors, ends }
+    }
+
+    /// The terms.
+    pub fn terms(&self) -> &Terms {
+        &self.terms
+    }
+
+    /// The standard coordinates.
+    pub fn coordinates(&self) -> &[Coordinate] {
+        &self.coordinates
+    }
+
+    fn factors(&self, t: usize) -> &[u32] {
+        let start = if t == 0 { 0 } else { self.ends[t - 1] };
+        &self.factors[start..self.ends[t]]
+    }
+
+    /// The basis functions at each point (one a row, in physical units), `points x terms`.
+    pub fn values(&self, points: &Matrix) -> Matrix {
+        let mut values = Matrix::zeros(points.rows(), self.terms.len());
+        let mut table = vec![0.0; self.coordinates.len() * self.stride];
+        for (r, point) in points.iter_rows().enumerate() {
+            let tables = table.chunks_exact_mut(self.stride);
+            for ((x, coordinate), table) in point.iter().zip(&self.coordinates).zip(tables) {
+                coordinate.family.values(coordinate.standard(*x), table);
+            }
+            for (t, value) in values.row_mut(r).iter_mut().enumerate() {
+                *value = self.factors(t).iter().map(|&f| table[f as usize]).product();
+            }
+        }
+        values
+    }
+
+    /// The derivative of each basis function (rows) by each parameter (columns), in physical units.
+    pub fn gradient(&self, point: &[f64]) -> Matrix {
+        let mut table = vec![0.0; self.coordinates.len() * self.stride];
+        let mut slopes = table.clone();
+        for (i, coordinate) in self.coordinates.iter().enumerate() {
+            let range = i * self.stride..(i + 1) * self.stride;
+            let z = coordinate.standard(point[i]);
+            coordinate.family.derivatives(z, &mut table[range.clone()], &mut slopes[range]);
+        }
+        let mut gradient = Matrix::zeros(self.terms.len(), self.coordinates.len());
+        for t in 0..self.terms.len() {
+            let factors = self.factors(t);
+            for (k, &f) in factors.iter().enumerate() {
+                let others: f64 = (factors.iter().enumerate())
+                    .filter(|(l, _)| *l != k)
+                    .map(|(_, &g)| table[g as usize])
+                    .product();
+                let i = f as usize / self.stride;
+                gradient[(t, i)] = slopes[f as usize] * others / self.coordinates[i].scale;
+            }
+        }
+        gradient
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surrogates::polynomial_chaos::family::Family;
+
+    const TOTAL: Truncation = Truncation { q_norm: 1.0, max_interaction: usize::MAX };
+
+    #[test]
+    fn total_degree_sets_have_binomial_sizes_and_are_prefixes() {
+        // Source: the number of monomials of degree at most p in d variables is C(d + p, p).
+        let nested = Nested::new(3, 20, TOTAL, 10_000);
+        assert_eq!((nested.counts[1], nested.counts[5], nested.counts[20]), (4, 56, 1771));
+        for (p, &count) in nested.counts.iter().enumerate() {
+            let degree = |t| nested.terms.term(t).iter().map(|&e| usize::from(e)).sum::<usize>();
+            assert!((0..count).all(|t| degree(t) <= p));
+            assert!((count..nested.terms.len()).all(|t| degree(t) > p));
+        }
+        assert_eq!(nested.terms.term(1), [1, 0, 0]);
+    }
+
+    #[test]
+    fn hyperbolic_sets_equal_their_definition() {
+        for (q, r) in [(0.5, 3), (0.75, 2), (1.0, 1)] {
+            let truncation = Truncation { q_norm: q, max_interaction: r };
+            let nested = Nested::new(3, 9, truncation, 10_000);
+            for p in 0..=9_usize {
+                let mut expected = 0;
+                for a in 0..=p {
+                    for b in 0..=p {
+                        for c in 0..=p {
+                            let index = [a, b, c];
+                            let sum: f64 = index.iter().map(|&e| (e as f64).powf(q)).sum();
+                            let active = index.iter().filter(|&&e| e > 0).count();
+                            let norm = if sum == 0.0 { 0.0 } else { sum.powf(1.0 / q) };
+                            expected += usize::from(norm <= p as f64 + 1e-9 && active <= r);
+                        }
+                    }
+                }
+                assert_eq!(nested.counts[p], expected, "q {q}, p {p}");
+            }
+        }
+    }
+
+    #[test]
+    fn sets_above_the_limit_are_left_out() {
+        assert_eq!(Nested::new(20, 20, TOTAL, 1000).counts, [1, 21, 231]);
+    }
+
+    #[test]
+    fn gradients_are_the_limits_of_differences() {
+        let coordinate = |centre, scale| Coordinate { family: Family::Legendre, centre, scale };
+        let basis = Basis::new(
+            vec![coordinate(1e4, 1.5e3), coordinate(-2e-3, 1e-3)],
+            Nested::new(2, 6, TOTAL, 100).terms,
+        );
+        let point = [1.03e4, -2.4e-3];
+        let gradient = basis.gradient(&point);
+        for (i, step) in [(0, 1.5e-2), (1, 1e-8)] {
+            let shifted = |sign: f64| {
+                let mut p = point;
+                p[i] += sign * step;
+                basis.values(&Matrix::from_rows(2, [p]))
+            };
+            let (up, down) = (shifted(1.0), shifted(-1.0));
+            for t in 0..basis.terms().len() {
+                let difference = (up[(0, t)] - down[(0, t)]) / (2.0 * step);
+                let scale = basis.coordinates()[i].scale;
+                assert!(((gradient[(t, i)] - difference) * scale).abs() < 1e-6);
+            }
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Accuracy on published functions, beside figures measured with another implementation.
+//!
+//! The bounds are the relative validation errors of a Python implementation of the same method
+//! (scikit-learn's path, UQLab's selection), one design each: unscrambled Sobol' points without the
+//! first, and one Latin hypercube. The Sobol' designs are the same points here. The Latin hypercubes
+//! are not, so that there the median of five stands against the one.
+
+use super::bench::{BOREHOLE, CIRCUIT, Function, ISHIGAMI, latin_hypercube, sobol, up_to};
+use crate::surrogates::polynomial_chaos::PolynomialChaos;
+use lacuna::plugin::Emulator;
+
+/// Validation error with the Sobol' design, and the median with five Latin hypercubes.
+fn errors(function: &Function, options: &PolynomialChaos, n: usize) -> (f64, f64) {
+    let d = function.dimension();
+    let error = |unit| function.validation(&function.fit(options, &unit), 10_000);
+    let mut latin: Vec<f64> = (0..5).map(|seed| error(latin_hypercube(n, d, seed))).collect();
+    latin.sort_by(f64::total_cmp);
+    (error(sobol(n, d)), latin[2])
+}
+
+fn check(function: &Function, options: &PolynomialChaos, bounds: &[(usize, f64, f64)]) {
+    for &(n, sobol_bound, latin_bound) in bounds {
+        let (sobol, latin) = errors(function, options, n);
+        println!(
+            "{n} runs: Sobol' {sobol:.1e} ({sobol_bound:.1e}), LHS {latin:.1e} ({latin_bound:.1e})"
+        );
+        assert!(sobol <= sobol_bound, "{n} Sobol' points: {sobol:e} above {sobol_bound:e}");
+        assert!(latin <= latin_bound, "{n} points of a Latin hypercube: {latin:e}");
+    }
+}
+
+#[test]
+fn ishigami_is_as_accurate_as_elsewhere() {
+    let bounds = [(100, 4.5e-5, 5.0e-6), (200, 1.7e-11, 1.3e-9), (603, 1.1e-11, 1.1e-11)];
+    check(&ISHIGAMI, &PolynomialChaos::default(), &bounds);
+}
+
+#[test]
+fn the_circuit_is_as_accurate_as_elsewhere() {
+    let options = PolynomialChaos { max_terms: 1300, ..up_to(1, 8) };
+    // The last: 1.3e-6 with the one design there; here five lie between 0.95e-6 and 7.6e-6.
+    check(&CIRCUIT, &options, &[(100, 3.4e-5, 2.5e-5), (200, 2.5e-6, 2.0e-6)]);
+}
+
+#[test]
+fn the_borehole_is_as_accurate_as_elsewhere() {
+    let options = PolynomialChaos { max_terms: 1300, ..up_to(1, 6) };
+    check(&BOREHOLE, &options, &[(100, 3.4e-5, 1.2e-3), (200, 2.8e-5, 1.4e-4)]);
+}
+
+#[test]
+fn moments_and_indices_of_ishigami_have_their_closed_forms() {
+    // Source: Ishigami and Homma (1990); a = 7, b = 0.1.
+    let (a, b, pi) = (7.0_f64, 0.1_f64, std::f64::consts::PI);
+    let v1 = 0.5 * (1.0 + b * pi.powi(4) / 5.0).powi(2);
+    let v2 = a * a / 8.0;
+    let v13 = b * b * pi.powi(8) * 8.0 / 225.0;
+    let v = v1 + v2 + v13;
+    let expansion = ISHIGAMI.fit(&PolynomialChaos::default(), &sobol(300, 3));
+    let (mean, variance) = expansion.mean_and_variance();
+    assert!((mean[0] - a / 2.0).abs() < 1e-6 && (variance[0] / v - 1.0).abs() < 1e-6);
+    let indices = expansion.sensitivity().unwrap();
+    assert_eq!(indices.pairs, [[0, 1], [0, 2], [1, 2]]);
+    for shares in [&indices.outputs, &indices.aggregated] {
+        for (row, expected) in [
+            (shares.first.row(0), [v1, v2, 0.0]),
+            (shares.total.row(0), [v1 + v13, v2, v13]),
+            (shares.pairs.row(0), [0.0, v13, 0.0]),
+        ] {
+            assert!(row.iter().zip(expected).all(|(s, e)| (s - e / v).abs() < 1e-6));
+        }
+    }
+}
+
+#[test]
+fn the_leave_one_out_error_is_near_the_validation_error() {
+    // Source of the factor: the measured table above has both within a factor of 2 for 100 runs and
+    // more; its single designs are widened to 4 for five hypercubes.
+    for seed in 0..5 {
+        let fit = CIRCUIT.fit(&up_to(1, 4), &latin_hypercube(200, 6, seed));
+        let ratio = fit.fit_error().relative[0] / CIRCUIT.validation(&fit, 10_000);
+        assert!((0.25..4.0).contains(&ratio), "seed {seed}: {ratio}");
+    }
+}

@@ -1,0 +1,8 @@
+//! Proof of the expansion against closed forms, slow textbook code and figures measured elsewhere.
+#![allow(clippy::unwrap_used)]
+
+mod accuracy;
+mod behaviour;
+mod bench;
+mod options;
+mod textbook;
