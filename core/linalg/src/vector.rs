@@ -13,19 +13,16 @@ const LANES: usize = 16;
 /// When the lengths differ.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len(), "vectors of one length");
-    if a.len() < 2 * LANES {
-        return a.iter().zip(b).fold(0.0, |sum, (x, y)| sum + x * y);
-    }
     Arch::new().dispatch(
         #[inline(always)]
-        || dot_in_lanes(a, b),
+        || dot_inline(a, b),
     )
 }
 
-// Only code inlined into the dispatched closure is compiled for the machine's widest vectors.
+// Only code inlined into a dispatched closure is compiled for the machine's widest vectors.
 #[expect(clippy::inline_always)]
 #[inline(always)]
-fn dot_in_lanes(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot_inline(a: &[f64], b: &[f64]) -> f64 {
     let mut lanes = [0.0; LANES];
     let (head_a, tail_a) = a.as_chunks::<LANES>();
     let (head_b, tail_b) = b.as_chunks::<LANES>();
@@ -58,12 +55,16 @@ pub fn add_scaled(y: &mut [f64], factor: f64, x: &[f64]) {
     assert_eq!(y.len(), x.len(), "vectors of one length");
     Arch::new().dispatch(
         #[inline(always)]
-        || {
-            for (y, x) in y.iter_mut().zip(x) {
-                *y += factor * x;
-            }
-        },
+        || add_scaled_inline(y, factor, x),
     );
+}
+
+#[expect(clippy::inline_always)]
+#[inline(always)]
+pub(crate) fn add_scaled_inline(y: &mut [f64], factor: f64, x: &[f64]) {
+    for (y, x) in y.iter_mut().zip(x) {
+        *y += factor * x;
+    }
 }
 
 /// The combination `sum_i weights[i] * matrix.row(rows[i])`, of its first `out.len()` entries.

@@ -170,7 +170,7 @@ impl Degrees<'_> {
             for (&o, found) in active.iter().zip(self.at_degree(degree, outputs, &active)?) {
                 searches[o].take(found, self.options.early_stop.degrees);
             }
-            progress.add(count(&searches) - reported);
+            eprintln!("{degree} {:?}", super::candidates::C);            progress.add(count(&searches) - reported);
             reported = count(&searches);
         }
         progress.add(outputs.len() as u64 - reported);

@@ -1,6 +1,7 @@
 //! `polynomial_chaos`: expansions in orthonormal polynomials of the parameters.
 
 mod bytes;
+mod candidates;
 mod emulator;
 mod family;
 mod fit;
