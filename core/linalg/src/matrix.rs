@@ -117,6 +117,12 @@ impl Matrix {
         Self::from_fn(self.rows, indices.len(), |i, j| self[(i, indices[j])])
     }
 
+    /// Removes all rows and sets the number of columns, keeping the memory.
+    pub fn clear(&mut self, columns: usize) {
+        self.data.clear();
+        (self.rows, self.columns) = (0, columns);
+    }
+
     /// Appends a row from its entries.
     ///
     /// # Panics

@@ -1,31 +1,38 @@
 //! Upper triangular matrices that grow by columns.
 
-use faer::traits::pulp::Arch;
+use faer::traits::pulp::{Arch, Simd, WithSimd};
 
-use crate::vector::{add_scaled_inline, dot_inline};
+const LANES: usize = 8;
 
 /// An upper triangular `n x n` matrix to which columns are appended, stored column after column
-/// without the zeros: the shape of factors that are updated one column at a time.
+/// without most of the zeros: the shape of factors that are updated one column at a time.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PackedUpper {
-    size: usize,
-    data: Vec<f64>,
+    /// Columns down to the diagonal, filled up with zeros to whole lanes: short columns are many, and
+    /// a remainder would cost more than the column.
+    lanes: Vec<[f64; LANES]>,
+    /// Where each column begins, and where the last one ends.
+    starts: Vec<usize>,
 }
 
 impl PackedUpper {
     /// The matrix without columns.
     pub fn new() -> Self {
-        Self::default()
+        Self { lanes: Vec::new(), starts: vec![0] }
     }
 
     /// `n`.
     pub fn size(&self) -> usize {
-        self.size
+        self.starts.len() - 1
     }
 
     /// Column `j` down to the diagonal: `j + 1` entries.
     pub fn column(&self, j: usize) -> &[f64] {
-        &self.data[j * (j + 1) / 2..(j + 1) * (j + 2) / 2]
+        &self.padded(j).as_flattened()[..=j]
+    }
+
+    fn padded(&self, j: usize) -> &[[f64; LANES]] {
+        &self.lanes[self.starts[j]..self.starts[j + 1]]
     }
 
     /// Appends a column down to the diagonal.
@@ -33,9 +40,9 @@ impl PackedUpper {
     /// # Panics
     /// When it has not `n + 1` entries.
     pub fn push(&mut self, column: &[f64]) {
-        assert_eq!(column.len(), self.size + 1, "a column reaches down to the diagonal");
-        self.data.extend_from_slice(column);
-        self.size += 1;
+        assert_eq!(column.len(), self.size() + 1, "a column reaches down to the diagonal");
+        self.lanes.extend(in_lanes(column));
+        self.starts.push(self.lanes.len());
     }
 
     /// `U x`.
@@ -43,16 +50,11 @@ impl PackedUpper {
     /// # Panics
     /// When `x` has not `n` entries.
     pub fn multiply(&self, x: &[f64]) -> Vec<f64> {
-        assert_eq!(x.len(), self.size, "a vector of the matrix' size");
-        let mut product = vec![0.0; self.size];
-        Arch::new().dispatch(
-            #[inline(always)]
-            || {
-                for (j, x) in x.iter().enumerate() {
-                    add_scaled_inline(&mut product[..=j], *x, self.column(j));
-                }
-            },
-        );
+        assert_eq!(x.len(), self.size(), "a vector of the matrix' size");
+        let mut product = vec![[0.0; LANES]; x.len().div_ceil(LANES)];
+        Arch::new().dispatch(Multiply { upper: self, x, product: &mut product });
+        let mut product = product.as_flattened().to_vec();
+        product.truncate(x.len());
         product
     }
 
@@ -61,18 +63,69 @@ impl PackedUpper {
     /// # Panics
     /// When `x` has not `n` entries.
     pub fn transposed_multiply(&self, x: &[f64]) -> Vec<f64> {
-        assert_eq!(x.len(), self.size, "a vector of the matrix' size");
-        let mut product = vec![0.0; self.size];
-        Arch::new().dispatch(
-            #[inline(always)]
-            || {
-                for (j, product) in product.iter_mut().enumerate() {
-                    *product = dot_inline(self.column(j), &x[..=j]);
-                }
-            },
-        );
+        assert_eq!(x.len(), self.size(), "a vector of the matrix' size");
+        let x = in_lanes(x);
+        let mut product = vec![0.0; self.size()];
+        Arch::new().dispatch(TransposedMultiply { upper: self, x: &x, product: &mut product });
         product
     }
+}
+
+struct Multiply<'a> {
+    upper: &'a PackedUpper,
+    x: &'a [f64],
+    product: &'a mut [[f64; LANES]],
+}
+
+impl WithSimd for Multiply<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (j, x) in self.x.iter().enumerate() {
+            for (y, u) in self.product.iter_mut().zip(self.upper.padded(j)) {
+                for l in 0..LANES {
+                    y[l] += x * u[l];
+                }
+            }
+        }
+    }
+}
+
+struct TransposedMultiply<'a> {
+    upper: &'a PackedUpper,
+    x: &'a [[f64; LANES]],
+    product: &'a mut [f64],
+}
+
+impl WithSimd for TransposedMultiply<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (j, product) in self.product.iter_mut().enumerate() {
+            let mut sums = [0.0; LANES];
+            for (u, x) in self.upper.padded(j).iter().zip(self.x) {
+                for l in 0..LANES {
+                    sums[l] += u[l] * x[l];
+                }
+            }
+            let [a, b, c, d, e, f, g, h] = sums;
+            *product = ((a + e) + (b + f)) + ((c + g) + (d + h));
+        }
+    }
+}
+
+/// The numbers in whole lanes, filled up with zeros.
+fn in_lanes(numbers: &[f64]) -> Vec<[f64; LANES]> {
+    let (whole, rest) = numbers.as_chunks::<LANES>();
+    let mut lanes = whole.to_vec();
+    if !rest.is_empty() {
+        let mut last = [0.0; LANES];
+        last[..rest.len()].copy_from_slice(rest);
+        lanes.push(last);
+    }
+    lanes
 }
 
 #[cfg(test)]

@@ -120,15 +120,25 @@ impl<'a> Candidates<'a> {
                 return self.advance_near(direction, first?, distance);
             }
         }
-cnt(1,1); cnt(4, self.closed.len()); if self.near.terms.is_empty() {cnt(2,self.closed.len()*direction.active.len());} else {cnt(3, self.closed.len()*direction.active.len());}
         self.look_at_all(direction);
-        let first =
-            first_arrival(direction.level, &self.correlations, &self.rates, &self.closed, &mut self.scratch);
-        let (term, distance) = first.filter(|(_, distance)| *distance < direction.level)?;
         self.choose_near(direction);
-        if let Ok(i) = self.near.terms.binary_search(&term) {
-            return self.advance_near(direction, i, distance);
+        if !self.near.terms.is_empty() {
+            let (first, distance) = self.near.first(direction.level);
+            if self.since.is_safe(distance, direction.level) {
+                return self.advance_near(direction, first?, distance);
+            }
+            self.near.clear();
         }
+        self.advance_all(direction)
+    }
+
+    /// Moves all candidates.
+    fn advance_all(&mut self, direction: &Direction<'_>) -> Option<Arrival> {
+        let level = direction.level;
+        let (correlations, rates) = (&self.correlations, &self.rates);
+        let (term, distance) =
+            first_arrival(level, correlations, rates, &self.closed, &mut self.scratch)
+                .filter(|(_, distance)| *distance < level)?;
         self.pace.took(distance);
         vector::add_scaled(&mut self.correlations, -distance, &self.rates);
         Some(Arrival { term, distance, correlation: self.correlations[term] })
@@ -144,7 +154,6 @@ cnt(1,1); cnt(4, self.closed.len()); if self.near.terms.is_empty() {cnt(2,self.c
             return None;
         }
         let near = &mut self.near;
-        cnt(0,1); cnt(5, near.terms.len()*direction.active.len());
         vector::add_scaled(&mut near.correlations, -distance, &near.rates);
         self.since.shifts.resize(direction.active.len(), 0.0);
         vector::add_scaled(&mut self.since.shifts, distance, direction.weights);
@@ -156,13 +165,15 @@ cnt(1,1); cnt(4, self.closed.len()); if self.near.terms.is_empty() {cnt(2,self.c
     /// Brings all correlations and rates to where the path is.
     fn look_at_all(&mut self, direction: &Direction<'_>) {
         let Direction { active, weights, .. } = *direction;
-        if self.since.fallen > 0.0 {
-            self.since.shifts.resize(active.len(), 0.0);
-            vector::combine_rows(self.gram, active, &self.since.shifts, &mut self.scratch);
-            vector::add_scaled(&mut self.correlations, -1.0, &self.scratch);
+        let Self { gram, rates, scratch, since, .. } = self;
+        if since.fallen > 0.0 {
+            since.shifts.resize(active.len(), 0.0);
+            vector::combine_rows_twice(gram, active, [weights, &since.shifts], [rates, scratch]);
+            vector::add_scaled(&mut self.correlations, -1.0, scratch);
+        } else {
+            vector::combine_rows(gram, active, weights, rates);
         }
         self.since = Since::default();
-        vector::combine_rows(self.gram, active, weights, &mut self.rates);
     }
 
     /// Packs the candidates that could arrive soon; none at all where most of them could.
@@ -176,7 +187,8 @@ cnt(1,1); cnt(4, self.closed.len()); if self.near.terms.is_empty() {cnt(2,self.c
         let candidates = self.correlations.iter().zip(&self.rates).zip(&self.closed);
         for (term, ((c, rate), closed)) in candidates.enumerate() {
             // The distance from the level is concave along the line: least at one of the ends.
-            let least = (level - c.abs()).min(level - horizon - (c - horizon * rate).abs()) + closed;
+            let least =
+                (level - c.abs()).min(level - horizon - (c - horizon * rate).abs()) + closed;
             if least < margin {
                 self.near.terms.push(term);
             } else if least < clearance {
@@ -248,7 +260,7 @@ impl Near {
         self.rates.extend(self.terms.iter().map(|&t| rates[t]));
         self.closed.resize(self.terms.len(), 0.0);
         self.scratch.resize(self.terms.len(), 0.0);
-        self.gram = Matrix::zeros(0, self.terms.len());
+        self.gram.clear(self.terms.len());
         for &t in active {
             self.push(gram.row(t));
         }
@@ -289,6 +301,3 @@ fn first_arrival(
     let first = arrivals.iter().position(|&a| a == least)?;
     least.is_finite().then_some((first, least))
 }
-
-pub static C: [std::sync::atomic::AtomicUsize; 6] = [const { std::sync::atomic::AtomicUsize::new(0) }; 6];
-pub fn cnt(i: usize, n: usize) { C[i].fetch_add(n, std::sync::atomic::Ordering::Relaxed); }

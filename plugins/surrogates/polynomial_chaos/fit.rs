@@ -170,7 +170,7 @@ impl Degrees<'_> {
             for (&o, found) in active.iter().zip(self.at_degree(degree, outputs, &active)?) {
                 searches[o].take(found, self.options.early_stop.degrees);
             }
-            eprintln!("{degree} {:?}", super::candidates::C);            progress.add(count(&searches) - reported);
+            progress.add(count(&searches) - reported);
             reported = count(&searches);
         }
         progress.add(outputs.len() as u64 - reported);
@@ -224,7 +224,7 @@ impl Degrees<'_> {
         let dictionary = Dictionary::new(basis);
         let centred = Matrix::from_rows(basis.rows(), active.iter().map(|&o| &outputs[o].centred));
         let correlations = multiply_transposed(&centred, dictionary.columns());
-        let window = self.options.early_stop.window(basis.columns() - 1);
+        let window = self.options.early_stop.window(basis.rows());
         let best = |i: usize| {
             let choice = best_along_path(&dictionary, centred.row(i), correlations.row(i), window)?;
             let mut terms = vec![0];

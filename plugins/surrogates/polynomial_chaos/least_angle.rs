@@ -227,7 +227,8 @@ impl<'a> Path<'a> {
 /// Keeps leverages and residuals of the least-squares fit while terms are added.
 struct Judge {
     residual: Vec<f64>,
-    leverage: Vec<f64>,
+    /// One less the leverage of each run.
+    freedom: Vec<f64>,
     /// The sum of squares of the centred output.
     total: f64,
     terms: usize,
@@ -238,7 +239,7 @@ impl Judge {
         let n = centred.len();
         Self {
             residual: centred.to_vec(),
-            leverage: vec![1.0 / n as f64; n],
+            freedom: vec![1.0 - 1.0 / n as f64; n],
             total: vector::dot(centred, centred),
             terms: 1,
         }
@@ -251,12 +252,10 @@ impl Judge {
         // already there is not projected twice.
         let projection = vector::dot(column, &self.residual);
         vector::add_scaled(&mut self.residual, -projection, column);
-        let mut squares = 0.0;
-        for ((h, q), r) in self.leverage.iter_mut().zip(column).zip(&self.residual) {
-            *h += q * q;
-            let left_out = r / (1.0 - *h);
-            squares += left_out * left_out;
+        for (d, q) in self.freedom.iter_mut().zip(column) {
+            *d -= q * q;
         }
+        let squares = vector::sum_squared_ratios(&self.residual, &self.freedom);
         let error = squares / self.total * correction(column.len(), self.terms, trace);
         if error.is_nan() { f64::INFINITY } else { error }
     }
