@@ -1,4 +1,5 @@
 //! Upper triangular matrices that grow by columns.
+#![allow(clippy::inline_always)]
 
 use faer::traits::pulp::{Arch, Simd, WithSimd};
 

@@ -4,6 +4,8 @@
 //! Each kernel is a struct with the loop in `with_simd`: only code inlined there is compiled for
 //! the machine at hand, and a closure is not.
 
+#![allow(clippy::inline_always)]
+
 use faer::traits::pulp::{Arch, Simd, WithSimd};
 
 use crate::Matrix;
@@ -150,7 +152,7 @@ fn combine_rows_of<const M: usize>(
     matrix: &Matrix,
     rows: &[usize],
     weights: [&[f64]; M],
-    mut out: [&mut [f64]; M],
+    out: [&mut [f64]; M],
 ) {
     for m in 0..M {
         assert_eq!(rows.len(), weights[m].len(), "one weight a row");
@@ -171,7 +173,7 @@ impl<const M: usize> WithSimd for CombineRows<'_, M> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(mut self, _: S) {
+    fn with_simd<S: Simd>(self, _: S) {
         let (quads, rest) = self.rows.as_chunks::<4>();
         for (q, quad) in quads.iter().enumerate() {
             let [a, b, c, d] = *quad;
