@@ -1,3 +1,9 @@
-//! The components a study can name: one folder a kind, one file (or folder) a plugin.
+//! The components that a study can name: one folder a kind, one file a plugin.
 
+pub mod designs;
+pub mod discrepancies;
+pub mod executors;
+pub mod models;
+pub mod readers;
+pub mod samplers;
 pub mod surrogates;

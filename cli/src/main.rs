@@ -1,2 +1,141 @@
-//! .
-fn main() {}
+//! The `lacuna` command: arguments and printing, no numerics.
+
+mod inspect;
+mod new;
+mod plugins;
+mod progress;
+mod study;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+// The plugins register themselves; naming their crate links it.
+use lacuna_plugins as _;
+
+/// Lacuna closes the gap between simulation and measurement.
+///
+/// A study is one TOML file that names a model, a design, a surrogate, a discrepancy and a sampler. Lacuna
+/// trains the surrogate on simulation runs, infers the model's parameters with their uncertainty,
+/// validates, and writes a report.
+#[derive(Parser)]
+#[command(version, about, max_term_width = 100)]
+struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+    /// Number of threads; all cores when left out. It changes the time and nothing else.
+    #[arg(long, global = true, value_name = "N")]
+    threads: Option<std::num::NonZeroUsize>,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Run all stages of a study and write its report.
+    Run {
+        /// The study file.
+        study: PathBuf,
+        #[command(flatten)]
+        settings: study::Settings,
+        /// The run directory; `runs/<study name>` when left out.
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
+    /// Check a study and list every problem at once, with line and caret.
+    Check {
+        /// The study file.
+        study: PathBuf,
+        #[command(flatten)]
+        settings: study::Settings,
+    },
+    /// Go on with a run that was interrupted, from its directory.
+    Resume {
+        /// The run directory.
+        run: PathBuf,
+    },
+    /// Write the report of a finished run again.
+    Report {
+        /// The run directory.
+        run: PathBuf,
+    },
+    /// List the plugins that a study can name, with their options, defaults and references.
+    Plugins {
+        /// A kind, such as `surrogate`, or one plugin, such as `surrogate.polynomial_chaos`.
+        name: Option<String>,
+        /// Print Markdown.
+        #[arg(long)]
+        markdown: bool,
+    },
+    /// Print the JSON Schema of the study language, for editors.
+    Schema,
+    /// Show what a reader sees in a file: variables, axes, units, steps.
+    Inspect {
+        /// The file.
+        file: PathBuf,
+        /// Show this variable alone; with `--csv`, write its signals.
+        #[arg(long, value_name = "NAME")]
+        variable: Option<String>,
+        /// Write the variable's signals as CSV to this file, or to the terminal with `-`.
+        #[arg(long, value_name = "OUT", requires = "variable")]
+        csv: Option<PathBuf>,
+        /// The reader to use; the first that recognises the file when left out.
+        #[arg(long, value_name = "NAME")]
+        reader: Option<String>,
+    },
+    /// Write the skeleton of something new.
+    New {
+        #[command(subcommand)]
+        what: new::What,
+    },
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    if let Some(threads) = arguments.threads {
+        // Only this line ever builds the pool, so that it cannot be there already.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global();
+    }
+    let result = match arguments.verb {
+        Verb::Run { study, settings, out } => study::run(&study, &settings, out.as_deref()),
+        Verb::Check { study, settings } => study::check(&study, &settings),
+        Verb::Resume { run } => study::resume(&run),
+        Verb::Report { run } => study::report(&run),
+        Verb::Plugins { name, markdown } => plugins::list(name.as_deref(), markdown),
+        Verb::Schema => plugins::schema(),
+        Verb::Inspect { file, variable, csv, reader } => {
+            inspect::inspect(&file, reader.as_deref(), variable.as_deref(), csv.as_deref())
+        }
+        Verb::New { what } => new::write(&what),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("{}", failure.text.trim_end());
+            ExitCode::from(failure.code)
+        }
+    }
+}
+
+/// A command that did not do what it was asked.
+struct Failure {
+    text: String,
+    /// 1: a run stopped; 2: the study or the arguments are wrong.
+    code: u8,
+}
+
+impl From<lacuna::run::Stop> for Failure {
+    fn from(stop: lacuna::run::Stop) -> Self {
+        Self { text: format!("error: {stop}"), code: 1 }
+    }
+}
+
+impl Failure {
+    fn wrong(text: impl Into<String>) -> Self {
+        Self { text: text.into(), code: 2 }
+    }
+}
+
+/// Prints a line; a reader that stopped reading (a closed pipe) is no error.
+fn print(text: &str) {
+    use std::io::Write as _;
+    let _ = writeln!(std::io::stdout(), "{text}");
+}

@@ -4,11 +4,15 @@
 //! plain data, keeps every artifact, and names no plugin. Plugins register themselves
 //! (see [`plugin::registry`]); the binary links the crate that holds them.
 
+pub mod contract;
 pub mod data;
+pub mod diagnose;
 pub mod math;
 pub mod plugin;
+pub mod posterior;
 pub mod report;
 pub mod run;
+pub mod stage;
 pub mod study;
 
 pub use lacuna_linalg as linalg;

@@ -1,5 +1,6 @@
 //! Plain data that stages pass to each other: named axes with units, runs, replicates, tables.
 
+pub mod draws;
 pub mod ensemble;
 pub mod layout;
 pub mod measurements;
@@ -8,10 +9,11 @@ pub mod scenario;
 pub mod table;
 pub mod unit;
 
+pub use draws::Draws;
 pub use ensemble::{Ensemble, FailedRun};
 pub use layout::{Axis, Coordinates, Layout};
 pub use measurements::{Measurements, Replicate};
 pub use parameter::Parameter;
 pub use scenario::Scenario;
 pub use table::Table;
-pub use unit::Unit;
+pub use unit::{Unit, UnitError};

@@ -19,5 +19,6 @@ pub struct Parameter {
     /// Where the calibration looks.
     pub prior: Distribution,
     /// A value from the literature or from practice, to compare with.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference: Option<f64>,
 }

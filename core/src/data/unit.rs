@@ -1,21 +1,217 @@
-//! Unit strings.
-use serde::{Deserialize, Serialize};
-/// A unit as written.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct Unit(String);
+//! Units as people write them: `kg/m3`, `m/s^2`, `microstrain`, `1/s`.
+//!
+//! Names, symbols and prefixes follow the SI brochure (BIPM, 9th edition, 2019, tables 1 to 8). Powers
+//! of ten are kept apart from other factors, so that `g/cm3` is exactly 1000 `kg/m3`.
+
+use std::borrow::Cow;
+use std::fmt::{self, Display};
+use std::ops::Range;
+use std::str::FromStr;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::de::{self, Deserializer};
+use serde::{Deserialize, Serialize, Serializer};
+
+mod parse;
+mod symbols;
+
+/// How many base quantities there are: length, mass, time, current, temperature, amount, intensity.
+const BASES: usize = 7;
+
+/// A unit of measurement, as written and as meant.
+#[derive(Clone, Debug)]
+pub struct Unit {
+    text: String,
+    meaning: Meaning,
+}
+
+/// A unit as a multiple of the coherent SI unit of its dimension.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Meaning {
+    /// The factor without its powers of ten.
+    factor: f64,
+    /// The powers of ten of the factor.
+    decimals: i32,
+    /// What is added after multiplying: not zero for `degC` only.
+    offset: f64,
+    /// Exponents of the base quantities, in sixths, so that square and cube roots are exact.
+    sixths: [i16; BASES],
+}
+
+impl Meaning {
+    const ONE: Self = Self { factor: 1.0, decimals: 0, offset: 0.0, sixths: [0; BASES] };
+
+    fn times(self, other: Self) -> Self {
+        let mut sixths = self.sixths;
+        for (sum, term) in sixths.iter_mut().zip(other.sixths) {
+            *sum += term;
+        }
+        Self {
+            factor: self.factor * other.factor,
+            decimals: self.decimals + other.decimals,
+            offset: 0.0,
+            sixths,
+        }
+    }
+
+    /// The unit raised to `sixths / 6`; `None` when an exponent of the result is not a sixth.
+    fn power(self, sixths: i16) -> Option<Self> {
+        let scale = |exponent: i32| {
+            let product = exponent.checked_mul(i32::from(sixths))?;
+            (product % 6 == 0).then_some(product / 6)
+        };
+        let mut exponents = [0; BASES];
+        for (result, exponent) in exponents.iter_mut().zip(self.sixths) {
+            *result = i16::try_from(scale(i32::from(exponent))?).ok()?;
+        }
+        let power = f64::from(sixths) / 6.0;
+        let (decimals, rest) = match scale(self.decimals) {
+            Some(decimals) => (decimals, 1.0),
+            None => (0, 10f64.powf(f64::from(self.decimals) * power)),
+        };
+        let factor = if sixths % 6 == 0 {
+            self.factor.powi(i32::from(sixths / 6))
+        } else {
+            self.factor.powf(power)
+        };
+        Some(Self { factor: factor * rest, decimals, offset: 0.0, sixths: exponents })
+    }
+}
+
+/// A text that is not a unit.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}", self.sentence())]
+pub struct UnitError {
+    /// The whole text.
+    pub text: String,
+    /// The bytes of the text that are wrong.
+    pub range: Range<usize>,
+    /// What is wrong with them.
+    pub message: String,
+    /// What was probably meant.
+    pub nearest: Option<String>,
+}
+
+impl UnitError {
+    /// In the form in which decoding errors name what was expected and what was found.
+    fn sentence(&self) -> String {
+        let help = match &self.nearest {
+            Some(near) => format!("{}; did you mean `{near}`?", self.message),
+            None => self.message.clone(),
+        };
+        format!("expected a unit such as `m/s2`, found {:?}; help: {help}", self.text)
+    }
+}
+
 impl Unit {
-    /// Parses.
-    pub fn parse(text: &str) -> Result<Self, String> {
-        Ok(Self(text.to_owned()))
+    /// Reads a unit.
+    ///
+    /// Products are written with a space, `*`, `·` or `.`; quotients with `/`; powers as `s2`, `s^2`,
+    /// `s²`, `s^-2`, `Hz^0.5` or `Hz^(1/2)`. More than one factor after `/` needs parentheses:
+    /// `J/(kg K)`. The empty text and `1` are the dimensionless unit.
+    pub fn parse(text: &str) -> Result<Self, UnitError> {
+        Ok(Self { text: text.trim().to_owned(), meaning: parse::parse(text)? })
     }
-    /// Factor.
-    pub fn factor_to(&self, _other: &Unit) -> Option<f64> {
-        Some(1.0)
+
+    /// The dimensionless unit.
+    pub fn dimensionless() -> Self {
+        Self { text: "1".to_owned(), meaning: Meaning::ONE }
+    }
+
+    /// The unit as written.
+    pub fn as_str(&self) -> &str {
+        &self.text
+    }
+
+    /// True when both units measure the same quantity.
+    pub fn same_dimension(&self, other: &Self) -> bool {
+        self.meaning.sixths == other.meaning.sixths
+    }
+
+    /// True when the unit has no dimension, such as `%`, `rad` or `microstrain`.
+    pub fn is_dimensionless(&self) -> bool {
+        self.meaning.sixths == [0; BASES]
+    }
+
+    /// What a number in this unit is multiplied by to be in the other unit.
+    ///
+    /// `None` when the dimensions differ, and when the zero points do (`degC` and `K`).
+    pub fn factor_to(&self, other: &Self) -> Option<f64> {
+        let (from, to) = (&self.meaning, &other.meaning);
+        if !self.same_dimension(other) || from.offset != to.offset {
+            return None;
+        }
+        // Positive powers of ten are exact up to 10^22, and so is a division by one.
+        let factor = from.factor / to.factor;
+        Some(match from.decimals - to.decimals {
+            up @ 0.. => factor * 10f64.powi(up),
+            down => factor / 10f64.powi(-down),
+        })
+    }
+
+    /// A number in this unit as a number in the other, zero points included.
+    pub fn convert(&self, x: f64, other: &Self) -> Option<f64> {
+        if let Some(factor) = self.factor_to(other) {
+            return Some(x * factor);
+        }
+        let si = |unit: &Self| unit.meaning.factor * 10f64.powi(unit.meaning.decimals);
+        self.same_dimension(other)
+            .then(|| (x * si(self) + self.meaning.offset - other.meaning.offset) / si(other))
     }
 }
-impl std::fmt::Display for Unit {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.0)
+
+impl PartialEq for Unit {
+    /// Equal when they mean the same, however written.
+    fn eq(&self, other: &Self) -> bool {
+        self.factor_to(other) == Some(1.0)
     }
 }
+
+impl Default for Unit {
+    fn default() -> Self {
+        Self::dimensionless()
+    }
+}
+
+impl Display for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&self.text)
+    }
+}
+
+impl FromStr for Unit {
+    type Err = UnitError;
+
+    fn from_str(text: &str) -> Result<Self, UnitError> {
+        Self::parse(text)
+    }
+}
+
+impl Serialize for Unit {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&self.text)
+    }
+}
+
+impl<'de> Deserialize<'de> for Unit {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Self::parse(&String::deserialize(deserializer)?).map_err(de::Error::custom)
+    }
+}
+
+impl JsonSchema for Unit {
+    fn schema_name() -> Cow<'static, str> {
+        "Unit".into()
+    }
+
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "string", "examples": ["kg/m3", "m/s2", "microstrain", "1"] })
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -8,6 +8,8 @@ pub mod design;
 pub mod discrepancy;
 pub mod effect;
 pub mod executor;
+mod kinds;
+pub mod manual;
 pub mod model;
 pub mod reader;
 pub mod registry;

@@ -1,1 +1,370 @@
-//! Registry.
+//! Which plugins there are: every plugin linked into the program, found by kind and name.
+//!
+//! A plugin registers itself with one line at the end of its file; nothing else names it.
+//!
+//! ```ignore
+//! lacuna::register!(Surrogate, "polynomial_chaos", PolynomialChaos);
+//! ```
+
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use super::manual::{Manual, generator, resolve};
+use crate::study::decode::{decode, decode_beside, fields};
+use crate::study::emit;
+use crate::study::nearest::{nearest, one_of};
+use crate::study::read::read;
+use crate::study::{Node, Place, Problem, Problems, Sources};
+
+#[doc(hidden)]
+pub use inventory;
+
+/// A kind of plugin: the trait object that all plugins of the kind become.
+///
+/// Implemented by [`kind!`](crate::kind), once beside each trait.
+pub trait Kind: 'static {
+    /// What the kind is called, such as `surrogate`.
+    const NAME: &'static str;
+    /// The sections of a study that choose a plugin of this kind.
+    const SECTIONS: &'static [&'static str];
+
+    /// Every plugin of this kind, in no particular order.
+    fn registered() -> Vec<&'static Entry<Self>>;
+}
+
+/// One registered plugin.
+pub struct Entry<K: ?Sized + 'static> {
+    /// The name a study chooses it by.
+    pub name: &'static str,
+    /// The schema of its options.
+    pub schema: fn(&mut SchemaGenerator) -> Schema,
+    /// Decodes its options, the given keys of the section being the engine's.
+    pub build: fn(&Node, &[&str], &mut Problems) -> Option<Built<K>>,
+    /// The module it is in.
+    pub module_path: &'static str,
+    /// The version of the package it is in.
+    pub version: &'static str,
+}
+
+/// A plugin with its options.
+pub struct Built<K: ?Sized> {
+    /// The name it is chosen by.
+    pub name: &'static str,
+    /// The plugin.
+    pub plugin: Box<K>,
+    /// All its options, the defaults filled in.
+    pub options: toml::Table,
+}
+
+impl<K: Kind + ?Sized> Entry<K> {
+    /// `surrogate.polynomial_chaos`
+    pub fn full_name(&self) -> String {
+        format!("{}.{}", K::NAME, self.name)
+    }
+
+    /// The plugin's page of the manual, from the documentation of its options.
+    pub fn documentation(&self) -> Manual {
+        let mut generator = generator();
+        let schema = (self.schema)(&mut generator);
+        Manual::of_schema(&self.full_name(), &resolve(&schema, &generator), &generator)
+    }
+}
+
+/// Declares a kind of plugin; belongs beside its trait, in this crate.
+///
+/// ```ignore
+/// crate::kind!(Surrogate, "surrogate", ["surrogate"]);
+/// ```
+#[macro_export]
+macro_rules! kind {
+    ($kind:path, $name:literal, [$($section:literal),+ $(,)?]) => {
+        impl $crate::plugin::registry::Kind for dyn $kind {
+            const NAME: &'static str = $name;
+            const SECTIONS: &'static [&'static str] = &[$($section),+];
+
+            fn registered() -> Vec<&'static $crate::plugin::registry::Entry<Self>> {
+                $crate::plugin::registry::inventory::iter::<
+                    $crate::plugin::registry::Entry<dyn $kind>,
+                >
+                    .into_iter()
+                    .collect()
+            }
+        }
+
+        $crate::plugin::registry::inventory::collect!(
+            $crate::plugin::registry::Entry<dyn $kind>
+        );
+
+        $crate::plugin::registry::inventory::submit! {
+            $crate::plugin::registry::KindEntry::of::<dyn $kind>()
+        }
+    };
+}
+
+/// Registers a plugin: its kind, its name in a study, its options, which implement the kind.
+#[macro_export]
+macro_rules! register {
+    ($kind:path, $name:literal, $options:ty) => {
+        $crate::plugin::registry::inventory::submit! {
+            $crate::plugin::registry::Entry::<dyn $kind> {
+                name: $name,
+                schema: <$options as $crate::plugin::registry::Documented>::json_schema,
+                build: |node, beside, problems| {
+                    $crate::plugin::registry::build(node, beside, problems, $name, |options| {
+                        let plugin: $options = options;
+                        Box::new(plugin)
+                    })
+                },
+                module_path: module_path!(),
+                version: env!("CARGO_PKG_VERSION"),
+            }
+        }
+    };
+}
+
+/// What `register!` needs of an options type's schema.
+#[doc(hidden)]
+pub trait Documented {
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema;
+}
+
+impl<T: JsonSchema> Documented for T {
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        generator.subschema_for::<T>()
+    }
+}
+
+/// What `register!` makes of an options type.
+#[doc(hidden)]
+pub fn build<K: ?Sized, O: DeserializeOwned + Serialize>(
+    node: &Node,
+    beside: &[&str],
+    problems: &mut Problems,
+    name: &'static str,
+    into_plugin: fn(O) -> Box<K>,
+) -> Option<Built<K>> {
+    let options: O = decode_beside(node, beside, problems)?;
+    match emit::to_table(&options) {
+        Ok(written) => Some(Built { name, plugin: into_plugin(options), options: written }),
+        Err(error) => {
+            let message = format!("the options of `{name}` {error}");
+            problems.report(Some(node.place.clone()), message);
+            None
+        }
+    }
+}
+
+/// Every plugin of a kind, sorted by name.
+pub fn entries<K: Kind + ?Sized>() -> Vec<&'static Entry<K>> {
+    let mut entries = K::registered();
+    entries.sort_by_key(|entry| (entry.name, entry.module_path));
+    entries
+}
+
+/// The plugin of a kind with this name, or the complaint that there is none.
+pub fn find<K: Kind + ?Sized>(name: &str) -> Result<&'static Entry<K>, Box<Problem>> {
+    let entries = entries::<K>();
+    if let Some(entry) = entries.iter().find(|entry| entry.name == name) {
+        return Ok(entry);
+    }
+    let names = || names_of(&entries);
+    let mut problem = Problem::new(format!("there is no {} `{name}`", K::NAME));
+    problem.expected(one_of(names()));
+    if let Some(near) = nearest(name, names()) {
+        problem.help(format!("did you mean `{near}`?"));
+    }
+    Err(Box::new(problem))
+}
+
+/// The names of sorted entries, each once.
+fn names_of<K: ?Sized>(entries: &[&'static Entry<K>]) -> impl Iterator<Item = &'static str> {
+    let mut names: Vec<&'static str> = entries.iter().map(|entry| entry.name).collect();
+    names.dedup();
+    names.into_iter()
+}
+
+/// A section of a study, taken apart.
+pub struct Split {
+    /// The plugin's name under `use`, and where it stands.
+    pub chosen: Option<(String, Place)>,
+    /// The engine's own keys.
+    pub common: Node,
+    /// The plugin's keys: all the others.
+    pub options: Node,
+}
+
+/// Takes a section apart: `use`, the engine's keys, the plugin's keys.
+///
+/// A `use` that is not a string is reported.
+pub fn split_section(section: &Node, common_keys: &[&str], problems: &mut Problems) -> Split {
+    let mut split = Split {
+        chosen: None,
+        common: Node::table(section.place.clone()),
+        options: Node::table(section.place.clone()),
+    };
+    for (key, node) in section.entries() {
+        if key.name == "use" {
+            split.chosen = decode::<String>(node, problems).map(|name| (name, node.place.clone()));
+        } else if common_keys.contains(&key.name.as_str()) {
+            split.common.set(key.clone(), node.clone());
+        } else {
+            split.options.set(key.clone(), node.clone());
+        }
+    }
+    split
+}
+
+/// A decoded section: what the engine reads of it, and the plugin it chooses.
+pub struct Section<K: ?Sized, C> {
+    /// The engine's own keys.
+    pub common: C,
+    /// The plugin.
+    pub built: Built<K>,
+}
+
+/// The engine's keys of a section that has none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct NoKeys {}
+
+/// Decodes a section; the plugin is `default` when the section does not say `use`.
+pub fn section<K: Kind + ?Sized, C: DeserializeOwned>(
+    node: &Node,
+    default: Option<&str>,
+    problems: &mut Problems,
+) -> Option<Section<K, C>> {
+    if !matches!(node.value, crate::study::Value::Table(_)) {
+        problems
+            .report(Some(node.place.clone()), format!("a {} is a table", K::NAME))
+            .expected("a table")
+            .found(node.describe());
+        return None;
+    }
+    let common_keys = fields::<C>();
+    let split = split_section(node, common_keys, problems);
+    let common = decode::<C>(&split.common, problems);
+    let entry = match (split.chosen, default) {
+        (Some((name, place)), _) => located::<K>(&name, place, problems),
+        (None, _) if node.get("use").is_some() => None,
+        (None, Some(name)) => located::<K>(name, node.place.clone(), problems),
+        (None, None) => {
+            problems
+                .report(Some(node.place.clone()), "missing key `use`")
+                .expected(one_of(names_of(&entries::<K>())));
+            None
+        }
+    }?;
+    let beside: Vec<&str> = std::iter::once("use").chain(common_keys.iter().copied()).collect();
+    let built = (entry.build)(&split.options, &beside, problems);
+    Some(Section { common: common?, built: built? })
+}
+
+fn located<K: Kind + ?Sized>(
+    name: &str,
+    place: Place,
+    problems: &mut Problems,
+) -> Option<&'static Entry<K>> {
+    find::<K>(name)
+        .map_err(|problem| {
+            let path = problems.path("use");
+            problems.push(Problem { place: Some(place), path, ..*problem });
+        })
+        .ok()
+}
+
+/// A plugin from its options alone, as TOML text; the error is every problem as it is shown.
+///
+/// For tests, contracts and programs that have no study.
+pub fn from_text<K: Kind + ?Sized>(name: &str, options: &str) -> Result<Built<K>, String> {
+    let mut sources = Sources::default();
+    let mut problems = Problems::new();
+    let source = sources.add_argument(&format!("{}.{name}", K::NAME), options.to_owned());
+    let entry = located::<K>(name, Place::whole(source), &mut problems);
+    let node = read(source, &sources, &mut problems);
+    let built = entry.zip(node).and_then(|(entry, node)| (entry.build)(&node, &[], &mut problems));
+    built.ok_or_else(|| problems.render(&sources))
+}
+
+/// One kind of plugin, as data.
+pub struct KindEntry {
+    /// What the kind is called.
+    pub name: &'static str,
+    /// The sections of a study that choose a plugin of this kind.
+    pub sections: &'static [&'static str],
+    list: fn() -> Vec<Listing>,
+}
+
+inventory::collect!(KindEntry);
+
+/// One plugin, as data.
+#[derive(Clone, Copy)]
+pub struct Listing {
+    /// What its kind is called.
+    pub kind: &'static str,
+    /// Its name in a study.
+    pub name: &'static str,
+    /// The module it is in.
+    pub module_path: &'static str,
+    /// The version of the package it is in.
+    pub version: &'static str,
+    /// Its page of the manual.
+    pub documentation: fn(&str) -> Option<Manual>,
+}
+
+impl Listing {
+    /// Its page of the manual.
+    pub fn manual(&self) -> Option<Manual> {
+        (self.documentation)(self.name)
+    }
+}
+
+impl KindEntry {
+    /// The kind of a trait object.
+    pub const fn of<K: Kind + ?Sized>() -> Self {
+        Self { name: K::NAME, sections: K::SECTIONS, list: list::<K> }
+    }
+
+    /// Every plugin of the kind, sorted by name.
+    pub fn plugins(&self) -> Vec<Listing> {
+        (self.list)()
+    }
+}
+
+fn list<K: Kind + ?Sized>() -> Vec<Listing> {
+    let listing = |entry: &'static Entry<K>| Listing {
+        kind: K::NAME,
+        name: entry.name,
+        module_path: entry.module_path,
+        version: entry.version,
+        documentation: |name| find::<K>(name).ok().map(Entry::documentation),
+    };
+    entries::<K>().into_iter().map(listing).collect()
+}
+
+/// Every kind of plugin, in the order of the names.
+pub fn kinds() -> Vec<&'static KindEntry> {
+    let mut kinds: Vec<&KindEntry> = inventory::iter::<KindEntry>.into_iter().collect();
+    kinds.sort_by_key(|kind| kind.name);
+    kinds
+}
+
+/// Complains of names that two plugins of a kind share.
+pub fn audit() -> Vec<Problem> {
+    kinds().into_iter().flat_map(|kind| duplicates(&kind.plugins())).collect()
+}
+
+/// Complaints about neighbours of the same name in a sorted list.
+fn duplicates(plugins: &[Listing]) -> Vec<Problem> {
+    let same = plugins.windows(2).filter(|pair| pair[0].name == pair[1].name);
+    same.map(|pair| {
+        let Listing { kind, name, .. } = pair[0];
+        let mut problem = Problem::new(format!("two plugins are called `{kind}.{name}`"));
+        problem.found(format!("`{}` and `{}`", pair[0].module_path, pair[1].module_path));
+        problem.help("give one of them another name");
+        problem
+    })
+    .collect()
+}
+
+#[cfg(test)]
+pub(crate) mod tests;

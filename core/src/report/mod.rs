@@ -1,3 +1,24 @@
 //! The report: a self-contained page of figures and tables, from plain results.
+//!
+//! [`render`] makes the page, [`summary_text`] what a terminal shows at the end, and
+//! [`summary_json`] what scripts read; all three from [`findings::Findings`] and nothing else.
 
+mod chart;
+mod curve;
 pub mod findings;
+mod number;
+mod page;
+mod scale;
+mod section;
+mod summary;
+mod svg;
+mod table;
+mod terminal;
+
+pub use page::render;
+pub use summary::{SCHEMA, summary, summary_json};
+pub use table::Table;
+pub use terminal::summary_text;
+
+#[cfg(test)]
+mod tests;

@@ -1,7 +1,12 @@
 //! The run directory: artifacts, checkpoints, manifest, progress.
 
+pub mod arrays;
+pub mod directory;
+pub mod files;
 pub mod progress;
 pub mod stop;
 
+pub use arrays::write_response;
+pub use directory::{Artifact, Kept, RunDirectory};
 pub use progress::{Observer, Progress, Silent};
 pub use stop::Stop;

@@ -1,2 +1,23 @@
-//! The study language.
+//! The study language: from TOML text to a study that can be run.
+
+mod context;
+pub mod decode;
+pub mod emit;
+pub mod file;
+pub mod inherit;
+pub mod language;
+pub mod nearest;
+pub mod node;
+pub mod overrides;
 pub mod problem;
+pub mod read;
+pub mod resolve;
+pub mod schema;
+pub mod source;
+pub mod values;
+
+pub use decode::{decode, decode_beside};
+pub use node::{Key, Node, Value};
+pub use problem::{Complaints, Problem, Problems};
+pub use resolve::{Checked, Study};
+pub use source::{Place, SourceId, Sources};

@@ -1,3 +1,247 @@
-//! Complaints.
-/// A view handed to plugins.
-pub struct Complaints<'a>(pub &'a ());
+//! What is wrong with a study: one complaint, its place, what would be right.
+
+use std::fmt::Write as _;
+
+use super::node::Node;
+use super::source::{Place, Sources};
+
+/// One thing that is wrong with a study.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Problem {
+    /// Where, if anywhere in particular.
+    pub place: Option<Place>,
+    /// Dotted path of the key it is about; empty when there is none.
+    pub path: String,
+    /// What is wrong, in one line.
+    pub message: String,
+    /// What would be right, as it reads after "expected".
+    pub expected: Option<String>,
+    /// What stands there instead, as it reads after "found".
+    pub found: Option<String>,
+    /// What to do about it, one sentence each.
+    pub help: Vec<String>,
+}
+
+impl Problem {
+    /// A complaint without a place.
+    pub fn new(message: impl Into<String>) -> Self {
+        Self {
+            place: None,
+            path: String::new(),
+            message: message.into(),
+            expected: None,
+            found: None,
+            help: Vec::new(),
+        }
+    }
+
+    /// Says what would be right.
+    pub fn expected(&mut self, expected: impl Into<String>) -> &mut Self {
+        self.expected = Some(expected.into());
+        self
+    }
+
+    /// Says what stands there.
+    pub fn found(&mut self, found: impl ToString) -> &mut Self {
+        self.found = Some(found.to_string());
+        self
+    }
+
+    /// Adds a piece of advice.
+    pub fn help(&mut self, help: impl Into<String>) -> &mut Self {
+        self.help.push(help.into());
+        self
+    }
+
+    /// The complaint as plain text, ending in a newline.
+    ///
+    /// ```text
+    /// study.toml:3:9: wrong value for `steps`
+    ///   |
+    /// 3 | steps = "many"
+    ///   |         ^^^^^^
+    ///   = expected a whole number, found "many"
+    ///   = help: …
+    /// ```
+    pub fn render(&self, sources: &Sources) -> String {
+        let mut text = String::new();
+        let mut gutter = 1;
+        match &self.place {
+            None if self.path.is_empty() => text.push_str(&self.message),
+            None => write_text(&mut text, format_args!("`{}`: {}", self.path, self.message)),
+            Some(place) => gutter = self.render_place(place, sources, &mut text),
+        }
+        text.push('\n');
+        for note in self.notes() {
+            write_text(&mut text, format_args!("{:gutter$} = {note}\n", ""));
+        }
+        text
+    }
+
+    /// Writes the first line and the excerpt without a final newline; returns the gutter's width.
+    fn render_place(&self, place: &Place, sources: &Sources, text: &mut String) -> usize {
+        let source = sources.get(place.source);
+        if place.is_whole() {
+            write_text(text, format_args!("{}: {}", source.name, self.message));
+            return 1;
+        }
+        let at = sources.position(place);
+        let line = sources.line(place).replace('\t', " ");
+        let left = at.column - 1;
+        let width = sources.text(place).lines().next().unwrap_or("").trim_end().chars().count();
+        let carets = "^".repeat(width.clamp(1, line.chars().count().saturating_sub(left).max(1)));
+        let (head, number) = if source.path.is_some() {
+            (format!("{}:{}:{}", source.name, at.line, at.column), at.line.to_string())
+        } else {
+            (source.name.clone(), " ".to_owned())
+        };
+        let gutter = number.len();
+        write_text(text, format_args!("{head}: {}\n{:gutter$} |\n", self.message, ""));
+        write_text(text, format_args!("{number} | {}\n", line.trim_end()));
+        write_text(text, format_args!("{:gutter$} | {:left$}{carets}", "", ""));
+        gutter
+    }
+
+    /// The lines under the excerpt.
+    fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        match (&self.expected, &self.found) {
+            (Some(expected), Some(found)) => {
+                notes.push(format!("expected {expected}, found {found}"));
+            }
+            (Some(expected), None) => notes.push(format!("expected {expected}")),
+            (None, Some(found)) => notes.push(format!("found {found}")),
+            (None, None) => {}
+        }
+        notes.extend(self.help.iter().map(|help| format!("help: {help}")));
+        notes
+    }
+}
+
+/// Formatting into a `String` cannot fail.
+fn write_text(text: &mut String, arguments: std::fmt::Arguments<'_>) {
+    let _ = text.write_fmt(arguments);
+}
+
+/// Every complaint about a study, to be shown at once.
+#[derive(Clone, Debug, Default)]
+pub struct Problems {
+    list: Vec<Problem>,
+    /// Keys that lead from the root of the study to what is being looked at.
+    scope: Vec<String>,
+}
+
+impl Problems {
+    /// No complaints.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a complaint and hands it back to say more.
+    pub fn report(&mut self, place: Option<Place>, message: impl Into<String>) -> &mut Problem {
+        let path = self.path("");
+        self.push(Problem { place, path, ..Problem::new(message) })
+    }
+
+    /// Adds a complaint as it is.
+    pub fn push(&mut self, problem: Problem) -> &mut Problem {
+        self.list.push(problem);
+        let last = self.list.len() - 1;
+        &mut self.list[last]
+    }
+
+    /// Runs `look` with paths relative to `section`.
+    pub fn within<R>(&mut self, section: &str, look: impl FnOnce(&mut Self) -> R) -> R {
+        self.scope.push(section.to_owned());
+        let result = look(self);
+        self.scope.pop();
+        result
+    }
+
+    /// The path from the root of the study of something in what is being looked at.
+    pub(crate) fn path(&self, relative: &str) -> String {
+        let mut steps: Vec<&str> = self.scope.iter().map(String::as_str).collect();
+        steps.extend((!relative.is_empty()).then_some(relative));
+        steps.join(".")
+    }
+
+    /// True when nothing is wrong so far.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// How many complaints there are so far, repetitions counted.
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// The complaints in the order of the texts, each once; those without a place come last.
+    pub fn sorted(&self) -> Vec<&Problem> {
+        let mut sorted: Vec<&Problem> = Vec::with_capacity(self.list.len());
+        for problem in &self.list {
+            if !sorted.contains(&problem) {
+                sorted.push(problem);
+            }
+        }
+        sorted.sort_by_key(|problem| {
+            problem
+                .place
+                .as_ref()
+                .map_or((true, None, 0), |place| (false, Some(place.source), place.span.start))
+        });
+        sorted
+    }
+
+    /// Every complaint as plain text, an empty line between two.
+    pub fn render(&self, sources: &Sources) -> String {
+        let texts: Vec<String> =
+            self.sorted().into_iter().map(|problem| problem.render(sources)).collect();
+        texts.join("\n")
+    }
+}
+
+impl Extend<Problem> for Problems {
+    fn extend<I: IntoIterator<Item = Problem>>(&mut self, problems: I) {
+        self.list.extend(problems);
+    }
+}
+
+/// What a plugin complains with: paths are relative to its own section.
+///
+/// ```ignore
+/// complaints.at("degree.max").say("the degree is above the number of runs").found(20).help("…");
+/// ```
+pub struct Complaints<'a> {
+    section: &'a Node,
+    problems: &'a mut Problems,
+}
+
+impl<'a> Complaints<'a> {
+    /// Complaints about `section`, collected in `problems`.
+    pub fn new(section: &'a Node, problems: &'a mut Problems) -> Self {
+        Self { section, problems }
+    }
+
+    /// The value at a dotted path of the section, or the nearest parent that was written.
+    pub fn at(&mut self, path: &str) -> Spot<'_> {
+        let place = Some(self.section.nearest_place(path));
+        let path = self.problems.path(path);
+        Spot { place, path, problems: self.problems }
+    }
+}
+
+/// Where a plugin is about to complain.
+#[must_use = "nothing is reported until `say`"]
+pub struct Spot<'a> {
+    place: Option<Place>,
+    path: String,
+    problems: &'a mut Problems,
+}
+
+impl<'a> Spot<'a> {
+    /// Reports the problem and hands it back to say more.
+    pub fn say(self, message: impl Into<String>) -> &'a mut Problem {
+        let Self { place, path, problems } = self;
+        problems.push(Problem { place, path, ..Problem::new(message) })
+    }
+}

@@ -191,3 +191,5 @@ impl Surrogate for PolynomialChaos {
         Ok(Box::new(Expansion::from_bytes(bytes)?))
     }
 }
+
+lacuna::register!(Surrogate, "polynomial_chaos", PolynomialChaos);

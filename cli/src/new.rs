@@ -1,0 +1,47 @@
+//! `new`: skeletons.
+
+use std::path::{Path, PathBuf};
+
+use lacuna::run::{Stop, files};
+
+use crate::{Failure, print};
+
+/// What can be made new.
+#[derive(clap::Subcommand)]
+pub enum What {
+    /// A folder with a study that runs as it stands: `NAME/study.toml` and its measured data.
+    Study {
+        /// The folder to make.
+        name: PathBuf,
+    },
+}
+
+/// `lacuna new …`
+pub fn write(what: &What) -> Result<(), Failure> {
+    match what {
+        What::Study { name } => study(name),
+    }
+}
+
+const STUDY: &str = include_str!("new/study.toml");
+const RUNS: &str = include_str!("new/runs.csv");
+const RESPONSES: &str = include_str!("new/responses.csv");
+const MEASURED: &str = include_str!("new/measured.csv");
+
+fn study(folder: &Path) -> Result<(), Failure> {
+    if folder.exists() {
+        let stop = Stop::new(format!("{} is there already", folder.display()));
+        return Err(stop.help("choose another name").into());
+    }
+    let all = [
+        ("study.toml", STUDY),
+        ("runs.csv", RUNS),
+        ("responses.csv", RESPONSES),
+        ("measured.csv", MEASURED),
+    ];
+    for (file, text) in all {
+        files::write_atomic(&folder.join(file), text.as_bytes())?;
+    }
+    print(&format!("wrote {0}; run it with `lacuna run {0}/study.toml`", folder.display()));
+    Ok(())
+}

@@ -1,0 +1,108 @@
+//! Progress on the terminal: a bar a stage, or plain lines when the output is no terminal.
+
+use std::io::IsTerminal as _;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use lacuna::run::Observer;
+
+/// How often a plain line is printed.
+const INTERVAL: Duration = Duration::from_secs(10);
+
+/// Shows the progress of a run on standard error.
+pub struct Terminal {
+    interactive: bool,
+    current: Mutex<Option<Current>>,
+}
+
+struct Current {
+    stage: String,
+    unit: String,
+    total: u64,
+    bar: Option<ProgressBar>,
+    begun: Instant,
+    /// What was done when the first report came: taken from an earlier run, not made now.
+    first: Option<u64>,
+    spoken: Instant,
+}
+
+impl Terminal {
+    /// Nothing shown yet.
+    pub fn new() -> Self {
+        let interactive = std::io::stderr().is_terminal();
+        Self { interactive, current: Mutex::new(None) }
+    }
+
+    fn with<R>(&self, act: impl FnOnce(&mut Option<Current>) -> R) -> R {
+        // A thread that panicked while it reported progress spoils nothing here.
+        let mut current = self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        act(&mut current)
+    }
+}
+
+impl Observer for Terminal {
+    fn begin(&self, stage: &str, unit: &str, total: u64) {
+        let bar = (self.interactive && total > 0).then(|| bar(stage, unit, total));
+        let now = Instant::now();
+        let current = Current {
+            stage: stage.to_owned(),
+            unit: unit.to_owned(),
+            total,
+            bar,
+            begun: now,
+            first: None,
+            spoken: now,
+        };
+        self.with(|slot| *slot = Some(current));
+    }
+
+    fn advance(&self, done: u64) {
+        self.with(|slot| {
+            let Some(current) = slot else { return };
+            let first = *current.first.get_or_insert(done);
+            if let Some(bar) = &current.bar {
+                bar.set_position(done);
+            } else if !self.interactive && current.spoken.elapsed() > INTERVAL {
+                current.spoken = Instant::now();
+                eprintln!("{}", plain_line(current, first, done));
+            }
+        });
+    }
+
+    fn end(&self, stage: &str, note: &str) {
+        let current = self.with(Option::take);
+        let Some(current) = current else { return };
+        if let Some(bar) = current.bar {
+            bar.finish_and_clear();
+        }
+        let seconds = current.begun.elapsed().as_secs_f64();
+        eprintln!("{stage:<10} {seconds:>8.2} s   {note}");
+    }
+
+    fn warn(&self, text: &str) {
+        self.with(|slot| match slot.as_ref().and_then(|current| current.bar.as_ref()) {
+            Some(bar) => bar.println(format!("warning: {text}")),
+            None => eprintln!("warning: {text}"),
+        });
+    }
+}
+
+fn bar(stage: &str, unit: &str, total: u64) -> ProgressBar {
+    let template =
+        format!("{stage:<10} [{{bar:30}}] {{pos}}/{{len}} {unit}s, {{per_sec}}, {{eta}} left");
+    let style = ProgressStyle::with_template(&template)
+        .unwrap_or_else(|_| ProgressStyle::default_bar())
+        .progress_chars("=> ");
+    let bar = ProgressBar::new(total).with_style(style);
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
+}
+
+fn plain_line(current: &Current, first: u64, done: u64) -> String {
+    let seconds = current.begun.elapsed().as_secs_f64();
+    let rate = done.saturating_sub(first) as f64 / seconds.max(1e-9);
+    let left = current.total.saturating_sub(done) as f64 / rate.max(1e-9);
+    let Current { stage, unit, total, .. } = current;
+    format!("{stage}: {done}/{total} {unit}s, {rate:.1} {unit}s/s, {left:.0} s left")
+}

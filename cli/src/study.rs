@@ -1,0 +1,97 @@
+//! `run`, `check`, `resume`, `report`.
+
+use std::path::{Path, PathBuf};
+
+use lacuna::report::summary_text;
+use lacuna::run::{RunDirectory, Stop, files};
+use lacuna::stage;
+use lacuna::study::{Study, resolve};
+
+use crate::progress::Terminal;
+use crate::{Failure, print};
+
+/// Keys set on the command line.
+#[derive(clap::Args)]
+pub struct Settings {
+    /// Set a key of the study, such as `sampler.steps=200`; may be given more than once.
+    #[arg(long = "set", value_name = "PATH=VALUE")]
+    set: Vec<String>,
+}
+
+/// `lacuna run STUDY`
+pub fn run(path: &Path, settings: &Settings, out: Option<&Path>) -> Result<(), Failure> {
+    let study = load(path, settings)?;
+    let folder = out.map_or_else(|| Path::new("runs").join(&study.name), Path::to_owned);
+    execute(&study, &folder)
+}
+
+/// `lacuna check STUDY`
+pub fn check(path: &Path, settings: &Settings) -> Result<(), Failure> {
+    let study = load(path, settings)?;
+    let layout = &study.layout;
+    print(&format!(
+        "{}: no problems; {} parameters, {} values a response",
+        path.display(),
+        study.parameters.len(),
+        layout.len()
+    ));
+    Ok(())
+}
+
+/// `lacuna resume RUN`
+pub fn resume(folder: &Path) -> Result<(), Failure> {
+    execute(&kept_study(folder)?, folder)
+}
+
+/// `lacuna report RUN`
+pub fn report(folder: &Path) -> Result<(), Failure> {
+    let study = kept_study(folder)?;
+    if !folder.join("manifest.json").exists() {
+        let stop = Stop::new(format!("the run in {} is not finished", folder.display()));
+        return Err(stop
+            .help(format!("`lacuna resume {}` goes on with it", folder.display()))
+            .into());
+    }
+    execute(&study, folder)
+}
+
+fn load(path: &Path, settings: &Settings) -> Result<Study, Failure> {
+    let checked = resolve::load(path, &settings.set);
+    let complaints = checked.complaints();
+    match checked.study {
+        Some(study) => Ok(study),
+        None => {
+            let count = checked.problems.sorted().len();
+            let plural = if count == 1 { "" } else { "s" };
+            Err(Failure::wrong(format!(
+                "{complaints}\n{count} problem{plural} in {}",
+                path.display()
+            )))
+        }
+    }
+}
+
+/// The study of a run directory: as it was resolved, so that `--set` arguments count.
+fn kept_study(folder: &Path) -> Result<Study, Failure> {
+    let resolved = folder.join("resolved.toml");
+    if !resolved.exists() {
+        let text =
+            format!("error: {} is no run directory: it has no resolved.toml", folder.display());
+        return Err(Failure::wrong(text));
+    }
+    let mut study = load(&resolved, &Settings { set: Vec::new() })?;
+    let written: PathBuf = folder.join("study.toml");
+    study.text = String::from_utf8_lossy(&files::read(&written)?).into_owned();
+    Ok(study)
+}
+
+fn execute(study: &Study, folder: &Path) -> Result<(), Failure> {
+    let mut run = RunDirectory::open(folder)?;
+    let terminal = Terminal::new();
+    let findings = stage::run(study, &mut run, &terminal)?;
+    print("");
+    print(summary_text(&findings).trim_end());
+    print("");
+    print(&format!("report: {}", folder.join("report.html").display()));
+    Ok(())
+}

@@ -1,0 +1,189 @@
+//! Whether draws can be trusted, and what would help.
+//!
+//! What is valid for **independent chains**: R-hat compares them, effective sample sizes and
+//! Monte Carlo errors follow from their autocorrelation.
+//!
+//! What is valid for **walkers of one ensemble**: each walker is a chain with the right stationary
+//! law, so that a large R-hat, a stranded walker or few autocorrelation times show a failure. But
+//! walkers move along lines through each other and are not independent: a small R-hat is no proof of
+//! convergence, and it is expected to be near `sqrt(1 + 2 tau / steps)` however well the ensemble
+//! has converged. Effective sizes add over walkers as if they were independent, which holds only for
+//! many walkers and many autocorrelation times; the honest error of a mean is that of the series
+//! of ensemble means, [`autocorrelation::ensemble_error`].
+
+pub mod autocorrelation;
+pub mod chains;
+pub mod walkers;
+
+use serde::{Deserialize, Serialize};
+
+use crate::data::Draws;
+use walkers::Stranded;
+
+/// What is known about the draws of one coordinate.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Coordinate {
+    /// Its name.
+    pub name: String,
+    /// Rank-normalised split R-hat.
+    pub r_hat: f64,
+    /// The effective sample size for the bulk.
+    pub ess_bulk: f64,
+    /// The effective sample size for the tails.
+    pub ess_tail: f64,
+    /// The integrated autocorrelation time, in steps.
+    pub autocorrelation_time: f64,
+    /// The Monte Carlo standard error of the mean; for an ensemble, from its means.
+    pub mcse_mean: f64,
+    /// The Monte Carlo standard error of the standard deviation.
+    pub mcse_sd: f64,
+}
+
+/// What draws must satisfy to count as converged.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Criteria {
+    /// The largest R-hat.
+    pub r_hat: f64,
+    /// The smallest effective sample size of bulk and tails.
+    pub ess: f64,
+    /// The smallest number of autocorrelation times in the steps kept.
+    pub times: f64,
+}
+
+impl Criteria {
+    /// Independent chains: R-hat below 1.01 and 400 effective draws (Vehtari et al. 2021).
+    pub const CHAINS: Self = Self { r_hat: 1.01, ess: 400.0, times: 10.0 };
+
+    /// Walkers of an ensemble: 400 effective draws and ten autocorrelation times, at which the
+    /// R-hat of a converged ensemble is expected to be 1.095.
+    pub const ENSEMBLE: Self = Self { r_hat: 1.1, ess: 400.0, times: 10.0 };
+}
+
+/// A judgement on the draws of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Diagnosis {
+    /// Each coordinate.
+    pub coordinates: Vec<Coordinate>,
+    /// The share of steps at which each chain moved.
+    pub acceptance: Vec<f64>,
+    /// Chains that never reached the bulk.
+    pub stranded: Stranded,
+    /// Whether the chains are walkers of one ensemble.
+    pub ensemble: bool,
+    /// What was asked.
+    pub criteria: Criteria,
+    /// Whether all of it holds.
+    pub converged: bool,
+    /// How many more steps would satisfy the criteria at the present rate, where steps are what is missing.
+    pub more_steps: usize,
+    /// What a person should know, most important first.
+    pub advice: Vec<String>,
+}
+
+impl Diagnosis {
+    /// Judges draws from which the burn-in has been dropped.
+    pub fn of(draws: &Draws, ensemble: bool) -> Self {
+        let criteria = if ensemble { Criteria::ENSEMBLE } else { Criteria::CHAINS };
+        let coordinates: Vec<Coordinate> =
+            (0..draws.dimension()).map(|j| coordinate(draws, j, ensemble)).collect();
+        let mut diagnosis = Self {
+            acceptance: walkers::acceptance(draws),
+            stranded: Stranded::among(draws),
+            more_steps: more_steps(&coordinates, draws.steps, &criteria),
+            coordinates,
+            ensemble,
+            criteria,
+            converged: false,
+            advice: Vec::new(),
+        };
+        diagnosis.converged = diagnosis.holds();
+        diagnosis.advice = diagnosis.advise(draws);
+        diagnosis
+    }
+
+    fn holds(&self) -> bool {
+        let good = |c: &Coordinate| {
+            c.r_hat <= self.criteria.r_hat && c.ess_bulk.min(c.ess_tail) >= self.criteria.ess
+        };
+        let reached = self.stranded.to_the_end.is_empty() && self.stranded.late.is_empty();
+        reached && self.more_steps == 0 && self.coordinates.iter().all(good)
+    }
+
+    fn advise(&self, draws: &Draws) -> Vec<String> {
+        let mut advice = Vec::new();
+        let kind = if self.ensemble { "walkers" } else { "chains" };
+        let (lost, late) = (self.stranded.to_the_end.len(), self.stranded.late.len());
+        if lost > 0 {
+            advice.push(format!(
+                "{lost} of {} {kind} never reached the bulk: start them around the best fit",
+                draws.chains
+            ));
+        }
+        if late > 0 {
+            advice.push(format!(
+                "{late} of {} {kind} reached the bulk late: drop a longer burn-in",
+                draws.chains
+            ));
+        }
+        for c in &self.coordinates {
+            // Written so that an R-hat that could not be computed complains too.
+            if !(c.r_hat <= self.criteria.r_hat) {
+                advice.push(format!(
+                    "the {kind} disagree on `{}`: R-hat is {:.3} and should be at most {}",
+                    c.name, c.r_hat, self.criteria.r_hat
+                ));
+            }
+        }
+        if self.more_steps > 0 {
+            advice.push(format!(
+                "{} more steps would give {} autocorrelation times and {} effective draws",
+                self.more_steps, self.criteria.times, self.criteria.ess
+            ));
+        }
+        let longest = longest_time(&self.coordinates);
+        if (draws.steps as f64) < 50.0 * longest {
+            advice.push(format!(
+                "the autocorrelation time, {longest:.0} steps, is rough: {} steps would settle it",
+                (50.0 * longest).ceil()
+            ));
+        }
+        advice
+    }
+}
+
+fn coordinate(draws: &Draws, j: usize, ensemble: bool) -> Coordinate {
+    let values: Vec<Vec<f64>> = draws.coordinate(j).collect();
+    Coordinate {
+        name: draws.names[j].clone(),
+        r_hat: chains::r_hat(&values),
+        ess_bulk: chains::ess_bulk(&values),
+        ess_tail: chains::ess_tail(&values),
+        autocorrelation_time: autocorrelation::integrated_time(&values),
+        mcse_mean: if ensemble {
+            autocorrelation::ensemble_error(&values)
+        } else {
+            chains::mcse_mean(&values)
+        },
+        mcse_sd: chains::mcse_sd(&values),
+    }
+}
+
+fn longest_time(coordinates: &[Coordinate]) -> f64 {
+    coordinates.iter().map(|c| c.autocorrelation_time).fold(0.0, f64::max)
+}
+
+/// Steps that are missing at the present rate; as many again as there are where the rate is unknown.
+fn more_steps(coordinates: &[Coordinate], steps: usize, criteria: &Criteria) -> usize {
+    let known = |c: &Coordinate| c.autocorrelation_time.is_finite() && c.ess_tail.is_finite();
+    if !coordinates.iter().all(known) {
+        return steps.max(1);
+    }
+    let smallest =
+        coordinates.iter().map(|c| c.ess_bulk.min(c.ess_tail)).fold(f64::INFINITY, f64::min);
+    let for_size = steps as f64 * criteria.ess / smallest;
+    let for_times = criteria.times * longest_time(coordinates);
+    (for_size.max(for_times).ceil() as usize).saturating_sub(steps)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,156 @@
+//! The normal law that touches a log density at its maximum.
+
+use serde::{Deserialize, Serialize};
+
+use super::Region;
+use crate::linalg::{Matrix, multiply_transposed, multiply_vector, symmetric_eigen};
+use crate::math::random::{Stream, normal};
+use crate::plugin::Target;
+use crate::run::Stop;
+
+/// Step of the differences, in standard deviations: large enough for a gradient with nine digits.
+const STEP: f64 = 1e-3;
+
+/// The smallest curvature relative to the coordinates' own that counts as one.
+const FLATTEST: f64 = 1e-8;
+
+/// The normal approximation of a density around its maximum.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Laplace {
+    /// The covariance.
+    pub covariance: Matrix,
+    /// A factor `F` of it, `covariance = F F'`.
+    pub factor: Matrix,
+    /// Whether the density falls in all directions. Where it does not, the covariance has the width
+    /// of the bounds or a thousand times that of the other coordinates in place of an infinite one.
+    pub definite: bool,
+}
+
+/// The inverse of the curvature at a maximum, from central differences of the gradient.
+///
+/// Steps are a thousandth of the standard deviation that the curvature itself implies; at a
+/// bound they lie on one side.
+pub fn laplace(target: &dyn Target, maximum: &[f64]) -> Result<Laplace, Stop> {
+    let start = Matrix::from_rows(maximum.len(), [maximum]);
+    let regions = super::regions(target, &start);
+    let scales = scales(target, maximum, &regions);
+    let d = maximum.len();
+    let mut curvature = Matrix::zeros(d, d);
+    let mut definite = true;
+    for j in 0..d {
+        let step = STEP * scales[j];
+        let column = if flat(target, maximum, j, scales[j], regions[j]) {
+            None
+        } else {
+            slope_of_gradient(target, maximum, j, step)
+        };
+        if let Some(column) = column {
+            (0..d).for_each(|i| curvature[(i, j)] = -column[i] * scales[i] * scales[j]);
+        } else {
+            definite = false;
+            curvature[(j, j)] = 1.0;
+        }
+    }
+    let symmetric = Matrix::from_fn(d, d, |i, j| 0.5 * (curvature[(i, j)] + curvature[(j, i)]));
+    let eigen = symmetric_eigen(&symmetric)
+        .map_err(|error| Stop::new(format!("the curvature at the maximum is unusable: {error}")))?;
+    let largest = eigen.values.iter().copied().fold(0.0, f64::max);
+    definite &= eigen.values.iter().all(|value| *value > FLATTEST * largest);
+    let floor = if definite { 0.0 } else { 1e-6 };
+    let factor = Matrix::from_fn(d, d, |i, k| {
+        scales[i] * eigen.vectors[(i, k)] / eigen.values[k].max(floor).sqrt()
+    });
+    Ok(Laplace { covariance: multiply_transposed(&factor, &factor), factor, definite })
+}
+
+/// Starting points around a maximum: draws of its normal law inside the support.
+///
+/// Draws outside the support are drawn again, nearer to the maximum after every ten tries.
+pub fn scatter(
+    target: &dyn Target,
+    maximum: &[f64],
+    laplace: &Laplace,
+    count: usize,
+    stream: &Stream,
+) -> Result<Matrix, Stop> {
+    const TRIES: u32 = 400;
+    let bounds = target.bounds();
+    let mut points = Matrix::zeros(0, maximum.len());
+    for index in 0..count {
+        let mut rng = stream.at(index as u64).generator();
+        let found = (0..TRIES).find_map(|attempt| {
+            let shrink = 0.8_f64.powi((attempt / 10) as i32);
+            let z: Vec<f64> = maximum.iter().map(|_| shrink * normal(&mut rng)).collect();
+            let offset = multiply_vector(&laplace.factor, &z);
+            let point: Vec<f64> = maximum.iter().zip(offset).map(|(x, o)| x + o).collect();
+            let inside = point.iter().zip(&bounds).all(|(x, (lo, hi))| x >= lo && x <= hi);
+            let row = Matrix::from_rows(point.len(), [&point]);
+            (inside && target.log_density(&row)[0].is_finite()).then_some(point)
+        });
+        match found {
+            Some(point) => points.push_row(&point),
+            None => {
+                return Err(Stop::new(
+                    "no starting point near the best fit has a posterior density above zero",
+                ));
+            }
+        }
+    }
+    Ok(points)
+}
+
+/// The standard deviation of each coordinate given the others, from the curvature; the size of
+/// its region stands in where the density does not curve downwards.
+pub(super) fn scales(target: &dyn Target, x: &[f64], regions: &[Region]) -> Vec<f64> {
+    (0..x.len()).map(|j| scale(target, x, j, regions[j])).collect()
+}
+
+fn scale(target: &dyn Target, x: &[f64], j: usize, region: Region) -> f64 {
+    // The step must fit the scale that it measures: start from the region and refine.
+    let mut step = STEP * region.size;
+    let mut found = region.size;
+    for _ in 0..30 {
+        let curvature = slope_of_gradient(target, x, j, step).map(|slopes| -slopes[j]);
+        match curvature {
+            Some(curvature) if curvature > 0.0 => {
+                let scale = 1.0 / curvature.sqrt();
+                found = scale.min(region.largest);
+                if (10.0 * step..=1e5 * step).contains(&scale) || scale >= region.largest {
+                    break;
+                }
+                step = STEP * found;
+            }
+            // No density, or convex: perhaps the step left the peak.
+            _ => step *= 0.1,
+        }
+        if step < 1e-14 * region.size.min(found) {
+            break;
+        }
+    }
+    found
+}
+
+/// Whether coordinate `j` has no downward curvature, so that its scale is that of its region.
+fn flat(target: &dyn Target, x: &[f64], j: usize, scale: f64, region: Region) -> bool {
+    scale >= region.size.min(region.largest)
+        && slope_of_gradient(target, x, j, STEP * scale)
+            .is_none_or(|slopes| -slopes[j] * scale * scale < FLATTEST)
+}
+
+/// The change of the gradient along coordinate `j`, per unit; `None` where the density or its
+/// gradient has no value.
+fn slope_of_gradient(target: &dyn Target, x: &[f64], j: usize, step: f64) -> Option<Vec<f64>> {
+    let (lo, hi) = target.bounds()[j];
+    let at = |place: f64| {
+        let mut point = x.to_vec();
+        point[j] = place;
+        let (value, gradient) = target.gradient(&point);
+        (value.is_finite() && gradient.iter().all(|g| g.is_finite())).then_some(gradient)
+    };
+    let (left, right) = ((x[j] - step).max(lo), (x[j] + step).min(hi));
+    if right <= left {
+        return None;
+    }
+    let (below, above) = (at(left)?, at(right)?);
+    Some(below.iter().zip(above).map(|(b, a)| (a - b) / (right - left)).collect())
+}

@@ -1,0 +1,146 @@
+//! The largest values of a log density, and its shape around them.
+
+mod bounded;
+mod laplace;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::linalg::Matrix;
+use crate::linalg::vector::norm;
+use crate::math::random::Stream;
+use crate::plugin::Target;
+use bounded::Scaled;
+
+pub use laplace::{Laplace, laplace, scatter};
+
+/// A maximum of a log density.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Optimum {
+    /// Where it is.
+    pub point: Vec<f64>,
+    /// The log density there.
+    pub value: f64,
+    /// The size of the gradient, in log density per standard deviation of each coordinate (given
+    /// the others); a coordinate that is pressed against a bound does not count.
+    pub gradient_norm: f64,
+    /// Whether the gradient is so small that the point is within a thousandth of a standard
+    /// deviation of a maximum.
+    pub converged: bool,
+    /// Evaluations of density and gradient spent on the way from its start.
+    pub evaluations: usize,
+}
+
+/// The gradient norm below which a maximum counts as found.
+const CONVERGED: f64 = 1e-3;
+
+/// The most times that coordinates are scaled anew.
+const PASSES: usize = 6;
+
+/// The distinct maxima of a log density within its bounds, reached from each row of `starts`, the
+/// largest first.
+///
+/// Each start is followed by L-BFGS-B (Byrd, Lu, Nocedal and Zhu 1995) in coordinates scaled by the
+/// curvature of the density, or by the bounds and the spread of the starts where it has none, so that
+/// unknowns of 1e6 and of 1e-10 go together. Places where the density is zero or has no value turn
+/// the search back. Starts at such places are left out: no start inside the support gives no optimum.
+/// Maxima nearer to each other than a tenth of a standard deviation are one.
+pub fn maximise(target: &dyn Target, starts: &Matrix) -> Vec<Optimum> {
+    let regions = regions(target, starts);
+    let found: Vec<Option<Optimum>> = (0..starts.rows())
+        .into_par_iter()
+        .map(|row| climb(target, starts.row(row), &regions))
+        .collect();
+    let mut found: Vec<Optimum> = found.into_iter().flatten().collect();
+    found.sort_by(|a, b| {
+        let by_point =
+            || a.point.iter().zip(&b.point).map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne());
+        b.value.total_cmp(&a.value).then_with(|| by_point().unwrap_or(std::cmp::Ordering::Equal))
+    });
+    let mut distinct: Vec<(Optimum, Vec<f64>)> = Vec::new();
+    for optimum in found {
+        let near = |(better, scales): &(Optimum, Vec<f64>)| {
+            let pairs = better.point.iter().zip(&optimum.point);
+            pairs.zip(scales).all(|((x, y), scale)| (x - y).abs() <= 0.1 * scale)
+        };
+        if !distinct.iter().any(near) {
+            let scales = laplace::scales(target, &optimum.point, &regions);
+            distinct.push((optimum, scales));
+        }
+    }
+    distinct.into_iter().map(|(optimum, _)| optimum).collect()
+}
+
+/// The extent of one coordinate.
+#[derive(Debug, Clone, Copy)]
+struct Region {
+    /// A size to begin with: between the bounds, else of the prior or the starts.
+    size: f64,
+    /// No standard deviation is larger than this.
+    largest: f64,
+}
+
+fn regions(target: &dyn Target, starts: &Matrix) -> Vec<Region> {
+    // Any fixed stream will do: the draws tell the order of magnitude only.
+    let prior = target.prior_draws(64, &Stream::root(0).named("region"));
+    let spread = |points: &Matrix, j: usize| {
+        let column = points.column(j);
+        let low = column.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        high - low
+    };
+    let region = |(j, (lo, hi)): (usize, (f64, f64))| {
+        let between = hi - lo;
+        let largest = if between > 0.0 { between } else { f64::INFINITY };
+        let magnitude = starts.column(j).iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let size = [between, spread(&prior, j), spread(starts, j), magnitude]
+            .into_iter()
+            .find(|size| *size > 0.0 && size.is_finite())
+            .unwrap_or(1.0);
+        Region { size, largest }
+    };
+    target.bounds().into_iter().enumerate().map(region).collect()
+}
+
+/// Follows one start upwards; `None` where the density is zero at the start.
+fn climb(target: &dyn Target, start: &[f64], regions: &[Region]) -> Option<Optimum> {
+    let bounds = target.bounds();
+    let clamped = start.iter().zip(&bounds).map(|(x, (lo, hi))| x.max(*lo).min(*hi));
+    let mut point: Vec<f64> = clamped.collect();
+    let (mut value, mut gradient) = target.gradient(&point);
+    let mut evaluations = 1;
+    if !value.is_finite() || gradient.iter().any(|g| !g.is_finite()) {
+        return None;
+    }
+    let mut scales = laplace::scales(target, &point, regions);
+    for _ in 0..PASSES {
+        let reached = Scaled::new(target, &point, &scales).maximise(value, &gradient);
+        evaluations += reached.evaluations;
+        let gain = reached.value - value;
+        if gain >= 0.0 {
+            (point, value, gradient) = (reached.point, reached.value, reached.gradient);
+        }
+        scales = laplace::scales(target, &point, regions);
+        let small = gradient_norm(&point, &gradient, &bounds, &scales) < 1e-3 * CONVERGED;
+        // Below this gain the rounding of the density hides the rest.
+        if small || gain <= 1e-13 * value.abs() {
+            break;
+        }
+    }
+    let gradient_norm = gradient_norm(&point, &gradient, &bounds, &scales);
+    let converged = gradient_norm <= CONVERGED;
+    Some(Optimum { point, value, gradient_norm, converged, evaluations })
+}
+
+/// The norm of the scaled gradient without the parts that press against a bound.
+fn gradient_norm(x: &[f64], gradient: &[f64], bounds: &[(f64, f64)], scales: &[f64]) -> f64 {
+    let free = |j: usize| {
+        let (lo, hi) = bounds[j];
+        let pressed = (x[j] <= lo && gradient[j] < 0.0) || (x[j] >= hi && gradient[j] > 0.0);
+        if pressed { 0.0 } else { gradient[j] * scales[j] }
+    };
+    norm(&(0..x.len()).map(free).collect::<Vec<_>>())
+}
+
+#[cfg(test)]
+mod tests;

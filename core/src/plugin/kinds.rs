@@ -1,0 +1,12 @@
+//! The kinds of plugins, and the sections of a study that choose one.
+
+use super::{Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate};
+
+crate::kind!(Reader, "reader", ["simulations", "measurements"]);
+crate::kind!(Design, "design", ["design"]);
+crate::kind!(Model, "model", ["model"]);
+crate::kind!(Executor, "executor", ["executor"]);
+crate::kind!(Surrogate, "surrogate", ["surrogate"]);
+crate::kind!(Discrepancy, "discrepancy", ["discrepancy"]);
+crate::kind!(Sampler, "sampler", ["sampler"]);
+crate::kind!(Effect, "effect", ["effect"]);

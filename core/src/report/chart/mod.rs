@@ -1,0 +1,201 @@
+//! The figures of the report, one kind a file, all drawn on the same frame.
+
+mod bars;
+mod design;
+mod heat_map;
+mod histogram;
+mod lines;
+mod pairs;
+mod rows;
+mod scatter;
+mod trace;
+
+pub use bars::{BarChart, BarSeries, Level};
+pub use design::{DesignColumn, design_matrix};
+pub use heat_map::correlation_map;
+pub use histogram::{Marginal, Mark, SecondAxis, marginals};
+pub use lines::{Band, Curve, Panel, small_multiples};
+pub use pairs::{PairColumn, pair_matrix};
+pub use rows::{Row, row_chart};
+pub use scatter::agreement;
+pub use trace::{Trace, traces};
+
+use super::scale::Scale;
+use super::svg::{Anchor, Area, Svg};
+
+/// The width of every figure in its own units; the page shows it as wide as its column.
+pub const WIDTH: f64 = 880.0;
+
+/// What an axis says and how far it reaches.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    /// The name with its unit; empty for an axis that shares its neighbour's label.
+    pub label: String,
+    /// The numbers it spans.
+    pub domain: (f64, f64),
+    /// About how many ticks it has; none leaves the axis bare.
+    pub ticks: usize,
+    /// Whether the ticks carry numbers; an axis that shares its neighbour's does not.
+    pub numbers: bool,
+    /// Whether equal ratios are equal lengths.
+    pub logarithmic: bool,
+}
+
+impl Axis {
+    /// An axis of five or so ticks.
+    pub fn new(label: impl Into<String>, domain: (f64, f64)) -> Self {
+        Self { label: label.into(), domain, ticks: 5, numbers: true, logarithmic: false }
+    }
+
+    /// The axis without label and numbers, unless `shown`.
+    pub fn shown(&self, shown: bool) -> Self {
+        if shown {
+            self.clone()
+        } else {
+            Self { label: String::new(), numbers: false, ..self.clone() }
+        }
+    }
+
+    /// The axis on a range of places.
+    fn scale(&self, range: (f64, f64)) -> Scale {
+        if self.logarithmic {
+            Scale::logarithmic(self.domain, range)
+        } else {
+            Scale::linear(self.domain, range)
+        }
+    }
+
+    /// The axis with another number of ticks.
+    pub fn ticks(self, ticks: usize) -> Self {
+        Self { ticks, ..self }
+    }
+}
+
+/// A rectangle with two scales.
+#[derive(Debug, Clone, Copy)]
+pub struct Frame {
+    /// The rectangle inside the axes.
+    pub area: Area,
+    /// The horizontal scale.
+    pub x: Scale,
+    /// The vertical scale.
+    pub y: Scale,
+}
+
+impl Frame {
+    /// The scales of these axes on this rectangle.
+    pub fn new(area: Area, x: &Axis, y: &Axis) -> Self {
+        Self { area, x: x.scale((area.x, area.right())), y: y.scale((area.bottom(), area.y)) }
+    }
+
+    /// The place of a pair of numbers.
+    pub fn at(&self, (x, y): (f64, f64)) -> (f64, f64) {
+        (self.x.place(x), self.y.place(y))
+    }
+
+    /// The places of pairs of numbers.
+    pub fn along(&self, points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+        points.iter().map(|&p| self.at(p)).collect()
+    }
+
+    /// Grid lines, ticks, tick labels and axis labels.
+    pub fn axes(&self, svg: &mut Svg, x: &Axis, y: &Axis) {
+        let Area { x: left, y: top, .. } = self.area;
+        let (right, bottom) = (self.area.right(), self.area.bottom());
+        for tick in ticks(&self.y, y.ticks) {
+            let place = self.y.place(tick.value);
+            svg.line("grid", (left, place), (right, place));
+            if y.numbers {
+                svg.text("tick", (left - 5.0, place + 3.6), Anchor::End, &tick.label);
+            }
+        }
+        for tick in ticks(&self.x, x.ticks) {
+            let place = self.x.place(tick.value);
+            svg.line("grid", (place, top), (place, bottom));
+            if x.numbers {
+                svg.text("tick", (place, bottom + 14.0), Anchor::Middle, &tick.label);
+            }
+        }
+        svg.rectangle("frame", self.area, "");
+        let middle = (left + 0.5 * self.area.width, top + 0.5 * self.area.height);
+        if !x.label.is_empty() {
+            svg.text("axis", (middle.0, bottom + 30.0), Anchor::Middle, &x.label);
+        }
+        if !y.label.is_empty() {
+            svg.upward_text("axis", (left - 44.0, middle.1), &y.label);
+        }
+    }
+
+    /// What `draw` draws, cut off at the frame and open to the page's read-out.
+    pub fn inside(&self, svg: &mut Svg, x: &Axis, y: &Axis, draw: impl FnOnce(&mut Svg)) {
+        let (left, right) = (self.area.x, self.area.right());
+        let (bottom, top) = (self.area.bottom(), self.area.y);
+        let across = describe((left, right), &self.x);
+        let along = describe((bottom, top), &self.y);
+        let attributes = [
+            ("class", "plot"),
+            ("data-x", across.as_str()),
+            ("data-y", along.as_str()),
+            ("data-x-label", x.label.as_str()),
+            ("data-y-label", y.label.as_str()),
+        ];
+        svg.group(&attributes, |svg| {
+            svg.rectangle("hit", self.area, "");
+            svg.clipped(self.area, draw);
+        });
+    }
+}
+
+fn ticks(scale: &Scale, count: usize) -> Vec<super::scale::Tick> {
+    if count == 0 { Vec::new() } else { scale.ticks(count) }
+}
+
+/// A linear scale for the page's script: two places and the numbers there.
+fn describe(range: (f64, f64), scale: &Scale) -> String {
+    let domain = scale.domain();
+    format!("{} {} {:e} {:e}", range.0, range.1, domain.0, domain.1)
+}
+
+/// How a key of a legend looks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Swatch {
+    /// A line.
+    Line,
+    /// A filled area.
+    Area,
+    /// A dot.
+    Dot,
+}
+
+/// An entry of a figure's legend; the class is that of the shapes it names.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Key {
+    /// The class of the shapes.
+    pub class: &'static str,
+    /// Its look.
+    pub swatch: Swatch,
+    /// What the shapes are.
+    pub label: String,
+}
+
+impl Key {
+    /// A key for lines.
+    pub fn line(class: &'static str, label: impl Into<String>) -> Self {
+        Self { class, swatch: Swatch::Line, label: label.into() }
+    }
+
+    /// A key for filled areas.
+    pub fn area(class: &'static str, label: impl Into<String>) -> Self {
+        Self { class, swatch: Swatch::Area, label: label.into() }
+    }
+
+    /// A key for dots.
+    pub fn dot(class: &'static str, label: impl Into<String>) -> Self {
+        Self { class, swatch: Swatch::Dot, label: label.into() }
+    }
+}
+
+/// Whether two numbers tell more than rounding of a drawing.
+fn drawable(points: &[(f64, f64)]) -> bool {
+    points.iter().any(|(x, y)| x.is_finite() && y.is_finite())
+}

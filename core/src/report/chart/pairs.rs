@@ -1,0 +1,168 @@
+//! The posterior in pairs: hexagonal bins below the diagonal, densities on it.
+
+use std::collections::BTreeMap;
+
+use super::design::Grid;
+use super::{Axis, Frame, Mark, WIDTH};
+use crate::report::curve::{quantile, smooth_density, sorted};
+use crate::report::scale::{extent, padded};
+use crate::report::svg::{Anchor, Area, Path, Svg};
+
+/// One coordinate of the posterior, in the shown unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PairColumn {
+    /// The name with its unit.
+    pub label: String,
+    /// The kept draws.
+    pub draws: Vec<f64>,
+    /// The effective number of draws.
+    pub effective: f64,
+    /// Numbers marked in every cell, the same ones in the same order for all columns.
+    pub marks: Vec<Mark>,
+}
+
+/// The largest number of coordinates that a page has room for.
+const MOST: usize = 6;
+
+/// Shades of the hexagons, from rare to frequent.
+const SHADES: usize = 6;
+
+/// Every pair of coordinates below the diagonal.
+pub fn pair_matrix(columns: &[PairColumn], description: &str) -> String {
+    let n = columns.len().min(MOST);
+    let grid = Grid::new(n);
+    let mut svg = Svg::new(WIDTH, grid.height());
+    let axes: Vec<Axis> = columns.iter().map(axis).collect();
+    for row in 0..n {
+        for column in 0..=row {
+            let area = grid.cell(row, column);
+            let x = axes[column].shown(row + 1 == n);
+            if row == column {
+                draw_density(&mut svg, area, &columns[row], &axes[row], &x);
+                continue;
+            }
+            let frame = Frame::new(area, &axes[column], &axes[row]);
+            frame.axes(&mut svg, &x, &axes[row].shown(column == 0));
+            svg.clipped(area, |svg| {
+                draw_hexagons(svg, &frame, &columns[column].draws, &columns[row].draws);
+                draw_marks(svg, &frame, &columns[column].marks, &columns[row].marks);
+            });
+        }
+    }
+    svg.finish(description)
+}
+
+/// All but the outermost thousandth, so that a few stray draws do not shrink the rest.
+fn axis(column: &PairColumn) -> Axis {
+    let sorted = sorted(&column.draws);
+    let domain = extent([quantile(&sorted, 0.0005), quantile(&sorted, 0.9995)]);
+    Axis::new(column.label.as_str(), padded(domain.unwrap_or((0.0, 1.0)), 0.12)).ticks(4)
+}
+
+fn draw_density(svg: &mut Svg, area: Area, column: &PairColumn, domain: &Axis, shown: &Axis) {
+    let curve = smooth_density(&column.draws, column.effective, 128);
+    let highest = curve.iter().map(|p| p.1).fold(0.0, f64::max);
+    let y = Axis::new("", (0.0, 1.15 * highest)).ticks(0);
+    let frame = Frame::new(area, domain, &y);
+    frame.axes(svg, shown, &y);
+    svg.clipped(area, |svg| {
+        let outline = frame.along(&curve);
+        let base: Vec<_> = curve.iter().map(|&(x, _)| frame.at((x, 0.0))).collect();
+        svg.path("s-density-area", &Path::band(&outline, &base), "");
+        svg.path("line s-density", &Path::through(outline), "");
+        for mark in column.marks.iter().filter(|m| m.value.is_finite()) {
+            let place = frame.x.place(mark.value);
+            svg.line(&format!("line {}", mark.class), (place, area.y), (place, area.bottom()));
+        }
+    });
+    svg.text("panel-title", (area.x, area.y - 5.0), Anchor::Start, &column.label);
+}
+
+fn draw_marks(svg: &mut Svg, frame: &Frame, across: &[Mark], along: &[Mark]) {
+    for (x, y) in across.iter().zip(along) {
+        let (cx, cy) = frame.at((x.value, y.value));
+        let cross = Path::through([
+            (cx - 6.0, cy),
+            (cx + 6.0, cy),
+            (f64::NAN, 0.0),
+            (cx, cy - 6.0),
+            (cx, cy + 6.0),
+        ]);
+        svg.path("cross-halo", &cross, "");
+        svg.path(&format!("cross {}", x.class), &cross, &x.label);
+    }
+}
+
+/// Counts in hexagons, one path a shade.
+///
+/// The nearest of two interleaved rectangular lattices is the nearest centre of a hexagonal one
+/// (Carr, Littlefield, Nicholson and Littlefield, JASA 82, 1987).
+fn draw_hexagons(svg: &mut Svg, frame: &Frame, x: &[f64], y: &[f64]) {
+    let width = frame.area.width / 26.0;
+    let height = width * 3.0_f64.sqrt();
+    let mut counts: BTreeMap<(i64, i64, bool), usize> = BTreeMap::new();
+    for point in x.iter().zip(y).map(|(&x, &y)| frame.at((x, y))) {
+        if point.0.is_finite() && point.1.is_finite() {
+            *counts.entry(nearest((point.0 / width, point.1 / height))).or_default() += 1;
+        }
+    }
+    let most = counts.values().copied().max().unwrap_or(1) as f64;
+    let mut shades = vec![Vec::new(); SHADES];
+    for ((column, row, shifted), count) in counts {
+        let shift = if shifted { 0.5 } else { 0.0 };
+        let centre = ((column as f64 + shift) * width, (row as f64 + shift) * height);
+        // Shades by the square root of the count: the outskirts matter as much as the peak.
+        let shade = ((count as f64 / most).sqrt() * SHADES as f64).ceil() as usize;
+        shades[shade.clamp(1, SHADES) - 1].push(hexagon(centre, width));
+    }
+    for (i, outlines) in shades.into_iter().enumerate() {
+        svg.path(&format!("hex h-{}", i + 1), &Path::polygons(outlines), "");
+    }
+}
+
+fn nearest((x, y): (f64, f64)) -> (i64, i64, bool) {
+    let distance = |cx: f64, cy: f64| (x - cx).powi(2) + 3.0 * (y - cy).powi(2);
+    let plain = (x.round(), y.round());
+    let shifted = (x.floor(), y.floor());
+    if distance(plain.0, plain.1) <= distance(shifted.0 + 0.5, shifted.1 + 0.5) {
+        (plain.0 as i64, plain.1 as i64, false)
+    } else {
+        (shifted.0 as i64, shifted.1 as i64, true)
+    }
+}
+
+/// A hexagon with a corner above, `width` wide.
+fn hexagon((x, y): (f64, f64), width: f64) -> Vec<(f64, f64)> {
+    let radius = width / 3.0_f64.sqrt();
+    (0..6)
+        .map(|k| (f64::from(k) * 60.0 + 30.0).to_radians())
+        .map(|angle| (x + radius * angle.cos(), y + radius * angle.sin()))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A hexagonal lattice: every place is nearest to the centre that the search finds.
+    #[test]
+    fn the_nearest_hexagon_is_found() {
+        let centre = |(column, row, shifted): (i64, i64, bool)| {
+            let shift = if shifted { 0.5 } else { 0.0 };
+            (column as f64 + shift, row as f64 + shift)
+        };
+        let distance =
+            |p: (f64, f64), c: (f64, f64)| (p.0 - c.0).powi(2) + 3.0 * (p.1 - c.1).powi(2);
+        for i in 0..400 {
+            let p = (f64::from(i % 20) * 0.17 - 1.5, f64::from(i / 20) * 0.13 - 1.1);
+            let found = distance(p, centre(nearest(p)));
+            for column in -3..5 {
+                for row in -3..5 {
+                    for shifted in [false, true] {
+                        assert!(found <= distance(p, centre((column, row, shifted))) + 1e-12);
+                    }
+                }
+            }
+        }
+    }
+}

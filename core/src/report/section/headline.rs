@@ -1,0 +1,110 @@
+//! What came out, warnings first.
+
+use maud::{Markup, html};
+
+use super::{coordinate_unit, response_unit};
+use crate::report::findings::{CalibrationFindings, Findings, ValidationFindings};
+use crate::report::number::{decimals, fixed, percent, typeset};
+use crate::report::page::paragraph;
+
+/// The box at the top of the page.
+pub fn headline(findings: &Findings) -> Markup {
+    html! {
+        @if !findings.warnings.is_empty() {
+            div.warnings role="note" {
+                h2 { "Read this first" }
+                ul { @for warning in &findings.warnings { li { (paragraph(warning)) } } }
+            }
+        }
+        div.headline {
+            @for sentence in sentences(findings) { p { (paragraph(&sentence)) } }
+            @if let Some(calibration) = &findings.calibration { (cards(findings, calibration)) }
+            @if let Some(note) = &findings.note { p.note { b { "Note. " } (paragraph(note)) } }
+        }
+    }
+}
+
+/// What came out, in at most three sentences.
+pub fn sentences(findings: &Findings) -> Vec<String> {
+    let mut sentences = Vec::new();
+    if let Some(calibration) = &findings.calibration {
+        sentences.push(estimate(findings, calibration));
+        sentences.push(convergence(calibration));
+    }
+    sentences.extend(findings.validation.as_ref().and_then(|v| agreement(findings, v)));
+    if sentences.is_empty() {
+        sentences.push(String::from("This run has no calibration yet."));
+    }
+    sentences
+}
+
+fn estimate(findings: &Findings, calibration: &CalibrationFindings) -> String {
+    let parameters = calibration.coordinates.iter().take(findings.parameters.len());
+    let values: Vec<String> = parameters
+        .map(|c| {
+            let unit = coordinate_unit(c);
+            let places = decimals(unit.show(c.mcse_mean), unit.show(c.sd));
+            let number = |value: f64| typeset(&fixed(unit.show(value), places));
+            let interval = format!("{} to {}", number(c.q025), number(c.q975));
+            format!("`{}` {}", c.name, unit.join(&format!("{} ({interval})", number(c.mean))))
+        })
+        .collect();
+    format!("Posterior means with 95 % credible intervals: {}.", values.join("; "))
+}
+
+fn convergence(calibration: &CalibrationFindings) -> String {
+    let outcome = if calibration.converged { "The chains converged" } else { "Not converged" };
+    match calibration.verdict.trim_end_matches('.') {
+        "" => format!("{outcome}."),
+        verdict => format!("{outcome}: {verdict}."),
+    }
+}
+
+fn agreement(findings: &Findings, validation: &ValidationFindings) -> Option<String> {
+    let unit = response_unit(findings);
+    let (first, others) = validation.cases.split_first()?;
+    let how = if first.simulated { "simulated" } else { "emulated" };
+    let map = format!(
+        "{} of the {how} points at the {} lie inside the replicates' 95 % interval (mean over \
+         groups) and differ from the replicates' mean by {} root mean square",
+        percent(first.average),
+        case_title(&first.name),
+        unit.text(first.rmse, 3),
+    );
+    let others = others.iter().map(|other| {
+        let (share, rmse) = (percent(other.average), unit.text(other.rmse, 3));
+        format!("; at the {} {share} and {rmse}", case_title(&other.name))
+    });
+    Some(format!("{map}{}.", others.collect::<String>()))
+}
+
+/// The name of a case as people say it.
+pub fn case_title(name: &str) -> &str {
+    match name {
+        "map" => "MAP",
+        name => name,
+    }
+}
+
+fn cards(findings: &Findings, calibration: &CalibrationFindings) -> Markup {
+    let parameters = calibration.coordinates.iter().take(findings.parameters.len());
+    html! {
+        div.cards {
+            @for c in parameters {
+                @let unit = coordinate_unit(c);
+                @let places = decimals(unit.show(c.mcse_mean), unit.show(c.sd));
+                div.card {
+                    div.card-name { (c.name) }
+                    div.card-value {
+                        (typeset(&fixed(unit.show(c.mean), places)))
+                        span.card-unit { (unit.join("")) }
+                    }
+                    div.card-more {
+                        "posterior sd " (typeset(&fixed(unit.show(c.sd), places)))
+                        " · MAP " (typeset(&fixed(unit.show(c.map), places)))
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! The measured data.
+
+use maud::{Markup, html};
+
+use super::{CurvePanel, Curves, group_word, response_label, response_unit};
+use crate::report::chart::{Axis, Band, Curve, Key, Panel, small_multiples};
+use crate::report::findings::{Findings, MeasuredFindings};
+use crate::report::number::{count, significant};
+use crate::report::page::{Caption, Numbers, Section};
+use crate::report::scale::{ShownUnit, extent, padded};
+use crate::report::table::Table;
+
+/// More replicates than this are not drawn one by one.
+const MOST_DRAWN: usize = 60;
+
+/// The replicates, where there are any.
+pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
+    let measured = findings.measured.as_ref()?;
+    let replicates = measured.used.replicates.len();
+    let content = html! {
+        p {
+            b { (count(replicates)) } " replicates with " (count(measured.used.count()))
+            " measured values; " (count(measured.data_count)) " data enter the likelihood."
+            @if !measured.added_curves.is_empty() {
+                " Beside the replicates the likelihood counts these curves of every group as data: "
+                (measured.added_curves.join(", ")) ". They are not measurements, and the posterior is \
+                narrower for them."
+            }
+        }
+        @if replicates > 0 { (figure(findings, measured, numbers)) }
+        @if !measured.flagged.is_empty() { (flagged(findings, measured, numbers)) }
+    };
+    Some(Section { id: "measurements", title: "Measurements", content })
+}
+
+fn figure(findings: &Findings, measured: &MeasuredFindings, numbers: &mut Numbers) -> Markup {
+    let curves = Curves::of(findings);
+    let unit = response_unit(findings);
+    let panels: Vec<Panel> =
+        curves.panels.iter().map(|outline| panel(measured, outline, &unit)).collect();
+    let values = panels.iter().flat_map(|p| p.curves.iter().flat_map(|c| c.points.iter()));
+    let range = extent(values.map(|p| p.1)).unwrap_or((0.0, 1.0));
+    let x = Axis::new(curves.label.as_str(), curves.domain).ticks(6);
+    let y = Axis::new(response_label(findings), padded(range, 0.06)).ticks(4);
+    let drawing = small_multiples(&panels, &x, &y, "measured curves of every group");
+    let mut keys = vec![
+        Key::line("s-replicate", "replicate"),
+        Key::line("s-mean", "mean of the replicates"),
+        Key::area("s-band", "mean ± 1.96 sd of the replicates"),
+    ];
+    if measured.flagged.iter().any(|f| !f.left_out) {
+        keys.insert(1, Key::line("s-flagged", "replicate flagged by the screen"));
+    }
+    let replicates = measured.used.replicates.len();
+    let thinned = if replicates > MOST_DRAWN {
+        let (all, most) = (count(replicates), MOST_DRAWN);
+        format!(" Of {all} replicates at most {most} are drawn; mean and band are of all.")
+    } else {
+        String::new()
+    };
+    let shows = format!(
+        "Measured curves of every group, all panels on the same axes.{thinned}{}",
+        curves.left_out_sentence()
+    );
+    let caption = Caption::new(
+        shows,
+        "the replicates: the band is where single repetitions fall, not the error of their mean.",
+        "curves apart from the others, bands that widen late, gaps.",
+    );
+    numbers.figure(drawing, &keys, &caption)
+}
+
+fn panel(measured: &MeasuredFindings, outline: &CurvePanel, unit: &ShownUnit) -> Panel {
+    let summaries = measured.used.summaries();
+    let is_flagged = |replicate: &str| {
+        measured.flagged.iter().any(|f| f.replicate == replicate && f.group == outline.title)
+    };
+    let replicates = &measured.used.replicates;
+    let stride = replicates.len().div_ceil(MOST_DRAWN).max(1);
+    let chosen = replicates.iter().enumerate();
+    let chosen = chosen.filter(|(i, r)| i % stride == 0 || is_flagged(&r.name)).map(|(_, r)| r);
+    let mut curves: Vec<Curve> = chosen
+        .map(|replicate| Curve {
+            class: if is_flagged(&replicate.name) { "s-flagged" } else { "s-replicate" },
+            name: String::new(),
+            points: outline.curve(|i| replicate.values[i].map_or(f64::NAN, |v| unit.show(v))),
+        })
+        .collect();
+    curves.sort_by_key(|c| c.class == "s-flagged");
+    let mean = |i: usize| if summaries[i].count > 0 { summaries[i].mean } else { f64::NAN };
+    curves.push(Curve {
+        class: "s-mean",
+        name: String::from("mean"),
+        points: outline.curve(|i| unit.show(mean(i))),
+    });
+    let edges = |i: usize| {
+        let half = 1.96 * summaries[i].sd()?;
+        Some((unit.show(mean(i) - half), unit.show(mean(i) + half)))
+    };
+    let most = outline.places.iter().map(|&(_, i)| summaries[i].count).max().unwrap_or(0);
+    Panel {
+        title: outline.title.clone(),
+        remark: format!("{} replicates", count(most)),
+        bands: vec![Band { class: "s-band", edges: outline.band(edges) }],
+        curves,
+    }
+}
+
+fn flagged(findings: &Findings, measured: &MeasuredFindings, numbers: &mut Numbers) -> Markup {
+    let mut table = Table::new(
+        &["replicate", group_word(&findings.layout), "fate"],
+        &["distance", "threshold"],
+    );
+    for curve in &measured.flagged {
+        let fate = if curve.left_out { "left out" } else { "kept" };
+        table.row([
+            curve.replicate.clone(),
+            curve.group.clone(),
+            fate.to_owned(),
+            significant(curve.distance, 3),
+            significant(curve.threshold, 3),
+        ]);
+    }
+    let caption = Caption::new(
+        "Curves that the screen flagged; distances from the median curve in robust standard \
+         deviations. A curve that was left out is not in the figure nor in any summary.",
+        "",
+        "one replicate in many groups (a bad pulse) or one group in many replicates (a bad gauge).",
+    );
+    numbers.table(&table, &caption)
+}

@@ -1,0 +1,250 @@
+//! The posterior: summary table, correlation, marginals, pairs.
+
+use maud::{Markup, html};
+
+use super::sampling::{kept_draws, marks};
+use super::{coordinate_unit, response_unit, titled};
+use crate::report::chart::{
+    Curve, Key, Marginal, Mark, PairColumn, SecondAxis, correlation_map, marginals, pair_matrix,
+};
+use crate::report::curve::named_density;
+use crate::report::findings::{CalibrationFindings, CoordinateFindings, Findings};
+use crate::report::number::{decimals, fixed, rounded, significant};
+use crate::report::page::{Caption, Numbers, Section};
+use crate::report::scale::extent;
+use crate::report::table::Table;
+
+/// The posterior, where there is a calibration.
+pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
+    let calibration = findings.calibration.as_ref()?;
+    let several = calibration.coordinates.len() > 1;
+    let content = html! {
+        (summary(calibration, numbers))
+        @if several { (correlation(calibration, numbers)) }
+        @if !calibration.draws.is_empty() {
+            (marginal_figures(findings, calibration, numbers))
+            @if several { (pairs(calibration, numbers)) }
+        }
+        (fits(calibration, numbers))
+    };
+    Some(Section { id: "posterior", title: "Posterior", content })
+}
+
+/// The summary of every coordinate, with as many digits as the Monte Carlo error leaves.
+pub fn posterior_table(calibration: &CalibrationFindings) -> Table {
+    let heads =
+        ["mean", "sd", "2.5 %", "median", "97.5 %", "MAP", "R-hat", "ESS bulk", "ESS tail", "MCSE"];
+    let mut table = Table::new(&["parameter", "unit"], &heads);
+    for c in &calibration.coordinates {
+        let unit = coordinate_unit(c);
+        let places = decimals(unit.show(c.mcse_mean), unit.show(c.sd));
+        let number = |value: f64| fixed(unit.show(value), places);
+        let shown = unit.unit.clone();
+        let mut cells = vec![c.name.clone(), shown];
+        cells.extend([c.mean, c.sd, c.q025, c.median, c.q975, c.map].map(number));
+        cells.extend([fixed(c.r_hat, 3), fixed(c.ess_bulk, 0), fixed(c.ess_tail, 0)]);
+        cells.push(significant(unit.show(c.mcse_mean), 2));
+        table.row(cells);
+    }
+    table
+}
+
+fn summary(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
+    let caption = Caption::new(
+        "Posterior of the parameters and of the hyperparameters. Mean, sd and quantiles are those of \
+         the draws after the burn-in; the MAP is the optimised maximum of the density. Numbers end \
+         at the first digit of the Monte Carlo standard error (MCSE) of the mean.",
+        "posterior, given this model and this discrepancy; it holds no doubt about the model's form.",
+        "R-hat above 1.01, effective sample sizes (ESS) below some hundreds.",
+    );
+    numbers.table(&posterior_table(calibration), &caption)
+}
+
+fn correlation(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
+    let names: Vec<String> = calibration.coordinates.iter().map(|c| c.name.clone()).collect();
+    let drawing = correlation_map(&names, &calibration.correlation, "posterior correlation matrix");
+    let caption = Caption::new(
+        "Correlation of the coordinates; blue is positive, red negative.",
+        "the posterior.",
+        "numbers near ±1: the data fix a combination of the two and not each of them.",
+    );
+    numbers.figure(drawing, &[], &caption)
+}
+
+fn marginal_figures(
+    findings: &Findings,
+    calibration: &CalibrationFindings,
+    numbers: &mut Numbers,
+) -> Markup {
+    let split = findings.parameters.len().min(calibration.coordinates.len());
+    let (parameters, hyper): (Vec<_>, Vec<_>) = calibration
+        .coordinates
+        .iter()
+        .enumerate()
+        .map(|(i, c)| (i, marginal(findings, calibration, i, c)))
+        .partition(|(i, _)| *i < split);
+    let panels = |pairs: Vec<(usize, Marginal)>| pairs.into_iter().map(|p| p.1).collect::<Vec<_>>();
+    let (parameters, hyper) = (panels(parameters), panels(hyper));
+    let mut keys = vec![
+        Key::area("s-histogram", "draws"),
+        Key::line("s-fit", "best-fitting named distribution"),
+        Key::line("s-prior", "prior"),
+        Key::line("m-map", "MAP"),
+    ];
+    let hyper_keys = keys.clone();
+    if calibration.coordinates.iter().any(|c| c.reference.is_some()) {
+        keys.push(Key::line("m-reference", "reference"));
+    }
+    let second = hyper.iter().any(|m| m.second.is_some());
+    html! {
+        @if !parameters.is_empty() {
+            (numbers.figure(marginals(&parameters, "marginals of the parameters"), &keys, &Caption::new(
+                "Marginals of the parameters, scaled to area one. An arrow at the edge points to a \
+                 mark beyond the axis.",
+                "histogram and fitted curve the posterior, grey dashes the prior.",
+                "a histogram cut off at the prior's bound; a posterior as wide as the prior, which \
+                 means that the data said nothing; a reference in the tail.",
+            )))
+        }
+        @if !hyper.is_empty() {
+            (numbers.figure(marginals(&hyper, "marginals of the hyperparameters"), &hyper_keys, &Caption::new(
+                format!(
+                    "Marginals of the hyperparameters, scaled to area one.{}",
+                    if second {
+                        " The lower axis is the variance, the upper axis its square root: the \
+                         standard deviation, in the response's unit. The density is that of the variance."
+                    } else { "" }
+                ),
+                "histogram and fitted curve the posterior, grey dashes the prior. A discrepancy's sd is \
+                 that of single data around the model, not an uncertainty of the parameters.",
+                "an sd far above the spread of the replicates: the model misses something.",
+            )))
+        }
+    }
+}
+
+fn marginal(
+    findings: &Findings,
+    calibration: &CalibrationFindings,
+    i: usize,
+    c: &CoordinateFindings,
+) -> Marginal {
+    let unit = coordinate_unit(c);
+    let draws = kept_draws(calibration, i, &unit);
+    let natural = extent(draws.iter().map(|d| d * unit.factor));
+    let span = natural.map(|(low, high)| {
+        let margin = 0.12 * (high - low);
+        (low - margin, high + margin)
+    });
+    let shown = |points: Vec<(f64, f64)>| -> Vec<(f64, f64)> {
+        points.into_iter().map(|(x, d)| (unit.show(x), d * unit.factor)).collect()
+    };
+    let mut curves = Vec::new();
+    if let Some(span) = span.filter(|(low, high)| high > low) {
+        let prior = shown(named_density(&c.prior, span, 160));
+        curves.push(Curve { class: "s-prior", name: String::from("prior"), points: prior });
+        if let Some(fit) = c.fits.first() {
+            let name = fit.distribution.name().replace('_', "-");
+            let points = shown(named_density(&fit.distribution, span, 160));
+            curves.push(Curve { class: "s-fit", name, points });
+        }
+    }
+    let remark = c.fits.first().map_or_else(String::new, |fit| {
+        let name = fit.distribution.name().replace('_', "-");
+        format!("best fit {name}, KS p = {}", significant(fit.p_value, 2))
+    });
+    let per_unit =
+        if unit.unit.is_empty() { String::new() } else { format!(" [1/({})]", unit.unit) };
+    Marginal {
+        title: titled(&c.name, &c.symbol),
+        remark,
+        label: unit.label(&c.name),
+        density_label: format!("density{per_unit}"),
+        draws,
+        curves,
+        marks: marks(c, &unit),
+        second: is_variance(findings, i, c).then(|| sd_axis(findings, unit.factor)),
+    }
+}
+
+/// Whether a hyperparameter is the variance of the response.
+fn is_variance(findings: &Findings, i: usize, c: &CoordinateFindings) -> bool {
+    i >= findings.parameters.len() && c.name.contains("variance") && c.q025 > 0.0
+}
+
+/// The standard deviation in the response's unit above a variance in a unit of this size.
+fn sd_axis(findings: &Findings, variance_factor: f64) -> SecondAxis {
+    let unit = response_unit(findings);
+    SecondAxis {
+        label: unit.label("standard deviation"),
+        factor: unit.factor / variance_factor.sqrt(),
+        to_first: |sd| sd * sd,
+        from_first: f64::sqrt,
+    }
+}
+
+fn pairs(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
+    let columns: Vec<PairColumn> = calibration
+        .coordinates
+        .iter()
+        .enumerate()
+        .map(|(i, c)| {
+            let unit = coordinate_unit(c);
+            PairColumn {
+                label: unit.label(&titled(&c.name, &c.symbol)),
+                draws: kept_draws(calibration, i, &unit),
+                effective: c.ess_bulk,
+                marks: pair_marks(c, &unit),
+            }
+        })
+        .collect();
+    let mut keys = vec![Key::area("hex h-4", "draws (darker: more)"), Key::line("m-map", "MAP")];
+    if calibration.coordinates.iter().any(|c| c.reference.is_some()) {
+        keys.push(Key::line("m-reference", "reference"));
+    }
+    let caption = Caption::new(
+        "The coordinates in pairs: counts of draws in hexagons, shaded by the root of the count, with \
+         densities on the diagonal. The axes hold 99.9 % of the draws; crosses mark the MAP and, \
+         where it is that near, the reference.",
+        "the posterior.",
+        "narrow ridges, bananas, several islands.",
+    );
+    numbers.figure(pair_matrix(&columns, "the posterior in pairs"), &keys, &caption)
+}
+
+/// The MAP and the reference, both in every column, so that they pair up.
+fn pair_marks(c: &CoordinateFindings, unit: &crate::report::scale::ShownUnit) -> Vec<Mark> {
+    let mark = |class, label: &str, value: f64| Mark {
+        class,
+        label: label.to_owned(),
+        value: unit.show(value),
+    };
+    vec![
+        mark("m-map", "MAP", c.map),
+        mark("m-reference", "reference", c.reference.unwrap_or(f64::NAN)),
+    ]
+}
+
+fn fits(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
+    let heads = ["KS distance", "p", "ΔAIC"];
+    let mut table = Table::new(&["parameter", "unit", "distribution"], &heads);
+    for c in &calibration.coordinates {
+        for fit in &c.fits {
+            table.row([
+                c.name.clone(),
+                c.unit.to_string(),
+                rounded(&fit.distribution.to_string(), 5),
+                fixed(fit.ks, 4),
+                significant(fit.p_value, 2),
+                fixed(fit.delta_aic, 1),
+            ]);
+        }
+    }
+    let caption = Caption::new(
+        "Named distributions fitted to the marginals, best first, in the unit of the row. The \
+         p-value is that of the Kolmogorov-Smirnov distance at the effective sample size.",
+        "the posterior, marginally: independent draws from these lose the correlations.",
+        "small p-values: then no named distribution stands in for the draws.",
+    );
+    html! { @if !table.is_empty() { (numbers.table(&table, &caption)) } }
+}

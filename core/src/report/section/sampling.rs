@@ -1,0 +1,164 @@
+//! Whether the sampler did its work: acceptance and traces.
+
+use maud::{Markup, html};
+
+use super::{coordinate_unit, fact_list, titled};
+use crate::plugin::Fact;
+use crate::report::chart::{Axis, BarChart, BarSeries, Key, Level, Mark, Trace, traces};
+use crate::report::findings::{CalibrationFindings, CoordinateFindings, Findings};
+use crate::report::number::{count, percent, significant};
+use crate::report::page::{Caption, Numbers, Section, paragraph};
+use crate::report::scale::ShownUnit;
+
+/// About how many points all traces have together.
+const MOST_POINTS: usize = 70_000;
+
+/// The sampler, where there is a calibration.
+pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
+    let calibration = findings.calibration.as_ref()?;
+    let content = html! {
+        p.verdict.good[calibration.converged] {
+            b { @if calibration.converged { "Converged. " } @else { "Not converged. " } }
+            (paragraph(calibration.verdict.trim_end_matches('.'))) "."
+        }
+        (fact_list(&facts(calibration)))
+        @if !calibration.acceptance.is_empty() { (acceptance(calibration, numbers)) }
+        @if !calibration.draws.is_empty() { (walkers(calibration, numbers)) }
+    };
+    Some(Section { id: "sampling", title: "Sampling", content })
+}
+
+fn facts(calibration: &CalibrationFindings) -> Vec<Fact> {
+    let kept = calibration.steps.saturating_sub(calibration.burn_in);
+    let mut facts = vec![
+        Fact::new("chains", count(calibration.chains)),
+        Fact::new("steps of each", count(calibration.steps)),
+        Fact::new("left out as burn-in", count(calibration.burn_in)),
+        Fact::new("draws kept", count(kept * calibration.chains)),
+        Fact::new("log density at the MAP", significant(calibration.log_density.0, 8)),
+        Fact::new("log density of the best draw", significant(calibration.log_density.1, 8)),
+    ];
+    facts.extend(calibration.facts.iter().cloned());
+    facts
+}
+
+fn acceptance(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
+    let shares = &calibration.acceptance;
+    let mean = shares.iter().sum::<f64>() / shares.len() as f64;
+    let highest = shares.iter().copied().filter(|v| v.is_finite()).fold(0.5, f64::max);
+    let chart = BarChart {
+        names: (1..=shares.len()).map(|i| i.to_string()).collect(),
+        series: vec![BarSeries {
+            class: "s-acceptance",
+            name: String::from("chain"),
+            values: shares.clone(),
+        }],
+        levels: vec![Level {
+            class: "m-mean",
+            label: format!("mean {}", percent(mean)),
+            value: mean,
+        }],
+        x_label: String::from("chain [number]"),
+        y: Axis::new("accepted moves [share]", (0.0, (1.15 * highest).min(1.0))),
+        outstanding: calibration.stranded.clone(),
+        numbers: false,
+    };
+    let mut keys = vec![Key::area("s-acceptance", "chain")];
+    if !calibration.stranded.is_empty() {
+        keys.push(Key::area("outstanding", "chain stranded far below the bulk of the density"));
+    }
+    let caption = Caption::new(
+        "Share of accepted moves of every chain.",
+        "none: each bar is one chain.",
+        "chains that hardly move. For ensembles of walkers 0.2 to 0.5 is usual.",
+    );
+    numbers.figure(chart.draw("share of accepted moves of every chain"), &keys, &caption)
+}
+
+fn walkers(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
+    let points = calibration.steps * calibration.chains * calibration.coordinates.len();
+    let stride = points.div_ceil(MOST_POINTS).max(1);
+    let steps: Vec<usize> = (0..calibration.steps).step_by(stride).collect();
+    let coordinates = calibration.coordinates.iter().enumerate();
+    let rows: Vec<Trace> = coordinates.map(|(i, c)| trace(calibration, (i, c), &steps)).collect();
+    let last = calibration.steps.saturating_sub(1);
+    let drawing = traces(&rows, last, "traces of all chains with the density of the kept draws");
+    let mut keys = vec![
+        Key::line("s-walker", "chain"),
+        Key::area("burn-in", "burn-in"),
+        Key::line("s-density", "density of the kept draws"),
+        Key::line("m-map", "MAP"),
+    ];
+    if calibration.coordinates.iter().any(|c| c.reference.is_some()) {
+        keys.push(Key::line("m-reference", "reference"));
+    }
+    if !calibration.stranded.is_empty() {
+        keys.insert(1, Key::line("s-stranded", "stranded chain"));
+    }
+    let every = match stride {
+        1 => String::from("every step"),
+        stride => format!("one step in {stride}"),
+    };
+    let caption = Caption::new(
+        format!(
+            "Every chain against the step ({every} is drawn), and beside it the density of the kept \
+             draws on the same axis. The axis reaches 0.7 of the kept draws' range beyond them; what \
+             starts farther out is cut off.",
+        ),
+        "the posterior, after the burn-in.",
+        "after the burn-in a band of constant middle and width, without drift and without lonely lines.",
+    );
+    numbers.figure(drawing, &keys, &caption)
+}
+
+fn trace(
+    calibration: &CalibrationFindings,
+    (i, coordinate): (usize, &CoordinateFindings),
+    steps: &[usize],
+) -> Trace {
+    let unit = coordinate_unit(coordinate);
+    let value =
+        |chain: usize, step: usize| unit.show(calibration.draw(chain, step, i).unwrap_or(f64::NAN));
+    let chain = |c: usize| steps.iter().map(|&step| value(c, step)).collect();
+    Trace {
+        title: titled(&coordinate.name, &coordinate.symbol),
+        label: unit.label(&coordinate.name),
+        chains: (0..calibration.chains).map(chain).collect(),
+        stranded: (0..calibration.chains).map(|c| calibration.stranded.contains(&c)).collect(),
+        steps: steps.to_vec(),
+        burn_in: calibration.burn_in,
+        kept: kept_draws(calibration, i, &unit),
+        effective: coordinate.ess_bulk,
+        marks: marks(coordinate, &unit),
+    }
+}
+
+/// The draws after the burn-in of one coordinate, in the shown unit, chain after chain.
+pub fn kept_draws(calibration: &CalibrationFindings, i: usize, unit: &ShownUnit) -> Vec<f64> {
+    let steps = calibration.burn_in..calibration.steps;
+    (0..calibration.chains)
+        .flat_map(|chain| steps.clone().map(move |step| (chain, step)))
+        .filter_map(|(chain, step)| calibration.draw(chain, step, i))
+        .map(|value| unit.show(value))
+        .collect()
+}
+
+/// The MAP and, where there is one, the reference.
+pub fn marks(coordinate: &CoordinateFindings, unit: &ShownUnit) -> Vec<Mark> {
+    let mark = |class, label: &str, value: f64| Mark {
+        class,
+        label: format!("{label} {}", unit.text(value, 4)),
+        value: unit.show(value),
+    };
+    let map = Some(mark("m-map", "MAP", coordinate.map));
+    let reference = coordinate.reference.map(|r| mark("m-reference", "reference", r));
+    map.into_iter().chain(reference).collect()
+}
+
+impl CalibrationFindings {
+    /// One draw of one coordinate; `None` beyond the chains, steps and coordinates there are.
+    fn draw(&self, chain: usize, step: usize, coordinate: usize) -> Option<f64> {
+        let width = self.coordinates.len();
+        self.draws.get((chain * self.steps + step) * width + coordinate).copied()
+    }
+}

@@ -1,0 +1,32 @@
+//! The time each stage took.
+
+use crate::report::chart::{Row, row_chart};
+use crate::report::findings::Findings;
+use crate::report::number::{duration, percent};
+use crate::report::page::{Caption, Numbers, Section};
+
+/// The times, where any are known.
+pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
+    if findings.seconds.is_empty() {
+        return None;
+    }
+    let total: f64 = findings.seconds.iter().map(|(_, seconds)| seconds).sum();
+    let mut rows: Vec<Row> = findings
+        .seconds
+        .iter()
+        .map(|(stage, seconds)| Row {
+            name: stage.clone(),
+            value: *seconds,
+            text: format!("{} · {}", duration(*seconds), percent(seconds / total)),
+        })
+        .collect();
+    rows.push(Row { name: String::from("together"), value: total, text: duration(total) });
+    let caption = Caption::new(
+        "Wall-clock time of each stage when its result was made; a result that was kept from an \
+         earlier run counts with the time it took then.",
+        "",
+        "",
+    );
+    let drawing = row_chart(&rows, "bar s-time", "time of every stage");
+    Some(Section { id: "timing", title: "Time", content: numbers.figure(drawing, &[], &caption) })
+}

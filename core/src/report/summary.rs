@@ -1,0 +1,204 @@
+//! `summary.json`: the results that scripts read.
+
+use serde_json::{Map, Value, json};
+
+use super::findings::{
+    CalibrationFindings, CoordinateFindings, Findings, SurrogateFindings, ValidationCase,
+};
+
+/// The version of the keys and their meaning.
+pub const SCHEMA: u64 = 1;
+
+/// The content of `summary.json`.
+///
+/// Numbers are in the study's own units, unrounded; one that is not finite is `null`. A part is
+/// absent when the run did not make it.
+///
+/// | key | meaning |
+/// |---|---|
+/// | `schema` | version of this table: 1 |
+/// | `study`, `title`, `seed`, `version` | the study's name and title, its seed, the version of Lacuna |
+/// | `warnings` | what a reader must know first, in words |
+/// | `runs.used`, `.failed`, `.invalid`, `.in_prior` | simulation runs with a response, without one, outside the model's validity, inside the prior's support |
+/// | `data.replicates`, `.values`, `.count` | replicates used, their measured values, the number of data in the likelihood |
+/// | `data.added_curves` | curves per group that the likelihood counts beside the replicates |
+/// | `data.flagged` | how many curves the screen flagged; `data.left_out`: how many of them were left out |
+/// | `surrogate.mae`, `.rmse` | mean absolute and root mean square error over the validation runs, in `surrogate.unit` |
+/// | `surrogate.loo` | leave-one-out error relative to the outputs' variance, mean over outputs |
+/// | `surrogate.training`, `.validation` | numbers of runs |
+/// | `surrogate.near_posterior` | root mean square leave-one-out error of the runs near the posterior, in `surrogate.unit`, where known |
+/// | `surrogate.sobol` | for each parameter its `first` and `total` index, where known |
+/// | `parameters.NAME` | parameters and hyperparameters, in that order |
+/// | `….mean`, `.sd`, `.q025`, `.median`, `.q975` | of the posterior draws after the burn-in |
+/// | `….map` | where the posterior density has its maximum |
+/// | `….r_hat`, `.ess_bulk`, `.ess_tail`, `.mcse_mean` | rank-normalised split R-hat, effective sample sizes, Monte Carlo standard error of the mean |
+/// | `….autocorrelation_time` | integrated autocorrelation time in steps |
+/// | `….unit` | the unit of all these but R-hat and the sample sizes |
+/// | `….role` | `parameter` or `hyperparameter` |
+/// | `….reference` | the study's reference value, where it gives one |
+/// | `correlation.names`, `.matrix` | posterior correlation, rows and columns in the order of `names` |
+/// | `acceptance.mean`, `.min`, `.max` | share of accepted moves over the chains |
+/// | `chains.count`, `.steps`, `.burn_in`, `.stranded` | the chains; `stranded` lists those that stayed far below the bulk of the density, from 0 |
+/// | `converged`, `verdict` | whether the run converged, and why in words |
+/// | `log_density.map`, `.best_draw` | log posterior density at the MAP and at the best draw |
+/// | `accuracy.CASE.GROUP` | share of points inside the replicates' 95 % interval; cases `map`, `reference`; `average` is the mean over the groups |
+/// | `rmse.CASE` | root mean square difference from the replicates' mean, in the response's unit |
+/// | `simulated.CASE` | whether the model itself was run there (else the emulator answered) |
+/// | `spread.ORIGIN` | standard deviation of a new replicate by origin, root mean square over outputs, in the response's unit |
+/// | `seconds.STAGE` | wall-clock time when the stage's result was made |
+pub fn summary(findings: &Findings) -> Value {
+    let mut summary = Map::new();
+    let mut put = |key: &str, value: Value| summary.insert(key.to_owned(), value);
+    put("schema", json!(SCHEMA));
+    put("study", json!(findings.study));
+    put("title", json!(findings.title));
+    put("seed", json!(findings.seed));
+    put("version", json!(findings.version));
+    put("warnings", json!(findings.warnings));
+    if let Some(runs) = runs(findings) {
+        put("runs", runs);
+    }
+    if let Some(data) = data(findings) {
+        put("data", data);
+    }
+    if let Some(found) = &findings.surrogate {
+        put("surrogate", surrogate(findings, found));
+    }
+    if let Some(calibration) = &findings.calibration {
+        put("parameters", parameters(findings, calibration));
+        put("correlation", correlation(calibration));
+        put("acceptance", acceptance(calibration));
+        put("chains", chains(calibration));
+        put("converged", json!(calibration.converged));
+        put("verdict", json!(calibration.verdict));
+        let (map, best) = calibration.log_density;
+        put("log_density", json!({ "map": map, "best_draw": best }));
+    }
+    if let Some(validation) = &findings.validation {
+        let cases = &validation.cases;
+        put("accuracy", by_case(cases, accuracy));
+        put("rmse", by_case(cases, |case| json!(case.rmse)));
+        put("simulated", by_case(cases, |case| json!(case.simulated)));
+        put("spread", pairs(&validation.spread));
+    }
+    put("seconds", pairs(&findings.seconds));
+    Value::Object(summary)
+}
+
+/// The text of `summary.json`.
+pub fn summary_json(findings: &Findings) -> String {
+    format!("{:#}\n", summary(findings))
+}
+
+fn runs(findings: &Findings) -> Option<Value> {
+    let ensemble = findings.ensemble.as_ref()?;
+    Some(json!({
+        "used": ensemble.points.rows(),
+        "failed": ensemble.failed.len(),
+        "invalid": ensemble.valid.iter().filter(|valid| !**valid).count(),
+        "in_prior": ensemble.in_prior,
+    }))
+}
+
+fn data(findings: &Findings) -> Option<Value> {
+    let measured = findings.measured.as_ref()?;
+    Some(json!({
+        "replicates": measured.used.replicates.len(),
+        "values": measured.used.count(),
+        "count": measured.data_count,
+        "added_curves": measured.added_curves,
+        "flagged": measured.flagged.len(),
+        "left_out": measured.flagged.iter().filter(|curve| curve.left_out).count(),
+    }))
+}
+
+fn surrogate(findings: &Findings, found: &SurrogateFindings) -> Value {
+    let mut value = json!({
+        "mae": found.mae,
+        "rmse": found.rmse,
+        "loo": found.loo,
+        "unit": findings.layout.unit.to_string(),
+        "training": found.training,
+        "validation": found.validation,
+    });
+    if let Some((error, _)) = found.near_posterior {
+        value["near_posterior"] = json!(error);
+    }
+    if let Some(sobol) = &found.sobol {
+        let named = findings.parameters.iter().zip(sobol);
+        value["sobol"] = named
+            .map(|(p, (first, total))| (p.name.clone(), json!({ "first": first, "total": total })))
+            .collect::<Map<_, _>>()
+            .into();
+    }
+    value
+}
+
+fn parameters(findings: &Findings, calibration: &CalibrationFindings) -> Value {
+    let split = findings.parameters.len();
+    let coordinates = calibration.coordinates.iter().enumerate();
+    let named = coordinates.map(|(i, c)| {
+        let role = if i < split { "parameter" } else { "hyperparameter" };
+        (c.name.clone(), coordinate(c, role))
+    });
+    named.collect::<Map<_, _>>().into()
+}
+
+fn coordinate(c: &CoordinateFindings, role: &str) -> Value {
+    let mut value = json!({
+        "mean": c.mean,
+        "sd": c.sd,
+        "q025": c.q025,
+        "median": c.median,
+        "q975": c.q975,
+        "map": c.map,
+        "r_hat": c.r_hat,
+        "ess_bulk": c.ess_bulk,
+        "ess_tail": c.ess_tail,
+        "mcse_mean": c.mcse_mean,
+        "autocorrelation_time": c.autocorrelation_time,
+        "unit": c.unit.to_string(),
+        "role": role,
+    });
+    if let Some(reference) = c.reference {
+        value["reference"] = json!(reference);
+    }
+    value
+}
+
+fn correlation(calibration: &CalibrationFindings) -> Value {
+    let names: Vec<&str> = calibration.coordinates.iter().map(|c| c.name.as_str()).collect();
+    let matrix: Vec<&[f64]> = calibration.correlation.iter_rows().collect();
+    json!({ "names": names, "matrix": matrix })
+}
+
+fn acceptance(calibration: &CalibrationFindings) -> Value {
+    let shares = &calibration.acceptance;
+    let mean = shares.iter().sum::<f64>() / shares.len() as f64;
+    let min = shares.iter().copied().fold(f64::NAN, f64::min);
+    let max = shares.iter().copied().fold(f64::NAN, f64::max);
+    json!({ "mean": mean, "min": min, "max": max })
+}
+
+fn chains(calibration: &CalibrationFindings) -> Value {
+    json!({
+        "count": calibration.chains,
+        "steps": calibration.steps,
+        "burn_in": calibration.burn_in,
+        "stranded": calibration.stranded,
+    })
+}
+
+fn accuracy(case: &ValidationCase) -> Value {
+    let mut value = pairs(&case.accuracy);
+    value["average"] = json!(case.average);
+    value
+}
+
+fn by_case(cases: &[ValidationCase], value: impl Fn(&ValidationCase) -> Value) -> Value {
+    cases.iter().map(|case| (case.name.clone(), value(case))).collect::<Map<_, _>>().into()
+}
+
+fn pairs(pairs: &[(String, f64)]) -> Value {
+    pairs.iter().map(|(name, value)| (name.clone(), json!(value))).collect::<Map<_, _>>().into()
+}

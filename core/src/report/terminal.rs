@@ -1,0 +1,26 @@
+//! The closing summary that a terminal shows after a run.
+
+use super::findings::Findings;
+use super::section::{accuracy_table, group_word, headline, posterior_table};
+
+/// The result of a run in plain text: warnings, what came out, the posterior, the accuracy.
+pub fn summary_text(findings: &Findings) -> String {
+    let mut parts = Vec::new();
+    if !findings.warnings.is_empty() {
+        let lines: Vec<String> =
+            findings.warnings.iter().map(|warning| format!("warning: {warning}")).collect();
+        parts.push(lines.join("\n") + "\n");
+    }
+    parts.push(headline::sentences(findings).join("\n") + "\n");
+    if let Some(calibration) = &findings.calibration {
+        parts.push(posterior_table(calibration).text());
+    }
+    if let Some(validation) = findings.validation.as_ref().filter(|v| !v.cases.is_empty()) {
+        let title = "points inside the replicates' 95 % interval";
+        parts.push(format!(
+            "{title}\n{}",
+            accuracy_table(group_word(&findings.layout), &validation.cases).text()
+        ));
+    }
+    parts.join("\n")
+}

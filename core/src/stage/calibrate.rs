@@ -1,0 +1,314 @@
+//! Stage 5: the posterior of the parameters.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use crate::data::{Draws, Unit};
+use crate::diagnose::Diagnosis;
+use crate::linalg::Matrix;
+use crate::math::distribution::Distribution;
+use crate::math::optimise;
+use crate::math::random::Stream;
+use crate::plugin::{Effect, Emulator, Fact, Likelihood, Target};
+use crate::posterior::Posterior;
+use crate::run::arrays::{self, Array};
+use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
+use crate::study::Study;
+use crate::study::file::Start;
+
+use super::read::{Data, Measured};
+use super::sampling::{self, Sampled};
+use super::stream;
+use super::surrogate::Fitted;
+
+/// The posterior as draws, with its maximum.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Calibrated {
+    /// All draws in natural units, burn-in included.
+    pub draws: Draws,
+    /// The rest.
+    pub outcome: Outcome,
+}
+
+/// What a calibration found besides its draws.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Outcome {
+    /// The coordinates, parameters first.
+    pub coordinates: Vec<Coordinate>,
+    /// The point of largest posterior density, natural units, found by optimisation.
+    pub map: Vec<f64>,
+    /// The log posterior density there, without the Jacobian of logarithmic coordinates.
+    pub map_log_density: f64,
+    /// Other local maxima within ten of the best, with their log densities.
+    pub other_maxima: Vec<(Vec<f64>, f64)>,
+    /// The draw with the largest density, natural units, and its log density.
+    pub best_draw: (Vec<f64>, f64),
+    /// The number of first steps that are burn-in.
+    pub burn_in: usize,
+    /// The share of accepted moves of each chain.
+    pub acceptance: Vec<f64>,
+    /// The judgement on the draws after burn-in.
+    pub diagnosis: Diagnosis,
+    /// Evaluations of the log density.
+    pub evaluations: u64,
+    /// Facts about the likelihood and the sampler.
+    pub facts: Vec<Fact>,
+}
+
+/// A coordinate of the posterior.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Coordinate {
+    /// Its name.
+    pub name: String,
+    /// Its symbol.
+    pub symbol: String,
+    /// Its unit.
+    pub unit: Unit,
+    /// Its prior.
+    pub prior: Distribution,
+    /// Its reference value.
+    pub reference: Option<f64>,
+}
+
+impl Artifact for Calibrated {
+    fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
+        let d = &self.draws;
+        let axes = |last: Option<usize>| {
+            let both = [("chain".to_owned(), d.chains), ("step".to_owned(), d.steps)];
+            both.into_iter().chain(last.map(|n| ("coordinate".to_owned(), n))).collect()
+        };
+        let array = |name: &str, values: &[f64], last| Array {
+            name: name.to_owned(),
+            dimensions: axes(last),
+            values: values.to_vec(),
+            unit: None,
+        };
+        let arrays = [
+            array("draws", &d.values, Some(d.dimension())),
+            array("log_density", &d.log_density, None),
+        ];
+        let names = d.names.join(" ");
+        arrays::write(&folder.join("draws.nc"), &[("coordinates", names)], &arrays)?;
+        files::write_json(&folder.join("outcome.json"), &self.outcome)?;
+        Ok(["draws.nc", "outcome.json"].map(str::to_owned).to_vec())
+    }
+
+    fn load(folder: &Path) -> Result<Self, Stop> {
+        let outcome: Outcome = files::read_json(&folder.join("outcome.json"))?;
+        let path = folder.join("draws.nc");
+        let values = arrays::read(&path, "draws")?;
+        let log_density = arrays::read(&path, "log_density")?;
+        let draws = Draws {
+            names: outcome.coordinates.iter().map(|c| c.name.clone()).collect(),
+            chains: values.dimensions[0].1,
+            steps: values.dimensions[1].1,
+            values: values.values,
+            log_density: log_density.values,
+        };
+        Ok(Self { draws, outcome })
+    }
+}
+
+/// The parts of a posterior that outlive the stage.
+pub struct Parts {
+    likelihood: Box<dyn Likelihood>,
+}
+
+impl Parts {
+    /// The likelihood of the study's measurements, with the emulator's error if the study wants it.
+    pub fn of(study: &Study, measured: &Measured, fitted: &Fitted) -> Result<Self, Stop> {
+        let section =
+            study.discrepancy.as_ref().ok_or_else(|| Stop::new("the study has no discrepancy"))?;
+        let error =
+            if section.common.emulator_error { Some(fitted.covariance(study)?) } else { None };
+        let likelihood = section.built.plugin.likelihood(&measured.likelihood, error.as_ref())?;
+        Ok(Self { likelihood })
+    }
+
+    /// The likelihood.
+    pub fn likelihood(&self) -> &dyn Likelihood {
+        &*self.likelihood
+    }
+
+    /// The posterior of a study with this emulator.
+    pub fn posterior<'a>(&'a self, study: &'a Study, emulator: &'a dyn Emulator) -> Posterior<'a> {
+        let effects: Vec<&dyn Effect> = study.effects.iter().map(|e| &*e.built.plugin).collect();
+        Posterior::new(&study.layout, &study.parameters, emulator, &effects, self.likelihood())
+    }
+}
+
+/// Draws from the posterior; `None` when the study has no measurements.
+pub fn stage(
+    study: &Study,
+    data: &Kept<Data>,
+    fitted: &Kept<Fitted>,
+    emulator: &dyn Emulator,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Option<Kept<Calibrated>>, Stop> {
+    let (Some(measured), Some(section), Some(discrepancy)) =
+        (&data.value.measured, &study.sampler, &study.discrepancy)
+    else {
+        return Ok(None);
+    };
+    let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.prior, p.reference)).collect();
+    let effects: Vec<_> = study.effects.iter().map(|e| (e.built.name, &e.built.options)).collect();
+    let inputs = json!([
+        data.hash,
+        fitted.hash,
+        laws,
+        (discrepancy.built.name, &discrepancy.built.options, &discrepancy.common),
+        effects,
+        (section.built.name, &section.built.options, &section.common),
+        study.about.seed
+    ]);
+    let parts = Parts::of(study, measured, &fitted.value)?;
+    let posterior = parts.posterior(study, emulator);
+    let plan = section.built.plugin.plan(posterior.dimension());
+    observer.begin("calibrate", "step", plan.steps as u64);
+    let kept = run.keep("5-calibrate", &inputs, observer, |folder| {
+        calibrate(study, &posterior, folder, observer)
+    })?;
+    observer.end("calibrate", &summary(&kept.value));
+    Ok(Some(kept))
+}
+
+fn summary(calibrated: &Calibrated) -> String {
+    let (draws, outcome) = (&calibrated.draws, &calibrated.outcome);
+    let state = if outcome.diagnosis.converged { "converged" } else { "not converged" };
+    format!("{} chains x {} steps, {state}", draws.chains, draws.steps)
+}
+
+fn calibrate(
+    study: &Study,
+    posterior: &Posterior<'_>,
+    folder: &Path,
+    observer: &dyn Observer,
+) -> Result<Calibrated, Stop> {
+    let section = study.sampler.as_ref().ok_or_else(|| Stop::new("the study has no sampler"))?;
+    let random = stream(study, "calibrate");
+    let maxima = maxima(posterior, &random.named("optimise"))?;
+    let best = &maxima[0];
+    let plan = section.built.plugin.plan(posterior.dimension());
+    let start = || match section.common.start {
+        Start::Prior => Ok(from_prior(posterior, plan.chains, &random.named("start"))),
+        Start::Map => {
+            let laplace = optimise::laplace(posterior, &best.point)?;
+            let random = random.named("start");
+            optimise::scatter(posterior, &best.point, &laplace, plan.chains, &random)
+        }
+    };
+    let coordinates = coordinates(study, posterior);
+    let names = coordinates.iter().map(|c| c.name.clone()).collect();
+    let progress = Progress::new(observer);
+    let sampled = sampling::sample(
+        &*section.built.plugin,
+        posterior,
+        names,
+        start,
+        &random.named("sample"),
+        folder,
+        &progress,
+    )?;
+    let other_maxima = maxima[1..]
+        .iter()
+        .filter(|m| best.value - m.value < 10.0)
+        .map(|m| (posterior.natural(&m.point), m.value))
+        .collect();
+    let burn_in = (section.common.burn_in.get() * plan.steps as f64).floor() as usize;
+    let kept = sampled.draws.after_burn_in(section.common.burn_in.get());
+    let diagnosis = Diagnosis::of(&kept, plan.ensemble);
+    let outcome = Outcome {
+        coordinates,
+        map: posterior.natural(&best.point),
+        map_log_density: best.value,
+        other_maxima,
+        best_draw: best_draw(posterior, &sampled),
+        burn_in,
+        acceptance: sampled.acceptance,
+        diagnosis,
+        evaluations: sampled.evaluations,
+        facts: section.built.plugin.facts(),
+    };
+    Ok(Calibrated { draws: natural(posterior, sampled.draws), outcome })
+}
+
+fn coordinates(study: &Study, posterior: &Posterior<'_>) -> Vec<Coordinate> {
+    let parameters = study.parameters.iter().map(|p| Coordinate {
+        name: p.name.clone(),
+        symbol: p.symbol.clone(),
+        unit: p.unit.clone(),
+        prior: p.prior.clone(),
+        reference: p.reference,
+    });
+    let hyper = posterior.hyperparameters().iter().map(|h| Coordinate {
+        name: h.name.clone(),
+        symbol: h.symbol.clone(),
+        unit: h.unit.clone(),
+        prior: h.prior.clone(),
+        reference: None,
+    });
+    parameters.chain(hyper).collect()
+}
+
+/// Number of prior draws among which the starting points of the optimiser are chosen.
+const CANDIDATES: usize = 400;
+/// Number of starting points of the optimiser.
+const STARTS: usize = 12;
+
+/// The local maxima of the posterior density in natural units, best first.
+fn maxima(posterior: &Posterior<'_>, stream: &Stream) -> Result<Vec<optimise::Optimum>, Stop> {
+    let mode = posterior.mode();
+    let d = posterior.parameters().len();
+    let mut candidates = posterior.prior_draws(CANDIDATES, stream);
+    // A discrepancy knows a sensible start for its own unknowns; a wide prior on a variance does not.
+    let starts: Vec<f64> = posterior.hyperparameters().iter().map(|h| h.start).collect();
+    let filled = [vec![1.0; d], starts].concat();
+    let hyper = posterior.coordinates(&filled)[d..].to_vec();
+    for i in 0..candidates.rows() {
+        candidates.row_mut(i)[d..].copy_from_slice(&hyper);
+    }
+    let density = mode.log_density(&candidates);
+    let mut order: Vec<usize> = (0..CANDIDATES).filter(|&i| density[i].is_finite()).collect();
+    if order.is_empty() {
+        return Err(Stop::new("the posterior density is zero at every point tried in the prior")
+            .help("check the priors and the units of the measurements"));
+    }
+    order.sort_by(|&a, &b| density[b].total_cmp(&density[a]).then(a.cmp(&b)));
+    // Half of the starts are the best candidates, half are spread over the others.
+    let (best, rest) = order.split_at((STARTS / 2).min(order.len()));
+    let spread = rest.iter().step_by((rest.len() / (STARTS / 2)).max(1)).take(STARTS / 2);
+    let chosen: Vec<usize> = best.iter().chain(spread).copied().collect();
+    let maxima = optimise::maximise(&mode, &candidates.select_rows(&chosen));
+    if maxima.is_empty() {
+        return Err(Stop::new("no maximum of the posterior density was found"));
+    }
+    Ok(maxima)
+}
+
+fn from_prior(posterior: &Posterior<'_>, chains: usize, stream: &Stream) -> Matrix {
+    let draws = posterior.prior_draws(4 * chains, stream);
+    let density = posterior.log_density(&draws);
+    let finite: Vec<usize> =
+        (0..draws.rows()).filter(|&i| density[i].is_finite()).take(chains).collect();
+    draws.select_rows(&finite)
+}
+
+fn best_draw(posterior: &Posterior<'_>, sampled: &Sampled) -> (Vec<f64>, f64) {
+    let draws = &sampled.draws;
+    let Some((chain, step)) = draws.best() else { return (Vec::new(), f64::NEG_INFINITY) };
+    let point = draws.point(chain, step);
+    let row = Matrix::from_vec(1, point.len(), point.to_vec());
+    (posterior.natural(point), posterior.mode().log_density(&row)[0])
+}
+
+fn natural(posterior: &Posterior<'_>, mut draws: Draws) -> Draws {
+    let d = draws.dimension();
+    for point in draws.values.chunks_exact_mut(d) {
+        let values = posterior.natural(point);
+        point.copy_from_slice(&values);
+    }
+    draws
+}

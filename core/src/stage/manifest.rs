@@ -1,0 +1,31 @@
+//! What a run was made from: the study as written, the study as resolved, and the provenance of every stage.
+
+use serde_json::json;
+
+use crate::run::{RunDirectory, Stop, files};
+use crate::study::{Study, emit};
+
+/// Writes `study.toml` (byte for byte) and `resolved.toml` (which runs as it stands).
+pub fn begin(study: &Study, run: &RunDirectory) -> Result<(), Stop> {
+    files::write_atomic(&run.root().join("study.toml"), study.text.as_bytes())?;
+    let resolved = emit::to_toml(&study.resolved)
+        .map_err(|error| Stop::new(format!("cannot write resolved.toml: {error}")))?;
+    let version = env!("CARGO_PKG_VERSION");
+    let head = format!(
+        "# Written by lacuna {version}: every default filled in. It runs as it stands.\n\n"
+    );
+    files::write_atomic(&run.root().join("resolved.toml"), (head + &resolved).as_bytes())
+}
+
+/// Writes `manifest.json`: versions, and for each stage the hash of its inputs, its files and its time.
+pub fn end(study: &Study, run: &RunDirectory) -> Result<(), Stop> {
+    let manifest = json!({
+        "schema": 1,
+        "study": study.name,
+        "study_sha256": files::hash(study.text.as_bytes()),
+        "lacuna": env!("CARGO_PKG_VERSION"),
+        "seed": study.about.seed,
+        "stages": run.records(),
+    });
+    files::write_json(&run.root().join("manifest.json"), &manifest)
+}

@@ -1,0 +1,246 @@
+//! Stage 8: what was found, for people (`report.html`) and for scripts (`summary.json`, `posterior.nc`).
+
+use crate::data::Draws;
+use crate::diagnose::Diagnosis;
+use crate::linalg::Matrix;
+use crate::math::fit;
+use crate::math::moments::{self, Moments};
+use crate::plugin::Emulator;
+use crate::report::findings::{
+    CalibrationFindings, CoordinateFindings, EnsembleFindings, Findings, FittedDistribution,
+    MeasuredFindings, SurrogateFindings,
+};
+use crate::report::{render, summary_json};
+use crate::run::{Kept, RunDirectory, Stop, files};
+use crate::study::Study;
+
+use super::calibrate::Calibrated;
+use super::inference_data;
+use super::read::{Data, Measured};
+use super::surrogate::Fitted;
+use super::validate::Validated;
+
+/// The artifacts of all stages.
+pub struct Artifacts<'a> {
+    /// What was read.
+    pub data: &'a Kept<Data>,
+    /// The surrogate.
+    pub fitted: &'a Kept<Fitted>,
+    /// The emulator.
+    pub emulator: &'a dyn Emulator,
+    /// The posterior.
+    pub calibrated: Option<&'a Kept<Calibrated>>,
+    /// The validation.
+    pub validated: Option<&'a Kept<Validated>>,
+}
+
+/// Writes report, summary and posterior file; returns the findings.
+pub fn stage(study: &Study, all: &Artifacts<'_>, run: &RunDirectory) -> Result<Findings, Stop> {
+    let findings = findings(study, all, run);
+    let root = run.root();
+    files::write_atomic(&root.join("summary.json"), summary_json(&findings).as_bytes())?;
+    let page = render(&findings);
+    files::write_atomic(&run.stage_folder("8-report").join("report.html"), page.as_bytes())?;
+    files::write_atomic(&root.join("report.html"), page.as_bytes())?;
+    if let (Some(calibrated), Some(measured)) = (all.calibrated, &all.data.value.measured) {
+        let bytes = inference_data::encode(study, &calibrated.value, measured, all.validated)
+            .map_err(|error| Stop::new(format!("cannot write posterior.nc: {error}")))?;
+        files::write_atomic(&root.join("posterior.nc"), &bytes)?;
+    }
+    Ok(findings)
+}
+
+fn findings(study: &Study, all: &Artifacts<'_>, run: &RunDirectory) -> Findings {
+    let data = &all.data.value;
+    let measured = data.measured.as_ref();
+    let calibration = all.calibrated.map(|c| calibration(&c.value));
+    let validation =
+        all.validated.zip(measured).map(|(kept, measured)| kept.value.findings(measured));
+    let seconds = run
+        .records()
+        .iter()
+        .map(|r| (r.stage.split_once('-').map_or(r.stage.as_str(), |s| s.1).to_owned(), r.seconds))
+        .collect();
+    Findings {
+        title: study.about.title.clone(),
+        study: study.name.clone(),
+        seed: study.about.seed,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        components: components(study),
+        parameters: study.parameters.clone(),
+        layout: study.layout.clone(),
+        ensemble: Some(ensemble(study, data)),
+        measured: measured.map(|m| measurements(study, m)),
+        surrogate: Some(surrogate(all)),
+        warnings: warnings(data, all, calibration.as_ref()),
+        calibration,
+        validation,
+        seconds,
+        note: study.about.note.clone(),
+    }
+}
+
+fn components(study: &Study) -> Vec<(String, String)> {
+    let mut list = Vec::new();
+    macro_rules! name {
+        ($($field:ident),+) => {
+            $(if let Some(section) = &study.$field {
+                list.push((stringify!($field).to_owned(), section.built.name.to_owned()));
+            })+
+        };
+    }
+    name!(model, design, executor, simulations, measurements, surrogate, discrepancy, sampler);
+    list.extend(study.effects.iter().map(|e| ("effect".to_owned(), e.built.name.to_owned())));
+    list
+}
+
+fn ensemble(study: &Study, data: &Data) -> EnsembleFindings {
+    let e = &data.ensemble;
+    let inside = |point: &&[f64]| {
+        study.parameters.iter().zip(*point).all(|(p, &x)| p.prior.log_density(x).is_finite())
+    };
+    EnsembleFindings {
+        points: e.points.clone(),
+        valid: e.valid.clone(),
+        failed: e.failed.clone(),
+        in_prior: e.points.iter_rows().filter(inside).count(),
+    }
+}
+
+fn measurements(study: &Study, measured: &Measured) -> MeasuredFindings {
+    let added =
+        study.measurements.as_ref().map(|s| s.common.added_curves.len()).unwrap_or_default();
+    let curves = measured.likelihood.replicates.iter().rev().take(added).rev();
+    MeasuredFindings {
+        used: measured.used.clone(),
+        flagged: measured.flagged.clone(),
+        data_count: measured.likelihood.count(),
+        added_curves: curves.map(|r| r.name.clone()).collect(),
+    }
+}
+
+fn surrogate(all: &Artifacts<'_>) -> SurrogateFindings {
+    let errors = &all.fitted.value.errors;
+    let sobol = all.emulator.sensitivity().map(|s| {
+        let total = s.aggregated.total.row(0).iter();
+        s.aggregated.first.row(0).iter().zip(total).map(|(f, t)| (*f, *t)).collect()
+    });
+    SurrogateFindings {
+        facts: errors.facts.clone(),
+        training: errors.training,
+        validation: errors.validation,
+        mae: errors.mae,
+        rmse: errors.rmse,
+        loo: errors.loo,
+        by_group: errors.by_group.clone(),
+        near_posterior: all.validated.and_then(|v| v.value.emulator_at_posterior),
+        pairs: errors.pairs.clone(),
+        sobol,
+    }
+}
+
+fn calibration(calibrated: &Calibrated) -> CalibrationFindings {
+    let outcome = &calibrated.outcome;
+    let share = outcome.burn_in as f64 / calibrated.draws.steps.max(1) as f64;
+    let kept = calibrated.draws.after_burn_in(share);
+    let coordinates = (0..kept.dimension()).map(|j| coordinate(calibrated, &kept, j)).collect();
+    CalibrationFindings {
+        coordinates,
+        draws: calibrated.draws.values.clone(),
+        chains: calibrated.draws.chains,
+        steps: calibrated.draws.steps,
+        burn_in: outcome.burn_in,
+        correlation: correlation(&kept),
+        acceptance: outcome.acceptance.clone(),
+        stranded: outcome.diagnosis.stranded.to_the_end.clone(),
+        converged: outcome.diagnosis.converged,
+        verdict: verdict(&outcome.diagnosis),
+        log_density: (outcome.map_log_density, outcome.best_draw.1),
+        best_draw: outcome.best_draw.0.clone(),
+        facts: outcome.facts.clone(),
+    }
+}
+
+fn verdict(diagnosis: &Diagnosis) -> String {
+    if diagnosis.converged && diagnosis.advice.is_empty() {
+        "converged".to_owned()
+    } else {
+        diagnosis.advice.join("; ")
+    }
+}
+
+fn coordinate(calibrated: &Calibrated, kept: &Draws, j: usize) -> CoordinateFindings {
+    let outcome = &calibrated.outcome;
+    let about = &outcome.coordinates[j];
+    let judged = &outcome.diagnosis.coordinates[j];
+    let pooled = kept.pooled(j);
+    let sorted = moments::sorted(&pooled);
+    let fits = fit::fit(&pooled, judged.ess_bulk);
+    let best = fits.first().map_or(0.0, |f| f.aic);
+    CoordinateFindings {
+        name: about.name.clone(),
+        symbol: about.symbol.clone(),
+        unit: about.unit.clone(),
+        prior: about.prior.clone(),
+        reference: about.reference,
+        mean: moments::mean(&pooled),
+        sd: moments::variance(&pooled).sqrt(),
+        q025: moments::quantile(&sorted, 0.025),
+        median: moments::quantile(&sorted, 0.5),
+        q975: moments::quantile(&sorted, 0.975),
+        map: outcome.map[j],
+        r_hat: judged.r_hat,
+        ess_bulk: judged.ess_bulk,
+        ess_tail: judged.ess_tail,
+        mcse_mean: judged.mcse_mean,
+        autocorrelation_time: judged.autocorrelation_time,
+        fits: fits
+            .into_iter()
+            .map(|f| FittedDistribution {
+                delta_aic: f.aic - best,
+                distribution: f.distribution,
+                ks: f.distance,
+                p_value: f.probability,
+            })
+            .collect(),
+    }
+}
+
+fn correlation(kept: &Draws) -> Matrix {
+    Moments::of_rows(&kept.points()).correlation()
+}
+
+fn warnings(
+    data: &Data,
+    all: &Artifacts<'_>,
+    calibration: Option<&CalibrationFindings>,
+) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if let Some(c) = calibration {
+        if !c.converged {
+            warnings.push(format!("The sampler has not converged: {}.", c.verdict));
+        }
+        if !c.stranded.is_empty() {
+            let list: Vec<String> = c.stranded.iter().map(ToString::to_string).collect();
+            warnings.push(format!(
+                "{} of {} walkers are stranded far below the bulk of the density: {}.",
+                c.stranded.len(),
+                c.chains,
+                list.join(", ")
+            ));
+        }
+    }
+    if !data.ensemble.failed.is_empty() {
+        let count = data.ensemble.failed.len();
+        warnings.push(format!("{count} simulation runs have no usable response and are left out."));
+    }
+    if let Some(others) = all.calibrated.map(|c| c.value.outcome.other_maxima.len())
+        && others > 0
+    {
+        warnings.push(format!(
+            "The posterior has {others} further local maxima within ten of the best log density."
+        ));
+    }
+    warnings.extend(all.validated.iter().flat_map(|v| v.value.failed.clone()));
+    warnings
+}

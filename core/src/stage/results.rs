@@ -1,0 +1,52 @@
+//! The engine's own result files: what a model without a file format of its own leaves behind.
+
+use crate::data::{Ensemble, FailedRun};
+use crate::linalg::Matrix;
+use crate::plugin::reader::EnsembleSource;
+use crate::run::{Artifact, Stop, arrays};
+
+use super::simulate::Simulated;
+
+/// The runs of the simulate stage from the NetCDF files that [`crate::run::write_response`] wrote.
+pub fn ensemble(source: &EnsembleSource<'_>) -> Result<Ensemble, Stop> {
+    let folder = source.simulated.ok_or_else(|| {
+        Stop::new("the study has no simulation runs").help("add `[simulations]` with their files")
+    })?;
+    let simulated = Simulated::load(folder)?;
+    let (mut runs, mut valid, mut failed) = (Vec::new(), Vec::new(), Vec::new());
+    let mut points = Matrix::zeros(0, simulated.parameters.len());
+    let mut responses = Matrix::zeros(0, source.layout.len());
+    for (record, point) in simulated.runs.iter().zip(simulated.points.iter_rows()) {
+        match &record.file {
+            Some(file) => {
+                let response = arrays::read(&folder.join(file), &source.layout.name)?.values;
+                if response.len() != source.layout.len() {
+                    let (n, m) = (response.len(), source.layout.len());
+                    let message = format!("{file} holds {n} values where {m} were asked for");
+                    return Err(Stop::new(message));
+                }
+                responses.push_row(&response);
+                points.push_row(point);
+                runs.push(record.run.clone());
+                valid.push(record.valid);
+            }
+            None => failed.push(FailedRun {
+                run: record.run.clone(),
+                reason: record.reason.clone().unwrap_or_default(),
+            }),
+        }
+    }
+    if runs.is_empty() {
+        return Err(Stop::new("every simulation run failed"));
+    }
+    Ok(Ensemble {
+        parameters: simulated.parameters,
+        units: source.parameters.iter().map(|p| p.unit.clone()).collect(),
+        runs,
+        points,
+        layout: source.layout.clone(),
+        responses,
+        valid,
+        failed,
+    })
+}

@@ -1,0 +1,266 @@
+//! Stage 2: the simulator is run at every point of the design.
+//!
+//! Every run's result file is written as it finishes and noted in `progress.jsonl`; a killed study goes
+//! on with the runs that are missing, and runs that failed are tried again.
+
+use std::collections::BTreeMap;
+use std::fs::{self, OpenOptions};
+use std::io::Write as _;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use crate::linalg::Matrix;
+use crate::plugin::executor::{Batch, Finished, Job};
+use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
+use crate::study::Study;
+
+use super::design::Design;
+use super::simulator::Simulator;
+
+/// The runs that were made.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Simulated {
+    /// One record a run, in the order of the design.
+    pub runs: Vec<RunRecord>,
+    /// The names of the parameters.
+    pub parameters: Vec<String>,
+    /// The parameters of each run, `runs x parameters`.
+    pub points: Matrix,
+}
+
+/// How one run ended.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RunRecord {
+    /// The run's name.
+    pub run: String,
+    /// The result file, when the run is done.
+    pub file: Option<String>,
+    /// The SHA-256 of that file.
+    pub sha256: Option<String>,
+    /// Whether the run stayed inside the model's range of validity.
+    pub valid: bool,
+    /// Why the run failed.
+    pub reason: Option<String>,
+    /// How long it took, in seconds.
+    pub seconds: f64,
+}
+
+const TABLE: &str = "runs.csv";
+const LOG: &str = "progress.jsonl";
+
+impl Artifact for Simulated {
+    fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
+        files::write_atomic(&folder.join(TABLE), self.table().as_bytes())?;
+        let seconds: String = std::iter::once("run,seconds\n".to_owned())
+            .chain(self.runs.iter().map(|r| format!("{},{:.3}\n", r.run, r.seconds)))
+            .collect();
+        // Times differ from machine to machine: kept for people, not part of the result.
+        files::write_atomic(&folder.join("seconds.csv"), seconds.as_bytes())?;
+        Ok(vec![TABLE.to_owned()])
+    }
+
+    fn load(folder: &Path) -> Result<Self, Stop> {
+        Self::from_table(&folder.join(TABLE))
+    }
+}
+
+impl Simulated {
+    /// `runs.csv`: `run`, `file`, `status`, `valid`, `reason`, `sha256` and one column a parameter.
+    fn table(&self) -> String {
+        let mut text =
+            format!("run,file,status,valid,reason,sha256,{}\n", self.parameters.join(","));
+        for (record, point) in self.runs.iter().zip(self.points.iter_rows()) {
+            let status = if record.file.is_some() { "done" } else { "failed" };
+            let reason = record.reason.as_deref().unwrap_or("").replace('"', "\"\"");
+            let values: Vec<String> = point.iter().map(ToString::to_string).collect();
+            text.push_str(&format!(
+                "{},{},{status},{},\"{reason}\",{},{}\n",
+                record.run,
+                record.file.as_deref().unwrap_or(""),
+                record.valid,
+                record.sha256.as_deref().unwrap_or(""),
+                values.join(",")
+            ));
+        }
+        text
+    }
+
+    fn from_table(path: &Path) -> Result<Self, Stop> {
+        let bad = |what: String| Stop::new(format!("cannot read {}: {what}", path.display()));
+        let bytes = files::read(path)?;
+        let mut reader = csv::Reader::from_reader(&bytes[..]);
+        let header = reader.headers().map_err(|e| bad(e.to_string()))?.clone();
+        let parameters: Vec<String> = header.iter().skip(6).map(str::to_owned).collect();
+        let mut runs = Vec::new();
+        let mut points = Matrix::zeros(0, parameters.len());
+        for row in reader.records() {
+            let row = row.map_err(|e| bad(e.to_string()))?;
+            let some = |i: usize| row.get(i).filter(|t| !t.is_empty()).map(str::to_owned);
+            runs.push(RunRecord {
+                run: some(0).unwrap_or_default(),
+                file: some(1),
+                valid: row.get(3) == Some("true"),
+                reason: some(4),
+                sha256: some(5),
+                seconds: 0.0,
+            });
+            let values: Result<Vec<f64>, _> = row.iter().skip(6).map(str::parse).collect();
+            points.push_row(&values.map_err(|e| bad(format!("a parameter: {e}")))?);
+        }
+        Ok(Self { runs, parameters, points })
+    }
+
+    /// How many runs failed.
+    pub fn failures(&self) -> usize {
+        self.runs.iter().filter(|r| r.file.is_none()).count()
+    }
+
+    /// Whether every result file is there, unchanged.
+    fn whole(&self, folder: &Path) -> bool {
+        self.runs.iter().all(|record| is_whole(record, folder) || record.file.is_none())
+    }
+}
+
+fn is_whole(record: &RunRecord, folder: &Path) -> bool {
+    record.file.as_ref().is_some_and(|file| {
+        files::hash_file(&folder.join(file)).is_ok_and(|hash| record.sha256.as_ref() == Some(&hash))
+    })
+}
+
+/// Runs the simulator; `None` when the study has no design or no model.
+pub fn stage(
+    study: &Study,
+    design: Option<&Kept<Design>>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Option<Kept<Simulated>>, Stop> {
+    let (Some(design), Some(simulator)) = (design, Simulator::of(study)?) else { return Ok(None) };
+    let Some(section) = &study.model else { return Ok(None) };
+    let inputs = json!([
+        design.hash,
+        section.built.name,
+        section.built.options,
+        section.common,
+        simulator.asked
+    ]);
+    let points = &design.value.points;
+    observer.begin("simulate", "run", points.rows() as u64);
+    let folder = run.stage_folder(STAGE);
+    let make = |folder: &Path| simulate(study, &simulator, points, folder, observer);
+    let kept = run.keep(STAGE, &inputs, observer, make)?;
+    let kept = if !kept.fresh && (kept.value.failures() > 0 || !kept.value.whole(&folder)) {
+        run.reopen(STAGE)?;
+        run.keep(STAGE, &inputs, observer, make)?
+    } else {
+        kept
+    };
+    observer.end("simulate", &summary(&kept.value));
+    Ok(Some(kept))
+}
+
+const STAGE: &str = "2-simulate";
+
+fn summary(simulated: &Simulated) -> String {
+    let invalid = simulated.runs.iter().filter(|r| r.file.is_some() && !r.valid).count();
+    let mut text = format!("{} runs", simulated.runs.len());
+    if simulated.failures() > 0 {
+        text.push_str(&format!(", {} failed", simulated.failures()));
+    }
+    if invalid > 0 {
+        text.push_str(&format!(", {invalid} outside the model's range of validity"));
+    }
+    text
+}
+
+fn simulate(
+    study: &Study,
+    simulator: &Simulator<'_>,
+    points: &Matrix,
+    folder: &Path,
+    observer: &dyn Observer,
+) -> Result<Simulated, Stop> {
+    let executor = study.executor.as_ref().ok_or_else(|| Stop::new("the study has no executor"))?;
+    let names = names(points.rows());
+    let mut ended = earlier(folder);
+    ended.retain(|_, record| is_whole(record, folder));
+    let missing: Vec<usize> =
+        (0..names.len()).filter(|&i| !ended.contains_key(&names[i])).collect();
+    let progress = Progress::new(observer);
+    progress.add((names.len() - missing.len()) as u64);
+    let jobs: Vec<Job> = missing
+        .iter()
+        .map(|&i| Job { name: names[i].clone(), inputs: simulator.inputs(points.row(i)) })
+        .collect();
+    let log_path = folder.join(LOG);
+    let mut log = OpenOptions::new()
+        .create(true)
+        .append(true)
+        .open(&log_path)
+        .map_err(|error| files::cannot_write(&log_path, &error))?;
+    let batch = Batch {
+        model: simulator.model,
+        jobs: &jobs,
+        layout: &simulator.asked,
+        scenario: &simulator.scenario,
+        directory: folder,
+    };
+    let mut note = |finished: Finished| {
+        let record = record(&jobs[finished.index].name, finished, folder)?;
+        let line = serde_json::to_string(&record)
+            .map_err(|e| Stop::new(format!("cannot note a finished run: {e}")))?;
+        writeln!(log, "{line}").map_err(|error| files::cannot_write(&log_path, &error))?;
+        ended.insert(record.run.clone(), record);
+        progress.add(1);
+        Ok(())
+    };
+    let submitted = executor.built.plugin.submit(&batch, &mut note);
+    submitted.map_err(|stop| {
+        let done = names.len() - missing.len()
+            + jobs.iter().filter(|j| ended.contains_key(&j.name)).count();
+        stop.saved(format!("{done} of {} runs in {}", names.len(), folder.display()))
+    })?;
+    let runs: Option<Vec<RunRecord>> = names.iter().map(|name| ended.remove(name)).collect();
+    let runs = runs.ok_or_else(|| Stop::new("the executor left runs out"))?;
+    let parameters = study.parameters.iter().map(|p| p.name.clone()).collect();
+    Ok(Simulated { runs, parameters, points: points.clone() })
+}
+
+/// `run001`, `run002`, …, with as many digits as the last one needs.
+fn names(count: usize) -> Vec<String> {
+    let digits = count.to_string().len().max(3);
+    (1..=count).map(|i| format!("run{i:0digits$}")).collect()
+}
+
+/// What an earlier, interrupted attempt noted; the last word on each run counts.
+fn earlier(folder: &Path) -> BTreeMap<String, RunRecord> {
+    let text = fs::read_to_string(folder.join(LOG)).unwrap_or_default();
+    text.lines()
+        .filter_map(|line| serde_json::from_str::<RunRecord>(line).ok())
+        .map(|record| (record.run.clone(), record))
+        .collect()
+}
+
+fn record(run: &str, finished: Finished, folder: &Path) -> Result<RunRecord, Stop> {
+    let run = run.to_owned();
+    let seconds = finished.seconds;
+    Ok(match finished.outcome {
+        Ok((response, file)) => {
+            let sha256 = Some(files::hash_file(&folder.join(&file))?);
+            RunRecord {
+                run,
+                file: Some(file),
+                sha256,
+                valid: response.valid,
+                reason: None,
+                seconds,
+            }
+        }
+        Err(reason) => {
+            // One line a run in the table.
+            let reason = Some(reason.replace(['\n', '\r'], "; "));
+            RunRecord { run, file: None, sha256: None, valid: false, reason, seconds }
+        }
+    })
+}

@@ -1,0 +1,265 @@
+//! Stage 4: the emulator is fitted and its error measured.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use crate::data::Ensemble;
+use crate::linalg::{self, Matrix};
+use crate::plugin::discrepancy::LowRank;
+use crate::plugin::surrogate::Training;
+use crate::plugin::{Emulator, Fact, Surrogate};
+use crate::run::arrays::{self, Array};
+use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
+use crate::study::Study;
+
+use super::read::Data;
+use super::stream;
+
+/// A fitted emulator as it is kept, with its measured error.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fitted {
+    /// The emulator's own bytes.
+    pub bytes: Vec<u8>,
+    /// Its errors.
+    pub errors: Errors,
+    /// Errors of the emulator at runs it was not trained on, `runs x outputs`, in the response's unit: the
+    /// leave-one-out errors of the training runs, then those of the validation runs.
+    pub samples: Matrix,
+    /// The parameters of those runs.
+    pub sample_points: Matrix,
+}
+
+/// Errors of an emulator.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Errors {
+    /// The number of runs it was trained on.
+    pub training: usize,
+    /// The number of runs it was tested on.
+    pub validation: usize,
+    /// Mean absolute error over validation runs and outputs (over leave-one-out errors without any).
+    pub mae: f64,
+    /// Root mean square error over the same.
+    pub rmse: f64,
+    /// Relative leave-one-out error, mean over outputs.
+    pub loo: f64,
+    /// Relative leave-one-out error of each output.
+    pub loo_by_output: Vec<f64>,
+    /// For each group of outputs: name, mean absolute error, root mean square error, relative leave-one-out error.
+    pub by_group: Vec<(String, f64, f64, f64)>,
+    /// Pairs of simulated and emulated values of the validation runs, thinned.
+    pub pairs: Vec<(f64, f64)>,
+    /// What the emulator says of itself.
+    pub facts: Vec<Fact>,
+}
+
+impl Artifact for Fitted {
+    fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
+        files::write_atomic(&folder.join("emulator.bin"), &self.bytes)?;
+        files::write_json(&folder.join("errors.json"), &self.errors)?;
+        let arrays = [
+            Array::matrix("samples", "run", "output", &self.samples),
+            Array::matrix("points", "run", "parameter", &self.sample_points),
+        ];
+        arrays::write(&folder.join("errors.nc"), &[], &arrays)?;
+        Ok(["emulator.bin", "errors.json", "errors.nc"].map(str::to_owned).to_vec())
+    }
+
+    fn load(folder: &Path) -> Result<Self, Stop> {
+        let path = folder.join("errors.nc");
+        Ok(Self {
+            bytes: files::read(&folder.join("emulator.bin"))?,
+            errors: files::read_json(&folder.join("errors.json"))?,
+            samples: arrays::read(&path, "samples")?.into_matrix(),
+            sample_points: arrays::read(&path, "points")?.into_matrix(),
+        })
+    }
+}
+
+/// Fits the surrogate; returns what is kept and the emulator itself.
+pub fn stage(
+    study: &Study,
+    data: &Kept<Data>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<(Kept<Fitted>, Box<dyn Emulator>), Stop> {
+    let section =
+        study.surrogate.as_ref().ok_or_else(|| Stop::new("the study has no surrogate"))?;
+    let plugin = &*section.built.plugin;
+    let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.design)).collect();
+    let inputs = json!([
+        data.hash,
+        section.built.name,
+        section.built.options,
+        section.common,
+        laws,
+        study.about.seed
+    ]);
+    let ensemble = &data.value.ensemble;
+    observer.begin("surrogate", "output", ensemble.layout.len() as u64);
+    let kept = run.keep("4-surrogate", &inputs, observer, |_| {
+        let split = split(study, ensemble)?;
+        fit(study, plugin, ensemble, split, observer)
+    })?;
+    let emulator = plugin.load(&kept.value.bytes)?;
+    let errors = &kept.value.errors;
+    let unit = &study.layout.unit;
+    observer.end("surrogate", &format!("rmse {:.3e} {unit}, loo {:.2e}", errors.rmse, errors.loo));
+    Ok((kept, emulator))
+}
+
+/// The numbers of training and validation runs.
+fn split(study: &Study, ensemble: &Ensemble) -> Result<(usize, usize), Stop> {
+    let common = study.surrogate.as_ref().map(|s| s.common.clone()).unwrap_or_default();
+    let (runs, validation) = (ensemble.runs.len(), common.validation);
+    let training =
+        common.training.map_or_else(|| runs.saturating_sub(validation), |count| count.get());
+    // Runs that failed and may be left out come off the training set, never off the runs kept aside.
+    let lost = ensemble.failed.len();
+    let training = training.min(runs.saturating_sub(validation)).max(training.saturating_sub(lost));
+    if training == 0 || training + validation > runs {
+        return Err(Stop::new(format!(
+            "{training} runs for training and {validation} for validation are more than the {runs} runs there are"
+        ))
+        .help("lower `training` or `validation` in `[surrogate]`"));
+    }
+    Ok((training, validation))
+}
+
+fn fit(
+    study: &Study,
+    plugin: &dyn Surrogate,
+    ensemble: &Ensemble,
+    (training, validation): (usize, usize),
+    observer: &dyn Observer,
+) -> Result<Fitted, Stop> {
+    let first: Vec<usize> = (0..training).collect();
+    let last: Vec<usize> = (ensemble.runs.len() - validation..ensemble.runs.len()).collect();
+    let points = ensemble.points.select_rows(&first);
+    let responses = ensemble.responses.select_rows(&first);
+    let runs = Training {
+        parameters: &study.parameters,
+        layout: &study.layout,
+        points: &points,
+        responses: &responses,
+    };
+    let progress = Progress::new(observer);
+    let emulator = plugin.fit(&runs, &stream(study, "surrogate"), &progress)?;
+    let test_points = ensemble.points.select_rows(&last);
+    let simulated = ensemble.responses.select_rows(&last);
+    let emulated = emulator.mean(&test_points);
+    let held_out = difference(&simulated, &emulated);
+    let left_out = corrected(&*emulator, &responses);
+    let judged = if validation > 0 { &held_out } else { &left_out };
+    let loo_by_output = emulator.fit_error().relative.clone();
+    let errors = Errors {
+        training,
+        validation,
+        mae: mean(judged.as_slice().iter().map(|e| e.abs())),
+        rmse: mean(judged.as_slice().iter().map(|e| e * e)).sqrt(),
+        loo: mean(loo_by_output.iter().copied()),
+        by_group: by_group(study, judged, &loo_by_output),
+        loo_by_output,
+        pairs: pairs(&simulated, &emulated),
+        facts: emulator.facts(),
+    };
+    let samples = stacked(&left_out, &held_out);
+    let sample_points = stacked(&points, &test_points);
+    Ok(Fitted { bytes: emulator.save()?, errors, samples, sample_points })
+}
+
+/// The leave-one-out residuals, scaled so that their mean square is the (corrected) leave-one-out error.
+fn corrected(emulator: &dyn Emulator, responses: &Matrix) -> Matrix {
+    let error = emulator.fit_error();
+    let scale: Vec<f64> = (0..responses.columns())
+        .map(|j| {
+            let column = responses.column(j);
+            let centre = mean(column.iter().copied());
+            let variance = mean(column.iter().map(|y| (y - centre).powi(2)));
+            let square = mean(error.residuals.column(j).iter().map(|r| r * r));
+            let expected = error.relative[j] * variance;
+            if square > 0.0 && expected > square { (expected / square).sqrt() } else { 1.0 }
+        })
+        .collect();
+    let residuals = &error.residuals;
+    Matrix::from_fn(residuals.rows(), residuals.columns(), |i, j| residuals[(i, j)] * scale[j])
+}
+
+fn by_group(study: &Study, errors: &Matrix, loo: &[f64]) -> Vec<(String, f64, f64, f64)> {
+    let groups = study.layout.groups();
+    let figures = |group: &crate::data::layout::Group| {
+        let all = || errors.iter_rows().flat_map(|row| group.indices.iter().map(|&i| row[i]));
+        let loo = mean(group.indices.iter().map(|&i| loo[i]));
+        (mean(all().map(f64::abs)), mean(all().map(|e| e * e)).sqrt(), loo)
+    };
+    groups
+        .iter()
+        .map(|group| {
+            let (mae, rmse, loo) = figures(group);
+            (group.name.clone(), mae, rmse, loo)
+        })
+        .collect()
+}
+
+/// At most about 3000 pairs of simulated and emulated values, evenly thinned.
+fn pairs(simulated: &Matrix, emulated: &Matrix) -> Vec<(f64, f64)> {
+    let step = (simulated.as_slice().len() / 3000).max(1);
+    let all = simulated.as_slice().iter().zip(emulated.as_slice());
+    all.step_by(step).map(|(a, b)| (*a, *b)).collect()
+}
+
+fn difference(a: &Matrix, b: &Matrix) -> Matrix {
+    Matrix::from_fn(a.rows(), a.columns(), |i, j| a[(i, j)] - b[(i, j)])
+}
+
+fn stacked(a: &Matrix, b: &Matrix) -> Matrix {
+    Matrix::from_rows(a.columns(), a.iter_rows().chain(b.iter_rows()))
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for value in values {
+        sum += value;
+        count += 1.0;
+    }
+    if count > 0.0 { sum / count } else { 0.0 }
+}
+
+/// How many runs inside the prior are enough to learn the emulator's error from them alone.
+const ENOUGH: usize = 50;
+
+impl Fitted {
+    /// The errors at the runs inside the prior's support, or at all runs when those are fewer than fifty.
+    pub fn errors_near_prior(&self, study: &Study) -> Matrix {
+        let inside = |point: &[f64]| {
+            let prior = study.parameters.iter().zip(point);
+            prior.into_iter().all(|(p, &x)| p.prior.log_density(x).is_finite())
+        };
+        let near: Vec<usize> =
+            (0..self.samples.rows()).filter(|&i| inside(self.sample_points.row(i))).collect();
+        if near.len() >= ENOUGH { self.samples.select_rows(&near) } else { self.samples.clone() }
+    }
+
+    /// The covariance of the emulator's error as a low-rank factor that carries 99.9 % of its variance.
+    ///
+    /// Each run's error curve is one sample of the error, which is common to all replicates and correlated
+    /// between outputs; the covariance is their mean square about zero.
+    pub fn covariance(&self, study: &Study) -> Result<LowRank, Stop> {
+        let errors = self.errors_near_prior(study);
+        let svd = linalg::thin_svd(&errors)
+            .map_err(|e| Stop::new(format!("the covariance of the emulator's error: {e}")))?;
+        let total: f64 = svd.values.iter().map(|s| s * s).sum();
+        let mut sum = 0.0;
+        let rank = svd.values.iter().take_while(|&s| {
+            let before = sum;
+            sum += s * s;
+            before < 0.999 * total
+        });
+        let rank = rank.count();
+        let scale = (errors.rows() as f64).sqrt();
+        let factor =
+            Matrix::from_fn(errors.columns(), rank, |i, k| svd.v[(i, k)] * svd.values[k] / scale);
+        Ok(LowRank { factor })
+    }
+}

@@ -1,0 +1,320 @@
+//! Stage 6: the calibrated model against the data, and the emulator against the model.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use crate::data::{Draws, Measurements};
+use crate::linalg::Matrix;
+use crate::math::moments;
+use crate::math::random::Stream;
+use crate::plugin::model::EvalError;
+use crate::plugin::{Emulator, Likelihood};
+use crate::report::findings::{ValidationCase, ValidationFindings};
+use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
+use crate::study::Study;
+use crate::study::file::Against;
+
+use super::calibrate::{Calibrated, Parts};
+use super::read::{Data, Measured};
+use super::screen::Z975;
+use super::simulator::Simulator;
+use super::stream;
+use super::surrogate::Fitted;
+
+/// What the validation found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Validated {
+    /// See [`ValidationFindings`].
+    pub cases: Vec<ValidationCase>,
+    /// The 95 % band of a new replicate, lower and upper.
+    pub predictive: Option<(Vec<f64>, Vec<f64>)>,
+    /// The standard deviation of a new replicate by origin.
+    pub spread: Vec<(String, f64)>,
+    /// The root mean square error of the emulator at posterior draws where the model was run, with their number.
+    pub emulator_at_posterior: Option<(f64, usize)>,
+    /// Evaluations that failed, in words.
+    pub failed: Vec<String>,
+}
+
+impl Artifact for Validated {
+    fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
+        files::write_json(&folder.join("validation.json"), self)?;
+        Ok(vec!["validation.json".to_owned()])
+    }
+    fn load(folder: &Path) -> Result<Self, Stop> {
+        files::read_json(&folder.join("validation.json"))
+    }
+}
+
+/// Compares the calibrated model with the data; `None` without a calibration.
+pub fn stage(
+    study: &Study,
+    data: &Kept<Data>,
+    fitted: &Kept<Fitted>,
+    emulator: &dyn Emulator,
+    calibrated: Option<&Kept<Calibrated>>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Option<Kept<Validated>>, Stop> {
+    let (Some(calibrated), Some(measured)) = (calibrated, &data.value.measured) else {
+        return Ok(None);
+    };
+    let inputs = json!([
+        data.hash,
+        fitted.hash,
+        calibrated.hash,
+        study.validate,
+        study.model.as_ref().map(|m| (m.built.name, &m.built.options, &m.common)),
+        study.parameters.iter().map(|p| p.reference).collect::<Vec<_>>(),
+    ]);
+    let simulator = Simulator::of(study)?;
+    let rerun = study.validate.rerun_model.unwrap_or(simulator.is_some());
+    let simulator = simulator.filter(|_| rerun || study.validate.emulator_check > 0);
+    let cases = 1 + u64::from(study.validate.against.is_some());
+    observer.begin("validate", "run", cases + study.validate.emulator_check as u64);
+    let kept = run.keep("6-validate", &inputs, observer, |_| {
+        let parts = Parts::of(study, measured, &fitted.value)?;
+        let work =
+            Work { study, measured, emulator, simulator, rerun, progress: Progress::new(observer) };
+        work.validate(&calibrated.value, parts.likelihood())
+    })?;
+    for failure in &kept.value.failed {
+        observer.warn(failure);
+    }
+    observer.end("validate", &summary(&kept.value));
+    Ok(Some(kept))
+}
+
+fn summary(validated: &Validated) -> String {
+    let accuracy = validated.cases.iter().map(|c| format!("{} {:.1} %", c.name, 100.0 * c.average));
+    format!("accuracy: {}", accuracy.collect::<Vec<_>>().join(", "))
+}
+
+struct Work<'a> {
+    study: &'a Study,
+    measured: &'a Measured,
+    emulator: &'a dyn Emulator,
+    simulator: Option<Simulator<'a>>,
+    rerun: bool,
+    progress: Progress<'a>,
+}
+
+impl Work<'_> {
+    fn validate(
+        &self,
+        calibrated: &Calibrated,
+        likelihood: &dyn Likelihood,
+    ) -> Result<Validated, Stop> {
+        let d = self.study.parameters.len();
+        let mut failed = Vec::new();
+        let mut cases = vec![self.case("map", &calibrated.outcome.map[..d], &mut failed)?];
+        if self.study.validate.against == Some(Against::Reference) {
+            let point: Vec<f64> =
+                self.study.parameters.iter().filter_map(|p| p.reference).collect();
+            cases.push(self.case("reference", &point, &mut failed)?);
+        }
+        let draws = calibrated.draws.after_burn_in(
+            calibrated.outcome.burn_in as f64 / calibrated.draws.steps.max(1) as f64,
+        );
+        let random = stream(self.study, "validate");
+        let emulator_at_posterior = self.check_emulator(&draws, &mut failed)?;
+        let (predictive, spread) = self.predict(calibrated, &draws, likelihood, &random);
+        Ok(Validated { cases, predictive, spread, emulator_at_posterior, failed })
+    }
+
+    fn case(
+        &self,
+        name: &str,
+        point: &[f64],
+        failed: &mut Vec<String>,
+    ) -> Result<ValidationCase, Stop> {
+        let simulated = match (&self.simulator, self.rerun) {
+            (Some(simulator), true) => match simulator.respond(point) {
+                Ok(response) => Some(response.values),
+                Err(EvalError::Rejected(reason)) => {
+                    failed.push(format!(
+                        "the model gave no answer at the {name} parameters: {reason}"
+                    ));
+                    None
+                }
+                Err(EvalError::Fatal(reason)) => return Err(Stop::new(reason)),
+            },
+            _ => None,
+        };
+        self.progress.add(1);
+        let row = Matrix::from_vec(1, point.len(), point.to_vec());
+        let is_simulated = simulated.is_some();
+        let response = simulated.unwrap_or_else(|| self.emulator.mean(&row).row(0).to_vec());
+        let accuracy = accuracy(&self.measured.used, &response);
+        let average = accuracy.iter().map(|a| a.1).sum::<f64>() / accuracy.len().max(1) as f64;
+        Ok(ValidationCase {
+            name: name.to_owned(),
+            point: point.to_vec(),
+            rmse: rmse(&self.measured.used, &response),
+            response,
+            simulated: is_simulated,
+            accuracy,
+            average,
+        })
+    }
+
+    /// The emulator against fresh runs of the model at evenly spaced posterior draws.
+    fn check_emulator(
+        &self,
+        draws: &Draws,
+        failed: &mut Vec<String>,
+    ) -> Result<Option<(f64, usize)>, Stop> {
+        let count = self.study.validate.emulator_check.min(draws.len());
+        let (Some(simulator), true) = (&self.simulator, count > 0) else { return Ok(None) };
+        let d = self.study.parameters.len();
+        let points = draws.points();
+        let (mut squares, mut checked) = (0.0, 0);
+        for k in 0..count {
+            let point = &points.row((2 * k + 1) * draws.len() / (2 * count))[..d];
+            match simulator.respond(point) {
+                Ok(response) => {
+                    let row = Matrix::from_vec(1, d, point.to_vec());
+                    let emulated = self.emulator.mean(&row);
+                    let pairs = response.values.iter().zip(emulated.row(0));
+                    squares += pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+                    checked += 1;
+                }
+                Err(EvalError::Rejected(reason)) => {
+                    failed.push(format!("the model gave no answer at a posterior draw: {reason}"));
+                }
+                Err(EvalError::Fatal(reason)) => return Err(Stop::new(reason)),
+            }
+            self.progress.add(1);
+        }
+        let outputs = self.study.layout.len() as f64;
+        Ok((checked > 0)
+            .then(|| ((squares / (f64::from(checked) * outputs)).sqrt(), checked as usize)))
+    }
+
+    /// The 95 % band of a new replicate from data simulated at posterior draws, and its spread by origin.
+    fn predict(
+        &self,
+        calibrated: &Calibrated,
+        draws: &Draws,
+        likelihood: &dyn Likelihood,
+        random: &Stream,
+    ) -> (Option<(Vec<f64>, Vec<f64>)>, Vec<(String, f64)>) {
+        let d = self.study.parameters.len();
+        let own = likelihood.hyperparameters().len();
+        if draws.is_empty() {
+            return (None, Vec::new());
+        }
+        let points = draws.points();
+        let count = PREDICTED.min(draws.len());
+        let rows: Vec<usize> =
+            (0..count).map(|k| (2 * k + 1) * draws.len() / (2 * count)).collect();
+        let chosen = points.select_rows(&rows);
+        let mut responses = self.responses(&chosen);
+        for (i, response) in responses.iter_mut().enumerate() {
+            let hyper = &chosen.row(i)[chosen.columns() - own..];
+            let variance = total(&likelihood.predictive(response, hyper));
+            let mut rng = random.at(i as u64).generator();
+            for (y, v) in response.iter_mut().zip(variance) {
+                *y += v.sqrt() * crate::math::random::normal(&mut rng);
+            }
+        }
+        let outputs = self.study.layout.len();
+        let ends = |p: f64| -> Vec<f64> {
+            let column = |j: usize| responses.iter().map(|r| r[j]).collect::<Vec<f64>>();
+            (0..outputs).map(|j| moments::quantile(&moments::sorted(&column(j)), p)).collect()
+        };
+        let map = &calibrated.outcome.map;
+        let at_map = &self.responses(&Matrix::from_vec(1, map.len(), map.clone()))[0];
+        let parts = likelihood.predictive(at_map, &map[map.len() - own..]);
+        let mut spread: Vec<(String, f64)> = parts
+            .iter()
+            .map(|part| (part.origin.clone(), moments::mean(&part.variance).sqrt()))
+            .collect();
+        let sds: Vec<f64> = self
+            .measured
+            .used
+            .summaries()
+            .iter()
+            .filter_map(|s| s.sd().map(|sd| sd * sd))
+            .collect();
+        if !sds.is_empty() {
+            spread.push(("replicates".to_owned(), moments::mean(&sds).sqrt()));
+        }
+        debug_assert!(d + own <= map.len());
+        (Some((ends(0.025), ends(0.975))), spread)
+    }
+
+    /// The emulated responses with the effects applied, natural units.
+    fn responses(&self, points: &Matrix) -> Vec<Vec<f64>> {
+        let d = self.study.parameters.len();
+        let theta = Matrix::from_rows(d, points.iter_rows().map(|p| &p[..d]));
+        let mean = self.emulator.mean(&theta);
+        let layout = &self.study.layout;
+        mean.iter_rows()
+            .zip(points.iter_rows())
+            .map(|(mean, point)| {
+                let mut response = mean.to_vec();
+                let mut from = d;
+                for effect in &self.study.effects {
+                    let plugin = &effect.built.plugin;
+                    let count = plugin.parameters(layout).len();
+                    response = plugin.apply(layout, &response, &point[from..from + count]);
+                    from += count;
+                }
+                response
+            })
+            .collect()
+    }
+}
+
+/// Number of posterior draws behind the predictive band.
+const PREDICTED: usize = 1000;
+
+fn total(parts: &[crate::plugin::discrepancy::VariancePart]) -> Vec<f64> {
+    let outputs = parts.first().map_or(0, |p| p.variance.len());
+    (0..outputs).map(|i| parts.iter().map(|p| p.variance[i]).sum()).collect()
+}
+
+/// The share of points inside the replicates' 95 % interval `mean +- 1.96 sd`, for each group (Radaideh et al.,
+/// arXiv 2202.03959). Points with fewer than two replicates are not counted.
+pub fn accuracy(data: &Measurements, response: &[f64]) -> Vec<(String, f64)> {
+    let summaries = data.summaries();
+    let share = |indices: &[usize]| {
+        let (mut inside, mut judged) = (0.0, 0.0);
+        for &i in indices {
+            if let Some(sd) = summaries[i].sd() {
+                judged += 1.0;
+                inside += f64::from(u8::from((response[i] - summaries[i].mean).abs() <= Z975 * sd));
+            }
+        }
+        (judged > 0.0).then(|| inside / judged)
+    };
+    let groups = data.layout.groups();
+    groups.iter().filter_map(|g| Some((g.name.clone(), share(&g.indices)?))).collect()
+}
+
+/// The root mean square difference between a response and the replicates' mean.
+fn rmse(data: &Measurements, response: &[f64]) -> f64 {
+    let summaries = data.summaries();
+    let measured = summaries.iter().zip(response).filter(|(s, _)| s.count > 0);
+    let squares: Vec<f64> = measured.map(|(s, y)| (y - s.mean).powi(2)).collect();
+    moments::mean(&squares).sqrt()
+}
+
+impl Validated {
+    /// The findings for the report.
+    pub fn findings(&self, measured: &Measured) -> ValidationFindings {
+        let replicates = measured.used.summaries();
+        ValidationFindings {
+            cases: self.cases.clone(),
+            replicates: replicates
+                .iter()
+                .map(|s| (s.count, s.mean, s.sd().unwrap_or(0.0)))
+                .collect(),
+            predictive: self.predictive.clone(),
+            spread: self.spread.clone(),
+        }
+    }
+}

@@ -1,0 +1,411 @@
+//! A study as it is run: plugins built, priors and units checked, everything consistent.
+//!
+//! Three layers, each reporting all its problems before the next begins: *structure* (syntax, keys, types,
+//! names of plugins), *context* (the sections against each other), *environment* (files and folders).
+
+use std::path::{Path, PathBuf};
+
+use toml::Table;
+
+use super::context;
+use super::decode::{decode, fields};
+use super::emit::{Unwritable, to_table};
+use super::file::{
+    DesignKeys, DiscrepancyKeys, MeasurementKeys, ModelKeys, ParameterSection, ResponseSection,
+    SamplerKeys, StudySection, SurrogateKeys, ValidateSection,
+};
+use super::{Complaints, Node, Problems, Sources, inherit, overrides};
+use crate::data::{Layout, Parameter};
+use crate::plugin::registry::{Kind, NoKeys, Section, section};
+use crate::plugin::{
+    Context, Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate,
+};
+
+/// A study that can be run.
+pub struct Study {
+    /// Its name: the stem of its file.
+    pub name: String,
+    /// The folder of its file; relative paths start there.
+    pub directory: PathBuf,
+    /// Its file, byte for byte.
+    pub text: String,
+    /// `[study]`.
+    pub about: StudySection,
+    /// The unknowns of the model.
+    pub parameters: Vec<Parameter>,
+    /// The shape of the response.
+    pub layout: Layout,
+    /// `[model]`.
+    pub model: Option<Section<dyn Model, ModelKeys>>,
+    /// `[design]`.
+    pub design: Option<Section<dyn Design, DesignKeys>>,
+    /// `[executor]`.
+    pub executor: Option<Section<dyn Executor, NoKeys>>,
+    /// `[simulations]`.
+    pub simulations: Option<Section<dyn Reader, NoKeys>>,
+    /// `[measurements]`.
+    pub measurements: Option<Section<dyn Reader, MeasurementKeys>>,
+    /// `[surrogate]`.
+    pub surrogate: Option<Section<dyn Surrogate, SurrogateKeys>>,
+    /// `[discrepancy]`.
+    pub discrepancy: Option<Section<dyn Discrepancy, DiscrepancyKeys>>,
+    /// `[sampler]`.
+    pub sampler: Option<Section<dyn Sampler, SamplerKeys>>,
+    /// `[[effect]]`.
+    pub effects: Vec<Section<dyn Effect, NoKeys>>,
+    /// `[validate]`.
+    pub validate: ValidateSection,
+    /// The whole study with every default filled in, for `resolved.toml`.
+    pub resolved: Table,
+}
+
+/// The sections of the study language, in the order in which a study is written.
+pub const SECTIONS: [&str; 13] = [
+    "study",
+    "parameter",
+    "response",
+    "model",
+    "design",
+    "executor",
+    "simulations",
+    "measurements",
+    "surrogate",
+    "discrepancy",
+    "effect",
+    "sampler",
+    "validate",
+];
+
+/// A study that was looked at: the texts it comes from, what is wrong with it, and the study itself
+/// when nothing is.
+pub struct Checked {
+    /// The texts.
+    pub sources: Sources,
+    /// What is wrong.
+    pub problems: Problems,
+    /// The study, when nothing is wrong.
+    pub study: Option<Study>,
+}
+
+impl Checked {
+    /// All problems as text; empty when there is none.
+    pub fn complaints(&self) -> String {
+        self.problems.render(&self.sources)
+    }
+}
+
+/// Reads a study file with `--set` arguments and checks all three layers.
+pub fn load(path: &Path, arguments: &[String]) -> Checked {
+    let mut sources = Sources::default();
+    let mut problems = Problems::new();
+    let root = inherit::load(path, &common_keys, &mut sources, &mut problems);
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    finish(path, text, root, arguments, sources, problems)
+}
+
+/// Checks a study given as text, as if it stood in a file at `path`.
+pub fn load_text(path: &Path, text: &str, arguments: &[String]) -> Checked {
+    let mut sources = Sources::default();
+    let mut problems = Problems::new();
+    let root = inherit::load_text(path, text.to_owned(), &common_keys, &mut sources, &mut problems);
+    finish(path, text.to_owned(), root, arguments, sources, problems)
+}
+
+fn finish(
+    path: &Path,
+    text: String,
+    root: Option<Node>,
+    arguments: &[String],
+    mut sources: Sources,
+    mut problems: Problems,
+) -> Checked {
+    let study = root.and_then(|mut root| {
+        overrides::apply(&mut root, arguments, &common_keys, &mut sources, &mut problems);
+        let study = structure(path, text, &root, &mut problems)?;
+        if problems.is_empty() {
+            context::check(&study, &root, &mut problems);
+        }
+        if problems.is_empty() {
+            environment(&study, &root, &mut problems);
+        }
+        Some(study)
+    });
+    let study = study.filter(|_| problems.is_empty());
+    Checked { sources, problems, study }
+}
+
+/// The engine's own keys of a section, which stay when its plugin changes.
+fn common_keys(section: &str) -> &'static [&'static str] {
+    match section {
+        "model" => fields::<ModelKeys>(),
+        "design" => fields::<DesignKeys>(),
+        "measurements" => fields::<MeasurementKeys>(),
+        "surrogate" => fields::<SurrogateKeys>(),
+        "discrepancy" => fields::<DiscrepancyKeys>(),
+        "sampler" => fields::<SamplerKeys>(),
+        _ => &[],
+    }
+}
+
+/// First layer: the sections, their keys and types, the names of the plugins.
+fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) -> Option<Study> {
+    unknown_sections(root, problems);
+    let about = table::<StudySection>(root, "study", problems);
+    let parameters = parameters(root, problems);
+    let response = table::<ResponseSection>(root, "response", problems);
+    let layout = response.as_ref().and_then(|r| layout(r, root, problems));
+    let before = problems.len();
+    let model = chosen(root, "model", None, problems);
+    let design = chosen(root, "design", None, problems);
+    let executor = chosen_or(root, "executor", "local", problems);
+    let simulations = chosen(root, "simulations", None, problems);
+    let measurements = chosen(root, "measurements", None, problems);
+    let surrogate = chosen(root, "surrogate", None, problems);
+    let discrepancy = chosen(root, "discrepancy", None, problems);
+    let sampler = chosen(root, "sampler", None, problems);
+    let effects = effects(root, problems);
+    let validate = match root.get("validate") {
+        Some(node) => problems.within("validate", |problems| decode(node, problems)),
+        None => Some(ValidateSection::default()),
+    };
+    if problems.len() > before {
+        return None;
+    }
+    let mut about = about?;
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+    let directory = about.directory.take().map_or(folder.clone(), |given| folder.join(given));
+    let mut study = Study {
+        name: about.name.take().unwrap_or(stem),
+        directory,
+        text,
+        about,
+        parameters: parameters?.iter().map(parameter).collect(),
+        layout: layout?,
+        model,
+        design,
+        executor,
+        simulations,
+        measurements,
+        surrogate,
+        discrepancy,
+        sampler,
+        effects: effects?,
+        validate: validate?,
+        resolved: Table::new(),
+    };
+    match resolved(&study, &response?) {
+        Ok(resolved) => study.resolved = resolved,
+        Err(error) => {
+            problems.report(None, format!("the study with its defaults {error}"));
+            return None;
+        }
+    }
+    Some(study)
+}
+
+fn unknown_sections(root: &Node, problems: &mut Problems) {
+    for (key, _) in root.entries() {
+        if !SECTIONS.contains(&key.name.as_str()) {
+            let problem =
+                problems.report(Some(key.place.clone()), format!("unknown section `{}`", key.name));
+            problem.expected(super::nearest::one_of(SECTIONS));
+            if let Some(near) = super::nearest::nearest(&key.name, SECTIONS) {
+                problem.help(format!("did you mean `{near}`?"));
+            }
+        }
+    }
+}
+
+fn table<T: serde::de::DeserializeOwned>(
+    root: &Node,
+    name: &str,
+    problems: &mut Problems,
+) -> Option<T> {
+    let Some(node) = root.get(name) else {
+        problems.report(Some(root.place.clone()), format!("the study has no `[{name}]`"));
+        return None;
+    };
+    problems.within(name, |problems| decode(node, problems))
+}
+
+fn chosen<K: Kind + ?Sized, C: serde::de::DeserializeOwned>(
+    root: &Node,
+    name: &str,
+    default: Option<&str>,
+    problems: &mut Problems,
+) -> Option<Section<K, C>> {
+    let node = root.get(name)?;
+    problems.within(name, |problems| section(node, default, problems))
+}
+
+/// A section that is there even when it is not written.
+fn chosen_or<K: Kind + ?Sized, C: serde::de::DeserializeOwned>(
+    root: &Node,
+    name: &str,
+    default: &str,
+    problems: &mut Problems,
+) -> Option<Section<K, C>> {
+    let unwritten = Node::table(root.place.clone());
+    let node = root.get(name).unwrap_or(&unwritten);
+    problems.within(name, |problems| section(node, Some(default), problems))
+}
+
+fn parameters(root: &Node, problems: &mut Problems) -> Option<Vec<ParameterSection>> {
+    let list = root.get("parameter").map(Node::elements).unwrap_or_default();
+    if list.is_empty() {
+        let place = root.get("parameter").map_or(&root.place, |node| &node.place).clone();
+        problems
+            .report(Some(place), "the study has no unknowns")
+            .expected("at least one `[[parameter]]` with `name` and `prior`");
+        return None;
+    }
+    let decoded: Vec<Option<ParameterSection>> = list
+        .iter()
+        .map(|node| {
+            let name = format!("parameter.{}", node.name().unwrap_or("?"));
+            problems.within(&name, |problems| decode(node, problems))
+        })
+        .collect();
+    decoded.into_iter().collect()
+}
+
+fn effects(root: &Node, problems: &mut Problems) -> Option<Vec<Section<dyn Effect, NoKeys>>> {
+    let list = root.get("effect").map(Node::elements).unwrap_or_default();
+    let decoded: Vec<Option<_>> = list
+        .iter()
+        .map(|node| problems.within("effect", |problems| section(node, None, problems)))
+        .collect();
+    decoded.into_iter().collect()
+}
+
+fn parameter(section: &ParameterSection) -> Parameter {
+    let name = section.name.as_str().to_owned();
+    Parameter {
+        symbol: section.symbol.clone().unwrap_or_else(|| name.clone()),
+        name,
+        unit: section.unit.clone(),
+        design: section.design.clone().unwrap_or_else(|| section.prior.clone()),
+        prior: section.prior.clone(),
+        reference: section.reference,
+    }
+}
+
+fn layout(section: &ResponseSection, root: &Node, problems: &mut Problems) -> Option<Layout> {
+    let mut axes = Vec::new();
+    let node = root.get("response")?;
+    problems.within("response", |problems| {
+        for (name, axis) in &section.axes.0 {
+            let path = format!("axes.{}", name.as_str());
+            match axis.axis(name.as_str()) {
+                Ok(axis) => axes.push(axis),
+                Err(reason) => {
+                    let message = format!("the axis `{}`: {reason}", name.as_str());
+                    Complaints::new(node, problems).at(&path).say(message);
+                }
+            }
+        }
+    });
+    let whole = axes.len() == section.axes.0.len();
+    let name = section.name.as_str().to_owned();
+    whole.then(|| Layout { name, unit: section.unit.clone(), axes })
+}
+
+/// Third layer: what the plugins need of the machine.
+fn environment(study: &Study, root: &Node, problems: &mut Problems) {
+    study.each_plugin(root, problems, |component, context, complaints| {
+        component.environment(context, complaints);
+    });
+}
+
+impl Study {
+    /// What a plugin sees of the study.
+    pub fn context(&self) -> Context<'_> {
+        let made = self.design.as_ref().map(|design| design.common.runs.get());
+        let kept = self.surrogate.as_ref().map_or(0, |s| s.common.validation);
+        let training = self.surrogate.as_ref().and_then(|s| s.common.training).map(usize::from);
+        let runs = training.or_else(|| made.map(|made| made.saturating_sub(kept)));
+        Context {
+            directory: &self.directory,
+            parameters: &self.parameters,
+            layout: &self.layout,
+            runs,
+        }
+    }
+
+    /// Calls `look` for every plugin with complaints about its own section.
+    pub(super) fn each_plugin(
+        &self,
+        root: &Node,
+        problems: &mut Problems,
+        look: impl Fn(&dyn crate::plugin::Component, &Context<'_>, &mut Complaints<'_>),
+    ) {
+        let context = self.context();
+        let mut visit =
+            |name: &str, node: Option<&Node>, component: &dyn crate::plugin::Component| {
+                let unwritten = Node::table(root.place.clone());
+                let node = node.unwrap_or(&unwritten);
+                problems.within(name, |problems| {
+                    look(component, &context, &mut Complaints::new(node, problems));
+                });
+            };
+        macro_rules! visit_sections {
+            ($($field:ident),+) => {
+                $(if let Some(section) = &self.$field {
+                    visit(stringify!($field), root.get(stringify!($field)), &*section.built.plugin);
+                })+
+            };
+        }
+        visit_sections!(
+            model,
+            design,
+            executor,
+            simulations,
+            measurements,
+            surrogate,
+            discrepancy,
+            sampler
+        );
+        let nodes = root.get("effect").map(Node::elements).unwrap_or_default();
+        for (section, node) in self.effects.iter().zip(nodes) {
+            visit("effect", Some(node), &*section.built.plugin);
+        }
+    }
+}
+
+/// The study with every default filled in.
+fn resolved(study: &Study, response: &ResponseSection) -> Result<Table, Unwritable> {
+    let mut about = to_table(&study.about)?;
+    about.insert("name".to_owned(), study.name.clone().into());
+    let directory = std::path::absolute(&study.directory).unwrap_or(study.directory.clone());
+    about.insert("directory".to_owned(), directory.display().to_string().into());
+    let parameters: Result<Vec<Table>, _> = study.parameters.iter().map(to_table).collect();
+    let mut whole = Table::new();
+    whole.insert("study".to_owned(), about.into());
+    whole.insert("parameter".to_owned(), parameters?.into());
+    whole.insert("response".to_owned(), to_table(response)?.into());
+    macro_rules! sections {
+        ($($field:ident),+) => {
+            $(if let Some(section) = &study.$field {
+                whole.insert(stringify!($field).to_owned(), merged(section)?.into());
+            })+
+        };
+    }
+    sections!(model, design, executor, simulations, measurements, surrogate, discrepancy);
+    if !study.effects.is_empty() {
+        let effects: Result<Vec<Table>, _> = study.effects.iter().map(merged).collect();
+        whole.insert("effect".to_owned(), effects?.into());
+    }
+    sections!(sampler);
+    whole.insert("validate".to_owned(), to_table(&study.validate)?.into());
+    Ok(whole)
+}
+
+/// One table of `use`, the engine's keys and the plugin's.
+fn merged<K: ?Sized, C: serde::Serialize>(section: &Section<K, C>) -> Result<Table, Unwritable> {
+    let mut table = Table::new();
+    table.insert("use".to_owned(), section.built.name.into());
+    table.extend(to_table(&section.common)?);
+    table.extend(section.built.options.clone());
+    Ok(table)
+}

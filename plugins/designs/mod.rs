@@ -1,0 +1,5 @@
+//! Designs: where the simulator is run.
+
+pub mod latin_hypercube;
+pub mod random;
+pub mod sobol;

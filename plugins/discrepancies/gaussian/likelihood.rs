@@ -1,0 +1,270 @@
+//! The likelihood in the sufficient statistics of the replicates.
+//!
+//! With `n_i` replicates of output `i`, mean `ybar_i` and scatter `S_i = sum_r (y_ir - ybar_i)^2`, and the
+//! residual `z_i = sqrt(n_i) (ybar_i - m_i)`, the data are distributed as
+//!
+//! ```text
+//! log L = -1/2 [ N log(2 pi v) + (sum_i S_i)/v + log det(I + K/v) + z' (v I + K)^-1 z ]
+//! ```
+//!
+//! where `K = W F F' W`, `W = diag(sqrt(n_i))`, is the covariance `F F'` of the emulator's error as it enters `z`. The
+//! thin singular value decomposition `W F = U diag(s) V'` diagonalises `K` once for all `v`.
+
+use lacuna::data::{Measurements, Unit};
+use lacuna::linalg::vector::dot;
+use lacuna::linalg::{self, Matrix};
+use lacuna::math::distribution::Distribution;
+use lacuna::math::random::{Stream, normal};
+use lacuna::plugin::Fact;
+use lacuna::plugin::discrepancy::{Compressed, Hyperparameter, Likelihood, LowRank, VariancePart};
+use lacuna::plugin::surrogate::Linear;
+use lacuna::run::Stop;
+
+use super::compressed::CompressedGaussian;
+
+/// See the module.
+pub(super) struct GaussianLikelihood {
+    data: Measurements,
+    hyper: Vec<Hyperparameter>,
+    emulator_error: Option<LowRank>,
+    pub(super) statistics: Statistics,
+}
+
+/// What the likelihood needs of the data and of the emulator's error.
+#[derive(Debug, Clone)]
+pub(super) struct Statistics {
+    /// The outputs that were measured at least once.
+    pub measured: Vec<usize>,
+    /// `sqrt(n_i)` of each of them.
+    pub weight: Vec<f64>,
+    /// `sqrt(n_i) ybar_i` of each of them.
+    pub weighted_mean: Vec<f64>,
+    /// Number of data and total scatter.
+    pub spread: Spread,
+    /// `U'`: the directions of the emulator's error, `rank x measured`.
+    pub directions: Matrix,
+}
+
+/// The part of the statistics that does not depend on the response.
+#[derive(Debug, Clone)]
+pub(super) struct Spread {
+    /// The number of data.
+    pub count: f64,
+    /// The sum of squared deviations of the replicates from their means.
+    pub scatter: f64,
+    /// The eigenvalues of `K`.
+    pub eigenvalues: Vec<f64>,
+}
+
+impl Spread {
+    /// The log-likelihood given the squared residual outside the directions of the emulator's error and
+    /// the residual along each of them.
+    pub fn log_likelihood(&self, v: f64, outside: f64, along: &[f64]) -> f64 {
+        let mut twice =
+            self.count * (std::f64::consts::TAU * v).ln() + (self.scatter + outside) / v;
+        for (&a, &lambda) in along.iter().zip(&self.eigenvalues) {
+            twice += (lambda / v).ln_1p() + a * a / (v + lambda);
+        }
+        -0.5 * twice
+    }
+
+    /// Its derivative by the variance.
+    pub fn by_variance(&self, v: f64, outside: f64, along: &[f64]) -> f64 {
+        let mut twice = self.count / v - (self.scatter + outside) / (v * v);
+        for (&a, &lambda) in along.iter().zip(&self.eigenvalues) {
+            twice -= lambda / (v * (v + lambda)) + (a / (v + lambda)).powi(2);
+        }
+        -0.5 * twice
+    }
+}
+
+impl GaussianLikelihood {
+    pub(super) fn new(
+        data: &Measurements,
+        emulator_error: Option<&LowRank>,
+        prior: Distribution,
+    ) -> Result<Self, Stop> {
+        let statistics = Statistics::of(data, emulator_error)?;
+        let hyper = vec![Hyperparameter {
+            name: "variance".to_owned(),
+            symbol: "variance".to_owned(),
+            unit: squared(&data.layout.unit)?,
+            start: starting_variance(&statistics.spread, &statistics.weighted_mean, &prior),
+            prior,
+            log: true,
+        }];
+        let emulator_error = emulator_error.cloned();
+        Ok(Self { data: data.clone(), hyper, emulator_error, statistics })
+    }
+
+    fn residual(&self, response: &[f64]) -> Vec<f64> {
+        let s = &self.statistics;
+        let outputs = s.measured.iter().zip(&s.weight).zip(&s.weighted_mean);
+        outputs.map(|((&i, w), mean)| mean - w * response[i]).collect()
+    }
+
+    /// The residual along the directions of the emulator's error, and what remains of it outside them.
+    fn split(&self, response: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let mut outside = self.residual(response);
+        let mut along = Vec::with_capacity(self.statistics.directions.rows());
+        for direction in self.statistics.directions.iter_rows() {
+            along.push(dot(direction, &outside));
+        }
+        for (direction, &a) in self.statistics.directions.iter_rows().zip(&along) {
+            for (z, u) in outside.iter_mut().zip(direction) {
+                *z -= a * u;
+            }
+        }
+        (along, outside)
+    }
+}
+
+impl Statistics {
+    fn of(data: &Measurements, emulator_error: Option<&LowRank>) -> Result<Self, Stop> {
+        let summaries = data.summaries();
+        let measured: Vec<usize> =
+            (0..summaries.len()).filter(|&i| summaries[i].count > 0).collect();
+        if measured.is_empty() {
+            return Err(Stop::new("the measurements hold no value"));
+        }
+        let weight: Vec<f64> =
+            measured.iter().map(|&i| (summaries[i].count as f64).sqrt()).collect();
+        let weighted_mean =
+            measured.iter().zip(&weight).map(|(&i, w)| w * summaries[i].mean).collect();
+        let count = data.count() as f64;
+        let scatter = summaries.iter().map(|s| s.scatter).sum();
+        let (directions, eigenvalues) = match emulator_error {
+            None => (Matrix::zeros(0, measured.len()), Vec::new()),
+            Some(error) => error_directions(error, &measured, &weight)?,
+        };
+        let spread = Spread { count, scatter, eigenvalues };
+        Ok(Self { measured, weight, weighted_mean, spread, directions })
+    }
+}
+
+fn error_directions(
+    error: &LowRank,
+    measured: &[usize],
+    weight: &[f64],
+) -> Result<(Matrix, Vec<f64>), Stop> {
+    let factor = &error.factor;
+    let weighted = Matrix::from_fn(measured.len(), factor.columns(), |i, j| {
+        weight[i] * factor[(measured[i], j)]
+    });
+    let svd = linalg::thin_svd(&weighted)
+        .map_err(|e| Stop::new(format!("the covariance of the emulator's error: {e}")))?;
+    let rank = svd.values.iter().filter(|&&s| s > 1e-12 * svd.values[0]).count();
+    let kept: Vec<usize> = (0..rank).collect();
+    let directions = svd.u.select_columns(&kept).transposed();
+    Ok((directions, svd.values[..rank].iter().map(|s| s * s).collect()))
+}
+
+/// The unit of a variance.
+fn squared(unit: &Unit) -> Result<Unit, Stop> {
+    let text = unit.to_string();
+    let squared = match text.as_str() {
+        "1" => "1".to_owned(),
+        t if t.chars().all(char::is_alphabetic) => format!("{t}^2"),
+        t => format!("({t})^2"),
+    };
+    Unit::parse(&squared).map_err(|e| Stop::new(format!("the unit of the variance: {e}")))
+}
+
+/// The variance of the replicates about their means, or of the means where there are no replicates, kept
+/// inside the prior.
+fn starting_variance(spread: &Spread, means: &[f64], prior: &Distribution) -> f64 {
+    let freedom = spread.count - means.len() as f64;
+    let estimate = if freedom > 0.0 && spread.scatter > 0.0 {
+        spread.scatter / freedom
+    } else {
+        0.01 * means.iter().map(|m| m * m).sum::<f64>() / means.len() as f64
+    };
+    if prior.log_density(estimate).is_finite() && estimate > 0.0 {
+        estimate
+    } else {
+        prior.quantile(0.5)
+    }
+}
+
+impl Likelihood for GaussianLikelihood {
+    fn hyperparameters(&self) -> &[Hyperparameter] {
+        &self.hyper
+    }
+
+    fn log_likelihood(&self, response: &[f64], hyper: &[f64]) -> f64 {
+        if hyper[0].is_nan() || hyper[0] <= 0.0 {
+            return f64::NEG_INFINITY;
+        }
+        let (along, outside) = self.split(response);
+        self.statistics.spread.log_likelihood(hyper[0], dot(&outside, &outside), &along)
+    }
+
+    fn gradient(&self, response: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let v = hyper[0];
+        let s = &self.statistics;
+        let (along, outside) = self.split(response);
+        let squares = dot(&outside, &outside);
+        let mut pull: Vec<f64> = outside.iter().map(|z| z / v).collect();
+        for ((direction, a), lambda) in
+            s.directions.iter_rows().zip(&along).zip(&s.spread.eigenvalues)
+        {
+            for (p, u) in pull.iter_mut().zip(direction) {
+                *p += u * a / (v + lambda);
+            }
+        }
+        let mut by_response = vec![0.0; response.len()];
+        for ((&i, w), p) in s.measured.iter().zip(&s.weight).zip(&pull) {
+            by_response[i] = w * p;
+        }
+        (by_response, vec![s.spread.by_variance(v, squares, &along)])
+    }
+
+    fn compress(&self, linear: &dyn Linear) -> Option<Box<dyn Compressed>> {
+        let compressed = CompressedGaussian::new(&self.statistics, linear.coefficients()).ok()?;
+        Some(Box::new(compressed))
+    }
+
+    fn predictive(&self, response: &[f64], hyper: &[f64]) -> Vec<VariancePart> {
+        let mut parts = vec![VariancePart {
+            origin: "discrepancy".to_owned(),
+            variance: vec![hyper[0]; response.len()],
+        }];
+        if let Some(error) = &self.emulator_error {
+            let variance = error.factor.iter_rows().map(|row| dot(row, row)).collect();
+            parts.push(VariancePart { origin: "emulator".to_owned(), variance });
+        }
+        parts
+    }
+
+    fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Measurements {
+        let mut mean = response.to_vec();
+        if let Some(error) = &self.emulator_error {
+            let mut rng = stream.named("emulator").generator();
+            let weights: Vec<f64> = (0..error.factor.columns()).map(|_| normal(&mut rng)).collect();
+            for (m, row) in mean.iter_mut().zip(error.factor.iter_rows()) {
+                *m += dot(row, &weights);
+            }
+        }
+        let sd = hyper[0].sqrt();
+        let mut data = self.data.clone();
+        for (r, replicate) in data.replicates.iter_mut().enumerate() {
+            let mut rng = stream.named("replicate").at(r as u64).generator();
+            for (value, m) in replicate.values.iter_mut().zip(&mean) {
+                let noise = sd * normal(&mut rng);
+                if value.is_some() {
+                    *value = Some(m + noise);
+                }
+            }
+        }
+        data
+    }
+
+    fn facts(&self) -> Vec<Fact> {
+        let s = &self.statistics;
+        vec![
+            Fact::new("data", s.spread.count),
+            Fact::new("measured outputs", s.measured.len()),
+            Fact::new("directions of the emulator's error", s.directions.rows()),
+        ]
+    }
+}

@@ -1,0 +1,180 @@
+//! The likelihood against the multivariate normal density written out, and its parts against each other.
+#![allow(clippy::unwrap_used)]
+
+use lacuna::data::{Axis, Layout, Measurements, Replicate, Scenario, Unit};
+use lacuna::linalg::{self, Cholesky, Matrix};
+use lacuna::math::distribution::Distribution;
+use lacuna::math::random::{Stream, normal, uniform};
+use lacuna::plugin::discrepancy::{Likelihood, LowRank};
+use lacuna::plugin::surrogate::Linear;
+
+use super::likelihood::GaussianLikelihood;
+
+const OUTPUTS: usize = 7;
+const TERMS: usize = 3;
+
+struct Emulated {
+    coefficients: Matrix,
+}
+
+impl Linear for Emulated {
+    fn coefficients(&self) -> &Matrix {
+        &self.coefficients
+    }
+    fn basis(&self, points: &Matrix) -> Matrix {
+        points.clone()
+    }
+    fn basis_gradient(&self, point: &[f64]) -> Matrix {
+        Matrix::from_fn(point.len(), point.len(), |i, j| f64::from(u8::from(i == j)))
+    }
+}
+
+/// Random data with unequal replicates and missing values.
+fn data(seed: u64) -> Measurements {
+    let mut rng = Stream::root(seed).generator();
+    let replicate = |r: usize, rng: &mut _| Replicate {
+        name: r.to_string(),
+        scenario: Scenario::default(),
+        values: (0..OUTPUTS)
+            .map(|i| {
+                let y = normal(rng) + i as f64;
+                (i != 4 && (r == 0 || uniform(rng) < 0.6)).then_some(y)
+            })
+            .collect(),
+    };
+    let grid = (0..OUTPUTS).map(|i| i as f64).collect();
+    Measurements {
+        layout: Layout {
+            name: "y".into(),
+            unit: Unit::parse("m").unwrap(),
+            axes: vec![Axis::grid("time", grid, Unit::parse("s").unwrap())],
+        },
+        replicates: (0..5).map(|r| replicate(r, &mut rng)).collect(),
+    }
+}
+
+fn random_matrix(rows: usize, columns: usize, seed: u64) -> Matrix {
+    let mut rng = Stream::root(seed).generator();
+    Matrix::from_fn(rows, columns, |_, _| normal(&mut rng))
+}
+
+fn likelihood(data: &Measurements, error: Option<&LowRank>) -> GaussianLikelihood {
+    GaussianLikelihood::new(data, error, Distribution::Uniform([0.0, 10.0])).unwrap()
+}
+
+/// The log density of all data as one normal vector with covariance `v I + E F F' E'`, where `E` repeats each
+/// output for each of its replicates; by a Cholesky factor of that whole covariance.
+fn naive(data: &Measurements, error: Option<&LowRank>, response: &[f64], v: f64) -> f64 {
+    let mut residual = Vec::new();
+    let mut output = Vec::new();
+    for replicate in &data.replicates {
+        for (i, value) in replicate.values.iter().enumerate() {
+            if let Some(y) = value {
+                residual.push(y - response[i]);
+                output.push(i);
+            }
+        }
+    }
+    let n = residual.len();
+    let covariance = Matrix::from_fn(n, n, |a, b| {
+        let common = error.map_or(0.0, |e| {
+            let (p, q) = (e.factor.row(output[a]), e.factor.row(output[b]));
+            p.iter().zip(q).map(|(x, y)| x * y).sum()
+        });
+        common + if a == b { v } else { 0.0 }
+    });
+    let factor = Cholesky::new(&covariance).unwrap();
+    let quadratic = factor.quadratic(&residual);
+    -0.5 * (n as f64 * std::f64::consts::TAU.ln() + factor.log_determinant() + quadratic)
+}
+
+#[test]
+fn equals_the_normal_density_written_out() {
+    for seed in 0..20 {
+        let data = data(seed);
+        let error = LowRank { factor: random_matrix(OUTPUTS, 2, seed + 100) };
+        let response = random_matrix(1, OUTPUTS, seed + 200);
+        for error in [None, Some(&error)] {
+            let found = likelihood(&data, error).log_likelihood(response.row(0), &[0.7]);
+            let expected = naive(&data, error, response.row(0), 0.7);
+            assert!((found - expected).abs() < 1e-10 * expected.abs(), "{found} {expected}");
+        }
+    }
+}
+
+#[test]
+fn the_compressed_form_equals_the_full_one() {
+    for seed in 0..20 {
+        let data = data(seed);
+        let error = LowRank { factor: random_matrix(OUTPUTS, 2, seed + 100) };
+        for (terms, error) in [(TERMS, None), (TERMS, Some(&error)), (12, Some(&error))] {
+            let emulated = Emulated { coefficients: random_matrix(terms, OUTPUTS, seed + 300) };
+            let full = likelihood(&data, error);
+            let compressed = full.compress(&emulated).unwrap();
+            let basis = random_matrix(4, terms, seed + 400);
+            let hyper = Matrix::from_fn(4, 1, |i, _| 0.2 + i as f64);
+            let found = compressed.log_likelihood(&basis, &hyper);
+            let responses = linalg::multiply(&basis, &emulated.coefficients);
+            for i in 0..4 {
+                let expected = full.log_likelihood(responses.row(i), hyper.row(i));
+                assert!((found[i] - expected).abs() < 1e-10 * expected.abs());
+            }
+        }
+    }
+}
+
+/// Central differences have an error of the order of `h^2`; the tolerance is a hundred times that.
+#[test]
+fn gradients_are_the_derivatives() {
+    let data = data(3);
+    let error = LowRank { factor: random_matrix(OUTPUTS, 2, 5) };
+    let full = likelihood(&data, Some(&error));
+    let emulated = Emulated { coefficients: random_matrix(TERMS, OUTPUTS, 6) };
+    let compressed = full.compress(&emulated).unwrap();
+    let basis = random_matrix(1, TERMS, 7);
+    let response = linalg::multiply(&basis, &emulated.coefficients);
+    let (v, h) = (0.6, 1e-5);
+    let at = |moved: &[f64], v: f64| full.log_likelihood(moved, &[v]);
+    let (by_response, by_hyper) = full.gradient(response.row(0), &[v]);
+    for i in 0..OUTPUTS {
+        let mut above = response.row(0).to_vec();
+        let mut below = above.clone();
+        above[i] += h;
+        below[i] -= h;
+        let slope = (at(&above, v) - at(&below, v)) / (2.0 * h);
+        assert!((slope - by_response[i]).abs() < 1e-6 * (1.0 + slope.abs()));
+    }
+    let slope = (at(response.row(0), v + h) - at(response.row(0), v - h)) / (2.0 * h);
+    assert!((slope - by_hyper[0]).abs() < 1e-6 * (1.0 + slope.abs()));
+    let (by_basis, by_variance) = compressed.gradient(basis.row(0), &[v]);
+    let chained =
+        linalg::multiply(&emulated.coefficients, &Matrix::from_vec(OUTPUTS, 1, by_response));
+    for j in 0..TERMS {
+        assert!((by_basis[j] - chained[(j, 0)]).abs() < 1e-10 * (1.0 + by_basis[j].abs()));
+    }
+    assert!((by_variance[0] - by_hyper[0]).abs() < 1e-10 * (1.0 + by_hyper[0].abs()));
+}
+
+#[test]
+fn simulated_data_have_the_gaps_of_the_measurements_and_the_variance_asked_for() {
+    let data = data(4);
+    let full = likelihood(&data, None);
+    let response = vec![1.0; OUTPUTS];
+    let mut squares = 0.0;
+    let mut count = 0.0;
+    for k in 0..400 {
+        let simulated = full.simulate(&response, &[0.25], &Stream::root(9).at(k));
+        for (made, real) in simulated.replicates.iter().zip(&data.replicates) {
+            for (m, r) in made.values.iter().zip(&real.values) {
+                assert_eq!(m.is_some(), r.is_some());
+                if let Some(m) = m {
+                    squares += (m - 1.0) * (m - 1.0);
+                    count += 1.0;
+                }
+            }
+        }
+    }
+    // The mean square of n normal numbers of variance v has the standard deviation v sqrt(2/n).
+    let bound = 4.0 * 0.25 * f64::sqrt(2.0 / count);
+    assert!((squares / count - 0.25).abs() < bound);
+}

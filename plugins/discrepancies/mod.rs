@@ -1,0 +1,3 @@
+//! Discrepancies: the statistical model of what separates model and data.
+
+pub mod gaussian;

@@ -1,0 +1,108 @@
+//! `local`: all cores of this machine.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc;
+use std::time::Instant;
+
+use lacuna::plugin::executor::{Batch, Finished, Job};
+use lacuna::plugin::model::{Call, EvalError, Response};
+use lacuna::plugin::{Component, Executor};
+use lacuna::run::{Stop, write_response};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Runs the model on this machine, one run a thread.
+///
+/// Each run's result file is written as the run finishes, so a killed study loses at most the
+/// runs under way. The number of threads changes the time and nothing else.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Local {
+    /// Number of runs at a time; those of `lacuna --threads`, or all cores, when left out.
+    pub threads: Option<std::num::NonZeroUsize>,
+}
+
+impl Component for Local {}
+
+impl Executor for Local {
+    fn submit(
+        &self,
+        batch: &Batch<'_>,
+        finished: &mut dyn FnMut(Finished) -> Result<(), Stop>,
+    ) -> Result<(), Stop> {
+        let threads = self.threads.map_or_else(rayon::current_num_threads, std::num::NonZero::get);
+        let next = AtomicUsize::new(0);
+        let halt = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            let (sender, receiver) = mpsc::channel();
+            for _ in 0..threads.min(batch.jobs.len()) {
+                let sender = sender.clone();
+                let (next, halt) = (&next, &halt);
+                scope.spawn(move || {
+                    while !halt.load(Ordering::Relaxed) {
+                        let index = next.fetch_add(1, Ordering::Relaxed);
+                        let Some(job) = batch.jobs.get(index) else { break };
+                        if sender.send((index, run_one(batch, job))).is_err() {
+                            break;
+                        }
+                    }
+                });
+            }
+            drop(sender);
+            let result = collect(&receiver, finished);
+            halt.store(true, Ordering::Relaxed);
+            result
+        })
+    }
+}
+
+type Ended = (Result<(Response, String), EvalError>, f64);
+
+fn collect(
+    receiver: &mpsc::Receiver<(usize, Ended)>,
+    finished: &mut dyn FnMut(Finished) -> Result<(), Stop>,
+) -> Result<(), Stop> {
+    for (index, (outcome, seconds)) in receiver {
+        let outcome = match outcome {
+            Ok(done) => Ok(done),
+            Err(EvalError::Rejected(reason)) => Err(reason),
+            Err(EvalError::Fatal(reason)) => return Err(Stop::new(reason)),
+        };
+        finished(Finished { index, outcome, seconds })?;
+    }
+    Ok(())
+}
+
+fn run_one(batch: &Batch<'_>, job: &Job) -> Ended {
+    let begun = Instant::now();
+    // A model that panics must cost its own run and no other.
+    let outcome = catch_unwind(AssertUnwindSafe(|| evaluate(batch, job)))
+        .unwrap_or_else(|_| Err(EvalError::Rejected("the model panicked".to_owned())));
+    (outcome, begun.elapsed().as_secs_f64())
+}
+
+fn evaluate(batch: &Batch<'_>, job: &Job) -> Result<(Response, String), EvalError> {
+    let call = Call {
+        inputs: &job.inputs,
+        layout: batch.layout,
+        scenario: batch.scenario,
+        directory: None,
+    };
+    let response = batch.model.predict(&call)?;
+    if let Some(i) = response.values.iter().position(|y| !y.is_finite()) {
+        let place = batch.layout.describe(i);
+        return Err(EvalError::Rejected(format!(
+            "the response is {} at {place}",
+            response.values[i]
+        )));
+    }
+    let file = match batch.model.write(&job.name, &call, &response, batch.directory)? {
+        Some(file) => file,
+        None => write_response(batch.directory, &job.name, batch.layout, &response)
+            .map_err(|stop| EvalError::Fatal(stop.to_string()))?,
+    };
+    Ok((response, file))
+}
+
+lacuna::register!(Executor, "local", Local);

@@ -1,0 +1,3 @@
+//! Executors: where many model evaluations run.
+
+pub mod local;

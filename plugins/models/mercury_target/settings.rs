@@ -1,0 +1,376 @@
+//! What a user can set: geometry, wall, pulse, numerics, gauges and sampling, with their defaults.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::SimulationError;
+
+/// Every setting of the stand-in; the calibrated quantities are in [`super::Mercury`].
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// Shape of the vessel.
+    pub geometry: Geometry,
+    /// Steel wall.
+    pub wall: Wall,
+    /// Energy deposited by the proton pulse.
+    pub pulse: Pulse,
+    /// Mesh, time step and numerical damping.
+    pub numerics: Numerics,
+    /// Strain gauges on the outer face of the wall.
+    pub gauges: Gauges,
+    /// Output times.
+    pub sampling: Sampling,
+}
+
+/// A cylinder with a spherical cap as beam window; `z` runs from the cap's apex to the rear.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Geometry {
+    /// Inner radius of the cylinder, m.
+    pub radius: f64,
+    /// Distance from the apex of the cap to the rear end, m.
+    pub length: f64,
+    /// Radius of curvature of the cap, m; at least `radius`.
+    pub cap_radius: f64,
+}
+
+impl Default for Geometry {
+    fn default() -> Self {
+        Self { radius: 0.10, length: 0.45, cap_radius: 0.16 }
+    }
+}
+
+/// The wall, a thin shell; defaults are 316L stainless steel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Wall {
+    /// Thickness of the cap, m.
+    pub cap_thickness: f64,
+    /// Thickness of the cylinder, m.
+    pub cylinder_thickness: f64,
+    /// Young's modulus, Pa.
+    pub young_modulus: f64,
+    /// Poisson's ratio.
+    pub poisson_ratio: f64,
+    /// Density, kg/m³.
+    pub density: f64,
+}
+
+impl Default for Wall {
+    fn default() -> Self {
+        Self {
+            cap_thickness: 3e-3,
+            cylinder_thickness: 3e-3,
+            young_modulus: 193e9,
+            poisson_ratio: 0.3,
+            density: 7990.0,
+        }
+    }
+}
+
+/// What stays the same when the mercury's density and sound speed change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Load {
+    /// The thermal expansion: the initial pressure is proportional to the bulk modulus.
+    ThermalStrain,
+    /// The initial pressure.
+    FixedPressure,
+}
+
+/// Initial state left by a pulse much shorter than the response:
+/// `p = P₀ exp(-r²/2s²) f(z')/max f` with `f = (1 - exp(-z'/l₁)) exp(-z'/l₂)` and `z'` the
+/// distance behind the window.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Pulse {
+    /// Which quantity the mercury's properties leave unchanged.
+    pub load: Load,
+    /// Peak initial pressure `P₀` at the reference density and sound speed, Pa.
+    pub peak_pressure: f64,
+    /// Density at which `peak_pressure` holds under `load = "thermal_strain"`, kg/m³.
+    pub reference_density: f64,
+    /// Sound speed at which `peak_pressure` holds under `load = "thermal_strain"`, m/s.
+    pub reference_sound_speed: f64,
+    /// Standard deviation `s` of the beam, m.
+    pub width: f64,
+    /// Build-up length `l₁` behind the window, m.
+    pub rise: f64,
+    /// Decay length `l₂` along the beam, m.
+    pub decay: f64,
+    /// Thermal strain of the cap on the axis, falling off like the beam; dimensionless.
+    pub wall_strain: f64,
+}
+
+impl Default for Pulse {
+    fn default() -> Self {
+        Self {
+            load: Load::ThermalStrain,
+            peak_pressure: 36e6,
+            reference_density: 13_500.0,
+            reference_sound_speed: 1456.0,
+            width: 0.032,
+            rise: 0.020,
+            decay: 0.160,
+            wall_strain: 20e-6,
+        }
+    }
+}
+
+/// What the fluid meets at the rear end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Rear {
+    /// Mercury continuing without end, at rest: plane waves leave.
+    Absorbing,
+    /// A rigid wall.
+    Rigid,
+}
+
+/// A mesh by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum NamedMesh {
+    /// 20 x 90 cells.
+    Default,
+    /// 40 x 180 cells.
+    Fine,
+}
+
+/// Number of cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "expected \"default\", \"fine\" or [radial cells, axial cells]")]
+pub enum Cells {
+    /// `"default"` or `"fine"`.
+    Named(NamedMesh),
+    /// `[radial, axial]`.
+    Explicit([usize; 2]),
+}
+
+impl Cells {
+    /// Radial and axial number of cells.
+    pub fn counts(self) -> [usize; 2] {
+        match self {
+            Self::Named(NamedMesh::Default) => [20, 90],
+            Self::Named(NamedMesh::Fine) => [40, 180],
+            Self::Explicit(counts) => counts,
+        }
+    }
+}
+
+/// Mesh, time step and numerical damping.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Numerics {
+    /// `"default"` (20 x 90 cells), `"fine"` (40 x 180) or `[radial, axial]`.
+    pub mesh: Cells,
+    /// Time step as a share of the stability limit, in (0, 1].
+    pub cfl: f64,
+    /// Linear artificial viscosity `b₁`.
+    pub linear_viscosity: f64,
+    /// Quadratic artificial viscosity `b₂`.
+    pub quadratic_viscosity: f64,
+    /// Viscous hourglass control.
+    pub hourglass: f64,
+    /// Rear end of the fluid.
+    pub rear: Rear,
+}
+
+impl Default for Numerics {
+    fn default() -> Self {
+        Self {
+            mesh: Cells::Named(NamedMesh::Default),
+            cfl: 0.7,
+            linear_viscosity: 0.25,
+            quadratic_viscosity: 1.2,
+            hourglass: 0.01,
+            rear: Rear::Absorbing,
+        }
+    }
+}
+
+/// The part of the wall that carries a gauge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Place {
+    /// The beam window; positions are radii.
+    Cap,
+    /// The cylinder; positions are distances from the apex of the cap.
+    Cylinder,
+}
+
+/// A strain gauge.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Gauge {
+    /// Name of the signal.
+    pub name: String,
+    /// Part of the wall.
+    pub place: Place,
+    /// Radius (cap) or distance from the apex (cylinder) of the gauge's middle, m.
+    pub position: f64,
+    /// Angle between the gauge and the meridian, degrees: 0 axial, 90 hoop.
+    pub angle: f64,
+    /// Length over which the gauge averages, m.
+    #[serde(default = "default_gauge_length")]
+    pub length: f64,
+}
+
+/// The gauge table; the strain traces come in its order.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct Gauges(pub Vec<Gauge>);
+
+/// Fibre gauges of the 1999 single-pulse tests at WNR.
+fn default_gauge_length() -> f64 {
+    12.7e-3
+}
+
+impl Default for Gauges {
+    fn default() -> Self {
+        use Place::{Cap, Cylinder};
+        let table = [
+            ("B", Cap, 0.055, 45.0),
+            ("C", Cylinder, 0.150, 90.0),
+            ("G", Cylinder, 0.100, 90.0),
+            ("M", Cylinder, 0.100, 0.0),
+            ("R", Cylinder, 0.330, 90.0),
+            ("T", Cylinder, 0.055, 90.0),
+            ("U", Cylinder, 0.200, 90.0),
+            ("V", Cylinder, 0.280, 90.0),
+            ("Y", Cylinder, 0.150, 0.0),
+            ("Z", Cylinder, 0.200, 0.0),
+        ];
+        let gauge = |(name, place, position, angle): (&str, Place, f64, f64)| Gauge {
+            name: name.to_owned(),
+            place,
+            position,
+            angle,
+            length: default_gauge_length(),
+        };
+        Self(table.into_iter().map(gauge).collect())
+    }
+}
+
+/// Output times `interval`, `2 interval`, ..., `count interval` after the pulse.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Sampling {
+    /// Time between outputs, s.
+    pub interval: f64,
+    /// Number of outputs.
+    pub count: usize,
+}
+
+impl Default for Sampling {
+    fn default() -> Self {
+        Self { interval: 1e-5, count: 100 }
+    }
+}
+
+/// A value that `keep` refuses is reported under its name.
+fn check(
+    name: &str,
+    value: f64,
+    keep: impl Fn(f64) -> bool,
+    right: &str,
+) -> Result<(), SimulationError> {
+    if value.is_finite() && keep(value) {
+        Ok(())
+    } else {
+        Err(SimulationError::Settings(format!("`{name}` is {value}; it must be {right}")))
+    }
+}
+
+impl Settings {
+    /// Reports the first setting that has no meaning.
+    pub fn validate(&self) -> Result<(), SimulationError> {
+        self.validate_vessel()?;
+        self.validate_numerics()?;
+        let gauges = &self.gauges.0;
+        for (k, gauge) in gauges.iter().enumerate() {
+            self.validate_gauge(gauge)?;
+            if gauges[..k].iter().any(|other| other.name == gauge.name) {
+                let name = &gauge.name;
+                return Err(SimulationError::Settings(format!("two gauges are named `{name}`")));
+            }
+        }
+        if gauges.is_empty() {
+            return Err(SimulationError::Settings("`gauges` is empty; name at least one".into()));
+        }
+        Ok(())
+    }
+
+    fn validate_vessel(&self) -> Result<(), SimulationError> {
+        let (g, w, p) = (&self.geometry, &self.wall, &self.pulse);
+        let positive = |x: f64| x > 0.0;
+        for (name, value) in [
+            ("geometry.radius", g.radius),
+            ("wall.cap_thickness", w.cap_thickness),
+            ("wall.cylinder_thickness", w.cylinder_thickness),
+            ("wall.young_modulus", w.young_modulus),
+            ("wall.density", w.density),
+            ("pulse.reference_density", p.reference_density),
+            ("pulse.reference_sound_speed", p.reference_sound_speed),
+            ("pulse.width", p.width),
+            ("pulse.rise", p.rise),
+            ("pulse.decay", p.decay),
+        ] {
+            check(name, value, positive, "a positive number")?;
+        }
+        check("geometry.cap_radius", g.cap_radius, |x| x >= g.radius, "at least `radius`")?;
+        let depth = g.nose(g.radius);
+        check("geometry.length", g.length, |x| x > 1.5 * depth, "over 1.5 times the cap's depth")?;
+        check("wall.poisson_ratio", w.poisson_ratio, |x| (0.0..0.5).contains(&x), "in [0, 0.5)")?;
+        let zero_or_more = |x: f64| x >= 0.0;
+        check("pulse.peak_pressure", p.peak_pressure, zero_or_more, "zero or more")?;
+        check("pulse.wall_strain", p.wall_strain, |x| x.abs() < 0.1, "below 0.1 in size")
+    }
+
+    fn validate_numerics(&self) -> Result<(), SimulationError> {
+        let n = &self.numerics;
+        let [radial, axial] = n.mesh.counts();
+        if !(2..=200).contains(&radial) || !(4..=2000).contains(&axial) {
+            return Err(SimulationError::Settings(format!(
+                "`numerics.mesh` is [{radial}, {axial}]; it must have 2 to 200 radial and 4 to \
+                 2000 axial cells"
+            )));
+        }
+        check("numerics.cfl", n.cfl, |x| x > 0.0 && x <= 1.0, "in (0, 1]")?;
+        let mild = |x: f64| (0.0..=2.0).contains(&x);
+        check("numerics.linear_viscosity", n.linear_viscosity, mild, "in [0, 2]")?;
+        check("numerics.quadratic_viscosity", n.quadratic_viscosity, mild, "in [0, 2]")?;
+        check("numerics.hourglass", n.hourglass, |x| (0.0..=0.2).contains(&x), "in [0, 0.2]")?;
+        check("sampling.interval", self.sampling.interval, |x| x > 0.0, "a positive number")?;
+        if self.sampling.count == 0 {
+            return Err(SimulationError::Settings(
+                "`sampling.count` is 0; it must be at least 1".into(),
+            ));
+        }
+        Ok(())
+    }
+
+    fn validate_gauge(&self, gauge: &Gauge) -> Result<(), SimulationError> {
+        let (g, name) = (&self.geometry, &gauge.name);
+        let (range, right) = match gauge.place {
+            Place::Cap => (0.0..=g.radius, "between 0 and `geometry.radius` on the cap"),
+            Place::Cylinder => (
+                g.nose(g.radius)..=g.length,
+                "between the rim of the cap and `geometry.length` on the cylinder",
+            ),
+        };
+        let position = format!("position of gauge {name}");
+        check(&position, gauge.position, |x| range.contains(&x), right)?;
+        check(&format!("angle of gauge {name}"), gauge.angle, |_| true, "a finite number")?;
+        let length = format!("length of gauge {name}");
+        check(&length, gauge.length, |x| (0.0..=g.length).contains(&x), "zero or more")
+    }
+}
+
+impl Geometry {
+    /// Depth `z` of the cap at radius `r`, m.
+    pub fn nose(&self, r: f64) -> f64 {
+        self.cap_radius - (self.cap_radius.powi(2) - r.powi(2)).max(0.0).sqrt()
+    }
+}

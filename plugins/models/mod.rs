@@ -1,0 +1,3 @@
+//! Simulators a study can name.
+
+pub mod mercury_target;

@@ -1,0 +1,125 @@
+//! Which value of the response a text means: a sensor's label, a time on the grid.
+
+use lacuna::data::{Axis, Coordinates, Layout, Unit};
+use lacuna::plugin::reader::ReadError;
+
+use super::listed;
+use super::sheet::{Conversion, Record, Sheet};
+
+/// A coordinate belongs to a place on a grid if it is within this fraction of the grid's smallest
+/// spacing: room for the digits that a file does not print, and for nothing else.
+const CLOSE: f64 = 1e-4;
+
+/// Place of a number on a numeric axis.
+pub fn on_grid(values: &[f64], x: f64) -> Option<usize> {
+    let after = values.partition_point(|&v| v < x);
+    let candidates = [after.checked_sub(1), Some(after)];
+    let nearest = candidates
+        .into_iter()
+        .flatten()
+        .filter(|&i| i < values.len())
+        .min_by(|&a, &b| (values[a] - x).abs().total_cmp(&(values[b] - x).abs()))?;
+    let spacing = values.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
+    let spacing = if spacing.is_finite() { spacing } else { values[nearest].abs() };
+    ((values[nearest] - x).abs() <= CLOSE * spacing).then_some(nearest)
+}
+
+/// Place on an axis of a text as a file has it.
+pub fn on_axis(
+    axis: &Axis,
+    text: &str,
+    convert: impl Fn(f64) -> Option<f64>,
+) -> Result<usize, String> {
+    match &axis.coordinates {
+        Coordinates::Labels(labels) => axis.position(text).ok_or_else(|| {
+            format!("unknown {} `{text}`; the response has {}", axis.name, listed(labels))
+        }),
+        Coordinates::Grid { values, unit } => {
+            let x = text.parse().ok().filter(|x: &f64| x.is_finite()).and_then(convert);
+            let x = x.ok_or_else(|| format!("expected a number, found `{text}`"))?;
+            on_grid(values, x).ok_or_else(|| {
+                let (first, last) = (values.first(), values.last());
+                let (first, last) = (first.copied().unwrap_or(0.0), last.copied().unwrap_or(0.0));
+                format!(
+                    "{} {x} {unit} is not on the response's axis of {} values from {first} to {last} {unit}",
+                    axis.name,
+                    values.len()
+                )
+            })
+        }
+    }
+}
+
+/// The columns of a long table that say where a value belongs, and the column of the value.
+pub struct LongColumns<'a> {
+    layout: &'a Layout,
+    axes: Vec<(usize, Option<Conversion>)>,
+    /// The column of the response.
+    pub value: usize,
+    conversion: Conversion,
+}
+
+impl<'a> LongColumns<'a> {
+    /// Finds the columns named like the axes and the response.
+    pub fn find(sheet: &Sheet, layout: &'a Layout) -> Result<Self, ReadError> {
+        let axes = layout
+            .axes
+            .iter()
+            .map(|axis| {
+                let column = sheet.column(&axis.name)?;
+                let conversion = match &axis.coordinates {
+                    Coordinates::Labels(_) => None,
+                    Coordinates::Grid { unit, .. } => Some(sheet.conversion(column, unit)?),
+                };
+                Ok((column, conversion))
+            })
+            .collect::<Result<_, ReadError>>()?;
+        let value = sheet.column(&layout.name)?;
+        let conversion = sheet.conversion(value, &layout.unit)?;
+        Ok(Self { layout, axes, value, conversion })
+    }
+
+    /// Whether a column is one of these.
+    pub fn has(&self, column: usize) -> bool {
+        self.value == column || self.axes.iter().any(|(c, _)| *c == column)
+    }
+
+    /// The flat index of a record's value.
+    pub fn place(&self, sheet: &Sheet, record: &Record) -> Result<usize, ReadError> {
+        let mut place = Vec::with_capacity(self.axes.len());
+        for (axis, (column, conversion)) in self.layout.axes.iter().zip(&self.axes) {
+            let convert = |x| conversion.as_ref().map_or(Some(x), |c| c.apply(x));
+            let i = on_axis(axis, &record.cells[*column], convert)
+                .map_err(|text| sheet.complain(record, *column, text))?;
+            place.push(i);
+        }
+        Ok(self.layout.index(&place))
+    }
+
+    /// A record's value in the response's unit; `None` if it is missing.
+    pub fn number(&self, sheet: &Sheet, record: &Record) -> Result<Option<f64>, ReadError> {
+        Ok(sheet.number(record, self.value)?.and_then(|x| self.conversion.apply(x)))
+    }
+}
+
+/// Labels and places of an axis as a file gives them, turned into places of the response's axis.
+///
+/// `numbers` are the file's coordinates on a numeric axis in `unit`.
+pub fn grid_places(
+    axis: &Axis,
+    numbers: &[f64],
+    unit: Option<&Unit>,
+) -> Result<Vec<usize>, String> {
+    let Coordinates::Grid { unit: to, .. } = &axis.coordinates else {
+        return Err(format!("axis `{}` has labels, the file has numbers", axis.name));
+    };
+    let convert = |x: f64| unit.map_or(Some(x), |unit| unit.convert(x, to));
+    if convert(1.0).is_none() {
+        let unit = unit.map_or(String::new(), ToString::to_string);
+        return Err(format!(
+            "axis `{}` is in `{unit}`, which does not convert to `{to}`",
+            axis.name
+        ));
+    }
+    numbers.iter().map(|x| on_axis(axis, &x.to_string(), convert)).collect()
+}

@@ -1,0 +1,20 @@
+//! Readers: files in, data with names, units and axes out.
+
+pub mod cells;
+pub mod contents;
+pub mod csv;
+pub mod netcdf;
+pub mod runs;
+pub mod sheet;
+pub mod sierra;
+
+/// Shows names to a user: all of a short list, the beginning of a long one.
+pub(crate) fn listed<S: AsRef<str>>(names: &[S]) -> String {
+    const SHOWN: usize = 12;
+    let mut text: Vec<String> =
+        names.iter().take(SHOWN).map(|name| format!("`{}`", name.as_ref())).collect();
+    if names.len() > SHOWN {
+        text.push(format!("and {} more", names.len() - SHOWN));
+    }
+    if text.is_empty() { "none".to_owned() } else { text.join(", ") }
+}

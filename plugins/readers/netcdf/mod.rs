@@ -1,0 +1,189 @@
+//! `netcdf`: runs and measurements in netCDF files with named dimensions.
+
+mod array;
+mod inspect;
+
+use std::path::{Path, PathBuf};
+
+use lacuna::data::{Ensemble, Layout, Measurements, Replicate, Scenario};
+use lacuna::plugin::reader::{Contents, EnsembleSource, MeasurementSource, ReadError};
+use lacuna::plugin::{Component, Context, Reader};
+use lacuna::study::problem::Complaints;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use self::array::File;
+use super::runs::{self, AllowFailed, Run};
+use super::sierra;
+
+/// Reads netCDF files (classic, 64-bit offset, 64-bit data, netCDF-4) whose dimensions are named
+/// like the axes of the response, in any order.
+///
+/// Each axis has a coordinate variable of its name, with numbers and their `units` or with texts;
+/// labels may instead stand in the file's attribute `sensor_labels` (for an axis `sensor`),
+/// separated by blanks. Values are converted by the attribute `units`, unpacked by `scale_factor`
+/// and `add_offset`, and missing where they equal `_FillValue` or are NaN.
+///
+/// **Runs** (section `simulations`): either one file `path` with a further dimension `run` and a
+/// variable over it for each parameter, or a table `runs` with a file for each run.
+///
+/// **Measurements** (section `measurements`): one file `path` with a further dimension
+/// `replicate`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct NetCdf {
+    /// File with all runs or all measurements, relative to the study file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub path: Option<PathBuf>,
+    /// Table of runs (CSV), relative to the study file: the columns `run`, `file` and one a
+    /// parameter. Left out, and without `path`, the runs are those that the study simulates.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub runs: Option<PathBuf>,
+    /// Variable that holds the response; its name is that of the response when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub variable: Option<String>,
+    /// How many runs without a complete response may be left out: below 1 a fraction, from 1 on a
+    /// count.
+    pub allow_failed: AllowFailed,
+}
+
+impl Component for NetCdf {
+    fn check(&self, _context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        if self.path.is_some() && self.runs.is_some() {
+            complaints.at("runs").say("`path` and `runs` exclude each other");
+        }
+    }
+
+    fn environment(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        for (key, path) in [("path", &self.path), ("runs", &self.runs)] {
+            if let Some(path) = path
+                && !context.directory.join(path).is_file()
+            {
+                let text = format!("there is no file `{}`", context.directory.join(path).display());
+                complaints.at(key).say(text);
+            }
+        }
+    }
+}
+
+impl NetCdf {
+    fn variable<'a>(&'a self, layout: &'a Layout) -> &'a str {
+        self.variable.as_deref().unwrap_or(&layout.name)
+    }
+
+    fn whole_ensemble(
+        &self,
+        source: &EnsembleSource<'_>,
+        path: &Path,
+    ) -> Result<Ensemble, ReadError> {
+        let file = File::open(path)?;
+        let values = file.responses(self.variable(source.layout), source.layout, Some("run"))?;
+        let names = file.names("run", values.len())?;
+        let columns = source
+            .parameters
+            .iter()
+            .map(|p| file.along(&p.name, "run", values.len(), Some(&p.unit)))
+            .collect::<Result<Vec<_>, _>>()?;
+        let valid = if file.has("valid") {
+            file.along("valid", "run", values.len(), None)?
+        } else {
+            vec![1.0; values.len()]
+        };
+        let runs: Vec<Run> = names
+            .into_iter()
+            .enumerate()
+            .map(|(i, name)| Run {
+                name,
+                file: None,
+                failure: None,
+                valid: valid[i] != 0.0,
+                point: columns.iter().map(|column| column[i]).collect(),
+            })
+            .collect();
+        for (run, name) in runs.iter().zip(1..) {
+            if let Some(p) = run.point.iter().position(|x| !x.is_finite()) {
+                let parameter = &source.parameters[p].name;
+                let text = format!("run {name} has no finite value of `{parameter}`");
+                return Err(ReadError::new(path, text));
+            }
+        }
+        let position = |run: &Run| runs.iter().position(|r| r.name == run.name).unwrap_or(0);
+        runs::ensemble(source, path, &runs, self.allow_failed, |run| {
+            let values = values[position(run)].clone();
+            runs::finite(path, source.layout, &values).map(|()| values)
+        })
+    }
+}
+
+impl Reader for NetCdf {
+    fn recognises(&self, path: &Path, head: &[u8]) -> bool {
+        sierra::signal::is_exodus(head) && !sierra::Sierra::default().recognises(path, head)
+    }
+
+    fn inspect(&self, path: &Path) -> Result<Contents, ReadError> {
+        inspect::contents(&File::open(path)?)
+    }
+
+    fn names_files(&self) -> bool {
+        self.path.is_some() || self.runs.is_some()
+    }
+
+    fn ensemble(&self, source: &EnsembleSource<'_>) -> Result<Ensemble, ReadError> {
+        if let Some(path) = &self.path {
+            return self.whole_ensemble(source, &source.directory.join(path));
+        }
+        let table = runs::table_path(source, self.runs.as_deref(), "runs")?;
+        let list = runs::read_runs(&table, source.parameters)?;
+        runs::ensemble(source, &table, &list, self.allow_failed, |run| {
+            let file = run.file.as_ref().ok_or_else(|| {
+                ReadError::new(&table, format!("run `{}` has no file", run.name))
+                    .help("name it in a column `file`")
+            })?;
+            self.response(file, source.layout)
+        })
+    }
+
+    fn measurements(&self, source: &MeasurementSource<'_>) -> Result<Measurements, ReadError> {
+        let path = self.path.as_ref().ok_or_else(|| {
+            ReadError::new(source.directory, "there is no file of measurements")
+                .help("name it with `path`")
+        })?;
+        let path = source.directory.join(path);
+        let file = File::open(&path)?;
+        let layout = source.layout;
+        let values = file.responses(self.variable(layout), layout, Some("replicate"))?;
+        let names = file.names("replicate", values.len())?;
+        let replicates = names.into_iter().zip(values).map(|(name, values)| {
+            if let Some(i) = values.iter().position(|y| y.is_infinite()) {
+                let text = format!("replicate `{name}` is {} at {}", values[i], layout.describe(i));
+                return Err(ReadError::new(&path, text));
+            }
+            let values = values.into_iter().map(|y| (!y.is_nan()).then_some(y)).collect();
+            Ok(Replicate { name, scenario: Scenario::default(), values })
+        });
+        let replicates = replicates.collect::<Result<_, _>>()?;
+        Ok(Measurements { layout: layout.clone(), replicates })
+    }
+
+    fn response(&self, path: &Path, layout: &Layout) -> Result<Vec<f64>, ReadError> {
+        let file = File::open(path)?;
+        let mut values = file.responses(self.variable(layout), layout, None)?;
+        let values = values.pop().unwrap_or_default();
+        runs::finite(path, layout, &values)?;
+        Ok(values)
+    }
+
+    fn files(&self, directory: &Path) -> Vec<PathBuf> {
+        let mut files: Vec<PathBuf> =
+            [&self.path, &self.runs].into_iter().flatten().map(|p| directory.join(p)).collect();
+        if let Some(table) = &self.runs {
+            files.extend(runs::named_files(&directory.join(table)));
+        }
+        files
+    }
+}
+
+lacuna::register!(Reader, "netcdf", NetCdf);
+
+#[cfg(test)]
+mod tests;

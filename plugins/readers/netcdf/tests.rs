@@ -1,0 +1,172 @@
+//! Files written by `netcdf-writer` and by the engine's own `write_response`.
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+use std::sync::Arc;
+
+use hdf5_reader::BytesStorage;
+use lacuna::data::{Axis, Layout, Parameter, Unit};
+use lacuna::math::distribution::Distribution;
+use lacuna::math::random::{Stream, below};
+use lacuna::plugin::Reader;
+use lacuna::plugin::model::Response;
+use lacuna::plugin::reader::{EnsembleSource, MeasurementSource};
+use netcdf_writer::{NcAttrValue, NcFileBuilder, NcWriteFormat, NcWriteOptions};
+
+use super::NetCdf;
+use super::array::File;
+use crate::readers::runs::AllowFailed;
+
+fn unit(text: &str) -> Unit {
+    Unit::parse(text).unwrap()
+}
+
+fn layout() -> Layout {
+    Layout {
+        name: "strain".into(),
+        unit: unit("1"),
+        axes: vec![
+            Axis::labels("sensor", ["B", "C"]),
+            Axis::grid("time", vec![1e-5, 2e-5, 3e-5], unit("s")),
+        ],
+    }
+}
+
+/// Two records of `strain(time, outer, sensor)` with sensors in the order C, B and times in ms.
+fn write(path: &Path, outer: &str, format: NcWriteFormat, times: &[f64]) {
+    let mut file = NcFileBuilder::new();
+    let time = file.add_dimension("time", 3).unwrap();
+    let records = file.add_dimension(outer, 2).unwrap();
+    let sensor = file.add_dimension("sensor", 2).unwrap();
+    let v = file.add_variable::<f64>("time", &[time]).unwrap();
+    file.write_variable(v, times).unwrap();
+    file.add_variable_attribute(v, "units", NcAttrValue::Chars("ms".into())).unwrap();
+    if format == NcWriteFormat::Nc4 {
+        let v = file.add_string_variable("sensor", &[sensor]).unwrap();
+        file.write_string_variable(v, &["C", "B"]).unwrap();
+    } else {
+        let letters = file.add_dimension("letters", 4).unwrap();
+        let v = file.add_char_variable("sensor", &[sensor, letters]).unwrap();
+        file.write_char_variable(v, b"C   B\0\0\0").unwrap();
+    }
+    let v = file.add_variable::<f64>("density", &[records]).unwrap();
+    file.write_variable(v, &[13.5, 12.0]).unwrap();
+    file.add_variable_attribute(v, "units", NcAttrValue::Chars("g/cm3".into())).unwrap();
+    let v = file.add_variable::<f32>("strain", &[time, records, sensor]).unwrap();
+    file.set_variable_fill_value(v, -1.0f32).unwrap();
+    file.add_variable_attribute(v, "units", NcAttrValue::Chars("microstrain".into())).unwrap();
+    // Value 100 record + 10 sensor + time, the second record's first one missing.
+    let values =
+        [110.0, 100.0, 210.0, -1.0, 111.0, 101.0, 211.0, 201.0, 112.0, 102.0, 212.0, 202.0];
+    file.write_variable(v, &values.map(|x| x as f32)).unwrap();
+    let options = NcWriteOptions { format };
+    std::fs::write(path, file.to_vec(options).unwrap().1).unwrap();
+}
+
+#[test]
+fn dimensions_are_found_by_name_in_any_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let reader = NetCdf {
+        path: Some("a.nc".into()),
+        allow_failed: AllowFailed::new(1.0).unwrap(),
+        ..NetCdf::default()
+    };
+    let parameters = [Parameter {
+        name: "density".into(),
+        symbol: "rho".into(),
+        unit: unit("kg/m3"),
+        design: Distribution::Uniform([0.0, 1.0]),
+        prior: Distribution::Uniform([0.0, 1.0]),
+        reference: None,
+    }];
+    let layout = layout();
+    for format in [NcWriteFormat::Classic, NcWriteFormat::Cdf5, NcWriteFormat::Nc4] {
+        write(&folder.path().join("a.nc"), "run", format, &[0.01, 0.02, 0.03]);
+        let source = EnsembleSource {
+            directory: folder.path(),
+            simulated: None,
+            parameters: &parameters,
+            layout: &layout,
+        };
+        let ensemble = reader.ensemble(&source).unwrap();
+        assert_eq!((&ensemble.runs[..], ensemble.failed.len()), (&["1".to_owned()][..], 1));
+        assert!(ensemble.failed[0].reason.contains("NaN at sensor `B`, time 0.00001 s"));
+        assert!((ensemble.points.row(0)[0] - 13_500.0).abs() < 1e-9);
+        for (y, expected) in ensemble.responses.row(0).iter().zip([100, 101, 102, 110, 111, 112]) {
+            assert!((y - 1e-6 * f64::from(expected)).abs() < 1e-18);
+        }
+        write(&folder.path().join("a.nc"), "replicate", format, &[0.01, 0.02, 0.03]);
+        let source = MeasurementSource { directory: folder.path(), layout: &layout };
+        let measured = reader.measurements(&source).unwrap();
+        assert_eq!((measured.replicates.len(), measured.count()), (2, 11));
+        assert_eq!(measured.replicates[1].values[0], None);
+    }
+}
+
+#[test]
+fn files_of_the_simulate_stage_are_read_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let layout = layout();
+    let values: Vec<f64> = (0..6).map(|i| 1e-6 / (f64::from(i) + 0.3)).collect();
+    let response = Response { values: values.clone(), valid: true, facts: vec![] };
+    let name = lacuna::run::write_response(folder.path(), "run-1", &layout, &response).unwrap();
+    let path = folder.path().join(name);
+    assert_eq!(NetCdf::default().response(&path, &layout).unwrap(), values);
+    let contents = NetCdf::default().inspect(&path).unwrap();
+    let strain = contents.variables.iter().find(|v| v.name == "strain").unwrap();
+    assert_eq!(strain.axes, [("sensor".to_owned(), 2), ("time".to_owned(), 3)]);
+    assert_eq!(strain.signals.columns.len(), 3);
+    assert_eq!(strain.signals.columns[2].values, values[3..]);
+    let head = std::fs::read(&path).unwrap();
+    assert!(NetCdf::default().recognises(&path, &head));
+}
+
+#[test]
+fn mismatched_axes_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.nc");
+    let layout = layout();
+    let complaint = |outer: &str, times: &[f64]| {
+        write(&path, outer, NcWriteFormat::Classic, times);
+        let source = MeasurementSource { directory: folder.path(), layout: &layout };
+        let reader = NetCdf { path: Some("a.nc".into()), ..NetCdf::default() };
+        reader.measurements(&source).unwrap_err().to_string()
+    };
+    let text = complaint("replicate", &[0.01, 0.02, 0.04]);
+    assert!(
+        text.contains("dimension `time`: time 0.00004 s is not on the response's axis"),
+        "{text}"
+    );
+    let text = complaint("replicate", &[0.01, 0.02, 0.02]);
+    assert!(text.contains("found 2 on 3; `0.00003` is missing"), "{text}");
+    let text = complaint("pulse", &[0.01, 0.02, 0.03]);
+    assert!(text.contains("expected dimensions `replicate`, `sensor`, `time`"), "{text}");
+    std::fs::write(&path, b"CDF\x01").unwrap();
+    let text = NetCdf::default().response(&path, &layout).unwrap_err().to_string();
+    assert!(text.contains("is not a whole netCDF file"), "{text}");
+}
+
+#[test]
+fn damaged_files_do_no_harm() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.nc");
+    let layout = layout();
+    for (number, format) in [NcWriteFormat::Cdf5, NcWriteFormat::Nc4].into_iter().enumerate() {
+        write(&path, "run", format, &[0.01, 0.02, 0.03]);
+        let bytes = std::fs::read(&path).unwrap();
+        let mut random = Stream::root(7).at(number as u64).generator();
+        for round in 0..300 {
+            let mut damaged = bytes.clone();
+            for _ in 0..=round % 3 {
+                let at = below(&mut random, damaged.len());
+                damaged[at] = below(&mut random, 256) as u8;
+            }
+            damaged.truncate(bytes.len() - round % 2 * below(&mut random, bytes.len()));
+            let storage = Arc::new(BytesStorage::new(damaged));
+            if let Ok(file) = File::from_storage(&path, storage) {
+                let _ = file.responses("strain", &layout, Some("run"));
+                let _ = super::inspect::contents(&file);
+            }
+        }
+    }
+}

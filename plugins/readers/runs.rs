@@ -1,0 +1,227 @@
+//! Simulation runs: the table of their parameters, and the ensemble that they make.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use lacuna::data::{Ensemble, FailedRun, Parameter};
+use lacuna::linalg::Matrix;
+use lacuna::plugin::reader::{EnsembleSource, ReadError};
+use lacuna::study::values::Unfit;
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::de::{self, Deserializer};
+use serde::{Deserialize, Serialize};
+
+use super::sheet::{Record, Sheet};
+
+/// The table of runs that the simulate stage writes.
+const SIMULATED: &str = "runs.csv";
+/// How many failed runs an error names.
+const NAMED: usize = 10;
+
+/// How many runs may be left out: below 1 a fraction of them, from 1 on a count.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
+#[serde(transparent)]
+pub struct AllowFailed(#[schemars(range(min = 0.0))] f64);
+
+impl AllowFailed {
+    /// Checks that a number is a fraction or a count.
+    pub fn new(number: f64) -> Result<Self, Unfit> {
+        if (0.0..1.0).contains(&number) || (number >= 1.0 && number.fract() == 0.0) {
+            Ok(Self(number))
+        } else {
+            Err(Unfit::new("a fraction from 0 to 1 or a whole number of runs", number))
+        }
+    }
+
+    /// How many of a number of runs.
+    pub fn of(self, runs: usize) -> usize {
+        if self.0 < 1.0 { (self.0 * runs as f64) as usize } else { self.0 as usize }
+    }
+}
+
+impl<'de> Deserialize<'de> for AllowFailed {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Self::new(f64::deserialize(deserializer)?).map_err(de::Error::custom)
+    }
+}
+
+/// One run of the table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// Its name.
+    pub name: String,
+    /// Its result file, where the table names one.
+    pub file: Option<PathBuf>,
+    /// Why it failed, where the table says so.
+    pub failure: Option<String>,
+    /// Whether it stayed inside the model's range of validity.
+    pub valid: bool,
+    /// Its parameters, in the order and the units of the study.
+    pub point: Vec<f64>,
+}
+
+/// The table that a reader's options name, or else the one that the simulate stage wrote.
+pub fn table_path(
+    source: &EnsembleSource<'_>,
+    named: Option<&Path>,
+    key: &str,
+) -> Result<PathBuf, ReadError> {
+    match (named, source.simulated) {
+        (Some(path), _) => Ok(source.directory.join(path)),
+        (None, Some(folder)) => Ok(folder.join(SIMULATED)),
+        (None, None) => Err(ReadError::new(source.directory, "there are no simulation runs")
+            .help(format!("name a table of runs with `{key}`, or let the study simulate"))),
+    }
+}
+
+/// Reads a table with the columns `run` and one a parameter, and `file`, `status`, `valid` and
+/// `reason` where it has them. Relative files start at the table's folder.
+pub fn read_runs(path: &Path, parameters: &[Parameter]) -> Result<Vec<Run>, ReadError> {
+    let sheet = Sheet::read(path)?;
+    let run = sheet.column("run")?;
+    let columns = parameters
+        .iter()
+        .map(|p| {
+            let column = sheet.column(&p.name)?;
+            Ok((column, sheet.conversion(column, &p.unit)?))
+        })
+        .collect::<Result<Vec<_>, ReadError>>()?;
+    let mut names = BTreeSet::new();
+    let mut runs = Vec::with_capacity(sheet.records.len());
+    for record in &sheet.records {
+        let name = record.cells[run].clone();
+        if name.is_empty() || !names.insert(name.clone()) {
+            let text = if name.is_empty() {
+                "has no name".into()
+            } else {
+                format!("`{name}` appears twice")
+            };
+            return Err(sheet.complain(record, run, format!("a run {text}")));
+        }
+        let mut point = Vec::with_capacity(columns.len());
+        for (column, conversion) in &columns {
+            let x = sheet.number(record, *column)?.and_then(|x| conversion.apply(x));
+            let x = x.filter(|x| x.is_finite()).ok_or_else(|| {
+                let found = &record.cells[*column];
+                sheet.complain(
+                    record,
+                    *column,
+                    format!("expected a finite number, found `{found}`"),
+                )
+            })?;
+            point.push(x);
+        }
+        let file = cell(&sheet, record, "file").filter(|text| !text.is_empty());
+        runs.push(Run {
+            name,
+            file: file.map(|file| path.with_file_name(file)),
+            failure: failure(&sheet, record)?,
+            valid: word(&sheet, record, "valid", ["true", "false"])?,
+            point,
+        });
+    }
+    if runs.is_empty() {
+        return Err(ReadError::new(path, "has no runs"));
+    }
+    Ok(runs)
+}
+
+fn cell<'a>(sheet: &Sheet, record: &'a Record, name: &str) -> Option<&'a str> {
+    sheet.find(name).map(|column| record.cells[column].as_str())
+}
+
+/// Whether a cell has the first of two words; so it is where the column or the word is missing.
+fn word(sheet: &Sheet, record: &Record, name: &str, words: [&str; 2]) -> Result<bool, ReadError> {
+    let Some(column) = sheet.find(name) else { return Ok(true) };
+    let found = record.cells[column].as_str();
+    if found.is_empty() || found.eq_ignore_ascii_case(words[0]) {
+        Ok(true)
+    } else if found.eq_ignore_ascii_case(words[1]) {
+        Ok(false)
+    } else {
+        let text = format!("expected `{}` or `{}`, found `{found}`", words[0], words[1]);
+        Err(sheet.complain(record, column, text))
+    }
+}
+
+fn failure(sheet: &Sheet, record: &Record) -> Result<Option<String>, ReadError> {
+    if word(sheet, record, "status", ["done", "failed"])? {
+        return Ok(None);
+    }
+    let reason = cell(sheet, record, "reason").unwrap_or_default();
+    Ok(Some(if reason.is_empty() { "failed".to_owned() } else { reason.to_owned() }))
+}
+
+/// Puts the responses of runs together. Runs that the table calls failed are listed as such; runs
+/// whose response cannot be read are listed and left out if there are no more than allowed.
+pub fn ensemble(
+    source: &EnsembleSource<'_>,
+    table: &Path,
+    runs: &[Run],
+    allow_failed: AllowFailed,
+    response: impl Fn(&Run) -> Result<Vec<f64>, ReadError> + Sync,
+) -> Result<Ensemble, ReadError> {
+    let outcomes: Vec<Result<Vec<f64>, ReadError>> = runs
+        .par_iter()
+        .map(|run| if run.failure.is_some() { Ok(Vec::new()) } else { response(run) })
+        .collect();
+    let mut failed = Vec::new();
+    let mut unreadable = Vec::new();
+    let mut kept: Vec<(&Run, Vec<f64>)> = Vec::new();
+    for (run, outcome) in runs.iter().zip(outcomes) {
+        let reason = match (&run.failure, outcome) {
+            (Some(reason), _) => reason.clone(),
+            (None, Err(error)) => {
+                unreadable.push(format!("\n  `{}`: {error}", run.name));
+                error.to_string()
+            }
+            (None, Ok(values)) => {
+                kept.push((run, values));
+                continue;
+            }
+        };
+        failed.push(FailedRun { run: run.name.clone(), reason });
+    }
+    let allowed = allow_failed.of(runs.len());
+    if unreadable.len() > allowed || kept.is_empty() {
+        let count = unreadable.len();
+        let more = count.saturating_sub(NAMED);
+        unreadable.truncate(NAMED);
+        let rest = if more > 0 { format!("\n  and {more} more") } else { String::new() };
+        let text = format!(
+            "{count} of {} runs cannot be used, {allowed} may fail:{}{rest}",
+            runs.len(),
+            unreadable.concat()
+        );
+        return Err(ReadError::new(table, text)
+            .help("`allow_failed` says how many runs may be left out, as a count or a fraction"));
+    }
+    Ok(Ensemble {
+        parameters: source.parameters.iter().map(|p| p.name.clone()).collect(),
+        units: source.parameters.iter().map(|p| p.unit.clone()).collect(),
+        runs: kept.iter().map(|(run, _)| run.name.clone()).collect(),
+        points: Matrix::from_rows(source.parameters.len(), kept.iter().map(|(run, _)| &run.point)),
+        layout: source.layout.clone(),
+        responses: Matrix::from_rows(source.layout.len(), kept.iter().map(|(_, values)| values)),
+        valid: kept.iter().map(|(run, _)| run.valid).collect(),
+        failed,
+    })
+}
+
+/// First complaint about a response that is not finite.
+pub fn finite(path: &Path, source: &lacuna::data::Layout, values: &[f64]) -> Result<(), ReadError> {
+    match values.iter().position(|y| !y.is_finite()) {
+        None => Ok(()),
+        Some(i) => {
+            let text = format!("the response is {} at {}", values[i], source.describe(i));
+            Err(ReadError::new(path, text))
+        }
+    }
+}
+
+/// The result files that a table names, as far as it can be read.
+pub fn named_files(table: &Path) -> Vec<PathBuf> {
+    let runs = read_runs(table, &[]).unwrap_or_default();
+    runs.into_iter().filter_map(|run| run.file).collect()
+}

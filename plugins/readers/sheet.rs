@@ -1,0 +1,183 @@
+//! A CSV file as a sheet: headings with units, records that know their line.
+
+use std::path::{Path, PathBuf};
+
+use csv::{ErrorKind, ReaderBuilder, Trim};
+use lacuna::data::Unit;
+use lacuna::plugin::reader::ReadError;
+
+use super::listed;
+
+/// The heading of a column: `time [s]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Heading {
+    /// The name, without the unit.
+    pub name: String,
+    /// The unit in brackets.
+    pub unit: Option<Unit>,
+}
+
+/// A row below the headings.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Record {
+    /// Its line in the file, counted from 1.
+    pub line: usize,
+    /// Its cells, without blanks around them.
+    pub cells: Vec<String>,
+}
+
+/// A CSV file in memory.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sheet {
+    /// The file.
+    pub path: PathBuf,
+    /// The columns.
+    pub headings: Vec<Heading>,
+    /// The line of the headings, counted from 1.
+    pub heading_line: usize,
+    /// The rows.
+    pub records: Vec<Record>,
+}
+
+impl Sheet {
+    /// Reads a file. Fields are separated by commas, or by semicolons or tabs if the first line
+    /// has no comma; lines that start with `#` are comments.
+    pub fn read(path: &Path) -> Result<Self, ReadError> {
+        let bytes = std::fs::read(path)
+            .map_err(|e| ReadError::new(path, format!("cannot be opened: {e}")))?;
+        Self::parse(path, &bytes)
+    }
+
+    /// Reads the bytes of a file; `path` only names them in messages.
+    pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, ReadError> {
+        let mut reader = ReaderBuilder::new()
+            .delimiter(delimiter(bytes))
+            .comment(Some(b'#'))
+            .trim(Trim::All)
+            .from_reader(bytes);
+        let broken = |error: csv::Error| unequal(path, &error);
+        let names = reader.headers().map_err(broken)?.clone();
+        if names.is_empty() {
+            return Err(ReadError::new(path, "is empty: expected a line of column names"));
+        }
+        let heading_line = names.position().map_or(1, |p| p.line() as usize);
+        let mut headings: Vec<Heading> = Vec::with_capacity(names.len());
+        for (column, text) in names.iter().enumerate() {
+            let heading = heading(text).map_err(|message| {
+                ReadError::new(path, message)
+                    .at(format!("line {heading_line}, column {}", column + 1))
+            })?;
+            if headings.iter().any(|h| h.name == heading.name) {
+                let message = format!("two columns are called `{}`", heading.name);
+                return Err(ReadError::new(path, message).at(format!("line {heading_line}")));
+            }
+            headings.push(heading);
+        }
+        let mut records = Vec::new();
+        for record in reader.records() {
+            let record = record.map_err(broken)?;
+            let line = record.position().map_or(0, |p| p.line() as usize);
+            records.push(Record { line, cells: record.iter().map(str::to_owned).collect() });
+        }
+        Ok(Self { path: path.to_owned(), headings, heading_line, records })
+    }
+
+    /// The position of a column, if there is one of this name.
+    pub fn find(&self, name: &str) -> Option<usize> {
+        self.headings.iter().position(|h| h.name == name)
+    }
+
+    /// The position of a column that has to be there.
+    pub fn column(&self, name: &str) -> Result<usize, ReadError> {
+        self.find(name).ok_or_else(|| {
+            let names: Vec<&str> = self.headings.iter().map(|h| h.name.as_str()).collect();
+            let text = format!("has no column `{name}`; it has {}", listed(&names));
+            ReadError::new(&self.path, text)
+        })
+    }
+
+    /// A complaint about a cell.
+    pub fn complain(
+        &self,
+        record: &Record,
+        column: usize,
+        message: impl Into<String>,
+    ) -> ReadError {
+        let name = &self.headings[column].name;
+        let place = format!("line {}, column {} (`{name}`)", record.line, column + 1);
+        ReadError::new(&self.path, message).at(place)
+    }
+
+    /// A cell as a number; `None` if it is blank, `NaN` or `NA`.
+    pub fn number(&self, record: &Record, column: usize) -> Result<Option<f64>, ReadError> {
+        let cell = record.cells[column].as_str();
+        if ["", "nan", "na"].iter().any(|missing| cell.eq_ignore_ascii_case(missing)) {
+            return Ok(None);
+        }
+        cell.parse().map(Some).map_err(|_| {
+            self.complain(record, column, format!("expected a number, found `{cell}`"))
+        })
+    }
+
+    /// How to turn numbers of a column into a unit: by the unit of its heading, if it has one.
+    pub fn conversion(&self, column: usize, to: &Unit) -> Result<Conversion, ReadError> {
+        let heading = &self.headings[column];
+        let conversion = Conversion { from: heading.unit.clone(), to: to.clone() };
+        if conversion.apply(1.0).is_none() {
+            let from = heading.unit.as_ref().map_or(String::new(), ToString::to_string);
+            let text = format!(
+                "expected a unit that converts to `{to}`, found `{}` in `{from}`",
+                heading.name
+            );
+            return Err(ReadError::new(&self.path, text).at(format!("line {}", self.heading_line)));
+        }
+        Ok(conversion)
+    }
+}
+
+/// A change of unit; none where the source does not say its unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Conversion {
+    from: Option<Unit>,
+    to: Unit,
+}
+
+impl Conversion {
+    /// The number in the new unit; `None` if the units do not measure the same.
+    pub fn apply(&self, x: f64) -> Option<f64> {
+        self.from.as_ref().map_or(Some(x), |from| from.convert(x, &self.to))
+    }
+}
+
+fn delimiter(bytes: &[u8]) -> u8 {
+    let first = bytes.split(|&b| b == b'\n').find(|line| !line.starts_with(b"#"));
+    let first = first.unwrap_or_default();
+    let has = |c: u8| first.contains(&c);
+    match (has(b','), has(b';'), has(b'\t')) {
+        (false, true, _) => b';',
+        (false, false, true) => b'\t',
+        _ => b',',
+    }
+}
+
+fn heading(text: &str) -> Result<Heading, String> {
+    let Some((name, unit)) = text.strip_suffix(']').and_then(|text| text.rsplit_once('[')) else {
+        return Ok(Heading { name: text.to_owned(), unit: None });
+    };
+    let unit = Unit::parse(unit).map_err(|e| e.to_string())?;
+    Ok(Heading { name: name.trim().to_owned(), unit: Some(unit) })
+}
+
+fn unequal(path: &Path, error: &csv::Error) -> ReadError {
+    let at = |line: u64, text: String| ReadError::new(path, text).at(format!("line {line}"));
+    match error.kind() {
+        ErrorKind::UnequalLengths { pos, expected_len, len } => {
+            let line = pos.as_ref().map_or(0, csv::Position::line);
+            at(line, format!("expected {expected_len} fields as in the first line, found {len}"))
+        }
+        ErrorKind::Utf8 { pos, .. } => {
+            at(pos.as_ref().map_or(0, csv::Position::line), "is not UTF-8 text".to_owned())
+        }
+        _ => ReadError::new(path, format!("cannot be read: {error}")),
+    }
+}

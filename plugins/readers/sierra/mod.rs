@@ -1,0 +1,309 @@
+//! `sierra`: output of Sierra/SM, Exodus II and heartbeat files.
+//!
+//! The folder also holds the formats for whoever reads or writes them: [`exodus`], [`heartbeat`]
+//! and [`write`].
+
+pub mod container;
+pub mod exodus;
+pub mod heartbeat;
+mod inspect;
+pub mod locate;
+pub mod parts;
+pub mod probe;
+pub mod signal;
+pub mod write;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use lacuna::data::{Axis, Coordinates, Ensemble, Layout, Unit};
+use lacuna::plugin::reader::{Contents, EnsembleSource, ReadError};
+use lacuna::plugin::{Component, Context, Reader};
+use lacuna::study::problem::Complaints;
+use lacuna::study::values::Fraction;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use self::probe::Probe;
+use self::signal::Output;
+use super::runs::{self, AllowFailed, Run};
+
+/// Reads what Sierra wrote for each run: Exodus II results or history files, in any netCDF
+/// container and in one file or one a processor, and heartbeat text in any of its formats.
+///
+/// ```toml
+/// [simulations]
+/// use = "sierra"
+/// runs = "runs.csv"
+/// file = "run_{run}/strain.h"
+/// variable = "strain_{sensor}"
+///
+/// [simulations.sensors.B]
+/// variable = "log_strain"
+/// nearest = [0.055, 0.0, 0.0]
+/// direction = [1.0, 1.0, 0.0]
+/// ```
+///
+/// Each sensor's signal is interpolated linearly to the response's times. A run whose file is
+/// missing, damaged or too short, or holds a value that is not finite, counts as failed.
+///
+/// Sources: the format descriptions in the SEACAS library's `exodusII_int.h`, `Iohb_DatabaseIO.C`
+/// and `Iohb_Layout.C`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Sierra {
+    /// Table of runs (CSV), relative to the study file: the columns `run`, one a parameter, and
+    /// `file` unless the key `file` is given. Left out, the runs are those that the study
+    /// simulates.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub runs: Option<PathBuf>,
+    /// Each run's file, relative to the table of runs; `{run}` stands for the run's name. Of a
+    /// parallel run's files the common name is enough: `strain.e` for `strain.e.96.00` and so on.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// Variable of every sensor that has no entry of its own under `sensors`. The name of an axis
+    /// in braces stands for the label on it: `strain_{sensor}`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub variable: Option<String>,
+    /// Where single sensors are read, by their label.
+    pub sensors: BTreeMap<String, Probe>,
+    /// Unit of the values in the files; the response's unit when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<Unit>,
+    /// Unit of the times in the files; the unit of the response's time axis when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_unit: Option<Unit>,
+    /// How much of the response's time axis a file may lack at either end, as a fraction of the
+    /// axis' spacing; there the first or last value holds.
+    pub tolerance: Fraction,
+    /// How many runs without a usable file may be left out: below 1 a fraction, from 1 on a count.
+    pub allow_failed: AllowFailed,
+}
+
+impl Default for Sierra {
+    fn default() -> Self {
+        Self {
+            runs: None,
+            file: None,
+            variable: None,
+            sensors: BTreeMap::new(),
+            unit: None,
+            time_unit: None,
+            tolerance: Fraction::new(0.01).expect("0.01 is a fraction"),
+            allow_failed: AllowFailed::default(),
+        }
+    }
+}
+
+impl Component for Sierra {
+    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        match Curves::new(context.layout) {
+            Err(text) => {
+                complaints.at("").say(text);
+            }
+            Ok(curves) => self.check_sensors(&curves, complaints),
+        }
+        let time = context.layout.axes.iter().find_map(|axis| match &axis.coordinates {
+            Coordinates::Grid { unit, .. } => Some(unit),
+            Coordinates::Labels(_) => None,
+        });
+        for (key, from, to) in
+            [("unit", &self.unit, Some(&context.layout.unit)), ("time_unit", &self.time_unit, time)]
+        {
+            if let (Some(from), Some(to)) = (from, to)
+                && from.factor_to(to).is_none()
+            {
+                complaints
+                    .at(key)
+                    .say(format!("`{key}` does not convert to the response's"))
+                    .expected(format!("a unit like `{to}`"))
+                    .found(format!("`{from}`"));
+            }
+        }
+    }
+
+    fn environment(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        if let Some(runs) = &self.runs
+            && !context.directory.join(runs).is_file()
+        {
+            let path = context.directory.join(runs);
+            complaints.at("runs").say(format!("there is no file `{}`", path.display()));
+        }
+    }
+}
+
+impl Sierra {
+    fn check_sensors(&self, curves: &Curves<'_>, complaints: &mut Complaints<'_>) {
+        let names: Vec<&str> = curves.list.iter().map(|curve| curve.name.as_str()).collect();
+        for sensor in self.sensors.keys().filter(|sensor| !names.contains(&sensor.as_str())) {
+            complaints
+                .at(&format!("sensors.{sensor}"))
+                .say(format!("the response has no sensor `{sensor}`"))
+                .expected(super::listed(&names));
+        }
+        if self.variable.is_none()
+            && let Some(name) = names.iter().find(|name| !self.sensors.contains_key(**name))
+        {
+            complaints
+                .at("sensors")
+                .say(format!("nothing says where sensor `{name}` is read"))
+                .help("add it under `sensors`, or give a pattern such as `variable = \"strain_{sensor}\"`");
+        }
+        if let Some(pattern) = &self.variable {
+            let varies = curves.labels.iter().all(|axis| pattern.contains(&format!("{{{axis}}}")));
+            if !varies && names.len() > 1 {
+                complaints.at("variable").say("`variable` is the same for several sensors").help(
+                    format!("write `{{{}}}` where the name varies", curves.labels.join("}{")),
+                );
+            }
+        }
+    }
+
+    fn probe(&self, curve: &Curve) -> Result<Probe, String> {
+        if let Some(probe) = self.sensors.get(&curve.name) {
+            return Ok(probe.clone());
+        }
+        let pattern = self.variable.as_ref().ok_or_else(|| {
+            format!("neither `variable` nor `sensors` says where `{}` is read", curve.name)
+        })?;
+        let name = curve.labels.iter().fold(pattern.clone(), |name, (axis, label)| {
+            name.replace(&format!("{{{axis}}}"), label)
+        });
+        Ok(Probe::named(name))
+    }
+
+    fn run_file(&self, table: &Path, run: &Run) -> Result<PathBuf, ReadError> {
+        let pattern =
+            self.file.as_ref().map(|file| table.with_file_name(file.replace("{run}", &run.name)));
+        pattern.or_else(|| run.file.clone()).ok_or_else(|| {
+            ReadError::new(table, format!("run `{}` has no file", run.name))
+                .help("name it in a column `file`, or give `file = \"run_{run}/strain.h\"`")
+        })
+    }
+}
+
+impl Reader for Sierra {
+    fn recognises(&self, path: &Path, head: &[u8]) -> bool {
+        if signal::is_exodus(head) {
+            return inspect::looks_like_exodus(path, head);
+        }
+        !head.contains(&0) && heartbeat::recognised(head)
+    }
+
+    fn inspect(&self, path: &Path) -> Result<Contents, ReadError> {
+        inspect::contents(path)
+    }
+
+    fn names_files(&self) -> bool {
+        self.runs.is_some()
+    }
+
+    fn ensemble(&self, source: &EnsembleSource<'_>) -> Result<Ensemble, ReadError> {
+        let table = runs::table_path(source, self.runs.as_deref(), "runs")?;
+        let list = runs::read_runs(&table, source.parameters)?;
+        // The simulate stage names its files in its own table; the pattern is for the user's.
+        let named = source.simulated.is_none() || self.runs.is_some();
+        runs::ensemble(source, &table, &list, self.allow_failed, |run| {
+            let file = match &run.file {
+                Some(file) if !named => file.clone(),
+                _ => self.run_file(&table, run)?,
+            };
+            self.response(&file, source.layout)
+        })
+    }
+
+    fn response(&self, path: &Path, layout: &Layout) -> Result<Vec<f64>, ReadError> {
+        let complain = |text: String| ReadError::new(path, text);
+        let curves = Curves::new(layout).map_err(complain)?;
+        let factor = |from: &Option<Unit>, to: &Unit| match from {
+            None => Ok(1.0),
+            Some(from) => from
+                .factor_to(to)
+                .ok_or_else(|| complain(format!("unit `{from}` does not convert to `{to}`"))),
+        };
+        let scale = factor(&self.unit, &layout.unit)?;
+        let time_scale = factor(&self.time_unit, curves.time_unit)?;
+        let output = Output::open(path)?;
+        let mut response = vec![0.0; layout.len()];
+        for curve in &curves.list {
+            let probe = self.probe(curve).map_err(complain)?;
+            let mut signal = output.signal(&probe)?;
+            signal.times.iter_mut().for_each(|t| *t *= time_scale);
+            let values = signal.resampled(curves.times, self.tolerance.get()).map_err(|text| {
+                complain(text).at(format!("sensor `{}`, variable `{}`", curve.name, probe.variable))
+            })?;
+            for (&place, value) in curve.places.iter().zip(values) {
+                response[place] = scale * value;
+            }
+        }
+        Ok(response)
+    }
+
+    fn files(&self, directory: &Path) -> Vec<PathBuf> {
+        let Some(table) = self.runs.as_ref().map(|runs| directory.join(runs)) else {
+            return Vec::new();
+        };
+        let list = runs::read_runs(&table, &[]).unwrap_or_default();
+        let mut files: Vec<PathBuf> = list
+            .iter()
+            .filter_map(|run| self.run_file(&table, run).ok())
+            .flat_map(|file| parts::part_paths(&file).0)
+            .collect();
+        files.insert(0, table);
+        files
+    }
+}
+
+/// The response as curves over time, one a sensor.
+struct Curves<'a> {
+    times: &'a [f64],
+    time_unit: &'a Unit,
+    labels: Vec<&'a str>,
+    list: Vec<Curve>,
+}
+
+struct Curve {
+    name: String,
+    labels: Vec<(String, String)>,
+    places: Vec<usize>,
+}
+
+impl<'a> Curves<'a> {
+    fn new(layout: &'a Layout) -> Result<Self, String> {
+        let grids: Vec<(&[f64], &Unit)> = layout
+            .axes
+            .iter()
+            .filter_map(|axis| match &axis.coordinates {
+                Coordinates::Grid { values, unit } => Some((&values[..], unit)),
+                Coordinates::Labels(_) => None,
+            })
+            .collect();
+        let [(times, time_unit)] = grids[..] else {
+            return Err(format!(
+                "this reader gives signals over time: it needs a response with one numeric axis, \
+                 `{}` has {}",
+                layout.name,
+                grids.len()
+            ));
+        };
+        let is_label = |axis: &&Axis| matches!(axis.coordinates, Coordinates::Labels(_));
+        let labels = layout.axes.iter().filter(is_label).map(|axis| axis.name.as_str()).collect();
+        let list = layout.groups().into_iter().map(|group| {
+            let place = layout.place(group.indices[0]);
+            let labels = layout
+                .axes
+                .iter()
+                .zip(place)
+                .filter(|(axis, _)| is_label(axis))
+                .map(|(axis, i)| (axis.name.clone(), axis.text(i)))
+                .collect();
+            Curve { name: group.name, labels, places: group.indices }
+        });
+        Ok(Self { times, time_unit, labels, list: list.collect() })
+    }
+}
+
+lacuna::register!(Reader, "sierra", Sierra);
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,149 @@
+//! Heartbeat text: samples of the real library and of Sierra, and every further option in text
+//! made after the library's printed layout (`Iohb_Layout.C`).
+
+use std::path::Path;
+
+use super::super::heartbeat::Heartbeat;
+use super::{base, largest_difference, reference, sample};
+
+fn parse(text: &str) -> Heartbeat {
+    Heartbeat::parse(Path::new("run.txt"), text.as_bytes()).unwrap()
+}
+
+fn complaint(text: &str) -> String {
+    Heartbeat::parse(Path::new("run.txt"), text.as_bytes()).unwrap_err().to_string()
+}
+
+#[test]
+fn the_formats_of_the_library_agree_with_the_signals() {
+    let (names, times, values) = base();
+    let mut files: Vec<_> =
+        ["hb_default.txt", "hb_csv_labels.csv", "hb_spyhis.txt"].map(sample).to_vec();
+    let others = ["hb_csv.csv", "hb_sm_labelsoff_legendon_p8.txt"];
+    files.extend(others.iter().filter_map(|name| reference(&format!("seacas_written/{name}"))));
+    for path in files {
+        let table = Heartbeat::read(&path).unwrap();
+        assert!(table.notes.is_empty(), "{:?}", table.notes);
+        for (name, expected) in names.iter().zip(&values) {
+            let (t, y) = table.series(&format!("strain_{name}")).unwrap();
+            assert!(largest_difference(&t, &times) < 1e-12);
+            // Five digits behind the first: half a unit of the last is 5e-6 of the value.
+            assert!(largest_difference(&y, expected) < 5e-6 * 1e-3, "{}", path.display());
+        }
+    }
+    let table = Heartbeat::read(&sample("hb_csv_labels.csv")).unwrap();
+    assert_eq!(table.series("log_strain_B_zx").unwrap().1, [3e-9; 100]);
+    assert_eq!(table.series("step").unwrap().1[99], 100.0);
+}
+
+#[test]
+fn a_spyhis_file_of_sierra_is_read_whole() {
+    let Some(path) = reference("real/sibl_sierra_spyhis_history.csv") else { return };
+    let table = Heartbeat::read(&path).unwrap();
+    assert_eq!((table.names.len(), table.columns[0].len()), (73, 201));
+    // The last number of the last line.
+    assert_eq!(*table.columns[72].last().unwrap(), -4.99491e-04);
+    assert_eq!(table.layout, "SPYHIS, `,` separator");
+}
+
+#[test]
+fn labels_name_the_components_that_follow() {
+    let table = parse("time=1.0e-05, v=1, 2, 3, s=1, 2, 3, 4, 5, 6, q=8, 9, step=1\n");
+    let expected = [
+        "time", "v_x", "v_y", "v_z", "s_xx", "s_yy", "s_zz", "s_xy", "s_yz", "s_zx", "q_1", "q_2",
+        "step",
+    ];
+    assert_eq!(table.names, expected);
+    assert_eq!(table.series("s_zx").unwrap().1, [6.0]);
+}
+
+#[test]
+fn time_stamps_of_any_format_are_removed() {
+    let stamps = ["[06:08:23]", "2022-04-15 06:08:23", "{Fri Apr 15, 2022}", "15 Apr", ""];
+    for stamp in stamps {
+        for separator in [", ", "\t", " | ", ";", " "] {
+            let join = |fields: [&str; 3]| {
+                let text = fields.map(|f| format!("{f:>12}")).join(separator);
+                format!("+{stamp} {text}\n")
+            };
+            let legend = join(["Time", "strain_B", "strain_C"]);
+            let rows =
+                join(["1.00000e-05", "2.0e-06", "-3.0e-06"]) + &join(["2.00000e-05", "nan", "inf"]);
+            let table = parse(&(legend.clone() + &rows));
+            let context = format!("stamp `{stamp}`, separator `{separator}`");
+            assert_eq!(table.names, ["Time", "strain_B", "strain_C"], "{context}");
+            assert_eq!(table.columns[0], [1e-5, 2e-5], "{context}");
+            assert_eq!(table.columns[2], [-3e-6, f64::INFINITY], "{context}");
+            assert!(table.columns[1][1].is_nan());
+            let restarted = parse(&(legend.clone() + &rows + &legend + &rows));
+            assert_eq!(restarted.columns[0], [1e-5, 2e-5], "{context}");
+        }
+    }
+    let labelled = "+[06:08:23] time=1.0e-05 | strain_B=8.8e-06\n\
+                    +[06:08:24] time=2.0e-05 | strain_B=9.9e-06\n";
+    assert_eq!(
+        parse(labelled).series("STRAIN_B").unwrap(),
+        (vec![1e-5, 2e-5], vec![8.8e-6, 9.9e-6])
+    );
+}
+
+#[test]
+fn a_restart_repeats_the_header_and_its_steps_hold() {
+    let header = "% Sierra SPYHIS Output Mon Sep 16 13:34:22 2019\n    TIME,   a\n    TIME,   a\n";
+    let first = " 1.0e-05,  1.0\n 2.0e-05,  2.0\n 3.0e-05,  3.0\n";
+    let second = " 2.0e-05,  2.5\n 3.0e-05,  3.5\n 4.0e-05,  4.5\n";
+    let table = parse(&format!("{header}{first}{header}{second}"));
+    assert_eq!(table.columns[0], [1e-5, 2e-5, 3e-5, 4e-5]);
+    assert_eq!(table.columns[1], [1.0, 2.5, 3.5, 4.5]);
+    assert!(table.notes.contains(&"2 repeated steps: the later ones hold".to_owned()));
+    // The killed run left half a row, alone in its line or with the restart's header behind it.
+    for cut in [" 4.0e-05,  3\n", " 4.0e-05, ", " 4.0e-0", " 4.0e-05,\n"] {
+        let table = parse(&format!("{header}{first}{cut}{header}{second}"));
+        assert_eq!(table.columns[1], [1.0, 2.5, 3.5, 4.5], "cut `{cut}`");
+    }
+    let table = parse("Time,  a\n 1.0,  1.0\n 2.0,  2.Time,  a\n 2.0,  2.5\n");
+    assert_eq!(table.columns[1], [1.0, 2.5]);
+    let table = parse("time=1.0, a=1.0\ntime=2.0, a=2.time=2.0, a=2.5\ntime=3.0, a=3.5\n");
+    assert_eq!(table.columns[1], [1.0, 2.5, 3.5]);
+}
+
+#[test]
+fn a_last_line_without_end_counts_only_if_it_is_whole() {
+    let start = "Time,  a\n 1.00e-05,  1.25e+00\n";
+    assert_eq!(parse(&format!("{start} 2.00e-05, -2.25e+00")).columns[0].len(), 2);
+    for cut in [" 2.00e-05,  2.25e+0", " 2.00e-05,  2.2", " 2.00e-05", " 2.00e-0", " "] {
+        let table = parse(&format!("{start}{cut}"));
+        assert_eq!(table.columns[0], [1e-5], "cut `{cut}`");
+        assert_eq!(table.notes.len(), usize::from(!cut.trim().is_empty()), "cut `{cut}`");
+    }
+    assert!(complaint("Time, a\n 1.0, 1.").contains("no complete row"));
+}
+
+#[test]
+fn rounded_times_and_messages_do_no_harm() {
+    let text = "Time,  a\n- output paused, 3 steps skipped\n 1.00000e-02,  1\n 1.00000e-02,  2\n\
+                 1.00001e-02,  3\n-restarted\n 1.00002e-02,  4\n";
+    let table = parse(text);
+    assert_eq!(table.columns[0], [1.00000e-2, 1.00001e-2, 1.00002e-2]);
+    assert_eq!(table.columns[1], [2.0, 3.0, 4.0]);
+    // A second header line with units, as CTH's hscth files have it.
+    let table = parse("time, pressure\n(s), (dyn/cm2)\n 0.0, 1.0D+6\n 1.0, -2.0D+6\n");
+    assert_eq!((table.names[1].as_str(), &table.columns[1][..]), ("pressure", &[1e6, -2e6][..]));
+    // Negative numbers first in the line are no messages.
+    assert_eq!(parse("a, time\n-1.0, 0.1\n-2.0, 0.2\n").columns[0], [-1.0, -2.0]);
+}
+
+#[test]
+fn what_cannot_be_read_is_named() {
+    let text = complaint("Time, a\n 1.0, 2.0\n 2.0, x1.0\n 3.0, 4.0\n");
+    assert_eq!(text, "run.txt, line 3: expected a row of 2 numbers, found `2.0, x1.0`");
+    let text = complaint("Time, a\n 1.0, 2.0\nTime, b\n 3.0, 4.0\n");
+    assert!(text.contains("line 3: the header changes to `Time`, `b`"), "{text}");
+    assert!(complaint("").contains("is empty"));
+    assert!(complaint("a\0b").contains("zero bytes"));
+    let table = parse("strain_B=1.0, strain_C=2.0\n");
+    let text = table.series("strain_B").unwrap_err().to_string();
+    assert!(text.contains("no time column") && text.contains("global time"), "{text}");
+    let text = parse("time=1.0, a=2.0\n").series("b").unwrap_err().to_string();
+    assert!(text.contains("no column `b`; it has `time`, `a`"), "{text}");
+}
