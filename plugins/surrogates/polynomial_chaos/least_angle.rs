@@ -5,10 +5,10 @@
 //! and judged by their corrected leave-one-out error ("hybrid" selection: Blatman and Sudret 2011),
 //! which is exactly the error of the final model.
 //!
-//! What makes it fast: the Gram matrix is shared by all outputs, so a step of the path costs
-//! `O(terms x active + active^2)` and never touches the runs; the inverse Cholesky factor of the
-//! active Gram matrix grows by one column a step; and the orthonormal columns that leverages and residuals
-//! need are made for a block of steps at a time by one matrix product.
+//! What makes it fast: the Gram matrix is shared by all outputs, so that the path never touches the
+//! runs; only candidates that can arrive are followed ([`super::candidates`]); the inverse Cholesky
+//! factor of the active Gram matrix grows by one column a step; and the orthonormal columns that
+//! leverages and residuals need are made for a block of steps at a time by one matrix product.
 
 use lacuna::linalg::{Matrix, PackedUpper, gram, multiply, vector};
 
@@ -42,10 +42,14 @@ impl Dictionary {
             let column = columns.row_mut(t);
             let size = vector::norm(column);
             let mean = column.iter().sum::<f64>() / runs as f64;
-            column.iter_mut().for_each(|x| *x -= mean);
+            for x in &mut *column {
+                *x -= mean;
+            }
             let length = vector::norm(column);
             let varies = length > 1e-10 * size;
-            column.iter_mut().for_each(|x| *x = if varies { *x / length } else { 0.0 });
+            for x in column {
+                *x = if varies { *x / length } else { 0.0 };
+            }
             means.push(mean);
             lengths.push(if varies { length } else { 0.0 });
         }
@@ -179,7 +183,9 @@ impl<'a> Path<'a> {
         }
         let scale = outside.sqrt().recip();
         let mut next = self.inverse.multiply(&projections);
-        next.iter_mut().for_each(|x| *x *= -scale);
+        for x in &mut next {
+            *x *= -scale;
+        }
         next.push(scale);
 
         self.active.push(term);
