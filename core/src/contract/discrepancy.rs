@@ -5,11 +5,11 @@ use crate::data::{Measurements, Replicate, Scenario};
 use crate::linalg::{self, Matrix};
 use crate::math::random::{Stream, normal};
 use crate::plugin::Discrepancy;
-use crate::plugin::discrepancy::{Likelihood, LowRank};
+use crate::plugin::discrepancy::{CommonError, Likelihood};
 use crate::plugin::surrogate::Linear;
 
 /// Puts a discrepancy through the contract, on five replicates of ten outputs with gaps, one output never
-/// measured, with and without an emulator's error.
+/// measured, with and without errors that all replicates share.
 ///
 /// - hyperparameters have different names, and starts where their priors are above zero;
 /// - the likelihood is finite at the start, the same each time, larger for a response that fits than for one far
@@ -22,8 +22,10 @@ use crate::plugin::surrogate::Linear;
 pub fn discrepancy(name: &str, discrepancy: &dyn Discrepancy) -> Result<(), Vec<String>> {
     let over = |check: fn(&dyn Likelihood) -> Result<(), String>| {
         move || {
-            for error in [None, Some(error())] {
-                let built = discrepancy.likelihood(&data(), error.as_ref());
+            let emulator = || common("emulator", true);
+            for errors in [vec![], vec![emulator()], vec![emulator(), common("replicates", false)]]
+            {
+                let built = discrepancy.likelihood(&data(), &errors);
                 check(&*built.map_err(|stop| format!("sound data are refused: {stop}"))?)?;
             }
             Ok(())
@@ -61,10 +63,11 @@ fn data() -> Measurements {
     Measurements { layout: layout(), replicates: (0..5).map(replicate).collect() }
 }
 
-/// The covariance of an emulator's error, a tenth as large as the scatter of the data.
-fn error() -> LowRank {
-    let mut rng = Stream::root(8).generator();
-    LowRank { factor: Matrix::from_fn(OUTPUTS, 2, |_, _| 0.05 * normal(&mut rng)) }
+/// An error that all replicates share, about a quarter of the scatter of the data.
+fn common(origin: &str, predictive: bool) -> CommonError {
+    let mut rng = Stream::root(8).named(origin).generator();
+    let factor = Matrix::from_fn(OUTPUTS, 2, |_, _| 0.05 * normal(&mut rng));
+    CommonError { origin: origin.to_owned(), factor, predictive }
 }
 
 fn start(likelihood: &dyn Likelihood) -> Vec<f64> {
@@ -191,7 +194,7 @@ fn simulates_what_it_predicts(likelihood: &dyn Likelihood) -> Result<(), String>
         if gaps(&made) != gaps(&data) {
             return Err("simulated data have other gaps than the measurements".into());
         }
-        // Only one replicate of each data set: the others share the emulator's error with it.
+        // Only one replicate of each data set: the others share the common errors with it.
         for (i, value) in made.replicates[0].values.iter().enumerate() {
             squares[i].extend(value.map(|y| (y - truth[i]).powi(2)));
         }
@@ -222,16 +225,20 @@ fn refuses_bad_data(discrepancy: &dyn Discrepancy) -> Result<(), String> {
         ("an infinite value", changed(|r| r.values[1] = Some(f64::INFINITY))),
         ("replicates of another shape", changed(|r| r.values.truncate(4))),
     ] {
-        refused(what, || discrepancy.likelihood(&data, None).map(|_| ()))?;
+        refused(what, || discrepancy.likelihood(&data, &[]).map(|_| ()))?;
     }
-    let short = LowRank { factor: Matrix::zeros(OUTPUTS - 1, 2) };
-    refused("an emulator's error of another shape", || {
-        discrepancy.likelihood(&data(), Some(&short)).map(|_| ())
+    let rank = |rows: usize, columns: usize| {
+        [CommonError { factor: Matrix::zeros(rows, columns), ..common("emulator", true) }]
+    };
+    refused("a common error of another shape", || {
+        discrepancy.likelihood(&data(), &rank(OUTPUTS - 1, 2)).map(|_| ())
     })?;
     // An emulator without an error is a good one.
-    let none = LowRank { factor: Matrix::zeros(OUTPUTS, 0) };
-    match calm("an emulator's error of rank 0", || discrepancy.likelihood(&data(), Some(&none)))? {
-        Ok(_) => Ok(()),
-        Err(stop) => Err(format!("an emulator's error of rank 0 is refused: {stop}")),
+    for errors in [rank(OUTPUTS, 0), rank(OUTPUTS, 2)] {
+        let what = "a common error of zero";
+        if let Err(stop) = calm(what, || discrepancy.likelihood(&data(), &errors))? {
+            return Err(format!("{what} is refused: {stop}"));
+        }
     }
+    Ok(())
 }

@@ -26,7 +26,7 @@ pub const SCHEMA: u64 = 1;
 /// | `surrogate.mae`, `.rmse` | mean absolute and root mean square error over the validation runs, in `surrogate.unit` |
 /// | `surrogate.loo` | leave-one-out error relative to the outputs' variance, mean over outputs |
 /// | `surrogate.training`, `.validation` | numbers of runs |
-/// | `surrogate.near_posterior` | root mean square leave-one-out error of the runs near the posterior, in `surrogate.unit`, where known |
+/// | `surrogate.near_posterior` | root mean square difference between the emulator and the model, run anew at posterior draws (`validate.emulator_check`), in `surrogate.unit` |
 /// | `surrogate.sobol` | for each parameter its `first` and `total` index, where known |
 /// | `parameters.NAME` | parameters and hyperparameters, in that order |
 /// | `….mean`, `.sd`, `.q025`, `.median`, `.q975` | of the posterior draws after the burn-in |

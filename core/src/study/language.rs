@@ -1,12 +1,15 @@
-//! The JSON Schema of the whole study language, every installed plugin included.
+//! The whole study language, every installed plugin included: as JSON Schema, and as a manual of the
+//! engine's own keys.
 
+use schemars::JsonSchema;
 use serde_json::Value;
 
 use super::file::{
-    DesignKeys, DiscrepancyKeys, MeasurementKeys, ModelKeys, ParameterSection, ResponseSection,
-    SamplerKeys, StudySection, SurrogateKeys, ValidateSection,
+    DesignKeys, DiscrepancyKeys, MeasurementKeys, ModelKeys, NumericalErrorSection,
+    ParameterSection, ResponseSection, SamplerKeys, StudySection, SurrogateKeys, ValidateSection,
 };
 use super::schema::Language;
+use crate::plugin::manual::{Manual, generator, resolve};
 use crate::plugin::registry::NoKeys;
 use crate::plugin::{Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate};
 
@@ -27,8 +30,31 @@ pub fn schema() -> Value {
         .section::<dyn Reader, MeasurementKeys>("measurements")
         .section::<dyn Surrogate, SurrogateKeys>("surrogate")
         .section::<dyn Discrepancy, DiscrepancyKeys>("discrepancy")
+        .table::<NumericalErrorSection>("numerical_error")
         .sections::<dyn Effect, NoKeys>("effect")
         .section::<dyn Sampler, SamplerKeys>("sampler")
         .table::<ValidateSection>("validate");
     language.finish()
+}
+
+/// The engine's own sections, and its keys in sections that choose a plugin, in the order of a study.
+pub fn manual() -> Vec<Manual> {
+    vec![
+        page::<StudySection>("[study]"),
+        page::<ParameterSection>("[[parameter]]"),
+        page::<ResponseSection>("[response]"),
+        page::<ModelKeys>("[model]"),
+        page::<DesignKeys>("[design]"),
+        page::<MeasurementKeys>("[measurements]"),
+        page::<SurrogateKeys>("[surrogate]"),
+        page::<DiscrepancyKeys>("[discrepancy]"),
+        page::<SamplerKeys>("[sampler]"),
+        page::<ValidateSection>("[validate]"),
+    ]
+}
+
+fn page<T: JsonSchema>(name: &str) -> Manual {
+    let mut generator = generator();
+    let schema = generator.subschema_for::<T>();
+    Manual::of_schema(name, &resolve(&schema, &generator), &generator)
 }
