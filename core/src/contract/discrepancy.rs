@@ -20,23 +20,24 @@ use crate::plugin::surrogate::Linear;
 ///   within five Monte Carlo errors;
 /// - data without a value, with a value that is not finite or of another shape are refused.
 pub fn discrepancy(name: &str, discrepancy: &dyn Discrepancy) -> Result<(), Vec<String>> {
-    let over = |check: fn(&dyn Likelihood) -> Result<(), String>| {
+    let over = |check: fn(&dyn Likelihood) -> Result<(), String>, last: CommonError| {
         move || {
             let emulator = || common("emulator", true);
-            for errors in [vec![], vec![emulator()], vec![emulator(), common("replicates", false)]]
-            {
+            for errors in [vec![], vec![emulator()], vec![emulator(), last.clone()]] {
                 let built = discrepancy.likelihood(&data(), &errors);
                 check(&*built.map_err(|stop| format!("sound data are refused: {stop}"))?)?;
             }
             Ok(())
         }
     };
+    // An error of the data's mean belongs to data that are there, not to a replicate that is new.
+    let (of_data, of_model) = (|| common("replicates", false), || common("numerics", true));
     let checks: [Check<'_>; 6] = [
-        ("has sound hyperparameters", Box::new(over(has_sound_hyperparameters))),
-        ("judges responses", Box::new(over(judges_responses))),
-        ("knows its derivatives", Box::new(over(knows_its_derivatives))),
-        ("compresses exactly", Box::new(over(compresses_exactly))),
-        ("simulates what it predicts", Box::new(over(simulates_what_it_predicts))),
+        ("has sound hyperparameters", Box::new(over(has_sound_hyperparameters, of_data()))),
+        ("judges responses", Box::new(over(judges_responses, of_data()))),
+        ("knows its derivatives", Box::new(over(knows_its_derivatives, of_data()))),
+        ("compresses exactly", Box::new(over(compresses_exactly, of_data()))),
+        ("simulates what it predicts", Box::new(over(simulates_what_it_predicts, of_model()))),
         ("refuses bad data", Box::new(|| refuses_bad_data(discrepancy))),
     ];
     judge("discrepancy", name, &checks)

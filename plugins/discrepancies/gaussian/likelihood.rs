@@ -156,7 +156,7 @@ fn check(data: &Measurements, common: &[CommonError]) -> Result<(), Stop> {
             return Err(Stop::new(format!("replicate `{name}` is not finite at {place}")));
         }
     }
-    for CommonError { origin, factor } in common {
+    for CommonError { origin, factor, .. } in common {
         let rows = factor.rows();
         if rows != outputs {
             let text = format!("the common error `{origin}` has {rows} outputs and not {outputs}");
