@@ -5,6 +5,8 @@ mod new;
 mod plugins;
 mod progress;
 mod study;
+#[cfg(test)]
+mod tests;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
