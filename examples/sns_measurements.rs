@@ -1,7 +1,7 @@
 //! Makes the measured data of `configs/sns`: `cargo run --release -p lacuna-examples --bin sns_measurements`.
 //!
 //! The strain measured at the SNS target is not public. These curves come from the stand-in model
-//! `mercury_target` on a mesh twice as fine in each direction as the study's, at the founding paper's MAP
+//! `mercury_target` on a mesh three times as fine in each direction as the study's, at the founding paper's MAP
 //! (arXiv 2202.03959), with the scatter from pulse to pulse that the paper describes: gain and timing jitter,
 //! noise, larger for U and C and small for G and M, and a few curves of white noise. Everything that
 //! was chosen is written to `measurements.json` beside the data; no study reads it.
@@ -11,9 +11,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use lacuna::math::random::{Stream, normal};
-use lacuna_plugins::models::mercury_target::{
-    Cells, Mercury, NamedMesh, Sampling, Settings, simulate,
-};
+use lacuna_plugins::models::mercury_target::{Cells, Mercury, Sampling, Settings, simulate};
 use serde_json::json;
 
 const SEED: u64 = 1_004_056;
@@ -46,7 +44,7 @@ const FAULTY: [(usize, &str, f64); 4] =
 fn main() -> Result<(), Box<dyn Error>> {
     let mercury = Mercury { density: 12_112.1, sound_speed: 1850.4, tensile_cutoff: 6.45e4 };
     let mut settings = Settings::default();
-    settings.numerics.mesh = Cells::Named(NamedMesh::Fine);
+    settings.numerics.mesh = Cells::Explicit([60, 270]);
     settings.sampling = Sampling { interval: STEP, count: 1020 };
     let truth = simulate(&settings, &mercury)?.strain;
     let names: Vec<&str> = settings.gauges.0.iter().map(|gauge| gauge.name.as_str()).collect();
@@ -83,7 +81,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         "what": "how strain.csv was made; no study reads this file",
         "program": "examples/sns_measurements.rs",
         "seed": SEED,
-        "model": "mercury_target, mesh `fine` (40 x 180 cells), other settings at their defaults",
+        "model": "mercury_target, mesh of 60 x 270 cells, other settings at their defaults",
         "density [kg/m3]": mercury.density,
         "sound_speed [m/s]": mercury.sound_speed,
         "tensile_cutoff [Pa]": mercury.tensile_cutoff,

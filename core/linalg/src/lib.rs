@@ -13,6 +13,7 @@ mod eigen;
 mod error;
 mod faer_view;
 mod matrix;
+mod packed;
 mod product;
 mod qr;
 mod svd;
@@ -23,6 +24,7 @@ pub use cholesky::Cholesky;
 pub use eigen::{SymmetricEigen, symmetric_eigen};
 pub use error::Error;
 pub use matrix::Matrix;
+pub use packed::PackedUpper;
 pub use product::{
     gram, multiply, multiply_transposed, multiply_vector, transposed_multiply,
     transposed_multiply_vector,

@@ -117,6 +117,22 @@ impl Matrix {
         Self::from_fn(self.rows, indices.len(), |i, j| self[(i, indices[j])])
     }
 
+    /// Removes all rows and sets the number of columns, keeping the memory.
+    pub fn clear(&mut self, columns: usize) {
+        self.data.clear();
+        (self.rows, self.columns) = (0, columns);
+    }
+
+    /// Appends a row from its entries.
+    ///
+    /// # Panics
+    /// When there are not as many entries as the matrix has columns.
+    pub fn extend_row(&mut self, row: impl IntoIterator<Item = f64>) {
+        self.data.extend(row);
+        self.rows += 1;
+        assert_eq!(self.data.len(), self.rows * self.columns, "all rows have one length");
+    }
+
     /// Appends a row.
     ///
     /// # Panics

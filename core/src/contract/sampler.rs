@@ -8,6 +8,9 @@ use crate::math::moments::{mean, variance};
 use crate::math::random::{Stream, uniform};
 use crate::plugin::sampler::{Sampler, State, Target};
 
+/// One clause of the contract; an error says how it was broken.
+type Check = fn(&dyn Sampler) -> Result<(), String>;
+
 /// Puts a sampler through the contract.
 ///
 /// - `start` and `step` keep one finite point a chain, inside the support, with the log density of
@@ -18,7 +21,7 @@ use crate::plugin::sampler::{Sampler, State, Target};
 /// - the mean and the standard deviation of a normal law in two correlated coordinates come out
 ///   within four Monte Carlo errors.
 pub fn sampler(name: &str, sampler: &dyn Sampler) -> Result<(), Vec<String>> {
-    let checks: [(&str, fn(&dyn Sampler) -> Result<(), String>); 5] = [
+    let checks: [(&str, Check); 5] = [
         ("keeps sound states", keeps_sound_states),
         ("continues from a saved state", continues_from_a_saved_state),
         ("does not depend on threads", does_not_depend_on_threads),

@@ -8,8 +8,8 @@
 //! walkers move along lines through each other and are not independent: a small R-hat is no proof of
 //! convergence, and it is expected to be near `sqrt(1 + 2 tau / steps)` however well the ensemble
 //! has converged. Effective sizes add over walkers as if they were independent, which holds only for
-//! many walkers and many autocorrelation times; the honest error of a mean is that of the series
-//! of ensemble means, [`autocorrelation::ensemble_error`].
+//! many walkers and many autocorrelation times; the error of a mean that needs no independence is
+//! that of the series of ensemble means, [`autocorrelation::ensemble_error`].
 
 pub mod autocorrelation;
 pub mod chains;
@@ -33,7 +33,8 @@ pub struct Coordinate {
     pub ess_tail: f64,
     /// The integrated autocorrelation time, in steps.
     pub autocorrelation_time: f64,
-    /// The Monte Carlo standard error of the mean; for an ensemble, from its means.
+    /// The Monte Carlo standard error of the mean; for an ensemble, the larger one of those of
+    /// independent walkers and of the series of its means.
     pub mcse_mean: f64,
     /// The Monte Carlo standard error of the standard deviation.
     pub mcse_sd: f64,
@@ -102,11 +103,8 @@ impl Diagnosis {
     }
 
     fn holds(&self) -> bool {
-        let good = |c: &Coordinate| {
-            c.r_hat <= self.criteria.r_hat && c.ess_bulk.min(c.ess_tail) >= self.criteria.ess
-        };
         let reached = self.stranded.to_the_end.is_empty() && self.stranded.late.is_empty();
-        reached && self.more_steps == 0 && self.coordinates.iter().all(good)
+        reached && self.more_steps == 0
     }
 
     fn advise(&self, draws: &Draws) -> Vec<String> {
@@ -126,8 +124,8 @@ impl Diagnosis {
             ));
         }
         for c in &self.coordinates {
-            // Written so that an R-hat that could not be computed complains too.
-            if !(c.r_hat <= self.criteria.r_hat) {
+            // An R-hat that could not be computed complains too.
+            if c.r_hat.is_nan() || c.r_hat > self.criteria.r_hat {
                 advice.push(format!(
                     "the {kind} disagree on `{}`: R-hat is {:.3} and should be at most {}",
                     c.name, c.r_hat, self.criteria.r_hat
@@ -136,7 +134,8 @@ impl Diagnosis {
         }
         if self.more_steps > 0 {
             advice.push(format!(
-                "{} more steps would give {} autocorrelation times and {} effective draws",
+                "{} more steps would give {} autocorrelation times and {} effective draws, \
+                 if the {kind} go on as they do",
                 self.more_steps, self.criteria.times, self.criteria.ess
             ));
         }
@@ -160,7 +159,8 @@ fn coordinate(draws: &Draws, j: usize, ensemble: bool) -> Coordinate {
         ess_tail: chains::ess_tail(&values),
         autocorrelation_time: autocorrelation::integrated_time(&values),
         mcse_mean: if ensemble {
-            autocorrelation::ensemble_error(&values)
+            // The first is too small for short runs, the second for walkers that move together.
+            autocorrelation::ensemble_error(&values).max(chains::mcse_mean(&values))
         } else {
             chains::mcse_mean(&values)
         },
@@ -173,16 +173,25 @@ fn longest_time(coordinates: &[Coordinate]) -> f64 {
 }
 
 /// Steps that are missing at the present rate; as many again as there are where the rate is unknown.
+///
+/// The excess of R-hat squared over one falls as one over the number of steps. It tells when chains are
+/// still too short to show their own autocorrelation time.
 fn more_steps(coordinates: &[Coordinate], steps: usize, criteria: &Criteria) -> usize {
-    let known = |c: &Coordinate| c.autocorrelation_time.is_finite() && c.ess_tail.is_finite();
-    if !coordinates.iter().all(known) {
-        return steps.max(1);
-    }
-    let smallest =
-        coordinates.iter().map(|c| c.ess_bulk.min(c.ess_tail)).fold(f64::INFINITY, f64::min);
-    let for_size = steps as f64 * criteria.ess / smallest;
-    let for_times = criteria.times * longest_time(coordinates);
-    (for_size.max(for_times).ceil() as usize).saturating_sub(steps)
+    let present = steps as f64;
+    let needed = |c: &Coordinate| {
+        let for_size = present * criteria.ess / c.ess_bulk.min(c.ess_tail);
+        let for_times = criteria.times * c.autocorrelation_time;
+        let excess = |r_hat: f64| r_hat * r_hat - 1.0;
+        let for_r_hat = present * excess(c.r_hat) / excess(criteria.r_hat);
+        let all = [for_size, for_times, for_r_hat];
+        if all.iter().all(|n| n.is_finite()) {
+            all.into_iter().fold(0.0, f64::max)
+        } else {
+            (2.0 * present).max(1.0)
+        }
+    };
+    let most = coordinates.iter().map(needed).fold(0.0, f64::max);
+    (most.ceil() as usize).saturating_sub(steps)
 }
 
 #[cfg(test)]

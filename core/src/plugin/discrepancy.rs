@@ -14,12 +14,13 @@ use crate::run::Stop;
 pub trait Discrepancy: Component {
     /// The likelihood of these measurements.
     ///
-    /// `emulator_error` is the covariance of the emulator's error, common to all replicates; it is
-    /// added once to the covariance of the mean curve, never divided by the number of replicates.
+    /// `common` are errors that all replicates share (of the emulator, of the model's numerics, of the
+    /// replicates' mean): their covariances are added once to the covariance of the mean curve, never divided by
+    /// the number of replicates.
     fn likelihood(
         &self,
         data: &Measurements,
-        emulator_error: Option<&LowRank>,
+        common: &[CommonError],
     ) -> Result<Box<dyn Likelihood>, Stop>;
 }
 
@@ -40,11 +41,15 @@ pub struct Hyperparameter {
     pub start: f64,
 }
 
-/// A covariance `F F'` of rank at most the number of columns of `F` (`outputs x rank`).
+/// An error that all replicates share, as a covariance `F F'` of rank at most the number of columns of `F`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct LowRank {
+pub struct CommonError {
+    /// Where it comes from: `emulator`, `numerics`, `replicates`.
+    pub origin: String,
     /// The factor `F`, `outputs x rank`, in the response's unit.
     pub factor: Matrix,
+    /// Whether a new replicate has it too, beside what the discrepancy adds to a replicate.
+    pub predictive: bool,
 }
 
 /// The likelihood of fixed measurements as a function of the model's response.

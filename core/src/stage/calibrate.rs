@@ -18,6 +18,8 @@ use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
 use crate::study::Study;
 use crate::study::file::Start;
 
+use super::common_error;
+use super::numerical_error::NumericalError;
 use super::read::{Data, Measured};
 use super::sampling::{self, Sampled};
 use super::stream;
@@ -117,13 +119,24 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// The likelihood of the study's measurements, with the emulator's error if the study wants it.
-    pub fn of(study: &Study, measured: &Measured, fitted: &Fitted) -> Result<Self, Stop> {
+    /// The likelihood of the study's measurements, with the common errors that the study wants.
+    pub fn of(
+        study: &Study,
+        measured: &Measured,
+        fitted: &Fitted,
+        numerics: Option<&Kept<NumericalError>>,
+    ) -> Result<Self, Stop> {
         let section =
             study.discrepancy.as_ref().ok_or_else(|| Stop::new("the study has no discrepancy"))?;
-        let error =
-            if section.common.emulator_error { Some(fitted.covariance(study)?) } else { None };
-        let likelihood = section.built.plugin.likelihood(&measured.likelihood, error.as_ref())?;
+        let mut common = Vec::new();
+        if section.common.emulator_error {
+            common.push(fitted.covariance(study)?);
+        }
+        if section.common.replicate_error {
+            common.extend(common_error::of_replicates(&measured.used));
+        }
+        common.extend(numerics.map(|kept| kept.value.common_error()));
+        let likelihood = section.built.plugin.likelihood(&measured.likelihood, &common)?;
         Ok(Self { likelihood })
     }
 
@@ -144,6 +157,7 @@ pub fn stage(
     study: &Study,
     data: &Kept<Data>,
     fitted: &Kept<Fitted>,
+    numerics: Option<&Kept<NumericalError>>,
     emulator: &dyn Emulator,
     run: &mut RunDirectory,
     observer: &dyn Observer,
@@ -158,13 +172,14 @@ pub fn stage(
     let inputs = json!([
         data.hash,
         fitted.hash,
+        numerics.map(|n| &n.hash),
         laws,
         (discrepancy.built.name, &discrepancy.built.options, &discrepancy.common),
         effects,
         (section.built.name, &section.built.options, &section.common),
         study.about.seed
     ]);
-    let parts = Parts::of(study, measured, &fitted.value)?;
+    let parts = Parts::of(study, measured, &fitted.value, numerics)?;
     let posterior = parts.posterior(study, emulator);
     let plan = section.built.plugin.plan(posterior.dimension());
     observer.begin("calibrate", "step", plan.steps as u64);

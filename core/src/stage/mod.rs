@@ -1,9 +1,11 @@
 //! The whole program: stages in order, each one function from plain data to plain data.
 
 pub mod calibrate;
+pub mod common_error;
 pub mod design;
 pub mod inference_data;
 pub mod manifest;
+pub mod numerical_error;
 pub mod read;
 pub mod report;
 pub mod results;
@@ -30,9 +32,12 @@ pub fn run(
     let simulated = simulate::stage(study, design.as_ref(), run, observer)?;
     let data = read::stage(study, simulated.as_ref(), run, observer)?;
     let (fitted, emulator) = surrogate::stage(study, &data, run, observer)?;
-    let calibrated = calibrate::stage(study, &data, &fitted, &*emulator, run, observer)?;
-    let (emulator, calibrated) = (&*emulator, calibrated.as_ref());
-    let validated = validate::stage(study, &data, &fitted, emulator, calibrated, run, observer)?;
+    let numerics = numerical_error::stage(study, design.as_ref(), &data, run, observer)?;
+    let (emulator, numerics) = (&*emulator, numerics.as_ref());
+    let calibrated = calibrate::stage(study, &data, &fitted, numerics, emulator, run, observer)?;
+    let calibrated = calibrated.as_ref();
+    let validated =
+        validate::stage(study, &data, &fitted, numerics, emulator, calibrated, run, observer)?;
     let validated = validated.as_ref();
     let all = report::Artifacts { data: &data, fitted: &fitted, emulator, calibrated, validated };
     let findings = report::stage(study, &all, run)?;

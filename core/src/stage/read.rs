@@ -144,9 +144,14 @@ fn ensemble(study: &Study, simulated: Option<&Path>) -> Result<Ensemble, Stop> {
         parameters: &study.parameters,
         layout: &study.layout,
     };
+    from_files(study, &source)
+}
+
+/// The runs of a source through the study's reader, every response finite.
+pub fn from_files(study: &Study, source: &EnsembleSource<'_>) -> Result<Ensemble, Stop> {
     let ensemble = match &study.simulations {
-        Some(section) => section.built.plugin.ensemble(&source)?,
-        None => super::results::ensemble(&source)?,
+        Some(section) => section.built.plugin.ensemble(source)?,
+        None => super::results::ensemble(source)?,
     };
     if let Some((i, value)) =
         ensemble.responses.as_slice().iter().enumerate().find(|(_, y)| !y.is_finite())

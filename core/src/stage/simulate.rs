@@ -138,26 +138,37 @@ pub fn stage(
 ) -> Result<Option<Kept<Simulated>>, Stop> {
     let (Some(design), Some(simulator)) = (design, Simulator::of(study)?) else { return Ok(None) };
     let Some(section) = &study.model else { return Ok(None) };
-    let inputs = json!([
-        design.hash,
-        section.built.name,
-        section.built.options,
-        section.common,
-        simulator.asked
-    ]);
     let points = &design.value.points;
+    let names = names(points.rows());
+    let model = (section.built.name, &section.built.options, &section.common);
     observer.begin("simulate", "run", points.rows() as u64);
-    let folder = run.stage_folder(STAGE);
-    let make = |folder: &Path| simulate(study, &simulator, points, folder, observer);
-    let kept = run.keep(STAGE, &inputs, observer, make)?;
-    let kept = if !kept.fresh && (kept.value.failures() > 0 || !kept.value.whole(&folder)) {
-        run.reopen(STAGE)?;
-        run.keep(STAGE, &inputs, observer, make)?
-    } else {
-        kept
-    };
+    let kept = kept(study, &simulator, STAGE, &names, points, &model, run, observer)?;
     observer.end("simulate", &summary(&kept.value));
     Ok(Some(kept))
+}
+
+/// The runs at some points as a stage of their own: taken when they are there, made when not, and
+/// those that failed or lost their files made again.
+#[expect(clippy::too_many_arguments, reason = "what runs, where, and what its hash is made of")]
+pub fn kept(
+    study: &Study,
+    simulator: &Simulator<'_>,
+    stage: &str,
+    names: &[String],
+    points: &Matrix,
+    model: &impl Serialize,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Kept<Simulated>, Stop> {
+    let inputs = json!([names, points, model, simulator.asked]);
+    let folder = run.stage_folder(stage);
+    let make = |folder: &Path| simulate(study, simulator, names, points, folder, observer);
+    let kept = run.keep(stage, &inputs, observer, make)?;
+    if !kept.fresh && (kept.value.failures() > 0 || !kept.value.whole(&folder)) {
+        run.reopen(stage)?;
+        return run.keep(stage, &inputs, observer, make);
+    }
+    Ok(kept)
 }
 
 const STAGE: &str = "2-simulate";
@@ -177,12 +188,12 @@ fn summary(simulated: &Simulated) -> String {
 fn simulate(
     study: &Study,
     simulator: &Simulator<'_>,
+    names: &[String],
     points: &Matrix,
     folder: &Path,
     observer: &dyn Observer,
 ) -> Result<Simulated, Stop> {
     let executor = study.executor.as_ref().ok_or_else(|| Stop::new("the study has no executor"))?;
-    let names = names(points.rows());
     let mut ended = earlier(folder);
     ended.retain(|_, record| is_whole(record, folder));
     let missing: Vec<usize> =
@@ -228,7 +239,7 @@ fn simulate(
 }
 
 /// `run001`, `run002`, …, with as many digits as the last one needs.
-fn names(count: usize) -> Vec<String> {
+pub fn names(count: usize) -> Vec<String> {
     let digits = count.to_string().len().max(3);
     (1..=count).map(|i| format!("run{i:0digits$}")).collect()
 }

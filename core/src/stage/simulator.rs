@@ -2,8 +2,10 @@
 
 use crate::data::{Axis, Coordinates, Layout, Scenario};
 use crate::plugin::model::{Call, EvalError, Model, Response};
+use crate::plugin::registry::Section;
 use crate::run::Stop;
 use crate::study::Study;
+use crate::study::file::ModelKeys;
 
 /// A model with its fixed inputs, fed with the study's parameters.
 pub struct Simulator<'a> {
@@ -29,7 +31,14 @@ enum Source {
 impl<'a> Simulator<'a> {
     /// The simulator of a study, if it has a model.
     pub fn of(study: &'a Study) -> Result<Option<Self>, Stop> {
-        let Some(section) = &study.model else { return Ok(None) };
+        study.model.as_ref().map(|section| Self::with_model(study, section)).transpose()
+    }
+
+    /// The simulator of a study with another model in place of its own.
+    pub fn with_model(
+        study: &'a Study,
+        section: &'a Section<dyn Model, ModelKeys>,
+    ) -> Result<Self, Stop> {
         let model = &*section.built.plugin;
         let signature = model.signature();
         let mut sources = Vec::new();
@@ -51,7 +60,7 @@ impl<'a> Simulator<'a> {
             });
         }
         let (asked, factor) = asked(&study.layout, &signature.layout)?;
-        Ok(Some(Self { model, asked, scenario: Scenario::default(), sources, factor }))
+        Ok(Self { model, asked, scenario: Scenario::default(), sources, factor })
     }
 
     /// The model's inputs for one point of the study's parameters.

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use crate::data::Ensemble;
 use crate::linalg::{self, Matrix};
-use crate::plugin::discrepancy::LowRank;
+use crate::plugin::discrepancy::CommonError;
 use crate::plugin::surrogate::Training;
 use crate::plugin::{Emulator, Fact, Surrogate};
 use crate::run::arrays::{self, Array};
@@ -245,7 +245,7 @@ impl Fitted {
     ///
     /// Each run's error curve is one sample of the error, which is common to all replicates and correlated
     /// between outputs; the covariance is their mean square about zero.
-    pub fn covariance(&self, study: &Study) -> Result<LowRank, Stop> {
+    pub fn covariance(&self, study: &Study) -> Result<CommonError, Stop> {
         let errors = self.errors_near_prior(study);
         let svd = linalg::thin_svd(&errors)
             .map_err(|e| Stop::new(format!("the covariance of the emulator's error: {e}")))?;
@@ -260,6 +260,6 @@ impl Fitted {
         let scale = (errors.rows() as f64).sqrt();
         let factor =
             Matrix::from_fn(errors.columns(), rank, |i, k| svd.v[(i, k)] * svd.values[k] / scale);
-        Ok(LowRank { factor })
+        Ok(CommonError { origin: "emulator".to_owned(), factor, predictive: true })
     }
 }

@@ -17,6 +17,7 @@ use crate::study::Study;
 use crate::study::file::Against;
 
 use super::calibrate::{Calibrated, Parts};
+use super::numerical_error::NumericalError;
 use super::read::{Data, Measured};
 use super::screen::Z975;
 use super::simulator::Simulator;
@@ -53,6 +54,7 @@ pub fn stage(
     study: &Study,
     data: &Kept<Data>,
     fitted: &Kept<Fitted>,
+    numerics: Option<&Kept<NumericalError>>,
     emulator: &dyn Emulator,
     calibrated: Option<&Kept<Calibrated>>,
     run: &mut RunDirectory,
@@ -75,7 +77,7 @@ pub fn stage(
     let cases = 1 + u64::from(study.validate.against.is_some());
     observer.begin("validate", "run", cases + study.validate.emulator_check as u64);
     let kept = run.keep("6-validate", &inputs, observer, |_| {
-        let parts = Parts::of(study, measured, &fitted.value)?;
+        let parts = Parts::of(study, measured, &fitted.value, numerics)?;
         let work =
             Work { study, measured, emulator, simulator, rerun, progress: Progress::new(observer) };
         work.validate(&calibrated.value, parts.likelihood())

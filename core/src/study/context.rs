@@ -32,6 +32,12 @@ fn sections(study: &Study, complaints: &mut Complaints<'_>) {
             "`[model]` and `[design]`, or `[simulations]` with the files of finished runs",
         );
     }
+    if study.numerical_error.is_some() && (!simulated || imported) {
+        complaints
+            .at("numerical_error")
+            .say("the study makes no runs that could be repeated")
+            .expected("`[model]` and `[design]`, and no files of finished runs in `[simulations]`");
+    }
     if study.surrogate.is_none() {
         complaints
             .at("")

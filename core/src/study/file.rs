@@ -294,12 +294,28 @@ pub struct DiscrepancyKeys {
     /// Whether the emulator's own error is part of the likelihood: a covariance estimated from the leave-one-out
     /// errors, common to all replicates and correlated between outputs.
     pub emulator_error: bool,
+    /// Whether what the points of a replicate share (its gain, its timing) is part of the likelihood: a covariance
+    /// of the mean curve estimated from the replicates. Without it all points count as independent.
+    pub replicate_error: bool,
 }
 
 impl Default for DiscrepancyKeys {
     fn default() -> Self {
-        Self { emulator_error: true }
+        Self { emulator_error: true, replicate_error: true }
     }
+}
+
+/// How the model's own numerical error is estimated: some runs of the design are repeated with finer numerics,
+/// and the differences are a covariance in the likelihood, common to all replicates and correlated
+/// between outputs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NumericalErrorSection {
+    /// How many runs are repeated: the first ones of the design that lie inside the prior.
+    pub runs: Count,
+    /// Options of `[model]` that make it finer, such as `{ numerics = { mesh = "fine" } }`.
+    #[schemars(with = "std::collections::BTreeMap<String, serde_json::Value>")]
+    pub model: toml::Table,
 }
 
 /// The engine's keys of `[sampler]`.

@@ -5,8 +5,8 @@ use schemars::JsonSchema;
 use serde_json::Value;
 
 use super::file::{
-    DesignKeys, DiscrepancyKeys, MeasurementKeys, ModelKeys, ParameterSection, ResponseSection,
-    SamplerKeys, StudySection, SurrogateKeys, ValidateSection,
+    DesignKeys, DiscrepancyKeys, MeasurementKeys, ModelKeys, NumericalErrorSection,
+    ParameterSection, ResponseSection, SamplerKeys, StudySection, SurrogateKeys, ValidateSection,
 };
 use super::schema::Language;
 use crate::plugin::manual::{Manual, generator, resolve};
@@ -30,6 +30,7 @@ pub fn schema() -> Value {
         .section::<dyn Reader, MeasurementKeys>("measurements")
         .section::<dyn Surrogate, SurrogateKeys>("surrogate")
         .section::<dyn Discrepancy, DiscrepancyKeys>("discrepancy")
+        .table::<NumericalErrorSection>("numerical_error")
         .sections::<dyn Effect, NoKeys>("effect")
         .section::<dyn Sampler, SamplerKeys>("sampler")
         .table::<ValidateSection>("validate");

@@ -11,8 +11,8 @@ use super::context;
 use super::decode::{decode, fields};
 use super::emit::{Unwritable, to_table};
 use super::file::{
-    DesignKeys, DiscrepancyKeys, MeasurementKeys, ModelKeys, ParameterSection, ResponseSection,
-    SamplerKeys, StudySection, SurrogateKeys, ValidateSection,
+    DesignKeys, DiscrepancyKeys, MeasurementKeys, ModelKeys, NumericalErrorSection,
+    ParameterSection, ResponseSection, SamplerKeys, StudySection, SurrogateKeys, ValidateSection,
 };
 use super::{Complaints, Node, Problems, Sources, inherit, overrides};
 use crate::data::{Layout, Parameter};
@@ -51,6 +51,8 @@ pub struct Study {
     pub discrepancy: Option<Section<dyn Discrepancy, DiscrepancyKeys>>,
     /// `[sampler]`.
     pub sampler: Option<Section<dyn Sampler, SamplerKeys>>,
+    /// `[numerical_error]`.
+    pub numerical_error: Option<NumericalError>,
     /// `[[effect]]`.
     pub effects: Vec<Section<dyn Effect, NoKeys>>,
     /// `[validate]`.
@@ -59,8 +61,18 @@ pub struct Study {
     pub resolved: Table,
 }
 
+/// How the model's numerical error is estimated.
+pub struct NumericalError {
+    /// How many runs of the design are repeated.
+    pub runs: usize,
+    /// The model with finer numerics.
+    pub model: Section<dyn Model, ModelKeys>,
+    /// The section as it is written.
+    pub written: NumericalErrorSection,
+}
+
 /// The sections of the study language, in the order in which a study is written.
-pub const SECTIONS: [&str; 13] = [
+pub const SECTIONS: [&str; 14] = [
     "study",
     "parameter",
     "response",
@@ -71,6 +83,7 @@ pub const SECTIONS: [&str; 13] = [
     "measurements",
     "surrogate",
     "discrepancy",
+    "numerical_error",
     "effect",
     "sampler",
     "validate",
@@ -163,6 +176,7 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
     let surrogate = chosen(root, "surrogate", None, problems);
     let discrepancy = chosen(root, "discrepancy", None, problems);
     let sampler = chosen(root, "sampler", None, problems);
+    let numerical_error = numerical_error(root, problems);
     let effects = effects(root, problems);
     let validate = match root.get("validate") {
         Some(node) => problems.within("validate", |problems| decode(node, problems)),
@@ -190,6 +204,7 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
         surrogate,
         discrepancy,
         sampler,
+        numerical_error,
         effects: effects?,
         validate: validate?,
         resolved: Table::new(),
@@ -268,6 +283,34 @@ fn parameters(root: &Node, problems: &mut Problems) -> Option<Vec<ParameterSecti
         })
         .collect();
     decoded.into_iter().collect()
+}
+
+/// `[numerical_error]`: the study's model with some options changed.
+fn numerical_error(root: &Node, problems: &mut Problems) -> Option<NumericalError> {
+    let node = root.get("numerical_error")?;
+    problems.within("numerical_error", |problems| {
+        let written: NumericalErrorSection = decode(node, problems)?;
+        let Some(base) = root.get("model") else {
+            problems.report(Some(node.place.clone()), "the study has no model to run finer");
+            return None;
+        };
+        let mut finer = base.clone();
+        overlay(&mut finer, node.get("model")?);
+        let model = problems.within("model", |problems| section(&finer, None, problems))?;
+        Some(NumericalError { runs: written.runs.get(), model, written })
+    })
+}
+
+/// Puts the values of `over` in the place of those of `base`, table by table.
+fn overlay(base: &mut Node, over: &Node) {
+    for (key, value) in over.entries() {
+        match base.get_mut(&key.name) {
+            Some(old) if !old.entries().is_empty() && !value.entries().is_empty() => {
+                overlay(old, value);
+            }
+            _ => base.set(key.clone(), value.clone()),
+        }
+    }
 }
 
 fn effects(root: &Node, problems: &mut Problems) -> Option<Vec<Section<dyn Effect, NoKeys>>> {
@@ -392,6 +435,10 @@ fn resolved(study: &Study, response: &ResponseSection) -> Result<Table, Unwritab
         };
     }
     sections!(model, design, executor, simulations, measurements, surrogate, discrepancy);
+    if let Some(numerical_error) = &study.numerical_error {
+        let table = to_table(&numerical_error.written)?;
+        whole.insert("numerical_error".to_owned(), table.into());
+    }
     if !study.effects.is_empty() {
         let effects: Result<Vec<Table>, _> = study.effects.iter().map(merged).collect();
         whole.insert("effect".to_owned(), effects?.into());

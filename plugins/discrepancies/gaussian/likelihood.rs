@@ -7,7 +7,7 @@
 //! log L = -1/2 [ N log(2 pi v) + (sum_i S_i)/v + log det(I + K/v) + z' (v I + K)^-1 z ]
 //! ```
 //!
-//! where `K = W F F' W`, `W = diag(sqrt(n_i))`, is the covariance `F F'` of the emulator's error as it enters `z`. The
+//! where `K = W F F' W`, `W = diag(sqrt(n_i))`, is the covariance `F F'` of the common errors as it enters `z`. The
 //! thin singular value decomposition `W F = U diag(s) V'` diagonalises `K` once for all `v`.
 
 use lacuna::data::{Measurements, Unit};
@@ -16,7 +16,9 @@ use lacuna::linalg::{self, Matrix};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::Fact;
-use lacuna::plugin::discrepancy::{Compressed, Hyperparameter, Likelihood, LowRank, VariancePart};
+use lacuna::plugin::discrepancy::{
+    CommonError, Compressed, Hyperparameter, Likelihood, VariancePart,
+};
 use lacuna::plugin::surrogate::Linear;
 use lacuna::run::Stop;
 
@@ -26,11 +28,11 @@ use super::compressed::CompressedGaussian;
 pub(super) struct GaussianLikelihood {
     data: Measurements,
     hyper: Vec<Hyperparameter>,
-    emulator_error: Option<LowRank>,
+    common: Vec<CommonError>,
     pub(super) statistics: Statistics,
 }
 
-/// What the likelihood needs of the data and of the emulator's error.
+/// What the likelihood needs of the data and of the common errors.
 #[derive(Debug, Clone)]
 pub(super) struct Statistics {
     /// The outputs that were measured at least once.
@@ -41,7 +43,7 @@ pub(super) struct Statistics {
     pub weighted_mean: Vec<f64>,
     /// Number of data and total scatter.
     pub spread: Spread,
-    /// `U'`: the directions of the emulator's error, `rank x measured`.
+    /// `U'`: the directions of the common errors, `rank x measured`.
     pub directions: Matrix,
 }
 
@@ -57,7 +59,7 @@ pub(super) struct Spread {
 }
 
 impl Spread {
-    /// The log-likelihood given the squared residual outside the directions of the emulator's error and
+    /// The log-likelihood given the squared residual outside the directions of the common errors and
     /// the residual along each of them.
     pub fn log_likelihood(&self, v: f64, outside: f64, along: &[f64]) -> f64 {
         let mut twice =
@@ -81,10 +83,10 @@ impl Spread {
 impl GaussianLikelihood {
     pub(super) fn new(
         data: &Measurements,
-        emulator_error: Option<&LowRank>,
+        common: &[CommonError],
         prior: Distribution,
     ) -> Result<Self, Stop> {
-        let statistics = Statistics::of(data, emulator_error)?;
+        let statistics = Statistics::of(data, common)?;
         let hyper = vec![Hyperparameter {
             name: "variance".to_owned(),
             symbol: "variance".to_owned(),
@@ -93,8 +95,7 @@ impl GaussianLikelihood {
             prior,
             log: true,
         }];
-        let emulator_error = emulator_error.cloned();
-        Ok(Self { data: data.clone(), hyper, emulator_error, statistics })
+        Ok(Self { data: data.clone(), hyper, common: common.to_vec(), statistics })
     }
 
     fn residual(&self, response: &[f64]) -> Vec<f64> {
@@ -103,7 +104,7 @@ impl GaussianLikelihood {
         outputs.map(|((&i, w), mean)| mean - w * response[i]).collect()
     }
 
-    /// The residual along the directions of the emulator's error, and what remains of it outside them.
+    /// The residual along the directions of the common errors, and what remains of it outside them.
     fn split(&self, response: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let mut outside = self.residual(response);
         let mut along = Vec::with_capacity(self.statistics.directions.rows());
@@ -120,7 +121,7 @@ impl GaussianLikelihood {
 }
 
 impl Statistics {
-    fn of(data: &Measurements, emulator_error: Option<&LowRank>) -> Result<Self, Stop> {
+    fn of(data: &Measurements, common: &[CommonError]) -> Result<Self, Stop> {
         let summaries = data.summaries();
         let measured: Vec<usize> =
             (0..summaries.len()).filter(|&i| summaries[i].count > 0).collect();
@@ -133,26 +134,31 @@ impl Statistics {
             measured.iter().zip(&weight).map(|(&i, w)| w * summaries[i].mean).collect();
         let count = data.count() as f64;
         let scatter = summaries.iter().map(|s| s.scatter).sum();
-        let (directions, eigenvalues) = match emulator_error {
-            None => (Matrix::zeros(0, measured.len()), Vec::new()),
-            Some(error) => error_directions(error, &measured, &weight)?,
-        };
+        let (directions, eigenvalues) = common_directions(common, &measured, &weight)?;
         let spread = Spread { count, scatter, eigenvalues };
         Ok(Self { measured, weight, weighted_mean, spread, directions })
     }
 }
 
-fn error_directions(
-    error: &LowRank,
+/// The eigenvectors (as rows) and eigenvalues of the covariance `K` of all common errors.
+fn common_directions(
+    common: &[CommonError],
     measured: &[usize],
     weight: &[f64],
 ) -> Result<(Matrix, Vec<f64>), Stop> {
-    let factor = &error.factor;
-    let weighted = Matrix::from_fn(measured.len(), factor.columns(), |i, j| {
-        weight[i] * factor[(measured[i], j)]
+    let columns: Vec<(&Matrix, usize)> = common
+        .iter()
+        .flat_map(|error| (0..error.factor.columns()).map(move |k| (&error.factor, k)))
+        .collect();
+    if columns.is_empty() {
+        return Ok((Matrix::zeros(0, measured.len()), Vec::new()));
+    }
+    let weighted = Matrix::from_fn(measured.len(), columns.len(), |i, k| {
+        let (factor, column) = columns[k];
+        weight[i] * factor[(measured[i], column)]
     });
     let svd = linalg::thin_svd(&weighted)
-        .map_err(|e| Stop::new(format!("the covariance of the emulator's error: {e}")))?;
+        .map_err(|e| Stop::new(format!("the covariance of the common errors: {e}")))?;
     let rank = svd.values.iter().filter(|&&s| s > 1e-12 * svd.values[0]).count();
     let kept: Vec<usize> = (0..rank).collect();
     let directions = svd.u.select_columns(&kept).transposed();
@@ -229,17 +235,17 @@ impl Likelihood for GaussianLikelihood {
             origin: "discrepancy".to_owned(),
             variance: vec![hyper[0]; response.len()],
         }];
-        if let Some(error) = &self.emulator_error {
+        for error in self.common.iter().filter(|error| error.predictive) {
             let variance = error.factor.iter_rows().map(|row| dot(row, row)).collect();
-            parts.push(VariancePart { origin: "emulator".to_owned(), variance });
+            parts.push(VariancePart { origin: error.origin.clone(), variance });
         }
         parts
     }
 
     fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Measurements {
         let mut mean = response.to_vec();
-        if let Some(error) = &self.emulator_error {
-            let mut rng = stream.named("emulator").generator();
+        for (k, error) in self.common.iter().enumerate() {
+            let mut rng = stream.named("common").at(k as u64).generator();
             let weights: Vec<f64> = (0..error.factor.columns()).map(|_| normal(&mut rng)).collect();
             for (m, row) in mean.iter_mut().zip(error.factor.iter_rows()) {
                 *m += dot(row, &weights);
@@ -264,7 +270,7 @@ impl Likelihood for GaussianLikelihood {
         vec![
             Fact::new("data", s.spread.count),
             Fact::new("measured outputs", s.measured.len()),
-            Fact::new("directions of the emulator's error", s.directions.rows()),
+            Fact::new("directions of the common errors", s.directions.rows()),
         ]
     }
 }

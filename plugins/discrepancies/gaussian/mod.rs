@@ -8,7 +8,7 @@ mod tests;
 use lacuna::data::Measurements;
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::component::{Component, Context};
-use lacuna::plugin::discrepancy::{Discrepancy, Likelihood, LowRank};
+use lacuna::plugin::discrepancy::{CommonError, Discrepancy, Likelihood};
 use lacuna::run::Stop;
 use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
@@ -19,9 +19,9 @@ use likelihood::GaussianLikelihood;
 /// Independent normal differences between data and model, all of one unknown variance.
 ///
 /// Every measured value is the model's response plus a normal number of mean zero and the
-/// unknown `variance` (homoscedastic; Radaideh et al. arXiv 2202.03959, equation of the likelihood). When the
-/// emulator's own error is given, it is a further normal error, the same for all
-/// replicates and correlated between outputs: its covariance is added once to that of the mean curve.
+/// unknown `variance` (homoscedastic; Radaideh et al. arXiv 2202.03959, equation of the likelihood). Errors that
+/// all replicates share, such as the emulator's own, are further normal errors, correlated between
+/// outputs: their covariance is added once to that of the mean curve.
 ///
 /// The likelihood uses the count, mean and scatter of the replicates of each output, which are
 /// sufficient; with a linear emulator it is reduced further, by an orthogonal factorisation, to
@@ -51,9 +51,9 @@ impl Discrepancy for Gaussian {
     fn likelihood(
         &self,
         data: &Measurements,
-        emulator_error: Option<&LowRank>,
+        common: &[CommonError],
     ) -> Result<Box<dyn Likelihood>, Stop> {
-        Ok(Box::new(GaussianLikelihood::new(data, emulator_error, self.variance.clone())?))
+        Ok(Box::new(GaussianLikelihood::new(data, common, self.variance.clone())?))
     }
 }
 

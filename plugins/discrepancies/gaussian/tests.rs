@@ -5,7 +5,7 @@ use lacuna::data::{Axis, Layout, Measurements, Replicate, Scenario, Unit};
 use lacuna::linalg::{self, Cholesky, Matrix};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal, uniform};
-use lacuna::plugin::discrepancy::{Likelihood, LowRank};
+use lacuna::plugin::discrepancy::{CommonError, Likelihood};
 use lacuna::plugin::surrogate::Linear;
 
 use super::likelihood::GaussianLikelihood;
@@ -58,13 +58,18 @@ fn random_matrix(rows: usize, columns: usize, seed: u64) -> Matrix {
     Matrix::from_fn(rows, columns, |_, _| normal(&mut rng))
 }
 
-fn likelihood(data: &Measurements, error: Option<&LowRank>) -> GaussianLikelihood {
+fn common(seed: u64) -> CommonError {
+    let factor = random_matrix(OUTPUTS, 2, seed);
+    CommonError { origin: "emulator".to_owned(), factor, predictive: true }
+}
+
+fn likelihood(data: &Measurements, error: &[CommonError]) -> GaussianLikelihood {
     GaussianLikelihood::new(data, error, Distribution::Uniform([0.0, 10.0])).unwrap()
 }
 
 /// The log density of all data as one normal vector with covariance `v I + E F F' E'`, where `E` repeats each
 /// output for each of its replicates; by a Cholesky factor of that whole covariance.
-fn naive(data: &Measurements, error: Option<&LowRank>, response: &[f64], v: f64) -> f64 {
+fn naive(data: &Measurements, error: &[CommonError], response: &[f64], v: f64) -> f64 {
     let mut residual = Vec::new();
     let mut output = Vec::new();
     for replicate in &data.replicates {
@@ -77,11 +82,11 @@ fn naive(data: &Measurements, error: Option<&LowRank>, response: &[f64], v: f64)
     }
     let n = residual.len();
     let covariance = Matrix::from_fn(n, n, |a, b| {
-        let common = error.map_or(0.0, |e| {
+        let shared = error.iter().map(|e| {
             let (p, q) = (e.factor.row(output[a]), e.factor.row(output[b]));
-            p.iter().zip(q).map(|(x, y)| x * y).sum()
+            p.iter().zip(q).map(|(x, y)| x * y).sum::<f64>()
         });
-        common + if a == b { v } else { 0.0 }
+        shared.sum::<f64>() + if a == b { v } else { 0.0 }
     });
     let factor = Cholesky::new(&covariance).unwrap();
     let quadratic = factor.quadratic(&residual);
@@ -92,9 +97,9 @@ fn naive(data: &Measurements, error: Option<&LowRank>, response: &[f64], v: f64)
 fn equals_the_normal_density_written_out() {
     for seed in 0..20 {
         let data = data(seed);
-        let error = LowRank { factor: random_matrix(OUTPUTS, 2, seed + 100) };
+        let error = [common(seed + 100)];
         let response = random_matrix(1, OUTPUTS, seed + 200);
-        for error in [None, Some(&error)] {
+        for error in [&[][..], &error[..]] {
             let found = likelihood(&data, error).log_likelihood(response.row(0), &[0.7]);
             let expected = naive(&data, error, response.row(0), 0.7);
             assert!((found - expected).abs() < 1e-10 * expected.abs(), "{found} {expected}");
@@ -106,8 +111,8 @@ fn equals_the_normal_density_written_out() {
 fn the_compressed_form_equals_the_full_one() {
     for seed in 0..20 {
         let data = data(seed);
-        let error = LowRank { factor: random_matrix(OUTPUTS, 2, seed + 100) };
-        for (terms, error) in [(TERMS, None), (TERMS, Some(&error)), (12, Some(&error))] {
+        let error = [common(seed + 100)];
+        for (terms, error) in [(TERMS, &[][..]), (TERMS, &error[..]), (12, &error[..])] {
             let emulated = Emulated { coefficients: random_matrix(terms, OUTPUTS, seed + 300) };
             let full = likelihood(&data, error);
             let compressed = full.compress(&emulated).unwrap();
@@ -127,8 +132,8 @@ fn the_compressed_form_equals_the_full_one() {
 #[test]
 fn gradients_are_the_derivatives() {
     let data = data(3);
-    let error = LowRank { factor: random_matrix(OUTPUTS, 2, 5) };
-    let full = likelihood(&data, Some(&error));
+    let error = [common(5)];
+    let full = likelihood(&data, &error);
     let emulated = Emulated { coefficients: random_matrix(TERMS, OUTPUTS, 6) };
     let compressed = full.compress(&emulated).unwrap();
     let basis = random_matrix(1, TERMS, 7);
@@ -158,7 +163,7 @@ fn gradients_are_the_derivatives() {
 #[test]
 fn simulated_data_have_the_gaps_of_the_measurements_and_the_variance_asked_for() {
     let data = data(4);
-    let full = likelihood(&data, None);
+    let full = likelihood(&data, &[]);
     let response = vec![1.0; OUTPUTS];
     let mut squares = 0.0;
     let mut count = 0.0;

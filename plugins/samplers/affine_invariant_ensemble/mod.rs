@@ -189,4 +189,6 @@ impl AffineInvariantEnsemble {
 lacuna::register!(Sampler, "affine_invariant_ensemble", AffineInvariantEnsemble);
 
 #[cfg(test)]
+mod calibration;
+#[cfg(test)]
 mod tests;

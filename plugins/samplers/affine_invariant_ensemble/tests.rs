@@ -16,7 +16,7 @@ struct Density<F> {
     dimension: usize,
     centre: f64,
     spread: f64,
-    log_density: F,
+    function: F,
 }
 
 impl<F: Fn(&[f64]) -> f64 + Sync> Target for Density<F> {
@@ -25,11 +25,11 @@ impl<F: Fn(&[f64]) -> f64 + Sync> Target for Density<F> {
     }
 
     fn log_density(&self, points: &Matrix) -> Vec<f64> {
-        points.iter_rows().map(&self.log_density).collect()
+        points.iter_rows().map(&self.function).collect()
     }
 
     fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
-        ((self.log_density)(point), vec![f64::NAN; point.len()])
+        ((self.function)(point), vec![f64::NAN; point.len()])
     }
 
     fn bounds(&self) -> Vec<(f64, f64)> {
@@ -43,8 +43,8 @@ impl<F: Fn(&[f64]) -> f64 + Sync> Target for Density<F> {
 }
 
 fn standard(dimension: usize) -> Density<impl Fn(&[f64]) -> f64 + Sync> {
-    let log_density = |x: &[f64]| -0.5 * x.iter().map(|x| x * x).sum::<f64>();
-    Density { dimension, centre: 0.0, spread: 1.0, log_density }
+    let function = |x: &[f64]| -0.5 * x.iter().map(|x| x * x).sum::<f64>();
+    Density { dimension, centre: 0.0, spread: 1.0, function }
 }
 
 fn ensemble(walkers: usize, steps: usize) -> AffineInvariantEnsemble {
@@ -53,8 +53,19 @@ fn ensemble(walkers: usize, steps: usize) -> AffineInvariantEnsemble {
 
 /// A whole run; the draws after `burn_in` steps.
 fn run(sampler: &AffineInvariantEnsemble, target: &dyn Target, seed: u64, burn_in: usize) -> Draws {
+    let points = target.prior_draws(sampler.walkers, &Stream::root(seed).named("start"));
+    run_from(sampler, target, points, seed, burn_in)
+}
+
+/// The same from given starting points.
+pub(super) fn run_from(
+    sampler: &AffineInvariantEnsemble,
+    target: &dyn Target,
+    points: Matrix,
+    seed: u64,
+    burn_in: usize,
+) -> Draws {
     let root = Stream::root(seed);
-    let points = target.prior_draws(sampler.walkers, &root.named("start"));
     let mut state = sampler.start(target, points).unwrap();
     let mut kept = Vec::new();
     for step in 0..sampler.steps {
@@ -85,13 +96,25 @@ fn it_keeps_the_contract_of_samplers() {
     }
 }
 
+/// The first two of all coordinates, which are alike, of a run of 100 walkers.
+fn first_two_coordinates(target: &dyn Target, steps: u64) -> Draws {
+    let (sampler, root) = (ensemble(100, 1), Stream::root(1));
+    let mut state = sampler.start(target, target.prior_draws(100, &root.named("start"))).unwrap();
+    let mut kept = Vec::new();
+    for step in 0..steps {
+        sampler.step(target, &mut state, &root.named("step").at(step)).unwrap();
+        kept.push((state.points.select_columns(&[0, 1]), state.log_density.clone()));
+    }
+    Draws::from_steps(vec!["x0".into(), "x1".into()], &kept)
+}
+
 #[test]
 fn acceptance_and_autocorrelation_are_those_of_emcee() {
     // Source: emcee 3.1.6, standard normal law, 100 walkers, 20000 steps, a = 2: acceptance and tau.
     for (dimension, acceptance, tau) in
         [(2, 0.716, 31.0), (5, 0.552, 56.0), (10, 0.418, 111.0), (20, 0.298, 264.0)]
     {
-        let draws = run(&ensemble(100, 20_000), &standard(dimension), 1, 0);
+        let draws = first_two_coordinates(&standard(dimension), 20_000);
         let shares = walkers::acceptance(&draws);
         let found = shares.iter().sum::<f64>() / 100.0;
         assert!((found - acceptance).abs() < 0.01, "d = {dimension}: acceptance {found}");
@@ -107,11 +130,11 @@ fn acceptance_and_autocorrelation_are_those_of_emcee() {
 fn a_conjugate_normal_posterior_is_found_in_sixty_steps() {
     // Source: the self-test of UQLab. Prior N(7, variance 2), data 9.1241 and 8.151 with variance 3;
     // the posterior is normal with mean 7.935743 and variance 0.857143.
-    let log_density = |x: &[f64]| {
+    let function = |x: &[f64]| {
         let misfit = (9.1241 - x[0]).powi(2) + (8.151 - x[0]).powi(2);
         -0.25 * (x[0] - 7.0).powi(2) - misfit / 6.0
     };
-    let target = Density { dimension: 1, centre: 7.0, spread: 2.0_f64.sqrt(), log_density };
+    let target = Density { dimension: 1, centre: 7.0, spread: 2.0_f64.sqrt(), function };
     let mut divergences: Vec<f64> = (0..20)
         .map(|seed| {
             let draws = run(&ensemble(100, 60), &target, seed, 30);
@@ -128,21 +151,15 @@ fn a_conjugate_normal_posterior_is_found_in_sixty_steps() {
 #[test]
 fn a_strongly_correlated_normal_law_has_its_mean_and_covariance() {
     let (scale, rho) = ([1e-6, 1e6], 0.99);
-    let log_density = move |x: &[f64]| {
+    let function = move |x: &[f64]| {
         let (u, v) = (x[0] / scale[0] - 3.0, x[1] / scale[1] + 2.0);
         -0.5 * (u * u + v * v - 2.0 * rho * u * v) / (1.0 - rho * rho)
     };
-    let target = Density { dimension: 2, centre: 0.0, spread: 1e-6, log_density };
+    let target = Density { dimension: 2, centre: 0.0, spread: 1e-6, function };
     let sampler = ensemble(40, 6000);
     let mut rng = Stream::root(4).named("start").generator();
     let points = Matrix::from_fn(40, 2, |_, j| scale[j] * ([3.0, -2.0][j] + normal(&mut rng)));
-    let mut state = sampler.start(&target, points).unwrap();
-    let mut kept = Vec::new();
-    for step in 0..6000 {
-        sampler.step(&target, &mut state, &Stream::root(4).at(step)).unwrap();
-        kept.push((state.points.clone(), state.log_density.clone()));
-    }
-    let draws = Draws::from_steps(vec!["x".into(), "y".into()], &kept).after_burn_in(0.1);
+    let draws = run_from(&sampler, &target, points, 4, 600);
     let u = move |x: &[f64]| x[0] / scale[0] - 3.0;
     let v = move |x: &[f64]| x[1] / scale[1] + 2.0;
     assert_mean(&draws, "mean of x", 0.0, u);
@@ -156,8 +173,8 @@ fn a_strongly_correlated_normal_law_has_its_mean_and_covariance() {
 fn a_curved_ridge_has_its_exact_moments() {
     // x ~ N(1, 1) and y | x ~ N(x^2, 0.1), a density of Rosenbrock's shape: the moments of the
     // normal law give E y = 2 and var y = 6.1.
-    let log_density = |x: &[f64]| -0.5 * (x[0] - 1.0).powi(2) - 5.0 * (x[1] - x[0] * x[0]).powi(2);
-    let target = Density { dimension: 2, centre: 1.0, spread: 0.5, log_density };
+    let function = |x: &[f64]| -0.5 * (x[0] - 1.0).powi(2) - 5.0 * (x[1] - x[0] * x[0]).powi(2);
+    let target = Density { dimension: 2, centre: 1.0, spread: 0.5, function };
     for update in [Update::Split, Update::Sequential] {
         let draws =
             run(&AffineInvariantEnsemble { update, ..ensemble(100, 10_000) }, &target, 2, 2000);
@@ -188,7 +205,7 @@ fn an_affine_change_of_the_unknowns_changes_the_chain_by_the_same_map() {
         dimension: 3,
         centre: 0.0,
         spread: 1.0,
-        log_density: move |y: &[f64]| -0.5 * inverse(y).iter().map(|x| x * x).sum::<f64>(),
+        function: move |y: &[f64]| -0.5 * inverse(y).iter().map(|x| x * x).sum::<f64>(),
     };
     for update in [Update::Split, Update::Sequential] {
         let sampler = AffineInvariantEnsemble { update, ..ensemble(20, 100) };
@@ -242,24 +259,17 @@ fn threads_that_share_a_batch_do_not_change_it() {
 fn stranded_walkers_are_found_in_a_real_run() {
     // Two modes 40 standard deviations apart, the second with e^-60 of the density: walkers that start
     // there are too few to leave it.
-    let log_density = |x: &[f64]| {
+    let function = |x: &[f64]| {
         let square = |m: f64| x.iter().map(|x| (x - m).powi(2)).sum::<f64>();
         (-0.5 * square(0.0)).max(-60.0 - 0.5 * square(40.0))
     };
-    let target = Density { dimension: 4, centre: 0.0, spread: 1.0, log_density };
+    let target = Density { dimension: 4, centre: 0.0, spread: 1.0, function };
     let sampler = ensemble(60, 400);
     let mut points = target.prior_draws(60, &Stream::root(1));
     for walker in 0..12 {
         points.row_mut(walker).iter_mut().for_each(|x| *x += 40.0);
     }
-    let mut state = sampler.start(&target, points).unwrap();
-    let mut kept = Vec::new();
-    for step in 0..400 {
-        sampler.step(&target, &mut state, &Stream::root(2).at(step)).unwrap();
-        kept.push((state.points.clone(), state.log_density.clone()));
-    }
-    let names = (0..4).map(|j| format!("x{j}")).collect();
-    let draws = Draws::from_steps(names, &kept).after_burn_in(0.5);
+    let draws = run_from(&sampler, &target, points, 2, 200);
     let far: Vec<usize> = (0..60).filter(|&k| draws.point(k, draws.steps - 1)[0] > 20.0).collect();
     assert!(far.len() > 3, "{far:?}");
     assert_eq!(Stranded::among(&draws).to_the_end, far);
@@ -300,8 +310,8 @@ fn bad_starts_say_what_would_be_right() {
     ] {
         assert!(message.contains(expected), "{message}");
     }
-    let log_density = |x: &[f64]| Distribution::Exponential(1.0).log_density(x[0]);
-    let half = Density { dimension: 1, centre: 0.0, spread: 1.0, log_density };
+    let function = |x: &[f64]| Distribution::Exponential(1.0).log_density(x[0]);
+    let half = Density { dimension: 1, centre: 0.0, spread: 1.0, function };
     let message =
         ensemble(20, 1).start(&half, half.prior_draws(20, &Stream::root(1))).unwrap_err().message;
     assert!(message.contains("walkers start where the posterior density is zero"), "{message}");

@@ -32,16 +32,19 @@ impl Family {
 
     /// The standard coordinate of a parameter, or what stands against this family in words.
     pub fn coordinate(self, parameter: &Parameter) -> Result<Coordinate, String> {
+        let name = &parameter.name;
         match (self, &parameter.design) {
-            (Self::Legendre, Distribution::Uniform([low, high])) => Ok(Coordinate {
+            (Self::Legendre, Distribution::Uniform([low, high])) if low < high => Ok(Coordinate {
                 family: self,
                 centre: 0.5 * (low + high),
                 scale: 0.5 * (high - low),
             }),
-            #[allow(unreachable_patterns)]
-            (Self::Legendre, _) => Err(format!(
-                "basis `legendre` needs a uniform design, but that of parameter `{}` is another",
-                parameter.name
+            (Self::Legendre, Distribution::Uniform([low, high])) => Err(format!(
+                "the design of parameter `{name}` runs from {low} to {high}, which is no interval"
+            )),
+            (Self::Legendre, other) => Err(format!(
+                "basis `legendre` needs a uniform design, but that of parameter `{name}` is `{}`",
+                other.name()
             )),
         }
     }

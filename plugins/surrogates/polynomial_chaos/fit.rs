@@ -224,7 +224,7 @@ impl Degrees<'_> {
         let dictionary = Dictionary::new(basis);
         let centred = Matrix::from_rows(basis.rows(), active.iter().map(|&o| &outputs[o].centred));
         let correlations = multiply_transposed(&centred, dictionary.columns());
-        let window = self.options.early_stop.window(basis.columns() - 1);
+        let window = self.options.early_stop.window(basis.rows());
         let best = |i: usize| {
             let choice = best_along_path(&dictionary, centred.row(i), correlations.row(i), window)?;
             let mut terms = vec![0];
@@ -238,6 +238,9 @@ impl Degrees<'_> {
     /// The least-squares fit of an output on its chosen terms; on the constant alone without any.
     fn refit(&self, output: &Output, best: Option<&Best>) -> Result<Refit, Stop> {
         let Some(best) = best else {
+            if output.variance > 0.0 {
+                return Err(unexplained());
+            }
             let n = output.centred.len() as f64;
             let residuals = output.centred.iter().map(|y| y / (1.0 - 1.0 / n)).collect();
             return Ok(Refit {
@@ -260,6 +263,11 @@ impl Degrees<'_> {
             residuals: fit.residuals,
         })
     }
+}
+
+fn unexplained() -> Stop {
+    Stop::new("the responses vary over the runs, but no basis function does so with them")
+        .help("check that the runs' parameters and responses belong together")
 }
 
 fn dependent(degree: usize) -> Stop {

@@ -5,13 +5,14 @@
 //! and judged by their corrected leave-one-out error ("hybrid" selection: Blatman and Sudret 2011),
 //! which is exactly the error of the final model.
 //!
-//! What makes it fast: the Gram matrix is shared by all outputs, so a step of the path costs
-//! `O(terms x active + active^2)` and never touches the runs; the inverse Cholesky factor of the
-//! active Gram matrix grows by one column a step; and the orthonormal columns that leverages and residuals
-//! need are made for a block of steps at a time by one matrix product.
+//! What makes it fast: the Gram matrix is shared by all outputs, so that the path never touches the
+//! runs; only candidates that can arrive are followed ([`super::candidates`]); the inverse Cholesky
+//! factor of the active Gram matrix grows by one column a step; and the orthonormal columns that
+//! leverages and residuals need are made for a block of steps at a time by one matrix product.
 
-use lacuna::linalg::{Matrix, gram, multiply, vector};
+use lacuna::linalg::{Matrix, PackedUpper, gram, multiply, vector};
 
+use super::candidates::{Arrival, Candidates, Direction};
 use super::least_squares::correction;
 
 /// A new column whose share outside the span of the active ones is below this is dependent on them.
@@ -41,10 +42,14 @@ impl Dictionary {
             let column = columns.row_mut(t);
             let size = vector::norm(column);
             let mean = column.iter().sum::<f64>() / runs as f64;
-            column.iter_mut().for_each(|x| *x -= mean);
+            for x in &mut *column {
+                *x -= mean;
+            }
             let length = vector::norm(column);
             let varies = length > 1e-10 * size;
-            column.iter_mut().for_each(|x| *x = if varies { *x / length } else { 0.0 });
+            for x in column {
+                *x = if varies { *x / length } else { 0.0 };
+            }
             means.push(mean);
             lengths.push(if varies { length } else { 0.0 });
         }
@@ -103,17 +108,10 @@ pub(super) fn best_along_path(
     best.map(|(error, k)| Choice { terms: path.active[..k].to_vec(), error })
 }
 
-/// The state of the path: which terms are active and where the correlations stand.
+/// The state of the path: which terms are active and where it goes.
 struct Path<'a> {
     dictionary: &'a Dictionary,
-    /// The correlation of each column with the residual.
-    correlations: Vec<f64>,
-    /// How fast each correlation falls along the current direction; one for the active.
-    rates: Vec<f64>,
-    /// The steps at which candidates would enter; scratch.
-    arrivals: Vec<f64>,
-    /// Zero for candidates, infinity for the active and the dependent.
-    closed: Vec<f64>,
+    candidates: Candidates<'a>,
     /// The common size of the active correlations.
     level: f64,
     active: Vec<usize>,
@@ -122,27 +120,25 @@ struct Path<'a> {
     weights: Vec<f64>,
     /// The active columns, `active x runs`.
     columns: Matrix,
-    /// The inverse `R^-1` of the Cholesky factor `G = R' R`, column after column, upper part only.
-    inverse: Vec<f64>,
+    /// The inverse `R^-1` of the Cholesky factor of the active Gram matrix `G = R' R`.
+    inverse: PackedUpper,
     /// `tr (Psi' Psi)^-1` after each step, for the basis functions as they are and the constant.
     traces: Vec<f64>,
 }
 
 impl<'a> Path<'a> {
     fn new(dictionary: &'a Dictionary, correlations: &[f64]) -> Self {
-        let open = |length: &f64| if *length > 0.0 { 0.0 } else { f64::INFINITY };
+        let open = dictionary.lengths.iter().map(|length| *length > 0.0);
+        let runs = dictionary.columns.columns();
         Self {
             dictionary,
-            correlations: correlations.to_vec(),
-            rates: vec![0.0; correlations.len()],
-            arrivals: vec![0.0; correlations.len()],
-            closed: dictionary.lengths.iter().map(open).collect(),
+            candidates: Candidates::new(&dictionary.gram, correlations, open),
             level: 0.0,
             active: Vec::new(),
             signs: Vec::new(),
             weights: Vec::new(),
-            columns: Matrix::zeros(0, dictionary.columns.columns()),
-            inverse: Vec::new(),
+            columns: Matrix::zeros(0, runs),
+            inverse: PackedUpper::new(),
             traces: Vec::new(),
         }
     }
@@ -150,97 +146,63 @@ impl<'a> Path<'a> {
     /// Moves to where the next candidate enters and lets it in; false when there is none.
     fn step(&mut self) -> bool {
         loop {
-            let Some(entering) = self.advance() else { return false };
-            self.closed[entering] = f64::INFINITY;
-            if self.enter(entering) {
-                vector::combine_rows(
-                    &self.dictionary.gram,
-                    &self.active,
-                    &self.weights,
-                    &mut self.rates,
-                );
+            let Some(arrival) = self.advance() else { return false };
+            self.candidates.close(arrival.term);
+            if let Some(turn) = self.enter(arrival.term, arrival.correlation.signum()) {
+                self.candidates.turn(arrival.term, &self.weights, turn);
                 return true;
             }
         }
     }
 
     /// Moves along the current direction until a candidate is as correlated as the active ones.
-    fn advance(&mut self) -> Option<usize> {
+    fn advance(&mut self) -> Option<Arrival> {
         if self.active.is_empty() {
-            let mut first = None;
-            for (j, (c, closed)) in self.correlations.iter().zip(&self.closed).enumerate() {
-                if *closed == 0.0 && c.abs() > self.level {
-                    (first, self.level) = (Some(j), c.abs());
-                }
-            }
-            return first;
+            let strongest = self.candidates.strongest()?;
+            self.level = strongest.correlation.abs();
+            return Some(strongest);
         }
-        let (entering, distance) = self.next_arrival()?;
-        if distance >= self.level {
-            return None;
-        }
-        self.level -= distance;
-        vector::add_scaled(&mut self.correlations, -distance, &self.rates);
-        Some(entering)
+        let arrival = self.candidates.advance(&Direction {
+            active: &self.active,
+            weights: &self.weights,
+            level: self.level,
+        })?;
+        self.level -= arrival.distance;
+        Some(arrival)
     }
 
-    /// The candidate that the falling level meets first, and after how long.
-    fn next_arrival(&mut self) -> Option<(usize, f64)> {
-        let level = self.level;
-        // Where the level does not gain on a candidate they never meet. A candidate that stands at
-        // the level, but for round-off, meets it at once.
-        let meet = |gap: f64, gain: f64| {
-            if gain > 1e-12 { gap.max(0.0) / gain } else { f64::INFINITY }
-        };
-        let candidates = self.correlations.iter().zip(&self.rates).zip(&self.closed);
-        for (arrival, ((c, rate), closed)) in self.arrivals.iter_mut().zip(candidates) {
-            let up = meet(level - c, 1.0 - rate);
-            let down = meet(level + c, 1.0 + rate);
-            *arrival = closed + if up < down { up } else { down };
-        }
-        let mut least = f64::INFINITY;
-        for &arrival in &self.arrivals {
-            least = if arrival < least { arrival } else { least };
-        }
-        let entering = self.arrivals.iter().position(|&a| a == least)?;
-        least.is_finite().then_some((entering, least))
-    }
-
-    /// Adds a term to the active set; false when it depends linearly on those there.
-    fn enter(&mut self, term: usize) -> bool {
-        let k = self.active.len();
+    /// Adds a term to the active set and says by what length the direction turns; none when the term
+    /// depends linearly on those there.
+    fn enter(&mut self, term: usize, sign: f64) -> Option<f64> {
         let gram = self.dictionary.gram.row(term);
         let products: Vec<f64> = self.active.iter().map(|&t| gram[t]).collect();
-        let column = |i: usize| i * (i + 1) / 2..(i + 1) * (i + 2) / 2;
-        let projections: Vec<f64> =
-            (0..k).map(|i| vector::dot(&self.inverse[column(i)], &products[..=i])).collect();
+        let projections = self.inverse.transposed_multiply(&products);
         let outside = 1.0 - vector::dot(&projections, &projections);
         if outside < DEPENDENT {
-            return false;
+            return None;
         }
-        let mut next = vec![0.0; k + 1];
-        for (i, projection) in projections.iter().enumerate() {
-            vector::add_scaled(&mut next[..=i], -projection, &self.inverse[column(i)]);
-        }
-        next[k] = 1.0;
         let scale = outside.sqrt().recip();
-        next.iter_mut().for_each(|x| *x *= scale);
+        let mut next = self.inverse.multiply(&projections);
+        for x in &mut next {
+            *x *= -scale;
+        }
+        next.push(scale);
 
         self.active.push(term);
-        self.signs.push(self.correlations[term].signum());
+        self.signs.push(sign);
         self.columns.push_row(self.dictionary.columns.row(term));
         self.weights.push(0.0);
         // G^-1 s = R^-1 (R^-T s): the new column of R^-1 adds one entry of R^-T s and nothing else.
         let entry = vector::dot(&next, &self.signs);
         vector::add_scaled(&mut self.weights, entry, &next);
         self.traces.push(self.traces.last().copied().unwrap_or(0.0) + self.trace_of(&next));
-        self.inverse.extend(next);
-        true
+        self.inverse.push(&next);
+        Some(entry)
     }
 
     /// What one column of `R^-1` adds to `tr (Psi' Psi)^-1` of the basis functions as they are.
     ///
-    /// With `D` the lengths and `m` the means of the centred functions, the block inverse of the Gram matrix with
+    /// With `D` the lengths and `m` the means of the centred functions, the inverse Gram matrix with
     /// the constant has the trace `1/N + |D^-1 R^-1|^2 + |m' D^-1 R^-1|^2`.
     fn trace_of(&self, column: &[f64]) -> f64 {
         let (mut squares, mut shift) = (0.0, 0.0);
@@ -262,8 +224,7 @@ impl<'a> Path<'a> {
         let k = self.active.len();
         let mut block = Matrix::zeros(k - first, k);
         for i in first..k {
-            let column = &self.inverse[i * (i + 1) / 2..(i + 1) * (i + 2) / 2];
-            block.row_mut(i - first)[..=i].copy_from_slice(column);
+            block.row_mut(i - first)[..=i].copy_from_slice(self.inverse.column(i));
         }
         multiply(&block, &self.columns)
     }
@@ -272,7 +233,8 @@ impl<'a> Path<'a> {
 /// Keeps leverages and residuals of the least-squares fit while terms are added.
 struct Judge {
     residual: Vec<f64>,
-    leverage: Vec<f64>,
+    /// One less the leverage of each run.
+    freedom: Vec<f64>,
     /// The sum of squares of the centred output.
     total: f64,
     terms: usize,
@@ -283,7 +245,7 @@ impl Judge {
         let n = centred.len();
         Self {
             residual: centred.to_vec(),
-            leverage: vec![1.0 / n as f64; n],
+            freedom: vec![1.0 - 1.0 / n as f64; n],
             total: vector::dot(centred, centred),
             terms: 1,
         }
@@ -296,12 +258,10 @@ impl Judge {
         // already there is not projected twice.
         let projection = vector::dot(column, &self.residual);
         vector::add_scaled(&mut self.residual, -projection, column);
-        let mut squares = 0.0;
-        for ((h, q), r) in self.leverage.iter_mut().zip(column).zip(&self.residual) {
-            *h += q * q;
-            let left_out = r / (1.0 - *h);
-            squares += left_out * left_out;
+        for (d, q) in self.freedom.iter_mut().zip(column) {
+            *d -= q * q;
         }
+        let squares = vector::sum_squared_ratios(&self.residual, &self.freedom);
         let error = squares / self.total * correction(column.len(), self.terms, trace);
         if error.is_nan() { f64::INFINITY } else { error }
     }

@@ -1,6 +1,7 @@
 //! `polynomial_chaos`: expansions in orthonormal polynomials of the parameters.
 
 mod bytes;
+mod candidates;
 mod emulator;
 mod family;
 mod fit;
@@ -16,8 +17,9 @@ mod tests;
 use lacuna::data::Parameter;
 use lacuna::math::random::Stream;
 use lacuna::plugin::surrogate::{Surrogate, Training};
-use lacuna::plugin::{Component, Emulator};
+use lacuna::plugin::{Component, Context, Emulator};
 use lacuna::run::{Progress, Stop};
+use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -174,7 +176,13 @@ impl PolynomialChaos {
     }
 }
 
-impl Component for PolynomialChaos {}
+impl Component for PolynomialChaos {
+    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        for fault in self.faults(context.parameters, context.runs) {
+            complaints.at(fault.key).say(fault.message).help(fault.help);
+        }
+    }
+}
 
 impl Surrogate for PolynomialChaos {
     fn fit(

@@ -113,20 +113,20 @@ pub struct EarlyStop {
     /// An output is done when so many degrees in a row were worse than its best one; 0 tries all. A
     /// search that has not yet explained half of the output's variance goes on regardless.
     pub degrees: usize,
-    /// The path of least-angle regression ends when so many terms (or a tenth of the terms to choose
-    /// from, where that is more) brought no improvement; 0 follows it to its end.
+    /// The path of least-angle regression ends when so many terms (or a tenth of the runs, where
+    /// that is more) brought no improvement; 0 follows it to its end.
     pub terms: usize,
 }
 
 impl Default for EarlyStop {
     fn default() -> Self {
-        Self { degrees: 2, terms: 100 }
+        Self { degrees: 2, terms: 50 }
     }
 }
 
 impl EarlyStop {
-    /// After how many steps without improvement a path among `candidates` terms ends.
-    pub fn window(&self, candidates: usize) -> usize {
-        if self.terms == 0 { usize::MAX } else { self.terms.max((candidates + 5) / 10) }
+    /// After how many steps without improvement a path ends.
+    pub fn window(&self, runs: usize) -> usize {
+        if self.terms == 0 { usize::MAX } else { self.terms.max(runs / 10) }
     }
 }

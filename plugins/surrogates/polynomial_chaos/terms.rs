@@ -103,6 +103,11 @@ impl Terms {
         self.exponents.len() / self.dimension
     }
 
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.exponents.is_empty()
+    }
+
     /// The exponents of term `t`.
     pub fn term(&self, t: usize) -> &[u16] {
         &self.exponents[t * self.dimension..(t + 1) * self.dimension]

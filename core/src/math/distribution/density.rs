@@ -1,6 +1,7 @@
 //! Densities and their derivatives.
 
 use super::Distribution;
+use super::probability::ln_ratio;
 use crate::math::special::{
     HALF_LN_TWO_PI, ln_beta_density, ln_gamma, ln_gamma_density, ln_normal_between,
 };
@@ -29,7 +30,7 @@ impl Distribution {
             Self::LogNormal([mu, sigma]) => {
                 ln_standard_normal((x.ln() - mu) / sigma) - sigma.ln() - x.ln()
             }
-            Self::LogUniform([lo, hi]) => -x.ln() - (hi.ln() - lo.ln()).ln(),
+            Self::LogUniform([lo, hi]) => -x.ln() - ln_ratio(lo, hi).ln(),
             Self::Gamma([1.0, scale]) | Self::Exponential(scale) => -x / scale - scale.ln(),
             Self::Gamma(_) if x == 0.0 => f64::NEG_INFINITY,
             Self::Gamma([shape, scale]) => ln_gamma_density(shape, x / scale) - scale.ln(),

@@ -122,6 +122,12 @@ impl Distribution {
             {
                 complain("the lower bound below the upper")
             }
+            // Farther away the law is an exponential one at its bound, and its digits are lost.
+            Self::TruncatedNormal([mean, sd, lo, hi])
+                if lo - mean > 1000.0 * sd || mean - hi > 1000.0 * sd =>
+            {
+                complain("bounds at most 1000 standard deviations from the mean")
+            }
             Self::Triangular([lo, mode, hi]) if !(lo <= mode && mode <= hi && lo < hi) => {
                 complain("the mode between a lower and a higher bound")
             }

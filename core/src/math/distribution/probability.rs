@@ -28,8 +28,7 @@ impl Distribution {
             Self::Normal([mean, sd]) => normal_cdf((x - mean) / sd),
             Self::HalfNormal(scale) => libm::erf(x / scale * std::f64::consts::FRAC_1_SQRT_2),
             Self::LogNormal([mu, sigma]) => normal_cdf((x.ln() - mu) / sigma),
-            // Near the lower bound the difference keeps the digits that the ratio loses.
-            Self::LogUniform([lo, hi]) => ((x - lo) / lo).ln_1p() / (hi / lo).ln(),
+            Self::LogUniform([lo, hi]) => ln_ratio(lo, x) / ln_ratio(lo, hi),
             Self::Gamma([shape, scale]) => gamma_tails(shape, x / scale).0.exp(),
             Self::InverseGamma([shape, scale]) => gamma_tails(shape, scale / x).1.exp(),
             Self::Beta([a, b, lo, hi]) => {
@@ -38,11 +37,10 @@ impl Distribution {
             Self::Exponential(mean) => -(-x / mean).exp_m1(),
             Self::StudentT([dof, location, scale]) => student_cdf(dof, (x - location) / scale),
             Self::TruncatedNormal([mean, sd, lo, hi]) => {
-                let below = if lo.is_finite() {
-                    ln_normal_from((lo - mean) / sd, (x - lo) / sd)
-                } else {
-                    ln_normal_cdf((x - mean) / sd)
-                };
+                // Near the bound the distance from it has more digits than the number itself.
+                let (a, z, width) = ((lo - mean) / sd, (x - mean) / sd, (x - lo) / sd);
+                let below =
+                    if width < 1.0 { ln_normal_from(a, width) } else { ln_normal_between(a, z) };
                 (below - ln_normal_between((lo - mean) / sd, (hi - mean) / sd)).exp().min(1.0)
             }
             Self::Triangular([lo, mode, hi]) if x <= mode => {
@@ -73,7 +71,7 @@ impl Distribution {
             Self::Normal([mean, sd]) => mean + sd * normal_quantile(p),
             Self::HalfNormal(scale) => scale * std::f64::consts::SQRT_2 * inverse_erf(p),
             Self::LogNormal([mu, sigma]) => (mu + sigma * normal_quantile(p)).exp(),
-            Self::LogUniform([lo, hi]) => lo * (p * (hi / lo).ln()).exp(),
+            Self::LogUniform([lo, hi]) => log_uniform_quantile(lo, hi, p),
             Self::Gamma([shape, scale]) => scale * inverse_gamma_tails(shape, p, q),
             Self::InverseGamma([shape, scale]) => scale / inverse_gamma_tails(shape, q, p),
             Self::Beta([a, b, lo, hi]) => {
@@ -85,9 +83,9 @@ impl Distribution {
             Self::TruncatedNormal([mean, sd, lo, hi]) => {
                 let (a, b) = ((lo - mean) / sd, (hi - mean) / sd);
                 let z = truncated_quantile(a, b, p, q);
-                if p <= q && lo.is_finite() {
+                if p <= q && z - a < 1.0 {
                     lo + sd * offset_from_bound(a, b, z - a, p)
-                } else if p > q && hi.is_finite() {
+                } else if p > q && b - z < 1.0 {
                     hi - sd * offset_from_bound(-b, -a, b - z, q)
                 } else {
                     mean + sd * z
@@ -105,6 +103,17 @@ impl Distribution {
     pub fn sample(&self, rng: &mut impl Rng) -> f64 {
         self.quantile(uniform(rng))
     }
+}
+
+/// `ln(x / lo)`: near the lower bound the difference keeps the digits that the ratio loses.
+pub(super) fn ln_ratio(lo: f64, x: f64) -> f64 {
+    let excess = (x - lo) / lo;
+    if excess.is_finite() { excess.ln_1p() } else { x.ln() - lo.ln() }
+}
+
+fn log_uniform_quantile(lo: f64, hi: f64, p: f64) -> f64 {
+    let factor = (p * ln_ratio(lo, hi)).exp();
+    if factor.is_finite() { lo * factor } else { ((1.0 - p) * lo.ln() + p * hi.ln()).exp() }
 }
 
 fn student_cdf(dof: f64, t: f64) -> f64 {

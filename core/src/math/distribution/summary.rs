@@ -3,6 +3,7 @@
 use std::f64::consts::FRAC_2_PI;
 
 use super::Distribution;
+use super::probability::ln_ratio;
 use crate::math::special::five_point_rule;
 
 impl Distribution {
@@ -31,7 +32,7 @@ impl Distribution {
             Self::Normal([mean, _]) | Self::Exponential(mean) => mean,
             Self::HalfNormal(scale) => scale * FRAC_2_PI.sqrt(),
             Self::LogNormal([mu, sigma]) => (mu + 0.5 * sigma * sigma).exp(),
-            Self::LogUniform([lo, hi]) => lo * (hi / lo - 1.0) / (hi / lo).ln(),
+            Self::LogUniform([lo, hi]) => (hi - lo) / ln_ratio(lo, hi),
             Self::Gamma([shape, scale]) => shape * scale,
             Self::InverseGamma([shape, scale]) if shape > 1.0 => scale / (shape - 1.0),
             Self::InverseGamma(_) => f64::INFINITY,
@@ -55,8 +56,8 @@ impl Distribution {
                 (sigma * sigma).exp_m1() * (2.0 * mu + sigma * sigma).exp()
             }
             Self::LogUniform([lo, hi]) => {
-                let (r, l) = (hi / lo, (hi / lo).ln());
-                lo * lo * (0.5 * (r * r - 1.0) / l - ((r - 1.0) / l).powi(2))
+                let mean = (hi - lo) / ln_ratio(lo, hi);
+                mean * (0.5 * (hi + lo) - mean)
             }
             Self::Gamma([shape, scale]) => shape * scale * scale,
             Self::InverseGamma([shape, scale]) if shape > 2.0 => {

@@ -231,6 +231,69 @@ fn draws_follow_the_distribution_function() {
     }
 }
 
+/// Laws with numbers of all magnitudes.
+fn any_law(kind: u32, size: &mut impl FnMut() -> f64) -> Distribution {
+    let (a, b, c) = (size(), size(), size());
+    match kind {
+        0 => Distribution::Uniform([-a, b]),
+        1 => Distribution::Normal([a - b, c]),
+        2 => Distribution::HalfNormal(a),
+        3 => Distribution::LogNormal([b.ln(), a.min(20.0)]),
+        4 => Distribution::LogUniform([a, a * (1.0 + b)]),
+        5 => Distribution::Gamma([a, b]),
+        6 => Distribution::InverseGamma([a, b]),
+        7 => Distribution::Beta([a, b, -1.0, 1.0]),
+        8 => Distribution::Exponential(a),
+        9 => Distribution::StudentT([a, 0.0, b]),
+        10 => Distribution::TruncatedNormal([(b - c).clamp(-b - 99.0 * a, c + 99.0 * a), a, -b, c]),
+        _ => Distribution::Triangular([0.0, a, a + b]),
+    }
+}
+
+#[test]
+fn quantiles_grow_inside_the_support_whatever_the_numbers() {
+    let mut rng = Stream::root(11).generator();
+    let mut size = || Distribution::LogUniform([1e-4, 1e4]).sample(&mut rng);
+    for round in 0..50 {
+        for kind in 0..12 {
+            let law = any_law(kind, &mut size);
+            assert_eq!(law.check(), Ok(()), "{law}");
+            let (lo, hi) = law.support();
+            let mut last = lo;
+            for p in [1e-12, 1e-5, 0.03, 0.3, 0.5, 0.7, 0.98, 1.0 - 1e-9] {
+                let x = law.quantile(p);
+                // Neighbouring quantiles may round to one number, each to its own last digit.
+                let grows = x >= last || last - x <= 1e-13 * last.abs();
+                assert!(x >= lo && x <= hi && grows, "{round}: {law}, p {p}: {x}");
+                assert!(!law.log_density(x).is_nan() && !law.log_density_derivative(x).is_nan());
+                last = x;
+                // A step of one rounding of x must not carry more probability than is tested.
+                let (below, above) = (law.cdf(x * (1.0 - 1e-15)), law.cdf(x * (1.0 + 1e-15)));
+                let rounding = (above - below).abs();
+                let bound = 1e-9 * p + 4.0 * rounding;
+                assert!(
+                    x.is_infinite()
+                        || x == 0.0
+                        || x == lo
+                        || x == hi
+                        || (law.cdf(x) - p).abs() <= bound,
+                    "{round}: {law}, p {p}: {x}, {:e}",
+                    law.cdf(x) - p
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_log_uniform_law_spans_six_hundred_decades() {
+    let law = Distribution::LogUniform([1e-300, 1e300]);
+    for (p, expected) in [(0.25, 1e-150), (0.5, 1.0), (0.75, 1e150), (0.999, 10_f64.powf(299.4))] {
+        assert!(near(law.quantile(p), expected, 1e-10), "{p}: {:e}", law.quantile(p));
+        assert!(near(law.cdf(expected), p, 1e-12));
+    }
+}
+
 #[test]
 fn what_is_written_is_read_again() {
     for (text, _, _) in MOMENTS {
@@ -261,6 +324,10 @@ fn complaints_say_what_was_expected_and_what_was_found() {
         (
             "truncated_normal = [0, 1, 2, 2]",
             "expected the lower bound below the upper, found [0, 1, 2, 2]",
+        ),
+        (
+            "truncated_normal = [0, 1, 2000, inf]",
+            "expected bounds at most 1000 standard deviations from the mean, found [0, 1, 2000, inf]",
         ),
         ("unifrom = [0, 1]", "found `unifrom` (did you mean `uniform`?)"),
         (

@@ -29,27 +29,32 @@ pub struct Laplace {
 /// The inverse of the curvature at a maximum, from central differences of the gradient.
 ///
 /// Steps are a thousandth of the standard deviation that the curvature itself implies; at a
-/// bound they lie on one side.
+/// bound they lie on one side. A coordinate that is pressed against its bound with slope `g` counts as
+/// exponential, with variance `1 / g^2`.
 pub fn laplace(target: &dyn Target, maximum: &[f64]) -> Result<Laplace, Stop> {
     let start = Matrix::from_rows(maximum.len(), [maximum]);
     let regions = super::regions(target, &start);
-    let scales = scales(target, maximum, &regions);
+    let pressure = pressure(target, maximum);
+    let curved = scales(target, maximum, &regions);
+    let scales: Vec<f64> =
+        curved.iter().zip(&pressure).map(|(s, p)| 1.0 / (1.0 / (s * s) + p).sqrt()).collect();
     let d = maximum.len();
     let mut curvature = Matrix::zeros(d, d);
     let mut definite = true;
     for j in 0..d {
         let step = STEP * scales[j];
-        let column = if flat(target, maximum, j, scales[j], regions[j]) {
+        let column = if flat(target, maximum, j, curved[j], regions[j]) {
             None
         } else {
             slope_of_gradient(target, maximum, j, step)
         };
         if let Some(column) = column {
             (0..d).for_each(|i| curvature[(i, j)] = -column[i] * scales[i] * scales[j]);
-        } else {
+        } else if pressure[j] == 0.0 {
             definite = false;
             curvature[(j, j)] = 1.0;
         }
+        curvature[(j, j)] += pressure[j] * scales[j] * scales[j];
     }
     let symmetric = Matrix::from_fn(d, d, |i, j| 0.5 * (curvature[(i, j)] + curvature[(j, i)]));
     let eigen = symmetric_eigen(&symmetric)
@@ -63,9 +68,20 @@ pub fn laplace(target: &dyn Target, maximum: &[f64]) -> Result<Laplace, Stop> {
     Ok(Laplace { covariance: multiply_transposed(&factor, &factor), factor, definite })
 }
 
+/// The square of the gradient of each coordinate that is pressed against a bound; zero of the others.
+fn pressure(target: &dyn Target, maximum: &[f64]) -> Vec<f64> {
+    let (_, gradient) = target.gradient(maximum);
+    let pressed = |((x, g), (lo, hi)): ((&f64, &f64), (f64, f64))| {
+        if (*x <= lo && *g < 0.0) || (*x >= hi && *g > 0.0) { g * g } else { 0.0 }
+    };
+    maximum.iter().zip(&gradient).zip(target.bounds()).map(pressed).collect()
+}
+
 /// Starting points around a maximum: draws of its normal law inside the support.
 ///
-/// Draws outside the support are drawn again, nearer to the maximum after every ten tries.
+/// Draws outside the support, and draws where the density is lower than draws of a normal law ever
+/// find it (more than `10 + 4 sqrt(d / 2)` below its median in logarithms), are drawn again, nearer to the
+/// maximum after every ten tries: a walker that starts there might never find in.
 pub fn scatter(
     target: &dyn Target,
     maximum: &[f64],
@@ -75,6 +91,9 @@ pub fn scatter(
 ) -> Result<Matrix, Stop> {
     const TRIES: u32 = 400;
     let bounds = target.bounds();
+    let half = 0.5 * maximum.len() as f64;
+    let density = |x: &[f64]| target.log_density(&Matrix::from_rows(x.len(), [x]))[0];
+    let lowest = density(maximum) - half - 10.0 - 4.0 * half.sqrt();
     let mut points = Matrix::zeros(0, maximum.len());
     for index in 0..count {
         let mut rng = stream.at(index as u64).generator();
@@ -84,8 +103,7 @@ pub fn scatter(
             let offset = multiply_vector(&laplace.factor, &z);
             let point: Vec<f64> = maximum.iter().zip(offset).map(|(x, o)| x + o).collect();
             let inside = point.iter().zip(&bounds).all(|(x, (lo, hi))| x >= lo && x <= hi);
-            let row = Matrix::from_rows(point.len(), [&point]);
-            (inside && target.log_density(&row)[0].is_finite()).then_some(point)
+            (inside && density(&point) >= lowest).then_some(point)
         });
         match found {
             Some(point) => points.push_row(&point),

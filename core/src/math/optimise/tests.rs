@@ -207,7 +207,21 @@ fn walkers_are_scattered_inside_the_support() {
     let top = maximise(&target, &Matrix::from_rows(1, [[0.5]])).remove(0);
     assert!(top.point == [0.0] && top.converged && top.gradient_norm == 0.0);
     let shape = laplace(&target, &top.point).unwrap();
+    close(shape.covariance.as_slice(), &[1.0 / 400.0], 1e-9);
     let points = scatter(&target, &top.point, &shape, 100, &Stream::root(2)).unwrap();
     assert!(points.as_slice().iter().all(|x| (0.0..=1.0).contains(x)));
+    assert!(Moments::of_rows(&points).sd()[0] > 0.02);
+}
+
+#[test]
+fn no_walker_starts_far_below_the_ridge() {
+    // A thin curved ridge: draws of the normal law at its top fall hundreds of nats beside it.
+    let target = density(&[FREE, FREE], |x: &[f64]| {
+        let b = x[1] - x[0] * x[0];
+        (-0.5 * x[0] * x[0] - 5e3 * b * b, vec![-x[0] + 2e4 * b * x[0], -1e4 * b])
+    });
+    let shape = laplace(&target, &[0.0, 0.0]).unwrap();
+    let points = scatter(&target, &[0.0, 0.0], &shape, 200, &Stream::root(3)).unwrap();
+    assert!(target.log_density(&points).iter().all(|l| *l > -15.1));
     assert!(Moments::of_rows(&points).sd()[0] > 0.1);
 }

@@ -73,7 +73,7 @@ fn lower_inverse(a: f64, b: f64, p: f64, q: f64) -> f64 {
     let (ln_p, ln_q) = (p.ln(), q.ln());
     let ln_beta = |a: f64, b: f64| libm::lgamma(a) + libm::lgamma(b) - libm::lgamma(a + b);
     let start = (ln_p + a.ln() + ln_beta(a, b)) / a;
-    let u = increasing_zero(-745.0, -std::f64::consts::LN_2, start, |u| {
+    let u = increasing_zero(-700.0, -std::f64::consts::LN_2, start, |u| {
         let x = u.exp();
         let (lower, upper) = beta_tails(a, b, x, 1.0 - x);
         let ln_slope = ln_beta_density(a, b, x, 1.0 - x) + u;
@@ -83,5 +83,5 @@ fn lower_inverse(a: f64, b: f64, p: f64, q: f64) -> f64 {
             (ln_q - upper, (ln_slope - upper).exp())
         }
     });
-    if u <= -744.0 { 0.0 } else { u.exp() }
+    if u <= -699.0 { 0.0 } else { u.exp() }
 }

@@ -34,12 +34,13 @@ pub fn five_point_rule() -> [(f64, f64); 5] {
     [(-far, light), (-near, heavy), (0.0, 128.0 / 225.0), (near, heavy), (far, light)]
 }
 
-/// The zero of an increasing function on an interval: Newton's steps, halving when they leave the
-/// bracket. `f` returns its value and slope; the bound nearest to the zero when there is none.
+/// The zero of an increasing difference of logarithms on an interval: Newton's steps, halving when
+/// they leave the bracket. `f` returns its value and slope; the bound nearest to the zero when
+/// there is none.
 fn increasing_zero(lo: f64, hi: f64, start: f64, f: impl Fn(f64) -> (f64, f64)) -> f64 {
     let (mut lo, mut hi) = (lo, hi);
     let mut x = start.clamp(lo, hi);
-    for _ in 0..400 {
+    for step in 1..=400 {
         let (value, slope) = f(x);
         if value == 0.0 {
             return x;
@@ -50,11 +51,15 @@ fn increasing_zero(lo: f64, hi: f64, start: f64, f: impl Fn(f64) -> (f64, f64)) 
             hi = x;
         }
         let newton = x - value / slope;
-        let next = if newton > lo && newton < hi { newton } else { 0.5 * (lo + hi) };
-        if (next - x).abs() <= 2.0 * f64::EPSILON * x.abs() || hi - lo <= f64::EPSILON * x.abs() {
-            return next;
+        // Far from the zero the slope may be all rounding error: a short step proves nothing there,
+        // and every fourth step halves the bracket.
+        let near = value.abs() < 1e-6;
+        let short = (newton - x).abs() <= 2.0 * f64::EPSILON * x.abs();
+        if short && near || hi - lo <= f64::EPSILON * x.abs() {
+            return x;
         }
-        x = next;
+        let inside = newton > lo && newton < hi && !short && (near || step % 4 != 0);
+        x = if inside { newton } else { 0.5 * (lo + hi) };
     }
     x
 }

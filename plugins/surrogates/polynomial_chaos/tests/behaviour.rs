@@ -82,6 +82,22 @@ fn low_degrees_that_explain_nothing_do_not_end_the_search() {
 }
 
 #[test]
+fn basis_functions_that_repeat_others_on_the_runs_are_passed_over() {
+    let mut unit = latin_hypercube(60, 3, 2);
+    for i in 0..60 {
+        let row = unit.row_mut(i);
+        (row[1], row[2]) = (row[0], 0.3);
+    }
+    let points = scaled(&unit, &BOX);
+    let responses = Matrix::from_fn(60, 1, |i, _| (4.0 * unit[(i, 0)]).sin());
+    let fit = fitted(&up_to(1, 8), &BOX, &points, &responses).unwrap();
+    assert!(fit.fit_error().relative[0] < 1e-8 && fit.summary().terms[0] < 12);
+    let same = Matrix::from_fn(60, 3, |_, j| points[(0, j)]);
+    let stop = fitted(&up_to(1, 8), &BOX, &same, &responses).unwrap_err();
+    assert!(stop.message.starts_with("the responses vary over the runs, but no basis function"));
+}
+
+#[test]
 fn the_number_of_threads_changes_no_bit() {
     let (points, responses) = waves(70, 12);
     let fit = |threads| {

@@ -1,5 +1,7 @@
 //! The options as a study writes them.
 
+use lacuna::math::distribution::Distribution;
+
 use super::bench::{of_degree, parameters, up_to};
 use crate::surrogates::polynomial_chaos::{Degree, DegreeRange, PolynomialChaos, Solver};
 
@@ -44,4 +46,16 @@ fn options_that_cannot_work_are_named() {
     assert_eq!(keys(&dense, Some(165)), ["degree"]);
     assert!(keys(&dense, Some(166)).is_empty() && keys(&dense, None).is_empty());
     assert_eq!(PolynomialChaos::default().faults(&[], None)[0].key, "use");
+}
+
+#[test]
+fn a_design_that_is_not_uniform_is_refused_by_the_parameters_name() {
+    let mut parameters = parameters(&[[0.0, 1.0]; 3]);
+    parameters[1].design = Distribution::Normal([0.0, 1.0]);
+    let faults = PolynomialChaos::default().faults(&parameters, Some(100));
+    assert_eq!((faults.len(), faults[0].key), (1, "basis"));
+    assert_eq!(
+        faults[0].message,
+        "basis `legendre` needs a uniform design, but that of parameter `x2` is `normal`"
+    );
 }

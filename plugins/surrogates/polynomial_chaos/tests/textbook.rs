@@ -1,11 +1,13 @@
 //! The same figures by slow, independent textbook code: explicit inverses, the explicit hat matrix,
 //! runs really left out, and the equiangular vector of Efron et al. (2004), section 2, literally.
 
-use lacuna::linalg::Matrix;
+use lacuna::linalg::{Matrix, multiply_vector};
+use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::Emulator;
 use lacuna::plugin::surrogate::Linear;
 
 use super::bench::{fitted, latin_hypercube, of_degree, scaled};
+use crate::surrogates::polynomial_chaos::least_angle::{Dictionary, best_along_path};
 use crate::surrogates::polynomial_chaos::{EarlyStop, Expansion, PolynomialChaos, Solver};
 
 type Rows = Vec<Vec<f64>>;
@@ -236,5 +238,29 @@ fn the_chosen_terms_are_the_best_along_the_explicit_path() {
         chosen.sort();
         assert_eq!(chosen, expected, "output {o}");
         close(expansion.fit_error().relative[o] / error(&best), 1.0, 1.0);
+    }
+}
+
+#[test]
+fn terms_enter_in_the_order_of_the_explicit_path_when_there_are_more_terms_than_runs() {
+    let unit = latin_hypercube(150, 3, 9);
+    let exponents: Vec<Vec<u16>> = (0..11_u16)
+        .flat_map(|p| (0..=p).flat_map(move |j| (0..=j).map(move |k| vec![p - j, j - k, k])))
+        .collect();
+    let psi = basis(&exponents, &unit);
+    let dictionary = Dictionary::new(&Matrix::from_rows(exponents.len(), &psi));
+    for seed in 0..3 {
+        // A dense sum of all terms, so that many enter before the best fit.
+        let mut rng = Stream::root(seed).generator();
+        let size = |e: &Vec<u16>| (-0.8 * f64::from(e.iter().sum::<u16>())).exp();
+        let weights: Vec<f64> = exponents.iter().map(|e| size(e) * normal(&mut rng)).collect();
+        let y: Vec<f64> =
+            psi.iter().map(|row| row.iter().zip(&weights).map(|(p, w)| p * w).sum()).collect();
+        let mean = y.iter().sum::<f64>() / 150.0;
+        let centred: Vec<f64> = y.iter().map(|v| v - mean).collect();
+        let correlations = multiply_vector(dictionary.columns(), &centred);
+        let choice = best_along_path(&dictionary, &centred, &correlations, usize::MAX).unwrap();
+        assert!(choice.terms.len() > 25, "only {} terms", choice.terms.len());
+        assert_eq!(choice.terms, slow_path(&psi, &y, choice.terms.len()), "seed {seed}");
     }
 }

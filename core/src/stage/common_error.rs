@@ -1,0 +1,66 @@
+//! Errors that all replicates share, as they enter the covariance of the mean curve.
+
+use crate::data::Measurements;
+use crate::linalg::Matrix;
+use crate::plugin::discrepancy::CommonError;
+
+/// The error of the replicates' mean curve, from the replicates themselves; `None` below three replicates.
+///
+/// Points of one replicate share its gain and its timing, so that the mean over R replicates is not as exact
+/// as that of independent points. The sample covariance of the mean curve is `sum_r d_r d_r' / (R (R - 1))` with
+/// the deviations `d_r` of the replicates from their mean; where a value has fewer replicates, its own
+/// number stands for R. Its part that is white noise is counted again in at most R - 1 directions
+/// of all outputs, which costs next to no information.
+pub fn of_replicates(data: &Measurements) -> Option<CommonError> {
+    let summaries = data.summaries();
+    let used: Vec<_> =
+        data.replicates.iter().filter(|r| r.values.iter().any(Option::is_some)).collect();
+    if used.len() < 3 {
+        return None;
+    }
+    let factor = Matrix::from_fn(data.layout.len(), used.len(), |i, r| {
+        let (count, mean) = (summaries[i].count as f64, summaries[i].mean);
+        match used[r].values[i] {
+            Some(y) if summaries[i].count >= 2 => (y - mean) / (count * (count - 1.0)).sqrt(),
+            _ => 0.0,
+        }
+    });
+    Some(CommonError { origin: "replicates".to_owned(), factor, predictive: false })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::{Axis, Layout, Replicate, Scenario, Unit};
+    use crate::math::random::{Stream, normal};
+
+    /// Curves that differ by a gain of standard deviation 0.1 about a mean curve: the covariance of
+    /// the mean of R is that of the gain over R along the mean curve. The mean square of R - 1 degrees of
+    /// freedom has the relative standard deviation sqrt(2 / (R - 1)).
+    #[test]
+    fn a_common_gain_is_found_along_the_mean_curve() {
+        let grid: Vec<f64> = (1..=30).map(f64::from).collect();
+        let curve: Vec<f64> = grid.iter().map(|t| (0.2 * t).sin()).collect();
+        let count = 200;
+        let replicate = |r: usize| {
+            let gain = 1.0 + 0.1 * normal(&mut Stream::root(3).at(r as u64).generator());
+            let values = curve.iter().map(|y| Some(gain * y)).collect();
+            Replicate { name: r.to_string(), scenario: Scenario::default(), values }
+        };
+        let unit = Unit::dimensionless();
+        let axes = vec![Axis::grid("time", grid.clone(), unit.clone())];
+        let layout = Layout { name: "y".into(), unit, axes };
+        let data = Measurements { layout, replicates: (0..count).map(replicate).collect() };
+        let factor = of_replicates(&data).unwrap().factor;
+        let norm: f64 = curve.iter().map(|y| y * y).sum();
+        let along: f64 = (0..count)
+            .map(|r| {
+                let product: f64 = curve.iter().enumerate().map(|(i, y)| y * factor[(i, r)]).sum();
+                (product / norm).powi(2)
+            })
+            .sum();
+        let expected = 0.01 / count as f64;
+        let bound = 4.0 * expected * (2.0 / (count as f64 - 1.0)).sqrt();
+        assert!((along - expected).abs() < bound, "{along} {expected}");
+    }
+}

@@ -1,0 +1,303 @@
+//! Which term enters the path next.
+//!
+//! All candidates matter, but most are far from entering. Between two looks at all of them their
+//! correlations would fall at known rates if the direction stayed; each term that enters turns it by a
+//! known length `t` along one new orthonormal vector, and because columns have length one no
+//! correlation can leave its straight line by more than `drift = sqrt(sum_i (t_i d_i)^2)`, where `d_i` is
+//! the distance since term `i` entered. So only candidates near the level are followed at each
+//! step; the others are looked at again before the drift could have brought one of them there. This is
+//! a bound, not a guess: the path is the same.
+
+use lacuna::linalg::{Matrix, vector};
+
+/// The near candidates are those that could arrive within about so many steps.
+const HORIZON: f64 = 8.0;
+/// Round-off that the bound must allow for, relative to the level.
+const SLACK: f64 = 1e-9;
+
+/// Where the path goes: along `sum_i weights[i] * column(active[i])`.
+pub(super) struct Direction<'a> {
+    pub active: &'a [usize],
+    pub weights: &'a [f64],
+    /// The common size of the active correlations, which falls at the rate 1.
+    pub level: f64,
+}
+
+/// A candidate that reaches the level.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Arrival {
+    pub term: usize,
+    /// How far along the direction.
+    pub distance: f64,
+    /// Its correlation there.
+    pub correlation: f64,
+}
+
+/// The candidates and their correlations with the residual.
+pub(super) struct Candidates<'a> {
+    gram: &'a Matrix,
+    /// Zero for candidates, infinity for the active and the dependent.
+    closed: Vec<f64>,
+    /// All correlations where they were last looked at together, and how fast they fell there.
+    correlations: Vec<f64>,
+    rates: Vec<f64>,
+    /// Scratch of their size.
+    scratch: Vec<f64>,
+    since: Since,
+    pace: Pace,
+    near: Near,
+}
+
+/// What happened since all candidates were last looked at.
+#[derive(Default)]
+struct Since {
+    /// How the fit has changed, by active term.
+    shifts: Vec<f64>,
+    /// How far the level has fallen.
+    fallen: f64,
+    /// The turns: their lengths and where the level was, as `fallen`.
+    turns: Vec<(f64, f64)>,
+    /// The least distance of a far candidate from the level, on its straight line up to `horizon`.
+    clearance: f64,
+    horizon: f64,
+}
+
+/// What a step was like lately: running means.
+#[derive(Default)]
+struct Pace {
+    distance: f64,
+    turn: f64,
+}
+
+/// The candidates near the level, densely packed.
+#[derive(Default)]
+struct Near {
+    terms: Vec<usize>,
+    closed: Vec<f64>,
+    correlations: Vec<f64>,
+    rates: Vec<f64>,
+    scratch: Vec<f64>,
+    /// The entries of the Gram matrix, `active x near`.
+    gram: Matrix,
+    /// `0, 1, 2, ...`: all rows of `gram`.
+    rows: Vec<usize>,
+}
+
+impl<'a> Candidates<'a> {
+    /// All candidates at the start of the path; `open` says which columns may enter at all.
+    pub fn new(gram: &'a Matrix, correlations: &[f64], open: impl Iterator<Item = bool>) -> Self {
+        let n = correlations.len();
+        Self {
+            gram,
+            closed: open.map(|open| if open { 0.0 } else { f64::INFINITY }).collect(),
+            correlations: correlations.to_vec(),
+            rates: vec![0.0; n],
+            scratch: vec![0.0; n],
+            since: Since::default(),
+            pace: Pace::default(),
+            near: Near::default(),
+        }
+    }
+
+    /// The candidate of largest correlation at the start of the path.
+    pub fn strongest(&self) -> Option<Arrival> {
+        let mut best: Option<Arrival> = None;
+        for (term, (&correlation, closed)) in self.correlations.iter().zip(&self.closed).enumerate()
+        {
+            let least = best.map_or(0.0, |b| b.correlation.abs());
+            if *closed == 0.0 && correlation.abs() > least {
+                best = Some(Arrival { term, distance: 0.0, correlation });
+            }
+        }
+        best
+    }
+
+    /// Moves until the level meets a candidate; none when the level falls to zero before.
+    pub fn advance(&mut self, direction: &Direction<'_>) -> Option<Arrival> {
+        if !self.near.terms.is_empty() {
+            let (first, distance) = self.near.first(direction.level);
+            if self.since.is_safe(distance, direction.level) {
+                return self.advance_near(direction, first?, distance);
+            }
+        }
+        self.look_at_all(direction);
+        self.choose_near(direction);
+        if !self.near.terms.is_empty() {
+            let (first, distance) = self.near.first(direction.level);
+            if self.since.is_safe(distance, direction.level) {
+                return self.advance_near(direction, first?, distance);
+            }
+            self.near.clear();
+        }
+        self.advance_all(direction)
+    }
+
+    /// Moves all candidates.
+    fn advance_all(&mut self, direction: &Direction<'_>) -> Option<Arrival> {
+        let level = direction.level;
+        let (correlations, rates) = (&self.correlations, &self.rates);
+        let (term, distance) =
+            first_arrival(level, correlations, rates, &self.closed, &mut self.scratch)
+                .filter(|(_, distance)| *distance < level)?;
+        self.pace.took(distance);
+        vector::add_scaled(&mut self.correlations, -distance, &self.rates);
+        Some(Arrival { term, distance, correlation: self.correlations[term] })
+    }
+
+    fn advance_near(
+        &mut self,
+        direction: &Direction<'_>,
+        i: usize,
+        distance: f64,
+    ) -> Option<Arrival> {
+        if distance >= direction.level {
+            return None;
+        }
+        let near = &mut self.near;
+        vector::add_scaled(&mut near.correlations, -distance, &near.rates);
+        self.since.shifts.resize(direction.active.len(), 0.0);
+        vector::add_scaled(&mut self.since.shifts, distance, direction.weights);
+        self.since.fallen += distance;
+        self.pace.took(distance);
+        Some(Arrival { term: near.terms[i], distance, correlation: near.correlations[i] })
+    }
+
+    /// Brings all correlations and rates to where the path is.
+    fn look_at_all(&mut self, direction: &Direction<'_>) {
+        let Direction { active, weights, .. } = *direction;
+        let Self { gram, rates, scratch, since, .. } = self;
+        if since.fallen > 0.0 {
+            since.shifts.resize(active.len(), 0.0);
+            vector::combine_rows_twice(gram, active, [weights, &since.shifts], [rates, scratch]);
+            vector::add_scaled(&mut self.correlations, -1.0, scratch);
+        } else {
+            vector::combine_rows(gram, active, weights, rates);
+        }
+        self.since = Since::default();
+    }
+
+    /// Packs the candidates that could arrive soon; none at all where most of them could.
+    fn choose_near(&mut self, direction: &Direction<'_>) {
+        let level = direction.level;
+        let horizon = (HORIZON * self.pace.distance).min(level);
+        // The drift after so many steps of the usual length with turns of the usual length.
+        let margin = self.pace.turn * self.pace.distance * (HORIZON.powi(3) / 3.0).sqrt();
+        self.near.clear();
+        let mut clearance = f64::INFINITY;
+        let candidates = self.correlations.iter().zip(&self.rates).zip(&self.closed);
+        for (term, ((c, rate), closed)) in candidates.enumerate() {
+            // The distance from the level is concave along the line: least at one of the ends.
+            let least =
+                (level - c.abs()).min(level - horizon - (c - horizon * rate).abs()) + closed;
+            if least < margin {
+                self.near.terms.push(term);
+            } else if least < clearance {
+                clearance = least;
+            }
+        }
+        if 2 * self.near.terms.len() > self.correlations.len() {
+            self.near.clear();
+            return;
+        }
+        self.since = Since { clearance, horizon, ..Since::default() };
+        self.near.pack(direction.active, self.gram, &self.correlations, &self.rates);
+    }
+
+    /// Takes a term out of the candidates.
+    pub fn close(&mut self, term: usize) {
+        self.closed[term] = f64::INFINITY;
+        if let Ok(i) = self.near.terms.binary_search(&term) {
+            self.near.closed[i] = f64::INFINITY;
+        }
+    }
+
+    /// A term became active: the direction has new weights and turned by this length.
+    pub fn turn(&mut self, entered: usize, weights: &[f64], length: f64) {
+        self.pace.turned(length.abs());
+        if self.near.terms.is_empty() {
+            return;
+        }
+        self.since.turns.push((length, self.since.fallen));
+        self.near.push(self.gram.row(entered));
+        let Near { gram, rows, rates, .. } = &mut self.near;
+        vector::combine_rows(gram, rows, weights, rates);
+    }
+}
+
+impl Since {
+    /// Whether no far candidate can arrive before the level has fallen by `distance` more.
+    fn is_safe(&self, distance: f64, level: f64) -> bool {
+        let end = self.fallen + distance;
+        let squares: f64 =
+            self.turns.iter().map(|(length, at)| (length * (end - at)).powi(2)).sum();
+        end <= self.horizon && squares.sqrt() + SLACK * level < self.clearance
+    }
+}
+
+impl Pace {
+    fn took(&mut self, distance: f64) {
+        self.distance += 0.25 * (distance - self.distance);
+    }
+
+    fn turned(&mut self, length: f64) {
+        self.turn += 0.25 * (length - self.turn);
+    }
+}
+
+impl Near {
+    fn clear(&mut self) {
+        self.terms.clear();
+        self.closed.clear();
+        self.correlations.clear();
+        self.rates.clear();
+        self.scratch.clear();
+        self.rows.clear();
+    }
+
+    /// Copies what belongs to the chosen terms.
+    fn pack(&mut self, active: &[usize], gram: &Matrix, correlations: &[f64], rates: &[f64]) {
+        self.correlations.extend(self.terms.iter().map(|&t| correlations[t]));
+        self.rates.extend(self.terms.iter().map(|&t| rates[t]));
+        self.closed.resize(self.terms.len(), 0.0);
+        self.scratch.resize(self.terms.len(), 0.0);
+        self.gram.clear(self.terms.len());
+        for &t in active {
+            self.push(gram.row(t));
+        }
+    }
+
+    /// The first to arrive and its distance; the level itself when none does.
+    fn first(&mut self, level: f64) -> (Option<usize>, f64) {
+        let Self { correlations, rates, closed, scratch, .. } = self;
+        let first = first_arrival(level, correlations, rates, closed, scratch);
+        (first.map(|(i, _)| i), first.map_or(level, |(_, distance)| distance.min(level)))
+    }
+
+    /// Adds the row of one active term, of which the near columns are kept.
+    fn push(&mut self, gram: &[f64]) {
+        self.rows.push(self.rows.len());
+        self.gram.extend_row(self.terms.iter().map(|&t| gram[t]));
+    }
+}
+
+/// The candidate that the falling level meets first, by its position, and how far that is.
+fn first_arrival(
+    level: f64,
+    correlations: &[f64],
+    rates: &[f64],
+    closed: &[f64],
+    arrivals: &mut [f64],
+) -> Option<(usize, f64)> {
+    // Where the level does not gain on a candidate they never meet. A candidate that stands at the
+    // level, but for round-off, meets it at once.
+    let meet = |gap: f64, gain: f64| if gain > 1e-12 { gap.max(0.0) / gain } else { f64::INFINITY };
+    let candidates = correlations.iter().zip(rates).zip(closed);
+    for (arrival, ((c, rate), closed)) in arrivals.iter_mut().zip(candidates) {
+        let up = meet(level - c, 1.0 - rate);
+        let down = meet(level + c, 1.0 + rate);
+        *arrival = closed + if up < down { up } else { down };
+    }
+    let least = arrivals.iter().fold(f64::INFINITY, |least, &a| if a < least { a } else { least });
+    let first = arrivals.iter().position(|&a| a == least)?;
+    least.is_finite().then_some((first, least))
+}
