@@ -72,7 +72,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                     Some((_, _, sd)) => sd * normal(&mut own),
                     None => 1e6 * gain * at(&truth[row], time - shift) + noise * normal(&mut own),
                 };
-                writeln!(text, "{pulse},{gauge},{:.5},{strain:.2}", time)?;
+                writeln!(text, "{pulse},{gauge},{time:.5},{strain:.2}")?;
             }
         }
     }

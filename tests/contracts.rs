@@ -31,10 +31,7 @@ struct Case<'a> {
 }
 
 /// Puts every plugin of a kind through its suite.
-fn all<K: Kind + ?Sized>(
-    table: &Table,
-    suite: impl Fn(&Case<'_>, &K) -> Result<(), Vec<String>>,
-) {
+fn all<K: Kind + ?Sized>(table: &Table, suite: impl Fn(&Case<'_>, &K) -> Result<(), Vec<String>>) {
     let registered: Vec<&str> = registry::entries::<K>().iter().map(|entry| entry.name).collect();
     let tested: Vec<&str> = table.iter().map(|(name, _)| *name).collect();
     assert_eq!(tested, registered, "the plugins of kind {} that are tested here", K::NAME);
@@ -107,8 +104,19 @@ fn discrepancies() {
 
 #[test]
 fn samplers() {
-    let table: &Table =
-        &[("affine_invariant_ensemble", &["walkers = 40", "walkers = 20\nupdate = \"sequential\"", "walkers = 20\nsteps=4000\nupdate = \"sequential\"", "walkers = 20\nsteps=4000", "walkers = 20\nsteps=2000", "walkers = 20\nsteps=2000\nupdate = \"sequential\"", "walkers = 40\nsteps=4000\nupdate = \"sequential\"", "walkers = 40\nupdate = \"sequential\""])];
+    let table: &Table = &[(
+        "affine_invariant_ensemble",
+        &[
+            "walkers = 40",
+            "walkers = 20\nupdate = \"sequential\"",
+            "walkers = 20\nsteps=4000\nupdate = \"sequential\"",
+            "walkers = 20\nsteps=4000",
+            "walkers = 20\nsteps=2000",
+            "walkers = 20\nsteps=2000\nupdate = \"sequential\"",
+            "walkers = 40\nsteps=4000\nupdate = \"sequential\"",
+            "walkers = 40\nupdate = \"sequential\"",
+        ],
+    )];
     all::<dyn Sampler>(table, |case, plugin| contract::sampler(&case.label, plugin));
 }
 

@@ -152,12 +152,8 @@ fn by_hand([a, b, gain, log_variance]: [f64; 4]) -> f64 {
     prior + likelihood + log_variance
 }
 
-const POINTS: [[f64; 4]; 4] = [
-    [1.0, 1.0, 1.0, -2.0],
-    [0.4, 1.3, 0.93, -4.0],
-    [-1.5, 0.2, 1.2, 0.3],
-    [2.9, 1.9, 0.7, -1.0],
-];
+const POINTS: [[f64; 4]; 4] =
+    [[1.0, 1.0, 1.0, -2.0], [0.4, 1.3, 0.93, -4.0], [-1.5, 0.2, 1.2, 0.3], [2.9, 1.9, 0.7, -1.0]];
 
 #[test]
 fn the_posterior_with_an_effect_is_the_one_computed_by_hand() {

@@ -53,7 +53,7 @@ impl Manual {
             let mut meaning = vec![one_line(&option.text)];
             match self.options[..i].iter().find(|earlier| same_choices(earlier, option)) {
                 Some(earlier) => {
-                    meaning.push(format!("The choices are those of `{}`.", earlier.key))
+                    meaning.push(format!("The choices are those of `{}`.", earlier.key));
                 }
                 None => meaning.extend(option.choices.iter().map(Choice::markdown)),
             }
