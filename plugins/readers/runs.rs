@@ -153,8 +153,8 @@ fn failure(sheet: &Sheet, record: &Record) -> Result<Option<String>, ReadError> 
     Ok(Some(if reason.is_empty() { "failed".to_owned() } else { reason.to_owned() }))
 }
 
-/// Puts the responses of runs together. Runs that the table calls failed are listed as such; runs
-/// whose response cannot be read are listed and left out if there are no more than allowed.
+/// Puts the responses of runs together. Runs that the table calls failed, and runs whose response
+/// cannot be read, are listed and left out if there are no more than allowed.
 pub fn ensemble(
     source: &EnsembleSource<'_>,
     table: &Path,
@@ -162,40 +162,24 @@ pub fn ensemble(
     allow_failed: AllowFailed,
     response: impl Fn(&Run) -> Result<Vec<f64>, ReadError> + Sync,
 ) -> Result<Ensemble, ReadError> {
-    let outcomes: Vec<Result<Vec<f64>, ReadError>> = runs
+    let outcomes: Vec<Result<Vec<f64>, String>> = runs
         .par_iter()
-        .map(|run| if run.failure.is_some() { Ok(Vec::new()) } else { response(run) })
+        .map(|run| match &run.failure {
+            Some(reason) => Err(reason.clone()),
+            None => response(run).map_err(|error| error.to_string()),
+        })
         .collect();
     let mut failed = Vec::new();
-    let mut unreadable = Vec::new();
     let mut kept: Vec<(&Run, Vec<f64>)> = Vec::new();
     for (run, outcome) in runs.iter().zip(outcomes) {
-        let reason = match (&run.failure, outcome) {
-            (Some(reason), _) => reason.clone(),
-            (None, Err(error)) => {
-                unreadable.push(format!("\n  `{}`: {error}", run.name));
-                error.to_string()
-            }
-            (None, Ok(values)) => {
-                kept.push((run, values));
-                continue;
-            }
-        };
-        failed.push(FailedRun { run: run.name.clone(), reason });
+        match outcome {
+            Ok(values) => kept.push((run, values)),
+            Err(reason) => failed.push(FailedRun { run: run.name.clone(), reason }),
+        }
     }
     let allowed = allow_failed.of(runs.len());
-    if unreadable.len() > allowed || kept.is_empty() {
-        let count = unreadable.len();
-        let more = count.saturating_sub(NAMED);
-        unreadable.truncate(NAMED);
-        let rest = if more > 0 { format!("\n  and {more} more") } else { String::new() };
-        let text = format!(
-            "{count} of {} runs cannot be used, {allowed} may fail:{}{rest}",
-            runs.len(),
-            unreadable.concat()
-        );
-        return Err(ReadError::new(table, text)
-            .help("`allow_failed` says how many runs may be left out, as a count or a fraction"));
+    if failed.len() > allowed || kept.is_empty() {
+        return Err(too_many(table, &failed, runs.len(), allowed));
     }
     Ok(Ensemble {
         parameters: source.parameters.iter().map(|p| p.name.clone()).collect(),
@@ -207,6 +191,17 @@ pub fn ensemble(
         valid: kept.iter().map(|(run, _)| run.valid).collect(),
         failed,
     })
+}
+
+fn too_many(table: &Path, failed: &[FailedRun], runs: usize, allowed: usize) -> ReadError {
+    let count = failed.len();
+    let named: String =
+        failed.iter().take(NAMED).map(|f| format!("\n  `{}`: {}", f.run, f.reason)).collect();
+    let more = count.saturating_sub(NAMED);
+    let rest = if more > 0 { format!("\n  and {more} more") } else { String::new() };
+    let text = format!("{count} of {runs} runs cannot be used, {allowed} may fail:{named}{rest}");
+    ReadError::new(table, text)
+        .help("`allow_failed` says how many runs may be left out, as a count or a fraction")
 }
 
 /// First complaint about a response that is not finite.

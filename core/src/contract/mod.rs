@@ -2,6 +2,24 @@
 //!
 //! A suite gives every breach it finds in words; it never panics.
 
+mod design;
+mod discrepancy;
+mod effect;
+mod executor;
+mod judge;
+mod model;
+mod reader;
 mod sampler;
+mod surrogate;
 
+pub use design::design;
+pub use discrepancy::discrepancy;
+pub use effect::effect;
+pub use executor::executor;
+pub use model::model;
+pub use reader::{Sample, reader};
 pub use sampler::sampler;
+pub use surrogate::surrogate;
+
+#[cfg(test)]
+mod tests;

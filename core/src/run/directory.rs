@@ -113,14 +113,19 @@ impl RunDirectory {
         let inputs = hash_of(stage, inputs)?;
         let folder = self.stage_folder(stage);
         self.bring_folder(stage, &inputs)?;
-        if let Some(record) = finished(&folder, &inputs) {
-            if let Ok(value) = T::load(&folder) {
-                return Ok(self.kept(record, value, false));
-            }
-            observer.warn(&format!(
-                "the files in {} do not read back; making them again",
-                folder.display()
-            ));
+        match finished(&folder, &inputs) {
+            Finished::Whole(record) => match T::load(&folder) {
+                Ok(value) => return Ok(self.kept(record, value, false)),
+                Err(_) => observer.warn(&format!(
+                    "the files in {} do not read back; making them again",
+                    folder.display()
+                )),
+            },
+            Finished::Changed(file) => observer.warn(&format!(
+                "{} is missing or not as it was written; making it again",
+                folder.join(file).display()
+            )),
+            Finished::No => {}
         }
         let begun = Instant::now();
         let value = make(&folder)?;
@@ -142,8 +147,8 @@ impl RunDirectory {
     pub fn has(&self, stage: &str, inputs: &impl Serialize) -> Result<bool, Stop> {
         let inputs = hash_of(stage, inputs)?;
         let folder = self.stage_folder(stage);
-        Ok(finished(&folder, &inputs).is_some()
-            || finished(&self.aside(stage, &inputs), &inputs).is_some())
+        let aside = self.aside(stage, &inputs);
+        Ok([folder, aside].iter().any(|f| matches!(finished(f, &inputs), Finished::Whole(_))))
     }
 
     /// Takes back the mark that a stage is finished, so that [`RunDirectory::keep`] goes on with it.
@@ -198,13 +203,28 @@ fn move_folder(from: &Path, to: &Path) -> Result<(), Stop> {
     result.map_err(|error| files::cannot_write(to, &error))
 }
 
-/// The record of a stage that is finished for these inputs with its files unchanged.
-fn finished(folder: &Path, inputs: &str) -> Option<Record> {
-    let record: Record = files::read_json(&folder.join(RECORD)).ok()?;
-    let whole = |(name, hash): (&String, &String)| {
-        files::hash_file(&folder.join(name)).is_ok_and(|found| &found == hash)
+/// Whether a folder holds a finished stage.
+enum Finished {
+    /// It does, and its files are as they were written.
+    Whole(Record),
+    /// It did: this file is missing or another one.
+    Changed(String),
+    /// It does not, or for other inputs.
+    No,
+}
+
+fn finished(folder: &Path, inputs: &str) -> Finished {
+    let record = files::read_json::<Record>(&folder.join(RECORD)).ok();
+    let Some(record) = record.filter(|record| record.inputs == inputs) else {
+        return Finished::No;
     };
-    (record.inputs == inputs && record.outputs.iter().all(whole)).then_some(record)
+    let changed = |(name, hash): &(&String, &String)| {
+        !files::hash_file(&folder.join(name)).is_ok_and(|found| &found == *hash)
+    };
+    match record.outputs.iter().find(changed) {
+        Some((name, _)) => Finished::Changed(name.clone()),
+        None => Finished::Whole(record),
+    }
 }
 
 /// The time that interrupted attempts took, which a stage with checkpoints notes in `seconds`.

@@ -233,21 +233,23 @@ fn calibrate(
         .map(|m| (posterior.natural(&m.point), m.value))
         .collect();
     let burn_in = (section.common.burn_in.get() * plan.steps as f64).floor() as usize;
-    let kept = sampled.draws.after_burn_in(section.common.burn_in.get());
+    let best_draw = best_draw(posterior, &sampled);
+    let draws = natural(posterior, sampled.draws);
+    let kept = draws.after_burn_in(section.common.burn_in.get());
     let diagnosis = Diagnosis::of(&kept, plan.ensemble);
     let outcome = Outcome {
         coordinates,
         map: posterior.natural(&best.point),
         map_log_density: best.value,
         other_maxima,
-        best_draw: best_draw(posterior, &sampled),
+        best_draw,
         burn_in,
         acceptance: sampled.acceptance,
         diagnosis,
         evaluations: sampled.evaluations,
         facts: section.built.plugin.facts(),
     };
-    Ok(Calibrated { draws: natural(posterior, sampled.draws), outcome })
+    Ok(Calibrated { draws, outcome })
 }
 
 fn coordinates(study: &Study, posterior: &Posterior<'_>) -> Vec<Coordinate> {

@@ -218,12 +218,12 @@ fn warnings(
     let mut warnings = Vec::new();
     if let Some(c) = calibration {
         if !c.converged {
-            warnings.push(format!("The sampler has not converged: {}.", c.verdict));
+            warnings.push(format!("the sampler has not converged: {}", c.verdict));
         }
         if !c.stranded.is_empty() {
             let list: Vec<String> = c.stranded.iter().map(ToString::to_string).collect();
             warnings.push(format!(
-                "{} of {} walkers are stranded far below the bulk of the density: {}.",
+                "{} of {} walkers are stranded far below the bulk of the density: {}",
                 c.stranded.len(),
                 c.chains,
                 list.join(", ")
@@ -232,13 +232,13 @@ fn warnings(
     }
     if !data.ensemble.failed.is_empty() {
         let count = data.ensemble.failed.len();
-        warnings.push(format!("{count} simulation runs have no usable response and are left out."));
+        warnings.push(format!("{count} simulation runs have no usable response and are left out"));
     }
     if let Some(others) = all.calibrated.map(|c| c.value.outcome.other_maxima.len())
         && others > 0
     {
         warnings.push(format!(
-            "The posterior has {others} further local maxima within ten of the best log density."
+            "the posterior has {others} further local maxima within ten of the best log density"
         ));
     }
     warnings.extend(all.validated.iter().flat_map(|v| v.value.failed.clone()));

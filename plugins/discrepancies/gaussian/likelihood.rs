@@ -86,6 +86,7 @@ impl GaussianLikelihood {
         common: &[CommonError],
         prior: Distribution,
     ) -> Result<Self, Stop> {
+        check(data, common)?;
         let statistics = Statistics::of(data, common)?;
         let hyper = vec![Hyperparameter {
             name: "variance".to_owned(),
@@ -138,6 +139,31 @@ impl Statistics {
         let spread = Spread { count, scatter, eigenvalues };
         Ok(Self { measured, weight, weighted_mean, spread, directions })
     }
+}
+
+/// Refuses data and errors that are not on the layout, and values that no normal law gives.
+fn check(data: &Measurements, common: &[CommonError]) -> Result<(), Stop> {
+    let outputs = data.layout.len();
+    for replicate in &data.replicates {
+        let (name, count) = (&replicate.name, replicate.values.len());
+        if count != outputs {
+            let text = format!("replicate `{name}` has {count} values and not {outputs}");
+            return Err(Stop::new(text));
+        }
+        let bad = |value: &Option<f64>| value.is_some_and(|y| !y.is_finite());
+        if let Some(i) = replicate.values.iter().position(bad) {
+            let place = data.layout.describe(i);
+            return Err(Stop::new(format!("replicate `{name}` is not finite at {place}")));
+        }
+    }
+    for CommonError { origin, factor, .. } in common {
+        let rows = factor.rows();
+        if rows != outputs {
+            let text = format!("the common error `{origin}` has {rows} outputs and not {outputs}");
+            return Err(Stop::new(text));
+        }
+    }
+    Ok(())
 }
 
 /// The eigenvectors (as rows) and eigenvalues of the covariance `K` of all common errors.

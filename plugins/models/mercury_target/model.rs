@@ -61,11 +61,11 @@ impl MercuryTarget {
     fn run(&self, call: &Call<'_>) -> Result<(Outcome, Vec<f64>), EvalError> {
         let times = times(call.layout).map_err(EvalError::Fatal)?;
         let (sampling, steps) = sampling(times).map_err(EvalError::Fatal)?;
-        let mercury = Mercury {
-            density: call.inputs[0],
-            sound_speed: call.inputs[1],
-            tensile_cutoff: call.inputs[2],
+        let &[density, sound_speed, tensile_cutoff] = call.inputs else {
+            let count = call.inputs.len();
+            return Err(EvalError::Fatal(format!("expected 3 inputs, found {count}")));
         };
+        let mercury = Mercury { density, sound_speed, tensile_cutoff };
         let outcome =
             simulate(&self.settings(sampling), &mercury).map_err(|error| match error {
                 SimulationError::Settings(_) => EvalError::Fatal(error.to_string()),

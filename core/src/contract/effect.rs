@@ -1,0 +1,121 @@
+//! The contract of effects.
+
+use super::judge::{Check, agree, judge, layout, slope, twice};
+use crate::linalg::Matrix;
+use crate::math::random::{Stream, normal};
+use crate::plugin::Effect;
+
+/// Puts an effect through the contract.
+///
+/// - it says in words what it is, and its parameters have different names;
+/// - with its parameters at `absent` it changes nothing, not even a bit;
+/// - `absent` and every `start` lie in the support of their priors;
+/// - a response has as many values after it as before, all finite, the same each time;
+/// - its derivatives by its parameters and by the response are those that differences give.
+pub fn effect(name: &str, effect: &dyn Effect) -> Result<(), Vec<String>> {
+    let checks: [Check<'_>; 4] = [
+        ("describes itself", Box::new(|| describes_itself(effect))),
+        ("can be absent", Box::new(|| can_be_absent(effect))),
+        ("answers", Box::new(|| answers(effect))),
+        ("knows its derivatives", Box::new(|| knows_its_derivatives(effect))),
+    ];
+    judge("effect", name, &checks)
+}
+
+/// A response of the size of strains, without a zero.
+fn response() -> Vec<f64> {
+    let mut rng = Stream::root(2).generator();
+    (0..layout().len()).map(|i| 1e-4 * (1.0 + i as f64 + 0.3 * normal(&mut rng))).collect()
+}
+
+/// Draws of the effect's parameters from their priors, one a row.
+fn draws(effect: &dyn Effect) -> Matrix {
+    let parameters = effect.parameters(&layout());
+    let mut rng = Stream::root(3).generator();
+    Matrix::from_fn(5, parameters.len(), |_, j| parameters[j].prior.sample(&mut rng))
+}
+
+fn describes_itself(effect: &dyn Effect) -> Result<(), String> {
+    let words = effect.describe();
+    for (what, text) in
+        [("title", words.title), ("formula", words.formula), ("source", words.source)]
+    {
+        if text.trim().is_empty() {
+            return Err(format!("its {what} is empty"));
+        }
+    }
+    let parameters = effect.parameters(&layout());
+    match twice(parameters.iter().map(|p| p.name.as_str())) {
+        Some(name) => Err(format!("two parameters are called `{name}`")),
+        None => Ok(()),
+    }
+}
+
+fn can_be_absent(effect: &dyn Effect) -> Result<(), String> {
+    let (layout, response) = (layout(), response());
+    let (parameters, absent) = (effect.parameters(&layout), effect.absent(&layout));
+    if parameters.len() != absent.len() {
+        return Err(format!("{} parameters, {} values", parameters.len(), absent.len()));
+    }
+    for (parameter, absent) in parameters.iter().zip(&absent) {
+        let (low, high) = parameter.prior.support();
+        for (what, x) in [("absence", *absent), ("start", parameter.start)] {
+            if !(low..=high).contains(&x) {
+                return Err(format!("`{}` at its {what} {x} leaves its prior", parameter.name));
+            }
+        }
+    }
+    if effect.apply(&layout, &response, &absent) == response {
+        Ok(())
+    } else {
+        Err("it changes the response".into())
+    }
+}
+
+fn answers(effect: &dyn Effect) -> Result<(), String> {
+    let (layout, response) = (layout(), response());
+    for values in draws(effect).iter_rows() {
+        let after = effect.apply(&layout, &response, values);
+        if after.len() != response.len() {
+            return Err(format!("{} values become {}", response.len(), after.len()));
+        }
+        if let Some(y) = after.iter().find(|y| !y.is_finite()) {
+            return Err(format!("with {values:?} the response is {y}"));
+        }
+        if effect.apply(&layout, &response, values) != after {
+            return Err("the same values give another response".into());
+        }
+    }
+    Ok(())
+}
+
+/// Central differences with steps of 1e-5 are exact to about 1e-8 for smooth effects of order one.
+const TOLERANCE: f64 = 1e-5;
+
+fn knows_its_derivatives(effect: &dyn Effect) -> Result<(), String> {
+    let (layout, response) = (layout(), response());
+    let mut rng = Stream::root(4).generator();
+    let weight: Vec<f64> = response.iter().map(|_| normal(&mut rng)).collect();
+    for values in draws(effect).iter_rows() {
+        let jacobian = effect.by_parameters(&layout, &response, values);
+        if (jacobian.rows(), jacobian.columns()) != (response.len(), values.len()) {
+            return Err("the derivative by the parameters has the wrong shape".into());
+        }
+        for j in 0..values.len() {
+            let step = 1e-5 * values[j].abs().max(1e-3);
+            let by = slope(|v| effect.apply(&layout, &response, v), values, j, step);
+            let what = format!("the derivative by parameter {} of value", j + 1);
+            agree(&what, &jacobian.column(j), &by, TOLERANCE)?;
+        }
+        let pulled = effect.pull_back(&layout, &response, values, &weight);
+        let dot = |y: &[f64]| y.iter().zip(&weight).map(|(y, w)| y * w).sum::<f64>();
+        let expected: Vec<f64> = (0..response.len())
+            .map(|i| {
+                let step = 1e-5 * response[i].abs();
+                slope(|y| vec![dot(&effect.apply(&layout, y, values))], &response, i, step)[0]
+            })
+            .collect();
+        agree("the transposed derivative by value", &pulled, &expected, TOLERANCE)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,250 @@
+//! The contract of surrogates.
+
+use super::judge::{Check, agree, calm, judge, layout, refused, same_on_threads, slope};
+use crate::data::{Layout, Parameter, Unit};
+use crate::linalg::{self, Matrix};
+use crate::math::distribution::Distribution;
+use crate::math::random::{Stream, uniform};
+use crate::plugin::surrogate::{Emulator, Indices, Surrogate, Training};
+use crate::run::{Progress, Silent};
+
+/// Puts a surrogate through the contract, on 60 runs of a smooth function of two parameters with ten outputs, one of
+/// which does not vary.
+///
+/// - shapes are right and all numbers finite; ninety per cent of the variance at new points is explained;
+/// - several points at once give what each gives alone;
+/// - the Jacobian, and the gradient of the basis where the emulator is linear, are those that differences
+///   give; a linear emulator is the product of its basis and its coefficients;
+/// - Sobol' indices are shares: first order up to total, from 0 to 1;
+/// - it reads back from its bytes bit for bit, and damaged bytes are refused;
+/// - the same runs give the same bytes, on any number of threads;
+/// - runs that are too few, of unequal number or not finite are refused.
+pub fn surrogate(name: &str, surrogate: &dyn Surrogate) -> Result<(), Vec<String>> {
+    let problem = Problem::new();
+    let checks: [Check<'_>; 6] = [
+        ("emulates", Box::new(|| emulates(surrogate, &problem))),
+        ("knows its derivatives", Box::new(|| knows_its_derivatives(surrogate, &problem))),
+        ("shares out the variance", Box::new(|| shares_out_the_variance(surrogate, &problem))),
+        ("reads back", Box::new(|| reads_back(surrogate, &problem))),
+        ("repeats itself", Box::new(|| same_on_threads(|| problem.bytes(surrogate)))),
+        ("refuses bad runs", Box::new(|| refuses_bad_runs(surrogate, &problem))),
+    ];
+    judge("surrogate", name, &checks)
+}
+
+struct Problem {
+    parameters: Vec<Parameter>,
+    layout: Layout,
+    points: Matrix,
+    responses: Matrix,
+    /// Points that no run has.
+    fresh: Matrix,
+}
+
+const RUNS: usize = 60;
+/// The output that does not vary.
+const CONSTANT: usize = 3;
+
+fn truth(point: &[f64]) -> Vec<f64> {
+    let (a, b) = (point[0], (point[1] - 20.0) / 10.0);
+    let output = |i: usize| {
+        let w = i as f64 / 4.0;
+        if i == CONSTANT { 2.0 } else { (a + w * b).sin() + 0.3 * w * a * b + b * b }
+    };
+    (0..10).map(output).collect()
+}
+
+impl Problem {
+    fn new() -> Self {
+        let parameter = |name: &str, range: [f64; 2]| Parameter {
+            name: name.to_owned(),
+            symbol: name.to_owned(),
+            unit: Unit::dimensionless(),
+            design: Distribution::Uniform(range),
+            prior: Distribution::Uniform(range),
+            reference: None,
+        };
+        let parameters = vec![parameter("a", [-1.0, 1.0]), parameter("b", [10.0, 30.0])];
+        let draw = |count: usize, label: &str| {
+            let mut rng = Stream::root(5).named(label).generator();
+            Matrix::from_fn(count, 2, |_, j| parameters[j].design.quantile(uniform(&mut rng)))
+        };
+        let (points, fresh) = (draw(RUNS, "runs"), draw(40, "fresh"));
+        let responses = Matrix::from_rows(10, points.iter_rows().map(truth));
+        Self { parameters, layout: layout(), points, responses, fresh }
+    }
+
+    fn fit(&self, surrogate: &dyn Surrogate) -> Result<Box<dyn Emulator>, String> {
+        let fitted = self.fit_to(surrogate, &self.points, &self.responses);
+        fitted.map_err(|stop| format!("sound runs are refused: {stop}"))
+    }
+
+    fn fit_to(
+        &self,
+        surrogate: &dyn Surrogate,
+        points: &Matrix,
+        responses: &Matrix,
+    ) -> Result<Box<dyn Emulator>, crate::run::Stop> {
+        let training =
+            Training { parameters: &self.parameters, layout: &self.layout, points, responses };
+        let stream = Stream::root(6).named("surrogate");
+        surrogate.fit(&training, &stream, &Progress::new(&Silent))
+    }
+
+    fn bytes(&self, surrogate: &dyn Surrogate) -> Result<Vec<u8>, String> {
+        self.fit(surrogate)?.save().map_err(|stop| format!("it cannot be saved: {stop}"))
+    }
+}
+
+fn shaped(what: &str, m: &Matrix, rows: usize, columns: usize) -> Result<(), String> {
+    if (m.rows(), m.columns()) != (rows, columns) {
+        let (found, other) = (m.rows(), m.columns());
+        return Err(format!("{what} is {found} x {other} and not {rows} x {columns}"));
+    }
+    match m.as_slice().iter().find(|x| !x.is_finite()) {
+        Some(x) => Err(format!("{what} holds {x}")),
+        None => Ok(()),
+    }
+}
+
+fn emulates(surrogate: &dyn Surrogate, problem: &Problem) -> Result<(), String> {
+    let emulator = problem.fit(surrogate)?;
+    if (emulator.dimension(), emulator.outputs()) != (2, 10) {
+        return Err("it has other numbers of parameters or outputs than the runs".into());
+    }
+    let mean = emulator.mean(&problem.fresh);
+    shaped("the mean", &mean, 40, 10)?;
+    shaped("the residuals", &emulator.fit_error().residuals, RUNS, 10)?;
+    let relative = &emulator.fit_error().relative;
+    if relative.len() != 10 || relative.iter().any(|e| !(e.is_finite() && *e >= 0.0)) {
+        return Err(format!("the relative errors are {relative:?}"));
+    }
+    if let Some(variance) = emulator.variance(&problem.fresh) {
+        shaped("the variance", &variance, 40, 10)?;
+        if variance.as_slice().iter().any(|v| *v < 0.0) {
+            return Err("a variance is negative".into());
+        }
+    }
+    let exact = Matrix::from_rows(10, problem.fresh.iter_rows().map(truth));
+    for i in 0..10 {
+        let (found, right) = (mean.column(i), exact.column(i));
+        let centre = right.iter().sum::<f64>() / 40.0;
+        let variance: f64 = right.iter().map(|y| (y - centre).powi(2)).sum();
+        let error: f64 = found.iter().zip(&right).map(|(a, b)| (a - b).powi(2)).sum();
+        if error > 0.1 * variance + 1e-18 {
+            return Err(format!("output {} is explained by {}", i + 1, 1.0 - error / variance));
+        }
+    }
+    for (i, point) in problem.fresh.iter_rows().enumerate().take(5) {
+        let alone = emulator.mean(&Matrix::from_vec(1, 2, point.to_vec()));
+        agree("alone, output", alone.row(0), mean.row(i), 1e-11)?;
+    }
+    Ok(())
+}
+
+fn knows_its_derivatives(surrogate: &dyn Surrogate, problem: &Problem) -> Result<(), String> {
+    let emulator = problem.fit(surrogate)?;
+    let at = |point: &[f64]| Matrix::from_vec(1, 2, point.to_vec());
+    for point in problem.fresh.iter_rows().take(5) {
+        let jacobian = emulator.jacobian(point);
+        shaped("the Jacobian", &jacobian, 10, 2)?;
+        for (j, step) in [1e-5, 1e-4].into_iter().enumerate() {
+            let mean = |x: &[f64]| emulator.mean(&at(x)).into_vec();
+            let differences = slope(mean, point, j, step);
+            let what = format!("the derivative by parameter {} of output", j + 1);
+            agree(&what, &jacobian.column(j), &differences, 1e-5)?;
+            let Some(linear) = emulator.linear() else { continue };
+            let basis = |x: &[f64]| linear.basis(&at(x)).into_vec();
+            let gradient = linear.basis_gradient(point).column(j);
+            let what = format!("the derivative by parameter {} of term", j + 1);
+            agree(&what, &gradient, &slope(basis, point, j, step), 1e-5)?;
+        }
+    }
+    if let Some(linear) = emulator.linear() {
+        let product = linalg::multiply(&linear.basis(&problem.fresh), linear.coefficients());
+        let mean = emulator.mean(&problem.fresh);
+        agree("basis times coefficients, entry", product.as_slice(), mean.as_slice(), 1e-11)?;
+    }
+    Ok(())
+}
+
+fn shares_out_the_variance(surrogate: &dyn Surrogate, problem: &Problem) -> Result<(), String> {
+    let Some(sensitivity) = problem.fit(surrogate)?.sensitivity() else { return Ok(()) };
+    for (name, list) in [("mean", &sensitivity.mean), ("variance", &sensitivity.variance)] {
+        if list.len() != 10 || list.iter().any(|x| !x.is_finite()) {
+            return Err(format!("the {name} of the outputs is {list:?}"));
+        }
+    }
+    shares("outputs", &sensitivity.outputs, 10, sensitivity.pairs.len())?;
+    shares("aggregated", &sensitivity.aggregated, 1, sensitivity.pairs.len())?;
+    if sensitivity.outputs.total.row(CONSTANT).iter().any(|s| *s != 0.0) {
+        return Err("an output that does not vary has shares".into());
+    }
+    Ok(())
+}
+
+fn shares(what: &str, indices: &Indices, rows: usize, pairs: usize) -> Result<(), String> {
+    const ROUNDING: f64 = 1e-9;
+    for (name, m, columns) in [
+        ("first", &indices.first, 2),
+        ("total", &indices.total, 2),
+        ("pairs", &indices.pairs, pairs),
+    ] {
+        shaped(&format!("{what}.{name}"), m, rows, columns)?;
+        if m.as_slice().iter().any(|s| !(-ROUNDING..=1.0 + ROUNDING).contains(s)) {
+            return Err(format!("{what}.{name} holds what is no share"));
+        }
+    }
+    let ordered = indices.first.as_slice().iter().zip(indices.total.as_slice());
+    if ordered.into_iter().any(|(first, total)| *first > total + ROUNDING) {
+        return Err(format!("in {what} a first-order share is above its total"));
+    }
+    Ok(())
+}
+
+fn reads_back(surrogate: &dyn Surrogate, problem: &Problem) -> Result<(), String> {
+    let emulator = problem.fit(surrogate)?;
+    let bytes = emulator.save().map_err(|stop| format!("it cannot be saved: {stop}"))?;
+    let read = surrogate.load(&bytes).map_err(|stop| format!("its bytes are refused: {stop}"))?;
+    let same = read.mean(&problem.fresh) == emulator.mean(&problem.fresh)
+        && read.jacobian(problem.fresh.row(0)) == emulator.jacobian(problem.fresh.row(0))
+        && read.fit_error() == emulator.fit_error()
+        && read.facts() == emulator.facts();
+    if !same {
+        return Err("it is another one after reading".into());
+    }
+    if read.save().map_err(|stop| stop.to_string())? != bytes {
+        return Err("its bytes are others after reading".into());
+    }
+    for length in [0, 1, bytes.len() / 3, bytes.len() / 2, bytes.len() - 1] {
+        refused(&format!("{length} of its bytes"), || surrogate.load(&bytes[..length]))?;
+    }
+    refused("another file", || surrogate.load(b"this is something else altogether"))?;
+    for place in (0..bytes.len()).step_by(bytes.len() / 60 + 1) {
+        let mut damaged = bytes.clone();
+        damaged[place] ^= 0x11;
+        calm(&format!("a damaged byte {place}"), || surrogate.load(&damaged).is_ok())?;
+    }
+    Ok(())
+}
+
+fn refuses_bad_runs(surrogate: &dyn Surrogate, problem: &Problem) -> Result<(), String> {
+    let spoilt = |matrix: &Matrix, value: f64| {
+        let mut matrix = matrix.clone();
+        matrix[(7, 1)] = value;
+        matrix
+    };
+    let (points, responses) = (&problem.points, &problem.responses);
+    let short = responses.select_rows(&(1..RUNS).collect::<Vec<_>>());
+    let none = (Matrix::zeros(0, 2), Matrix::zeros(0, 10));
+    for (what, points, responses) in [
+        ("a response that is not a number", points, &spoilt(responses, f64::NAN)),
+        ("an infinite response", points, &spoilt(responses, f64::INFINITY)),
+        ("a parameter that is not a number", &spoilt(points, f64::NAN), responses),
+        ("a run without a response", points, &short),
+        ("a fit to no runs", &none.0, &none.1),
+    ] {
+        refused(what, || problem.fit_to(surrogate, points, responses))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,196 @@
+//! Every registered plugin does what its kind demands: a listed plugin is a tested plugin.
+//!
+//! Plugins are built from their names and options as a study builds them. A plugin without an entry in the
+//! tables below fails here. In a binary of its own, because it registers an effect, which the
+//! generated documentation must not list.
+
+#[path = "contracts/gain.rs"]
+mod gain;
+
+use std::path::{Path, PathBuf};
+
+use lacuna::contract::{self, Sample};
+use lacuna::data::{Axis, Layout, Unit};
+use lacuna::plugin::model::Response;
+use lacuna::plugin::registry::{self, Kind};
+use lacuna::plugin::{Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate};
+use lacuna::run::write_response;
+// Without this line the linker leaves the plugins out.
+use lacuna_plugins as _;
+
+/// Plugins of a kind with the options, as TOML, under which each is tested.
+type Table = [(&'static str, &'static [&'static str])];
+
+/// One plugin with one set of options.
+struct Case<'a> {
+    plugin: &'static str,
+    /// The plugin's name with its options, for messages.
+    label: String,
+    /// An empty folder.
+    scratch: &'a Path,
+}
+
+/// Puts every plugin of a kind through its suite.
+fn all<K: Kind + ?Sized>(
+    table: &Table,
+    suite: impl Fn(&Case<'_>, &K) -> Result<(), Vec<String>>,
+) {
+    let registered: Vec<&str> = registry::entries::<K>().iter().map(|entry| entry.name).collect();
+    let tested: Vec<&str> = table.iter().map(|(name, _)| *name).collect();
+    assert_eq!(tested, registered, "the plugins of kind {} that are tested here", K::NAME);
+    let mut breaches = Vec::new();
+    for &(plugin, all_options) in table {
+        for options in all_options {
+            let scratch = tempfile::tempdir().unwrap();
+            let built = registry::from_text::<K>(plugin, options).unwrap_or_else(|e| panic!("{e}"));
+            let label = format!("{plugin} {}", options.replace('\n', ", "));
+            let case = Case { plugin, label: label.trim().to_owned(), scratch: scratch.path() };
+            breaches.extend(suite(&case, &*built.plugin).err().unwrap_or_default());
+        }
+    }
+    assert!(breaches.is_empty(), "{}", breaches.join("\n"));
+}
+
+#[test]
+fn every_kind_has_a_suite() {
+    let kinds: Vec<&str> = registry::kinds().iter().map(|kind| kind.name).collect();
+    let suites =
+        ["design", "discrepancy", "effect", "executor", "model", "reader", "sampler", "surrogate"];
+    assert_eq!(kinds, suites);
+    assert!(registry::audit().is_empty());
+}
+
+#[test]
+fn designs() {
+    let table: &Table = &[
+        (
+            "latin_hypercube",
+            &["", "optimise = \"maximin\"", "optimise = \"correlation\"", "centred = true"],
+        ),
+        ("random", &[""]),
+        ("sobol", &["", "scramble = \"none\""]),
+    ];
+    all::<dyn Design>(table, |case, design| contract::design(&case.label, design));
+}
+
+#[test]
+fn models() {
+    let table: &Table = &[("mercury_target", &["numerics = { mesh = [6, 24] }"])];
+    all::<dyn Model>(table, |case, model| contract::model(&case.label, model, case.scratch));
+}
+
+#[test]
+fn executors() {
+    let table: &Table = &[("local", &["", "threads = 1"])];
+    all::<dyn Executor>(table, |case, plugin| {
+        contract::executor(&case.label, plugin, case.scratch)
+    });
+}
+
+#[test]
+fn surrogates() {
+    let table: &Table = &[(
+        "polynomial_chaos",
+        &["degree = { max = 8 }", "degree = 5\nsolver = \"least_squares\""],
+    )];
+    all::<dyn Surrogate>(table, |case, plugin| contract::surrogate(&case.label, plugin));
+}
+
+#[test]
+fn discrepancies() {
+    let table: &Table = &[(
+        "gaussian",
+        &["variance = { half_normal = 1.0 }", "variance = { uniform = [0.0, 10.0] }"],
+    )];
+    all::<dyn Discrepancy>(table, |case, plugin| contract::discrepancy(&case.label, plugin));
+}
+
+#[test]
+fn samplers() {
+    let table: &Table =
+        &[("affine_invariant_ensemble", &["walkers = 40", "walkers = 20\nupdate = \"sequential\"", "walkers = 20\nsteps=4000\nupdate = \"sequential\"", "walkers = 20\nsteps=4000", "walkers = 20\nsteps=2000", "walkers = 20\nsteps=2000\nupdate = \"sequential\"", "walkers = 40\nsteps=4000\nupdate = \"sequential\"", "walkers = 40\nupdate = \"sequential\""])];
+    all::<dyn Sampler>(table, |case, plugin| contract::sampler(&case.label, plugin));
+}
+
+#[test]
+fn effects() {
+    all::<dyn Effect>(&[("gain", &[""])], |case, effect| contract::effect(&case.label, effect));
+}
+
+/// Two gauges at one hundred times, as `samples/base.csv` holds them in microstrain.
+fn layout() -> Layout {
+    let times = (1..=100).map(|i| f64::from(i) * 1e-5).collect();
+    Layout {
+        name: "strain".into(),
+        unit: Unit::parse("strain").unwrap(),
+        axes: vec![
+            Axis::labels("sensor", ["B", "C"]),
+            Axis::grid("time", times, Unit::parse("s").unwrap()),
+        ],
+    }
+}
+
+fn samples() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("samples")
+}
+
+fn strain() -> Vec<f64> {
+    let text = std::fs::read_to_string(samples().join("base.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+    let column = |name: &str| {
+        let j = rows[0].iter().position(|heading| *heading == name).unwrap();
+        rows[1..].iter().map(move |row| 1e-6 * row[j].parse::<f64>().unwrap()).collect()
+    };
+    let (b, c): (Vec<f64>, Vec<f64>) = (column("B"), column("C"));
+    [b, c].concat()
+}
+
+/// The same signals in the formats of a reader.
+fn sound_files(reader: &str, folder: &Path) -> Vec<Sample> {
+    let (layout, values) = (layout(), strain());
+    let sample = |file: PathBuf, tolerance: f64| Sample {
+        file,
+        layout: layout.clone(),
+        values: values.clone(),
+        tolerance,
+    };
+    match reader {
+        "csv" => {
+            let row = |(i, y): (usize, &f64)| {
+                let place = layout.place(i);
+                format!("{},{},{y}\n", layout.axes[0].text(place[0]), layout.axes[1].text(place[1]))
+            };
+            let rows: String = values.iter().enumerate().map(row).collect();
+            let path = folder.join("sound.csv");
+            std::fs::write(&path, format!("sensor,time,strain\n{rows}")).unwrap();
+            vec![sample(path, 0.0)]
+        }
+        "netcdf" => {
+            let response = Response { values: values.clone(), valid: true, facts: Vec::new() };
+            let file = write_response(folder, "sound", &layout, &response).unwrap();
+            vec![sample(folder.join(file), 0.0)]
+        }
+        // `base.csv` holds the signals to a thousandth of a microstrain, the other files all digits.
+        "sierra" => ["hist_cdf2.h", "hist_cdf5.h", "hist_nc4.h", "hb_spyhis.txt"]
+            .map(|file| sample(samples().join(file), 1e-5))
+            .to_vec(),
+        other => panic!("no file for the reader `{other}`"),
+    }
+}
+
+#[test]
+fn readers() {
+    let table: &Table =
+        &[("csv", &[""]), ("netcdf", &[""]), ("sierra", &["variable = \"strain_{sensor}\""])];
+    let folder = tempfile::tempdir().unwrap();
+    all::<dyn Reader>(table, |case, reader| {
+        let samples = sound_files(case.plugin, folder.path());
+        let judge = |sample: &Sample| {
+            let name = sample.file.file_name().unwrap_or_default().display();
+            let label = format!("{} on {name}", case.label);
+            contract::reader(&label, reader, sample, case.scratch).err().unwrap_or_default()
+        };
+        let breaches: Vec<String> = samples.iter().flat_map(judge).collect();
+        if breaches.is_empty() { Ok(()) } else { Err(breaches) }
+    });
+}

@@ -1,0 +1,84 @@
+//! A study that is killed goes on where it was, and ends with the bits it would have had.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::quick;
+
+/// Slow enough to be killed in the middle: runs of about 30 ms one after the other, and a sampler that writes its
+/// state (every two seconds) before it ends.
+const SETTINGS: [&str; 5] = [
+    "model.numerics.mesh=[12, 54]",
+    "sampler.walkers=60",
+    "sampler.steps=9000",
+    "surrogate.degree=3",
+    "validate.emulator_check=0",
+];
+
+fn start(folder: &Path, out: &Path) -> Command {
+    let mut command = quick::command();
+    command.args(["run", "--threads", "1", "--out"]).arg(out).arg(folder.join("study.toml"));
+    command.args(SETTINGS.iter().flat_map(|setting| ["--set", setting]));
+    command
+}
+
+fn resume(out: &Path) -> Command {
+    let mut command = quick::command();
+    command.args(["resume", "--threads", "1"]).arg(out);
+    command
+}
+
+/// Starts a command and sends it SIGKILL as soon as `now` says so.
+fn kill_when(command: &mut Command, now: impl Fn() -> bool) {
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let begun = Instant::now();
+    while !now() {
+        if let Some(status) = child.try_wait().unwrap() {
+            let output = child.wait_with_output().unwrap();
+            panic!("ended before it could be killed: {status}\n{}", String::from_utf8_lossy(&output.stderr));
+        }
+        assert!(begun.elapsed() < Duration::from_secs(120), "the moment does not come");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    assert!(!child.wait().unwrap().success());
+}
+
+fn lines(path: &Path) -> usize {
+    fs::read_to_string(path).map_or(0, |text| text.lines().count())
+}
+
+#[test]
+fn a_killed_study_ends_with_the_bits_it_would_have_had() {
+    let folder = quick::simulated();
+    let (whole, broken) = (folder.path().join("whole"), folder.path().join("broken"));
+
+    let log = broken.join("2-simulate/progress.jsonl");
+    kill_when(&mut start(folder.path(), &broken), || lines(&log) >= 3);
+    assert!(lines(&log) < 40 && !broken.join("3-read").exists());
+    kill_when(&mut resume(&broken), || lines(&log) >= 20);
+    assert!(lines(&log) < 40 && !broken.join("3-read").exists());
+    let first_run = fs::metadata(broken.join("2-simulate/run001.h")).unwrap().modified().unwrap();
+
+    let calibrate = broken.join("5-calibrate");
+    let drawn = || fs::metadata(calibrate.join("draws.bin")).map_or(0, |m| m.len());
+    kill_when(&mut resume(&broken), || drawn() > 0);
+    assert!(!calibrate.join("stage.json").exists());
+    kill_when(&mut resume(&broken), || calibrate.join("state.json").exists());
+    assert!(!calibrate.join("stage.json").exists());
+    // A checkpoint is there, and so the next attempt does not begin anew.
+    let checkpoint = fs::read_to_string(calibrate.join("state.json")).unwrap();
+    let checkpoint: serde_json::Value = serde_json::from_str(&checkpoint).unwrap();
+    assert!(checkpoint["step"].as_u64().unwrap() > 0);
+
+    let (code, text) = quick::said(&mut resume(&broken));
+    assert_eq!(code, Some(0), "{text}");
+    let (code, text) = quick::said(&mut start(folder.path(), &whole));
+    assert_eq!(code, Some(0), "{text}");
+    assert_eq!(quick::results(&broken), quick::results(&whole));
+    // Nothing was lost: the first run is the one that was made before the first kill.
+    let kept = fs::metadata(broken.join("2-simulate/run001.h")).unwrap().modified().unwrap();
+    assert_eq!(kept, first_run);
+}

@@ -1,0 +1,175 @@
+//! Studies that are small enough for tests, and what running them leaves behind.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::{Mutex, OnceLock};
+
+use lacuna::report::findings::Findings;
+use lacuna::run::{Observer, RunDirectory, Stop, files};
+use lacuna::stage;
+use lacuna::study::{Study, resolve};
+// Without this line the linker leaves the plugins out.
+use lacuna_plugins as _;
+use tempfile::TempDir;
+
+pub fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// A folder with the study in which the stand-in is simulated on a coarse mesh: 40 runs, three sensors,
+/// twenty times, and the founding study's measurements of them.
+pub fn simulated() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("quick/study.toml");
+    fs::copy(here, folder.path().join("study.toml")).unwrap();
+    let all = fs::read_to_string(root().join("configs/sns/strain.csv")).unwrap();
+    let wanted = |line: &&str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let time: f64 = cells[2].parse().unwrap_or(0.0);
+        ["sensor", "B", "C", "U"].contains(&cells[1]) && time < 2.05e-4
+    };
+    let some: Vec<&str> = all.lines().filter(|line| !line.starts_with('#')).filter(wanted).collect();
+    fs::write(folder.path().join("strain.csv"), some.join("\n") + "\n").unwrap();
+    folder
+}
+
+/// A folder with the study that `lacuna new study` writes: runs and measurements in tables.
+pub fn tables() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for file in ["study.toml", "runs.csv", "responses.csv", "measured.csv"] {
+        let from = root().join("cli/src/new").join(file);
+        fs::copy(from, folder.path().join(file)).unwrap();
+    }
+    folder
+}
+
+/// Changes a file of a study by replacing some text that must be there.
+pub fn replace(path: &Path, old: &str, new: &str) {
+    let text = fs::read_to_string(path).unwrap();
+    assert!(text.contains(old), "{} has no `{old}`", path.display());
+    fs::write(path, text.replace(old, new)).unwrap();
+}
+
+pub fn load(path: &Path, settings: &[&str]) -> Study {
+    let settings: Vec<String> = settings.iter().map(ToString::to_string).collect();
+    let checked = resolve::load(path, &settings);
+    let complaints = checked.complaints();
+    checked.study.unwrap_or_else(|| panic!("{complaints}"))
+}
+
+/// Notes which stages begin and what is said to the user.
+#[derive(Default)]
+pub struct Watch {
+    pub warnings: Mutex<Vec<String>>,
+}
+
+impl Observer for Watch {
+    fn begin(&self, _: &str, _: &str, _: u64) {}
+    fn advance(&self, _: u64) {}
+    fn end(&self, _: &str, _: &str) {}
+    fn warn(&self, text: &str) {
+        self.warnings.lock().unwrap().push(text.to_owned());
+    }
+}
+
+/// What a run through the library gives.
+pub struct Ran {
+    pub findings: Findings,
+    /// The stages that were made and not taken from what is kept.
+    pub made: Vec<String>,
+    pub warnings: Vec<String>,
+}
+
+/// Runs a study through the library.
+pub fn run(path: &Path, settings: &[&str], out: &Path) -> Result<Ran, Stop> {
+    let study = load(path, settings);
+    let before = finished(out);
+    let watch = Watch::default();
+    let mut directory = RunDirectory::open(out)?;
+    let findings = stage::run(&study, &mut directory, &watch)?;
+    let made = directory.records().iter().filter(|r| {
+        !before.contains(&(r.stage.clone(), r.inputs.clone(), r.seconds.to_bits()))
+    });
+    let made = made.map(|r| r.stage.clone()).collect();
+    Ok(Ran { findings, made, warnings: watch.warnings.into_inner().unwrap() })
+}
+
+/// Every record of a finished stage that a run directory keeps, set aside or not.
+fn finished(out: &Path) -> Vec<(String, String, u64)> {
+    let mut found = Vec::new();
+    for folder in [out.to_owned(), out.join(".kept")] {
+        for entry in fs::read_dir(folder).into_iter().flatten() {
+            let record = entry.unwrap().path().join("stage.json");
+            let Ok(text) = fs::read_to_string(record) else { continue };
+            let record: serde_json::Value = serde_json::from_str(&text).unwrap();
+            let word = |key: &str| record[key].as_str().unwrap().to_owned();
+            let seconds = record["seconds"].as_f64().unwrap().to_bits();
+            found.push((word("stage"), word("inputs"), seconds));
+        }
+    }
+    found
+}
+
+/// The files that hold results, by their paths from the run directory, with their hashes; times, which differ
+/// from run to run, are taken out.
+pub fn results(out: &Path) -> BTreeMap<String, String> {
+    let mut found = BTreeMap::new();
+    for entry in fs::read_dir(out).unwrap() {
+        let folder = entry.unwrap().path();
+        let name = folder.file_name().unwrap().to_string_lossy().into_owned();
+        if !folder.is_dir() || name.starts_with('.') || name.ends_with("report") {
+            continue;
+        }
+        for entry in fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            let file = path.file_name().unwrap().to_string_lossy().into_owned();
+            // Checkpoints and records, not results.
+            let skipped = ["stage.json", "seconds.csv", "seconds", "progress.jsonl", "state.json"];
+            if !skipped.contains(&file.as_str()) {
+                found.insert(format!("{name}/{file}"), files::hash_file(&path).unwrap());
+            }
+        }
+    }
+    if out.join("posterior.nc").exists() {
+        let hash = files::hash_file(&out.join("posterior.nc")).unwrap();
+        found.insert("posterior.nc".to_owned(), hash);
+    }
+    let mut summary = summary(out);
+    summary.as_object_mut().unwrap().remove("seconds");
+    found.insert("summary.json".to_owned(), summary.to_string());
+    found
+}
+
+pub fn summary(out: &Path) -> serde_json::Value {
+    files::read_json(&out.join("summary.json")).unwrap()
+}
+
+/// The command `lacuna`, built once for this test run.
+pub fn command() -> Command {
+    static BUILT: OnceLock<PathBuf> = OnceLock::new();
+    let binary = BUILT.get_or_init(|| {
+        // The test is `target/<profile>/deps/all-…`.
+        let test = std::env::current_exe().unwrap();
+        let profile = test.parent().unwrap().parent().unwrap();
+        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+        let mut build = Command::new(cargo);
+        build.args(["build", "--quiet", "-p", "lacuna-cli", "--target-dir"]);
+        build.arg(profile.parent().unwrap()).current_dir(root());
+        if profile.ends_with("release") {
+            build.arg("--release");
+        }
+        assert!(build.status().unwrap().success(), "the command `lacuna` is not built");
+        profile.join("lacuna")
+    });
+    let mut command = Command::new(binary);
+    command.stdin(Stdio::null());
+    command
+}
+
+/// What a finished command said: exit code and standard error.
+pub fn said(command: &mut Command) -> (Option<i32>, String) {
+    let output = command.output().unwrap();
+    (output.status.code(), String::from_utf8(output.stderr).unwrap())
+}

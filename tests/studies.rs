@@ -1,0 +1,171 @@
+//! A small study from nothing to its report, and again: the same bits, whatever is kept, on any number of threads.
+
+use std::fs;
+use std::path::Path;
+use std::time::Instant;
+
+use crate::quick::{self, Ran};
+
+fn run(folder: &Path, settings: &[&str], out: &str) -> Ran {
+    let out = folder.join(out);
+    quick::run(&folder.join("study.toml"), settings, &out).unwrap_or_else(|stop| panic!("{stop}"))
+}
+
+const STAGES: [&str; 6] =
+    ["1-design", "2-simulate", "3-read", "4-surrogate", "5-calibrate", "6-validate"];
+
+#[test]
+fn a_study_runs_from_nothing_to_its_report() {
+    let folder = quick::simulated();
+    let ran = run(folder.path(), &[], "run");
+    assert_eq!(ran.made, STAGES);
+    let out = folder.path().join("run");
+    for file in ["resolved.toml", "manifest.json", "posterior.nc", "report.html"] {
+        assert!(fs::metadata(out.join(file)).unwrap().len() > 100, "{file}");
+    }
+    let bytes = |path: &Path| fs::read(path).unwrap();
+    assert_eq!(bytes(&out.join("study.toml")), bytes(&folder.path().join("study.toml")));
+    assert_eq!(bytes(&out.join("8-report/report.html")), bytes(&out.join("report.html")));
+    let runs = fs::read_dir(out.join("2-simulate")).unwrap();
+    let histories = runs.filter(|e| e.as_ref().unwrap().path().extension().is_some_and(|e| e == "h"));
+    assert_eq!(histories.count(), 40);
+    check_summary(&out);
+    check_manifest(&out);
+}
+
+/// The keys of `summary.json`, as section 5 of the design demands them.
+fn check_summary(out: &Path) {
+    let summary = quick::summary(out);
+    assert_eq!(summary["schema"], 1);
+    assert_eq!(summary["study"], "quick");
+    for key in ["mae", "rmse", "loo"] {
+        let value = summary["surrogate"][key].as_f64().unwrap();
+        assert!(value > 0.0 && value.is_finite(), "surrogate.{key}");
+    }
+    assert_eq!(summary["surrogate"]["unit"], "strain");
+    let names = ["tensile_cutoff", "density", "sound_speed", "variance"];
+    for name in names {
+        let parameter = &summary["parameters"][name];
+        for key in ["mean", "sd", "q025", "q975", "map", "r_hat", "ess_bulk", "ess_tail"] {
+            assert!(parameter[key].is_f64(), "parameters.{name}.{key}: {}", parameter[key]);
+        }
+        assert!(parameter["unit"].is_string(), "parameters.{name}.unit");
+        let [low, mean, high] = ["q025", "mean", "q975"].map(|k| parameter[k].as_f64().unwrap());
+        assert!(low < mean && mean < high, "{name}: {low} {mean} {high}");
+    }
+    assert_eq!(summary["correlation"]["names"], serde_json::json!(names));
+    for i in 0..4 {
+        assert!((summary["correlation"]["matrix"][i][i].as_f64().unwrap() - 1.0).abs() < 1e-12);
+    }
+    let acceptance = ["min", "mean", "max"].map(|k| summary["acceptance"][k].as_f64().unwrap());
+    assert!(acceptance.is_sorted() && acceptance[0] >= 0.0 && acceptance[2] <= 1.0);
+    assert!(summary["converged"].is_boolean());
+    for case in ["map", "reference"] {
+        for group in ["B", "C", "U", "average"] {
+            let share = summary["accuracy"][case][group].as_f64().unwrap();
+            assert!((0.0..=1.0).contains(&share), "accuracy.{case}.{group}");
+        }
+    }
+    for stage in ["design", "simulate", "read", "surrogate", "calibrate", "validate"] {
+        assert!(summary["seconds"][stage].as_f64().unwrap() >= 0.0, "seconds.{stage}");
+    }
+}
+
+fn check_manifest(out: &Path) {
+    let text = fs::read_to_string(out.join("manifest.json")).unwrap();
+    let manifest: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let stages = manifest["stages"].as_array().unwrap();
+    let names: Vec<&str> = stages.iter().map(|s| s["stage"].as_str().unwrap()).collect();
+    assert_eq!(names, STAGES);
+    for stage in stages {
+        assert_eq!(stage["inputs"].as_str().unwrap().len(), 64);
+        for (file, hash) in stage["outputs"].as_object().unwrap() {
+            let path = out.join(stage["stage"].as_str().unwrap()).join(file);
+            assert_eq!(lacuna::run::files::hash_file(&path).unwrap(), hash.as_str().unwrap());
+        }
+    }
+}
+
+#[test]
+fn the_resolved_study_gives_the_same_bits_in_another_directory() {
+    let folder = quick::simulated();
+    run(folder.path(), &["sampler.steps=70"], "first");
+    let first = folder.path().join("first");
+    let resolved = first.join("resolved.toml");
+    let second = folder.path().join("elsewhere/second");
+    quick::run(&resolved, &[], &second).unwrap_or_else(|stop| panic!("{stop}"));
+    assert_eq!(quick::results(&second), quick::results(&first));
+    // It resolves to itself.
+    let text = |path: &Path| fs::read_to_string(path.join("resolved.toml")).unwrap();
+    assert_eq!(text(&second), text(&first));
+}
+
+#[test]
+fn what_is_kept_is_taken_and_only_what_depends_on_a_change_is_made_again() {
+    let folder = quick::simulated();
+    run(folder.path(), &[], "run");
+    let out = folder.path().join("run");
+    let first = quick::results(&out);
+
+    let begun = Instant::now();
+    let again = run(folder.path(), &[], "run");
+    assert_eq!(again.made, [""; 0]);
+    assert_eq!(quick::results(&out), first);
+    assert!(begun.elapsed().as_secs_f64() < 10.0, "{:?}", begun.elapsed());
+
+    let longer = ["sampler.steps=80"];
+    assert_eq!(run(folder.path(), &longer, "run").made, ["5-calibrate", "6-validate"]);
+    let changed = quick::results(&out);
+    assert_ne!(changed["5-calibrate/draws.nc"], first["5-calibrate/draws.nc"]);
+    assert_eq!(changed["4-surrogate/emulator.bin"], first["4-surrogate/emulator.bin"]);
+    // Back, and forth: nothing is made twice.
+    assert_eq!(run(folder.path(), &[], "run").made, [""; 0]);
+    assert_eq!(quick::results(&out), first);
+    assert_eq!(run(folder.path(), &longer, "run").made, [""; 0]);
+    assert_eq!(quick::results(&out), changed);
+
+    let degree = ["surrogate.degree=2"];
+    assert_eq!(run(folder.path(), &degree, "run").made, STAGES[3..]);
+    assert_eq!(run(folder.path(), &["validate.emulator_check=1"], "run").made, ["6-validate"]);
+    // A word that no result depends on.
+    assert_eq!(run(folder.path(), &["study.title=\"Another title\""], "run").made, [""; 0]);
+    // Another measurement: the runs stay.
+    let data = folder.path().join("strain.csv");
+    let text = fs::read_to_string(&data).unwrap();
+    let (rest, _) = text.trim_end().rsplit_once(',').unwrap();
+    fs::write(&data, format!("{rest},1.5\n")).unwrap();
+    assert_eq!(run(folder.path(), &[], "run").made[0], "3-read");
+}
+
+#[test]
+fn results_do_not_depend_on_the_number_of_threads() {
+    let folder = quick::simulated();
+    let on = |threads: &str| {
+        let out = folder.path().join(format!("on{threads}"));
+        let mut command = quick::command();
+        command.arg("run").arg(folder.path().join("study.toml")).arg("--out").arg(&out);
+        let (code, text) = quick::said(command.args(["--threads", threads]));
+        assert_eq!(code, Some(0), "{text}");
+        quick::results(&out)
+    };
+    let one = on("1");
+    assert_eq!(on("2"), one);
+    // The library in a pool of its own gives what the command gives.
+    let out = folder.path().join("pool");
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+    let ran = pool.install(|| quick::run(&folder.path().join("study.toml"), &[], &out));
+    assert_eq!(ran.unwrap_or_else(|stop| panic!("{stop}")).made, STAGES);
+    assert_eq!(quick::results(&out), one);
+}
+
+#[test]
+fn a_study_of_tables_runs_without_a_model() {
+    let folder = quick::tables();
+    let ran = run(folder.path(), &["sampler.steps=300"], "run");
+    assert_eq!(ran.made, ["3-read", "4-surrogate", "5-calibrate", "6-validate"]);
+    let summary = quick::summary(&folder.path().join("run"));
+    assert_eq!(summary["simulated"]["map"], false);
+    let findings = ran.findings.calibration.unwrap();
+    let names: Vec<&str> = findings.coordinates.iter().map(|c| c.name.as_str()).collect();
+    assert_eq!(names, ["frequency", "damping", "variance"]);
+}

@@ -1,0 +1,216 @@
+//! The source keeps to the house rules that a compiler does not check.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::quick::root;
+
+/// Files of more than 400 lines, each with the reason why it is one file.
+const LONG: [(&str, &str); 1] = [(
+    "core/src/study/resolve.rs",
+    "the sections of a study in one place: each appears once in structure, resolution and checking",
+)];
+
+const LIMIT: usize = 400;
+
+/// Words that make a line that is not finished.
+const UNFINISHED: [&str; 5] = ["TODO", "FIXME", "XXX", "todo!(", "unimplemented!("];
+
+/// Beginnings of paths on somebody's machine.
+const MACHINE: [&str; 6] = ["/home/", "/Users/", "/root/", "/work/", "/tmp/", "C:\\"];
+
+/// Modules of the core from the top down: each may use those after it, and itself.
+const LAYERS: [&str; 11] = [
+    "stage", "contract", "diagnose", "report", "posterior", "plugin", "study", "run", "data", "math", "linalg",
+];
+
+/// Uses that go up a layer, with the reason.
+const UPWARD: [(&str, &str, &str); 0] = [];
+
+struct Source {
+    /// From the root of the project, with forward slashes.
+    name: String,
+    text: String,
+}
+
+impl Source {
+    fn is_test(&self) -> bool {
+        self.name.starts_with("tests/") || self.name.contains("/tests/") || self.name.ends_with("/tests.rs")
+    }
+
+    /// The lines of the program itself with their numbers: no comments, nothing after `#[cfg(test)]` blocks begin.
+    fn program(&self) -> impl Iterator<Item = (usize, &str)> {
+        let in_tests = self.text.find("#[cfg(test)]\nmod tests {").unwrap_or(self.text.len());
+        let lines = self.text[..in_tests].lines().enumerate().map(|(i, line)| (i + 1, line));
+        lines.filter(|(_, line)| !line.trim_start().starts_with("//"))
+    }
+}
+
+/// All files of some folders with this extension.
+fn sources(folders: &[&str], extension: &str) -> Vec<Source> {
+    let mut paths: Vec<PathBuf> = folders.iter().map(|folder| root().join(folder)).collect();
+    let mut found = Vec::new();
+    while let Some(path) = paths.pop() {
+        if path.is_dir() {
+            paths.extend(fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().path()));
+        } else if path.extension().is_some_and(|e| e == extension) {
+            let name = path.strip_prefix(root()).unwrap().display().to_string().replace('\\', "/");
+            found.push(Source { name, text: fs::read_to_string(&path).unwrap() });
+        }
+    }
+    found.sort_by(|a, b| a.name.cmp(&b.name));
+    found
+}
+
+const FOLDERS: [&str; 6] = ["core", "plugins", "cli", "tests", "examples", "bench"];
+
+fn rust() -> Vec<Source> {
+    let sources = sources(&FOLDERS, "rs");
+    assert!(sources.len() > 150, "{} files: the folders of the source have moved", sources.len());
+    sources
+}
+
+fn none(found: &[String], rule: &str) {
+    assert!(found.is_empty(), "{rule}:\n{}", found.join("\n"));
+}
+
+#[test]
+fn long_files_have_a_reason() {
+    let long: Vec<(String, usize)> = rust()
+        .iter()
+        .map(|source| (source.name.clone(), source.text.lines().count()))
+        .filter(|(_, lines)| *lines > LIMIT)
+        .collect();
+    let listed = |name: &str| LONG.iter().any(|(allowed, _)| *allowed == name);
+    let unlisted: Vec<String> = long
+        .iter()
+        .filter(|(name, _)| !listed(name))
+        .map(|(name, lines)| format!("{name}: {lines} lines"))
+        .collect();
+    none(&unlisted, "files above 400 lines want a reason in `LONG`, or to be two files");
+    for (name, reason) in LONG {
+        assert!(long.iter().any(|(file, _)| file == name), "{name} is short now: take it off");
+        assert!(reason.len() > 20, "{name} has no reason");
+    }
+}
+
+#[test]
+fn nothing_is_unfinished_or_of_one_machine() {
+    let mut found = Vec::new();
+    for source in rust() {
+        if source.name == "tests/tidy.rs" {
+            continue;
+        }
+        for (i, line) in source.text.lines().enumerate() {
+            let place = format!("{}:{}: {}", source.name, i + 1, line.trim());
+            if UNFINISHED.iter().any(|word| line.contains(word)) {
+                found.push(place);
+            } else if MACHINE.iter().any(|path| line.contains(path)) {
+                found.push(place);
+            }
+        }
+    }
+    for extension in ["toml", "md", "json", "py"] {
+        for source in sources(&["configs", "docs", "tests/problems", "cli", ".ci"], extension) {
+            for (i, line) in source.text.lines().enumerate() {
+                if MACHINE.iter().any(|path| line.contains(path)) {
+                    found.push(format!("{}:{}: {}", source.name, i + 1, line.trim()));
+                }
+            }
+        }
+    }
+    none(&found, "unfinished, or with a path of one machine");
+}
+
+#[test]
+fn nothing_is_unsafe() {
+    let mut found = Vec::new();
+    for source in rust().iter().filter(|source| source.name != "core/src/plugin/abi.rs") {
+        for (i, line) in source.program() {
+            let words = line.split(|c: char| !c.is_alphanumeric() && c != '_');
+            if words.into_iter().any(|word| word == "unsafe") && source.name != "tests/tidy.rs" {
+                found.push(format!("{}:{i}: {}", source.name, line.trim()));
+            }
+        }
+    }
+    none(&found, "`unsafe` outside `core/src/plugin/abi.rs`");
+}
+
+/// The names after `dependencies]` of a manifest.
+fn dependencies(krate: &str) -> Vec<String> {
+    let path = root().join(krate).join("Cargo.toml");
+    let manifest: toml::Table = fs::read_to_string(path).unwrap().parse().unwrap();
+    let table = manifest.get("dependencies").and_then(|d| d.as_table());
+    table.map_or(Vec::new(), |table| table.keys().cloned().collect())
+}
+
+#[test]
+fn crates_depend_one_way() {
+    for (krate, above) in [
+        ("core/linalg", &["lacuna", "lacuna-plugins", "lacuna-cli"][..]),
+        ("core", &["lacuna-plugins", "lacuna-cli"]),
+        ("plugins", &["lacuna-cli"]),
+    ] {
+        let found = dependencies(krate);
+        let wrong: Vec<&String> = found.iter().filter(|d| above.contains(&d.as_str())).collect();
+        assert!(wrong.is_empty(), "{krate} depends on {wrong:?}");
+    }
+}
+
+/// The modules of the core that a line uses.
+fn used(line: &str) -> Vec<&str> {
+    let after = line.split("crate::").skip(1);
+    let word = |rest: &'static str| rest;
+    let _ = word;
+    after
+        .map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap_or(""))
+        .collect()
+}
+
+#[test]
+fn modules_of_the_core_depend_one_way() {
+    let rank = |module: &str| LAYERS.iter().position(|layer| *layer == module);
+    let mut found = Vec::new();
+    for source in sources(&["core/src"], "rs").iter().filter(|source| !source.is_test()) {
+        let inside = source.name.strip_prefix("core/src/").unwrap();
+        let module = inside.split(['/', '.']).next().unwrap();
+        if module == "lib" {
+            continue;
+        }
+        let own = rank(module).unwrap_or_else(|| panic!("`{module}` is in no layer"));
+        for (i, line) in source.program() {
+            for other in used(line) {
+                let allowed = UPWARD.iter().any(|(from, to, _)| *from == module && *to == other);
+                if rank(other).is_some_and(|other| other < own) && !allowed {
+                    found.push(format!("{}:{i}: {}", source.name, line.trim()));
+                }
+            }
+        }
+    }
+    none(&found, "uses that go up a layer");
+}
+
+#[test]
+fn the_core_names_no_plugin() {
+    let kinds = lacuna::plugin::registry::kinds();
+    let names: Vec<&str> =
+        kinds.iter().flat_map(|kind| kind.plugins()).map(|plugin| plugin.name).collect();
+    assert!(names.len() > 8, "{names:?}");
+    let mut found = Vec::new();
+    for source in sources(&["core/src"], "rs").iter().filter(|source| !source.is_test()) {
+        for (i, line) in source.program() {
+            let named = names.iter().find(|name| {
+                // A quoted whole word: `"local"`, or a name in backticks or quotes inside a message.
+                ["\"", "`", "\\\""].iter().any(|quote| line.contains(&format!("{quote}{name}{quote}")))
+            });
+            // The engine's one choice: the executor of a study that names none.
+            let default = source.name == "core/src/study/resolve.rs" && line.contains("\"executor\"");
+            if let Some(name) = named
+                && !default
+            {
+                found.push(format!("{}:{i}: names `{name}`: {}", source.name, line.trim()));
+            }
+        }
+    }
+    none(&found, "the core names plugins");
+}
