@@ -22,6 +22,7 @@ for name in names:
     draws = data.posterior[name].values
     error = abs(draws.mean() - told["mean"]) / told["sd"]
     assert error < 1e-9, (name, draws.mean(), told["mean"])
+    assert 0 < told["mcse_mean"] < told["sd"], (name, told["mcse_mean"], told["sd"])
     for key, computed in (
         ("r_hat", arviz.rhat(draws)),
         ("ess_bulk", arviz.ess(draws)),
