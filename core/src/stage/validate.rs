@@ -73,8 +73,14 @@ pub fn stage(
     observer.begin("validate", "run", cases + study.validate.emulator_check as u64);
     let kept = run.keep("6-validate", &inputs, observer, |_| {
         let parts = Parts::of(study, measured, known)?;
-        let work =
-            Work { study, measured, emulator: known.emulator, simulator, rerun, progress: Progress::new(observer) };
+        let work = Work {
+            study,
+            measured,
+            emulator: known.emulator,
+            simulator,
+            rerun,
+            progress: Progress::new(observer),
+        };
         work.validate(&calibrated.value, parts.likelihood())
     })?;
     for failure in &kept.value.failed {
