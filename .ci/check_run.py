@@ -12,8 +12,8 @@ assert summary["schema"] == 1, summary["schema"]
 data = arviz.from_netcdf(run / "posterior.nc")
 for group in ("posterior", "sample_stats", "observed_data"):
     assert group in data.groups(), (group, data.groups())
-names = list(data.posterior.data_vars)
-assert names == list(summary["parameters"]), names
+names = sorted(data.posterior.data_vars)
+assert names == sorted(summary["parameters"]), names
 chains, steps = summary["chains"]["count"], summary["chains"]["steps"]
 kept = steps - summary["chains"]["burn_in"]
 assert dict(data.posterior.sizes) == {"chain": chains, "draw": kept}, data.posterior.sizes
@@ -22,6 +22,7 @@ for name in names:
     draws = data.posterior[name].values
     error = abs(draws.mean() - told["mean"]) / told["sd"]
     assert error < 1e-9, (name, draws.mean(), told["mean"])
+    assert 0 < told["mcse_mean"] < told["sd"], (name, told["mcse_mean"], told["sd"])
     for key, computed in (
         ("r_hat", arviz.rhat(draws)),
         ("ess_bulk", arviz.ess(draws)),

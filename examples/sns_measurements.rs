@@ -39,7 +39,7 @@ const GAUGES: [(&str, usize, f64); 10] = [
 ];
 /// Faulty curves: pulse, gauge, standard deviation of the white noise in microstrain.
 const FAULTY: [(usize, &str, f64); 4] =
-    [(7, "B", 160.0), (12, "T", 140.0), (12, "V", 120.0), (18, "U", 170.0)];
+    [(7, "B", 160.0), (12, "T", 140.0), (12, "V", 120.0), (9, "U", 170.0)];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mercury = Mercury { density: 12_112.1, sound_speed: 1850.4, tensile_cutoff: 6.45e4 };
@@ -72,7 +72,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                     Some((_, _, sd)) => sd * normal(&mut own),
                     None => 1e6 * gain * at(&truth[row], time - shift) + noise * normal(&mut own),
                 };
-                writeln!(text, "{pulse},{gauge},{:.5},{strain:.2}", time)?;
+                writeln!(text, "{pulse},{gauge},{time:.5},{strain:.2}")?;
             }
         }
     }

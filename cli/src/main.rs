@@ -5,6 +5,8 @@ mod new;
 mod plugins;
 mod progress;
 mod study;
+#[cfg(test)]
+mod tests;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -19,7 +21,7 @@ use lacuna_plugins as _;
 /// trains the surrogate on simulation runs, infers the model's parameters with their uncertainty,
 /// validates, and writes a report.
 #[derive(Parser)]
-#[command(version, about, max_term_width = 100)]
+#[command(version, max_term_width = 100)]
 struct Arguments {
     #[command(subcommand)]
     verb: Verb,

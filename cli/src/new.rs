@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use lacuna::run::{Stop, files};
+use lacuna::study::emit;
 
 use crate::{Failure, print};
 
@@ -24,6 +25,8 @@ pub fn write(what: &What) -> Result<(), Failure> {
 }
 
 const STUDY: &str = include_str!("new/study.toml");
+/// What the skeleton calls itself; the folder's name takes its place.
+const NAME: &str = "\"oscillator\"";
 const RUNS: &str = include_str!("new/runs.csv");
 const RESPONSES: &str = include_str!("new/responses.csv");
 const MEASURED: &str = include_str!("new/measured.csv");
@@ -33,8 +36,10 @@ fn study(folder: &Path) -> Result<(), Failure> {
         let stop = Stop::new(format!("{} is there already", folder.display()));
         return Err(stop.help("choose another name").into());
     }
+    let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let named = STUDY.replace(NAME, &emit::string(&name));
     let all = [
-        ("study.toml", STUDY),
+        ("study.toml", named.as_str()),
         ("runs.csv", RUNS),
         ("responses.csv", RESPONSES),
         ("measured.csv", MEASURED),

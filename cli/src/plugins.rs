@@ -43,10 +43,38 @@ fn unknown(what: &str, name: &str, near: Option<&str>, known: &str) -> Failure {
 fn overview(kind: &KindEntry) {
     let sections: Vec<String> = kind.sections.iter().map(|s| format!("[{s}]")).collect();
     print(&format!("{}  {}", kind.name, sections.join(" ")));
-    for plugin in kind.plugins() {
-        let title = plugin.manual().map(|manual| manual.title).unwrap_or_default();
-        print(&format!("  {:<28} {title}", plugin.name));
+    let plugins = kind.plugins();
+    if plugins.is_empty() {
+        print("  none is installed");
     }
+    for plugin in plugins {
+        let title = plugin.manual().map(|manual| manual.title).unwrap_or_default();
+        let lines = wrapped(&title, LINE - COLUMN);
+        let first = lines.first().map_or("", String::as_str);
+        print(&format!("  {:<1$}{first}", plugin.name, COLUMN - 2));
+        for line in lines.iter().skip(1) {
+            print(&format!("{:COLUMN$}{line}", ""));
+        }
+    }
+}
+
+/// The longest line of the list, and where the second column begins.
+const LINE: usize = 100;
+const COLUMN: usize = 30;
+
+/// Words on lines of at most `width` characters.
+fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= width => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
 }
 
 fn manual(listing: &Listing, markdown: bool) {

@@ -102,7 +102,10 @@ fn bar(stage: &str, unit: &str, total: u64) -> ProgressBar {
 fn plain_line(current: &Current, first: u64, done: u64) -> String {
     let seconds = current.begun.elapsed().as_secs_f64();
     let rate = done.saturating_sub(first) as f64 / seconds.max(1e-9);
-    let left = current.total.saturating_sub(done) as f64 / rate.max(1e-9);
     let Current { stage, unit, total, .. } = current;
+    if rate == 0.0 {
+        return format!("{stage}: {done}/{total} {unit}s");
+    }
+    let left = total.saturating_sub(done) as f64 / rate;
     format!("{stage}: {done}/{total} {unit}s, {rate:.1} {unit}s/s, {left:.0} s left")
 }

@@ -58,17 +58,11 @@ pub fn report(folder: &Path) -> Result<(), Failure> {
 fn load(path: &Path, settings: &Settings) -> Result<Study, Failure> {
     let checked = resolve::load(path, &settings.set);
     let complaints = checked.complaints();
-    match checked.study {
-        Some(study) => Ok(study),
-        None => {
-            let count = checked.problems.sorted().len();
-            let plural = if count == 1 { "" } else { "s" };
-            Err(Failure::wrong(format!(
-                "{complaints}\n{count} problem{plural} in {}",
-                path.display()
-            )))
-        }
-    }
+    checked.study.ok_or_else(|| {
+        let count = checked.problems.sorted().len();
+        let plural = if count == 1 { "" } else { "s" };
+        Failure::wrong(format!("{complaints}\n{count} problem{plural} in {}", path.display()))
+    })
 }
 
 /// The study of a run directory: as it was resolved, so that `--set` arguments count.

@@ -15,8 +15,8 @@ use serde::{Deserialize, Serialize};
 /// as possible; `optimise = "correlation"` exchanges them so that the columns are as
 /// uncorrelated as possible. Both keep the Latin property.
 ///
-/// References: McKay, Beckman, Conover, Technometrics 21 (1979) 239; Morris and Mitchell, J. Stat. Plan.
-/// Inference 43 (1995) 381 (the criterion phi_p); Iman and Conover, Commun. Stat. B 11 (1982) 311.
+/// References: M. D. `McKay`, Beckman, Conover, Technometrics 21 (1979) 239; Morris and Mitchell, J. Stat. Plan.
+/// Inference 43 (1995) 381 (the criterion `phi_p`); Iman and Conover, Commun. Stat. B 11 (1982) 311.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LatinHypercube {

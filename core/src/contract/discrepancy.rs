@@ -56,7 +56,7 @@ fn data() -> Measurements {
         let mut rng = Stream::root(7).at(r as u64).generator();
         let value = |(i, y): (usize, &f64)| {
             let measured = y + 0.2 * normal(&mut rng);
-            (i != UNMEASURED && (r == 0 || (i + r) % 3 != 0)).then_some(measured)
+            (i != UNMEASURED && (r == 0 || !(i + r).is_multiple_of(3))).then_some(measured)
         };
         let values = truth().iter().enumerate().map(value).collect();
         Replicate { name: format!("p{r}"), scenario: Scenario::default(), values }

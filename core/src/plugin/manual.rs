@@ -43,8 +43,10 @@ pub struct OptionManual {
 /// One value to choose from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
-    /// As a study writes it: `"leave_one_out"` or `{ uniform = … }`.
+    /// As a study writes it: `"leave_one_out"` or `{ uniform = … }`; or in words: `a table`.
     pub written: String,
+    /// Whether it is written like this, not in words.
+    pub literal: bool,
     /// Its documentation.
     pub text: String,
 }

@@ -100,7 +100,7 @@ pub struct SurrogateFindings {
     pub loo: f64,
     /// The same figures for each group: name, mean absolute error, root mean square error, leave-one-out.
     pub by_group: Vec<(String, f64, f64, f64)>,
-    /// Root mean square difference between the emulator and the model at posterior draws, with their number.
+    /// Root mean square error at posterior draws where the model was run anew, with their number.
     pub near_posterior: Option<(f64, usize)>,
     /// Validation pairs (simulated, emulated) for a scatter plot, thinned to a few thousand.
     pub pairs: Vec<(f64, f64)>,

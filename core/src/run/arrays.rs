@@ -58,13 +58,12 @@ fn encode(
     for array in arrays {
         let mut dimensions = Vec::new();
         for (name, length) in &array.dimensions {
-            let id = match known.iter().find(|(known, _)| known == name) {
-                Some((_, id)) => *id,
-                None => {
-                    let id = builder.add_dimension(name, *length as u64)?;
-                    known.push((name.clone(), id));
-                    id
-                }
+            let id = if let Some((_, id)) = known.iter().find(|(known, _)| known == name) {
+                *id
+            } else {
+                let id = builder.add_dimension(name, *length as u64)?;
+                known.push((name.clone(), id));
+                id
             };
             dimensions.push(id);
         }
@@ -74,7 +73,7 @@ fn encode(
         }
         builder.write_variable(variable, &array.values)?;
     }
-    let options = NcWriteOptions { format: NcWriteFormat::Offset64, ..NcWriteOptions::default() };
+    let options = NcWriteOptions { format: NcWriteFormat::Offset64 };
     Ok(builder.to_vec(options)?.1)
 }
 

@@ -18,12 +18,9 @@ use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
 use crate::study::Study;
 use crate::study::file::Start;
 
-use super::common_error;
-use super::numerical_error::NumericalError;
-use super::read::{Data, Measured};
+use super::read::Measured;
 use super::sampling::{self, Sampled};
-use super::stream;
-use super::surrogate::Fitted;
+use super::{Known, common_error, stream};
 
 /// The posterior as draws, with its maximum.
 #[derive(Debug, Clone, PartialEq)]
@@ -120,22 +117,17 @@ pub struct Parts {
 
 impl Parts {
     /// The likelihood of the study's measurements, with the common errors that the study wants.
-    pub fn of(
-        study: &Study,
-        measured: &Measured,
-        fitted: &Fitted,
-        numerics: Option<&Kept<NumericalError>>,
-    ) -> Result<Self, Stop> {
+    pub fn of(study: &Study, measured: &Measured, known: &Known<'_>) -> Result<Self, Stop> {
         let section =
             study.discrepancy.as_ref().ok_or_else(|| Stop::new("the study has no discrepancy"))?;
         let mut common = Vec::new();
         if section.common.emulator_error {
-            common.push(fitted.covariance(study)?);
+            common.push(known.fitted.value.covariance(study)?);
         }
         if section.common.replicate_error {
             common.extend(common_error::of_replicates(&measured.used));
         }
-        common.extend(numerics.map(|kept| kept.value.common_error()));
+        common.extend(known.numerics.map(|kept| kept.value.common_error()));
         let likelihood = section.built.plugin.likelihood(&measured.likelihood, &common)?;
         Ok(Self { likelihood })
     }
@@ -155,32 +147,29 @@ impl Parts {
 /// Draws from the posterior; `None` when the study has no measurements.
 pub fn stage(
     study: &Study,
-    data: &Kept<Data>,
-    fitted: &Kept<Fitted>,
-    numerics: Option<&Kept<NumericalError>>,
-    emulator: &dyn Emulator,
+    known: &Known<'_>,
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Option<Kept<Calibrated>>, Stop> {
     let (Some(measured), Some(section), Some(discrepancy)) =
-        (&data.value.measured, &study.sampler, &study.discrepancy)
+        (&known.data.value.measured, &study.sampler, &study.discrepancy)
     else {
         return Ok(None);
     };
     let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.prior, p.reference)).collect();
     let effects: Vec<_> = study.effects.iter().map(|e| (e.built.name, &e.built.options)).collect();
     let inputs = json!([
-        data.hash,
-        fitted.hash,
-        numerics.map(|n| &n.hash),
+        known.data.hash,
+        known.fitted.hash,
+        known.numerics.map(|n| &n.hash),
         laws,
         (discrepancy.built.name, &discrepancy.built.options, &discrepancy.common),
         effects,
         (section.built.name, &section.built.options, &section.common),
         study.about.seed
     ]);
-    let parts = Parts::of(study, measured, &fitted.value, numerics)?;
-    let posterior = parts.posterior(study, emulator);
+    let parts = Parts::of(study, measured, known)?;
+    let posterior = parts.posterior(study, known.emulator);
     let plan = section.built.plugin.plan(posterior.dimension());
     observer.begin("calibrate", "step", plan.steps as u64);
     let kept = run.keep("5-calibrate", &inputs, observer, |folder| {
@@ -233,21 +222,23 @@ fn calibrate(
         .map(|m| (posterior.natural(&m.point), m.value))
         .collect();
     let burn_in = (section.common.burn_in.get() * plan.steps as f64).floor() as usize;
-    let kept = sampled.draws.after_burn_in(section.common.burn_in.get());
+    let best_draw = best_draw(posterior, &sampled);
+    let draws = natural(posterior, sampled.draws);
+    let kept = draws.after_burn_in(section.common.burn_in.get());
     let diagnosis = Diagnosis::of(&kept, plan.ensemble);
     let outcome = Outcome {
         coordinates,
         map: posterior.natural(&best.point),
         map_log_density: best.value,
         other_maxima,
-        best_draw: best_draw(posterior, &sampled),
+        best_draw,
         burn_in,
         acceptance: sampled.acceptance,
         diagnosis,
         evaluations: sampled.evaluations,
         facts: section.built.plugin.facts(),
     };
-    Ok(Calibrated { draws: natural(posterior, sampled.draws), outcome })
+    Ok(Calibrated { draws, outcome })
 }
 
 fn coordinates(study: &Study, posterior: &Posterior<'_>) -> Vec<Coordinate> {

@@ -32,7 +32,7 @@ pub fn encode(
     if let Some(validated) = validated {
         file.predictive(&study.layout, &validated.value)?;
     }
-    let options = NcWriteOptions { format: NcWriteFormat::Nc4, ..NcWriteOptions::default() };
+    let options = NcWriteOptions { format: NcWriteFormat::Nc4 };
     Ok(file.builder.to_vec(options)?.1)
 }
 

@@ -17,9 +17,14 @@ pub mod surrogate;
 pub mod validate;
 
 use crate::math::random::Stream;
+use crate::plugin::Emulator;
 use crate::report::findings::Findings;
-use crate::run::{Observer, RunDirectory, Stop};
+use crate::run::{Kept, Observer, RunDirectory, Stop};
 use crate::study::Study;
+
+use numerical_error::NumericalError;
+use read::Data;
+use surrogate::Fitted;
 
 /// Runs a study: what is kept and unchanged is taken, the rest is made.
 pub fn run(
@@ -33,16 +38,25 @@ pub fn run(
     let data = read::stage(study, simulated.as_ref(), run, observer)?;
     let (fitted, emulator) = surrogate::stage(study, &data, run, observer)?;
     let numerics = numerical_error::stage(study, design.as_ref(), &data, run, observer)?;
-    let (emulator, numerics) = (&*emulator, numerics.as_ref());
-    let calibrated = calibrate::stage(study, &data, &fitted, numerics, emulator, run, observer)?;
-    let calibrated = calibrated.as_ref();
-    let validated =
-        validate::stage(study, &data, &fitted, numerics, emulator, calibrated, run, observer)?;
-    let validated = validated.as_ref();
-    let all = report::Artifacts { data: &data, fitted: &fitted, emulator, calibrated, validated };
-    let findings = report::stage(study, &all, run)?;
+    let known =
+        Known { data: &data, fitted: &fitted, numerics: numerics.as_ref(), emulator: &*emulator };
+    let calibrated = calibrate::stage(study, &known, run, observer)?;
+    let validated = validate::stage(study, &known, calibrated.as_ref(), run, observer)?;
+    let findings = report::stage(study, &known, calibrated.as_ref(), validated.as_ref(), run)?;
     manifest::end(study, run)?;
     Ok(findings)
+}
+
+/// What is known before the posterior: the data, the emulator and its errors.
+pub struct Known<'a> {
+    /// The runs and the measurements.
+    pub data: &'a Kept<Data>,
+    /// The fitted surrogate with its errors.
+    pub fitted: &'a Kept<Fitted>,
+    /// The model's numerical error, if the study asks for it.
+    pub numerics: Option<&'a Kept<NumericalError>>,
+    /// The emulator.
+    pub emulator: &'a dyn Emulator,
 }
 
 /// The random stream of a stage.

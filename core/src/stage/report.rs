@@ -5,7 +5,6 @@ use crate::diagnose::Diagnosis;
 use crate::linalg::Matrix;
 use crate::math::fit;
 use crate::math::moments::{self, Moments};
-use crate::plugin::Emulator;
 use crate::report::findings::{
     CalibrationFindings, CoordinateFindings, EnsembleFindings, Findings, FittedDistribution,
     MeasuredFindings, SurrogateFindings,
@@ -15,34 +14,26 @@ use crate::run::{Kept, RunDirectory, Stop, files};
 use crate::study::Study;
 
 use super::calibrate::Calibrated;
-use super::inference_data;
 use super::read::{Data, Measured};
-use super::surrogate::Fitted;
 use super::validate::Validated;
-
-/// The artifacts of all stages.
-pub struct Artifacts<'a> {
-    /// What was read.
-    pub data: &'a Kept<Data>,
-    /// The surrogate.
-    pub fitted: &'a Kept<Fitted>,
-    /// The emulator.
-    pub emulator: &'a dyn Emulator,
-    /// The posterior.
-    pub calibrated: Option<&'a Kept<Calibrated>>,
-    /// The validation.
-    pub validated: Option<&'a Kept<Validated>>,
-}
+use super::{Known, inference_data};
 
 /// Writes report, summary and posterior file; returns the findings.
-pub fn stage(study: &Study, all: &Artifacts<'_>, run: &RunDirectory) -> Result<Findings, Stop> {
-    let findings = findings(study, all, run);
+pub fn stage(
+    study: &Study,
+    known: &Known<'_>,
+    calibrated: Option<&Kept<Calibrated>>,
+    validated: Option<&Kept<Validated>>,
+    run: &RunDirectory,
+) -> Result<Findings, Stop> {
+    let all = Artifacts { known, calibrated, validated };
+    let findings = findings(study, &all, run);
     let root = run.root();
     files::write_atomic(&root.join("summary.json"), summary_json(&findings).as_bytes())?;
     let page = render(&findings);
     files::write_atomic(&run.stage_folder("8-report").join("report.html"), page.as_bytes())?;
     files::write_atomic(&root.join("report.html"), page.as_bytes())?;
-    if let (Some(calibrated), Some(measured)) = (all.calibrated, &all.data.value.measured) {
+    if let (Some(calibrated), Some(measured)) = (all.calibrated, &all.known.data.value.measured) {
         let bytes = inference_data::encode(study, &calibrated.value, measured, all.validated)
             .map_err(|error| Stop::new(format!("cannot write posterior.nc: {error}")))?;
         files::write_atomic(&root.join("posterior.nc"), &bytes)?;
@@ -50,8 +41,15 @@ pub fn stage(study: &Study, all: &Artifacts<'_>, run: &RunDirectory) -> Result<F
     Ok(findings)
 }
 
+/// The artifacts of all stages.
+struct Artifacts<'a> {
+    known: &'a Known<'a>,
+    calibrated: Option<&'a Kept<Calibrated>>,
+    validated: Option<&'a Kept<Validated>>,
+}
+
 fn findings(study: &Study, all: &Artifacts<'_>, run: &RunDirectory) -> Findings {
-    let data = &all.data.value;
+    let data = &all.known.data.value;
     let measured = data.measured.as_ref();
     let calibration = all.calibrated.map(|c| calibration(&c.value));
     let validation =
@@ -120,8 +118,8 @@ fn measurements(study: &Study, measured: &Measured) -> MeasuredFindings {
 }
 
 fn surrogate(all: &Artifacts<'_>) -> SurrogateFindings {
-    let errors = &all.fitted.value.errors;
-    let sobol = all.emulator.sensitivity().map(|s| {
+    let errors = &all.known.fitted.value.errors;
+    let sobol = all.known.emulator.sensitivity().map(|s| {
         let total = s.aggregated.total.row(0).iter();
         s.aggregated.first.row(0).iter().zip(total).map(|(f, t)| (*f, *t)).collect()
     });
@@ -218,12 +216,12 @@ fn warnings(
     let mut warnings = Vec::new();
     if let Some(c) = calibration {
         if !c.converged {
-            warnings.push(format!("The sampler has not converged: {}.", c.verdict));
+            warnings.push(format!("the sampler has not converged: {}", c.verdict));
         }
         if !c.stranded.is_empty() {
             let list: Vec<String> = c.stranded.iter().map(ToString::to_string).collect();
             warnings.push(format!(
-                "{} of {} walkers are stranded far below the bulk of the density: {}.",
+                "{} of {} walkers are stranded far below the bulk of the density: {}",
                 c.stranded.len(),
                 c.chains,
                 list.join(", ")
@@ -232,13 +230,13 @@ fn warnings(
     }
     if !data.ensemble.failed.is_empty() {
         let count = data.ensemble.failed.len();
-        warnings.push(format!("{count} simulation runs have no usable response and are left out."));
+        warnings.push(format!("{count} simulation runs have no usable response and are left out"));
     }
     if let Some(others) = all.calibrated.map(|c| c.value.outcome.other_maxima.len())
         && others > 0
     {
         warnings.push(format!(
-            "The posterior has {others} further local maxima within ten of the best log density."
+            "the posterior has {others} further local maxima within ten of the best log density"
         ));
     }
     warnings.extend(all.validated.iter().flat_map(|v| v.value.failed.clone()));

@@ -113,8 +113,7 @@ pub fn stage(
 fn split(study: &Study, ensemble: &Ensemble) -> Result<(usize, usize), Stop> {
     let common = study.surrogate.as_ref().map(|s| s.common.clone()).unwrap_or_default();
     let (runs, validation) = (ensemble.runs.len(), common.validation);
-    let training =
-        common.training.map_or_else(|| runs.saturating_sub(validation), |count| count.get());
+    let training = common.training.map_or_else(|| runs.saturating_sub(validation), usize::from);
     // Runs that failed and may be left out come off the training set, never off the runs kept aside.
     let lost = ensemble.failed.len();
     let training = training.min(runs.saturating_sub(validation)).max(training.saturating_sub(lost));

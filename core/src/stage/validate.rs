@@ -17,12 +17,10 @@ use crate::study::Study;
 use crate::study::file::Against;
 
 use super::calibrate::{Calibrated, Parts};
-use super::numerical_error::NumericalError;
-use super::read::{Data, Measured};
+use super::read::Measured;
 use super::screen::Z975;
 use super::simulator::Simulator;
-use super::stream;
-use super::surrogate::Fitted;
+use super::{Known, stream};
 
 /// What the validation found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -52,20 +50,17 @@ impl Artifact for Validated {
 /// Compares the calibrated model with the data; `None` without a calibration.
 pub fn stage(
     study: &Study,
-    data: &Kept<Data>,
-    fitted: &Kept<Fitted>,
-    numerics: Option<&Kept<NumericalError>>,
-    emulator: &dyn Emulator,
+    known: &Known<'_>,
     calibrated: Option<&Kept<Calibrated>>,
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Option<Kept<Validated>>, Stop> {
-    let (Some(calibrated), Some(measured)) = (calibrated, &data.value.measured) else {
+    let (Some(calibrated), Some(measured)) = (calibrated, &known.data.value.measured) else {
         return Ok(None);
     };
     let inputs = json!([
-        data.hash,
-        fitted.hash,
+        known.data.hash,
+        known.fitted.hash,
         calibrated.hash,
         study.validate,
         study.model.as_ref().map(|m| (m.built.name, &m.built.options, &m.common)),
@@ -77,9 +72,15 @@ pub fn stage(
     let cases = 1 + u64::from(study.validate.against.is_some());
     observer.begin("validate", "run", cases + study.validate.emulator_check as u64);
     let kept = run.keep("6-validate", &inputs, observer, |_| {
-        let parts = Parts::of(study, measured, &fitted.value, numerics)?;
-        let work =
-            Work { study, measured, emulator, simulator, rerun, progress: Progress::new(observer) };
+        let parts = Parts::of(study, measured, known)?;
+        let work = Work {
+            study,
+            measured,
+            emulator: known.emulator,
+            simulator,
+            rerun,
+            progress: Progress::new(observer),
+        };
         work.validate(&calibrated.value, parts.likelihood())
     })?;
     for failure in &kept.value.failed {
@@ -92,6 +93,15 @@ pub fn stage(
 fn summary(validated: &Validated) -> String {
     let accuracy = validated.cases.iter().map(|c| format!("{} {:.1} %", c.name, 100.0 * c.average));
     format!("accuracy: {}", accuracy.collect::<Vec<_>>().join(", "))
+}
+
+/// What a new replicate is expected to be.
+#[derive(Default)]
+struct Prediction {
+    /// The ends of its 95 % band.
+    band: Option<(Vec<f64>, Vec<f64>)>,
+    /// Its standard deviation by origin.
+    spread: Vec<(String, f64)>,
 }
 
 struct Work<'a> {
@@ -122,8 +132,8 @@ impl Work<'_> {
         );
         let random = stream(self.study, "validate");
         let emulator_at_posterior = self.check_emulator(&draws, &mut failed)?;
-        let (predictive, spread) = self.predict(calibrated, &draws, likelihood, &random);
-        Ok(Validated { cases, predictive, spread, emulator_at_posterior, failed })
+        let Prediction { band, spread } = self.predict(calibrated, &draws, likelihood, &random);
+        Ok(Validated { cases, predictive: band, spread, emulator_at_posterior, failed })
     }
 
     fn case(
@@ -202,11 +212,11 @@ impl Work<'_> {
         draws: &Draws,
         likelihood: &dyn Likelihood,
         random: &Stream,
-    ) -> (Option<(Vec<f64>, Vec<f64>)>, Vec<(String, f64)>) {
+    ) -> Prediction {
         let d = self.study.parameters.len();
         let own = likelihood.hyperparameters().len();
         if draws.is_empty() {
-            return (None, Vec::new());
+            return Prediction::default();
         }
         let points = draws.points();
         let count = PREDICTED.min(draws.len());
@@ -245,7 +255,7 @@ impl Work<'_> {
             spread.push(("replicates".to_owned(), moments::mean(&sds).sqrt()));
         }
         debug_assert!(d + own <= map.len());
-        (Some((ends(0.025), ends(0.975))), spread)
+        Prediction { band: Some((ends(0.025), ends(0.975))), spread }
     }
 
     /// The emulated responses with the effects applied, natural units.

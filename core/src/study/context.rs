@@ -137,17 +137,16 @@ fn inputs(study: &Study, signature: &Signature, complaints: &mut Complaints<'_>)
     let listed = names().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");
     for parameter in &study.parameters {
         let path = format!("parameter.{}", parameter.name);
-        match signature.inputs.iter().find(|input| input.name == parameter.name) {
-            Some(input) => input_fits(parameter, input, &path, complaints),
-            None => {
-                let problem = complaints
-                    .at(&format!("{path}.name"))
-                    .say(format!("the model has no input `{}`", parameter.name))
-                    .expected(format!("one of {listed}"));
-                if let Some(near) = nearest(&parameter.name, names()) {
-                    problem.help(format!("did you mean `{near}`?"));
-                }
-            }
+        if let Some(input) = signature.inputs.iter().find(|input| input.name == parameter.name) {
+            input_fits(parameter, input, &path, complaints);
+            continue;
+        }
+        let problem = complaints
+            .at(&format!("{path}.name"))
+            .say(format!("the model has no input `{}`", parameter.name))
+            .expected(format!("one of {listed}"));
+        if let Some(near) = nearest(&parameter.name, names()) {
+            problem.help(format!("did you mean `{near}`?"));
         }
     }
     let fixed = study.model.as_ref().map(|model| &model.common.fixed);

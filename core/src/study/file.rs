@@ -260,7 +260,7 @@ pub struct Screen {
 
 impl Default for Screen {
     fn default() -> Self {
-        let threshold = Positive::new(5.0).unwrap_or_else(|_| unreachable!("5 is positive"));
+        let threshold = Positive::new(10.0).unwrap_or_else(|_| unreachable!("10 is positive"));
         Self { threshold, leave_out: true }
     }
 }

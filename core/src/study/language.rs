@@ -48,6 +48,7 @@ pub fn manual() -> Vec<Manual> {
         page::<MeasurementKeys>("[measurements]"),
         page::<SurrogateKeys>("[surrogate]"),
         page::<DiscrepancyKeys>("[discrepancy]"),
+        page::<NumericalErrorSection>("[numerical_error]"),
         page::<SamplerKeys>("[sampler]"),
         page::<ValidateSection>("[validate]"),
     ]

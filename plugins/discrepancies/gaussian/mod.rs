@@ -42,7 +42,7 @@ impl Component for Gaussian {
                 .at("variance")
                 .say("a variance is never negative")
                 .expected("a prior on positive values, such as `{ half_normal = 1e-6 }`")
-                .found(&self.variance.to_string());
+                .found(&self.variance);
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{Manual, OptionManual};
+use super::{Choice, Manual, OptionManual};
 
 /// Lines of plain text are kept below this many characters.
 const WIDTH: usize = 90;
@@ -44,17 +44,18 @@ impl Manual {
             return page;
         }
         page.push_str("\n| option | value | default | meaning |\n|---|---|---|---|\n");
-        for option in &self.options {
+        for (i, option) in self.options.iter().enumerate() {
             let default = match &option.default {
                 Some(default) => format!("`{default}`"),
                 None if option.required => "required".to_owned(),
                 None => String::new(),
             };
             let mut meaning = vec![one_line(&option.text)];
-            for choice in &option.choices {
-                let text = one_line(&choice.text);
-                let colon = if text.is_empty() { "" } else { ": " };
-                meaning.push(format!("• `{}`{colon}{text}", choice.written));
+            match self.options[..i].iter().find(|earlier| same_choices(earlier, option)) {
+                Some(earlier) => {
+                    meaning.push(format!("The choices are those of `{}`.", earlier.key));
+                }
+                None => meaning.extend(option.choices.iter().map(Choice::markdown)),
             }
             meaning.retain(|part| !part.is_empty());
             let cells = [format!("`{}`", option.key), option.kind.clone(), default];
@@ -63,6 +64,20 @@ impl Manual {
             let _ = writeln!(page, "| {cells} | {meaning} |");
         }
         page
+    }
+}
+
+/// Whether two options offer the same long list.
+fn same_choices(a: &OptionManual, b: &OptionManual) -> bool {
+    a.choices.len() > 3 && a.choices == b.choices
+}
+
+impl Choice {
+    fn markdown(&self) -> String {
+        let text = one_line(&self.text);
+        let colon = if text.is_empty() { "" } else { ": " };
+        let quote = if self.literal { "`" } else { "" };
+        format!("• {quote}{}{quote}{colon}{text}", self.written)
     }
 }
 

@@ -79,15 +79,15 @@ pub(super) fn choices(schema: &Map<String, Value>, generator: &SchemaGenerator) 
         let description = text(&case, "description").trim();
         if let Some(name) = case.get("const").and_then(Value::as_str) {
             let written = emit::string(name);
-            choices.push(Choice { written, text: description.to_owned() });
+            choices.push(Choice { written, literal: true, text: description.to_owned() });
         } else if case.contains_key("enum") {
             choices.extend(names(&case, description));
         } else if let Some((name, content)) = variant(&case, generator) {
             let written = format!("{{ {} = {} }}", emit::key(name), shape(&content));
-            choices.push(Choice { written, text: description.to_owned() });
+            choices.push(Choice { written, literal: true, text: description.to_owned() });
         } else {
             let written = kind(&case, generator);
-            choices.push(Choice { written, text: description.to_owned() });
+            choices.push(Choice { written, literal: false, text: description.to_owned() });
         }
     }
     choices
@@ -113,7 +113,11 @@ fn shape(schema: &Map<String, Value>) -> String {
 /// The names of an enum whose variants hold nothing.
 fn names(schema: &Map<String, Value>, description: &str) -> Vec<Choice> {
     let names = schema.get("enum").and_then(Value::as_array).into_iter().flatten();
-    let choice = |name: &Value| Choice { written: as_toml(name), text: description.to_owned() };
+    let choice = |name: &Value| Choice {
+        written: as_toml(name),
+        literal: true,
+        text: description.to_owned(),
+    };
     names.map(choice).collect()
 }
 

@@ -55,7 +55,8 @@ fn estimate(findings: &Findings, calibration: &CalibrationFindings) -> String {
 fn convergence(calibration: &CalibrationFindings) -> String {
     let outcome = if calibration.converged { "The chains converged" } else { "Not converged" };
     match calibration.verdict.trim_end_matches('.') {
-        "" => format!("{outcome}."),
+        "" | "converged" => format!("{outcome}."),
+        verdict if calibration.converged => format!("{outcome}; note: {verdict}."),
         verdict => format!("{outcome}: {verdict}."),
     }
 }

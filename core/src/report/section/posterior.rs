@@ -57,7 +57,7 @@ fn summary(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
          the draws after the burn-in; the MAP is the optimised maximum of the density. Numbers end \
          at the first digit of the Monte Carlo standard error (MCSE) of the mean.",
         "posterior, given this model and this discrepancy: doubt about the form of either is not in it.",
-        "R-hat above 1.01, effective sample sizes (ESS) below some hundreds.",
+        "R-hat above 1.1 for the walkers of an ensemble or 1.01 for independent chains, effective sample sizes (ESS) below some hundreds.",
     );
     numbers.table(&posterior_table(calibration), &caption)
 }

@@ -28,7 +28,9 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
     let content = html! {
         p.verdict.good[calibration.converged] {
             b { @if calibration.converged { "Converged. " } @else { "Not converged. " } }
-            (paragraph(calibration.verdict.trim_end_matches('.'))) "."
+            @if calibration.verdict != "converged" {
+                (paragraph(calibration.verdict.trim_end_matches('.'))) "."
+            }
         }
         (fact_list(&facts(calibration)))
         @if !calibration.acceptance.is_empty() { (acceptance(calibration, numbers)) }

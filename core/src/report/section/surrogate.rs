@@ -18,7 +18,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
             "Trained on " b { (count(surrogate.training)) } " runs and checked on "
             (count(surrogate.validation)) " that it had not seen."
             @if let Some((error, runs)) = surrogate.near_posterior {
-                " Near the posterior (" (count(runs)) " runs) its leave-one-out error is "
+                " At " (count(runs)) " posterior draws where the model was run anew its error is "
                 b { (unit.text(error, 3)) } " root mean square: this, not the error over the whole \
                 design, is what the calibration feels."
             }
