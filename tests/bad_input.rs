@@ -96,9 +96,9 @@ fn a_missing_file_is_found_before_anything_runs() {
     assert_eq!(found, expected);
     fs::remove_file(folder.path().join("responses.csv")).unwrap();
     let expected = "\
-DIR/study.toml:30:13: there is no file `DIR/responses.csv`
+DIR/study.toml:31:13: there is no file `DIR/responses.csv`
    |
-30 | responses = \"responses.csv\"
+31 | responses = \"responses.csv\"
    |             ^^^^^^^^^^^^^^^
 ";
     assert_eq!(complaints(folder.path(), &[]), expected);
