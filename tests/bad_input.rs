@@ -94,12 +94,13 @@ fn a_missing_file_is_found_before_anything_runs() {
   |                   ^^^^^^^^^^^^^
 ";
     assert_eq!(found, expected);
-    fs::remove_file(folder.path().join("responses.csv")).unwrap();
+    let folder = imported();
+    fs::remove_file(folder.path().join("strain.csv")).unwrap();
     let expected = "\
-DIR/study.toml:31:13: there is no file `DIR/responses.csv`
+DIR/study.toml:39:8: there is no file `DIR/strain.csv`
    |
-31 | responses = \"responses.csv\"
-   |             ^^^^^^^^^^^^^^^
+39 | path = \"strain.csv\"
+   |        ^^^^^^^^^^^^
 ";
     assert_eq!(complaints(folder.path(), &[]), expected);
 }
@@ -212,7 +213,8 @@ fn numbers_that_are_none_are_refused_in_measurements() {
         ran.unwrap_or_else(|stop| panic!("{stop}"));
         quick::summary(&out)["data"]["count"].as_u64().unwrap()
     };
-    assert_eq!((count("0.5"), count("NaN"), count("")), (120, 119, 119));
+    let all = text.lines().count() as u64 - 1;
+    assert_eq!((count("0.5"), count("NaN"), count("")), (all, all - 1, all - 1));
 }
 
 #[test]

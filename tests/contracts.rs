@@ -4,6 +4,8 @@
 //! tables below fails here. In a binary of its own, because it registers an effect, which the
 //! generated documentation must not list.
 
+#[path = "contracts/faults.rs"]
+mod faults;
 #[path = "contracts/gain.rs"]
 mod gain;
 
