@@ -104,19 +104,10 @@ fn discrepancies() {
 
 #[test]
 fn samplers() {
-    let table: &Table = &[(
-        "affine_invariant_ensemble",
-        &[
-            "walkers = 40",
-            "walkers = 20\nupdate = \"sequential\"",
-            "walkers = 20\nsteps=4000\nupdate = \"sequential\"",
-            "walkers = 20\nsteps=4000",
-            "walkers = 20\nsteps=2000",
-            "walkers = 20\nsteps=2000\nupdate = \"sequential\"",
-            "walkers = 40\nsteps=4000\nupdate = \"sequential\"",
-            "walkers = 40\nupdate = \"sequential\"",
-        ],
-    )];
+    // With fewer steps the suite's own Monte Carlo error is too rough to judge by.
+    let options =
+        &["walkers = 40\nsteps = 2000", "walkers = 20\nsteps = 2000\nupdate = \"sequential\""];
+    let table: &Table = &[("affine_invariant_ensemble", options)];
     all::<dyn Sampler>(table, |case, plugin| contract::sampler(&case.label, plugin));
 }
 

@@ -37,7 +37,10 @@ fn kill_when(command: &mut Command, now: impl Fn() -> bool) {
     while !now() {
         if let Some(status) = child.try_wait().unwrap() {
             let output = child.wait_with_output().unwrap();
-            panic!("ended before it could be killed: {status}\n{}", String::from_utf8_lossy(&output.stderr));
+            panic!(
+                "ended before it could be killed: {status}\n{}",
+                String::from_utf8_lossy(&output.stderr)
+            );
         }
         assert!(begun.elapsed() < Duration::from_secs(120), "the moment does not come");
         std::thread::sleep(Duration::from_millis(1));

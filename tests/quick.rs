@@ -30,7 +30,8 @@ pub fn simulated() -> TempDir {
         let time: f64 = cells[2].parse().unwrap_or(0.0);
         ["sensor", "B", "C", "U"].contains(&cells[1]) && time < 2.05e-4
     };
-    let some: Vec<&str> = all.lines().filter(|line| !line.starts_with('#')).filter(wanted).collect();
+    let some: Vec<&str> =
+        all.lines().filter(|line| !line.starts_with('#')).filter(wanted).collect();
     fs::write(folder.path().join("strain.csv"), some.join("\n") + "\n").unwrap();
     folder
 }
@@ -89,9 +90,10 @@ pub fn run(path: &Path, settings: &[&str], out: &Path) -> Result<Ran, Stop> {
     let watch = Watch::default();
     let mut directory = RunDirectory::open(out)?;
     let findings = stage::run(&study, &mut directory, &watch)?;
-    let made = directory.records().iter().filter(|r| {
-        !before.contains(&(r.stage.clone(), r.inputs.clone(), r.seconds.to_bits()))
-    });
+    let made = directory
+        .records()
+        .iter()
+        .filter(|r| !before.contains(&(r.stage.clone(), r.inputs.clone(), r.seconds.to_bits())));
     let made = made.map(|r| r.stage.clone()).collect();
     Ok(Ran { findings, made, warnings: watch.warnings.into_inner().unwrap() })
 }

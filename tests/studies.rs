@@ -27,7 +27,8 @@ fn a_study_runs_from_nothing_to_its_report() {
     assert_eq!(bytes(&out.join("study.toml")), bytes(&folder.path().join("study.toml")));
     assert_eq!(bytes(&out.join("8-report/report.html")), bytes(&out.join("report.html")));
     let runs = fs::read_dir(out.join("2-simulate")).unwrap();
-    let histories = runs.filter(|e| e.as_ref().unwrap().path().extension().is_some_and(|e| e == "h"));
+    let histories =
+        runs.filter(|e| e.as_ref().unwrap().path().extension().is_some_and(|e| e == "h"));
     assert_eq!(histories.count(), 40);
     check_summary(&out);
     check_manifest(&out);

@@ -1,7 +1,7 @@
 //! The source keeps to the house rules that a compiler does not check.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::quick::root;
 
@@ -19,13 +19,31 @@ const UNFINISHED: [&str; 5] = ["TODO", "FIXME", "XXX", "todo!(", "unimplemented!
 /// Beginnings of paths on somebody's machine.
 const MACHINE: [&str; 6] = ["/home/", "/Users/", "/root/", "/work/", "/tmp/", "C:\\"];
 
-/// Modules of the core from the top down: each may use those after it, and itself.
-const LAYERS: [&str; 11] = [
-    "stage", "contract", "diagnose", "report", "posterior", "plugin", "study", "run", "data", "math", "linalg",
+/// Modules of the core from the top down: each may use those beside and below it.
+///
+/// A study chooses plugins and plugins complain about their part of a study; both stop with what a run
+/// says: these three are one layer.
+const LAYERS: [&[&str]; 9] = [
+    &["stage"],
+    &["contract"],
+    &["report"],
+    &["diagnose"],
+    &["posterior"],
+    &["plugin", "study", "run"],
+    &["data"],
+    &["math"],
+    &["linalg"],
 ];
 
 /// Uses that go up a layer, with the reason.
-const UPWARD: [(&str, &str, &str); 0] = [];
+const UPWARD: [(&str, &str, &str); 2] = [
+    (
+        "math/optimise",
+        "plugin",
+        "what is maximised is a `Target`, the density that samplers draw from",
+    ),
+    ("math/optimise", "run", "a density without a maximum stops the run"),
+];
 
 struct Source {
     /// From the root of the project, with forward slashes.
@@ -35,7 +53,9 @@ struct Source {
 
 impl Source {
     fn is_test(&self) -> bool {
-        self.name.starts_with("tests/") || self.name.contains("/tests/") || self.name.ends_with("/tests.rs")
+        self.name.starts_with("tests/")
+            || self.name.contains("/tests/")
+            || self.name.ends_with("/tests.rs")
     }
 
     /// The lines of the program itself with their numbers: no comments, nothing after `#[cfg(test)]` blocks begin.
@@ -158,18 +178,15 @@ fn crates_depend_one_way() {
 }
 
 /// The modules of the core that a line uses.
-fn used(line: &str) -> Vec<&str> {
-    let after = line.split("crate::").skip(1);
-    let word = |rest: &'static str| rest;
-    let _ = word;
-    after
-        .map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap_or(""))
-        .collect()
+fn used(line: &str) -> impl Iterator<Item = &str> {
+    line.split("crate::")
+        .skip(1)
+        .filter_map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_').next())
 }
 
 #[test]
 fn modules_of_the_core_depend_one_way() {
-    let rank = |module: &str| LAYERS.iter().position(|layer| *layer == module);
+    let rank = |module: &str| LAYERS.iter().position(|layer| layer.contains(&module));
     let mut found = Vec::new();
     for source in sources(&["core/src"], "rs").iter().filter(|source| !source.is_test()) {
         let inside = source.name.strip_prefix("core/src/").unwrap();
@@ -180,7 +197,8 @@ fn modules_of_the_core_depend_one_way() {
         let own = rank(module).unwrap_or_else(|| panic!("`{module}` is in no layer"));
         for (i, line) in source.program() {
             for other in used(line) {
-                let allowed = UPWARD.iter().any(|(from, to, _)| *from == module && *to == other);
+                let allowed =
+                    UPWARD.iter().any(|(from, to, _)| inside.starts_with(from) && *to == other);
                 if rank(other).is_some_and(|other| other < own) && !allowed {
                     found.push(format!("{}:{i}: {}", source.name, line.trim()));
                 }
@@ -189,6 +207,14 @@ fn modules_of_the_core_depend_one_way() {
     }
     none(&found, "uses that go up a layer");
 }
+
+/// Words of the engine's own that are also the name of a plugin.
+const WORDS: [(&str, &str); 2] = [
+    // The executor of a study that chooses none.
+    ("core/src/study/resolve.rs", "local"),
+    // The indices.
+    ("core/src/report/summary.rs", "sobol"),
+];
 
 #[test]
 fn the_core_names_no_plugin() {
@@ -199,16 +225,12 @@ fn the_core_names_no_plugin() {
     let mut found = Vec::new();
     for source in sources(&["core/src"], "rs").iter().filter(|source| !source.is_test()) {
         for (i, line) in source.program() {
-            let named = names.iter().find(|name| {
-                // A quoted whole word: `"local"`, or a name in backticks or quotes inside a message.
-                ["\"", "`", "\\\""].iter().any(|quote| line.contains(&format!("{quote}{name}{quote}")))
-            });
-            // The engine's one choice: the executor of a study that names none.
-            let default = source.name == "core/src/study/resolve.rs" && line.contains("\"executor\"");
-            if let Some(name) = named
-                && !default
-            {
-                found.push(format!("{}:{i}: names `{name}`: {}", source.name, line.trim()));
+            let quoted =
+                |name: &str| ["\"", "`"].iter().any(|q| line.contains(&format!("{q}{name}{q}")));
+            for name in names.iter().filter(|name| quoted(name)) {
+                if !WORDS.contains(&(&source.name, name)) {
+                    found.push(format!("{}:{i}: {}", source.name, line.trim()));
+                }
             }
         }
     }

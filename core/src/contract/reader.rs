@@ -108,7 +108,7 @@ fn refuses_bad_files(reader: &dyn Reader, sample: &Sample, scratch: &Path) -> Re
     let mut bad = vec![
         ("a missing file", scratch.join("missing.file")),
         ("an empty file", write(scratch, sample, "empty", &[])?),
-        ("random bytes", write(scratch, sample, "random", &garbage())?),
+        ("random bytes", write(scratch, sample, "noise", &garbage())?),
         ("a folder", scratch.to_owned()),
     ];
     for magic in [&b"CDF\x01"[..], b"CDF\x02", b"CDF\x05", b"\x89HDF\r\n\x1a\n"] {

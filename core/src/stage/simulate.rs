@@ -117,9 +117,9 @@ impl Simulated {
         self.runs.iter().filter(|r| r.file.is_none()).count()
     }
 
-    /// Whether every result file is there, unchanged.
-    fn whole(&self, folder: &Path) -> bool {
-        self.runs.iter().all(|record| is_whole(record, folder) || record.file.is_none())
+    /// How many result files are missing or have changed.
+    fn damaged(&self, folder: &Path) -> usize {
+        self.runs.iter().filter(|r| r.file.is_some() && !is_whole(r, folder)).count()
     }
 }
 
@@ -164,7 +164,15 @@ pub fn kept(
     let folder = run.stage_folder(stage);
     let make = |folder: &Path| simulate(study, simulator, names, points, folder, observer);
     let kept = run.keep(stage, &inputs, observer, make)?;
-    if !kept.fresh && (kept.value.failures() > 0 || !kept.value.whole(&folder)) {
+    let damaged = if kept.fresh { 0 } else { kept.value.damaged(&folder) };
+    if damaged > 0 {
+        observer.warn(&format!(
+            "result files in {} are missing or not as they were written ({damaged} of {}); making them again",
+            folder.display(),
+            names.len()
+        ));
+    }
+    if damaged > 0 || (!kept.fresh && kept.value.failures() > 0) {
         run.reopen(stage)?;
         return run.keep(stage, &inputs, observer, make);
     }

@@ -1,10 +1,11 @@
 //! Second layer of checking: the sections of a study against each other.
 
-use super::nearest::nearest;
+use super::nearest::{nearest, one_of};
 use super::resolve::Study;
 use super::{Complaints, Node, Problems};
 use crate::data::{Coordinates, Parameter};
 use crate::plugin::model::{Input, Signature};
+use crate::plugin::{Surrogate, registry};
 
 /// Reports everything that is inconsistent.
 pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
@@ -39,10 +40,11 @@ fn sections(study: &Study, complaints: &mut Complaints<'_>) {
             .expected("`[model]` and `[design]`, and no files of finished runs in `[simulations]`");
     }
     if study.surrogate.is_none() {
+        let names = registry::entries::<dyn Surrogate>().into_iter().map(|entry| entry.name);
         complaints
             .at("")
             .say("the study has no `[surrogate]`")
-            .expected("a section such as `[surrogate]` with `use = \"polynomial_chaos\"`");
+            .help(format!("add the section, with `use` set to {}", one_of(names)));
     }
     let calibration = [
         ("measurements", study.measurements.is_some()),
