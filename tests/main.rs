@@ -1,4 +1,6 @@
 //! Tests of the whole, in one binary.
+// A test that cannot go on has failed: here a panic is the message.
+#![allow(clippy::unwrap_used)]
 
 mod bad_input;
 mod docs;
