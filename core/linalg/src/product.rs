@@ -18,6 +18,10 @@ pub fn multiply(a: &Matrix, b: &Matrix) -> Matrix {
     product
 }
 
+/// Width of a block of columns: wide enough for the products to run at full speed, narrow enough to
+/// skip most zeros.
+const WIDTH: usize = 96;
+
 /// `A L`: `m x k` by `k x n` gives `m x n`, for `L` with zeros above its diagonal, which are not
 /// multiplied.
 ///
@@ -25,8 +29,6 @@ pub fn multiply(a: &Matrix, b: &Matrix) -> Matrix {
 /// When the inner sizes differ.
 pub fn multiply_lower(a: &Matrix, l: &Matrix) -> Matrix {
     assert_eq!(a.columns(), l.rows(), "inner sizes of a product");
-    /// Wide enough for the products to run at full speed, narrow enough to skip most zeros.
-    const WIDTH: usize = 96;
     let (inner, columns) = (l.rows(), l.columns());
     let mut product = Matrix::zeros(a.rows(), columns);
     for first in (0..columns.min(inner)).step_by(WIDTH) {

@@ -158,6 +158,7 @@ mod tests {
     }
 
     /// Point 1000 in dimensions 1, 2, 3, 51, 101 and 128.
+    #[expect(clippy::unreadable_literal, reason = "digits as scipy prints them")]
     const FAR: [f64; 6] =
         [0.2197265625, 0.0966796875, 0.5185546875, 0.3525390625, 0.7685546875, 0.5439453125];
 

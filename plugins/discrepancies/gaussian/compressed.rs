@@ -90,8 +90,8 @@ impl Compressed for CompressedGaussian {
     }
 
     fn log_likelihood_at(&self, linear: &dyn Linear, points: &Matrix, hyper: &Matrix) -> Vec<f64> {
-        let covering = |s: &&Box<dyn SumOfSquares>| points.iter_rows().all(|p| s.covers(p));
-        let Some(squares) = self.squares.as_ref().filter(covering) else {
+        let covering = |s: &&dyn SumOfSquares| points.iter_rows().all(|p| s.covers(p));
+        let Some(squares) = self.squares.as_deref().filter(covering) else {
             return self.log_likelihood(&linear.basis(points), hyper);
         };
         let along = if self.along.columns() == 0 {

@@ -122,9 +122,9 @@ fn the_compressed_form_equals_the_full_one() {
             let hyper = Matrix::from_fn(4, 1, |i, _| 0.2 + i as f64);
             let found = compressed.log_likelihood(&basis, &hyper);
             let responses = linalg::multiply(&basis, &emulated.coefficients);
-            for i in 0..4 {
+            for (i, found) in found.iter().enumerate() {
                 let expected = full.log_likelihood(responses.row(i), hyper.row(i));
-                assert!((found[i] - expected).abs() < 1e-10 * expected.abs());
+                assert!((found - expected).abs() < 1e-10 * expected.abs());
             }
         }
     }

@@ -76,7 +76,7 @@ fn measured(emulator: &dyn Emulator, replicates: usize, sd: f64) -> Measurements
         let mut rng = Stream::root(3).at(r as u64).generator();
         let value = |(k, m): (usize, &f64)| {
             let y = m + sd * normal(&mut rng);
-            ((k + r) % 17 > 0).then_some(y)
+            (!(k + r).is_multiple_of(17)).then_some(y)
         };
         Replicate {
             name: r.to_string(),
