@@ -170,12 +170,11 @@ impl<'a> Posterior<'a> {
     /// The log-likelihood's derivatives by the natural coordinates.
     fn likelihood_gradient(&self, natural: &[f64]) -> Vec<f64> {
         let (theta, hyper) = natural.split_at(self.parameters.len());
-        let row = Matrix::from_vec(1, theta.len(), theta.to_vec());
         if let Some((linear, compressed)) = &self.reduced {
-            let (by_basis, by_hyper) = compressed.gradient(linear.basis(&row).row(0), hyper);
-            let by_theta = transposed_product(&linear.basis_gradient(theta), &by_basis);
+            let (by_theta, by_hyper) = compressed.gradient_at(*linear, theta, hyper);
             return [by_theta, by_hyper].concat();
         }
+        let row = Matrix::from_vec(1, theta.len(), theta.to_vec());
         let mut responses = vec![self.emulator.mean(&row).row(0).to_vec()];
         for (effect, range) in &self.effects {
             let before = &responses[responses.len() - 1];

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::surrogate::Linear;
 use super::{Component, Fact};
 use crate::data::{Measurements, Unit};
-use crate::linalg::Matrix;
+use crate::linalg::{Matrix, transposed_multiply_vector};
 use crate::math::distribution::Distribution;
 use crate::math::random::Stream;
 use crate::run::Stop;
@@ -105,4 +105,17 @@ pub trait Compressed: Send + Sync {
 
     /// The derivatives at one point by the basis functions and by the hyperparameters.
     fn gradient(&self, basis: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>);
+
+    /// The derivatives by the parameters at a point in physical units, and by the hyperparameters, for
+    /// the emulator that was compressed.
+    fn gradient_at(
+        &self,
+        linear: &dyn Linear,
+        point: &[f64],
+        hyper: &[f64],
+    ) -> (Vec<f64>, Vec<f64>) {
+        let basis = linear.basis(&Matrix::from_rows(point.len(), [point]));
+        let (by_basis, by_hyper) = self.gradient(basis.row(0), hyper);
+        (transposed_multiply_vector(&linear.basis_gradient(point), &by_basis), by_hyper)
+    }
 }

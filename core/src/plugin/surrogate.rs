@@ -97,6 +97,9 @@ pub trait SumOfSquares: Send + Sync {
     /// The sum at each point (one a row, in physical units) that it [covers](Self::covers).
     fn values(&self, points: &Matrix) -> Vec<f64>;
 
+    /// The derivative by each parameter at a point that it covers.
+    fn gradient(&self, point: &[f64]) -> Vec<f64>;
+
     /// Whether the form holds at a point to its [error](Self::error).
     fn covers(&self, point: &[f64]) -> bool;
 

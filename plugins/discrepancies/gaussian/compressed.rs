@@ -56,6 +56,19 @@ impl CompressedGaussian {
         Ok(Self { spread: s.spread.clone(), along, outside, squares })
     }
 
+    /// The residual along the directions of the common errors, but for its sign, and what it
+    /// contributes to the derivatives by the basis functions.
+    fn pull(&self, basis: &[f64], v: f64) -> (Vec<f64>, Vec<f64>) {
+        let extended: Vec<f64> = basis.iter().copied().chain([1.0]).collect();
+        let along = linalg::transposed_multiply_vector(&self.along, &extended);
+        let eigenvalues = &self.spread.eigenvalues;
+        let weights: Vec<f64> =
+            along.iter().zip(eigenvalues).map(|(a, lambda)| -a / (v + lambda)).collect();
+        let mut pull = linalg::multiply_vector(&self.along, &weights);
+        pull.truncate(basis.len());
+        (along, pull)
+    }
+
     fn with_squares(&self, along: &Matrix, squares: &[f64], hyper: &Matrix) -> Vec<f64> {
         (squares.iter().enumerate())
             .map(|(i, &squares)| {
@@ -104,18 +117,36 @@ impl Compressed for CompressedGaussian {
 
     fn gradient(&self, basis: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let v = hyper[0];
+        let (along, pull) = self.pull(basis, v);
         let extended: Vec<f64> = basis.iter().copied().chain([1.0]).collect();
-        let along = linalg::transposed_multiply_vector(&self.along, &extended);
         let outside = linalg::transposed_multiply_vector(&self.outside, &extended);
-        let weights: Vec<f64> = along
-            .iter()
-            .zip(&self.spread.eigenvalues)
-            .map(|(a, lambda)| a / (v + lambda))
-            .collect();
-        let pull = linalg::multiply_vector(&self.along, &weights);
         let rest = linalg::multiply_vector(&self.outside, &outside);
-        let by_basis = (0..basis.len()).map(|j| -pull[j] - rest[j] / v).collect();
-        let by_variance = self.spread.by_variance(v, dot(&outside, &outside), &along);
-        (by_basis, vec![by_variance])
+        let by_basis = pull.iter().zip(rest).map(|(p, r)| p - r / v).collect();
+        (by_basis, vec![self.spread.by_variance(v, dot(&outside, &outside), &along)])
+    }
+
+    fn gradient_at(
+        &self,
+        linear: &dyn Linear,
+        point: &[f64],
+        hyper: &[f64],
+    ) -> (Vec<f64>, Vec<f64>) {
+        let v = hyper[0];
+        let row = Matrix::from_rows(point.len(), [point]);
+        let Some(squares) = self.squares.as_deref().filter(|s| s.covers(point)) else {
+            let (by_basis, by_hyper) = self.gradient(linear.basis(&row).row(0), hyper);
+            let slopes = linear.basis_gradient(point);
+            return (linalg::transposed_multiply_vector(&slopes, &by_basis), by_hyper);
+        };
+        let mut by_point: Vec<f64> = squares.gradient(point).iter().map(|g| -0.5 * g / v).collect();
+        let mut along = Vec::new();
+        if self.along.columns() > 0 {
+            let pull;
+            (along, pull) = self.pull(linear.basis(&row).row(0), v);
+            let slopes = linear.basis_gradient(point);
+            let added = linalg::transposed_multiply_vector(&slopes, &pull);
+            by_point.iter_mut().zip(added).for_each(|(g, a)| *g += a);
+        }
+        (by_point, vec![self.spread.by_variance(v, squares.values(&row)[0], &along)])
     }
 }

@@ -92,10 +92,7 @@ impl Squares {
 impl SumOfSquares for Squares {
     fn values(&self, points: &Matrix) -> Vec<f64> {
         let mut values = Vec::with_capacity(points.rows());
-        let mut tables: Vec<Vec<Lanes>> =
-            self.sizes.iter().map(|&size| vec![[0.0; LANES]; size]).collect();
-        let mut sums: Vec<Vec<Lanes>> =
-            self.levels.iter().map(|level| vec![[0.0; LANES]; level.starts.len() - 1]).collect();
+        let (mut tables, mut sums) = self.memory();
         for first in (0..points.rows()).step_by(LANES) {
             let end = points.rows().min(first + LANES);
             for (i, (coordinate, table)) in self.coordinates.iter().zip(&mut tables).enumerate() {
@@ -105,6 +102,30 @@ impl SumOfSquares for Squares {
             values.extend(&sums[0][0][..end - first]);
         }
         values
+    }
+
+    fn gradient(&self, point: &[f64]) -> Vec<f64> {
+        let mut gradient = Vec::with_capacity(point.len());
+        let (mut tables, mut sums) = self.memory();
+        for first in (0..point.len()).step_by(LANES) {
+            let end = point.len().min(first + LANES);
+            for (i, (coordinate, table)) in self.coordinates.iter().zip(&mut tables).enumerate() {
+                let mut values = vec![0.0; table.len()];
+                let mut slopes = values.clone();
+                let z = coordinate.standard(point[i]);
+                coordinate.family.derivatives(z, &mut values, &mut slopes);
+                for ((entry, value), slope) in table.iter_mut().zip(values).zip(slopes) {
+                    *entry = [value; LANES];
+                    // Side by side stand derivatives by one variable each.
+                    if (first..end).contains(&i) {
+                        entry[i - first] = slope / coordinate.scale;
+                    }
+                }
+            }
+            self.sum(&tables, &mut sums);
+            gradient.extend(&sums[0][0][..end - first]);
+        }
+        gradient
     }
 
     fn covers(&self, point: &[f64]) -> bool {
@@ -118,6 +139,14 @@ impl SumOfSquares for Squares {
 }
 
 impl Squares {
+    /// Room for the polynomials of each variable and for the sums of each level.
+    fn memory(&self) -> (Vec<Vec<Lanes>>, Vec<Vec<Lanes>>) {
+        let room = |length: usize| vec![[0.0; LANES]; length];
+        let tables = self.sizes.iter().map(|&size| room(size)).collect();
+        let sums = self.levels.iter().map(|level| room(level.starts.len() - 1)).collect();
+        (tables, sums)
+    }
+
     /// The sums of all levels, the last variable's first.
     fn sum(&self, tables: &[Vec<Lanes>], sums: &mut [Vec<Lanes>]) {
         let last = self.levels.len() - 1;
@@ -224,6 +253,7 @@ mod tests {
     use super::*;
     use crate::surrogates::polynomial_chaos::family::Family;
     use crate::surrogates::polynomial_chaos::terms::{Nested, Truncation};
+    use lacuna::linalg::transposed_multiply_vector;
     use lacuna::math::random::normal;
 
     fn basis(dimension: usize, degree: usize, skip: usize) -> Basis {
@@ -257,6 +287,27 @@ mod tests {
             assert!(worst <= squares.error(), "{worst} {}", squares.error());
             assert!(points.iter_rows().all(|p| squares.covers(p)));
             assert!(!squares.covers(&vec![8.0; dimension]));
+        }
+    }
+
+    /// The derivative of `r'r` is `2 r' R J`, `J` the derivatives of the basis functions.
+    #[test]
+    fn gradients_are_those_of_the_product() {
+        for (dimension, degree, skip) in [(1, 12, 2), (3, 8, 5), (4, 5, 2)] {
+            let basis = basis(dimension, degree, skip);
+            let terms = basis.terms().len();
+            let mut rng = Stream::root(8).generator();
+            let factor = Matrix::from_fn(terms + 40, terms + 1, |_, _| normal(&mut rng));
+            let squares = Squares::new(&basis, &factor).unwrap();
+            let point: Vec<f64> = (0..dimension).map(|i| 2.7 + 0.2 * i as f64).collect();
+            let psi = basis.values(&Matrix::from_rows(dimension, [&point[..]]));
+            let product = multiply_vector(&factor, &[psi.row(0), &[1.0]].concat());
+            let pull = transposed_multiply_vector(&factor, &product);
+            let plain = transposed_multiply_vector(&basis.gradient(&point), &pull[..terms]);
+            for (found, expected) in squares.gradient(&point).iter().zip(plain) {
+                let tolerance = 1e-11 * dot(&product, &product);
+                assert!((found - 2.0 * expected).abs() < tolerance, "{found} {expected}");
+            }
         }
     }
 

@@ -1,7 +1,7 @@
 //! The fast forms on a smooth problem of the founding study's size, against the sum over all data.
 
 use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Scenario, Unit};
-use lacuna::linalg::Matrix;
+use lacuna::linalg::{self, Matrix};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal, uniform};
 use lacuna::plugin::Emulator;
@@ -150,6 +150,17 @@ fn common_errors_do_not_change_that() {
     for (i, response) in emulator.mean(&theta).iter_rows().enumerate() {
         let expected = full.log_likelihood(response, hyper.row(i));
         assert!((fast[i] - expected).abs() < 1e-10 * expected.abs(), "{} {expected}", fast[i]);
+        let (by_point, by_variance) = compressed.gradient_at(linear, theta.row(i), hyper.row(i));
+        let (by_response, by_hyper) = full.gradient(response, hyper.row(i));
+        let jacobian = emulator.jacobian(theta.row(i));
+        let chained = linalg::transposed_multiply_vector(&jacobian, &by_response);
+        for (k, (found, expected)) in by_point.iter().zip(&chained).enumerate() {
+            // What a thousandth of the box changes is known to the digits of the log density.
+            let step = 1e-3 * (BOX[k][1] - BOX[k][0]);
+            let scale = fast[i].abs() + (expected * step).abs();
+            assert!(((found - expected) * step).abs() < 1e-9 * scale, "{found} {expected}");
+        }
+        assert!((by_variance[0] - by_hyper[0]).abs() < 1e-9 * by_hyper[0].abs());
     }
 }
 
