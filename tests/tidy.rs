@@ -122,11 +122,8 @@ fn nothing_is_unfinished_or_of_one_machine() {
             continue;
         }
         for (i, line) in source.text.lines().enumerate() {
-            let place = format!("{}:{}: {}", source.name, i + 1, line.trim());
-            if UNFINISHED.iter().any(|word| line.contains(word)) {
-                found.push(place);
-            } else if MACHINE.iter().any(|path| line.contains(path)) {
-                found.push(place);
+            if UNFINISHED.iter().chain(&MACHINE).any(|word| line.contains(word)) {
+                found.push(format!("{}:{}: {}", source.name, i + 1, line.trim()));
             }
         }
     }
