@@ -154,7 +154,7 @@ impl<'a> Posterior<'a> {
 
     fn log_likelihood(&self, theta: &Matrix, hyper: &Matrix) -> Vec<f64> {
         if let Some((linear, compressed)) = &self.reduced {
-            return compressed.log_likelihood(&linear.basis(theta), hyper);
+            return compressed.log_likelihood_at(*linear, theta, hyper);
         }
         let mean = self.emulator.mean(theta);
         let own = self.own();

@@ -12,6 +12,7 @@ mod cholesky;
 mod eigen;
 mod error;
 mod faer_view;
+pub mod lanes;
 mod matrix;
 mod packed;
 mod product;
@@ -26,7 +27,7 @@ pub use error::Error;
 pub use matrix::Matrix;
 pub use packed::PackedUpper;
 pub use product::{
-    gram, multiply, multiply_transposed, multiply_vector, transposed_multiply,
+    gram, multiply, multiply_lower, multiply_transposed, multiply_vector, transposed_multiply,
     transposed_multiply_vector,
 };
 pub use qr::{LeastSquares, Qr, least_squares, thin_qr};

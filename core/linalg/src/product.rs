@@ -18,6 +18,31 @@ pub fn multiply(a: &Matrix, b: &Matrix) -> Matrix {
     product
 }
 
+/// `A L`: `m x k` by `k x n` gives `m x n`, for `L` with zeros above its diagonal, which are not
+/// multiplied.
+///
+/// # Panics
+/// When the inner sizes differ.
+pub fn multiply_lower(a: &Matrix, l: &Matrix) -> Matrix {
+    assert_eq!(a.columns(), l.rows(), "inner sizes of a product");
+    /// Wide enough for the products to run at full speed, narrow enough to skip most zeros.
+    const WIDTH: usize = 96;
+    let (inner, columns) = (l.rows(), l.columns());
+    let mut product = Matrix::zeros(a.rows(), columns);
+    for first in (0..columns.min(inner)).step_by(WIDTH) {
+        let width = WIDTH.min(columns - first);
+        matmul(
+            view_mut(&mut product).subcols_mut(first, width),
+            Accum::Replace,
+            view(a).subcols(first, inner - first),
+            view(l).submatrix(first, first, inner - first, width),
+            1.0,
+            Par::Seq,
+        );
+    }
+    product
+}
+
 /// `A' B`: `k x m` by `k x n` gives `m x n`.
 ///
 /// # Panics
@@ -105,6 +130,16 @@ mod tests {
         let worst =
             a.as_slice().iter().zip(b.as_slice()).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
         assert!(worst < 1e-12, "{worst}");
+    }
+
+    #[test]
+    fn products_with_lower_matrices_skip_nothing_but_zeros() {
+        for (m, k, n) in [(3, 5, 5), (7, 300, 250), (30, 200, 97), (4, 90, 200), (2, 0, 3)] {
+            let a = wavy(m, k, 0.4);
+            let full = wavy(k, n, 0.2);
+            let l = Matrix::from_fn(k, n, |i, j| if i < j { 0.0 } else { full[(i, j)] });
+            close(&multiply_lower(&a, &l), &plain(&a, &l));
+        }
     }
 
     #[test]

@@ -97,6 +97,12 @@ pub trait Compressed: Send + Sync {
     /// The log-likelihood for each row of `basis` (`points x terms`) and `hyper` (`points x hyperparameters`).
     fn log_likelihood(&self, basis: &Matrix, hyper: &Matrix) -> Vec<f64>;
 
+    /// The same at points in physical units (one a row), for the emulator that was compressed: for
+    /// those who can do with less than all basis functions.
+    fn log_likelihood_at(&self, linear: &dyn Linear, points: &Matrix, hyper: &Matrix) -> Vec<f64> {
+        self.log_likelihood(&linear.basis(points), hyper)
+    }
+
     /// The derivatives at one point by the basis functions and by the hyperparameters.
     fn gradient(&self, basis: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>);
 }

@@ -84,6 +84,27 @@ pub trait Linear: Send + Sync {
 
     /// The derivative of each basis function (rows) by each parameter (columns) at a point.
     fn basis_gradient(&self, point: &[f64]) -> Matrix;
+
+    /// The sum of squares `|R (psi(x), 1)|^2` as a function of the point, for a factor `R` (`any x (terms +
+    /// 1)`), where the basis has a form of it that takes fewer operations than the product.
+    fn sum_of_squares(&self, _factor: &Matrix) -> Option<Box<dyn SumOfSquares>> {
+        None
+    }
+}
+
+/// A sum of squares of linear combinations of basis functions.
+pub trait SumOfSquares: Send + Sync {
+    /// The sum at each point (one a row, in physical units) that it [covers](Self::covers).
+    fn values(&self, points: &Matrix) -> Vec<f64>;
+
+    /// Whether the form holds at a point to its [error](Self::error).
+    fn covers(&self, point: &[f64]) -> bool;
+
+    /// The largest difference from the product's own sum of squares that round-off makes.
+    ///
+    /// A sum of squares that is expanded carries the round-off of its largest parts into its
+    /// smallest values; whoever uses it compares this number with what matters.
+    fn error(&self) -> f64;
 }
 
 /// The error of a fit estimated from its own training runs.

@@ -1,33 +1,40 @@
 //! The likelihood reduced to a small form in the basis functions of a linear emulator.
 //!
 //! With `m = C' psi` the weighted residual is `z = -B (psi, 1)`, `B = [W C', -W ybar]`. Its part along the
-//! directions `U` of the emulator's error is `-(U'B)(psi, 1)`; for the rest, the thin factorisation
-//! `(I - U U') B = Q R` gives `|z_rest| = |R (psi, 1)|` with `R` upper triangular of the basis' size: exact, since
-//! an orthogonal factor does not change a length.
-
-use lacuna::linalg::{self, Matrix};
-use lacuna::plugin::discrepancy::Compressed;
+//! directions `U` of the common errors is `-(U'B)(psi, 1)`; for the rest, the thin factorisation
+//! `(I - U U') B = Q R` gives `|z_rest| = |R (psi, 1)|` with `R` upper trapezoidal: exact, since an orthogonal
+//! factor does not change a length.
+//!
+//! Only the length of the rest matters, and a polynomial basis gives its square as one polynomial. That form
+//! carries the round-off of its largest values into its smallest, so that it is used only where
+//! this cannot be seen: against the scatter of the replicates and what no coefficients can explain.
 
 use lacuna::linalg::vector::dot;
+use lacuna::linalg::{self, Matrix};
+use lacuna::plugin::discrepancy::Compressed;
+use lacuna::plugin::surrogate::{Linear, SumOfSquares};
 
 use super::likelihood::{Spread, Statistics};
 
 /// See the module.
 pub(super) struct CompressedGaussian {
     spread: Spread,
-    /// `U'B`, `rank x (terms + 1)`.
+    /// `(U'B)'`, `(terms + 1) x rank`.
     along: Matrix,
-    /// `R`, at most `(terms + 1) x (terms + 1)`.
+    /// `R'`, `(terms + 1) x` at most `terms + 1`, with zeros above its diagonal.
     outside: Matrix,
+    /// `|R (psi, 1)|^2` as a function of the point, where it is exact enough.
+    pub(super) squares: Option<Box<dyn SumOfSquares>>,
 }
 
+/// The largest error of the sum of squares, relative to the least sum that can occur: a tenth of what
+/// the log-likelihood may differ from the sum over all data.
+const TOLERANCE: f64 = 1e-11;
+
 impl CompressedGaussian {
-    pub(super) fn new(
-        statistics: &Statistics,
-        coefficients: &Matrix,
-    ) -> Result<Self, linalg::Error> {
+    pub(super) fn new(s: &Statistics, linear: &dyn Linear) -> Result<Self, linalg::Error> {
+        let coefficients = linear.coefficients();
         let terms = coefficients.rows();
-        let s = statistics;
         let mut b = Matrix::from_fn(s.measured.len(), terms + 1, |i, j| {
             if j < terms {
                 s.weight[i] * coefficients[(j, s.measured[i])]
@@ -40,8 +47,25 @@ impl CompressedGaussian {
         for (entry, part) in b.as_mut_slice().iter_mut().zip(explained.as_slice()) {
             *entry -= part;
         }
-        let outside = if b.rows() > b.columns() { linalg::thin_qr(&b)?.r } else { b };
-        Ok(Self { spread: s.spread.clone(), along, outside })
+        let r = linalg::thin_qr(&b)?.r;
+        // The last entry of a square `R` is the distance of the data from all that the basis can make.
+        let distance = if r.rows() > terms { r[(terms, terms)] } else { 0.0 };
+        let least = s.spread.scatter + distance * distance;
+        let squares = linear.sum_of_squares(&r).filter(|q| q.error() <= TOLERANCE * least);
+        let (along, outside) = (along.transposed(), r.transposed());
+        Ok(Self { spread: s.spread.clone(), along, outside, squares })
+    }
+
+    fn with_squares(&self, along: &Matrix, squares: &[f64], hyper: &Matrix) -> Vec<f64> {
+        (squares.iter().enumerate())
+            .map(|(i, &squares)| {
+                let v = hyper[(i, 0)];
+                if v.is_nan() || v <= 0.0 {
+                    return f64::NEG_INFINITY;
+                }
+                self.spread.log_likelihood(v, squares, along.row(i))
+            })
+            .collect()
     }
 }
 
@@ -59,38 +83,38 @@ fn with_one(basis: &Matrix) -> Matrix {
 impl Compressed for CompressedGaussian {
     fn log_likelihood(&self, basis: &Matrix, hyper: &Matrix) -> Vec<f64> {
         let extended = with_one(basis);
-        let along = linalg::multiply_transposed(&extended, &self.along);
-        let outside = linalg::multiply_transposed(&extended, &self.outside);
-        (0..basis.rows())
-            .map(|i| {
-                let v = hyper[(i, 0)];
-                if v.is_nan() || v <= 0.0 {
-                    return f64::NEG_INFINITY;
-                }
-                let rest = outside.row(i);
-                self.spread.log_likelihood(v, dot(rest, rest), along.row(i))
-            })
-            .collect()
+        let along = linalg::multiply(&extended, &self.along);
+        let outside = linalg::multiply_lower(&extended, &self.outside);
+        let squares: Vec<f64> = outside.iter_rows().map(|row| dot(row, row)).collect();
+        self.with_squares(&along, &squares, hyper)
+    }
+
+    fn log_likelihood_at(&self, linear: &dyn Linear, points: &Matrix, hyper: &Matrix) -> Vec<f64> {
+        let covering = |s: &&Box<dyn SumOfSquares>| points.iter_rows().all(|p| s.covers(p));
+        let Some(squares) = self.squares.as_ref().filter(covering) else {
+            return self.log_likelihood(&linear.basis(points), hyper);
+        };
+        let along = if self.along.columns() == 0 {
+            Matrix::zeros(points.rows(), 0)
+        } else {
+            linalg::multiply(&with_one(&linear.basis(points)), &self.along)
+        };
+        self.with_squares(&along, &squares.values(points), hyper)
     }
 
     fn gradient(&self, basis: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let v = hyper[0];
-        let terms = basis.len();
         let extended: Vec<f64> = basis.iter().copied().chain([1.0]).collect();
-        let along: Vec<f64> = self.along.iter_rows().map(|row| dot(row, &extended)).collect();
-        let outside: Vec<f64> = self.outside.iter_rows().map(|row| dot(row, &extended)).collect();
-        let mut by_basis = vec![0.0; terms];
-        let mut subtract = |row: &[f64], scale: f64| {
-            for (g, entry) in by_basis.iter_mut().zip(row) {
-                *g -= scale * entry;
-            }
-        };
-        for (row, r) in self.outside.iter_rows().zip(&outside) {
-            subtract(row, r / v);
-        }
-        for ((row, a), lambda) in self.along.iter_rows().zip(&along).zip(&self.spread.eigenvalues) {
-            subtract(row, a / (v + lambda));
-        }
+        let along = linalg::transposed_multiply_vector(&self.along, &extended);
+        let outside = linalg::transposed_multiply_vector(&self.outside, &extended);
+        let weights: Vec<f64> = along
+            .iter()
+            .zip(&self.spread.eigenvalues)
+            .map(|(a, lambda)| a / (v + lambda))
+            .collect();
+        let pull = linalg::multiply_vector(&self.along, &weights);
+        let rest = linalg::multiply_vector(&self.outside, &outside);
+        let by_basis = (0..basis.len()).map(|j| -pull[j] - rest[j] / v).collect();
         let by_variance = self.spread.by_variance(v, dot(&outside, &outside), &along);
         (by_basis, vec![by_variance])
     }

@@ -58,16 +58,46 @@ pub(super) struct Spread {
     pub eigenvalues: Vec<f64>,
 }
 
+/// How many directions are summed side by side.
+const LANES: usize = 8;
+
 impl Spread {
     /// The log-likelihood given the squared residual outside the directions of the common errors and
     /// the residual along each of them.
     pub fn log_likelihood(&self, v: f64, outside: f64, along: &[f64]) -> f64 {
-        let mut twice =
-            self.count * (std::f64::consts::TAU * v).ln() + (self.scatter + outside) / v;
-        for (&a, &lambda) in along.iter().zip(&self.eigenvalues) {
-            twice += (lambda / v).ln_1p() + a * a / (v + lambda);
+        let (log_determinant, squares) = self.common(v, along);
+        let own = self.count * (std::f64::consts::TAU * v).ln();
+        -0.5 * (own + log_determinant + (self.scatter + outside + squares) / v)
+    }
+
+    /// `log det(I + K/v)`, and the sum of the squared residuals along the directions, each divided by
+    /// `1 + lambda / v`.
+    ///
+    /// Logarithms cost more than all the rest: one is taken of a product of as many factors as cannot
+    /// overflow.
+    fn common(&self, v: f64, along: &[f64]) -> (f64, f64) {
+        let largest = 1.0 + self.eigenvalues.iter().copied().fold(0.0, f64::max) / v;
+        let factors = ((600.0 / largest.ln()).min(1e6) as usize).max(1);
+        let (mut log_determinant, mut squares) = (0.0, [0.0; LANES]);
+        let runs = self.eigenvalues.chunks(LANES * factors);
+        for (lambda, along) in runs.zip(along.chunks(LANES * factors)) {
+            let mut product = [1.0; LANES];
+            let (lambda, rest_lambda) = lambda.as_chunks::<LANES>();
+            let (along, rest_along) = along.as_chunks::<LANES>();
+            for (lambda, a) in lambda.iter().zip(along) {
+                for l in 0..LANES {
+                    let factor = 1.0 + lambda[l] / v;
+                    product[l] *= factor;
+                    squares[l] += a[l] * a[l] / factor;
+                }
+            }
+            log_determinant += product.iter().map(|p| p.ln()).sum::<f64>();
+            for (lambda, a) in rest_lambda.iter().zip(rest_along) {
+                log_determinant += (lambda / v).ln_1p();
+                squares[0] += a * a / (1.0 + lambda / v);
+            }
         }
-        -0.5 * twice
+        (log_determinant, squares.iter().sum())
     }
 
     /// Its derivative by the variance.
@@ -252,7 +282,7 @@ impl Likelihood for GaussianLikelihood {
     }
 
     fn compress(&self, linear: &dyn Linear) -> Option<Box<dyn Compressed>> {
-        let compressed = CompressedGaussian::new(&self.statistics, linear.coefficients()).ok()?;
+        let compressed = CompressedGaussian::new(&self.statistics, linear).ok()?;
         Some(Box::new(compressed))
     }
 

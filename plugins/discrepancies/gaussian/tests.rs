@@ -10,6 +10,8 @@ use lacuna::plugin::surrogate::Linear;
 
 use super::likelihood::GaussianLikelihood;
 
+mod smooth;
+
 const OUTPUTS: usize = 7;
 const TERMS: usize = 3;
 

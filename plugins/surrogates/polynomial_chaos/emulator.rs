@@ -1,13 +1,14 @@
 //! The fitted expansion.
 
 use lacuna::linalg::{Matrix, multiply, transposed_multiply};
-use lacuna::plugin::surrogate::{FitError, Linear, Sensitivity};
+use lacuna::plugin::surrogate::{FitError, Linear, Sensitivity, SumOfSquares};
 use lacuna::plugin::{Emulator, Fact};
 use lacuna::run::Stop;
 use serde::{Deserialize, Serialize};
 
 use super::family::Coordinate;
 use super::options::Solver;
+use super::squares::Squares;
 use super::terms::{Basis, Terms};
 use super::{bytes, sensitivity};
 
@@ -174,6 +175,11 @@ impl Linear for Expansion {
 
     fn basis_gradient(&self, point: &[f64]) -> Matrix {
         self.basis.gradient(point)
+    }
+
+    fn sum_of_squares(&self, factor: &Matrix) -> Option<Box<dyn SumOfSquares>> {
+        let squares = Squares::new(&self.basis, factor)?;
+        Some(Box::new(squares))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Families of orthonormal polynomials in one variable, and where a parameter sits in its family.
 
 use lacuna::data::Parameter;
+use lacuna::linalg::lanes::Lanes;
 use lacuna::math::distribution::Distribution;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -27,6 +28,22 @@ impl Family {
     pub fn derivatives(self, z: f64, values: &mut [f64], derivatives: &mut [f64]) {
         match self {
             Self::Legendre => legendre_derivatives(z, values, derivatives),
+        }
+    }
+
+    /// The weights of the product of two polynomials in the family: `psi_m psi_n = sum_r weights[r]
+    /// psi_{m + n - 2 r}`, `r` from 0 to the lesser of the degrees.
+    pub fn product(self, m: usize, n: usize) -> Vec<f64> {
+        match self {
+            Self::Legendre => legendre_product(m, n),
+        }
+    }
+
+    /// Whether the standard variable is in the support of the family's law.
+    pub fn supports(self, z: f64) -> bool {
+        match self {
+            // Values on the bounds come back from physical units with round-off.
+            Self::Legendre => z.abs() <= 1.0 + 1e-9,
         }
     }
 
@@ -66,6 +83,17 @@ impl Coordinate {
     pub fn standard(&self, x: f64) -> f64 {
         (x - self.centre) / self.scale
     }
+
+    /// The polynomials of degree `0..table.len()` at some values of the parameter, side by side.
+    pub fn values(&self, parameter: impl Iterator<Item = f64>, table: &mut [Lanes]) {
+        let mut values = vec![0.0; table.len()];
+        for (l, x) in parameter.enumerate() {
+            self.family.values(self.standard(x), &mut values);
+            for (entry, value) in table.iter_mut().zip(&values) {
+                entry[l] = *value;
+            }
+        }
+    }
 }
 
 /// `sqrt(2 n + 1) P_n(z)` by the three-term recurrence (Abramowitz and Stegun 22.7.10).
@@ -99,6 +127,22 @@ fn legendre_raw(z: f64, values: &mut [f64]) {
             }
         };
     }
+}
+
+/// Adams (1878), in the form of Bailey (1933): with `A_k = (1/2)_k / k!`,
+/// `P_m P_n = sum_r A_r A_{m-r} A_{n-r} / A_{m+n-r} (2m+2n-4r+1)/(2m+2n-2r+1) P_{m+n-2r}`.
+fn legendre_product(m: usize, n: usize) -> Vec<f64> {
+    let mut a = vec![1.0];
+    for k in 1..=m + n {
+        a.push(a[k - 1] * (2 * k - 1) as f64 / (2 * k) as f64);
+    }
+    let odd = |k: usize| (2 * k + 1) as f64;
+    let weight = |r: usize| {
+        let degree = m + n - 2 * r;
+        let plain = a[r] * a[m - r] * a[n - r] / a[m + n - r] * odd(degree) / odd(m + n - r);
+        plain * (odd(m) * odd(n) / odd(degree)).sqrt()
+    };
+    (0..=m.min(n)).map(weight).collect()
 }
 
 fn normalise(values: &mut [f64]) {
@@ -153,6 +197,23 @@ mod tests {
             for (n, value, slope) in values {
                 assert!((p[n] - norm(n) * value).abs() < 1e-12);
                 assert!((d[n] - norm(n) * slope).abs() < 1e-11);
+            }
+        }
+    }
+
+    #[test]
+    fn products_of_polynomials_are_the_sums_of_their_weights() {
+        let mut psi = [0.0; 41];
+        for z in [-1.0, -0.9, -0.33, 0.0, 0.25, 0.77, 1.0] {
+            Family::Legendre.values(z, &mut psi);
+            for m in 0..=20 {
+                for n in 0..=20 {
+                    let weights = Family::Legendre.product(m, n);
+                    assert!(weights.iter().all(|w| *w > 0.0));
+                    let terms = weights.iter().enumerate().map(|(r, w)| w * psi[m + n - 2 * r]);
+                    let (sum, product) = (terms.sum::<f64>(), psi[m] * psi[n]);
+                    assert!((sum - product).abs() < 1e-12 * ((2 * m + 1) * (2 * n + 1)) as f64);
+                }
             }
         }
     }

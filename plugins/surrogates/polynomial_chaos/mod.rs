@@ -9,6 +9,7 @@ mod least_angle;
 mod least_squares;
 mod options;
 mod sensitivity;
+mod squares;
 mod terms;
 
 #[cfg(test)]

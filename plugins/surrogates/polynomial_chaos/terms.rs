@@ -1,6 +1,9 @@
 //! The multi-indices of an expansion, ordered so that each degree's set is a prefix of the next.
 
+use std::collections::BTreeMap;
+
 use lacuna::linalg::Matrix;
+use lacuna::linalg::lanes::LANES;
 
 use super::family::Coordinate;
 
@@ -136,6 +139,10 @@ pub struct Basis {
     /// The entries of the tables that each term multiplies, and where each term's entries end.
     factors: Vec<u32>,
     ends: Vec<usize>,
+    /// The products that make up the terms, after 1: an earlier one times an entry of the tables.
+    products: Vec<(u32, u32)>,
+    /// The product that each term is.
+    places: Vec<u32>,
 }
 
 impl Basis {
@@ -143,13 +150,22 @@ impl Basis {
     pub fn new(coordinates: Vec<Coordinate>, terms: Terms) -> Self {
         let stride = terms.exponents.iter().max().map_or(1, |&e| usize::from(e) + 1);
         let (mut factors, mut ends) = (Vec::new(), Vec::new());
+        let (mut products, mut places) = (Vec::new(), Vec::new());
+        let mut known = BTreeMap::new();
         for t in 0..terms.len() {
+            let mut place = 0;
             for (i, &e) in terms.term(t).iter().enumerate().filter(|(_, e)| **e > 0) {
-                factors.push((i * stride + usize::from(e)) as u32);
+                let factor = (i * stride + usize::from(e)) as u32;
+                factors.push(factor);
+                place = *known.entry((place, factor)).or_insert_with(|| {
+                    products.push((place, factor));
+                    products.len() as u32
+                });
             }
             ends.push(factors.len());
+            places.push(place);
         }
-        Self { coordinates, terms, stride, factors, ends }
+        Self { coordinates, terms, stride, factors, ends, products, places }
     }
 
     /// The terms.
@@ -169,15 +185,28 @@ impl Basis {
 
     /// The basis functions at each point (one a row, in physical units), `points x terms`.
     pub fn values(&self, points: &Matrix) -> Matrix {
-        let mut values = Matrix::zeros(points.rows(), self.terms.len());
-        let mut table = vec![0.0; self.coordinates.len() * self.stride];
-        for (r, point) in points.iter_rows().enumerate() {
+        let count = self.terms.len();
+        let mut values = Matrix::zeros(points.rows(), count);
+        let mut table = vec![[0.0; LANES]; self.coordinates.len() * self.stride];
+        let mut products = vec![[1.0; LANES]; self.products.len() + 1];
+        for first in (0..points.rows()).step_by(LANES) {
+            let end = points.rows().min(first + LANES);
             let tables = table.chunks_exact_mut(self.stride);
-            for ((x, coordinate), table) in point.iter().zip(&self.coordinates).zip(tables) {
-                coordinate.family.values(coordinate.standard(*x), table);
+            for (i, (coordinate, table)) in self.coordinates.iter().zip(tables).enumerate() {
+                coordinate.values((first..end).map(|r| points[(r, i)]), table);
             }
-            for (t, value) in values.row_mut(r).iter_mut().enumerate() {
-                *value = self.factors(t).iter().map(|&f| table[f as usize]).product();
+            for (p, &(earlier, factor)) in self.products.iter().enumerate() {
+                let (before, factor) = (products[earlier as usize], &table[factor as usize]);
+                for (l, product) in products[p + 1].iter_mut().enumerate() {
+                    *product = before[l] * factor[l];
+                }
+            }
+            let rows =
+                values.as_mut_slice()[first * count..end * count].chunks_exact_mut(count.max(1));
+            for (l, row) in rows.enumerate() {
+                for (value, &place) in row.iter_mut().zip(&self.places) {
+                    *value = products[place as usize][l];
+                }
             }
         }
         values

@@ -1,0 +1,78 @@
+//! Numbers of several points side by side: a loop over terms then does its arithmetic for all of them at
+//! once, whatever the terms look like. No multiplication is fused with an addition, so the bits
+//! are portable and those of a point do not depend on its neighbours.
+
+#![allow(clippy::inline_always)]
+
+use faer::traits::pulp::{Arch, Simd, WithSimd};
+
+/// How many points stand side by side.
+pub const LANES: usize = 16;
+
+/// A number of each point.
+pub type Lanes = [f64; LANES];
+
+/// Sums of entries of a table: `out[r] = sum_k weights[k] table[columns[k]]` for `k` in
+/// `starts[r]..starts[r + 1]`, a sparse matrix times the table.
+///
+/// # Panics
+/// When there is not one column a weight, not one row an output, or a column is not in the table.
+pub fn sparse_multiply(
+    starts: &[usize],
+    columns: &[u16],
+    weights: &[f64],
+    table: &[Lanes],
+    out: &mut [Lanes],
+) {
+    assert_eq!(columns.len(), weights.len(), "one column a weight");
+    assert_eq!(starts.len(), out.len() + 1, "one row an output");
+    Arch::new().dispatch(SparseMultiply { starts, columns, weights, table, out });
+}
+
+struct SparseMultiply<'a> {
+    starts: &'a [usize],
+    columns: &'a [u16],
+    weights: &'a [f64],
+    table: &'a [Lanes],
+    out: &'a mut [Lanes],
+}
+
+impl WithSimd for SparseMultiply<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (out, bounds) in self.out.iter_mut().zip(self.starts.windows(2)) {
+            let range = bounds[0]..bounds[1];
+            let mut sums = [0.0; LANES];
+            for (weight, &column) in self.weights[range.clone()].iter().zip(&self.columns[range]) {
+                let values = &self.table[usize::from(column)];
+                for l in 0..LANES {
+                    sums[l] += weight * values[l];
+                }
+            }
+            *out = sums;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sparse_product_agrees_with_its_definition() {
+        let table: Vec<Lanes> =
+            (0..5).map(|c| std::array::from_fn(|l| (3 * c + l) as f64)).collect();
+        let (starts, columns) = ([0, 2, 2, 5], [4, 1, 0, 2, 3]);
+        let weights = [2.0, -1.0, 0.5, 3.0, 1.0];
+        let mut out = [[f64::NAN; LANES]; 3];
+        sparse_multiply(&starts, &columns, &weights, &table, &mut out);
+        for l in 0..LANES {
+            let entry = |c: usize| table[c][l];
+            assert_eq!(out[0][l], 2.0 * entry(4) - entry(1));
+            assert_eq!(out[1][l], 0.0);
+            assert_eq!(out[2][l], 0.5 * entry(0) + 3.0 * entry(2) + entry(3));
+        }
+    }
+}
