@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use crate::quick;
 
-/// Slow enough to be killed in the middle: runs of about 30 ms one after the other, and a sampler that writes its
-/// state (every two seconds) before it ends.
+/// Slow enough to be killed in the middle: runs of several milliseconds one after the other, and a sampler that
+/// writes its state (first after a tenth of a second) before it ends.
 const SETTINGS: [&str; 5] = [
     "model.numerics.mesh=[12, 54]",
     "sampler.walkers=60",
