@@ -3,9 +3,7 @@
 //! Plugins are built from their names and options as a study builds them. A plugin without an entry in the
 //! tables below fails here. In a binary of its own, because it registers an effect, which the
 //! generated documentation must not list.
-
-// A test that cannot go on has failed: here a panic is the message.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 #[path = "contracts/faults.rs"]
 mod faults;

@@ -1,6 +1,5 @@
 //! Tests of the whole, in one binary.
-// A test that cannot go on has failed: here a panic is the message.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 mod bad_input;
 mod docs;

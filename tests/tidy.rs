@@ -122,9 +122,8 @@ fn nothing_is_unfinished_or_of_one_machine() {
             continue;
         }
         for (i, line) in source.text.lines().enumerate() {
-            let place = format!("{}:{}: {}", source.name, i + 1, line.trim());
             if UNFINISHED.iter().chain(&MACHINE).any(|word| line.contains(word)) {
-                found.push(place);
+                found.push(format!("{}:{}: {}", source.name, i + 1, line.trim()));
             }
         }
     }

@@ -1,5 +1,7 @@
 //! Commands quoted in the documentation are commands of this program.
 
+#![allow(clippy::unwrap_used)]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Local {
-    /// Number of runs at a time; those of `lacuna run STUDY --threads N`, or all cores, when left out.
+    /// Number of runs at a time; when left out, that of the command line's `--threads`, or all cores.
     pub threads: Option<std::num::NonZeroUsize>,
 }
 

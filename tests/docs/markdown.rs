@@ -34,7 +34,7 @@ impl Page {
                 let name = path.file_name().unwrap().to_string_lossy().into_owned();
                 if path.is_dir() && !name.starts_with('.') && name != "target" && name != "runs" {
                     folders.push(path);
-                } else if path.extension().is_some_and(|e| e == "md") {
+                } else if path.extension().is_some_and(|extension| extension == "md") {
                     pages.push(Self::read(&path));
                 }
             }

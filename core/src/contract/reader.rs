@@ -54,11 +54,7 @@ fn reads_its_sample(reader: &dyn Reader, sample: &Sample) -> Result<(), String> 
         return Err(format!("{} values and not {}", found.len(), sample.values.len()));
     }
     let largest = sample.values.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
-    // A number that is none is near to nothing.
-    let far = |(a, b): (&f64, &f64)| {
-        let near = (a - b).abs() <= sample.tolerance * largest;
-        !near
-    };
+    let far = |(a, b): (&f64, &f64)| a.is_nan() || (a - b).abs() > sample.tolerance * largest;
     if let Some(i) = found.iter().zip(&sample.values).position(far) {
         let (place, right) = (sample.layout.describe(i), sample.values[i]);
         return Err(format!("the response at {place} is {} and not {right}", found[i]));

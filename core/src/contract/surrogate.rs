@@ -2,10 +2,11 @@
 
 use super::judge::{Check, agree, calm, judge, layout, refused, same_on_threads, slope};
 use crate::data::{Layout, Parameter, Unit};
+use crate::linalg::vector::dot;
 use crate::linalg::{self, Matrix};
 use crate::math::distribution::Distribution;
-use crate::math::random::{Stream, uniform};
-use crate::plugin::surrogate::{Emulator, Indices, Surrogate, Training};
+use crate::math::random::{Stream, normal, uniform};
+use crate::plugin::surrogate::{Emulator, Indices, Linear, Surrogate, Training};
 use crate::run::{Progress, Silent};
 
 /// Puts a surrogate through the contract, on 60 runs of a smooth function of two parameters with ten outputs, one of
@@ -14,7 +15,8 @@ use crate::run::{Progress, Silent};
 /// - shapes are right and all numbers finite; ninety per cent of the variance at new points is explained;
 /// - several points at once give what each gives alone;
 /// - the Jacobian, and the gradient of the basis where the emulator is linear, are those that differences
-///   give; a linear emulator is the product of its basis and its coefficients;
+///   give; a linear emulator is the product of its basis and its coefficients, and its sums of squares are right
+///   to the error that they state;
 /// - Sobol' indices are shares: first order up to total, from 0 to 1;
 /// - it reads back from its bytes bit for bit, and damaged bytes are refused;
 /// - the same runs give the same bytes, on any number of threads;
@@ -164,6 +166,27 @@ fn knows_its_derivatives(surrogate: &dyn Surrogate, problem: &Problem) -> Result
         let product = linalg::multiply(&linear.basis(&problem.fresh), linear.coefficients());
         let mean = emulator.mean(&problem.fresh);
         agree("basis times coefficients, entry", product.as_slice(), mean.as_slice(), 1e-11)?;
+        sums_squares(linear, &problem.fresh)?;
+    }
+    Ok(())
+}
+
+/// The short form of a sum of squares against the product itself, written out.
+fn sums_squares(linear: &dyn Linear, points: &Matrix) -> Result<(), String> {
+    let terms = linear.coefficients().rows();
+    let mut rng = Stream::root(11).generator();
+    let factor = Matrix::from_fn(terms + 3, terms + 1, |_, _| normal(&mut rng));
+    let Some(form) = linear.sum_of_squares(&factor) else { return Ok(()) };
+    let values = form.values(points);
+    for (i, point) in points.iter_rows().enumerate().filter(|(_, point)| form.covers(point)) {
+        let psi = linear.basis(&Matrix::from_vec(1, point.len(), point.to_vec()));
+        let extended: Vec<f64> = psi.row(0).iter().copied().chain([1.0]).collect();
+        let squares = factor.iter_rows().map(|row| dot(row, &extended).powi(2));
+        let expected: f64 = squares.sum();
+        if (values[i] - expected).abs() > form.error() + 1e-12 * expected {
+            let (found, error) = (values[i], form.error());
+            return Err(format!("a sum of squares is {found} +- {error} and not {expected}"));
+        }
     }
     Ok(())
 }

@@ -15,7 +15,7 @@ use crate::study::decode::{decode, decode_beside, fields};
 use crate::study::emit;
 use crate::study::nearest::{nearest, one_of};
 use crate::study::read::read;
-use crate::study::{Node, Place, Problem, Problems, Sources};
+use crate::study::{Node, Place, Problem, Problems, Sources, Value};
 
 #[doc(hidden)]
 pub use inventory;
@@ -170,7 +170,11 @@ pub fn find<K: Kind + ?Sized>(name: &str) -> Result<&'static Entry<K>, Box<Probl
     }
     let names = || names_of(&entries);
     let mut problem = Problem::new(format!("there is no {} `{name}`", K::NAME));
-    problem.expected(one_of(names()));
+    if entries.is_empty() {
+        problem.help(format!("no {} is installed", K::NAME));
+    } else {
+        problem.expected(one_of(names()));
+    }
     if let Some(near) = nearest(name, names()) {
         problem.help(format!("did you mean `{near}`?"));
     }
@@ -205,7 +209,14 @@ pub fn split_section(section: &Node, common_keys: &[&str], problems: &mut Proble
     };
     for (key, node) in section.entries() {
         if key.name == "use" {
-            split.chosen = decode::<String>(node, problems).map(|name| (name, node.place.clone()));
+            if let Value::String(name) = &node.value {
+                split.chosen = Some((name.clone(), node.place.clone()));
+            } else {
+                problems
+                    .report(Some(node.place.clone()), "wrong value for `use`")
+                    .expected("the name of a plugin")
+                    .found(node.describe());
+            }
         } else if common_keys.contains(&key.name.as_str()) {
             split.common.set(key.clone(), node.clone());
         } else {
@@ -233,7 +244,7 @@ pub fn section<K: Kind + ?Sized, C: DeserializeOwned>(
     default: Option<&str>,
     problems: &mut Problems,
 ) -> Option<Section<K, C>> {
-    if !matches!(node.value, crate::study::Value::Table(_)) {
+    if !matches!(node.value, Value::Table(_)) {
         problems
             .report(Some(node.place.clone()), format!("a {} is a table", K::NAME))
             .expected("a table")

@@ -64,6 +64,16 @@ pub struct RunDirectory {
     _lock: File,
 }
 
+/// Takes the lock, waiting a moment for a process that is about to let it go.
+fn locked(lock: &File) -> bool {
+    (0..20).any(|attempt| {
+        if attempt > 0 {
+            std::thread::sleep(std::time::Duration::from_millis(50));
+        }
+        lock.try_lock().is_ok()
+    })
+}
+
 const RECORD: &str = "stage.json";
 const INPUTS: &str = "inputs.sha256";
 
@@ -74,7 +84,7 @@ impl RunDirectory {
         let lock_path = root.join(".lock");
         let lock =
             File::create(&lock_path).map_err(|error| files::cannot_write(&lock_path, &error))?;
-        if lock.try_lock().is_err() {
+        if !locked(&lock) {
             let message = format!("another process is working in {}", root.display());
             return Err(
                 Stop::new(message).help("wait for it, or choose another folder with `--out DIR`")

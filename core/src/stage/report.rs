@@ -230,7 +230,12 @@ fn warnings(
     }
     if !data.ensemble.failed.is_empty() {
         let count = data.ensemble.failed.len();
-        warnings.push(format!("{count} simulation runs have no usable response and are left out"));
+        let runs = if count == 1 {
+            "1 simulation run has"
+        } else {
+            &format!("{count} simulation runs have")
+        };
+        warnings.push(format!("{runs} no usable response: left out"));
     }
     if let Some(others) = all.calibrated.map(|c| c.value.outcome.other_maxima.len())
         && others > 0

@@ -36,8 +36,13 @@ pub fn ensemble(source: &EnsembleSource<'_>) -> Result<Ensemble, Stop> {
             }),
         }
     }
-    if runs.is_empty() {
-        return Err(Stop::new("every simulation run failed"));
+    if let Some(first) = failed.first() {
+        let (count, all) = (failed.len(), failed.len() + runs.len());
+        let message =
+            format!("{count} of {all} runs failed, first `{}`: {}", first.run, first.reason);
+        return Err(Stop::new(message)
+            .saved(format!("the other runs in {}", folder.display()))
+            .help("run the study again to retry them, or name a reader in `[simulations]` and say there how many may be left out (`allow_failed`)"));
     }
     Ok(Ensemble {
         parameters: simulated.parameters,

@@ -35,7 +35,9 @@ struct Checkpoint {
     state: State,
 }
 
-/// How often the state is written.
+/// How soon the state is written first; each further time takes twice as long, up to [`INTERVAL`].
+const FIRST: Duration = Duration::from_millis(100);
+/// How often the state is written in a long run.
 const INTERVAL: Duration = Duration::from_secs(2);
 
 /// Runs a sampler for the steps of its plan, going on from a checkpoint in `folder` if there is one.
@@ -55,15 +57,15 @@ pub fn sample(
         None => (0, sampler.start(target, start()?)?),
     };
     progress.add(step as u64);
-    let mut written = Instant::now();
+    let (mut written, mut interval) = (Instant::now(), FIRST);
     while step < plan.steps {
         sampler.step(target, &mut state, &stream.at(step as u64))?;
         log.append(&state)?;
         step += 1;
         progress.add(1);
-        if written.elapsed() > INTERVAL {
+        if written.elapsed() > interval {
             log.checkpoint(step, &state)?;
-            written = Instant::now();
+            (written, interval) = (Instant::now(), INTERVAL.min(2 * interval));
         }
     }
     log.checkpoint(step, &state)?;

@@ -149,7 +149,7 @@ mod tests {
 
     #[test]
     fn a_curve_of_white_noise_is_flagged_in_its_group_only() {
-        let flagged = flag(&data(Some(4)), 5.0, true);
+        let flagged = flag(&data(Some(4)), 10.0, true);
         assert_eq!(flagged.len(), 1);
         assert_eq!((flagged[0].replicate.as_str(), flagged[0].group.as_str()), ("p4", "A"));
         let kept = without(&data(Some(4)), &flagged);
@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn sound_curves_are_not_flagged() {
-        assert_eq!(flag(&data(None), 5.0, true), []);
+        assert_eq!(flag(&data(None), 10.0, true), []);
     }
 
     #[test]

@@ -65,7 +65,7 @@ fn parameters(study: &Study, complaints: &mut Complaints<'_>) {
     for (i, parameter) in study.parameters.iter().enumerate() {
         if study.parameters[..i].iter().any(|other| other.name == parameter.name) {
             complaints
-                .at("parameter")
+                .at(&format!("parameter.{}.name", parameter.name))
                 .say(format!("there are two parameters `{}`", parameter.name))
                 .help("give each `[[parameter]]` its own name");
         }

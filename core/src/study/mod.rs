@@ -12,6 +12,7 @@ pub mod overrides;
 pub mod problem;
 pub mod read;
 pub mod resolve;
+mod resolved;
 pub mod schema;
 pub mod source;
 pub mod values;

@@ -9,12 +9,11 @@ use toml::Table;
 
 use super::context;
 use super::decode::{decode, fields};
-use super::emit::{Unwritable, to_table};
 use super::file::{
     DesignKeys, DiscrepancyKeys, MeasurementKeys, ModelKeys, NumericalErrorSection,
     ParameterSection, ResponseSection, SamplerKeys, StudySection, SurrogateKeys, ValidateSection,
 };
-use super::{Complaints, Node, Problems, Sources, inherit, overrides};
+use super::{Complaints, Node, Problems, Sources, inherit, overrides, resolved};
 use crate::data::{Layout, Parameter};
 use crate::plugin::registry::{Kind, NoKeys, Section, section};
 use crate::plugin::{
@@ -209,7 +208,7 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
         validate: validate?,
         resolved: Table::new(),
     };
-    match resolved(&study, &response?) {
+    match resolved::table(&study, &response?) {
         Ok(resolved) => study.resolved = resolved,
         Err(error) => {
             problems.report(None, format!("the study with its defaults {error}"));
@@ -413,46 +412,8 @@ impl Study {
         for (section, node) in self.effects.iter().zip(nodes) {
             visit("effect", Some(node), &*section.built.plugin);
         }
+        if let Some(finer) = &self.numerical_error {
+            visit("numerical_error", root.get("numerical_error"), &*finer.model.built.plugin);
+        }
     }
-}
-
-/// The study with every default filled in.
-fn resolved(study: &Study, response: &ResponseSection) -> Result<Table, Unwritable> {
-    let mut about = to_table(&study.about)?;
-    about.insert("name".to_owned(), study.name.clone().into());
-    let directory = std::path::absolute(&study.directory).unwrap_or(study.directory.clone());
-    about.insert("directory".to_owned(), directory.display().to_string().into());
-    let parameters: Result<Vec<Table>, _> = study.parameters.iter().map(to_table).collect();
-    let mut whole = Table::new();
-    whole.insert("study".to_owned(), about.into());
-    whole.insert("parameter".to_owned(), parameters?.into());
-    whole.insert("response".to_owned(), to_table(response)?.into());
-    macro_rules! sections {
-        ($($field:ident),+) => {
-            $(if let Some(section) = &study.$field {
-                whole.insert(stringify!($field).to_owned(), merged(section)?.into());
-            })+
-        };
-    }
-    sections!(model, design, executor, simulations, measurements, surrogate, discrepancy);
-    if let Some(numerical_error) = &study.numerical_error {
-        let table = to_table(&numerical_error.written)?;
-        whole.insert("numerical_error".to_owned(), table.into());
-    }
-    if !study.effects.is_empty() {
-        let effects: Result<Vec<Table>, _> = study.effects.iter().map(merged).collect();
-        whole.insert("effect".to_owned(), effects?.into());
-    }
-    sections!(sampler);
-    whole.insert("validate".to_owned(), to_table(&study.validate)?.into());
-    Ok(whole)
-}
-
-/// One table of `use`, the engine's keys and the plugin's.
-fn merged<K: ?Sized, C: serde::Serialize>(section: &Section<K, C>) -> Result<Table, Unwritable> {
-    let mut table = Table::new();
-    table.insert("use".to_owned(), section.built.name.into());
-    table.extend(to_table(&section.common)?);
-    table.extend(section.built.options.clone());
-    Ok(table)
 }

@@ -122,6 +122,8 @@ fn each_run_may_have_a_file_of_its_own() {
                 b,,failed,no steps,true,2\nc,a.csv,done,,false,3\n";
     let folder = Folder::new(&[("runs.csv", runs), ("a.csv", file)]);
     let csv = Csv { parameters: Some("runs.csv".into()), ..Csv::default() };
+    assert!(folder.ensemble(&csv).is_err());
+    let csv = Csv { allow_failed: AllowFailed::new(1.0).unwrap(), ..csv };
     let ensemble = folder.ensemble(&csv).unwrap();
     assert_eq!((ensemble.runs.len(), &ensemble.valid[..]), (2, &[true, false][..]));
     assert_eq!(ensemble.failed[0].reason, "no steps");

@@ -138,7 +138,8 @@ fn what_the_simulate_stage_wrote_is_found() {
     let table = "run,file,status,valid,reason,density\nrun-1,run-1.h,done,false,,13500\n\
                  run-2,,failed,,no steps,12000\n";
     std::fs::write(folder.path().join("runs.csv"), table).unwrap();
-    let reader = Sierra { runs: None, ..reader() };
+    let allow_failed = AllowFailed::new(1.0).unwrap();
+    let reader = Sierra { runs: None, allow_failed, ..reader() };
     let layout = layout(times, "1");
     let source = EnsembleSource {
         directory: Path::new("elsewhere"),

@@ -1,0 +1,49 @@
+//! A study written out: every default filled in, for `resolved.toml`.
+
+use toml::Table;
+
+use super::emit::{Unwritable, to_table};
+use super::file::ResponseSection;
+use super::resolve::Study;
+use crate::plugin::registry::Section;
+
+/// The study with every default filled in.
+pub(super) fn table(study: &Study, response: &ResponseSection) -> Result<Table, Unwritable> {
+    let mut about = to_table(&study.about)?;
+    about.insert("name".to_owned(), study.name.clone().into());
+    let directory = std::path::absolute(&study.directory).unwrap_or(study.directory.clone());
+    about.insert("directory".to_owned(), directory.display().to_string().into());
+    let parameters: Result<Vec<Table>, _> = study.parameters.iter().map(to_table).collect();
+    let mut whole = Table::new();
+    whole.insert("study".to_owned(), about.into());
+    whole.insert("parameter".to_owned(), parameters?.into());
+    whole.insert("response".to_owned(), to_table(response)?.into());
+    macro_rules! sections {
+        ($($field:ident),+) => {
+            $(if let Some(section) = &study.$field {
+                whole.insert(stringify!($field).to_owned(), merged(section)?.into());
+            })+
+        };
+    }
+    sections!(model, design, executor, simulations, measurements, surrogate, discrepancy);
+    if let Some(numerical_error) = &study.numerical_error {
+        let table = to_table(&numerical_error.written)?;
+        whole.insert("numerical_error".to_owned(), table.into());
+    }
+    if !study.effects.is_empty() {
+        let effects: Result<Vec<Table>, _> = study.effects.iter().map(merged).collect();
+        whole.insert("effect".to_owned(), effects?.into());
+    }
+    sections!(sampler);
+    whole.insert("validate".to_owned(), to_table(&study.validate)?.into());
+    Ok(whole)
+}
+
+/// One table of `use`, the engine's keys and the plugin's.
+fn merged<K: ?Sized, C: serde::Serialize>(section: &Section<K, C>) -> Result<Table, Unwritable> {
+    let mut table = Table::new();
+    table.insert("use".to_owned(), section.built.name.into());
+    table.extend(to_table(&section.common)?);
+    table.extend(section.built.options.clone());
+    Ok(table)
+}
