@@ -129,7 +129,7 @@ fn a_truncated_run_is_named_and_left_out_only_when_allowed() {
     assert_eq!(quick::summary(&out)["runs"]["used"], 39);
     assert_eq!(quick::summary(&out)["runs"]["failed"], 1);
     let warnings = quick::summary(&out)["warnings"].to_string();
-    assert!(warnings.contains("1 simulation runs have no usable response"), "{warnings}");
+    assert!(warnings.contains("1 simulation run has no usable response"), "{warnings}");
 }
 
 #[test]

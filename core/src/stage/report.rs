@@ -230,12 +230,11 @@ fn warnings(
     }
     if !data.ensemble.failed.is_empty() {
         let count = data.ensemble.failed.len();
-        let runs = if count == 1 {
-            "1 simulation run has"
+        warnings.push(if count == 1 {
+            "1 simulation run has no usable response and is left out".to_owned()
         } else {
-            &format!("{count} simulation runs have")
-        };
-        warnings.push(format!("{runs} no usable response: left out"));
+            format!("{count} simulation runs have no usable response and are left out")
+        });
     }
     if let Some(others) = all.calibrated.map(|c| c.value.outcome.other_maxima.len())
         && others > 0
