@@ -52,7 +52,7 @@ impl Component for DifferentialEvolution {
 
 impl Sampler for DifferentialEvolution {
     fn plan(&self, _dimension: usize) -> Plan {
-        Plan { chains: self.walkers, steps: self.steps, ensemble: true }
+        Plan { chains: self.walkers, steps: self.steps, warm_up: 0, ensemble: true }
     }
 
     fn start(&self, target: &dyn Target, points: Matrix) -> Result<State, Stop> {

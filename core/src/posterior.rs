@@ -257,6 +257,12 @@ impl Target for Posterior<'_> {
     fn log_density(&self, points: &Matrix) -> Vec<f64> {
         self.batch(points, true)
     }
+    fn log_prior(&self, points: &Matrix) -> Vec<f64> {
+        points
+            .iter_rows()
+            .map(|p| self.log_prior(&self.natural(p)) + self.log_jacobian(p))
+            .collect()
+    }
     fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
         self.value_and_gradient(point, true)
     }
@@ -277,6 +283,9 @@ impl Target for Mode<'_> {
     }
     fn log_density(&self, points: &Matrix) -> Vec<f64> {
         self.0.batch(points, false)
+    }
+    fn log_prior(&self, points: &Matrix) -> Vec<f64> {
+        points.iter_rows().map(|p| self.0.log_prior(&self.0.natural(p))).collect()
     }
     fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
         self.0.value_and_gradient(point, false)

@@ -1,3 +1,4 @@
 //! Surrogates.
 
 pub mod polynomial_chaos;
+pub mod principal_components;

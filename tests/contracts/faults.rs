@@ -6,7 +6,7 @@ use lacuna::contract::{self, Sample};
 use lacuna::data::{Layout, Measurements};
 use lacuna::linalg::Matrix;
 use lacuna::math::random::Stream;
-use lacuna::plugin::discrepancy::{CommonError, VariancePart};
+use lacuna::plugin::discrepancy::{Known, VariancePart};
 use lacuna::plugin::model::{Call, EvalError, Response, Signature};
 use lacuna::plugin::reader::{Contents, ReadError};
 use lacuna::plugin::registry;
@@ -44,12 +44,8 @@ struct Faulty<T: ?Sized> {
 impl<T: ?Sized + Send + Sync> Component for Faulty<T> {}
 
 impl Discrepancy for Faulty<dyn Discrepancy> {
-    fn likelihood(
-        &self,
-        data: &Measurements,
-        common: &[CommonError],
-    ) -> Result<Box<dyn Likelihood>, Stop> {
-        let sound = self.sound.likelihood(data, common)?;
+    fn likelihood(&self, known: &Known<'_>) -> Result<Box<dyn Likelihood>, Stop> {
+        let sound = self.sound.likelihood(known)?;
         Ok(Box::new(Faulty { fault: self.fault, sound }))
     }
 }

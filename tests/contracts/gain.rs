@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Scenario, Unit};
 use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
+use lacuna::plugin::discrepancy::Known;
 use lacuna::plugin::effect::Description;
 use lacuna::plugin::registry;
 use lacuna::plugin::surrogate::FitError;
@@ -125,7 +126,8 @@ fn with_posterior(test: impl FnOnce(&Posterior<'_>)) {
         values: values.to_vec(),
     });
     let data = Measurements { layout: layout(), replicates: replicates.collect() };
-    let likelihood: Box<dyn Likelihood> = discrepancy.likelihood(&data, &[]).unwrap();
+    let likelihood: Box<dyn Likelihood> =
+        discrepancy.likelihood(&Known::without_slopes(&data, &[])).unwrap();
     let (layout, parameters, emulator) = (layout(), parameters(), Quadratic::default());
     test(&Posterior::new(&layout, &parameters, &emulator, &[&*effect], &*likelihood));
 }

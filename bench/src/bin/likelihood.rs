@@ -13,6 +13,7 @@ use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Scenario, U
 use lacuna::linalg::{Matrix, multiply};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal, uniform};
+use lacuna::plugin::discrepancy::Known;
 use lacuna::plugin::discrepancy::{CommonError, Discrepancy};
 use lacuna::plugin::surrogate::{Surrogate, Training};
 use lacuna::plugin::{Emulator, Target};
@@ -39,7 +40,7 @@ fn main() -> Fallible<()> {
     let emulator = emulator(&parameters, &layout, degree)?;
     let data = measured(&*emulator, &layout);
     let gaussian = Gaussian { variance: Distribution::HalfNormal(1e-6) };
-    let likelihood = gaussian.likelihood(&data, &error(rank))?;
+    let likelihood = gaussian.likelihood(&Known::without_slopes(&data, &error(rank)))?;
     let begun = processor_seconds()?;
     let posterior = Posterior::new(&layout, &parameters, &*emulator, &[], &*likelihood);
     let preparation = processor_seconds()? - begun;

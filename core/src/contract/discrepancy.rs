@@ -5,8 +5,9 @@ use crate::data::{Measurements, Replicate, Scenario};
 use crate::linalg::{self, Matrix};
 use crate::math::random::{Stream, normal};
 use crate::plugin::Discrepancy;
-use crate::plugin::discrepancy::{CommonError, Likelihood};
+use crate::plugin::discrepancy::{CommonError, Known, Likelihood};
 use crate::plugin::surrogate::Linear;
+use crate::run::Stop;
 
 /// Puts a discrepancy through the contract, on five replicates of ten outputs with gaps, one output never
 /// measured, with and without errors that all replicates share.
@@ -24,7 +25,7 @@ pub fn discrepancy(name: &str, discrepancy: &dyn Discrepancy) -> Result<(), Vec<
         move || {
             let emulator = || common("emulator", true);
             for errors in [vec![], vec![emulator()], vec![emulator(), last.clone()]] {
-                let built = discrepancy.likelihood(&data(), &errors);
+                let built = discrepancy.likelihood(&known(&data(), &errors));
                 check(&*built.map_err(|stop| format!("sound data are refused: {stop}"))?)?;
             }
             Ok(())
@@ -69,6 +70,15 @@ fn common(origin: &str, predictive: bool) -> CommonError {
     let mut rng = Stream::root(8).named(origin).generator();
     let factor = Matrix::from_fn(OUTPUTS, 2, |_, _| 0.05 * normal(&mut rng));
     CommonError { origin: origin.to_owned(), factor, predictive }
+}
+
+/// Slopes of two parameters, of which the second hardly matters.
+fn slopes() -> Result<Matrix, Stop> {
+    Ok(Matrix::from_fn(OUTPUTS, 2, |i, j| (0.3 * i as f64).cos() / (1.0 + 100.0 * j as f64)))
+}
+
+fn known<'a>(data: &'a Measurements, common: &'a [CommonError]) -> Known<'a> {
+    Known { data, common, slopes: &slopes }
 }
 
 fn start(likelihood: &dyn Likelihood) -> Vec<f64> {
@@ -226,18 +236,18 @@ fn refuses_bad_data(discrepancy: &dyn Discrepancy) -> Result<(), String> {
         ("an infinite value", changed(|r| r.values[1] = Some(f64::INFINITY))),
         ("replicates of another shape", changed(|r| r.values.truncate(4))),
     ] {
-        refused(what, || discrepancy.likelihood(&data, &[]).map(|_| ()))?;
+        refused(what, || discrepancy.likelihood(&known(&data, &[])).map(|_| ()))?;
     }
     let rank = |rows: usize, columns: usize| {
         [CommonError { factor: Matrix::zeros(rows, columns), ..common("emulator", true) }]
     };
     refused("a common error of another shape", || {
-        discrepancy.likelihood(&data(), &rank(OUTPUTS - 1, 2)).map(|_| ())
+        discrepancy.likelihood(&known(&data(), &rank(OUTPUTS - 1, 2))).map(|_| ())
     })?;
     // An emulator without an error is a good one.
     for errors in [rank(OUTPUTS, 0), rank(OUTPUTS, 2)] {
         let what = "a common error of zero";
-        if let Err(stop) = calm(what, || discrepancy.likelihood(&data(), &errors))? {
+        if let Err(stop) = calm(what, || discrepancy.likelihood(&known(&data(), &errors)))? {
             return Err(format!("{what} is refused: {stop}"));
         }
     }

@@ -53,6 +53,14 @@ impl Target for Normal {
         points.iter_rows().map(|point| self.gradient(point).0).collect()
     }
 
+    fn log_prior(&self, points: &Matrix) -> Vec<f64> {
+        let laws = || MEAN.into_iter().zip(SD).map(|(mean, sd)| Distribution::Normal([mean, sd]));
+        points
+            .iter_rows()
+            .map(|p| laws().zip(p).map(|(law, &x)| law.log_density(x)).sum())
+            .collect()
+    }
+
     fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
         let (u, v) = ((point[0] - MEAN[0]) / SD[0], (point[1] - MEAN[1]) / SD[1]);
         let rest = 1.0 - CORRELATION * CORRELATION;
@@ -80,6 +88,10 @@ impl Target for Bounded {
 
     fn log_density(&self, points: &Matrix) -> Vec<f64> {
         points.iter_rows().map(|point| self.gradient(point).0).collect()
+    }
+
+    fn log_prior(&self, points: &Matrix) -> Vec<f64> {
+        self.log_density(points)
     }
 
     fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {

@@ -12,16 +12,29 @@ use crate::run::Stop;
 
 /// A statistical model of the difference between model and data.
 pub trait Discrepancy: Component {
-    /// The likelihood of these measurements.
-    ///
-    /// `common` are errors that all replicates share (of the emulator, of the model's numerics, of the
-    /// replicates' mean): their covariances are added once to the covariance of the mean curve, never divided by
-    /// the number of replicates.
-    fn likelihood(
-        &self,
-        data: &Measurements,
-        common: &[CommonError],
-    ) -> Result<Box<dyn Likelihood>, Stop>;
+    /// The likelihood of what is known.
+    fn likelihood(&self, known: &Known<'_>) -> Result<Box<dyn Likelihood>, Stop>;
+}
+
+/// What a likelihood is built from.
+#[derive(Clone, Copy)]
+pub struct Known<'a> {
+    /// The measurements.
+    pub data: &'a Measurements,
+    /// Errors that all replicates share (of the emulator, of the model's numerics, of the replicates' mean): their
+    /// covariances are added once to the covariance of the mean curve, never divided by the number of
+    /// replicates.
+    pub common: &'a [CommonError],
+    /// The derivative of each output (rows) by each parameter (columns), in units of the prior's standard
+    /// deviation of that parameter, where the model fits the data best; computed when it is asked for.
+    pub slopes: &'a dyn Fn() -> Result<Matrix, Stop>,
+}
+
+impl<'a> Known<'a> {
+    /// Of measurements and common errors, for those who do not ask for slopes.
+    pub fn without_slopes(data: &'a Measurements, common: &'a [CommonError]) -> Self {
+        Self { data, common, slopes: &|| Err(Stop::new("the slopes of the model are not known")) }
+    }
 }
 
 /// An unknown of a discrepancy or an effect.
@@ -60,6 +73,13 @@ pub trait Likelihood: Send + Sync {
     /// The log-likelihood of the data given the model's response (one value an output) and the
     /// hyperparameters; minus infinity outside their support.
     fn log_likelihood(&self, response: &[f64], hyper: &[f64]) -> f64;
+
+    /// The log density of each measured value given all others, by replicate and output with gaps left out
+    /// (Bürkner, Gabry and Vehtari, Computational Statistics 36 (2021) 1243, for values that are not
+    /// independent); `None` when the discrepancy has no such form.
+    fn left_out(&self, _response: &[f64], _hyper: &[f64]) -> Option<Vec<f64>> {
+        None
+    }
 
     /// The derivatives of the log-likelihood by the response and by the hyperparameters.
     fn gradient(&self, response: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>);

@@ -18,6 +18,10 @@ pub trait Target: Sync {
     /// The log density at each row of `points`; minus infinity outside the support, never NaN.
     fn log_density(&self, points: &Matrix) -> Vec<f64>;
 
+    /// The log prior density at each row of `points`, in the same coordinates; minus infinity outside its
+    /// support. The log density less this is the log-likelihood.
+    fn log_prior(&self, points: &Matrix) -> Vec<f64>;
+
     /// The log density at a point and its gradient.
     fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>);
 
@@ -39,10 +43,54 @@ pub trait Sampler: Component {
     /// One step of all chains. `stream` belongs to this step alone.
     fn step(&self, target: &dyn Target, state: &mut State, stream: &Stream) -> Result<(), Stop>;
 
+    /// Whether this state is the last one, however many steps the plan has.
+    fn finished(&self, _state: &State) -> bool {
+        false
+    }
+
+    /// The draws of a method whose steps are not draws themselves (populations that are cooled, live points,
+    /// fits), from its last state; `None` where the points of each step are draws.
+    fn harvest(
+        &self,
+        _target: &dyn Target,
+        _state: &State,
+        _stream: &Stream,
+    ) -> Result<Option<Harvest>, Stop> {
+        Ok(None)
+    }
+
     /// What is worth telling about the method.
     fn facts(&self) -> Vec<Fact> {
         Vec::new()
     }
+}
+
+/// What a method brings home whose steps are not draws.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Harvest {
+    /// Draws of equal weight in random order, one a row.
+    pub points: Matrix,
+    /// The log density of each.
+    pub log_density: Vec<f64>,
+    /// The number of independent draws that they are worth.
+    pub effective_size: f64,
+    /// The evidence, where the method gives it.
+    pub evidence: Option<Evidence>,
+    /// Reasons not to trust the draws, each with what would help; none when all is well.
+    pub doubts: Vec<String>,
+    /// What is worth telling.
+    pub facts: Vec<Fact>,
+}
+
+/// The logarithm of the probability of the data: of the integral of likelihood times prior.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Evidence {
+    /// Its value.
+    pub log: f64,
+    /// The standard error of that value.
+    pub error: f64,
+    /// How it was found, in words.
+    pub method: String,
 }
 
 /// The size of a run.
@@ -52,6 +100,8 @@ pub struct Plan {
     pub chains: usize,
     /// The number of steps of each.
     pub steps: usize,
+    /// The number of first steps in which the method adapts itself: they are no draws, however short the burn-in.
+    pub warm_up: usize,
     /// Whether the chains are walkers of one ensemble, and so not independent of each other.
     pub ensemble: bool,
 }

@@ -11,6 +11,7 @@ use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::math::optimise;
 use crate::math::random::Stream;
+use crate::plugin::discrepancy;
 use crate::plugin::{Effect, Emulator, Fact, Likelihood, Target};
 use crate::posterior::Posterior;
 use crate::run::arrays::{self, Array};
@@ -20,7 +21,7 @@ use crate::study::file::Start;
 
 use super::read::Measured;
 use super::sampling::{self, Sampled};
-use super::{Known, common_error, stream};
+use super::{Known, best_fit, common_error, stream};
 
 /// The posterior as draws, with its maximum.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,7 +129,11 @@ impl Parts {
             common.extend(common_error::of_replicates(&measured.used));
         }
         common.extend(known.numerics.map(|kept| kept.value.common_error()));
-        let likelihood = section.built.plugin.likelihood(&measured.likelihood, &common)?;
+        let likelihood = section.built.plugin.likelihood(&discrepancy::Known {
+            data: &measured.likelihood,
+            common: &common,
+            slopes: &|| best_fit::slopes(study, &measured.likelihood, known.emulator),
+        })?;
         Ok(Self { likelihood })
     }
 
@@ -265,7 +270,10 @@ const CANDIDATES: usize = 400;
 const STARTS: usize = 12;
 
 /// The local maxima of the posterior density in natural units, best first.
-fn maxima(posterior: &Posterior<'_>, stream: &Stream) -> Result<Vec<optimise::Optimum>, Stop> {
+pub(super) fn maxima(
+    posterior: &Posterior<'_>,
+    stream: &Stream,
+) -> Result<Vec<optimise::Optimum>, Stop> {
     let mode = posterior.mode();
     let d = posterior.parameters().len();
     let mut candidates = posterior.prior_draws(CANDIDATES, stream);

@@ -1,5 +1,6 @@
 //! The whole program: stages in order, each one function from plain data to plain data.
 
+pub mod best_fit;
 pub mod calibrate;
 pub mod common_error;
 pub mod design;

@@ -5,10 +5,9 @@ mod likelihood;
 #[cfg(test)]
 mod tests;
 
-use lacuna::data::Measurements;
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::component::{Component, Context};
-use lacuna::plugin::discrepancy::{CommonError, Discrepancy, Likelihood};
+use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood};
 use lacuna::run::Stop;
 use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
@@ -48,12 +47,8 @@ impl Component for Gaussian {
 }
 
 impl Discrepancy for Gaussian {
-    fn likelihood(
-        &self,
-        data: &Measurements,
-        common: &[CommonError],
-    ) -> Result<Box<dyn Likelihood>, Stop> {
-        Ok(Box::new(GaussianLikelihood::new(data, common, self.variance.clone())?))
+    fn likelihood(&self, known: &Known<'_>) -> Result<Box<dyn Likelihood>, Stop> {
+        Ok(Box::new(GaussianLikelihood::new(known.data, known.common, self.variance.clone())?))
     }
 }
 

@@ -71,6 +71,13 @@ impl Target for Oscillations {
         (value, gradient)
     }
 
+    fn log_prior(&self, points: &Matrix) -> Vec<f64> {
+        let volume = 3.0 * 2.0_f64.ln();
+        let inside =
+            |x: &[f64]| x.iter().zip(self.bounds()).all(|(x, (lo, hi))| lo <= *x && *x <= hi);
+        points.iter_rows().map(|x| if inside(x) { -volume } else { f64::NEG_INFINITY }).collect()
+    }
+
     fn bounds(&self) -> Vec<(f64, f64)> {
         (0..self.dimension()).map(|j| if j < 3 { (-1.0, 1.0) } else { (0.0, 1.0) }).collect()
     }

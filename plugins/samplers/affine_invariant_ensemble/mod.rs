@@ -86,7 +86,7 @@ impl Component for AffineInvariantEnsemble {
 
 impl Sampler for AffineInvariantEnsemble {
     fn plan(&self, _dimension: usize) -> Plan {
-        Plan { chains: self.walkers, steps: self.steps, ensemble: true }
+        Plan { chains: self.walkers, steps: self.steps, warm_up: 0, ensemble: true }
     }
 
     fn start(&self, target: &dyn Target, points: Matrix) -> Result<State, Stop> {

@@ -28,6 +28,11 @@ impl<F: Fn(&[f64]) -> f64 + Sync> Target for Density<F> {
         points.iter_rows().map(&self.function).collect()
     }
 
+    fn log_prior(&self, points: &Matrix) -> Vec<f64> {
+        let law = Distribution::Normal([self.centre, self.spread]);
+        points.iter_rows().map(|p| p.iter().map(|&x| law.log_density(x)).sum()).collect()
+    }
+
     fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
         ((self.function)(point), vec![f64::NAN; point.len()])
     }
@@ -237,6 +242,9 @@ fn threads_that_share_a_batch_do_not_change_it() {
         fn log_density(&self, points: &Matrix) -> Vec<f64> {
             let rows: Vec<&[f64]> = points.iter_rows().collect();
             rows.par_iter().map(|x| -0.5 * x.iter().map(|x| x * x).sum::<f64>()).collect()
+        }
+        fn log_prior(&self, points: &Matrix) -> Vec<f64> {
+            standard(3).log_prior(points)
         }
         fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
             standard(3).gradient(point)

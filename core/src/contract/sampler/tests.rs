@@ -29,7 +29,7 @@ impl Component for Walk {}
 
 impl Sampler for Walk {
     fn plan(&self, _: usize) -> Plan {
-        Plan { chains: 30, steps: 3000, ensemble: false }
+        Plan { chains: 30, steps: 3000, warm_up: 0, ensemble: false }
     }
 
     fn start(&self, target: &dyn Target, points: Matrix) -> Result<State, Stop> {

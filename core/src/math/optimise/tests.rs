@@ -21,6 +21,12 @@ impl<F: Fn(&[f64]) -> (f64, Vec<f64>) + Sync> Target for Density<F> {
         points.iter_rows().map(|x| self.gradient(x).0).collect()
     }
 
+    fn log_prior(&self, points: &Matrix) -> Vec<f64> {
+        let law = |j: usize| Distribution::Normal([self.prior[j].0, self.prior[j].1]);
+        let density = |x: &[f64]| (0..x.len()).map(|j| law(j).log_density(x[j])).sum();
+        points.iter_rows().map(density).collect()
+    }
+
     fn gradient(&self, x: &[f64]) -> (f64, Vec<f64>) {
         if x.iter().zip(&self.bounds).any(|(x, (lo, hi))| x < lo || x > hi) {
             return (f64::NEG_INFINITY, vec![0.0; x.len()]);

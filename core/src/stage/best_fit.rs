@@ -1,0 +1,103 @@
+//! Where the model fits the data best, before any discrepancy is chosen, and how its response changes there.
+
+use crate::data::Measurements;
+use crate::linalg::Matrix;
+use crate::math::distribution::Distribution;
+use crate::math::random::Stream;
+use crate::plugin::Emulator;
+use crate::plugin::discrepancy::{Hyperparameter, Likelihood, VariancePart};
+use crate::posterior::Posterior;
+use crate::run::Stop;
+use crate::study::Study;
+
+use super::calibrate::maxima;
+use super::stream;
+
+/// The parameters at the largest of prior times `|y - m|^-N`: the normal likelihood of independent data
+/// with its unknown variance integrated out under the prior `1 / variance`.
+pub fn point(
+    study: &Study,
+    data: &Measurements,
+    emulator: &dyn Emulator,
+) -> Result<Vec<f64>, Stop> {
+    let likelihood = LeastSquares::of(data)?;
+    let posterior = Posterior::new(&study.layout, &study.parameters, emulator, &[], &likelihood);
+    let maxima = maxima(&posterior, &stream(study, "best-fit"))?;
+    Ok(maxima[0].point.clone())
+}
+
+/// The derivative of each output by each parameter at [`point`], per standard deviation of the prior.
+pub fn slopes(study: &Study, data: &Measurements, emulator: &dyn Emulator) -> Result<Matrix, Stop> {
+    let jacobian = emulator.jacobian(&point(study, data, emulator)?);
+    let sd: Vec<f64> = study.parameters.iter().map(|p| scale(&p.prior)).collect();
+    Ok(Matrix::from_fn(jacobian.rows(), jacobian.columns(), |i, j| jacobian[(i, j)] * sd[j]))
+}
+
+/// The standard deviation of a law, or a quarter of the range of its middle 95 % where it has none.
+fn scale(law: &Distribution) -> f64 {
+    let sd = law.variance().sqrt();
+    if sd.is_finite() { sd } else { 0.25 * (law.quantile(0.975) - law.quantile(0.025)) }
+}
+
+/// Independent normal data whose one variance is integrated out.
+struct LeastSquares<'a> {
+    data: &'a Measurements,
+    /// Number of replicates and their mean, by output.
+    outputs: Vec<(f64, f64)>,
+    scatter: f64,
+    count: f64,
+}
+
+impl<'a> LeastSquares<'a> {
+    fn of(data: &'a Measurements) -> Result<Self, Stop> {
+        let summaries = data.summaries();
+        if summaries.iter().all(|s| s.count == 0) {
+            return Err(Stop::new("the measurements hold no value"));
+        }
+        Ok(Self {
+            data,
+            outputs: summaries.iter().map(|s| (s.count as f64, s.mean)).collect(),
+            scatter: summaries.iter().map(|s| s.scatter).sum(),
+            count: data.count() as f64,
+        })
+    }
+
+    fn squares(&self, response: &[f64]) -> f64 {
+        let each = self.outputs.iter().zip(response).filter(|((n, _), _)| *n > 0.0);
+        self.scatter + each.map(|((n, mean), y)| n * (mean - y).powi(2)).sum::<f64>()
+    }
+}
+
+impl Likelihood for LeastSquares<'_> {
+    fn hyperparameters(&self) -> &[Hyperparameter] {
+        &[]
+    }
+
+    fn log_likelihood(&self, response: &[f64], _hyper: &[f64]) -> f64 {
+        // Data that fit exactly would make the density infinite.
+        -0.5 * self.count * self.squares(response).max(f64::MIN_POSITIVE).ln()
+    }
+
+    fn gradient(&self, response: &[f64], _hyper: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let factor = self.count / self.squares(response).max(f64::MIN_POSITIVE);
+        let slope = |((n, mean), y): (&(f64, f64), &f64)| {
+            if *n > 0.0 { factor * n * (mean - y) } else { 0.0 }
+        };
+        (self.outputs.iter().zip(response).map(slope).collect(), Vec::new())
+    }
+
+    fn predictive(&self, _response: &[f64], _hyper: &[f64]) -> Vec<VariancePart> {
+        Vec::new()
+    }
+
+    /// Data without noise, of which this likelihood knows no size.
+    fn simulate(&self, response: &[f64], _hyper: &[f64], _stream: &Stream) -> Measurements {
+        let mut data = self.data.clone();
+        for replicate in &mut data.replicates {
+            for (value, y) in replicate.values.iter_mut().zip(response) {
+                *value = value.map(|_| *y);
+            }
+        }
+        data
+    }
+}

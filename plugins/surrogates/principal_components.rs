@@ -1,0 +1,113 @@
+//! Principal components of the outputs: a thousand outputs that move together are a few tens of scores.
+
+use lacuna::linalg::{self, Matrix};
+use lacuna::run::Stop;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How many principal components of the outputs are emulated instead of the outputs themselves.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "snake_case")]
+pub enum Components {
+    /// As many as carry this share of the variance of all outputs over the runs, such as `{ variance = 0.9999 }`.
+    Variance(f64),
+    /// This many, such as `{ count = 20 }`.
+    Count(usize),
+}
+
+/// Responses `Y = 1 mean' + T V' + E` with few scores `T`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PrincipalComponents {
+    /// The mean of each output over the runs.
+    pub mean: Vec<f64>,
+    /// `V`, orthonormal columns in the order of the variance they carry, `outputs x components`.
+    pub directions: Matrix,
+    /// `T`, `runs x components`.
+    pub scores: Matrix,
+    /// `E`, what the components leave out, `runs x outputs`.
+    pub remainder: Matrix,
+}
+
+impl Components {
+    /// What is wrong with the choice, in words.
+    pub fn fault(&self) -> Option<String> {
+        match *self {
+            Self::Variance(share) if !(share > 0.0 && share <= 1.0) => Some(format!(
+                "the share of the variance is {share}, but must be above 0, at most 1"
+            )),
+            Self::Count(0) => Some("no component at all is left".to_owned()),
+            _ => None,
+        }
+    }
+
+    /// The components of responses, `runs x outputs`.
+    pub fn of(&self, responses: &Matrix) -> Result<PrincipalComponents, Stop> {
+        let (runs, outputs) = (responses.rows(), responses.columns());
+        let mean: Vec<f64> =
+            (0..outputs).map(|j| responses.column(j).iter().sum::<f64>() / runs as f64).collect();
+        let centred = Matrix::from_fn(runs, outputs, |i, j| responses[(i, j)] - mean[j]);
+        let svd = linalg::thin_svd(&centred)
+            .map_err(|e| Stop::new(format!("the principal components of the outputs: {e}")))?;
+        let rank = self.rank(&svd.values);
+        let scores = Matrix::from_fn(runs, rank, |i, k| svd.u[(i, k)] * svd.values[k]);
+        let directions = Matrix::from_fn(outputs, rank, |j, k| svd.v[(j, k)]);
+        let kept = linalg::multiply_transposed(&scores, &directions);
+        let remainder = Matrix::from_fn(runs, outputs, |i, j| centred[(i, j)] - kept[(i, j)]);
+        Ok(PrincipalComponents { mean, directions, scores, remainder })
+    }
+
+    fn rank(&self, singular_values: &[f64]) -> usize {
+        // What is below round-off is no component.
+        let largest = singular_values.first().copied().unwrap_or(0.0);
+        let real = singular_values.iter().take_while(|&&s| s > 1e-14 * largest).count();
+        match *self {
+            Self::Count(count) => count.min(real),
+            Self::Variance(share) => {
+                let total: f64 = singular_values.iter().map(|s| s * s).sum();
+                let mut sum = 0.0;
+                let short = |s: &&f64| {
+                    let before = sum;
+                    sum += *s * *s;
+                    before < share * total
+                };
+                singular_values[..real].iter().take_while(short).count()
+            }
+        }
+    }
+}
+
+impl PrincipalComponents {
+    /// The mean square of what the components leave out of each output over the runs.
+    pub fn truncation(&self) -> Vec<f64> {
+        let runs = self.remainder.rows() as f64;
+        let square = |j: usize| self.remainder.column(j).iter().map(|e| e * e).sum::<f64>() / runs;
+        (0..self.remainder.columns()).map(square).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lacuna::math::random::{Stream, normal};
+
+    /// Responses of rank three, so that three components leave out round-off only (Eckart and Young 1936).
+    #[test]
+    fn responses_of_low_rank_have_few_components() {
+        let mut rng = Stream::root(1).generator();
+        let mut random = |rows, columns| Matrix::from_fn(rows, columns, |_, _| normal(&mut rng));
+        let responses = linalg::multiply(&random(40, 3), &random(3, 25));
+        let found = Components::Variance(1.0).of(&responses).unwrap();
+        assert_eq!(found.scores.columns(), 3);
+        assert!(found.truncation().iter().all(|t| *t < 1e-24));
+        let two = Components::Count(2).of(&responses).unwrap();
+        let left: f64 = two.truncation().iter().sum();
+        let third: f64 = found.scores.column(2).iter().map(|s| s * s).sum::<f64>() / 40.0;
+        assert!((left - third).abs() < 1e-12 * third);
+    }
+
+    #[test]
+    fn responses_without_variance_have_no_component() {
+        let found = Components::Variance(0.99).of(&Matrix::from_fn(5, 4, |_, j| j as f64)).unwrap();
+        assert_eq!((found.scores.columns(), found.mean[3]), (0, 3.0));
+    }
+}
