@@ -49,9 +49,10 @@ impl<'a> Scaled<'a> {
         };
         let record = RefCell::new(Record { best: best.clone(), last: best, count: 0 });
         let cost = Cost { scaled: &self, record: &record };
+        // A step that gains no more than round-off is the last one: what follows is a walk in noise.
         let solver = Lbfgs::new()
             .with_absolute_projected_gradient_tolerance(1e-9)
-            .with_relative_cost_reduction_tolerance(None);
+            .with_relative_cost_reduction_tolerance(f64::EPSILON);
         let start = FirstOrderState::new(vec![0.0; self.origin.len()]);
         // The best point is taken from the record, so that a search that fails half-way counts too.
         let _ = Executor::new(cost, solver, start).max_iter(500).run();
