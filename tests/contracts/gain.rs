@@ -12,7 +12,7 @@ use lacuna::plugin::surrogate::FitError;
 use lacuna::plugin::{
     Component, Discrepancy, Effect, Emulator, Fact, Hyperparameter, Likelihood, Target,
 };
-use lacuna::posterior::Posterior;
+use lacuna::posterior::{Emulated, Posterior};
 use lacuna::run::Stop;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -129,7 +129,10 @@ fn with_posterior(test: impl FnOnce(&Posterior<'_>)) {
     let likelihood: Box<dyn Likelihood> =
         discrepancy.likelihood(&Known::without_slopes(&data, &[])).unwrap();
     let (layout, parameters, emulator) = (layout(), parameters(), Quadratic::default());
-    test(&Posterior::new(&layout, &parameters, &emulator, &[&*effect], &*likelihood));
+    test(&Posterior::new(
+        &parameters,
+        Emulated::new(&layout, &emulator, &[&*effect], &*likelihood),
+    ));
 }
 
 fn log_normal_density(x: f64, mean: f64, sd: f64) -> f64 {
@@ -204,8 +207,6 @@ fn without_the_effect_the_posterior_is_that_of_a_gain_of_one_less_its_prior() {
     with_posterior(|posterior| {
         let with = posterior.log_density(&Matrix::from_rows(4, [point]))[0];
         assert!((with - log_normal_density(1.0, 1.0, 0.1) - expected).abs() < 1e-10);
-        let (response, own) = posterior.response(&point);
-        assert_eq!(response, quadratic(0.4, 1.3));
-        assert!((own[0] - (-4.0_f64).exp()).abs() < 1e-16);
+        assert_eq!(posterior.natural(&point), [0.4, 1.3, 1.0, (-4.0_f64).exp()]);
     });
 }

@@ -17,7 +17,7 @@ use lacuna::plugin::discrepancy::Known;
 use lacuna::plugin::discrepancy::{CommonError, Discrepancy};
 use lacuna::plugin::surrogate::{Surrogate, Training};
 use lacuna::plugin::{Emulator, Target};
-use lacuna::posterior::Posterior;
+use lacuna::posterior::{Emulated, Posterior};
 use lacuna::run::{Progress, Silent};
 use lacuna_plugins::discrepancies::gaussian::Gaussian;
 use lacuna_plugins::surrogates::polynomial_chaos::{Degree, PolynomialChaos, Solver};
@@ -42,7 +42,8 @@ fn main() -> Fallible<()> {
     let gaussian = Gaussian { variance: Distribution::HalfNormal(1e-6) };
     let likelihood = gaussian.likelihood(&Known::without_slopes(&data, &error(rank)))?;
     let begun = processor_seconds()?;
-    let posterior = Posterior::new(&layout, &parameters, &*emulator, &[], &*likelihood);
+    let posterior =
+        Posterior::new(&parameters, Emulated::new(&layout, &*emulator, &[], &*likelihood));
     let preparation = processor_seconds()? - begun;
     let walkers = posterior.coordinates_of(&points(WALKERS, 4));
 

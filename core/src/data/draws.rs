@@ -98,6 +98,12 @@ impl Draws {
         self.keep(chains, 0)
     }
 
+    /// The draws without the first `first` steps of each chain.
+    #[must_use]
+    pub fn from_step(&self, first: usize) -> Self {
+        self.keep(&(0..self.chains).collect::<Vec<_>>(), first.min(self.steps))
+    }
+
     fn keep(&self, chains: &[usize], first: usize) -> Self {
         let mut kept = Self {
             names: self.names.clone(),

@@ -102,6 +102,32 @@ impl Diagnosis {
         diagnosis
     }
 
+    /// Judges independent draws of equal weight that are worth so many, with the method's own doubts.
+    pub fn of_harvest(draws: &Draws, size: f64, doubts: &[String]) -> Self {
+        let mut diagnosis = Self::of(draws, false);
+        diagnosis.acceptance = Vec::new();
+        diagnosis.stranded = Stranded::default();
+        diagnosis.criteria = Criteria { times: 0.0, ..Criteria::CHAINS };
+        for c in &mut diagnosis.coordinates {
+            // Draws that were resampled look better than they are.
+            let worth = |found: f64| found.min(size);
+            let shrink = (c.ess_bulk / worth(c.ess_bulk)).sqrt();
+            (c.ess_bulk, c.ess_tail) = (worth(c.ess_bulk), worth(c.ess_tail));
+            c.mcse_mean *= shrink;
+            c.mcse_sd *= shrink;
+        }
+        diagnosis.advice = doubts.to_vec();
+        diagnosis.more_steps = 0;
+        if size < diagnosis.criteria.ess {
+            let (wanted, found) = (diagnosis.criteria.ess, size.floor());
+            diagnosis.advice.push(format!(
+                "the draws are worth {found} independent ones, and {wanted} are wanted: ask the sampler for more"
+            ));
+        }
+        diagnosis.converged = diagnosis.advice.is_empty();
+        diagnosis
+    }
+
     fn holds(&self) -> bool {
         let reached = self.stranded.to_the_end.is_empty() && self.stranded.late.is_empty();
         reached && self.more_steps == 0

@@ -1,8 +1,9 @@
-//! Distributions, streams of random numbers, moments of samples, optimisation.
+//! Distributions, streams of random numbers, Sobol' sequences, moments of samples, optimisation.
 
 pub mod distribution;
 pub mod fit;
 pub mod moments;
 pub mod optimise;
 pub mod random;
+pub mod sobol;
 pub mod special;

@@ -6,7 +6,7 @@ use crate::math::distribution::Distribution;
 use crate::math::random::Stream;
 use crate::plugin::Emulator;
 use crate::plugin::discrepancy::{Hyperparameter, Likelihood, VariancePart};
-use crate::posterior::Posterior;
+use crate::posterior::{Emulated, Posterior};
 use crate::run::Stop;
 use crate::study::Study;
 
@@ -21,7 +21,8 @@ pub fn point(
     emulator: &dyn Emulator,
 ) -> Result<Vec<f64>, Stop> {
     let likelihood = LeastSquares::of(data)?;
-    let posterior = Posterior::new(&study.layout, &study.parameters, emulator, &[], &likelihood);
+    let posterior =
+        Posterior::new(&study.parameters, Emulated::new(&study.layout, emulator, &[], &likelihood));
     let maxima = maxima(&posterior, &stream(study, "best-fit"))?;
     Ok(maxima[0].point.clone())
 }

@@ -11,16 +11,18 @@ use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::math::optimise;
 use crate::math::random::Stream;
+use crate::math::sobol;
 use crate::plugin::discrepancy;
+use crate::plugin::sampler::Evidence;
 use crate::plugin::{Effect, Emulator, Fact, Likelihood, Target};
-use crate::posterior::Posterior;
+use crate::posterior::{Emulated, Posterior};
 use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
 use crate::study::Study;
 use crate::study::file::Start;
 
 use super::read::Measured;
-use super::sampling::{self, Sampled};
+use super::sampling::{self, Length, Sampled};
 use super::{Known, best_fit, common_error, stream};
 
 /// The posterior as draws, with its maximum.
@@ -55,6 +57,8 @@ pub struct Outcome {
     pub evaluations: u64,
     /// Facts about the likelihood and the sampler.
     pub facts: Vec<Fact>,
+    /// The probability of the data, where it is known.
+    pub evidence: Option<Evidence>,
 }
 
 /// A coordinate of the posterior.
@@ -145,7 +149,8 @@ impl Parts {
     /// The posterior of a study with this emulator.
     pub fn posterior<'a>(&'a self, study: &'a Study, emulator: &'a dyn Emulator) -> Posterior<'a> {
         let effects: Vec<&dyn Effect> = study.effects.iter().map(|e| &*e.built.plugin).collect();
-        Posterior::new(&study.layout, &study.parameters, emulator, &effects, self.likelihood())
+        let likelihood = Emulated::new(&study.layout, emulator, &effects, self.likelihood());
+        Posterior::new(&study.parameters, likelihood)
     }
 }
 
@@ -202,7 +207,11 @@ fn calibrate(
     let best = &maxima[0];
     let plan = section.built.plugin.plan(posterior.dimension());
     let start = || match section.common.start {
-        Start::Prior => Ok(from_prior(posterior, plan.chains, &random.named("start"))),
+        Start::Prior => {
+            let draws = posterior.prior_draws(4 * plan.chains, &random.named("start"));
+            inside(posterior, draws, plan.chains)
+        }
+        Start::Sobol => inside(posterior, sobol(posterior, 4 * plan.chains)?, plan.chains),
         Start::Map => {
             let laplace = optimise::laplace(posterior, &best.point)?;
             let random = random.named("start");
@@ -210,38 +219,45 @@ fn calibrate(
         }
     };
     let coordinates = coordinates(study, posterior);
-    let names = coordinates.iter().map(|c| c.name.clone()).collect();
     let progress = Progress::new(observer);
-    let sampled = sampling::sample(
+    let length =
+        Length { burn_in: section.common.burn_in.get(), stop: section.common.stop.as_ref() };
+    let mut sampled = sampling::sample(
         &*section.built.plugin,
         posterior,
-        names,
+        length,
         start,
         &random.named("sample"),
         folder,
         &progress,
     )?;
+    sampled.draws.names = coordinates.iter().map(|c| c.name.clone()).collect();
     let other_maxima = maxima[1..]
         .iter()
         .filter(|m| best.value - m.value < 10.0)
         .map(|m| (posterior.natural(&m.point), m.value))
         .collect();
-    let burn_in = (section.common.burn_in.get() * plan.steps as f64).floor() as usize;
     let best_draw = best_draw(posterior, &sampled);
     let draws = natural(posterior, sampled.draws);
-    let kept = draws.after_burn_in(section.common.burn_in.get());
-    let diagnosis = Diagnosis::of(&kept, plan.ensemble);
+    let kept = draws.from_step(sampled.burn_in);
+    let diagnosis = match &sampled.harvest {
+        Some(harvest) => Diagnosis::of_harvest(&kept, harvest.effective_size, &harvest.doubts),
+        None => Diagnosis::of(&kept, plan.ensemble),
+    };
+    let (harvested, evidence) =
+        sampled.harvest.map_or_else(Default::default, |h| (h.facts, h.evidence));
     let outcome = Outcome {
         coordinates,
         map: posterior.natural(&best.point),
         map_log_density: best.value,
         other_maxima,
         best_draw,
-        burn_in,
+        burn_in: sampled.burn_in,
         acceptance: sampled.acceptance,
         diagnosis,
-        evaluations: sampled.evaluations,
-        facts: section.built.plugin.facts(),
+        evaluations: sampled.state.evaluations,
+        facts: [section.built.plugin.facts(), harvested].concat(),
+        evidence,
     };
     Ok(Calibrated { draws, outcome })
 }
@@ -302,12 +318,36 @@ pub(super) fn maxima(
     Ok(maxima)
 }
 
-fn from_prior(posterior: &Posterior<'_>, chains: usize, stream: &Stream) -> Matrix {
-    let draws = posterior.prior_draws(4 * chains, stream);
-    let density = posterior.log_density(&draws);
+/// The first points at which the density is above zero.
+fn inside(posterior: &Posterior<'_>, points: Matrix, chains: usize) -> Result<Matrix, Stop> {
+    let density = posterior.log_density(&points);
     let finite: Vec<usize> =
-        (0..draws.rows()).filter(|&i| density[i].is_finite()).take(chains).collect();
-    draws.select_rows(&finite)
+        (0..points.rows()).filter(|&i| density[i].is_finite()).take(chains).collect();
+    if finite.len() < chains {
+        return Err(Stop::new(format!(
+            "only {} of {} points of the prior have a posterior density above zero, fewer than the {chains} chains",
+            finite.len(),
+            points.rows()
+        ))
+        .help("start the chains at the best fit: `start = \"map\"` in `[sampler]`"));
+    }
+    Ok(points.select_rows(&finite))
+}
+
+/// A Sobol' sequence through the quantiles of the priors.
+fn sobol(posterior: &Posterior<'_>, count: usize) -> Result<Matrix, Stop> {
+    let priors: Vec<&Distribution> = posterior.priors().collect();
+    if priors.len() > sobol::LARGEST_DIMENSION {
+        let most = sobol::LARGEST_DIMENSION;
+        let message = format!("{} unknowns are too many for a Sobol' start", priors.len());
+        return Err(Stop::new(message).help(format!("the most is {most}: use `start = \"prior\"`")));
+    }
+    let point = |i: usize| {
+        let unit = sobol::point(i as u32, priors.len());
+        let natural: Vec<f64> = priors.iter().zip(unit).map(|(p, u)| p.quantile(u)).collect();
+        posterior.coordinates(&natural)
+    };
+    Ok(Matrix::from_rows(priors.len(), (0..count).map(point)))
 }
 
 fn best_draw(posterior: &Posterior<'_>, sampled: &Sampled) -> (Vec<f64>, f64) {

@@ -71,8 +71,7 @@ impl File {
     }
 
     fn posterior(&mut self, calibrated: &Calibrated) -> Result<(), Error> {
-        let steps = calibrated.draws.steps.max(1) as f64;
-        let kept = calibrated.draws.after_burn_in(calibrated.outcome.burn_in as f64 / steps);
+        let kept = calibrated.draws.from_step(calibrated.outcome.burn_in);
         let chain = self.counted("posterior", "chain", kept.chains)?;
         let draw = self.counted("posterior", "draw", kept.steps)?;
         for (j, coordinate) in calibrated.outcome.coordinates.iter().enumerate() {

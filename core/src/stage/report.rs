@@ -139,8 +139,7 @@ fn surrogate(all: &Artifacts<'_>) -> SurrogateFindings {
 
 fn calibration(calibrated: &Calibrated) -> CalibrationFindings {
     let outcome = &calibrated.outcome;
-    let share = outcome.burn_in as f64 / calibrated.draws.steps.max(1) as f64;
-    let kept = calibrated.draws.after_burn_in(share);
+    let kept = calibrated.draws.from_step(outcome.burn_in);
     let coordinates = (0..kept.dimension()).map(|j| coordinate(calibrated, &kept, j)).collect();
     CalibrationFindings {
         coordinates,

@@ -1,22 +1,23 @@
 //! A sampler's steps with checkpoints: a killed run goes on with the same bits.
 //!
-//! `draws.bin` grows by one record a step; `state.json` says after how many steps the state in it holds. A run
-//! that goes on cuts the file back to that many records. The random numbers of a step depend on its
-//! number alone.
+//! The random numbers of a step depend on its number alone, and whether a run goes on is decided after numbers of
+//! steps that depend on the draws alone.
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter, Read as _, Write as _};
-use std::path::{Path, PathBuf};
+mod log;
+
+use std::path::Path;
 use std::time::{Duration, Instant};
 
-use serde::{Deserialize, Serialize};
-
 use crate::data::Draws;
+use crate::diagnose::chains;
 use crate::linalg::Matrix;
 use crate::math::random::Stream;
-use crate::plugin::sampler::{Plan, State};
+use crate::plugin::sampler::{Harvest, Plan, State};
 use crate::plugin::{Sampler, Target};
-use crate::run::{Progress, Stop, files};
+use crate::run::{Progress, Stop};
+use crate::study::file::StopRule;
+
+use log::Log;
 
 /// All draws of a run with what became of each step.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,26 +26,37 @@ pub struct Sampled {
     pub draws: Draws,
     /// The share of accepted moves of each chain.
     pub acceptance: Vec<f64>,
-    /// How often the log density was evaluated.
-    pub evaluations: u64,
+    /// The number of first steps that are left out.
+    pub burn_in: usize,
+    /// What the method brings home, if its steps are no draws; then `draws` are made of it.
+    pub harvest: Option<Harvest>,
+    /// The last state.
+    pub state: State,
 }
 
-#[derive(Serialize, Deserialize)]
-struct Checkpoint {
-    step: usize,
-    state: State,
+/// How long to sample.
+#[derive(Debug, Clone, Copy)]
+pub struct Length<'a> {
+    /// The share of the first steps that is left out.
+    pub burn_in: f64,
+    /// What must be reached.
+    pub stop: Option<&'a StopRule>,
 }
 
 /// How soon the state is written first; each further time takes twice as long, up to [`INTERVAL`].
 const FIRST: Duration = Duration::from_millis(100);
 /// How often the state is written in a long run.
 const INTERVAL: Duration = Duration::from_secs(2);
+/// How many times the sampler's own number of steps a run may have to reach its stop rule.
+const PATIENCE: usize = 50;
+/// The number of chains into which independent draws are dealt.
+const HANDS: usize = 4;
 
-/// Runs a sampler for the steps of its plan, going on from a checkpoint in `folder` if there is one.
+/// Runs a sampler, going on from a checkpoint in `folder` if there is one.
 pub fn sample(
     sampler: &dyn Sampler,
     target: &dyn Target,
-    names: Vec<String>,
+    length: Length<'_>,
     start: impl FnOnce() -> Result<Matrix, Stop>,
     stream: &Stream,
     folder: &Path,
@@ -58,103 +70,82 @@ pub fn sample(
     };
     progress.add(step as u64);
     let (mut written, mut interval) = (Instant::now(), FIRST);
-    while step < plan.steps {
-        sampler.step(target, &mut state, &stream.at(step as u64))?;
-        log.append(&state)?;
-        step += 1;
-        progress.add(1);
-        if written.elapsed() > interval {
-            log.checkpoint(step, &state)?;
-            (written, interval) = (Instant::now(), INTERVAL.min(2 * interval));
+    let mut limit = plan.steps;
+    loop {
+        while step < limit && !sampler.finished(&state) {
+            sampler.step(target, &mut state, &stream.at(step as u64))?;
+            log.append(&state)?;
+            step += 1;
+            progress.add(1);
+            if written.elapsed() > interval {
+                log.checkpoint(step, &state)?;
+                (written, interval) = (Instant::now(), INTERVAL.min(2 * interval));
+            }
         }
-    }
-    log.checkpoint(step, &state)?;
-    let (draws, acceptance) = log.read(names, plan)?;
-    Ok(Sampled { draws, acceptance, evaluations: state.evaluations })
-}
-
-/// The file of draws.
-struct Log {
-    path: PathBuf,
-    state_path: PathBuf,
-    file: BufWriter<File>,
-    chains: usize,
-    dimension: usize,
-}
-
-impl Log {
-    fn open(folder: &Path, chains: usize, dimension: usize) -> Result<Self, Stop> {
-        let path = folder.join("draws.bin");
-        let open = OpenOptions::new().create(true).append(true).open(&path);
-        let file = BufWriter::new(open.map_err(|error| files::cannot_write(&path, &error))?);
-        Ok(Self { state_path: folder.join("state.json"), path, file, chains, dimension })
-    }
-
-    /// Bytes of one step: point, log density and acceptance of each chain.
-    fn record(&self) -> usize {
-        self.chains * (8 * (self.dimension + 1) + 1)
-    }
-
-    /// The last checkpoint, with the file cut back to it; an empty file when there is none.
-    fn resume(&mut self) -> Result<Option<Checkpoint>, Stop> {
-        let length = fs::metadata(&self.path).map_or(0, |m| m.len());
-        let checkpoint: Option<Checkpoint> = files::read_json(&self.state_path).ok();
-        let fits = |c: &Checkpoint| {
-            let needed = (c.step * self.record()) as u64;
-            needed <= length && c.state.points.columns() == self.dimension
-        };
-        let checkpoint = checkpoint.filter(fits);
-        let kept = checkpoint.as_ref().map_or(0, |c| c.step * self.record());
-        let cut = self.file.get_ref().set_len(kept as u64);
-        cut.map_err(|error| files::cannot_write(&self.path, &error))?;
-        Ok(checkpoint)
-    }
-
-    fn append(&mut self, state: &State) -> Result<(), Stop> {
-        let mut write = || -> io::Result<()> {
-            for (point, density) in state.points.iter_rows().zip(&state.log_density) {
-                for value in point.iter().chain([density]) {
-                    self.file.write_all(&value.to_le_bytes())?;
+        log.checkpoint(step, &state)?;
+        match length.stop {
+            Some(rule) if !sampler.finished(&state) => {
+                let (draws, _) = log.read(limit)?;
+                match next_limit(&draws, plan, length.burn_in, rule) {
+                    Some(next) => limit = next,
+                    None => break,
                 }
             }
-            let accepted: Vec<u8> = state.accepted.iter().map(|&a| u8::from(a)).collect();
-            self.file.write_all(&accepted)
-        };
-        write().map_err(|error| files::cannot_write(&self.path, &error))
-    }
-
-    fn checkpoint(&mut self, step: usize, state: &State) -> Result<(), Stop> {
-        let flushed = self.file.flush().and_then(|()| self.file.get_ref().sync_data());
-        flushed.map_err(|error| files::cannot_write(&self.path, &error))?;
-        files::write_json(&self.state_path, &Checkpoint { step, state: state.clone() })
-    }
-
-    fn read(&self, names: Vec<String>, plan: Plan) -> Result<(Draws, Vec<f64>), Stop> {
-        let mut bytes = Vec::new();
-        let mut file = File::open(&self.path).map_err(|e| files::cannot_read(&self.path, &e))?;
-        file.read_to_end(&mut bytes).map_err(|e| files::cannot_read(&self.path, &e))?;
-        let (chains, d, record) = (self.chains, self.dimension, self.record());
-        if bytes.len() != plan.steps * record {
-            return Err(Stop::new(format!("{} has the wrong length", self.path.display())));
+            _ => break,
         }
-        let number = |at: usize| {
-            let mut word = [0; 8];
-            word.copy_from_slice(&bytes[at..at + 8]);
-            f64::from_le_bytes(word)
-        };
-        let mut steps = Vec::with_capacity(plan.steps);
-        let mut moves = vec![0_u32; chains];
-        for step in 0..plan.steps {
-            let from = step * record;
-            let point = |c: usize, j: usize| number(from + 8 * (c * (d + 1) + j));
-            let points = Matrix::from_fn(chains, d, point);
-            let density = (0..chains).map(|c| point(c, d)).collect();
-            steps.push((points, density));
-            for (c, count) in moves.iter_mut().enumerate() {
-                *count += u32::from(bytes[from + 8 * chains * (d + 1) + c]);
-            }
+    }
+    let (draws, acceptance) = log.read(step)?;
+    let burn_in = burn_in(plan, length.burn_in, step);
+    let harvest = sampler.harvest(target, &state, &stream.named("harvest"))?;
+    Ok(match harvest {
+        Some(harvest) => {
+            let draws = dealt(&harvest);
+            Sampled { draws, acceptance, burn_in: 0, harvest: Some(harvest), state }
         }
-        let acceptance = moves.iter().map(|&m| f64::from(m) / plan.steps.max(1) as f64).collect();
-        Ok((Draws::from_steps(names, &steps), acceptance))
+        None => Sampled { draws, acceptance, burn_in, harvest: None, state },
+    })
+}
+
+/// The steps that are left out of this many.
+fn burn_in(plan: Plan, share: f64, steps: usize) -> usize {
+    ((share * steps as f64).floor() as usize).max(plan.warm_up).min(steps)
+}
+
+/// After how many steps to look again; `None` when there are enough draws, or steps.
+fn next_limit(draws: &Draws, plan: Plan, share: f64, rule: &StopRule) -> Option<usize> {
+    let steps = draws.steps;
+    let most = rule.max_steps.map_or(PATIENCE * plan.steps, |most| most.get());
+    let wanted = rule.effective_sample_size.get() as f64;
+    let size = smallest_size(&draws.from_step(burn_in(plan, share, steps)));
+    if steps >= most || size >= wanted {
+        return None;
+    }
+    // A tenth more than the present rate asks for, and never more than as many steps again.
+    let needed = 1.1 * steps as f64 * wanted / size;
+    let next = if needed.is_finite() { (needed as usize).min(2 * steps) } else { 2 * steps };
+    Some(next.max(steps + steps.div_ceil(10)).min(most))
+}
+
+/// The smallest effective sample size of bulk and tails.
+fn smallest_size(draws: &Draws) -> f64 {
+    let of = |j: usize| {
+        let values: Vec<Vec<f64>> = draws.coordinate(j).collect();
+        let (bulk, tail) = (chains::ess_bulk(&values), chains::ess_tail(&values));
+        // A size that has no value is none.
+        if bulk.is_nan() || tail.is_nan() { 0.0 } else { bulk.min(tail) }
+    };
+    (0..draws.dimension()).map(of).fold(f64::INFINITY, f64::min)
+}
+
+/// Independent draws dealt into chains, so that they are summed up and drawn like all others.
+fn dealt(harvest: &Harvest) -> Draws {
+    let steps = harvest.points.rows() / HANDS;
+    let (count, d) = (HANDS * steps, harvest.points.columns());
+    Draws {
+        names: vec![String::new(); d],
+        chains: HANDS,
+        steps,
+        values: harvest.points.as_slice()[..count * d].to_vec(),
+        log_density: harvest.log_density[..count].to_vec(),
     }
 }

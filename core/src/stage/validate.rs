@@ -127,9 +127,7 @@ impl Work<'_> {
                 self.study.parameters.iter().filter_map(|p| p.reference).collect();
             cases.push(self.case("reference", &point, &mut failed)?);
         }
-        let draws = calibrated.draws.after_burn_in(
-            calibrated.outcome.burn_in as f64 / calibrated.draws.steps.max(1) as f64,
-        );
+        let draws = calibrated.draws.from_step(calibrated.outcome.burn_in);
         let random = stream(self.study, "validate");
         let emulator_at_posterior = self.check_emulator(&draws, &mut failed)?;
         let Prediction { band, spread } = self.predict(calibrated, &draws, likelihood, &random);

@@ -326,12 +326,26 @@ pub struct SamplerKeys {
     pub burn_in: Fraction,
     /// Where the chains start.
     pub start: Start,
+    /// Goes on after the sampler's own number of steps until this is reached.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stop: Option<StopRule>,
+}
+
+/// When a run has enough draws.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StopRule {
+    /// The smallest effective sample size, in bulk and tails, of all unknowns after the burn-in.
+    pub effective_sample_size: Count,
+    /// The most steps of each chain; fifty times the sampler's own number when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_steps: Option<Count>,
 }
 
 impl Default for SamplerKeys {
     fn default() -> Self {
         let burn_in = Fraction::new(0.5).unwrap_or_else(|_| unreachable!("0.5 is a fraction"));
-        Self { burn_in, start: Start::Map }
+        Self { burn_in, start: Start::Map, stop: None }
     }
 }
 
@@ -343,6 +357,8 @@ pub enum Start {
     Map,
     /// Independent draws from the prior. A wide prior is known to strand walkers.
     Prior,
+    /// A Sobol' sequence through the prior, more even than independent draws.
+    Sobol,
 }
 
 /// What is checked after the calibration.

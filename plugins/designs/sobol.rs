@@ -1,17 +1,14 @@
 //! `sobol`: a low-discrepancy sequence.
 
-mod joe_kuo;
-
 use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, uniform};
+use lacuna::math::sobol::{self, LARGEST_DIMENSION};
 use lacuna::plugin::{Component, Context, Design};
 use lacuna::run::Stop;
 use lacuna::study::problem::Complaints;
 use rand::Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-use joe_kuo::DIRECTIONS;
 
 /// Sobol' sequence with the direction numbers of Joe and Kuo, for up to 128 parameters.
 ///
@@ -45,7 +42,7 @@ impl Default for Sobol {
 
 impl Component for Sobol {
     fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        let (found, most) = (context.parameters.len(), DIRECTIONS.len() + 1);
+        let (found, most) = (context.parameters.len(), LARGEST_DIMENSION);
         if found > most {
             complaints
                 .at("use")
@@ -59,7 +56,7 @@ impl Component for Sobol {
 
 impl Design for Sobol {
     fn points(&self, count: usize, dimension: usize, stream: &Stream) -> Result<Matrix, Stop> {
-        if dimension > DIRECTIONS.len() + 1 {
+        if dimension > LARGEST_DIMENSION {
             return Err(Stop::new(format!(
                 "a Sobol' sequence of {dimension} dimensions is not known"
             )));
@@ -70,63 +67,20 @@ impl Design for Sobol {
         }
         let mut points = Matrix::zeros(count, dimension);
         for j in 0..dimension {
-            let directions = directions(j);
+            let directions = sobol::directions(j);
             let mut rng = stream.named("axis").at(j as u64).generator();
             let key = rng.next_u32();
             for i in 0..count {
-                let digits = digits(&directions, i as u32 + skipped);
+                let digits = sobol::digits(&directions, i as u32 + skipped);
                 let place = match self.scramble {
                     Scramble::None => f64::from(digits),
-                    Scramble::Owen => f64::from(scrambled(digits, key)) + uniform(&mut rng),
+                    Scramble::Owen => f64::from(sobol::scrambled(digits, key)) + uniform(&mut rng),
                 };
                 points[(i, j)] = place / 4_294_967_296.0;
             }
         }
         Ok(points)
     }
-}
-
-/// The direction numbers of a dimension as 32-bit binary fractions, by the recurrence of Joe and Kuo.
-fn directions(dimension: usize) -> [u32; 32] {
-    let mut v = [0_u32; 32];
-    if dimension == 0 {
-        for (i, v) in v.iter_mut().enumerate() {
-            *v = 1 << (31 - i);
-        }
-        return v;
-    }
-    let (inner, first) = DIRECTIONS[dimension - 1];
-    let degree = first.len();
-    for i in 0..32 {
-        v[i] = if i < degree {
-            first[i] << (31 - i)
-        } else {
-            let mut value = v[i - degree] ^ (v[i - degree] >> degree);
-            for k in 1..degree {
-                if (inner >> (degree - 1 - k)) & 1 == 1 {
-                    value ^= v[i - k];
-                }
-            }
-            value
-        };
-    }
-    v
-}
-
-/// Point `index` of the sequence in Gray code order (Antonov and Saleev 1979).
-fn digits(directions: &[u32; 32], index: u32) -> u32 {
-    let gray = index ^ (index >> 1);
-    (0..32).filter(|bit| (gray >> bit) & 1 == 1).fold(0, |x, bit| x ^ directions[bit as usize])
-}
-
-/// Owen's nested scrambling by a hash in which each bit depends on the higher ones only.
-fn scrambled(digits: u32, key: u32) -> u32 {
-    let mut x = digits.reverse_bits().wrapping_add(key);
-    x ^= x.wrapping_mul(0x6c50_b47c);
-    x ^= x.wrapping_mul(0xb82f_1e52);
-    x ^= x.wrapping_mul(0xc7af_e638);
-    x ^= x.wrapping_mul(0x8d22_f6e6);
-    x.reverse_bits()
 }
 
 lacuna::register!(Design, "sobol", Sobol);

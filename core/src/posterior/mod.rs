@@ -1,0 +1,217 @@
+//! Priors and a log-likelihood as one log density with its gradient.
+//!
+//! Coordinates, in this order: the model's parameters in physical units; the parameters of the study's
+//! effects; the discrepancy's hyperparameters. A hyperparameter that is declared `log` is represented by
+//! its logarithm and the density carries the Jacobian, so that its prior keeps its meaning.
+
+use rayon::prelude::*;
+
+use crate::data::Parameter;
+use crate::linalg::Matrix;
+use crate::math::distribution::Distribution;
+use crate::math::random::Stream;
+use crate::plugin::{Hyperparameter, Target};
+
+mod emulated;
+
+pub use emulated::Emulated;
+
+/// Points that are evaluated together. Fixed, because the rounding of a matrix product depends on the
+/// number of its rows and results must not depend on the number of threads.
+const BATCH: usize = 30;
+
+/// What the data say of natural values of the parameters and of unknowns beside them.
+pub trait LogLikelihood: Sync {
+    /// The unknowns beside the parameters.
+    fn hyperparameters(&self) -> &[Hyperparameter];
+
+    /// The log-likelihood for each row of the parameters and of the hyperparameters.
+    fn values(&self, theta: &Matrix, hyper: &Matrix) -> Vec<f64>;
+
+    /// Its derivatives at one point, by the parameters and then by the hyperparameters.
+    fn gradient(&self, theta: &[f64], hyper: &[f64]) -> Vec<f64>;
+}
+
+/// The posterior of a study.
+pub struct Posterior<'a> {
+    parameters: &'a [Parameter],
+    likelihood: Box<dyn LogLikelihood + 'a>,
+}
+
+impl<'a> Posterior<'a> {
+    /// The posterior under the parameters' priors.
+    pub fn new(parameters: &'a [Parameter], likelihood: impl LogLikelihood + 'a) -> Self {
+        Self { parameters, likelihood: Box::new(likelihood) }
+    }
+
+    /// The model's parameters.
+    pub fn parameters(&self) -> &[Parameter] {
+        self.parameters
+    }
+
+    /// The unknowns beside the model's parameters.
+    pub fn hyperparameters(&self) -> &[Hyperparameter] {
+        self.likelihood.hyperparameters()
+    }
+
+    /// The coordinates of a point in natural units.
+    pub fn natural(&self, point: &[f64]) -> Vec<f64> {
+        self.map_logs(point, f64::exp)
+    }
+
+    /// The coordinates that represent natural values.
+    pub fn coordinates(&self, natural: &[f64]) -> Vec<f64> {
+        self.map_logs(natural, f64::ln)
+    }
+
+    fn map_logs(&self, point: &[f64], map: impl Fn(f64) -> f64) -> Vec<f64> {
+        let d = self.parameters.len();
+        let is_log = |i: usize| i >= d && self.hyperparameters()[i - d].log;
+        point.iter().enumerate().map(|(i, &x)| if is_log(i) { map(x) } else { x }).collect()
+    }
+
+    /// The same density over the same coordinates without the Jacobian of the logarithms: its maximum
+    /// is the mode of the density in natural units.
+    pub fn mode(&'a self) -> Mode<'a> {
+        Mode(self)
+    }
+
+    /// The prior of each coordinate's natural value.
+    pub fn priors(&self) -> impl Iterator<Item = &Distribution> {
+        let parameters = self.parameters.iter().map(|p| &p.prior);
+        parameters.chain(self.hyperparameters().iter().map(|h| &h.prior))
+    }
+
+    /// The log prior density of natural values.
+    fn log_prior(&self, natural: &[f64]) -> f64 {
+        self.priors().zip(natural).map(|(prior, &x)| prior.log_density(x)).sum()
+    }
+
+    /// The logarithm of the Jacobian of the logarithmic coordinates: their sum.
+    fn log_jacobian(&self, point: &[f64]) -> f64 {
+        let d = self.parameters.len();
+        self.hyperparameters().iter().zip(&point[d..]).filter(|(h, _)| h.log).map(|(_, &x)| x).sum()
+    }
+
+    fn batch(&self, points: &Matrix, jacobian: bool) -> Vec<f64> {
+        let starts: Vec<usize> = (0..points.rows()).step_by(BATCH).collect();
+        let parts: Vec<Vec<f64>> = starts
+            .into_par_iter()
+            .map(|start| {
+                let rows: Vec<usize> = (start..points.rows().min(start + BATCH)).collect();
+                self.block(&points.select_rows(&rows), jacobian)
+            })
+            .collect();
+        parts.concat()
+    }
+
+    fn block(&self, points: &Matrix, jacobian: bool) -> Vec<f64> {
+        let d = self.parameters.len();
+        let natural: Vec<Vec<f64>> = points.iter_rows().map(|p| self.natural(p)).collect();
+        let mut density: Vec<f64> = natural
+            .iter()
+            .zip(points.iter_rows())
+            .map(|(x, p)| self.log_prior(x) + if jacobian { self.log_jacobian(p) } else { 0.0 })
+            .collect();
+        let inside: Vec<usize> = (0..points.rows()).filter(|&i| density[i].is_finite()).collect();
+        if !inside.is_empty() {
+            let theta = Matrix::from_rows(d, inside.iter().map(|&i| &natural[i][..d]));
+            let hyper = Matrix::from_rows(
+                self.hyperparameters().len(),
+                inside.iter().map(|&i| &natural[i][d..]),
+            );
+            for (&i, value) in inside.iter().zip(self.likelihood.values(&theta, &hyper)) {
+                density[i] += value;
+            }
+        }
+        // A NaN (an overflow far outside the data) is no density at all.
+        density.iter().map(|&v| if v.is_nan() { f64::NEG_INFINITY } else { v }).collect()
+    }
+
+    fn value_and_gradient(&self, point: &[f64], jacobian: bool) -> (f64, Vec<f64>) {
+        let d = self.parameters.len();
+        let row = Matrix::from_vec(1, point.len(), point.to_vec());
+        let value = self.block(&row, jacobian)[0];
+        let natural = self.natural(point);
+        if !value.is_finite() {
+            return (value, vec![0.0; point.len()]);
+        }
+        let mut gradient = self.likelihood.gradient(&natural[..d], &natural[d..]);
+        for ((g, prior), &x) in gradient.iter_mut().zip(self.priors()).zip(&natural) {
+            *g += prior.log_density_derivative(x);
+        }
+        for (i, hyper) in self.hyperparameters().iter().enumerate().filter(|(_, h)| h.log) {
+            debug_assert!(hyper.log);
+            let g = &mut gradient[d + i];
+            *g = *g * natural[d + i] + if jacobian { 1.0 } else { 0.0 };
+        }
+        (value, gradient)
+    }
+
+    fn coordinate_bounds(&self) -> Vec<(f64, f64)> {
+        let plain = self.parameters.iter().map(|p| p.prior.support());
+        let hyper = self.hyperparameters().iter().map(|h| {
+            let (low, high) = h.prior.support();
+            if h.log { (low.max(0.0).ln(), high.ln()) } else { (low, high) }
+        });
+        plain.chain(hyper).collect()
+    }
+
+    fn draws(&self, count: usize, stream: &Stream) -> Matrix {
+        let d = self.parameters.len() + self.hyperparameters().len();
+        let draw = |i: usize| {
+            let mut rng = stream.at(i as u64).generator();
+            let natural: Vec<f64> = self.priors().map(|p| p.sample(&mut rng)).collect();
+            self.coordinates(&natural)
+        };
+        Matrix::from_rows(d, (0..count).map(draw))
+    }
+}
+
+impl Target for Posterior<'_> {
+    fn dimension(&self) -> usize {
+        self.parameters.len() + self.hyperparameters().len()
+    }
+    fn log_density(&self, points: &Matrix) -> Vec<f64> {
+        self.batch(points, true)
+    }
+    fn log_prior(&self, points: &Matrix) -> Vec<f64> {
+        points
+            .iter_rows()
+            .map(|p| self.log_prior(&self.natural(p)) + self.log_jacobian(p))
+            .collect()
+    }
+    fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
+        self.value_and_gradient(point, true)
+    }
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        self.coordinate_bounds()
+    }
+    fn prior_draws(&self, count: usize, stream: &Stream) -> Matrix {
+        self.draws(count, stream)
+    }
+}
+
+/// A posterior without the Jacobian of its logarithmic coordinates; see [`Posterior::mode`].
+pub struct Mode<'a>(&'a Posterior<'a>);
+
+impl Target for Mode<'_> {
+    fn dimension(&self) -> usize {
+        self.0.dimension()
+    }
+    fn log_density(&self, points: &Matrix) -> Vec<f64> {
+        self.0.batch(points, false)
+    }
+    fn log_prior(&self, points: &Matrix) -> Vec<f64> {
+        points.iter_rows().map(|p| self.0.log_prior(&self.0.natural(p))).collect()
+    }
+    fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
+        self.0.value_and_gradient(point, false)
+    }
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        self.0.coordinate_bounds()
+    }
+    fn prior_draws(&self, count: usize, stream: &Stream) -> Matrix {
+        self.0.draws(count, stream)
+    }
+}

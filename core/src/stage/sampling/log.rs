@@ -1,0 +1,108 @@
+//! The files of a run of a sampler: `draws.bin` grows by one record a step; `state.json` says after how many steps
+//! the state in it holds. A run that goes on cuts the file back to that many records.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, Read as _, Write as _};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::data::Draws;
+use crate::linalg::Matrix;
+use crate::plugin::sampler::State;
+use crate::run::{Stop, files};
+
+/// A state and the number of steps after which it holds.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Checkpoint {
+    pub step: usize,
+    pub state: State,
+}
+
+/// The file of draws.
+pub(super) struct Log {
+    path: PathBuf,
+    state_path: PathBuf,
+    file: BufWriter<File>,
+    chains: usize,
+    dimension: usize,
+}
+
+impl Log {
+    pub fn open(folder: &Path, chains: usize, dimension: usize) -> Result<Self, Stop> {
+        let path = folder.join("draws.bin");
+        let open = OpenOptions::new().create(true).append(true).open(&path);
+        let file = BufWriter::new(open.map_err(|error| files::cannot_write(&path, &error))?);
+        Ok(Self { state_path: folder.join("state.json"), path, file, chains, dimension })
+    }
+
+    /// Bytes of one step: point, log density and acceptance of each chain.
+    fn record(&self) -> usize {
+        self.chains * (8 * (self.dimension + 1) + 1)
+    }
+
+    /// The last checkpoint, with the file cut back to it; an empty file when there is none.
+    pub fn resume(&mut self) -> Result<Option<Checkpoint>, Stop> {
+        let length = fs::metadata(&self.path).map_or(0, |m| m.len());
+        let checkpoint: Option<Checkpoint> = files::read_json(&self.state_path).ok();
+        let fits = |c: &Checkpoint| {
+            let needed = (c.step * self.record()) as u64;
+            needed <= length && c.state.points.columns() == self.dimension
+        };
+        let checkpoint = checkpoint.filter(fits);
+        let kept = checkpoint.as_ref().map_or(0, |c| c.step * self.record());
+        let cut = self.file.get_ref().set_len(kept as u64);
+        cut.map_err(|error| files::cannot_write(&self.path, &error))?;
+        Ok(checkpoint)
+    }
+
+    pub fn append(&mut self, state: &State) -> Result<(), Stop> {
+        let mut write = || -> io::Result<()> {
+            for (point, density) in state.points.iter_rows().zip(&state.log_density) {
+                for value in point.iter().chain([density]) {
+                    self.file.write_all(&value.to_le_bytes())?;
+                }
+            }
+            let accepted: Vec<u8> = state.accepted.iter().map(|&a| u8::from(a)).collect();
+            self.file.write_all(&accepted)
+        };
+        write().map_err(|error| files::cannot_write(&self.path, &error))
+    }
+
+    pub fn checkpoint(&mut self, step: usize, state: &State) -> Result<(), Stop> {
+        let flushed = self.file.flush().and_then(|()| self.file.get_ref().sync_data());
+        flushed.map_err(|error| files::cannot_write(&self.path, &error))?;
+        files::write_json(&self.state_path, &Checkpoint { step, state: state.clone() })
+    }
+
+    /// The draws of the first steps, without names, and the share of accepted moves of each chain.
+    pub fn read(&self, steps: usize) -> Result<(Draws, Vec<f64>), Stop> {
+        let (chains, d, record) = (self.chains, self.dimension, self.record());
+        let mut bytes = Vec::with_capacity(steps * record);
+        let file = File::open(&self.path).map_err(|e| files::cannot_read(&self.path, &e))?;
+        let taken = file.take((steps * record) as u64).read_to_end(&mut bytes);
+        taken.map_err(|e| files::cannot_read(&self.path, &e))?;
+        if bytes.len() != steps * record {
+            return Err(Stop::new(format!("{} has the wrong length", self.path.display())));
+        }
+        let number = |at: usize| {
+            let mut word = [0; 8];
+            word.copy_from_slice(&bytes[at..at + 8]);
+            f64::from_le_bytes(word)
+        };
+        let mut records = Vec::with_capacity(steps);
+        let mut moves = vec![0_u32; chains];
+        for step in 0..steps {
+            let from = step * record;
+            let point = |c: usize, j: usize| number(from + 8 * (c * (d + 1) + j));
+            let points = Matrix::from_fn(chains, d, point);
+            let density = (0..chains).map(|c| point(c, d)).collect();
+            records.push((points, density));
+            for (c, count) in moves.iter_mut().enumerate() {
+                *count += u32::from(bytes[from + 8 * chains * (d + 1) + c]);
+            }
+        }
+        let acceptance = moves.iter().map(|&m| f64::from(m) / steps.max(1) as f64).collect();
+        Ok((Draws::from_steps(vec![String::new(); d], &records), acceptance))
+    }
+}
