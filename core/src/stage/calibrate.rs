@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::data::{Draws, Unit};
+use crate::data::{Draws, Measurements, Unit};
 use crate::diagnose::Diagnosis;
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
@@ -127,7 +127,9 @@ impl Parts {
             study.discrepancy.as_ref().ok_or_else(|| Stop::new("the study has no discrepancy"))?;
         let mut common = Vec::new();
         if section.common.emulator_error {
-            common.push(known.fitted.value.covariance(study)?);
+            let data = &measured.likelihood;
+            let stated = stated_variance(study, data, known.emulator)?;
+            common.push(known.fitted.value.covariance(study, stated.as_deref())?);
         }
         if section.common.replicate_error {
             common.extend(common_error::of_replicates(&measured.used));
@@ -152,6 +154,21 @@ impl Parts {
         let likelihood = Emulated::new(&study.layout, emulator, &effects, self.likelihood());
         Posterior::new(&study.parameters, likelihood)
     }
+}
+
+/// The emulator's own variance of each output where it fits the data best; `None` when it knows none.
+fn stated_variance(
+    study: &Study,
+    data: &Measurements,
+    emulator: &dyn Emulator,
+) -> Result<Option<Vec<f64>>, Stop> {
+    let centre: Vec<f64> = study.parameters.iter().map(|p| p.prior.quantile(0.5)).collect();
+    if emulator.variance(&Matrix::from_vec(1, centre.len(), centre)).is_none() {
+        return Ok(None);
+    }
+    let best = best_fit::point(study, data, emulator)?;
+    let variance = emulator.variance(&Matrix::from_vec(1, best.len(), best));
+    Ok(variance.map(Matrix::into_vec))
 }
 
 /// Draws from the posterior; `None` when the study has no measurements.

@@ -52,6 +52,9 @@ pub struct Errors {
     pub pairs: Vec<(f64, f64)>,
     /// What the emulator says of itself.
     pub facts: Vec<Fact>,
+    /// The emulator's errors at the validation runs, root mean square, over the standard deviation that it
+    /// states there; where it states one and there are at least ten such runs.
+    pub inflation: Option<f64>,
 }
 
 impl Artifact for Fitted {
@@ -161,11 +164,19 @@ fn fit(
         by_group: by_group(study, judged, &loo_by_output),
         loo_by_output,
         pairs: pairs(&simulated, &emulated),
+        inflation: inflation(&*emulator, &test_points, &held_out),
         facts: emulator.facts(),
     };
     let samples = stacked(&left_out, &held_out);
     let sample_points = stacked(&points, &test_points);
     Ok(Fitted { bytes: emulator.save()?, errors, samples, sample_points })
+}
+
+fn inflation(emulator: &dyn Emulator, points: &Matrix, errors: &Matrix) -> Option<f64> {
+    let variance = emulator.variance(points).filter(|_| points.rows() >= 10)?;
+    let squares: f64 = errors.as_slice().iter().map(|e| e * e).sum();
+    let ratio = (squares / variance.as_slice().iter().sum::<f64>()).sqrt();
+    ratio.is_finite().then_some(ratio)
 }
 
 /// The leave-one-out residuals, scaled so that their mean square is the (corrected) leave-one-out error.
@@ -243,9 +254,14 @@ impl Fitted {
     /// The covariance of the emulator's error as a low-rank factor that carries 99.9 % of its variance.
     ///
     /// Each run's error curve is one sample of the error, which is common to all replicates and correlated
-    /// between outputs; the covariance is their mean square about zero.
-    pub fn covariance(&self, study: &Study) -> Result<CommonError, Stop> {
-        let errors = self.errors_near_prior(study);
+    /// between outputs; the covariance is their mean square about zero. An emulator that knows its own variance
+    /// passes it as `stated`, at the point where the data are fitted best: then the runs tell how the
+    /// errors of the outputs go together, and the variance how large they are there.
+    pub fn covariance(&self, study: &Study, stated: Option<&[f64]>) -> Result<CommonError, Stop> {
+        let mut errors = self.errors_near_prior(study);
+        if let Some(stated) = stated {
+            rescale(&mut errors, stated, self.errors.inflation.map_or(1.0, |r| r.max(1.0)));
+        }
         let svd = linalg::thin_svd(&errors)
             .map_err(|e| Stop::new(format!("the covariance of the emulator's error: {e}")))?;
         let total: f64 = svd.values.iter().map(|s| s * s).sum();
@@ -260,5 +276,17 @@ impl Fitted {
         let factor =
             Matrix::from_fn(errors.columns(), rank, |i, k| svd.v[(i, k)] * svd.values[k] / scale);
         Ok(CommonError { origin: "emulator".to_owned(), factor, predictive: true })
+    }
+}
+
+/// Scales the errors of each output to a mean square of `factor^2` times the stated variance.
+fn rescale(errors: &mut Matrix, stated: &[f64], factor: f64) {
+    let count = errors.rows() as f64;
+    for (j, variance) in stated.iter().enumerate() {
+        let square = errors.column(j).iter().map(|e| e * e).sum::<f64>() / count;
+        if square > 0.0 {
+            let scale = factor * (variance / square).sqrt();
+            (0..errors.rows()).for_each(|i| errors[(i, j)] *= scale);
+        }
     }
 }
