@@ -4,12 +4,13 @@
 //! effects; the discrepancy's hyperparameters. A hyperparameter that is declared `log` is represented by
 //! its logarithm and the density carries the Jacobian, so that its prior keeps its meaning.
 
+use rand::Rng;
 use rayon::prelude::*;
 
 use crate::data::Parameter;
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
-use crate::math::random::Stream;
+use crate::math::random::{Stream, uniform};
 use crate::plugin::{Hyperparameter, Target};
 
 mod emulated;
@@ -36,12 +37,23 @@ pub trait LogLikelihood: Sync {
 pub struct Posterior<'a> {
     parameters: &'a [Parameter],
     likelihood: Box<dyn LogLikelihood + 'a>,
+    region: Option<Vec<(f64, f64)>>,
 }
 
 impl<'a> Posterior<'a> {
     /// The posterior under the parameters' priors.
     pub fn new(parameters: &'a [Parameter], likelihood: impl LogLikelihood + 'a) -> Self {
-        Self { parameters, likelihood: Box::new(likelihood) }
+        Self { parameters, likelihood: Box::new(likelihood), region: None }
+    }
+
+    /// The same where each parameter is inside its interval, and zero elsewhere.
+    pub fn within(self, region: Option<Vec<(f64, f64)>>) -> Self {
+        Self { region, ..self }
+    }
+
+    fn is_inside(&self, natural: &[f64]) -> bool {
+        let region = self.region.iter().flatten();
+        region.zip(natural).all(|(&(low, high), &x)| low <= x && x <= high)
     }
 
     /// The model's parameters.
@@ -84,6 +96,9 @@ impl<'a> Posterior<'a> {
 
     /// The log prior density of natural values.
     fn log_prior(&self, natural: &[f64]) -> f64 {
+        if !self.is_inside(natural) {
+            return f64::NEG_INFINITY;
+        }
         self.priors().zip(natural).map(|(prior, &x)| prior.log_density(x)).sum()
     }
 
@@ -149,7 +164,10 @@ impl<'a> Posterior<'a> {
     }
 
     fn coordinate_bounds(&self) -> Vec<(f64, f64)> {
-        let plain = self.parameters.iter().map(|p| p.prior.support());
+        let plain = self.parameters.iter().enumerate().map(|(i, p)| {
+            let (low, high) = p.prior.support();
+            self.region.as_ref().map_or((low, high), |r| (low.max(r[i].0), high.min(r[i].1)))
+        });
         let hyper = self.hyperparameters().iter().map(|h| {
             let (low, high) = h.prior.support();
             if h.log { (low.max(0.0).ln(), high.ln()) } else { (low, high) }
@@ -157,11 +175,32 @@ impl<'a> Posterior<'a> {
         plain.chain(hyper).collect()
     }
 
+    /// A draw of one prior, inside the region.
+    fn draw(&self, j: usize, prior: &Distribution, rng: &mut impl Rng) -> f64 {
+        match self.region.as_ref().and_then(|region| region.get(j)) {
+            Some(&(low, high)) => {
+                let (from, to) = (prior.cdf(low), prior.cdf(high));
+                prior.quantile(from + (to - from) * uniform(rng)).clamp(low, high)
+            }
+            None => prior.sample(rng),
+        }
+    }
+
+    /// The logarithm of the prior probability of the region.
+    pub fn log_share(&self) -> f64 {
+        let region = self.region.iter().flatten();
+        let share = |(&(low, high), prior): (&(f64, f64), &Distribution)| {
+            (prior.cdf(high) - prior.cdf(low)).ln()
+        };
+        region.zip(self.priors()).map(share).sum()
+    }
+
     fn draws(&self, count: usize, stream: &Stream) -> Matrix {
         let d = self.parameters.len() + self.hyperparameters().len();
         let draw = |i: usize| {
             let mut rng = stream.at(i as u64).generator();
-            let natural: Vec<f64> = self.priors().map(|p| p.sample(&mut rng)).collect();
+            let natural: Vec<f64> =
+                self.priors().enumerate().map(|(j, p)| self.draw(j, p, &mut rng)).collect();
             self.coordinates(&natural)
         };
         Matrix::from_rows(d, (0..count).map(draw))

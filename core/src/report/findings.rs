@@ -86,6 +86,9 @@ pub struct FlaggedCurve {
 /// How good the surrogate is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurrogateFindings {
+    /// Rounds of refinement, the emulator's error near the posterior over the discrepancy, and whether that is
+    /// small enough; where the study asks for refinement.
+    pub refinement: Option<(usize, f64, bool)>,
     /// What the method says of itself.
     pub facts: Vec<Fact>,
     /// Runs it was trained on, and runs kept for validation.

@@ -27,6 +27,7 @@ pub const SCHEMA: u64 = 1;
 /// | `surrogate.loo` | leave-one-out error relative to the outputs' variance, mean over outputs |
 /// | `surrogate.training`, `.validation` | numbers of runs |
 /// | `surrogate.near_posterior` | root mean square difference between the emulator and the model, run anew at posterior draws (`validate.emulator_check`), in `surrogate.unit` |
+/// | `surrogate.refine.rounds`, `.ratio`, `.reached` | rounds of refinement; the emulator's error near the posterior over the discrepancy; whether that is small enough |
 /// | `surrogate.sobol` | for each parameter its `first` and `total` index, where known |
 /// | `parameters.NAME` | parameters and hyperparameters, in that order |
 /// | `….mean`, `.sd`, `.q025`, `.median`, `.q975` | of the posterior draws after the burn-in |
@@ -123,6 +124,9 @@ fn surrogate(findings: &Findings, found: &SurrogateFindings) -> Value {
     });
     if let Some((error, _)) = found.near_posterior {
         value["near_posterior"] = json!(error);
+    }
+    if let Some((rounds, ratio, reached)) = found.refinement {
+        value["refine"] = json!({ "rounds": rounds, "ratio": ratio, "reached": reached });
     }
     if let Some(sobol) = &found.sobol {
         let named = findings.parameters.iter().zip(sobol);

@@ -149,15 +149,15 @@ impl Parts {
     }
 
     /// The posterior of a study with this emulator.
-    pub fn posterior<'a>(&'a self, study: &'a Study, emulator: &'a dyn Emulator) -> Posterior<'a> {
+    pub fn posterior<'a>(&'a self, study: &'a Study, known: &Known<'a>) -> Posterior<'a> {
         let effects: Vec<&dyn Effect> = study.effects.iter().map(|e| &*e.built.plugin).collect();
-        let likelihood = Emulated::new(&study.layout, emulator, &effects, self.likelihood());
-        Posterior::new(&study.parameters, likelihood)
+        let likelihood = Emulated::new(&study.layout, known.emulator, &effects, self.likelihood());
+        Posterior::new(&study.parameters, likelihood).within(known.region.map(<[_]>::to_vec))
     }
 }
 
 /// The emulator's own variance of each output where it fits the data best; `None` when it knows none.
-fn stated_variance(
+pub(super) fn stated_variance(
     study: &Study,
     data: &Measurements,
     emulator: &dyn Emulator,
@@ -175,6 +175,7 @@ fn stated_variance(
 pub fn stage(
     study: &Study,
     known: &Known<'_>,
+    folder: &str,
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Option<Kept<Calibrated>>, Stop> {
@@ -189,6 +190,7 @@ pub fn stage(
         known.data.hash,
         known.fitted.hash,
         known.numerics.map(|n| &n.hash),
+        known.region,
         laws,
         (discrepancy.built.name, &discrepancy.built.options, &discrepancy.common),
         effects,
@@ -196,12 +198,11 @@ pub fn stage(
         study.about.seed
     ]);
     let parts = Parts::of(study, measured, known)?;
-    let posterior = parts.posterior(study, known.emulator);
+    let posterior = parts.posterior(study, known);
     let plan = section.built.plugin.plan(posterior.dimension());
     observer.begin("calibrate", "step", plan.steps as u64);
-    let kept = run.keep("5-calibrate", &inputs, observer, |folder| {
-        calibrate(study, &posterior, folder, observer)
-    })?;
+    let kept = run
+        .keep(folder, &inputs, observer, |folder| calibrate(study, &posterior, folder, observer))?;
     observer.end("calibrate", &summary(&kept.value));
     Ok(Some(kept))
 }
@@ -261,8 +262,11 @@ fn calibrate(
         Some(harvest) => Diagnosis::of_harvest(&kept, harvest.effective_size, &harvest.doubts),
         None => Diagnosis::of(&kept, plan.ensemble),
     };
-    let (harvested, evidence) =
+    let (harvested, mut evidence) =
         sampled.harvest.map_or_else(Default::default, |h| (h.facts, h.evidence));
+    if let Some(evidence) = &mut evidence {
+        evidence.log += posterior.log_share();
+    }
     let outcome = Outcome {
         coordinates,
         map: posterior.natural(&best.point),

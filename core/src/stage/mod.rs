@@ -8,6 +8,7 @@ pub mod inference_data;
 pub mod manifest;
 pub mod numerical_error;
 pub mod read;
+pub mod refine;
 pub mod report;
 pub mod results;
 pub mod sampling;
@@ -25,6 +26,7 @@ use crate::study::Study;
 
 use numerical_error::NumericalError;
 use read::Data;
+use refine::Refinement;
 use surrogate::Fitted;
 
 /// Runs a study: what is kept and unchanged is taken, the rest is made.
@@ -37,11 +39,12 @@ pub fn run(
     let design = design::stage(study, run, observer)?;
     let simulated = simulate::stage(study, design.as_ref(), run, observer)?;
     let data = read::stage(study, simulated.as_ref(), run, observer)?;
-    let (fitted, emulator) = surrogate::stage(study, &data, run, observer)?;
+    let fitting = surrogate::Fitting::of(study, &data.value.ensemble)?;
+    let (fitted, emulator) = surrogate::stage(study, &data, &fitting, run, observer)?;
     let numerics = numerical_error::stage(study, design.as_ref(), &data, run, observer)?;
-    let known =
-        Known { data: &data, fitted: &fitted, numerics: numerics.as_ref(), emulator: &*emulator };
-    let calibrated = calibrate::stage(study, &known, run, observer)?;
+    let first = Learned { data, fitted, emulator, region: None, refinement: None };
+    let (learned, calibrated) = refine::stage(study, first, numerics.as_ref(), run, observer)?;
+    let known = learned.with(numerics.as_ref());
     let validated = validate::stage(study, &known, calibrated.as_ref(), run, observer)?;
     let findings = report::stage(study, &known, calibrated.as_ref(), validated.as_ref(), run)?;
     manifest::end(study, run)?;
@@ -58,6 +61,38 @@ pub struct Known<'a> {
     pub numerics: Option<&'a Kept<NumericalError>>,
     /// The emulator.
     pub emulator: &'a dyn Emulator,
+    /// The interval of each parameter in which the emulator was fitted, where that is narrower than the design.
+    pub region: Option<&'a [(f64, f64)]>,
+    /// How far a refinement came.
+    pub refinement: Option<&'a Refinement>,
+}
+
+/// What runs and measurements have taught.
+pub struct Learned {
+    /// The runs and the measurements.
+    pub data: Kept<Data>,
+    /// The fitted surrogate with its errors.
+    pub fitted: Kept<Fitted>,
+    /// The emulator.
+    pub emulator: Box<dyn Emulator>,
+    /// See [`Known::region`].
+    pub region: Option<Vec<(f64, f64)>>,
+    /// How far a refinement came, where the study asks for one.
+    pub refinement: Option<Refinement>,
+}
+
+impl Learned {
+    /// Together with the model's numerical error.
+    pub fn with<'a>(&'a self, numerics: Option<&'a Kept<NumericalError>>) -> Known<'a> {
+        Known {
+            data: &self.data,
+            fitted: &self.fitted,
+            numerics,
+            emulator: &*self.emulator,
+            region: self.region.as_deref(),
+            refinement: self.refinement.as_ref(),
+        }
+    }
 }
 
 /// The random stream of a stage.

@@ -124,6 +124,7 @@ fn surrogate(all: &Artifacts<'_>) -> SurrogateFindings {
         s.aggregated.first.row(0).iter().zip(total).map(|(f, t)| (*f, *t)).collect()
     });
     SurrogateFindings {
+        refinement: all.known.refinement.map(|r| (r.rounds, r.ratio, r.reached)),
         facts: errors.facts.clone(),
         training: errors.training,
         validation: errors.validation,

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::data::Ensemble;
+use crate::data::{Ensemble, Parameter};
 use crate::linalg::{self, Matrix};
 use crate::plugin::discrepancy::CommonError;
 use crate::plugin::surrogate::Training;
@@ -80,30 +80,56 @@ impl Artifact for Fitted {
     }
 }
 
+/// What a surrogate is fitted to, and where it is kept.
+pub struct Fitting<'a> {
+    /// The folder of the stage.
+    pub folder: &'a str,
+    /// The parameters, with the laws under which the runs were made.
+    pub parameters: &'a [Parameter],
+    /// The runs it is trained on.
+    pub training: Vec<usize>,
+    /// The runs it is tested on.
+    pub validation: Vec<usize>,
+}
+
+impl<'a> Fitting<'a> {
+    /// The study's own: the first runs for training, the last for validation.
+    pub fn of(study: &'a Study, ensemble: &Ensemble) -> Result<Self, Stop> {
+        let (training, validation) = split(study, ensemble)?;
+        let runs = ensemble.runs.len();
+        Ok(Self {
+            folder: "4-surrogate",
+            parameters: &study.parameters,
+            training: (0..training).collect(),
+            validation: (runs - validation..runs).collect(),
+        })
+    }
+}
+
 /// Fits the surrogate; returns what is kept and the emulator itself.
 pub fn stage(
     study: &Study,
     data: &Kept<Data>,
+    fitting: &Fitting<'_>,
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<(Kept<Fitted>, Box<dyn Emulator>), Stop> {
     let section =
         study.surrogate.as_ref().ok_or_else(|| Stop::new("the study has no surrogate"))?;
     let plugin = &*section.built.plugin;
-    let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.design)).collect();
+    let laws: Vec<_> = fitting.parameters.iter().map(|p| (&p.name, &p.design)).collect();
     let inputs = json!([
         data.hash,
         section.built.name,
         section.built.options,
-        section.common,
+        (&fitting.training, &fitting.validation),
         laws,
         study.about.seed
     ]);
     let ensemble = &data.value.ensemble;
     observer.begin("surrogate", "output", ensemble.layout.len() as u64);
-    let kept = run.keep("4-surrogate", &inputs, observer, |_| {
-        let split = split(study, ensemble)?;
-        fit(study, plugin, ensemble, split, observer)
+    let kept = run.keep(fitting.folder, &inputs, observer, |_| {
+        fit(study, plugin, ensemble, fitting, observer)
     })?;
     let emulator = plugin.load(&kept.value.bytes)?;
     let errors = &kept.value.errors;
@@ -133,31 +159,29 @@ fn fit(
     study: &Study,
     plugin: &dyn Surrogate,
     ensemble: &Ensemble,
-    (training, validation): (usize, usize),
+    fitting: &Fitting<'_>,
     observer: &dyn Observer,
 ) -> Result<Fitted, Stop> {
-    let first: Vec<usize> = (0..training).collect();
-    let last: Vec<usize> = (ensemble.runs.len() - validation..ensemble.runs.len()).collect();
-    let points = ensemble.points.select_rows(&first);
-    let responses = ensemble.responses.select_rows(&first);
+    let points = ensemble.points.select_rows(&fitting.training);
+    let responses = ensemble.responses.select_rows(&fitting.training);
     let runs = Training {
-        parameters: &study.parameters,
+        parameters: fitting.parameters,
         layout: &study.layout,
         points: &points,
         responses: &responses,
     };
     let progress = Progress::new(observer);
     let emulator = plugin.fit(&runs, &stream(study, "surrogate"), &progress)?;
-    let test_points = ensemble.points.select_rows(&last);
-    let simulated = ensemble.responses.select_rows(&last);
+    let test_points = ensemble.points.select_rows(&fitting.validation);
+    let simulated = ensemble.responses.select_rows(&fitting.validation);
     let emulated = emulator.mean(&test_points);
     let held_out = difference(&simulated, &emulated);
     let left_out = corrected(&*emulator, &responses);
-    let judged = if validation > 0 { &held_out } else { &left_out };
+    let judged = if held_out.rows() > 0 { &held_out } else { &left_out };
     let loo_by_output = emulator.fit_error().relative.clone();
     let errors = Errors {
-        training,
-        validation,
+        training: fitting.training.len(),
+        validation: fitting.validation.len(),
         mae: mean(judged.as_slice().iter().map(|e| e.abs())),
         rmse: mean(judged.as_slice().iter().map(|e| e * e)).sqrt(),
         loo: mean(loo_by_output.iter().copied()),

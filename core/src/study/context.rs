@@ -13,6 +13,7 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     sections(study, &mut complaints);
     parameters(study, &mut complaints);
     runs(study, &mut complaints);
+    refinement(study, &mut complaints);
     validation(study, &mut complaints);
     if let Some(model) = &study.model {
         let signature = model.built.plugin.signature();
@@ -91,6 +92,25 @@ fn inside_design(parameter: &Parameter, complaints: &mut Complaints<'_>) {
             .expected(format!("95 % of the prior inside [{low}, {high}]"))
             .found(format!("[{}, {}]", bulk[0], bulk[1]))
             .help("widen `design`: outside it the surrogate has no runs to learn from");
+    }
+}
+
+fn refinement(study: &Study, complaints: &mut Complaints<'_>) {
+    let refine = study.surrogate.as_ref().and_then(|s| s.common.refine.as_ref());
+    if refine.is_none() {
+        return;
+    }
+    if study.model.is_none() {
+        complaints
+            .at("surrogate.refine")
+            .say("the study has no model to run again")
+            .expected("a `[model]` section, or no `refine`");
+    }
+    if study.sampler.is_none() {
+        complaints
+            .at("surrogate.refine")
+            .say("refinement needs a calibration")
+            .expected("`[measurements]`, `[discrepancy]` and `[sampler]`, or no `refine`");
     }
 }
 

@@ -285,6 +285,49 @@ pub struct SurrogateKeys {
     pub training: Option<Count>,
     /// The number of runs kept aside to measure the error, the last ones of the design.
     pub validation: usize,
+    /// Further runs after the calibration, where posterior and emulator's error are large.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refine: Option<Refine>,
+}
+
+/// Sequential refinement: runs are added where the posterior and the emulator's error are large, the surrogate is fitted
+/// and the study calibrated anew, until the emulator's error is small against the discrepancy.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Refine {
+    /// The number of runs added in each round.
+    pub runs: Count,
+    /// The most rounds; 5 when left out.
+    #[serde(default = "Refine::rounds")]
+    pub rounds: Count,
+    /// Refinement ends when the emulator's error near the posterior is at most this share of the discrepancy, as
+    /// root mean squares over the outputs; 0.1 when left out.
+    #[serde(default = "Refine::until")]
+    pub until: Positive,
+    /// Where the surrogate is fitted in each round.
+    #[serde(default)]
+    pub region: Region,
+}
+
+/// Where a refined surrogate is fitted.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Region {
+    /// In a box about the posterior, twice as wide as the posterior's 99.8 % intervals, on the runs inside it; the
+    /// posterior is kept to that box, which moves when the posterior meets its edge.
+    #[default]
+    Posterior,
+    /// In the whole design, on all runs.
+    Design,
+}
+
+impl Refine {
+    fn rounds() -> Count {
+        Count::new(5).unwrap_or_else(|_| unreachable!("5 is a count"))
+    }
+    fn until() -> Positive {
+        Positive::new(0.1).unwrap_or_else(|_| unreachable!("0.1 is positive"))
+    }
 }
 
 /// The engine's keys of `[discrepancy]`.

@@ -23,6 +23,13 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
                 design, is what the calibration feels."
             }
         }
+        @if let Some((rounds, ratio, reached)) = surrogate.refinement {
+            p {
+                "Refined in " (count(rounds)) " rounds: near the posterior its error is "
+                b { (significant(ratio, 2)) } " of the discrepancy"
+                @if !reached { ", more than the study wants" } "."
+            }
+        }
         (fact_list(&surrogate.facts))
         (errors(findings, surrogate, numbers))
         @if !surrogate.pairs.is_empty() { (pairs(findings, surrogate, numbers)) }
