@@ -1,0 +1,10 @@
+//! Numbers against truths that nobody here made: reference posteriors, closed forms, calibration by simulation.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+#[path = "truth/calibration.rs"]
+mod calibration;
+#[path = "truth/runs.rs"]
+mod runs;
+
+// Without this line the linker leaves the plugins out.
+use lacuna_plugins as _;

@@ -1,0 +1,205 @@
+//! Simulation-based calibration of every sampler with every discrepancy.
+//!
+//! Source: Talts, Betancourt, Simpson, Vehtari and Gelman, *Validating Bayesian inference algorithms with simulation-based
+//! calibration*, arXiv 1804.06788. Parameters and hyperparameters are drawn from their priors, data simulated by the
+//! discrepancy itself; the rank of each drawn value among posterior draws must be uniform. A pair passes when the
+//! chi-square test of its least uniform coordinate has p > 0.01, corrected for the number of coordinates. Of so many
+//! pairs some fail by chance; a pair that does is tried once more on four times as many simulations with other random
+//! numbers, where it must pass: a sound pair fails both with probability 1e-4.
+
+use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Scenario, Unit};
+use lacuna::linalg::{Matrix, multiply};
+use lacuna::math::distribution::Distribution;
+use lacuna::math::random::Stream;
+use lacuna::plugin::discrepancy::{CommonError, Known};
+use lacuna::plugin::surrogate::{FitError, Linear};
+use lacuna::plugin::{Discrepancy, Emulator, Fact, Likelihood, Target, registry};
+use lacuna::posterior::{Emulated, Posterior};
+use lacuna::run::Stop;
+use rayon::prelude::*;
+
+use super::runs;
+
+/// Ranks among this many draws fall into [`BINS`] bins of equal probability.
+const DRAWS: usize = 63;
+const BINS: usize = 16;
+const SIMULATIONS: u64 = 160;
+
+/// The straight line `y = a + b t` of each sensor, as an emulator with the basis `(1, a, b)`.
+struct Line {
+    coefficients: Matrix,
+    fit_error: FitError,
+}
+
+const TIMES: usize = 5;
+const OUTPUTS: usize = 2 * TIMES;
+
+fn time(i: usize) -> f64 {
+    (i % TIMES) as f64 / 2.0 - 1.0
+}
+
+impl Default for Line {
+    fn default() -> Self {
+        let coefficient = |k: usize, i: usize| match k {
+            0 => 0.0,
+            1 => 1.0,
+            _ => time(i),
+        };
+        Self { coefficients: Matrix::from_fn(3, OUTPUTS, coefficient), fit_error: FitError::default() }
+    }
+}
+
+impl Emulator for Line {
+    fn dimension(&self) -> usize {
+        2
+    }
+    fn outputs(&self) -> usize {
+        OUTPUTS
+    }
+    fn mean(&self, points: &Matrix) -> Matrix {
+        multiply(&self.basis(points), &self.coefficients)
+    }
+    fn jacobian(&self, _: &[f64]) -> Matrix {
+        Matrix::from_fn(OUTPUTS, 2, |i, j| if j == 0 { 1.0 } else { time(i) })
+    }
+    fn linear(&self) -> Option<&dyn Linear> {
+        Some(self)
+    }
+    fn fit_error(&self) -> &FitError {
+        &self.fit_error
+    }
+    fn facts(&self) -> Vec<Fact> {
+        Vec::new()
+    }
+    fn save(&self) -> Result<Vec<u8>, Stop> {
+        Ok(Vec::new())
+    }
+}
+
+impl Linear for Line {
+    fn coefficients(&self) -> &Matrix {
+        &self.coefficients
+    }
+    fn basis(&self, points: &Matrix) -> Matrix {
+        Matrix::from_fn(points.rows(), 3, |i, k| if k == 0 { 1.0 } else { points[(i, k - 1)] })
+    }
+    fn basis_gradient(&self, _: &[f64]) -> Matrix {
+        Matrix::from_fn(3, 2, |k, j| f64::from(u8::from(k == j + 1)))
+    }
+}
+
+fn layout() -> Layout {
+    let times = (0..TIMES).map(|i| i as f64).collect();
+    Layout {
+        name: "y".into(),
+        unit: Unit::parse("m").unwrap(),
+        axes: vec![
+            Axis::labels("sensor", ["A", "B"]),
+            Axis::grid("time", times, Unit::parse("s").unwrap()),
+        ],
+    }
+}
+
+fn parameters() -> Vec<Parameter> {
+    let parameter = |name: &str| Parameter {
+        name: name.into(),
+        symbol: name.into(),
+        unit: Unit::dimensionless(),
+        design: Distribution::Normal([0.0, 1.0]),
+        prior: Distribution::Normal([0.0, 1.0]),
+        reference: None,
+    };
+    vec![parameter("a"), parameter("b")]
+}
+
+/// Three replicates with gaps; the values are replaced by simulated ones.
+fn pattern() -> Measurements {
+    let replicate = |r: usize| Replicate {
+        name: format!("p{r}"),
+        scenario: Scenario::default(),
+        values: (0..OUTPUTS).map(|i| (!(i + 2 * r).is_multiple_of(7)).then_some(i as f64)).collect(),
+    };
+    Measurements { layout: layout(), replicates: (0..3).map(replicate).collect() }
+}
+
+fn likelihood(discrepancy: &dyn Discrepancy, data: &Measurements) -> Box<dyn Likelihood> {
+    let emulator = CommonError {
+        origin: "emulator".into(),
+        factor: Matrix::from_fn(OUTPUTS, 1, |i, _| 0.2 * (1.3 * i as f64).sin()),
+        predictive: true,
+    };
+    let slopes = || Ok(Line::default().jacobian(&[]));
+    let known = Known { data, common: &[emulator], slopes: &slopes };
+    discrepancy.likelihood(&known).unwrap_or_else(|stop| panic!("{stop}"))
+}
+
+/// The bin of each coordinate's rank in one simulation.
+fn bins(sampler: (&str, &str), discrepancy: (&str, &str), stream: &Stream) -> Vec<usize> {
+    let built = registry::from_text::<dyn Discrepancy>(discrepancy.0, discrepancy.1);
+    let discrepancy = built.unwrap_or_else(|e| panic!("{e}")).plugin;
+    let (line, parameters, layout) = (Line::default(), parameters(), layout());
+    let prior = likelihood(&*discrepancy, &pattern());
+    let emulated = Emulated::new(&layout, &line, &[], &*prior);
+    let truth = Posterior::new(&parameters, emulated).prior_draws(1, &stream.named("truth"));
+    let natural = {
+        let emulated = Emulated::new(&layout, &line, &[], &*prior);
+        Posterior::new(&parameters, emulated).natural(truth.row(0))
+    };
+    let response = line.mean(&Matrix::from_rows(2, [&natural[..2]]));
+    let data = prior.simulate(response.row(0), &natural[2..], &stream.named("data"));
+    let likelihood = likelihood(&*discrepancy, &data);
+    let posterior = Posterior::new(&parameters, Emulated::new(&layout, &line, &[], &*likelihood));
+    let method = runs::sampler(sampler.0, sampler.1);
+    let found = runs::run(&*method, &posterior, &stream.named("run")).draws;
+    let points = found.points();
+    let chosen: Vec<usize> =
+        (0..DRAWS).map(|k| (2 * k + 1) * points.rows() / (2 * DRAWS)).collect();
+    let rank = |j: usize| chosen.iter().filter(|&&i| points[(i, j)] < truth[(0, j)]).count();
+    (0..truth.columns()).map(|j| rank(j) * BINS / (DRAWS + 1)).collect()
+}
+
+/// The corrected p-value of a pair over so many simulations.
+fn p_value(sampler: (&str, &str), discrepancy: (&str, &str), count: u64, stream: &Stream) -> f64 {
+    let each: Vec<Vec<usize>> = (0..count)
+        .into_par_iter()
+        .map(|k| bins(sampler, discrepancy, &stream.at(k)))
+        .collect();
+    let expected = count as f64 / BINS as f64;
+    let coordinates = each[0].len();
+    let chi_square = |j: usize| -> f64 {
+        let mut counts = [0.0; BINS];
+        each.iter().for_each(|bins| counts[bins[j]] += 1.0);
+        counts.iter().map(|n| (n - expected).powi(2) / expected).sum()
+    };
+    let law = Distribution::Gamma([0.5 * (BINS - 1) as f64, 2.0]);
+    let smallest =
+        (0..coordinates).map(|j| 1.0 - law.cdf(chi_square(j))).fold(f64::INFINITY, f64::min);
+    (coordinates as f64 * smallest).min(1.0)
+}
+
+/// Every pair that must be calibrated.
+fn judge(samplers: &[(&str, &str)], discrepancies: &[(&str, &str)]) {
+    let mut failed = Vec::new();
+    for &sampler in samplers {
+        for &discrepancy in discrepancies {
+            let stream = Stream::root(20_180_418).named(sampler.0).named(discrepancy.1);
+            let first = p_value(sampler, discrepancy, SIMULATIONS, &stream.named("first"));
+            if first > 0.01 {
+                continue;
+            }
+            let second = p_value(sampler, discrepancy, 4 * SIMULATIONS, &stream.named("second"));
+            if second <= 0.01 {
+                let names = format!("{} with {} ({})", sampler.0, discrepancy.0, discrepancy.1);
+                failed.push(format!("{names}: p = {first:.1e}, then {second:.1e}"));
+            }
+        }
+    }
+    assert!(failed.is_empty(), "{}", failed.join("\n"));
+}
+
+const DISCREPANCIES: &[(&str, &str)] = &[("gaussian", "variance = { log_normal = [-1.0, 0.7] }")];
+
+#[test]
+fn affine_invariant_ensemble() {
+    judge(&[("affine_invariant_ensemble", "walkers = 24\nsteps = 400")], DISCREPANCIES);
+}
