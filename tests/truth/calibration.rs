@@ -45,7 +45,10 @@ impl Default for Line {
             1 => 1.0,
             _ => time(i),
         };
-        Self { coefficients: Matrix::from_fn(3, OUTPUTS, coefficient), fit_error: FitError::default() }
+        Self {
+            coefficients: Matrix::from_fn(3, OUTPUTS, coefficient),
+            fit_error: FitError::default(),
+        }
     }
 }
 
@@ -117,7 +120,9 @@ fn pattern() -> Measurements {
     let replicate = |r: usize| Replicate {
         name: format!("p{r}"),
         scenario: Scenario::default(),
-        values: (0..OUTPUTS).map(|i| (!(i + 2 * r).is_multiple_of(7)).then_some(i as f64)).collect(),
+        values: (0..OUTPUTS)
+            .map(|i| (!(i + 2 * r).is_multiple_of(7)).then_some(i as f64))
+            .collect(),
     };
     Measurements { layout: layout(), replicates: (0..3).map(replicate).collect() }
 }
@@ -160,10 +165,8 @@ fn bins(sampler: (&str, &str), discrepancy: (&str, &str), stream: &Stream) -> Ve
 
 /// The corrected p-value of a pair over so many simulations.
 fn p_value(sampler: (&str, &str), discrepancy: (&str, &str), count: u64, stream: &Stream) -> f64 {
-    let each: Vec<Vec<usize>> = (0..count)
-        .into_par_iter()
-        .map(|k| bins(sampler, discrepancy, &stream.at(k)))
-        .collect();
+    let each: Vec<Vec<usize>> =
+        (0..count).into_par_iter().map(|k| bins(sampler, discrepancy, &stream.at(k))).collect();
     let expected = count as f64 / BINS as f64;
     let coordinates = each[0].len();
     let chi_square = |j: usize| -> f64 {

@@ -21,7 +21,9 @@ pub struct Run {
 
 /// A sampler from its options as a study writes them.
 pub fn sampler(name: &str, options: &str) -> Box<dyn Sampler> {
-    registry::from_text::<dyn Sampler>(name, options).unwrap_or_else(|e| panic!("{name}: {e}")).plugin
+    registry::from_text::<dyn Sampler>(name, options)
+        .unwrap_or_else(|e| panic!("{name}: {e}"))
+        .plugin
 }
 
 /// Starting points about the largest maximum that is reached from draws of the prior.

@@ -41,10 +41,11 @@ pub fn run(
     let data = read::stage(study, simulated.as_ref(), run, observer)?;
     let fitting = surrogate::Fitting::of(study, &data.value.ensemble)?;
     let (fitted, emulator) = surrogate::stage(study, &data, &fitting, run, observer)?;
-    let numerics = numerical_error::stage(study, design.as_ref(), &data, run, observer)?;
-    let first = Learned { data, fitted, emulator, region: None, refinement: None };
-    let (learned, calibrated) = refine::stage(study, first, numerics.as_ref(), run, observer)?;
-    let known = learned.with(numerics.as_ref());
+    let folders = numerical_error::FOLDERS;
+    let numerics = numerical_error::stage(study, &data, None, folders, run, observer)?;
+    let first = Learned { data, fitted, numerics, emulator, region: None, refinement: None };
+    let (learned, calibrated) = refine::stage(study, first, run, observer)?;
+    let known = learned.known();
     let validated = validate::stage(study, &known, calibrated.as_ref(), run, observer)?;
     let findings = report::stage(study, &known, calibrated.as_ref(), validated.as_ref(), run)?;
     manifest::end(study, run)?;
@@ -73,6 +74,8 @@ pub struct Learned {
     pub data: Kept<Data>,
     /// The fitted surrogate with its errors.
     pub fitted: Kept<Fitted>,
+    /// The model's numerical error, if the study asks for it.
+    pub numerics: Option<Kept<NumericalError>>,
     /// The emulator.
     pub emulator: Box<dyn Emulator>,
     /// See [`Known::region`].
@@ -82,12 +85,12 @@ pub struct Learned {
 }
 
 impl Learned {
-    /// Together with the model's numerical error.
-    pub fn with<'a>(&'a self, numerics: Option<&'a Kept<NumericalError>>) -> Known<'a> {
+    /// The same as it is handed on.
+    pub fn known(&self) -> Known<'_> {
         Known {
             data: &self.data,
             fitted: &self.fitted,
-            numerics,
+            numerics: self.numerics.as_ref(),
             emulator: &*self.emulator,
             region: self.region.as_deref(),
             refinement: self.refinement.as_ref(),

@@ -7,6 +7,7 @@ use std::path::Path;
 
 use serde_json::json;
 
+use crate::data::{Ensemble, Parameter};
 use crate::linalg::Matrix;
 use crate::math::moments;
 use crate::plugin::discrepancy::CommonError;
@@ -15,7 +16,6 @@ use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, RunDirectory, Stop};
 use crate::study::Study;
 
-use super::design::Design;
 use super::read::{self, Data};
 use super::simulate;
 use super::simulator::Simulator;
@@ -28,8 +28,8 @@ pub struct NumericalError {
 }
 
 const FILE: &str = "differences.nc";
-const RUNS: &str = "2-simulate-finer";
-const STAGE: &str = "3-numerical-error";
+/// The folders of the finer runs and of the differences.
+pub const FOLDERS: [&str; 2] = ["2-simulate-finer", "3-numerical-error"];
 
 impl Artifact for NumericalError {
     fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
@@ -61,39 +61,45 @@ impl NumericalError {
     }
 }
 
-/// Repeats runs with finer numerics; `None` when the study does not ask for it.
+/// Repeats runs with finer numerics, those inside the prior and the region; `None` when the study does not ask for
+/// it, or when there is no such run and refinement will make some.
 pub fn stage(
     study: &Study,
-    design: Option<&Kept<Design>>,
     data: &Kept<Data>,
+    region: Option<&[(f64, f64)]>,
+    [runs_folder, folder]: [&str; 2],
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Option<Kept<NumericalError>>, Stop> {
-    let (Some(section), Some(design)) = (&study.numerical_error, design) else { return Ok(None) };
+    let Some(section) = &study.numerical_error else { return Ok(None) };
     let simulator = Simulator::with_model(study, &section.model)?;
-    let chosen = chosen(study, &design.value, section.runs);
+    let ensemble = &data.value.ensemble;
+    let chosen = chosen(study, ensemble, region, section.runs);
     if chosen.is_empty() {
+        if study.surrogate.as_ref().is_some_and(|s| s.common.refine.is_some()) {
+            return Ok(None);
+        }
         let stop = Stop::new("no run of the design lies inside the prior, so none can be repeated");
         return Err(stop.help("take `[numerical_error]` out, or narrow the design"));
     }
-    let all = simulate::names(design.value.points.rows());
-    let names: Vec<String> = chosen.iter().map(|&i| all[i].clone()).collect();
-    let points = design.value.points.select_rows(&chosen);
+    let names: Vec<String> = chosen.iter().map(|&i| ensemble.runs[i].clone()).collect();
+    let points = ensemble.points.select_rows(&chosen);
     let model = (section.model.built.name, &section.model.built.options, &section.model.common);
     observer.begin("finer", "run", names.len() as u64);
-    let runs = simulate::kept(study, &simulator, RUNS, &names, &points, &model, run, observer)?;
-    let folder = run.stage_folder(RUNS);
+    let runs =
+        simulate::kept(study, &simulator, runs_folder, &names, &points, &model, run, observer)?;
+    let made = run.stage_folder(runs_folder);
     let reader = study.simulations.as_ref().map(|s| (s.built.name, &s.built.options));
     let inputs = json!([runs.hash, data.hash, reader]);
-    let kept = run.keep(STAGE, &inputs, observer, |_| {
+    let kept = run.keep(folder, &inputs, observer, |_| {
         let source = EnsembleSource {
             directory: &study.directory,
-            simulated: Some(&folder),
+            simulated: Some(&made),
             parameters: &study.parameters,
             layout: &study.layout,
         };
         let finer = read::from_files(study, &source)?;
-        let ordinary = &data.value.ensemble;
+        let ordinary = ensemble;
         let mut differences = Matrix::zeros(0, study.layout.len());
         for (name, response) in finer.runs.iter().zip(finer.responses.iter_rows()) {
             if let Some(row) = ordinary.runs.iter().position(|run| run == name) {
@@ -115,10 +121,18 @@ pub fn stage(
     Ok(Some(kept))
 }
 
-/// The first runs of the design inside the prior.
-fn chosen(study: &Study, design: &Design, count: usize) -> Vec<usize> {
-    let inside = |point: &[f64]| {
-        study.parameters.iter().zip(point).all(|(p, &x)| p.prior.log_density(x).is_finite())
+/// The first runs inside the prior and the region.
+fn chosen(
+    study: &Study,
+    ensemble: &Ensemble,
+    region: Option<&[(f64, f64)]>,
+    count: usize,
+) -> Vec<usize> {
+    let inside = |&i: &usize| {
+        let point = ensemble.points.row(i);
+        let possible = |(p, &x): (&Parameter, &f64)| p.prior.log_density(x).is_finite();
+        study.parameters.iter().zip(point).all(possible)
+            && region.is_none_or(|r| r.iter().zip(point).all(|(&(a, b), &x)| a <= x && x <= b))
     };
-    (0..design.points.rows()).filter(|&i| inside(design.points.row(i))).take(count).collect()
+    (0..ensemble.runs.len()).filter(inside).take(count).collect()
 }

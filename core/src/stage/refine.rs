@@ -13,13 +13,14 @@ use crate::data::{Draws, Ensemble, Parameter};
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::math::moments;
+use crate::plugin::Emulator;
 use crate::plugin::reader::EnsembleSource;
 use crate::run::{Kept, Observer, RunDirectory, Stop};
 use crate::study::Study;
 use crate::study::file::{Refine, Region};
 
 use super::calibrate::{self, Calibrated, Parts};
-use super::numerical_error::NumericalError;
+use super::numerical_error;
 use super::read::{self, Data};
 use super::simulator::Simulator;
 use super::surrogate::{self, Fitting};
@@ -32,34 +33,38 @@ type Intervals = Vec<(f64, f64)>;
 pub fn stage(
     study: &Study,
     mut learned: Learned,
-    numerics: Option<&Kept<NumericalError>>,
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<(Learned, Option<Kept<Calibrated>>), Stop> {
-    let first = calibrate::stage(study, &learned.with(numerics), "5-calibrate", run, observer)?;
+    let first = calibrate::stage(study, &learned.known(), "5-calibrate", run, observer)?;
     let refine = study.surrogate.as_ref().and_then(|s| s.common.refine.as_ref());
     let (Some(refine), Some(mut calibrated)) = (refine, first.clone()) else {
         return Ok((learned, first));
     };
-    let most = refine.rounds.get();
-    for round in 1..=most + 1 {
-        observer.begin("refine", "round", most as u64);
-        let state = State::of(study, &learned, numerics, &calibrated)?;
-        observer.end("refine", &state.summary(round - 1, refine));
-        let reached = state.is_reached(refine);
-        learned.refinement = Some(Refinement { rounds: round - 1, ratio: state.ratio, reached });
-        if reached {
-            break;
-        }
-        if round > most {
-            observer.warn(&format!("{}; allow more `rounds`", state.summary(most, refine)));
-            break;
-        }
-        learned = next(study, refine, round, learned, &calibrated, run, observer)?;
+    let mut halvings = 0;
+    for round in 1..=refine.rounds.get() {
+        let data = data_variance(study, &learned, &calibrated)?;
+        halvings += i32::from(is_clear(study, learned.region.as_deref(), &kept(&calibrated)));
+        let place = about(study, &kept(&calibrated), halvings);
+        let (again, error) =
+            next(study, refine, round, learned, &calibrated, place, run, observer)?;
+        learned = again;
         let folder = folder(round, "calibrate");
-        let known = learned.with(numerics);
-        let again = calibrate::stage(study, &known, &folder, run, observer)?;
+        let again = calibrate::stage(study, &learned.known(), &folder, run, observer)?;
         calibrated = again.ok_or_else(|| Stop::new("the study has no measurements"))?;
+        let ratio = error / data.sqrt();
+        let clear = is_clear(study, learned.region.as_deref(), &kept(&calibrated));
+        let reached = ratio <= refine.until.get() && clear;
+        let refinement = Refinement { rounds: round, ratio, clear, reached };
+        observer.begin("refine", "round", refine.rounds.get() as u64);
+        observer.end("refine", &refinement.summary(refine));
+        if reached || round == refine.rounds.get() {
+            if !reached {
+                observer.warn(&format!("{}; allow more `rounds`", refinement.summary(refine)));
+            }
+            learned.refinement = Some(refinement);
+            break;
+        }
     }
     Ok((learned, Some(calibrated)))
 }
@@ -73,63 +78,53 @@ fn folder(round: usize, what: &str) -> String {
 pub struct Refinement {
     /// The number of rounds.
     pub rounds: usize,
-    /// The emulator's error near the posterior over the discrepancy, root mean squares over the outputs.
+    /// The error that the emulator had at the last new runs, before it learned from them, over the discrepancy: root
+    /// mean squares over the outputs.
     pub ratio: f64,
-    /// Whether that is as small as the study wants, and the posterior clear of the region's edges.
+    /// Whether the posterior keeps clear of the region's own edges.
+    pub clear: bool,
+    /// Whether the ratio is as small as the study wants, and the posterior clear of the region's edges.
     pub reached: bool,
 }
 
-/// How far a refinement has come.
-struct State {
-    /// The emulator's error over the discrepancy, root mean squares over the outputs.
-    ratio: f64,
-    /// Whether the posterior keeps clear of the region's own edges.
-    clear: bool,
-}
-
-impl State {
-    fn of(
-        study: &Study,
-        learned: &Learned,
-        numerics: Option<&Kept<NumericalError>>,
-        calibrated: &Kept<Calibrated>,
-    ) -> Result<Self, Stop> {
-        let known = learned.with(numerics);
-        let Some(measured) = &learned.data.value.measured else {
-            return Err(Stop::new("the study has no measurements"));
-        };
-        let parts = Parts::of(study, measured, &known)?;
-        let map = &calibrated.value.outcome.map;
-        let d = study.parameters.len();
-        let own = parts.likelihood().hyperparameters().len();
-        let mean = learned.emulator.mean(&Matrix::from_vec(1, d, map[..d].to_vec()));
-        let spread = parts.likelihood().predictive(mean.row(0), &map[map.len() - own..]);
-        let of_data = |origin: &str| origin != "emulator" && origin != "numerics";
-        let data: f64 = spread
-            .iter()
-            .filter(|part| of_data(&part.origin))
-            .map(|part| moments::mean(&part.variance))
-            .sum();
-        let stated = calibrate::stated_variance(study, &measured.likelihood, &*learned.emulator)?;
-        let factor = learned.fitted.value.covariance(study, stated.as_deref())?.factor;
-        let squares: f64 = factor.as_slice().iter().map(|f| f * f).sum();
-        let ratio = (squares / factor.rows() as f64 / data).sqrt();
-        let draws = calibrated.value.draws.from_step(calibrated.value.outcome.burn_in);
-        Ok(Self { ratio, clear: is_clear(study, learned.region.as_deref(), &draws) })
-    }
-
-    fn is_reached(&self, refine: &Refine) -> bool {
-        self.ratio <= refine.until.get() && self.clear
-    }
-
-    fn summary(&self, rounds: usize, refine: &Refine) -> String {
+impl Refinement {
+    fn summary(&self, refine: &Refine) -> String {
         let edge = if self.clear { "" } else { ", and the posterior meets the edge of the region" };
+        let (rounds, until) = (self.rounds, refine.until.get());
+        if self.ratio.is_infinite() {
+            return format!(
+                "after {rounds} rounds of refinement the region moved away from the runs{edge}"
+            );
+        }
+        let ratio = self.ratio;
         format!(
-            "after {rounds} rounds of refinement the emulator's error is {:.3} of the discrepancy (wanted: {}){edge}",
-            self.ratio,
-            refine.until.get()
+            "after {rounds} rounds of refinement the emulator's error at new runs is {ratio:.3} of the discrepancy (wanted: {until}){edge}"
         )
     }
+}
+
+fn kept(calibrated: &Kept<Calibrated>) -> Draws {
+    calibrated.value.draws.from_step(calibrated.value.outcome.burn_in)
+}
+
+/// The variance of the discrepancy at the best fit, mean over the outputs, without what emulator and numerics add.
+fn data_variance(
+    study: &Study,
+    learned: &Learned,
+    calibrated: &Kept<Calibrated>,
+) -> Result<f64, Stop> {
+    let known = learned.known();
+    let Some(measured) = &learned.data.value.measured else {
+        return Err(Stop::new("the study has no measurements"));
+    };
+    let parts = Parts::of(study, measured, &known)?;
+    let map = &calibrated.value.outcome.map;
+    let d = study.parameters.len();
+    let own = parts.likelihood().hyperparameters().len();
+    let mean = learned.emulator.mean(&Matrix::from_vec(1, d, map[..d].to_vec()));
+    let spread = parts.likelihood().predictive(mean.row(0), &map[map.len() - own..]);
+    let of_data = spread.iter().filter(|p| p.origin != "emulator" && p.origin != "numerics");
+    Ok(of_data.map(|part| moments::mean(&part.variance)).sum())
 }
 
 /// The middle 99.8 % of each parameter's draws.
@@ -158,33 +153,44 @@ fn is_clear(study: &Study, region: Option<&[(f64, f64)]>, draws: &Draws) -> bool
     })
 }
 
-/// A box about the posterior, twice as wide as its middle.
-fn about(study: &Study, draws: &Draws) -> Intervals {
+/// A box about the posterior: at least twice as wide as its middle, and as the range of the prior halved so often.
+///
+/// A posterior through a poor emulator is no guide to a small region, however narrow it is.
+fn about(study: &Study, draws: &Draws, halvings: i32) -> Intervals {
     let middle = middle(draws, study.parameters.len());
-    let widened = |(p, (from, to)): (&Parameter, (f64, f64))| {
-        let ((lowest, highest), half) = (bounds(p), 0.5 * (to - from));
-        ((from - half).max(lowest), (to + half).min(highest))
+    let boxed = |(p, (from, to)): (&Parameter, (f64, f64))| {
+        let (lowest, highest) = bounds(p);
+        let tails = [0.001, 0.999].map(|q| p.prior.quantile(q));
+        let range = highest.min(tails[1]) - lowest.max(tails[0]);
+        let half = (to - from).max(0.5 * range * 0.5_f64.powi(halvings));
+        let (low, high) = (0.5 * (from + to) - half, 0.5 * (from + to) + half);
+        // Moved inside the bounds as a whole, then cut where it is wider than they are.
+        let shift = (lowest - low).max(0.0) - (high - highest).max(0.0);
+        ((low + shift).max(lowest), (high + shift).min(highest))
     };
-    study.parameters.iter().zip(middle).map(widened).collect()
+    study.parameters.iter().zip(middle).map(boxed).collect()
 }
 
-/// One round: new runs, and the surrogate fitted anew.
+/// One round: new runs, and the surrogate fitted anew. Also the root mean square error that the emulator had at the new
+/// runs.
+#[expect(clippy::too_many_arguments, reason = "what a round starts from, and where it works")]
 fn next(
     study: &Study,
     refine: &Refine,
     round: usize,
     learned: Learned,
     calibrated: &Kept<Calibrated>,
+    place: Intervals,
     run: &mut RunDirectory,
     observer: &dyn Observer,
-) -> Result<Learned, Stop> {
-    let outcome = &calibrated.value.outcome;
-    let draws = calibrated.value.draws.from_step(outcome.burn_in);
-    let place = about(study, &draws);
+) -> Result<(Learned, f64), Stop> {
+    let draws = kept(calibrated);
     let random = stream(study, "refine").at(round as u64);
     let points = choose::points(&learned, &draws, &place, refine.runs.get(), &random);
+    let before = learned.data.value.ensemble.runs.len();
     let data = extended(study, round, learned.data, &points, run, observer)?;
     let ensemble = &data.value.ensemble;
+    let error = error_at_new(ensemble, before, &*learned.emulator, learned.region.as_deref())?;
     let parameters: Vec<Parameter>;
     let all = 0..ensemble.runs.len();
     let fitting = match refine.region {
@@ -206,8 +212,39 @@ fn next(
         }
     };
     let (fitted, emulator) = surrogate::stage(study, &data, &fitting, run, observer)?;
+    let numerics = if round == 1 {
+        // The first runs about the posterior tell more of its numerical error than those of the design.
+        let [finer, folder] = ["simulate-finer", "numerical-error"].map(|what| folder(1, what));
+        let folders = [finer.as_str(), folder.as_str()];
+        numerical_error::stage(study, &data, Some(&place), folders, run, observer)?
+    } else {
+        learned.numerics
+    };
     let region = (refine.region == Region::Posterior).then_some(place);
-    Ok(Learned { data, fitted, emulator, region, refinement: None })
+    Ok((Learned { data, fitted, numerics, emulator, region, refinement: None }, error))
+}
+
+/// The root mean square error of an emulator at the runs from `first` on that lie where it was fitted; infinite when
+/// there are none.
+fn error_at_new(
+    ensemble: &Ensemble,
+    first: usize,
+    emulator: &dyn Emulator,
+    region: Option<&[(f64, f64)]>,
+) -> Result<f64, Stop> {
+    if first == ensemble.runs.len() {
+        return Err(Stop::new("none of the runs near the posterior has a usable response"));
+    }
+    let fitted = |i: &usize| region.is_none_or(|r| is_inside(r, ensemble.points.row(*i)));
+    let new: Vec<usize> = (first..ensemble.runs.len()).filter(fitted).collect();
+    if new.is_empty() {
+        return Ok(f64::INFINITY);
+    }
+    let emulated = emulator.mean(&ensemble.points.select_rows(&new));
+    let simulated = ensemble.responses.select_rows(&new);
+    let pairs = simulated.as_slice().iter().zip(emulated.as_slice());
+    let squares: Vec<f64> = pairs.map(|(a, b)| (a - b).powi(2)).collect();
+    Ok(moments::mean(&squares).sqrt())
 }
 
 fn is_inside(place: &[(f64, f64)], point: &[f64]) -> bool {

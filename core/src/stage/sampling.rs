@@ -16,6 +16,7 @@ use crate::plugin::sampler::{Harvest, Plan, State};
 use crate::plugin::{Sampler, Target};
 use crate::run::{Progress, Stop};
 use crate::study::file::StopRule;
+use crate::study::values::Count;
 
 use log::Log;
 
@@ -114,7 +115,7 @@ fn burn_in(plan: Plan, share: f64, steps: usize) -> usize {
 /// After how many steps to look again; `None` when there are enough draws, or steps.
 fn next_limit(draws: &Draws, plan: Plan, share: f64, rule: &StopRule) -> Option<usize> {
     let steps = draws.steps;
-    let most = rule.max_steps.map_or(PATIENCE * plan.steps, |most| most.get());
+    let most = rule.max_steps.map_or(PATIENCE * plan.steps, Count::get);
     let wanted = rule.effective_sample_size.get() as f64;
     let size = smallest_size(&draws.from_step(burn_in(plan, share, steps)));
     if steps >= most || size >= wanted {

@@ -300,8 +300,8 @@ pub struct Refine {
     /// The most rounds; 5 when left out.
     #[serde(default = "Refine::rounds")]
     pub rounds: Count,
-    /// Refinement ends when the emulator's error near the posterior is at most this share of the discrepancy, as
-    /// root mean squares over the outputs; 0.1 when left out.
+    /// Refinement ends when the emulator's error at new runs near the posterior, before it has learned from them, is
+    /// at most this share of the discrepancy, as root mean squares over the outputs; 0.1 when left out.
     #[serde(default = "Refine::until")]
     pub until: Positive,
     /// Where the surrogate is fitted in each round.
@@ -313,8 +313,9 @@ pub struct Refine {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Region {
-    /// In a box about the posterior, twice as wide as the posterior's 99.8 % intervals, on the runs inside it; the
-    /// posterior is kept to that box, which moves when the posterior meets its edge.
+    /// In a box about the posterior, on the runs inside it; the posterior is kept to that box. The box is twice as wide
+    /// as the posterior's 99.8 % intervals, and in the first round at least half as wide as the prior; each round
+    /// halves that, unless the posterior meets an edge of the box: then the box only moves.
     #[default]
     Posterior,
     /// In the whole design, on all runs.
