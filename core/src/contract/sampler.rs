@@ -5,7 +5,6 @@ mod targets;
 
 use crate::data::Draws;
 use crate::diagnose::{autocorrelation, chains};
-use crate::linalg::Matrix;
 use crate::math::moments::{mean, variance};
 use crate::math::random::Stream;
 use crate::plugin::sampler::{Harvest, Sampler, State, Target};

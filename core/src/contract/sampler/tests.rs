@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::*;
+use crate::linalg::Matrix;
 use crate::math::random::{below, normal, uniform};
 use crate::plugin::Component;
 use crate::plugin::sampler::{Evidence, Plan};
