@@ -140,7 +140,12 @@ impl Adaptive {
     /// The scale follows Robbins and Monro's rule (algorithm 4 of Andrieu and Thoms). The shape becomes the
     /// covariance of the later half of the history (Haario, Saksman and Tamminen 2001, equation
     /// 1), of all chains together, after 1, 2, 4, 8 ... times a tenth of the warm-up.
-    pub(super) fn learn(&mut self, state: &mut State, chances: &[f64], rule: Rule) -> Result<(), Stop> {
+    pub(super) fn learn(
+        &mut self,
+        state: &mut State,
+        chances: &[f64],
+        rule: Rule,
+    ) -> Result<(), Stop> {
         let Some(learning) = &mut self.learning else { return Ok(()) };
         let dimension = state.points.columns();
         learning.step += 1;
@@ -170,4 +175,66 @@ fn learnt(window: &Moments) -> Option<Shape> {
     let mut covariance = window.covariance();
     (0..covariance.rows()).for_each(|j| covariance[(j, j)] *= 1.0 + RIDGE);
     Shape::of(&covariance)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use lacuna::math::distribution::Distribution;
+    use lacuna::math::random::Stream;
+    use lacuna::plugin::Sampler;
+
+    use super::super::adaptive_metropolis::AdaptiveMetropolis;
+    use super::super::truth::Density;
+    use super::*;
+
+    #[test]
+    fn windows_double() {
+        let rule = Rule { warm_up: 1000, adapt: Adapt::Always, acceptance: None };
+        let ends: Vec<usize> = (1..=4000).filter(|&step| rule.ends_window(step)).collect();
+        assert_eq!(ends, [100, 200, 400, 800, 1600, 3200]);
+        let shares = [1, 2, 5, 1000].map(|d| rule.acceptance(d));
+        for (share, best) in shares.into_iter().zip([0.441, 0.352, 0.275, 0.234]) {
+            assert!((share - best).abs() < 0.02, "{share}");
+        }
+    }
+
+    #[test]
+    fn a_walk_learns_the_covariance_and_then_keeps_it() {
+        // A strongly correlated normal law, and a first shape that is a hundred times too wide.
+        let priors = vec![Distribution::Normal([0.0, 100.0]), Distribution::Normal([0.0, 1.0])];
+        let target = Density::new(priors, |x: &[f64]| {
+            let (u, v) = (x[0], 100.0 * x[1]);
+            -0.5 * (u * u + v * v - 1.9 * u * v) / (1.0 - 0.95 * 0.95)
+        });
+        let proposal = Proposal::Prior(1.0);
+        let sampler = AdaptiveMetropolis { warm_up: 2000, proposal, ..Default::default() };
+        let points = Matrix::from_fn(4, 2, |i, j| [i as f64, 1e-2 * i as f64][j]);
+        let mut state = sampler.start(&target, points).unwrap();
+        let root = Stream::root(3);
+        let mut moved = 0;
+        for step in 0..6000 {
+            sampler.step(&target, &mut state, &root.at(step)).unwrap();
+            if step == 2000 {
+                let learnt = Adaptive::read(&state).unwrap();
+                assert!(learnt.learning.is_none());
+                // The factor of [[1, 0.95e-2], [0.95e-2, 1e-4]]; the last window has 3200 points.
+                let numbers = learnt.shape.into_numbers();
+                for (found, expected) in numbers.iter().zip([1.0, 0.95e-2, 0.312e-2]) {
+                    assert!((found / expected - 1.0).abs() < 0.25, "{numbers:?}");
+                }
+            }
+            if step > 2000 {
+                moved += state.accepted.iter().filter(|a| **a).count();
+            }
+        }
+        let share = moved as f64 / (4.0 * 3999.0);
+        assert!((share - 0.337).abs() < 0.05, "acceptance {share}");
+    }
+
+    #[test]
+    fn a_memory_that_is_none_is_an_error() {
+        let state = chains::state(Matrix::zeros(1, 1), vec![0.0], serde_json::Value::Null);
+        assert!(Adaptive::read(&state).unwrap_err().message.contains("cannot be read"));
+    }
 }

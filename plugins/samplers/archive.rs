@@ -106,3 +106,47 @@ impl<'a> Archive<'a> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn places(memory: &Value) -> usize {
+        memory["places"].as_array().unwrap().len() / 2
+    }
+
+    #[test]
+    fn it_grows_forgets_and_stays_small() {
+        let points = Matrix::from_rows(2, [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]);
+        let mut memory = Archive::begin(&Shape::diagonal(&[1.0, 1.0]), &points, &[0.0, 1.0, 0.5]);
+        assert_eq!(places(&memory), 20);
+        let mut sizes = Vec::new();
+        for _ in 0..20_000 {
+            Archive::remember(&mut memory, &points, 1000).unwrap();
+            sizes.push(places(&memory));
+        }
+        // Three places every ten steps; half of 320 is forgotten after the warm-up.
+        assert_eq!((sizes[8], sizes[9], sizes[998], sizes[999]), (20, 23, 317, 160));
+        assert!(sizes.iter().all(|&n| n <= LARGEST));
+        assert!(memory["every"] == 40 && sizes[19_999] > LARGEST / 2, "{}", sizes[19_999]);
+        // Every chain keeps its share.
+        let archive = Archive::read(&memory, 2).unwrap();
+        let firsts: Vec<f64> = archive.places.iter().step_by(2).filter_map(Value::as_f64).collect();
+        let count = |x: f64| firsts.iter().filter(|f| **f == x).count();
+        assert!(count(1.0).abs_diff(count(3.0)) <= 4 && count(3.0).abs_diff(count(5.0)) <= 4);
+    }
+
+    #[test]
+    fn picked_places_differ() {
+        let points = Matrix::from_rows(2, [[1.0, 2.0], [3.0, 4.0]]);
+        let memory = Archive::begin(&Shape::diagonal(&[1.0, 1.0]), &points, &[0.0, 1.0]);
+        let archive = Archive::read(&memory, 2).unwrap();
+        let mut rng = Stream::root(1).generator();
+        for _ in 0..200 {
+            let [a, b, c] = archive.pick(&mut rng);
+            assert!(a != b && b != c && a != c);
+        }
+        assert!(Archive::read(&Value::Null, 2).is_err());
+    }
+}

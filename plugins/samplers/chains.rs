@@ -34,11 +34,7 @@ pub(super) fn check_steps(steps: usize, warm_up: usize, complaints: &mut Complai
 /// Complains of a number that is not above zero.
 pub(super) fn check_positive(field: &str, value: f64, complaints: &mut Complaints<'_>) {
     if !(value > 0.0 && value.is_finite()) {
-        complaints
-            .at(field)
-            .say("chains would not move")
-            .expected("a number above 0")
-            .found(value);
+        complaints.at(field).say("chains would not move").expected("a number above 0").found(value);
     }
 }
 

@@ -161,3 +161,41 @@ lacuna::register!(
     "delayed_rejection_adaptive_metropolis",
     DelayedRejectionAdaptiveMetropolis
 );
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_step_and_its_reverse_are_in_balance() {
+        // The ratio of the way back is the inverse: detailed balance through the same rejected point.
+        let density = |x: f64| -0.5 * x * x - (1.0 + x * x).ln();
+        let shrink = 0.3;
+        let mut tried = 0;
+        for i in 0..400 {
+            let draw = |k: i32| 3.0 * (f64::from(k * 37 + i * 101) * 0.618).sin();
+            let (x, z1, z2) = (draw(1), draw(2), draw(3));
+            let (y1, y2) = (x + z1, x + shrink * z2);
+            let at = [density(x), density(y1), density(y2)];
+            if at[1] >= at[0].min(at[2]) {
+                continue;
+            }
+            tried += 1;
+            let there = second_ratio(at, &[z1], &[z2], shrink);
+            let back = second_ratio([at[2], at[1], at[0]], &[y1 - y2], &[-z2], shrink);
+            assert!((there + back).abs() < 1e-9 * there.abs().max(1.0), "{there} and {back}");
+        }
+        assert!(tried > 50);
+    }
+
+    #[test]
+    fn a_second_step_beside_a_better_rejected_point_is_never_taken() {
+        // From y2 the first try would have been accepted, so that the way back does not exist.
+        let ratio = second_ratio([0.0, -1.0, -2.0], &[1.0], &[1.0], 0.2);
+        assert_eq!(ratio, f64::NEG_INFINITY);
+        assert_eq!(
+            second_ratio([0.0, -1.0, f64::NEG_INFINITY], &[1.0], &[1.0], 0.2),
+            f64::NEG_INFINITY
+        );
+    }
+}

@@ -58,13 +58,7 @@ pub struct DifferentialEvolution {
 
 impl Default for DifferentialEvolution {
     fn default() -> Self {
-        Self {
-            chains: 4,
-            steps: 10_000,
-            warm_up: 2000,
-            snooker: 0.1,
-            archive: Proposal::Curvature,
-        }
+        Self { chains: 4, steps: 10_000, warm_up: 2000, snooker: 0.1, archive: Proposal::Curvature }
     }
 }
 

@@ -75,9 +75,11 @@ fn widths(target: &dyn Target, points: &Matrix) -> Result<Vec<f64>, Stop> {
     let usable = |width: &f64| *width > 0.0 && width.is_finite();
     (0..target.dimension())
         .map(|j| {
-            [&prior, points].into_iter().map(|draws| width(draws, j)).find(usable).ok_or_else(
-                || Stop::new(format!("the prior of coordinate {} has no width", j + 1)),
-            )
+            [&prior, points]
+                .into_iter()
+                .map(|draws| width(draws, j))
+                .find(usable)
+                .ok_or_else(|| Stop::new(format!("the prior of coordinate {} has no width", j + 1)))
         })
         .collect()
 }
@@ -172,4 +174,89 @@ pub(super) fn normals(count: usize, rng: &mut impl Rng) -> Vec<f64> {
 /// as a factor of standard deviations (Roberts, Gelman and Gilks, Ann. Appl. Probab. 7 (1997) 110).
 pub(super) fn best_scale(dimension: usize) -> f64 {
     2.38 / (dimension.max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use lacuna::math::distribution::Distribution;
+
+    use super::super::truth::Density;
+    use super::*;
+
+    /// A normal law with correlation 0.8 and standard deviations 2 and 1e-3.
+    fn normal_law() -> Density<impl Fn(&[f64]) -> f64 + Sync> {
+        let priors = vec![Distribution::Normal([0.0, 10.0]), Distribution::Normal([0.0, 1e-2])];
+        Density::new(priors, |x: &[f64]| {
+            let (u, v) = (x[0] / 2.0, x[1] / 1e-3);
+            -0.5 * (u * u + v * v - 1.6 * u * v) / 0.36
+        })
+    }
+
+    fn shape(target: &dyn Target, proposal: Proposal) -> (Shape, u64) {
+        let points = target.prior_draws(4, &Stream::root(1));
+        proposal.shape(target, &points, &target.log_density(&points)).unwrap()
+    }
+
+    #[test]
+    fn the_curvature_of_a_normal_law_is_its_covariance() {
+        let (shape, evaluations) = shape(&normal_law(), Proposal::Curvature);
+        let found = shape.into_numbers();
+        // The factor of [[4, 1.6e-3], [1.6e-3, 1e-6]].
+        for (found, expected) in found.iter().zip([2.0, 0.8e-3, 0.6e-3]) {
+            assert!((found / expected - 1.0).abs() < 1e-3, "{found} and {expected}");
+        }
+        assert!(evaluations > 0);
+    }
+
+    #[test]
+    fn a_fraction_of_the_prior_is_as_wide() {
+        let (shape, evaluations) = shape(&normal_law(), Proposal::Prior(0.1));
+        // The width of a normal law between its 16 % and 84 % quantiles is 0.9945 sd; its error over 1000
+        // draws is about 3.5 %.
+        for (found, expected) in shape.sd().iter().zip([0.9945, 0.9945e-3]) {
+            assert!((found / expected - 1.0).abs() < 0.14, "{found} and {expected}");
+        }
+        assert_eq!(evaluations, 0);
+    }
+
+    #[test]
+    fn the_prior_takes_the_place_of_a_curvature_that_is_not_there() {
+        let priors = vec![Distribution::Uniform([0.0, 2.0])];
+        let bounds = vec![(0.0, 2.0)];
+        let inside = |x: &[f64]| (0.0..=2.0).contains(&x[0]);
+        let flat = Density {
+            priors: priors.clone(),
+            bounds: bounds.clone(),
+            function: |x: &[f64]| if inside(x) { 0.0 } else { f64::NEG_INFINITY },
+        };
+        let edge = Density {
+            priors,
+            bounds,
+            function: |x: &[f64]| if inside(x) { 0.0 } else { f64::NAN },
+        };
+        for sd in [shape(&flat, Proposal::Curvature), shape(&edge, Proposal::Curvature)] {
+            assert!(sd.0.sd()[0] > 0.5 && sd.0.sd()[0] < 0.8, "{sd:?}");
+        }
+    }
+
+    #[test]
+    fn steps_have_the_covariance_of_the_shape() {
+        let covariance = Matrix::from_rows(2, [[4.0, -1.0], [-1.0, 1.0]]);
+        let shape = Shape::of(&covariance).unwrap();
+        let (mut rng, n) = (Stream::root(2).generator(), 20_000);
+        let steps = (0..n).map(|_| {
+            let mut new = [0.0; 2];
+            shape.step(&[3.0, -1.0], 2.0, &normals(2, &mut rng), &mut new);
+            new
+        });
+        let moments = lacuna::math::moments::Moments::of_rows(&Matrix::from_rows(2, steps));
+        // The variance of a sample covariance is (c_ij^2 + c_ii c_jj) / n; here of 16, -4, 4.
+        let found = moments.covariance();
+        for (i, j) in [(0, 0), (0, 1), (1, 1)] {
+            let c = |i, j| 4.0 * covariance[(i, j)];
+            let error = ((c(i, j) * c(i, j) + c(i, i) * c(j, j)) / f64::from(n)).sqrt();
+            assert!((found[(i, j)] - c(i, j)).abs() < 4.0 * error, "{i} {j}: {found:?}");
+        }
+    }
 }

@@ -188,11 +188,7 @@ struct Batch<'a> {
 }
 
 impl<'a> Batch<'a> {
-    fn new(
-        target: &'a dyn Target,
-        settings: &'a Settings<'a>,
-        shares: &'a [(Move, f64)],
-    ) -> Self {
+    fn new(target: &'a dyn Target, settings: &'a Settings<'a>, shares: &'a [(Move, f64)]) -> Self {
         let points = Matrix::zeros(0, target.dimension());
         Self { target, settings, shares, points, chances: Vec::new() }
     }
@@ -218,7 +214,8 @@ impl<'a> Batch<'a> {
         }
         let log_density = self.target.log_density(&self.points);
         state.evaluations += walkers.len() as u64;
-        for (row, (&walker, (ln_factor, ln_chance))) in walkers.iter().zip(&self.chances).enumerate()
+        for (row, (&walker, (ln_factor, ln_chance))) in
+            walkers.iter().zip(&self.chances).enumerate()
         {
             // A log density that is not a number compares false, and the walker stays.
             if *ln_chance < ln_factor + log_density[row] - state.log_density[walker] {

@@ -88,7 +88,8 @@ fn contracts_hold() {
         "adaptive for ever",
         Box::new(AdaptiveMetropolis { adapt, proposal, ..Default::default() }),
     ));
-    samplers.push(("metropolis of the prior", Box::new(Metropolis { proposal, ..Default::default() })));
+    samplers
+        .push(("metropolis of the prior", Box::new(Metropolis { proposal, ..Default::default() })));
     samplers.push((
         "evolution from the prior",
         Box::new(DifferentialEvolution { archive: Proposal::Prior(1.0), ..Default::default() }),
@@ -151,8 +152,8 @@ fn a_twisted_normal_law_has_its_moments() {
         -0.5 * (x[0] * x[0] / 100.0 + bent * bent + x[2] * x[2] + x[3] * x[3])
     });
     let means: [Mean; 5] = [
-        ("mean of x1", 0.0, 1.0, |x| x[0]),
-        ("variance of x1", 100.0, 15.0, |x| x[0] * x[0]),
+        ("mean of x1", 0.0, 1.5, |x| x[0]),
+        ("variance of x1", 100.0, 20.0, |x| x[0] * x[0]),
         ("mean of x2", 0.0, 0.5, |x| x[1]),
         ("variance of x2", 19.0, 6.0, |x| x[1] * x[1]),
         ("variance of x3", 1.0, 0.1, |x| x[2] * x[2]),
@@ -162,9 +163,8 @@ fn a_twisted_normal_law_has_its_moments() {
 
 /// Exponential of mean 1, uniform, and beta of 2 and 5.
 fn bounded() -> Density<impl Fn(&[f64]) -> f64 + Sync> {
-    let inside = |x: &[f64]| {
-        x[0] >= 0.0 && (0.0..=1.0).contains(&x[1]) && (0.0..=1.0).contains(&x[2])
-    };
+    let inside =
+        |x: &[f64]| x[0] >= 0.0 && (0.0..=1.0).contains(&x[1]) && (0.0..=1.0).contains(&x[2]);
     Density {
         priors: vec![
             Distribution::Exponential(2.0),
@@ -173,11 +173,7 @@ fn bounded() -> Density<impl Fn(&[f64]) -> f64 + Sync> {
         ],
         bounds: vec![(0.0, f64::INFINITY), (0.0, 1.0), (0.0, 1.0)],
         function: move |x: &[f64]| {
-            if inside(x) {
-                -x[0] + x[2].ln() + 4.0 * (-x[2]).ln_1p()
-            } else {
-                f64::NEG_INFINITY
-            }
+            if inside(x) { -x[0] + x[2].ln() + 4.0 * (-x[2]).ln_1p() } else { f64::NEG_INFINITY }
         },
     }
 }
@@ -210,9 +206,9 @@ fn each_move_of_the_ensemble_keeps_a_correlated_normal_law() {
 }
 
 #[test]
-fn each_move_of_the_ensemble_keeps_a_skewed_law() {
-    // x ~ gamma(3), y | x ~ N(x, 1), z | y ~ N(y^2 / 4, 1): the moments of the gamma law about zero are
-    // 3, 12, 60, 360, so that E y^2 = 13, E z = 13/4, and var x = 3, var y = 4; E (x - 3)^3 = 6.
+fn walks_and_moves_keep_a_skewed_law() {
+    // x ~ gamma(3), y | x ~ N(x, 1), z | y ~ N(y^2 / 16, 1): the moments of the gamma law about zero are
+    // 3, 12, 60, 360, so that E y^2 = 13, E z = 13/16, and var x = 3, var y = 4; E (x - 3)^3 = 6.
     let target = Density {
         priors: vec![
             Distribution::Gamma([3.0, 1.0]),
@@ -224,7 +220,7 @@ fn each_move_of_the_ensemble_keeps_a_skewed_law() {
             if x[0] <= 0.0 {
                 return f64::NEG_INFINITY;
             }
-            let (y, z) = (x[1] - x[0], x[2] - 0.25 * x[1] * x[1]);
+            let (y, z) = (x[1] - x[0], x[2] - x[1] * x[1] / 16.0);
             2.0 * x[0].ln() - x[0] - 0.5 * (y * y + z * z)
         },
     };
@@ -233,8 +229,8 @@ fn each_move_of_the_ensemble_keeps_a_skewed_law() {
         ("variance of x", 3.0, 0.3, |x| (x[0] - 3.0).powi(2)),
         ("third moment of x", 6.0, 3.0, |x| (x[0] - 3.0).powi(3)),
         ("variance of y", 4.0, 0.4, |x| (x[1] - 3.0).powi(2)),
-        ("mean of z", 3.25, 0.3, |x| x[2]),
-        ("residual of z", 1.0, 0.1, |x| (x[2] - 0.25 * x[1] * x[1]).powi(2)),
+        ("mean of z", 13.0 / 16.0, 0.1, |x| x[2]),
+        ("residual of z", 1.0, 0.1, |x| (x[2] - x[1] * x[1] / 16.0).powi(2)),
     ];
     judge(&moves(30, 20_000), &target, &means);
     judge(&walks(50_000, 5000), &target, &means);
@@ -260,10 +256,7 @@ fn jumps_find_their_way_between_two_modes() {
                 ..Default::default()
             }),
         ),
-        (
-            "ensemble",
-            Box::new(AffineInvariantEnsemble { walkers: 60, steps: 5000, moves, ..rest }),
-        ),
+        ("ensemble", Box::new(AffineInvariantEnsemble { walkers: 60, steps: 5000, moves, ..rest })),
     ];
     let means: [Mean; 2] = [
         ("weight of the second mode", 2.0 / 3.0, 0.03, |x| f64::from(u8::from(x[0] > 0.0))),
