@@ -108,9 +108,30 @@ fn discrepancies() {
 #[test]
 fn samplers() {
     // With fewer steps the suite's own Monte Carlo error is too rough to judge by.
-    let options =
-        &["walkers = 40\nsteps = 2000", "walkers = 20\nsteps = 2000\nupdate = \"sequential\""];
-    let table: &Table = &[("affine_invariant_ensemble", options)];
+    let table: &Table = &[
+        (
+            "adaptive_metropolis",
+            &["steps = 4000\nwarm_up = 1000", "adapt = \"always\"\nproposal = { prior = 0.5 }"],
+        ),
+        (
+            "affine_invariant_ensemble",
+            &[
+                "walkers = 40\nsteps = 2000",
+                "walkers = 20\nsteps = 2000\nupdate = \"sequential\"",
+                "walkers = 40\nsteps = 2000\nmoves = { differential_evolution = 0.8, snooker = 0.2 }",
+                "walkers = 40\nsteps = 2000\nmoves = { stretch = 0.5, walk = 0.5 }\nsubset = 4",
+            ],
+        ),
+        (
+            "delayed_rejection_adaptive_metropolis",
+            &["steps = 4000\nwarm_up = 1000", "proposal = { prior = 0.5 }\nshrink = 0.1"],
+        ),
+        (
+            "differential_evolution",
+            &["steps = 4000\nwarm_up = 1000", "archive = { prior = 1.0 }\nsnooker = 0.3"],
+        ),
+        ("metropolis", &["steps = 4000", "proposal = { prior = 0.5 }"]),
+    ];
     all::<dyn Sampler>(table, |case, plugin| contract::sampler(&case.label, plugin));
 }
 

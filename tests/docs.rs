@@ -114,7 +114,7 @@ fn the_keys_of_the_summary_are_those_of_the_program() {
 
 #[test]
 fn the_plugin_of_the_guide_is_the_one_that_is_compiled() {
-    let source = fs::read_to_string(root().join("examples/differential_evolution.rs")).unwrap();
+    let source = fs::read_to_string(root().join("examples/difference_walk.rs")).unwrap();
     let guide = fs::read_to_string(root().join("CONTRIBUTING.md")).unwrap();
     let (before, rest) = guide.split_once("```rust\n").expect("a block of Rust");
     let (_, after) = rest.split_once("```\n").expect("the end of the block");

@@ -1,3 +1,14 @@
 //! Samplers: draws from a log density.
 
+mod adaptation;
+pub mod adaptive_metropolis;
 pub mod affine_invariant_ensemble;
+mod archive;
+mod chains;
+pub mod delayed_rejection_adaptive_metropolis;
+pub mod differential_evolution;
+pub mod metropolis;
+mod proposal;
+mod snooker;
+#[cfg(test)]
+mod truth;

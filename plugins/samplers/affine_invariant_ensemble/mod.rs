@@ -1,9 +1,10 @@
 //! `affine_invariant_ensemble`: walkers that move along lines through each other.
 
+mod moves;
 mod start;
 
 use lacuna::linalg::Matrix;
-use lacuna::math::random::{Stream, below, permutation, uniform};
+use lacuna::math::random::{Stream, permutation, uniform};
 use lacuna::plugin::sampler::{Plan, State};
 use lacuna::plugin::{Component, Context, Fact, Sampler, Target};
 use lacuna::run::Stop;
@@ -11,6 +12,11 @@ use lacuna::study::Complaints;
 use rand::Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+pub use moves::Moves;
+use moves::{Move, Others, Settings};
+
+use super::chains;
 
 /// Affine-invariant ensemble: many walkers, each of which moves along the line through itself and
 /// another one, by a random stretch.
@@ -21,8 +27,13 @@ use serde::{Deserialize, Serialize};
 /// number. Walkers depend on each other, so that their number of effective draws is what counts,
 /// and walkers that start far outside the bulk may never find in: start them around the best fit.
 ///
+/// Other `moves` can be mixed in. Jumps by differences between walkers, `{ differential_evolution = 0.8,
+/// snooker = 0.2 }`, are the better ones for densities of several modes; the snooker move
+/// is the only one that minds how the unknowns are scaled, and takes their spread at the start for a unit.
+///
 /// References: Goodman and Weare, Comm. App. Math. Comp. Sci. 5 (2010) 65; Foreman-Mackey, Hogg, Lang
-/// and Goodman, PASP 125 (2013) 306 (the update by halves).
+/// and Goodman, PASP 125 (2013) 306 (the update by halves); Nelson, Ford and Payne, ApJS 210 (2014) 11
+/// (differential evolution within an ensemble).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct AffineInvariantEnsemble {
@@ -30,9 +41,14 @@ pub struct AffineInvariantEnsemble {
     pub walkers: usize,
     /// The number of steps of each walker.
     pub steps: usize,
-    /// The scale of the moves, called `a` in the literature: a walker's distance from the other one is
-    /// multiplied by a number between `1 / stretch` and `stretch`.
+    /// The weights of the moves, such as `{ stretch = 0.8, differential_evolution = 0.18, snooker = 0.02 }`:
+    /// each time a walker moves, one of them is drawn.
+    pub moves: Moves,
+    /// The scale of the stretch move, called `a` in the literature: a walker's distance from the other one
+    /// is multiplied by a number between `1 / stretch` and `stretch`.
     pub stretch: f64,
+    /// The number of walkers whose places shape one walk move: at least two.
+    pub subset: usize,
     /// The order in which the walkers of one step move.
     pub update: Update,
 }
@@ -41,23 +57,30 @@ pub struct AffineInvariantEnsemble {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Update {
-    /// In two halves, drawn anew at each step: each half moves at once, along lines through walkers
-    /// of the other half, so that its log densities are computed in parallel.
+    /// In two halves, drawn anew at each step: each half moves at once, by the places of walkers of the
+    /// other half, so that its log densities are computed in parallel.
     Split,
-    /// One after the other, along lines through any walker where it then is, as in the paper of 2010.
+    /// One after the other, by the places where all others then are, as in the paper of 2010.
     Sequential,
 }
 
 impl Default for AffineInvariantEnsemble {
     fn default() -> Self {
-        Self { walkers: 120, steps: 1200, stretch: 2.0, update: Update::Split }
+        Self {
+            walkers: 120,
+            steps: 1200,
+            moves: Moves::default(),
+            stretch: 2.0,
+            subset: 3,
+            update: Update::Split,
+        }
     }
 }
 
 impl Component for AffineInvariantEnsemble {
     fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
         // Unknowns of discrepancies and effects come on top; `start` counts all of them.
-        let least = 2 * (context.parameters.len() + 1);
+        let least = self.least(context.parameters.len());
         if self.walkers < least {
             complaints
                 .at("walkers")
@@ -71,15 +94,28 @@ impl Component for AffineInvariantEnsemble {
                 .expected("an even number")
                 .found(self.walkers);
         }
-        if self.steps == 0 {
-            complaints.at("steps").say("no steps").expected("at least 1").found(0);
-        }
+        chains::check_steps(self.steps, 0, complaints);
         if !(self.stretch > 1.0 && self.stretch.is_finite()) {
             complaints
                 .at("stretch")
                 .say("walkers would not move")
                 .expected("a number above 1")
                 .found(self.stretch);
+        }
+        if self.subset < 2 {
+            complaints
+                .at("subset")
+                .say("walkers would not move")
+                .expected("at least 2")
+                .found(self.subset);
+        }
+        if !self.moves.are_sound() {
+            let [stretch, walk, jump, snooker] = self.moves.weights().map(|(_, weight)| weight);
+            complaints
+                .at("moves")
+                .say("the weights are no shares of the moves")
+                .expected("numbers from 0 up, at least one of them above 0")
+                .found(format!("{stretch}, {walk}, {jump} and {snooker}"));
         }
     }
 }
@@ -91,33 +127,35 @@ impl Sampler for AffineInvariantEnsemble {
 
     fn start(&self, target: &dyn Target, points: Matrix) -> Result<State, Stop> {
         self.check_start(target.dimension(), &points)?;
-        let log_density = target.log_density(&points);
-        start::check_support(&log_density)?;
-        let count = points.rows();
-        Ok(State {
-            points,
-            log_density,
-            accepted: vec![false; count],
-            evaluations: count as u64,
-            memory: serde_json::Value::Null,
-        })
+        let log_density = chains::log_density(target, &points, "walkers")?;
+        // Only the snooker move needs to remember anything.
+        let memory = if self.moves.snooker > 0.0 {
+            start::lengths(&points).into()
+        } else {
+            serde_json::Value::Null
+        };
+        Ok(chains::state(points, log_density, memory))
     }
 
     fn step(&self, target: &dyn Target, state: &mut State, stream: &Stream) -> Result<(), Stop> {
         let mut rng = stream.generator();
         let count = state.points.rows();
         state.accepted.fill(false);
+        let lengths = chains::numbers(&state.memory);
+        let shares = self.moves.shares();
+        let settings = Settings { stretch: self.stretch, subset: self.subset, lengths: &lengths };
+        let mut batch = Batch::new(target, &settings, &shares);
         match self.update {
             Update::Split => {
                 let order = permutation(&mut rng, count);
                 let (red, blue) = order.split_at(count / 2);
-                self.move_walkers(target, state, red, blue, &mut rng);
-                self.move_walkers(target, state, blue, red, &mut rng);
+                batch.move_walkers(state, red, |_| Others::These(blue), &mut rng);
+                batch.move_walkers(state, blue, |_| Others::These(red), &mut rng);
             }
             Update::Sequential => {
                 for walker in 0..count {
-                    let others: Vec<usize> = (0..count).filter(|&k| k != walker).collect();
-                    self.move_walkers(target, state, &[walker], &others, &mut rng);
+                    let others = |walker| Others::AllBut { walker, count };
+                    batch.move_walkers(state, &[walker], others, &mut rng);
                 }
             }
         }
@@ -125,64 +163,67 @@ impl Sampler for AffineInvariantEnsemble {
     }
 
     fn facts(&self) -> Vec<Fact> {
+        let moves = self.moves.shares();
+        let named = |(kind, share): &(Move, f64)| format!("{:.0} % {}", 100.0 * share, kind.name());
+        let moves = moves.iter().map(named).collect::<Vec<_>>().join(", ");
         vec![
             Fact::new("walkers", self.walkers),
             Fact::new("steps", self.steps),
+            Fact::new("moves", moves),
             Fact::new("stretch", self.stretch),
         ]
     }
 }
 
-/// Where a walker wants to go.
-struct Proposal {
-    /// The logarithm of the factor that makes up for the change of volume, `(d - 1) ln z`.
-    ln_volume: f64,
-    /// The logarithm of the uniform number that decides.
-    ln_chance: f64,
+/// Walkers that move at once.
+struct Batch<'a> {
+    target: &'a dyn Target,
+    settings: &'a Settings<'a>,
+    shares: &'a [(Move, f64)],
+    /// Where they want to go.
+    points: Matrix,
+    /// The logarithms of the factor beside the ratio of the densities, and of the uniform number that
+    /// decides.
+    chances: Vec<(f64, f64)>,
 }
 
-impl AffineInvariantEnsemble {
-    /// Moves each of `walkers` along the line through one of `others` (equation 7 of the paper).
-    fn move_walkers(
-        &self,
-        target: &dyn Target,
+impl<'a> Batch<'a> {
+    fn new(target: &'a dyn Target, settings: &'a Settings<'a>, shares: &'a [(Move, f64)]) -> Self {
+        let points = Matrix::zeros(0, target.dimension());
+        Self { target, settings, shares, points, chances: Vec::new() }
+    }
+
+    /// Moves each of `walkers` by the places of others.
+    fn move_walkers<'o>(
+        &mut self,
         state: &mut State,
         walkers: &[usize],
-        others: &[usize],
+        others: impl Fn(usize) -> Others<'o>,
         rng: &mut impl Rng,
     ) {
-        let dimension = state.points.columns();
-        let mut points = Matrix::zeros(walkers.len(), dimension);
-        let mut proposals = Vec::with_capacity(walkers.len());
-        for (row, &walker) in walkers.iter().enumerate() {
-            let from = state.points.row(walker);
-            let through = state.points.row(others[below(rng, others.len())]);
-            let z = self.draw_stretch(rng);
-            for ((new, x), other) in points.row_mut(row).iter_mut().zip(from).zip(through) {
-                *new = other + z * (x - other);
-            }
-            proposals.push(Proposal {
-                ln_volume: (dimension as f64 - 1.0) * z.ln(),
-                ln_chance: uniform(rng).ln(),
-            });
+        self.chances.clear();
+        if self.points.rows() != walkers.len() {
+            self.points = Matrix::zeros(walkers.len(), state.points.columns());
         }
-        let log_density = target.log_density(&points);
+        for (row, &walker) in walkers.iter().enumerate() {
+            let kind = Move::draw(self.shares, rng);
+            let new = self.points.row_mut(row);
+            let ln_factor =
+                self.settings.propose(kind, &state.points, walker, others(walker), new, rng);
+            self.chances.push((ln_factor, uniform(rng).ln()));
+        }
+        let log_density = self.target.log_density(&self.points);
         state.evaluations += walkers.len() as u64;
-        for (row, (&walker, proposal)) in walkers.iter().zip(&proposals).enumerate() {
-            let ratio = proposal.ln_volume + log_density[row] - state.log_density[walker];
+        for (row, (&walker, (ln_factor, ln_chance))) in
+            walkers.iter().zip(&self.chances).enumerate()
+        {
             // A log density that is not a number compares false, and the walker stays.
-            if proposal.ln_chance < ratio {
-                state.points.row_mut(walker).copy_from_slice(points.row(row));
+            if *ln_chance < ln_factor + log_density[row] - state.log_density[walker] {
+                state.points.row_mut(walker).copy_from_slice(self.points.row(row));
                 state.log_density[walker] = log_density[row];
                 state.accepted[walker] = true;
             }
         }
-    }
-
-    /// A draw of the density proportional to `1 / sqrt(z)` on `[1 / a, a]` (equation 10).
-    fn draw_stretch(&self, rng: &mut impl Rng) -> f64 {
-        let a = self.stretch;
-        ((a - 1.0) * uniform(rng) + 1.0).powi(2) / a
     }
 }
 

@@ -1,7 +1,10 @@
 //! What starting points must satisfy.
 
 use lacuna::linalg::{Matrix, thin_svd};
+use lacuna::math::moments::Moments;
 use lacuna::run::Stop;
+
+use crate::samplers::chains;
 
 use super::AffineInvariantEnsemble;
 
@@ -9,20 +12,18 @@ use super::AffineInvariantEnsemble;
 const LARGEST_CONDITION: f64 = 1e8;
 
 impl AffineInvariantEnsemble {
+    /// The least number of walkers: they span the space twice, and each half has as many as a move
+    /// looks at.
+    pub(super) fn least(&self, dimension: usize) -> usize {
+        let needed = self.moves.shares().iter().map(|(kind, _)| kind.needs(self.subset)).max();
+        2 * (dimension + 1).max(needed.unwrap_or(1))
+    }
+
     /// Checks number and place of the starting points.
     pub(super) fn check_start(&self, dimension: usize, points: &Matrix) -> Result<(), Stop> {
-        let (rows, columns) = (points.rows(), points.columns());
-        if dimension == 0 {
-            return Err(Stop::new("there is nothing to sample: no parameter is unknown"));
-        }
-        if (rows, columns) != (self.walkers, dimension) {
-            return Err(Stop::new(format!(
-                "expected a starting point of {dimension} coordinates for each of {} walkers, \
-                 found {rows} points of {columns}",
-                self.walkers
-            )));
-        }
-        let least = 2 * (dimension + 1);
+        chains::check_points(points, self.walkers, dimension, "walkers")?;
+        let rows = points.rows();
+        let least = self.least(dimension);
         if rows < least || !rows.is_multiple_of(2) {
             return Err(Stop::new(format!(
                 "{rows} walkers cannot sample {dimension} unknowns: \
@@ -39,8 +40,11 @@ impl AffineInvariantEnsemble {
                 self.stretch
             )));
         }
-        if points.as_slice().iter().any(|x| !x.is_finite()) {
-            return Err(Stop::new("a starting point of the walkers is not finite"));
+        if !self.moves.are_sound() || self.subset < 2 {
+            return Err(Stop::new(
+                "expected `moves` of the sampler with weights from 0 up, one of them above 0, \
+                 and a `subset` of at least 2",
+            ));
         }
         spanning(points)
     }
@@ -80,23 +84,7 @@ fn spanning(points: &Matrix) -> Result<(), Stop> {
     Ok(())
 }
 
-/// Checks that each walker starts where the density is above zero.
-pub(super) fn check_support(log_density: &[f64]) -> Result<(), Stop> {
-    let outside: Vec<String> = log_density
-        .iter()
-        .enumerate()
-        .filter(|(_, value)| !value.is_finite())
-        .map(|(walker, _)| (walker + 1).to_string())
-        .collect();
-    if outside.is_empty() {
-        return Ok(());
-    }
-    let named = outside.iter().take(5).map(String::as_str).collect::<Vec<_>>().join(", ");
-    let more = if outside.len() > 5 { ", and more" } else { "" };
-    Err(Stop::new(format!(
-        "{} of {} walkers start where the posterior density is zero or has no value: \
-         number {named}{more}",
-        outside.len(),
-        log_density.len()
-    )))
+/// The standard deviation of the starting points in each coordinate.
+pub(super) fn lengths(points: &Matrix) -> Vec<f64> {
+    Moments::of_rows(points).sd()
 }

@@ -123,10 +123,12 @@ fn acceptance_and_autocorrelation_are_those_of_emcee() {
         let shares = walkers::acceptance(&draws);
         let found = shares.iter().sum::<f64>() / 100.0;
         assert!((found - acceptance).abs() < 0.01, "d = {dimension}: acceptance {found}");
+        println!("d = {dimension}: acceptance {found:.4}");
         let times = (0..2)
             .map(|j| autocorrelation::integrated_time(&draws.coordinate(j).collect::<Vec<_>>()));
         let found = times.sum::<f64>() / 2.0;
         assert!((found / tau - 1.0).abs() < 0.1, "d = {dimension}: tau {found}");
+        println!("d = {dimension}: autocorrelation time {found:.1}");
         assert_eq!(Stranded::among(&draws), Stranded::default());
     }
 }

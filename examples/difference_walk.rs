@@ -16,28 +16,29 @@ use rand::Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Differential evolution: many walkers, each of which jumps by the difference between two others.
+/// Difference walk: many walkers, each of which jumps by the difference between two others.
 ///
 /// The jumps take the shape of the ensemble, so that nothing has to be tuned to the scales and
 /// correlations of the unknowns.
 ///
-/// Reference: ter Braak, Statistics and Computing 16 (2006) 239.
+/// Reference: ter Braak, Statistics and Computing 16 (2006) 239. The built-in `affine_invariant_ensemble` has
+/// the same as one of its moves.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct DifferentialEvolution {
+pub struct DifferenceWalk {
     /// The number of walkers: at least four times the number of unknowns.
     pub walkers: usize,
     /// The number of steps of each walker.
     pub steps: usize,
 }
 
-impl Default for DifferentialEvolution {
+impl Default for DifferenceWalk {
     fn default() -> Self {
         Self { walkers: 100, steps: 2000 }
     }
 }
 
-impl Component for DifferentialEvolution {
+impl Component for DifferenceWalk {
     fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
         let least = 4 * context.parameters.len().max(1);
         if self.walkers < least {
@@ -50,7 +51,7 @@ impl Component for DifferentialEvolution {
     }
 }
 
-impl Sampler for DifferentialEvolution {
+impl Sampler for DifferenceWalk {
     fn plan(&self, _dimension: usize) -> Plan {
         Plan { chains: self.walkers, steps: self.steps, warm_up: 0, ensemble: true }
     }
@@ -112,12 +113,11 @@ fn jump(
     }
 }
 
-lacuna::register!(Sampler, "differential_evolution", DifferentialEvolution);
+lacuna::register!(Sampler, "difference_walk", DifferenceWalk);
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = std::env::args().nth(1).ok_or("usage: differential_evolution STUDY")?;
-    let checked =
-        resolve::load(Path::new(&path), &["sampler.use=differential_evolution".to_owned()]);
+    let path = std::env::args().nth(1).ok_or("usage: difference_walk STUDY")?;
+    let checked = resolve::load(Path::new(&path), &["sampler.use=difference_walk".to_owned()]);
     let complaints = checked.complaints();
     let study = checked.study.ok_or(complaints)?;
     let mut run = RunDirectory::open(&Path::new("runs").join(&study.name))?;
@@ -128,6 +128,6 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 #[test]
 fn keeps_the_contract_of_samplers() {
-    let sampler = DifferentialEvolution::default();
-    assert_eq!(lacuna::contract::sampler("differential_evolution", &sampler), Ok(()));
+    let sampler = DifferenceWalk::default();
+    assert_eq!(lacuna::contract::sampler("difference_walk", &sampler), Ok(()));
 }

@@ -1,0 +1,240 @@
+//! Proposals that learn from the history of the chains.
+
+use lacuna::linalg::Matrix;
+use lacuna::math::moments::Moments;
+use lacuna::plugin::Target;
+use lacuna::plugin::sampler::State;
+use lacuna::run::Stop;
+use lacuna::study::Complaints;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::chains;
+use super::proposal::{Proposal, Shape, best_scale};
+
+/// Accepted moves per unknown below which a window tells no covariance.
+const MOVES: usize = 10;
+/// The part of its own variance that is added to each coordinate of a learnt covariance.
+const RIDGE: f64 = 1e-8;
+/// The power with which gains fall, between 1/2 and 1 (Andrieu and Thoms 2008, section 4).
+const DECAY: f64 = 0.6;
+
+/// How long a proposal goes on learning.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Adapt {
+    /// During the warm-up: after it the proposal is fixed, and all chains are exact Markov chains
+    /// that are independent of each other.
+    WarmUp,
+    /// To the end, ever more rarely and in ever smaller steps. The distribution of the chains converges
+    /// all the same (Chimisov, Latuszynski and Roberts, arXiv 1801.09309), but is not exact after any
+    /// number of steps.
+    Always,
+}
+
+/// What a proposal learns by.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rule {
+    /// The number of steps of the warm-up.
+    pub warm_up: usize,
+    /// When it ends.
+    pub adapt: Adapt,
+    /// The share of accepted moves to aim at.
+    pub acceptance: Option<f64>,
+}
+
+impl Rule {
+    /// Complains of a share of accepted moves that is none.
+    pub(super) fn check(self, complaints: &mut Complaints<'_>) {
+        if let Some(share) = self.acceptance.filter(|share| !(0.0 < *share && *share < 1.0)) {
+            complaints
+                .at("acceptance")
+                .say("a share of accepted moves lies between none and all")
+                .expected("a number between 0 and 1")
+                .found(share);
+        }
+    }
+
+    fn acceptance(self, dimension: usize) -> f64 {
+        // Best for normal laws: 0.441, 0.352, 0.316, 0.279, 0.275 in one to five dimensions (Gelman, Roberts
+        // and Gilks, Bayesian Statistics 5 (1996) 599, table 1), 0.234 in many.
+        self.acceptance.unwrap_or(0.234 + 0.206 / dimension.max(1) as f64)
+    }
+
+    /// The first step after which the shape is learnt; each next is twice as far.
+    fn first_window(self) -> usize {
+        if self.warm_up == 0 { 100 } else { (self.warm_up / 10).max(10) }
+    }
+
+    fn is_over(self, step: usize) -> bool {
+        self.adapt == Adapt::WarmUp && step >= self.warm_up
+    }
+
+    /// Whether a window ends after this many steps.
+    fn ends_window(self, step: usize) -> bool {
+        let first = self.first_window();
+        step.is_multiple_of(first) && (step / first).is_power_of_two()
+    }
+}
+
+/// A proposal with what it has learnt so far.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Adaptive {
+    /// The shape of the steps.
+    pub shape: Shape,
+    /// Their scale.
+    pub scale: f64,
+    /// What is being learnt; none when learning is over.
+    learning: Option<Learning>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Learning {
+    step: usize,
+    /// Accepted moves of all chains since the shape was learnt last.
+    moves: usize,
+    /// The points of all chains since then.
+    window: Moments,
+}
+
+impl Adaptive {
+    /// The state of `count` chains before their first step.
+    pub(super) fn start(
+        target: &dyn Target,
+        points: Matrix,
+        count: usize,
+        proposal: Proposal,
+        rule: Rule,
+    ) -> Result<State, Stop> {
+        let dimension = target.dimension();
+        chains::check_points(&points, count, dimension, "chains")?;
+        let log_density = chains::log_density(target, &points, "chains")?;
+        let (shape, evaluations) = proposal.shape(target, &points, &log_density)?;
+        let memory = Self::new(shape, dimension, rule).written()?;
+        let mut state = chains::state(points, log_density, memory);
+        state.evaluations += evaluations;
+        Ok(state)
+    }
+
+    fn new(shape: Shape, dimension: usize, rule: Rule) -> Self {
+        let learning = Learning { step: 0, moves: 0, window: Moments::new(dimension) };
+        let learning = (!rule.is_over(0)).then_some(learning);
+        Self { shape, scale: best_scale(dimension), learning }
+    }
+
+    /// The proposal that a state keeps.
+    pub(super) fn read(state: &State) -> Result<Self, Stop> {
+        Self::deserialize(&state.memory)
+            .map_err(|error| Stop::new(format!("the saved proposal cannot be read: {error}")))
+    }
+
+    /// The proposal as a state keeps it.
+    fn written(&self) -> Result<serde_json::Value, Stop> {
+        serde_json::to_value(self)
+            .map_err(|error| Stop::new(format!("the proposal cannot be saved: {error}")))
+    }
+
+    /// Learns from a step: from the points where the chains now are, and from the probabilities with which
+    /// their moves were accepted.
+    ///
+    /// The scale follows Robbins and Monro's rule (algorithm 4 of Andrieu and Thoms). The shape becomes the
+    /// covariance of the later half of the history (Haario, Saksman and Tamminen 2001, equation
+    /// 1), of all chains together, after 1, 2, 4, 8 ... times a tenth of the warm-up.
+    pub(super) fn learn(
+        &mut self,
+        state: &mut State,
+        chances: &[f64],
+        rule: Rule,
+    ) -> Result<(), Stop> {
+        let Some(learning) = &mut self.learning else { return Ok(()) };
+        let dimension = state.points.columns();
+        learning.step += 1;
+        learning.moves += state.accepted.iter().filter(|a| **a).count();
+        state.points.iter_rows().for_each(|point| learning.window.add(point));
+        let gain = (learning.step as f64).powf(-DECAY);
+        let share = chances.iter().sum::<f64>() / chances.len() as f64;
+        self.scale *= (gain * (share - rule.acceptance(dimension))).exp();
+        let step = learning.step;
+        if rule.ends_window(step) && step > 0 {
+            let told = learning.moves >= MOVES * dimension;
+            let shape = told.then(|| learnt(&learning.window)).flatten();
+            if let Some(shape) = shape {
+                (self.shape, self.scale) = (shape, best_scale(dimension));
+            }
+            *learning = Learning { step, moves: 0, window: Moments::new(dimension) };
+        }
+        if rule.is_over(step) {
+            self.learning = None;
+        }
+        state.memory = self.written()?;
+        Ok(())
+    }
+}
+
+fn learnt(window: &Moments) -> Option<Shape> {
+    let mut covariance = window.covariance();
+    (0..covariance.rows()).for_each(|j| covariance[(j, j)] *= 1.0 + RIDGE);
+    Shape::of(&covariance)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use lacuna::math::distribution::Distribution;
+    use lacuna::math::random::Stream;
+    use lacuna::plugin::Sampler;
+
+    use super::super::adaptive_metropolis::AdaptiveMetropolis;
+    use super::super::truth::Density;
+    use super::*;
+
+    #[test]
+    fn windows_double() {
+        let rule = Rule { warm_up: 1000, adapt: Adapt::Always, acceptance: None };
+        let ends: Vec<usize> = (1..=4000).filter(|&step| rule.ends_window(step)).collect();
+        assert_eq!(ends, [100, 200, 400, 800, 1600, 3200]);
+        let shares = [1, 2, 5, 1000].map(|d| rule.acceptance(d));
+        for (share, best) in shares.into_iter().zip([0.441, 0.352, 0.275, 0.234]) {
+            assert!((share - best).abs() < 0.02, "{share}");
+        }
+    }
+
+    #[test]
+    fn a_walk_learns_the_covariance_and_then_keeps_it() {
+        // A strongly correlated normal law, and a first shape that is a hundred times too wide.
+        let priors = vec![Distribution::Normal([0.0, 100.0]), Distribution::Normal([0.0, 1.0])];
+        let target = Density::new(priors, |x: &[f64]| {
+            let (u, v) = (x[0], 100.0 * x[1]);
+            -0.5 * (u * u + v * v - 1.9 * u * v) / (1.0 - 0.95 * 0.95)
+        });
+        let proposal = Proposal::Prior(1.0);
+        let sampler = AdaptiveMetropolis { warm_up: 2000, proposal, ..Default::default() };
+        let points = Matrix::from_fn(4, 2, |i, j| [i as f64, 1e-2 * i as f64][j]);
+        let mut state = sampler.start(&target, points).unwrap();
+        let root = Stream::root(3);
+        let mut moved = 0;
+        for step in 0..6000 {
+            sampler.step(&target, &mut state, &root.at(step)).unwrap();
+            if step == 2000 {
+                let learnt = Adaptive::read(&state).unwrap();
+                assert!(learnt.learning.is_none());
+                // The factor of [[1, 0.95e-2], [0.95e-2, 1e-4]]; the last window has 3200 points.
+                let numbers = learnt.shape.into_numbers();
+                for (found, expected) in numbers.iter().zip([1.0, 0.95e-2, 0.312e-2]) {
+                    assert!((found / expected - 1.0).abs() < 0.25, "{numbers:?}");
+                }
+            }
+            if step > 2000 {
+                moved += state.accepted.iter().filter(|a| **a).count();
+            }
+        }
+        let share = moved as f64 / (4.0 * 3999.0);
+        assert!((share - 0.337).abs() < 0.05, "acceptance {share}");
+    }
+
+    #[test]
+    fn a_memory_that_is_none_is_an_error() {
+        let state = chains::state(Matrix::zeros(1, 1), vec![0.0], serde_json::Value::Null);
+        assert!(Adaptive::read(&state).unwrap_err().message.contains("cannot be read"));
+    }
+}

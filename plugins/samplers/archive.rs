@@ -1,0 +1,152 @@
+//! The archive of the past from which differential evolution takes its jumps.
+//!
+//! A state keeps it as plain numbers, which are read in place: a step looks at two or three places of some
+//! thousand.
+
+use lacuna::linalg::Matrix;
+use lacuna::math::random::{Stream, below};
+use lacuna::run::Stop;
+use rand::Rng;
+use serde_json::{Value, json};
+
+use super::proposal::{Shape, normals};
+
+/// Places for each unknown at the start, as in the paper.
+const FIRST: usize = 10;
+/// Steps between two visits to the archive at first.
+const EVERY: u64 = 10;
+/// The largest number of places.
+const LARGEST: usize = 2000;
+
+/// The archive as a step reads it.
+pub(super) struct Archive<'a> {
+    /// The places, coordinate by coordinate.
+    places: &'a [Value],
+    dimension: usize,
+    /// The standard deviation of the first archive in each coordinate.
+    pub lengths: Vec<f64>,
+}
+
+impl<'a> Archive<'a> {
+    /// What a state keeps before the first step: a normal cloud around the best starting point.
+    pub(super) fn begin(shape: &Shape, points: &Matrix, log_density: &[f64]) -> Value {
+        let dimension = points.columns();
+        let best = (0..points.rows()).max_by(|&a, &b| log_density[a].total_cmp(&log_density[b]));
+        let centre = points.row(best.unwrap_or(0));
+        // The cloud is part of the proposal: any fixed stream will do.
+        let mut rng = Stream::root(0).named("archive").generator();
+        let mut places = Matrix::zeros((FIRST * dimension).max(2 * FIRST), dimension);
+        for i in 0..places.rows() {
+            let z = normals(dimension, &mut rng);
+            shape.step(centre, 1.0, &z, places.row_mut(i));
+        }
+        json!({
+            "step": 0,
+            "every": EVERY,
+            "lengths": shape.sd(),
+            "places": places.into_vec(),
+        })
+    }
+
+    /// The archive that a state keeps.
+    pub(super) fn read(memory: &'a Value, dimension: usize) -> Result<Self, Stop> {
+        let places = memory["places"].as_array().map_or(&[][..], Vec::as_slice);
+        let lengths = super::chains::numbers(&memory["lengths"]);
+        if places.len() < 3 * dimension || lengths.len() != dimension {
+            return Err(Stop::new("the saved archive of the chains cannot be read"));
+        }
+        Ok(Self { places, dimension, lengths })
+    }
+
+    /// Some of its places, all different.
+    pub(super) fn pick<const N: usize>(&self, rng: &mut impl Rng) -> [Vec<f64>; N] {
+        let count = self.places.len() / self.dimension;
+        let mut picked = [usize::MAX; N];
+        for k in 0..N {
+            let mut next = below(rng, count);
+            while picked[..k].contains(&next) {
+                next = below(rng, count);
+            }
+            picked[k] = next;
+        }
+        picked.map(|i| {
+            let place = &self.places[i * self.dimension..(i + 1) * self.dimension];
+            place.iter().filter_map(Value::as_f64).collect()
+        })
+    }
+
+    /// Counts a step and takes in where the chains are, if it is time.
+    pub(super) fn remember(
+        memory: &mut Value,
+        points: &Matrix,
+        warm_up: usize,
+    ) -> Result<(), Stop> {
+        let dimension = points.columns();
+        let step = memory["step"].as_u64().unwrap_or(0) + 1;
+        let every = memory["every"].as_u64().unwrap_or(EVERY).max(1);
+        memory["step"] = step.into();
+        let Some(places) = memory["places"].as_array_mut() else {
+            return Err(Stop::new("the saved archive of the chains cannot be read"));
+        };
+        if step.is_multiple_of(every) {
+            places.extend(points.as_slice().iter().map(|x| Value::from(*x)));
+        }
+        if step == warm_up as u64 {
+            let half = places.len() / dimension / 2;
+            if half >= FIRST * dimension {
+                places.drain(..half * dimension);
+            }
+        }
+        if places.len() > LARGEST * dimension {
+            let visits = places.chunks(points.as_slice().len());
+            let kept = visits.skip(1).step_by(2).flatten().cloned().collect();
+            *places = kept;
+            memory["every"] = (2 * every).into();
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn places(memory: &Value) -> usize {
+        memory["places"].as_array().unwrap().len() / 2
+    }
+
+    #[test]
+    fn it_grows_forgets_and_stays_small() {
+        let points = Matrix::from_rows(2, [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]);
+        let mut memory = Archive::begin(&Shape::diagonal(&[1.0, 1.0]), &points, &[0.0, 1.0, 0.5]);
+        assert_eq!(places(&memory), 20);
+        let mut sizes = Vec::new();
+        for _ in 0..20_000 {
+            Archive::remember(&mut memory, &points, 1000).unwrap();
+            sizes.push(places(&memory));
+        }
+        // Three places every ten steps; half of 320 is forgotten after the warm-up.
+        assert_eq!((sizes[8], sizes[9], sizes[998], sizes[999]), (20, 23, 317, 160));
+        assert!(sizes.iter().all(|&n| n <= LARGEST));
+        assert!(memory["every"] == 40 && sizes[19_999] > LARGEST / 2, "{}", sizes[19_999]);
+        // Every chain keeps its share.
+        let archive = Archive::read(&memory, 2).unwrap();
+        let firsts: Vec<f64> = archive.places.iter().step_by(2).filter_map(Value::as_f64).collect();
+        let count = |x: f64| firsts.iter().filter(|f| **f == x).count();
+        assert!(count(1.0).abs_diff(count(3.0)) <= 4 && count(3.0).abs_diff(count(5.0)) <= 4);
+    }
+
+    #[test]
+    fn picked_places_differ() {
+        let points = Matrix::from_rows(2, [[1.0, 2.0], [3.0, 4.0]]);
+        let memory = Archive::begin(&Shape::diagonal(&[1.0, 1.0]), &points, &[0.0, 1.0]);
+        let archive = Archive::read(&memory, 2).unwrap();
+        let mut rng = Stream::root(1).generator();
+        for _ in 0..200 {
+            let [a, b, c] = archive.pick(&mut rng);
+            assert!(a != b && b != c && a != c);
+        }
+        assert!(Archive::read(&Value::Null, 2).is_err());
+    }
+}
