@@ -110,7 +110,12 @@ fn samplers() {
     // With fewer steps the suite's own Monte Carlo error is too rough to judge by.
     let options =
         &["walkers = 40\nsteps = 2000", "walkers = 20\nsteps = 2000\nupdate = \"sequential\""];
-    let table: &Table = &[("affine_invariant_ensemble", options)];
+    let table: &Table = &[
+        ("affine_invariant_ensemble", options),
+        ("hamiltonian", &["warm_up = 300", "warm_up = 300\ntrajectory = { leapfrog_steps = 8 }"]),
+        ("no_u_turn", &["warm_up = 300", "warm_up = 300\nmetric = \"diagonal\""]),
+        ("variational", &["", "refine = false"]),
+    ];
     all::<dyn Sampler>(table, |case, plugin| contract::sampler(&case.label, plugin));
 }
 
