@@ -130,7 +130,10 @@ fn samplers() {
             "differential_evolution",
             &["steps = 4000\nwarm_up = 1000", "archive = { prior = 1.0 }\nsnooker = 0.3"],
         ),
+        ("hamiltonian", &["warm_up = 300", "warm_up = 300\ntrajectory = { leapfrog_steps = 8 }"]),
         ("metropolis", &["steps = 4000", "proposal = { prior = 0.5 }"]),
+        ("no_u_turn", &["warm_up = 300", "warm_up = 300\nmetric = \"diagonal\""]),
+        ("variational", &["", "refine = false"]),
     ];
     all::<dyn Sampler>(table, |case, plugin| contract::sampler(&case.label, plugin));
 }

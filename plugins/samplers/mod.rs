@@ -7,8 +7,11 @@ mod archive;
 mod chains;
 pub mod delayed_rejection_adaptive_metropolis;
 pub mod differential_evolution;
+pub mod hamiltonian;
 pub mod metropolis;
+pub mod no_u_turn;
 mod proposal;
 mod snooker;
 #[cfg(test)]
 mod truth;
+pub mod variational;

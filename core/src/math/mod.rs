@@ -1,4 +1,5 @@
-//! Distributions, streams of random numbers, Sobol' sequences, moments of samples, optimisation.
+//! Distributions, streams of random numbers, Sobol' sequences, moments of samples, optimisation, changes of
+//! coordinates.
 
 pub mod distribution;
 pub mod fit;
@@ -7,3 +8,4 @@ pub mod optimise;
 pub mod random;
 pub mod sobol;
 pub mod special;
+pub mod transform;

@@ -1,0 +1,179 @@
+//! `hamiltonian`: chains that coast along trajectories of a fixed length.
+
+pub(crate) mod chains;
+pub(crate) mod curvature;
+mod leapfrog;
+mod metric;
+mod pace;
+mod windows;
+
+use lacuna::linalg::Matrix;
+use lacuna::math::random::{Stream, uniform};
+use lacuna::plugin::sampler::{Plan, State};
+use lacuna::plugin::{Component, Context, Fact, Sampler, Target};
+use lacuna::run::Stop;
+use lacuna::study::Complaints;
+use rand::Rng;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub(crate) use chains::{Settings, Transition};
+pub(crate) use leapfrog::{Flow, LARGEST_ERROR, Phase, Point};
+pub use metric::Shape;
+
+/// Hamiltonian Monte Carlo: each chain is pushed in a random direction and coasts over the
+/// landscape of the log density for a fixed time, guided by its gradient.
+///
+/// One trajectory carries a chain right across the posterior, so that draws are nearly independent
+/// even with many correlated unknowns, at the price of a gradient for each small step on the way. The
+/// length of the step and the shape of the posterior are learnt in the warm-up. `no_u_turn` chooses the
+/// length of each trajectory as well and is the safer choice; this method is the faster one where one
+/// length suits all of the posterior. Unknowns with bounds are moved in logarithms or logits, so that
+/// no trajectory hits a bound. The density must be smooth.
+///
+/// References: Neal, in Handbook of Markov Chain Monte Carlo (2011), chapter 5; Hoffman and Gelman,
+/// J. Mach. Learn. Res. 15 (2014) 1593 (the step size); Stan reference manual, chapter 15 (the windows of
+/// the warm-up).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Hamiltonian {
+    /// The number of independent chains.
+    pub chains: usize,
+    /// The number of steps of each chain, the warm-up included. A step is a whole trajectory.
+    pub steps: usize,
+    /// The number of first steps in which step size and metric are learnt; they are no draws.
+    pub warm_up: usize,
+    /// How far a trajectory goes.
+    pub trajectory: Trajectory,
+    /// The share by which the length of each trajectory varies at random, up and down, so that no
+    /// trajectory returns to its start time and again.
+    pub jitter: f64,
+    /// The share of accepted trajectories at which the step size aims: larger means smaller steps.
+    pub target_acceptance: f64,
+    /// Which shape of the posterior is learnt: by default all correlations for up to 20 unknowns, and only
+    /// the scales for more.
+    pub metric: Option<Shape>,
+}
+
+/// How far a trajectory goes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Trajectory {
+    /// For this time, in units in which a normal posterior has the period `2 pi`: a quarter of it,
+    /// 1.57, makes draws of a normal law independent.
+    Time(f64),
+    /// For this number of leapfrog steps, whatever their size.
+    LeapfrogSteps(usize),
+}
+
+/// No trajectory has more leapfrog steps, as in trees of depth ten.
+const MOST_STEPS: usize = 1023;
+
+impl Default for Hamiltonian {
+    fn default() -> Self {
+        Self {
+            chains: 4,
+            steps: 2000,
+            warm_up: 1000,
+            trajectory: Trajectory::Time(std::f64::consts::FRAC_PI_2),
+            jitter: 0.3,
+            target_acceptance: 0.8,
+            metric: None,
+        }
+    }
+}
+
+impl Hamiltonian {
+    fn settings(&self) -> Settings {
+        Settings {
+            chains: self.chains,
+            steps: self.steps,
+            warm_up: self.warm_up,
+            target_acceptance: self.target_acceptance,
+            metric: self.metric,
+        }
+    }
+
+    /// One trajectory and its acceptance.
+    fn coast(&self, flow: &Flow<'_>, from: &Point, step: f64, rng: &mut impl Rng) -> Transition {
+        let stretch = 1.0 + self.jitter * (2.0 * uniform(rng) - 1.0);
+        let count = match self.trajectory {
+            Trajectory::Time(time) => stretch * time / step,
+            Trajectory::LeapfrogSteps(count) => stretch * count as f64,
+        };
+        let count = (count.round() as usize).clamp(1, MOST_STEPS);
+        let mut phase = flow.push(from, rng);
+        let energy = phase.energy();
+        let mut gradients = 0;
+        while gradients < count && phase.point.value.is_finite() {
+            flow.leapfrog(&mut phase, step);
+            gradients += 1;
+        }
+        let error = phase.energy() - energy;
+        let acceptance = (-error).exp().min(1.0);
+        let accepted = uniform(rng) < acceptance;
+        Transition {
+            point: if accepted { phase.point } else { from.clone() },
+            moved: accepted,
+            acceptance,
+            gradients: gradients as u64,
+            divergent: error.is_nan() || error > LARGEST_ERROR,
+            saturated: false,
+        }
+    }
+}
+
+impl Component for Hamiltonian {
+    fn check(&self, _context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        self.settings().check(complaints);
+        let (good, found) = match self.trajectory {
+            Trajectory::Time(time) => (time > 0.0 && time.is_finite(), time.to_string()),
+            Trajectory::LeapfrogSteps(count) => (count > 0, count.to_string()),
+        };
+        if !good {
+            complaints
+                .at("trajectory")
+                .say("chains would not move")
+                .expected("a number above 0")
+                .found(found);
+        }
+        if !(0.0..1.0).contains(&self.jitter) {
+            complaints
+                .at("jitter")
+                .say("a trajectory would have no length")
+                .expected("a number from 0 to below 1")
+                .found(self.jitter);
+        }
+    }
+}
+
+impl Sampler for Hamiltonian {
+    fn plan(&self, _dimension: usize) -> Plan {
+        self.settings().plan()
+    }
+
+    fn start(&self, target: &dyn Target, points: Matrix) -> Result<State, Stop> {
+        chains::start(&self.settings(), target, points)
+    }
+
+    fn step(&self, target: &dyn Target, state: &mut State, stream: &Stream) -> Result<(), Stop> {
+        chains::advance(&self.settings(), target, state, stream, |flow, point, step, rng| {
+            self.coast(flow, point, step, rng)
+        })
+    }
+
+    fn doubts(&self, state: &State) -> Vec<String> {
+        chains::doubts(&self.settings(), state)
+    }
+
+    fn facts(&self) -> Vec<Fact> {
+        self.settings().facts()
+    }
+}
+
+lacuna::register!(Sampler, "hamiltonian", Hamiltonian);
+
+#[cfg(test)]
+pub(crate) mod laws;
+#[cfg(test)]
+mod tests;

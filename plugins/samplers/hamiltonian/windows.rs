@@ -1,0 +1,66 @@
+//! The windows of a warm-up, as Stan has them.
+
+/// When which part of a chain's memory learns.
+///
+/// The step size learns throughout. The metric learns between a first stretch, in which chains find
+/// the bulk, and a last one, in which the step size settles; there it is made anew at the end of each
+/// window, and each window is twice as long as the one before.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Windows {
+    /// The first step whose draw tells about the metric.
+    first: usize,
+    /// The last step of each window.
+    ends: Vec<usize>,
+}
+
+impl Windows {
+    pub fn new(warm_up: usize) -> Self {
+        let (first, last, base) = if warm_up >= 150 {
+            (75, 50, 25)
+        } else {
+            let (first, last) = (warm_up * 15 / 100, warm_up / 10);
+            (first, last, warm_up - first - last)
+        };
+        let close = warm_up - last;
+        let (mut ends, mut begin, mut size) = (Vec::new(), first, base);
+        while begin < close {
+            // A window after which no longer one fits takes the rest.
+            let end = if begin + 3 * size > close { close } else { begin + size };
+            ends.push(end - 1);
+            (begin, size) = (end, 2 * size);
+        }
+        Self { first, ends }
+    }
+
+    /// Whether the draw of this step tells about the metric.
+    pub fn measure(&self, step: usize) -> bool {
+        step >= self.first && self.ends.last().is_some_and(|last| step <= *last)
+    }
+
+    /// Whether the metric is made anew after this step.
+    pub fn end(&self, step: usize) -> bool {
+        self.ends.contains(&step)
+    }
+
+    /// Whether that is the last time.
+    pub fn last(&self, step: usize) -> bool {
+        self.ends.last() == Some(&step)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_are_those_of_stan() {
+        // Source: Stan reference manual, section 15.2: 75, then 25, 50, 100, 200, 500, then 50 of 1000 steps.
+        let windows = Windows::new(1000);
+        assert_eq!((windows.first, &windows.ends[..]), (75, &[99, 149, 249, 449, 949][..]));
+        assert!(!windows.measure(74) && windows.measure(75) && windows.measure(949));
+        assert!(!windows.measure(950) && windows.end(99) && !windows.end(100));
+        assert_eq!(Windows::new(150).ends, [99]);
+        assert_eq!((Windows::new(100).first, Windows::new(100).ends), (15, vec![89]));
+        assert_eq!(Windows::new(0).ends, Vec::<usize>::new());
+    }
+}

@@ -1,0 +1,110 @@
+//! The path to a maximum and the normal laws along it (Zhang et al. 2022).
+//!
+//! Where Pathfinder uses L-BFGS, the whole matrix of BFGS is kept, which costs `d^2` numbers and is the better
+//! covariance; its start is the curvature at the starting point.
+
+use lacuna::linalg::vector::{add_scaled, dot};
+use lacuna::linalg::{Matrix, multiply_vector};
+use lacuna::math::random::normal;
+use lacuna::math::transform::Unconstrained;
+use lacuna::plugin::Target;
+use rand::Rng;
+
+use super::law::Law;
+use super::{Fit, Path, Point, Progress};
+
+/// A path ends when less than this can be gained in the quadratic model, in units of log density.
+const LEAST_GAIN: f64 = 1e-6;
+/// Draws that estimate an evidence lower bound.
+const DRAWS: usize = 20;
+/// Constants of the weak conditions of Wolfe.
+const RISE: f64 = 1e-4;
+const CURVATURE: f64 = 0.9;
+/// The most points of one line search.
+const TRIALS: usize = 40;
+
+/// One step of the path, and whether it goes on.
+pub(super) fn iterate(
+    target: &Unconstrained<'_>,
+    path: &mut Path,
+    rng: &mut impl Rng,
+) -> (Progress, bool) {
+    let mut evaluations = judge(target, path, rng);
+    let direction = multiply_vector(&path.inverse, &path.point.gradient);
+    let slope = dot(&path.point.gradient, &direction);
+    if slope.is_nan() || 0.5 * slope < LEAST_GAIN {
+        return (Progress { moved: false, evaluations }, false);
+    }
+    let (found, spent) = search(target, &path.point, &direction, slope);
+    evaluations += spent;
+    let Some(next) = found else { return (Progress { moved: false, evaluations }, false) };
+    update(&mut path.inverse, &path.point, &next);
+    let moved = next.place != path.point.place;
+    path.point = next;
+    (Progress { moved, evaluations }, moved)
+}
+
+/// Compares the law at the present point with the best one so far; gives the evaluations spent.
+fn judge(target: &Unconstrained<'_>, path: &mut Path, rng: &mut impl Rng) -> u64 {
+    let mut mean = path.point.place.clone();
+    let shift = multiply_vector(&path.inverse, &path.point.gradient);
+    add_scaled(&mut mean, 1.0, &shift);
+    let Some(law) = Law::new(mean, &path.inverse) else { return 0 };
+    let z = Matrix::from_fn(DRAWS, path.point.place.len(), |_, _| normal(rng));
+    let density = target.log_density(&law.points(&z));
+    let differences = density.iter().zip(z.iter_rows()).map(|(p, z)| p - law.log_density_of(z));
+    let bound = differences.sum::<f64>() / DRAWS as f64;
+    if bound.is_finite() && path.best.as_ref().is_none_or(|best| bound > best.bound) {
+        path.best = Some(Fit { law, bound });
+    }
+    DRAWS as u64
+}
+
+/// A higher point along a direction, by bisection (Lewis and Overton, Math. Program. 141 (2013) 135); `None`
+/// where rounding hides the rise.
+fn search(
+    target: &Unconstrained<'_>,
+    from: &Point,
+    direction: &[f64],
+    slope: f64,
+) -> (Option<Point>, u64) {
+    let (mut low, mut high, mut t) = (0.0, f64::INFINITY, 1.0);
+    let mut best = None;
+    for trial in 1..=TRIALS {
+        let mut place = from.place.clone();
+        add_scaled(&mut place, t, direction);
+        let point = Point::at(target, place);
+        if point.value >= from.value + RISE * t * slope {
+            let flat = dot(&point.gradient, direction) <= CURVATURE * slope;
+            best = Some(point);
+            if flat {
+                return (best, trial as u64);
+            }
+            low = t;
+        } else {
+            high = t;
+        }
+        t = if high.is_finite() { 0.5 * (low + high) } else { 2.0 * low };
+    }
+    (best, TRIALS as u64)
+}
+
+/// The update of Broyden, Fletcher, Goldfarb and Shanno; left out where the density does not
+/// curve downwards along the step.
+fn update(inverse: &mut Matrix, from: &Point, to: &Point) {
+    let s: Vec<f64> = to.place.iter().zip(&from.place).map(|(b, a)| b - a).collect();
+    let y: Vec<f64> = from.gradient.iter().zip(&to.gradient).map(|(a, b)| a - b).collect();
+    let curvature = dot(&s, &y);
+    let spread = multiply_vector(inverse, &y);
+    let scale = dot(&y, &spread);
+    if !(curvature > 1e-10 * scale && curvature > 0.0 && scale.is_finite()) {
+        return;
+    }
+    let factor = (1.0 + scale / curvature) / curvature;
+    for i in 0..s.len() {
+        for j in 0..s.len() {
+            inverse[(i, j)] +=
+                factor * s[i] * s[j] - (spread[i] * s[j] + s[i] * spread[j]) / curvature;
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! Normal laws in free coordinates.
+
+use lacuna::linalg::vector::dot;
+use lacuna::linalg::{Cholesky, Matrix, multiply_vector, solve_lower};
+use lacuna::math::special::HALF_LN_TWO_PI;
+use serde::{Deserialize, Serialize};
+
+/// A normal law with the covariance `L L'`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Law {
+    pub mean: Vec<f64>,
+    /// `L`, lower triangular.
+    pub factor: Matrix,
+}
+
+impl Law {
+    /// `None` where the covariance is not positive definite or the mean not finite.
+    pub fn new(mean: Vec<f64>, covariance: &Matrix) -> Option<Self> {
+        let cholesky = Cholesky::new(covariance).ok()?;
+        let finite = mean.iter().all(|m| m.is_finite());
+        finite.then(|| Self { mean, factor: cholesky.lower().clone() })
+    }
+
+    /// `mean + L z`.
+    pub fn point(&self, z: &[f64]) -> Vec<f64> {
+        let offset = multiply_vector(&self.factor, z);
+        self.mean.iter().zip(offset).map(|(m, o)| m + o).collect()
+    }
+
+    /// The points of all rows of `nodes`.
+    pub fn points(&self, nodes: &Matrix) -> Matrix {
+        Matrix::from_rows(nodes.columns(), nodes.iter_rows().map(|z| self.point(z)))
+    }
+
+    /// `ln det L`.
+    pub fn log_volume(&self) -> f64 {
+        (0..self.mean.len()).map(|j| self.factor[(j, j)].ln()).sum()
+    }
+
+    /// The log density at `point(z)`.
+    pub fn log_density_of(&self, z: &[f64]) -> f64 {
+        -0.5 * dot(z, z) - z.len() as f64 * HALF_LN_TWO_PI - self.log_volume()
+    }
+
+    /// The log density at a point.
+    pub fn log_density(&self, point: &[f64]) -> f64 {
+        let mut z: Vec<f64> = point.iter().zip(&self.mean).map(|(x, m)| x - m).collect();
+        solve_lower(&self.factor, &mut z);
+        self.log_density_of(&z)
+    }
+}
