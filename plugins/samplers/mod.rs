@@ -1,3 +1,8 @@
 //! Samplers: draws from a log density.
 
 pub mod affine_invariant_ensemble;
+mod evaluated;
+#[cfg(test)]
+mod known_evidence;
+pub mod nested;
+pub mod sequential_monte_carlo;
