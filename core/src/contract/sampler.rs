@@ -1,196 +1,170 @@
 //! The contract of samplers.
 
+mod harvest;
+mod targets;
+
 use crate::data::Draws;
 use crate::diagnose::{autocorrelation, chains};
-use crate::linalg::Matrix;
-use crate::math::distribution::Distribution;
 use crate::math::moments::{mean, variance};
-use crate::math::random::{Stream, uniform};
-use crate::plugin::sampler::{Sampler, State, Target};
+use crate::math::random::Stream;
+use crate::plugin::sampler::{Harvest, Sampler, State, Target};
 
-/// One clause of the contract; an error says how it was broken.
-type Check = fn(&dyn Sampler) -> Result<(), String>;
+use super::judge::{self, Check};
+use targets::{Bounded, MEAN, Normal, SD};
+
+/// Steps that suffice to see whether two runs are the same, after those of the warm-up.
+const FEW: usize = 20;
 
 /// Puts a sampler through the contract.
 ///
+/// - the plan has chains, and steps beyond its warm-up unless the sampler harvests;
 /// - `start` and `step` keep one finite point a chain, inside the support, with the log density of
-///   that very point;
-/// - a state written and read again continues with the same bits;
+///   that very point, and so does the harvest;
+/// - a state written and read again continues with the same bits, to the harvest where there is one;
 /// - the number of threads changes nothing;
 /// - starting points outside the support, of the wrong number or not finite are refused;
 /// - the mean and the standard deviation of a normal law in two correlated coordinates come out
-///   within four Monte Carlo errors.
+///   within four Monte Carlo errors, from the steps after the warm-up or from the harvest, whose
+///   draws are in random order and worth as many as it says;
+/// - a log evidence comes out within a tenth or four of its errors.
+///
+/// A sampler that harvests says so in every state: asked before its last step it gives points or an
+/// error, never `None`.
 pub fn sampler(name: &str, sampler: &dyn Sampler) -> Result<(), Vec<String>> {
-    let checks: [(&str, Check); 5] = [
-        ("keeps sound states", keeps_sound_states),
-        ("continues from a saved state", continues_from_a_saved_state),
-        ("does not depend on threads", does_not_depend_on_threads),
-        ("refuses bad starting points", refuses_bad_starts),
-        ("draws a normal law", draws_a_normal_law),
+    let checks: [Check<'_>; 6] = [
+        ("plans a run", Box::new(|| plans_a_run(sampler))),
+        ("keeps sound states", Box::new(|| keeps_sound_states(sampler))),
+        ("continues from a saved state", Box::new(|| continues_from_a_saved_state(sampler))),
+        (
+            "does not depend on threads",
+            Box::new(|| judge::same_on_threads(|| Run::whole(sampler, &Normal, FEW))),
+        ),
+        ("refuses bad starting points", Box::new(|| refuses_bad_starts(sampler))),
+        ("draws a normal law", Box::new(|| draws_a_normal_law(sampler))),
     ];
-    let breaches: Vec<String> = checks
-        .iter()
-        .filter_map(|(what, check)| {
-            check(sampler).err().map(|breach| format!("sampler `{name}`, {what}: {breach}"))
-        })
-        .collect();
-    if breaches.is_empty() { Ok(()) } else { Err(breaches) }
+    judge::judge("sampler", name, &checks)
 }
 
-/// A normal law in two correlated coordinates of different scale.
-struct Normal;
-
-const MEAN: [f64; 2] = [1.0, -200.0];
-const SD: [f64; 2] = [0.5, 30.0];
-const CORRELATION: f64 = 0.6;
-
-impl Target for Normal {
-    fn dimension(&self) -> usize {
-        2
-    }
-
-    fn log_density(&self, points: &Matrix) -> Vec<f64> {
-        points.iter_rows().map(|point| self.gradient(point).0).collect()
-    }
-
-    fn log_prior(&self, points: &Matrix) -> Vec<f64> {
-        let laws = || MEAN.into_iter().zip(SD).map(|(mean, sd)| Distribution::Normal([mean, sd]));
-        points
-            .iter_rows()
-            .map(|p| laws().zip(p).map(|(law, &x)| law.log_density(x)).sum())
-            .collect()
-    }
-
-    fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
-        let (u, v) = ((point[0] - MEAN[0]) / SD[0], (point[1] - MEAN[1]) / SD[1]);
-        let rest = 1.0 - CORRELATION * CORRELATION;
-        let slope = [(u - CORRELATION * v) / rest, (v - CORRELATION * u) / rest];
-        (-0.5 * (u * slope[0] + v * slope[1]), vec![-slope[0] / SD[0], -slope[1] / SD[1]])
-    }
-
-    fn bounds(&self) -> Vec<(f64, f64)> {
-        vec![(f64::NEG_INFINITY, f64::INFINITY); 2]
-    }
-
-    fn prior_draws(&self, count: usize, stream: &Stream) -> Matrix {
-        let mut rng = stream.generator();
-        Matrix::from_fn(count, 2, |_, j| Distribution::Normal([MEAN[j], SD[j]]).sample(&mut rng))
-    }
+/// A run up to some step.
+#[derive(PartialEq)]
+struct Run {
+    step: usize,
+    state: State,
+    harvest: Option<Harvest>,
 }
 
-/// An exponential law beside a uniform one, with zero density outside `[0, inf) x [0, 1]`.
-struct Bounded;
-
-impl Target for Bounded {
-    fn dimension(&self) -> usize {
-        2
+impl Run {
+    fn begin(sampler: &dyn Sampler, target: &dyn Target) -> Result<Self, String> {
+        let count = sampler.plan(target.dimension()).chains;
+        let points = target.prior_draws(count, &Stream::root(1).named("start"));
+        let state = sampler
+            .start(target, points)
+            .map_err(|stop| format!("draws of the prior are refused: {stop}"))?;
+        Ok(Self { step: 0, state, harvest: None })
     }
 
-    fn log_density(&self, points: &Matrix) -> Vec<f64> {
-        points.iter_rows().map(|point| self.gradient(point).0).collect()
-    }
-
-    fn log_prior(&self, points: &Matrix) -> Vec<f64> {
-        self.log_density(points)
-    }
-
-    fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
-        if point[0] >= 0.0 && (0.0..=1.0).contains(&point[1]) {
-            (-point[0], vec![-1.0, 0.0])
-        } else {
-            (f64::NEG_INFINITY, vec![0.0, 0.0])
+    /// Goes on until there have been `steps`, or the sampler has finished.
+    fn advance(
+        &mut self,
+        sampler: &dyn Sampler,
+        target: &dyn Target,
+        steps: usize,
+    ) -> Result<(), String> {
+        let stream = Stream::root(1).named("step");
+        while self.step < steps && !sampler.finished(&self.state) {
+            sampler
+                .step(target, &mut self.state, &stream.at(self.step as u64))
+                .map_err(|stop| format!("step {} stops: {stop}", self.step))?;
+            self.step += 1;
         }
+        Ok(())
     }
 
-    fn bounds(&self) -> Vec<(f64, f64)> {
-        vec![(0.0, f64::INFINITY), (0.0, 1.0)]
+    /// Goes on to `few` steps beyond the warm-up, or to the harvest.
+    fn complete(
+        &mut self,
+        sampler: &dyn Sampler,
+        target: &dyn Target,
+        few: usize,
+    ) -> Result<(), String> {
+        let plan = sampler.plan(target.dimension());
+        if harvests(sampler, target, &self.state) {
+            self.advance(sampler, target, plan.steps)?;
+            self.harvest = sampler
+                .harvest(target, &self.state, &Stream::root(1).named("harvest"))
+                .map_err(|stop| format!("the harvest after {} steps fails: {stop}", self.step))?;
+            return Ok(());
+        }
+        self.advance(sampler, target, plan.warm_up + few)
     }
 
-    fn prior_draws(&self, count: usize, stream: &Stream) -> Matrix {
-        let mut rng = stream.generator();
-        Matrix::from_fn(
-            count,
-            2,
-            |_, j| {
-                if j == 0 { -uniform(&mut rng).ln() } else { uniform(&mut rng) }
-            },
-        )
+    fn whole(sampler: &dyn Sampler, target: &dyn Target, few: usize) -> Result<Self, String> {
+        let mut run = Self::begin(sampler, target)?;
+        run.complete(sampler, target, few)?;
+        Ok(run)
     }
 }
 
-fn begin(sampler: &dyn Sampler, target: &dyn Target) -> Result<State, String> {
-    let count = sampler.plan(target.dimension()).chains;
-    let points = target.prior_draws(count, &Stream::root(1).named("start"));
-    sampler.start(target, points).map_err(|stop| format!("draws of the prior are refused: {stop}"))
+/// Whether the points of the steps are no draws.
+fn harvests(sampler: &dyn Sampler, target: &dyn Target, state: &State) -> bool {
+    !matches!(sampler.harvest(target, state, &Stream::root(1).named("harvest")), Ok(None))
 }
 
-fn advance(
-    sampler: &dyn Sampler,
-    target: &dyn Target,
-    state: &mut State,
-    steps: std::ops::Range<u64>,
-) -> Result<(), String> {
-    let stream = Stream::root(1).named("step");
-    for step in steps {
-        sampler
-            .step(target, state, &stream.at(step))
-            .map_err(|stop| format!("step {step} stops: {stop}"))?;
+fn plans_a_run(sampler: &dyn Sampler) -> Result<(), String> {
+    let plan = sampler.plan(2);
+    if plan.chains == 0 || plan.steps == 0 {
+        return Err(format!("{} chains of {} steps are no run", plan.chains, plan.steps));
+    }
+    let run = Run::begin(sampler, &Normal)?;
+    if plan.warm_up >= plan.steps && !harvests(sampler, &Normal, &run.state) {
+        let (steps, warm_up) = (plan.steps, plan.warm_up);
+        return Err(format!("a warm-up of {warm_up} leaves no draws of {steps} steps"));
     }
     Ok(())
 }
 
 fn keeps_sound_states(sampler: &dyn Sampler) -> Result<(), String> {
-    let chains = sampler.plan(2).chains;
-    let mut state = begin(sampler, &Bounded)?;
+    let mut run = Run::begin(sampler, &Bounded)?;
     for step in 0..50 {
-        if step > 0 {
-            advance(sampler, &Bounded, &mut state, step - 1..step)?;
-        }
-        let shape = (state.points.rows(), state.points.columns());
-        if shape != (chains, 2)
-            || state.log_density.len() != chains
-            || state.accepted.len() != chains
-        {
-            return Err(format!("after {step} steps the state has not one entry a chain"));
-        }
-        let inside = |p: &[f64]| p[0] >= 0.0 && p[0].is_finite() && (0.0..=1.0).contains(&p[1]);
-        if let Some(point) = state.points.iter_rows().find(|point| !inside(point)) {
-            return Err(format!("after {step} steps a chain is outside the support at {point:?}"));
-        }
-        if state.log_density != Bounded.log_density(&state.points) {
-            return Err(format!("after {step} steps a log density is not that of its point"));
-        }
+        run.advance(sampler, &Bounded, step)?;
+        is_sound(&run.state, sampler.plan(2).chains)
+            .map_err(|breach| format!("after {step} steps {breach}"))?;
     }
-    if state.evaluations == 0 {
+    if run.state.evaluations == 0 {
         return Err("evaluations are not counted".into());
+    }
+    if harvests(sampler, &Bounded, &run.state) {
+        run.complete(sampler, &Bounded, FEW)?;
+    }
+    let Some(found) = &run.harvest else { return Ok(()) };
+    harvest::is_sound(found, &Bounded, Bounded::holds)?;
+    found.evidence.as_ref().map_or(Ok(()), |evidence| harvest::evidence_is(evidence, 0.0))
+}
+
+fn is_sound(state: &State, chains: usize) -> Result<(), String> {
+    let shape = (state.points.rows(), state.points.columns());
+    if shape != (chains, 2) || state.log_density.len() != chains || state.accepted.len() != chains {
+        return Err("the state has not one entry a chain".into());
+    }
+    if let Some(point) = state.points.iter_rows().find(|point| !Bounded::holds(point)) {
+        return Err(format!("a chain is outside the support at {point:?}"));
+    }
+    if state.log_density != Bounded.log_density(&state.points) {
+        return Err("a log density is not that of its point".into());
     }
     Ok(())
 }
 
 fn continues_from_a_saved_state(sampler: &dyn Sampler) -> Result<(), String> {
-    let mut state = begin(sampler, &Normal)?;
-    advance(sampler, &Normal, &mut state, 0..7)?;
-    let saved = serde_json::to_string(&state).map_err(|e| format!("cannot be written: {e}"))?;
-    let mut read: State =
+    let mut run = Run::begin(sampler, &Normal)?;
+    run.advance(sampler, &Normal, 7)?;
+    let saved = serde_json::to_string(&run.state).map_err(|e| format!("cannot be written: {e}"))?;
+    let state: State =
         serde_json::from_str(&saved).map_err(|e| format!("cannot be read again: {e}"))?;
-    advance(sampler, &Normal, &mut state, 7..20)?;
-    advance(sampler, &Normal, &mut read, 7..20)?;
-    if state == read { Ok(()) } else { Err("the continued chain is another one".into()) }
-}
-
-fn does_not_depend_on_threads(sampler: &dyn Sampler) -> Result<(), String> {
-    let run = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .map_err(|error| format!("no pool of {threads} threads: {error}"))?;
-        pool.install(|| {
-            let mut state = begin(sampler, &Normal)?;
-            advance(sampler, &Normal, &mut state, 0..20)?;
-            Ok::<State, String>(state)
-        })
-    };
-    if run(1)? == run(3)? { Ok(()) } else { Err("one and three threads differ".into()) }
+    let mut read = Run { step: run.step, state, harvest: None };
+    run.complete(sampler, &Normal, FEW)?;
+    read.complete(sampler, &Normal, FEW)?;
+    if run == read { Ok(()) } else { Err("the continued chain is another one".into()) }
 }
 
 fn refuses_bad_starts(sampler: &dyn Sampler) -> Result<(), String> {
@@ -207,23 +181,38 @@ fn refuses_bad_starts(sampler: &dyn Sampler) -> Result<(), String> {
         ("a point that is not a number", with(f64::NAN)),
         ("one point too few", short),
     ] {
-        if sampler.start(&Bounded, points).is_ok() {
-            return Err(format!("{what} is accepted"));
-        }
+        judge::refused(what, || sampler.start(&Bounded, points))?;
     }
     Ok(())
 }
 
 fn draws_a_normal_law(sampler: &dyn Sampler) -> Result<(), String> {
+    let mut run = Run::begin(sampler, &Normal)?;
+    if !harvests(sampler, &Normal, &run.state) {
+        return follows_the_normal_law(sampler, run);
+    }
+    run.complete(sampler, &Normal, FEW)?;
+    let found = run.harvest.ok_or("there is nothing to harvest after the last step")?;
+    harvest::is_sound(&found, &Normal, |point| point.iter().all(|x| x.is_finite()))?;
+    for j in 0..2 {
+        is_normal(&found.points.column(j), j, harvest::errors(&found, j))?;
+    }
+    harvest::is_in_random_order(&found)?;
+    let expected = Normal::log_evidence();
+    found.evidence.as_ref().map_or(Ok(()), |evidence| harvest::evidence_is(evidence, expected))
+}
+
+/// Judges the steps of a run as draws.
+fn follows_the_normal_law(sampler: &dyn Sampler, mut run: Run) -> Result<(), String> {
     let plan = sampler.plan(2);
     // Long enough for a sharp test, short enough for every test run.
-    let steps = plan.steps.clamp(1000, 4000) as u64;
-    let mut state = begin(sampler, &Normal)?;
-    advance(sampler, &Normal, &mut state, 0..steps / 4)?;
+    let steps = plan.steps.clamp(1000, 4000);
+    let first = plan.warm_up.max(steps / 4);
+    run.advance(sampler, &Normal, first)?;
     let mut kept = Vec::new();
-    for step in steps / 4..steps {
-        advance(sampler, &Normal, &mut state, step..step + 1)?;
-        kept.push((state.points.clone(), state.log_density.clone()));
+    for step in first..first + steps - steps / 4 {
+        run.advance(sampler, &Normal, step + 1)?;
+        kept.push((run.state.points.clone(), run.state.log_density.clone()));
     }
     let draws = Draws::from_steps(vec!["x".into(), "y".into()], &kept);
     let error = |values: &[Vec<f64>]| {
@@ -237,26 +226,26 @@ fn draws_a_normal_law(sampler: &dyn Sampler) -> Result<(), String> {
         let values: Vec<Vec<f64>> = draws.coordinate(j).collect();
         let squares: Vec<Vec<f64>> =
             values.iter().map(|c| c.iter().map(|x| (x - MEAN[j]).powi(2)).collect()).collect();
-        let pooled = draws.pooled(j);
-        let (found_mean, found_sd) = (mean(&pooled), variance(&pooled).sqrt());
         // The delta method turns the error of the variance into that of its root.
-        let (of_mean, of_sd) = (error(&values), error(&squares) / (2.0 * SD[j]));
-        for (what, found, expected, error) in
-            [("mean", found_mean, MEAN[j], of_mean), ("sd", found_sd, SD[j], of_sd)]
-        {
-            if error.is_nan() || (found - expected).abs() > 4.0 * error {
-                return Err(format!(
-                    "the {what} of coordinate {} is {found} and not {expected}, \
-                     with a Monte Carlo error of {error}",
-                    j + 1
-                ));
-            }
-            if error > 0.1 * SD[j] {
-                return Err(format!(
-                    "after {steps} steps the {what} of coordinate {} is known to {error} only",
-                    j + 1
-                ));
-            }
+        is_normal(&draws.pooled(j), j, (error(&values), error(&squares) / (2.0 * SD[j])))?;
+    }
+    Ok(())
+}
+
+/// Compares mean and standard deviation of coordinate `j` with the law, given their errors.
+fn is_normal(values: &[f64], j: usize, (of_mean, of_sd): (f64, f64)) -> Result<(), String> {
+    let coordinate = j + 1;
+    for (what, found, expected, error) in
+        [("mean", mean(values), MEAN[j], of_mean), ("sd", variance(values).sqrt(), SD[j], of_sd)]
+    {
+        if error.is_nan() || (found - expected).abs() > 4.0 * error {
+            return Err(format!(
+                "the {what} of coordinate {coordinate} is {found} and not {expected}, \
+                 with a Monte Carlo error of {error}"
+            ));
+        }
+        if error > 0.1 * SD[j] {
+            return Err(format!("the {what} of coordinate {coordinate} is known to {error} only"));
         }
     }
     Ok(())
