@@ -4,5 +4,6 @@ pub mod affine_invariant_ensemble;
 mod evaluated;
 #[cfg(test)]
 mod known_evidence;
+mod moves;
 pub mod nested;
 pub mod sequential_monte_carlo;

@@ -43,11 +43,11 @@ impl SequentialMonteCarlo {
             doubts: self.doubts(state, memory, families),
             facts: vec![
                 Fact::new("temperatures", memory.generations),
-                Fact::new("moves of each particle", memory.moves.sweeps),
+                Fact::new("moves of each particle", memory.moves.moves),
                 Fact::new("acceptance at the last temperature", format!("{:.3}", memory.moves.acceptance)),
                 Fact::new(
                     "largest correlation that the last moves left",
-                    format!("{:.3}", memory.moves.correlation),
+                    format!("{:.3}", memory.moves.of_coordinates),
                 ),
                 Fact::new("families of particles that are left", format!("{families:.0}")),
                 Fact::new("information gained, in nats", format!("{information:.2}")),

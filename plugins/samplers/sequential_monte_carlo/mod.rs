@@ -2,7 +2,6 @@
 
 mod genealogy;
 mod harvest;
-mod mutation;
 mod temperature;
 
 use lacuna::linalg::Matrix;
@@ -15,7 +14,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::evaluated::{Evaluated, Shape, check_start, from_prior};
-use mutation::Moves;
+use super::moves::{Learned, Movement, Mutation};
 
 /// Sequential Monte Carlo: a population of particles that is led from the prior to the posterior by
 /// raising the likelihood to a power that grows from 0 to 1.
@@ -51,20 +50,6 @@ pub struct SequentialMonteCarlo {
     pub moves: usize,
     /// The most temperatures.
     pub temperatures: usize,
-}
-
-/// How particles move.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Mutation {
-    /// Independent moves as long as they are taken often enough, by turns with random walks.
-    Automatic,
-    /// Normal steps with the covariance of the population, their size adapted to the acceptance.
-    RandomWalk,
-    /// Draws of Student's t law with the population's mean and covariance.
-    Independent,
-    /// Steps along the difference of two other particles, which follow curved and split populations.
-    DifferentialEvolution,
 }
 
 impl Default for SequentialMonteCarlo {
@@ -120,7 +105,7 @@ struct Memory {
     /// From which draw of the prior each particle descends.
     families: Vec<usize>,
     /// What is learned about the moves.
-    moves: Moves,
+    moves: Learned,
 }
 
 impl Sampler for SequentialMonteCarlo {
@@ -162,7 +147,20 @@ impl Sampler for SequentialMonteCarlo {
             Shape::of(&population.points, &equal)?
         };
         let stream = stream.named("move");
-        state.accepted = self.mutate(target, &mut population, &shape, &mut memory, &stream);
+        let power = memory.temperature;
+        let movement = Movement {
+            target,
+            mutation: self.mutation,
+            correlation: self.correlation,
+            most: self.moves,
+            shape: &shape,
+            law: &|old, i, new, j| {
+                new.log_prior[j] - old.log_prior[i]
+                    + power * (new.log_likelihood(j) - old.log_likelihood(i))
+            },
+            fixed: None,
+        };
+        state.accepted = movement.run(&mut population, &mut memory.moves, &stream);
         state.evaluations += population.evaluations;
         state.points = population.points;
         state.log_density = population.log_density;
@@ -180,8 +178,10 @@ impl Sampler for SequentialMonteCarlo {
         state: &State,
         stream: &Stream,
     ) -> Result<Option<Harvest>, Stop> {
-        let memory = recall(&mut state.clone())?;
-        memory.map(|memory| self.bring_home(target, state, &memory, stream)).transpose()
+        let memory = recall(&mut state.clone())?.ok_or_else(|| {
+            Stop::new("the particles have not left their starting points, which are no draws")
+        })?;
+        self.bring_home(target, state, &memory, stream).map(Some)
     }
 
     fn facts(&self) -> Vec<Fact> {

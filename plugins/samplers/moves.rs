@@ -1,32 +1,70 @@
-//! Moves of the particles at one temperature.
+//! Metropolis moves of a population, repeated until it has forgotten where it was.
 
 use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, below, normal, permutation, uniform};
 use lacuna::plugin::Target;
 use rand::Rng;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Evaluated, Memory, Mutation, SequentialMonteCarlo, Shape};
+use super::evaluated::{Evaluated, Shape};
 
-/// What is learned about the moves.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct Moves {
-    /// The size of random walks in units of `2.38 / sqrt(d)`.
-    size: f64,
-    /// The share of moves taken at the last temperature.
-    pub acceptance: f64,
-    /// The largest correlation of a coordinate that was left at the last temperature.
-    pub correlation: f64,
-    /// The correlation of the likelihood that was left there.
-    pub of_likelihood: f64,
-    /// Sweeps over all particles so far.
-    pub sweeps: usize,
+/// How points move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Mutation {
+    /// Independent moves as long as they are taken often enough, by turns with differential evolution.
+    Automatic,
+    /// Normal steps with the covariance of the population, their size adapted to the acceptance.
+    RandomWalk,
+    /// Draws of Student's t law with the population's mean and covariance.
+    Independent,
+    /// Steps along the difference of two other points, which follow curved and split populations.
+    DifferentialEvolution,
 }
 
-impl Default for Moves {
+/// What is learned about the moves.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Learned {
+    /// The size of random walks and differences, relative to what suits a normal law.
+    size: f64,
+    /// The share of moves that were taken last.
+    pub acceptance: f64,
+    /// The largest correlation of a coordinate with that before the last moves.
+    pub of_coordinates: f64,
+    /// The correlation of the likelihood with that before the last moves.
+    pub of_likelihood: f64,
+    /// Moves of each point so far.
+    pub moves: usize,
+}
+
+impl Default for Learned {
     fn default() -> Self {
-        Self { size: 1.0, acceptance: 0.0, correlation: 0.0, of_likelihood: 0.0, sweeps: 0 }
+        Self { size: 1.0, acceptance: 0.0, of_coordinates: 0.0, of_likelihood: 0.0, moves: 0 }
     }
+}
+
+/// The law that the moves keep: the log of its density at a point of the second population over
+/// that at a point of the first.
+pub(super) type Law<'a> = &'a dyn Fn(&Evaluated, usize, &Evaluated, usize) -> f64;
+
+/// What the moves of one population have in common.
+pub(super) struct Movement<'a> {
+    /// The density.
+    pub target: &'a dyn Target,
+    /// How points move.
+    pub mutation: Mutation,
+    /// The correlation below which the past is forgotten.
+    pub correlation: f64,
+    /// The most moves of each point.
+    pub most: usize,
+    /// Centre and covariance of the law.
+    pub shape: &'a Shape,
+    /// The law.
+    pub law: Law<'a>,
+    /// Draws of the law that stay where they are; without them each half of the population moves
+    /// along differences of the other half.
+    pub fixed: Option<&'a Matrix>,
 }
 
 /// Degrees of freedom of independent draws: tails heavier than those of any likelihood that matters.
@@ -43,95 +81,109 @@ struct Proposal {
     ln_ratio: Vec<f64>,
 }
 
-impl SequentialMonteCarlo {
-    /// Moves all particles until they have forgotten where they were; which have moved.
-    pub(super) fn mutate(
+impl Movement<'_> {
+    /// Moves all points until they have forgotten where they were; which have moved.
+    pub fn run(
         &self,
-        target: &dyn Target,
         population: &mut Evaluated,
-        shape: &Shape,
-        memory: &mut Memory,
+        learned: &mut Learned,
         stream: &Stream,
     ) -> Vec<bool> {
-        let mut moved = vec![false; self.particles];
+        let count = population.points.rows();
+        let mut moved = vec![false; count];
         let mut watch = Watch::new(population);
-        let (mut taken, mut independent) = (0, 1.0);
-        let mut sweeps = 0;
-        while sweeps < self.moves {
+        let (mut sweeps, mut taken, mut independent) = (0, 0.0, 1.0);
+        while sweeps < self.most {
             let mut rng = stream.at(sweeps as u64).generator();
             let kind = match self.mutation {
                 Mutation::Automatic if sweeps % 2 == 1 || independent < USEFUL => {
-                    Mutation::RandomWalk
+                    Mutation::DifferentialEvolution
                 }
                 Mutation::Automatic => Mutation::Independent,
                 given => given,
             };
-            let share = self.sweep(kind, target, population, shape, memory, &mut moved, &mut rng);
+            let share = self.sweep(kind, learned.size, population, &mut moved, &mut rng);
             if kind == Mutation::Independent {
                 independent = share;
             } else {
                 // Robbins and Monro's steps towards the acceptance that suits random walks.
-                let size = memory.moves.size * (2.0 * (share - 0.25)).exp();
-                memory.moves.size = size.clamp(1e-6, 10.0);
+                learned.size = (learned.size * (2.0 * (share - 0.25)).exp()).clamp(1e-6, 10.0);
             }
-            taken += (share * self.particles as f64).round() as usize;
+            taken += share;
             sweeps += 1;
             if watch.forgotten(population, self.correlation) {
                 break;
             }
         }
-        memory.moves.acceptance = taken as f64 / (sweeps * self.particles) as f64;
-        memory.moves.sweeps += sweeps;
-        (memory.moves.correlation, memory.moves.of_likelihood) = watch.left();
+        learned.acceptance = taken / sweeps as f64;
+        learned.moves += sweeps;
+        (learned.of_coordinates, learned.of_likelihood) = watch.left();
         moved
     }
 
-    /// One move of each particle; the share of those taken.
+    /// One move of each point; the share of those taken.
     fn sweep(
         &self,
         kind: Mutation,
-        target: &dyn Target,
+        size: f64,
         population: &mut Evaluated,
-        shape: &Shape,
-        memory: &Memory,
         moved: &mut [bool],
         rng: &mut impl Rng,
     ) -> f64 {
-        let count = self.particles;
-        let halves = match kind {
-            Mutation::DifferentialEvolution => {
+        let count = population.points.rows();
+        let all: Vec<usize> = (0..count).collect();
+        let taken = match (kind, self.fixed) {
+            (Mutation::DifferentialEvolution, Some(fixed)) => {
+                let proposal = differences(population, &all, fixed, size, rng);
+                self.decide(population, &all, proposal, moved, rng)
+            }
+            (Mutation::DifferentialEvolution, None) => {
                 let order = permutation(rng, count);
                 let (red, blue) = order.split_at(count / 2);
-                vec![(red.to_vec(), blue.to_vec()), (blue.to_vec(), red.to_vec())]
+                let mut taken = 0;
+                for (movers, others) in [(red, blue), (blue, red)] {
+                    let others = population.points.select_rows(others);
+                    let proposal = differences(population, movers, &others, size, rng);
+                    taken += self.decide(population, movers, proposal, moved, rng);
+                }
+                taken
             }
-            _ => vec![((0..count).collect(), Vec::new())],
+            (Mutation::Independent, _) => {
+                let proposal = independent(population, self.shape, rng);
+                self.decide(population, &all, proposal, moved, rng)
+            }
+            _ => {
+                let proposal = random_walk(population, self.shape, size, rng);
+                self.decide(population, &all, proposal, moved, rng)
+            }
         };
+        taken as f64 / count as f64
+    }
+
+    /// Takes or refuses the proposed points, one for each mover; the number of those taken.
+    fn decide(
+        &self,
+        population: &mut Evaluated,
+        movers: &[usize],
+        proposal: Proposal,
+        moved: &mut [bool],
+        rng: &mut impl Rng,
+    ) -> usize {
+        let proposed = Evaluated::new(self.target, proposal.points);
+        population.evaluations += proposed.evaluations;
         let mut taken = 0;
-        for (movers, others) in halves {
-            let proposal = match kind {
-                Mutation::Independent => independent(population, shape, rng),
-                Mutation::DifferentialEvolution => {
-                    differences(population, &movers, &others, memory.moves.size, rng)
-                }
-                _ => random_walk(population, shape, memory.moves.size, rng),
-            };
-            let proposed = Evaluated::new(target, proposal.points);
-            population.evaluations += proposed.evaluations;
-            for (row, &particle) in movers.iter().enumerate() {
-                let power = memory.temperature;
-                let change = proposed.log_prior[row] - population.log_prior[particle]
-                    + power * proposed.log_likelihood(row)
-                    - power * population.log_likelihood(particle);
-                let ln_chance = uniform(rng).ln();
-                // A change that is not a number compares false, and the particle stays.
-                if ln_chance < change + proposal.ln_ratio[row] {
-                    population.replace(particle, &proposed, row);
-                    moved[particle] = true;
-                    taken += 1;
-                }
+        for (row, &mover) in movers.iter().enumerate() {
+            let ln_chance = uniform(rng).ln();
+            if proposed.log_density[row] == f64::NEG_INFINITY {
+                continue;
+            }
+            if ln_chance < (self.law)(population, mover, &proposed, row) + proposal.ln_ratio[row] {
+                population.replace(mover, &proposed, row);
+                moved[mover] = true;
+                taken += 1;
             }
         }
-        taken as f64 / count as f64
+        taken
     }
 }
 
@@ -176,19 +228,19 @@ fn independent(population: &Evaluated, shape: &Shape, rng: &mut impl Rng) -> Pro
 fn differences(
     population: &Evaluated,
     movers: &[usize],
-    others: &[usize],
+    others: &Matrix,
     size: f64,
     rng: &mut impl Rng,
 ) -> Proposal {
     let d = population.points.columns();
     let mut points = Matrix::zeros(0, d);
     for &mover in movers {
-        let a = below(rng, others.len());
-        let b = (a + 1 + below(rng, others.len() - 1)) % others.len();
+        let a = below(rng, others.rows());
+        let b = (a + 1 + below(rng, others.rows() - 1)) % others.rows();
         let whole = uniform(rng) < 0.1;
-        let length =
-            if whole { 1.0 } else { size * 2.38 / (2.0 * d as f64).sqrt() * (0.1 * normal(rng)).exp() };
-        let (a, b) = (population.points.row(others[a]), population.points.row(others[b]));
+        let spread = size * 2.38 / (2.0 * d as f64).sqrt() * (0.1 * normal(rng)).exp();
+        let length = if whole { 1.0 } else { spread };
+        let (a, b) = (others.row(a), others.row(b));
         let from = population.points.row(mover);
         points.extend_row((0..d).map(|j| from[j] + length * (a[j] - b[j])));
     }
