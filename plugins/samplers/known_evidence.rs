@@ -148,6 +148,16 @@ pub(super) fn two_peaks() -> Known {
     Known { priors, log_likelihood: Box::new(log_likelihood), log_evidence: 0.0 }
 }
 
+/// Any likelihood with a uniform prior on the unit cube.
+pub(super) fn unit_cube(
+    dimension: usize,
+    log_evidence: f64,
+    log_likelihood: impl Fn(&[f64]) -> f64 + Sync + 'static,
+) -> Known {
+    let priors = vec![Distribution::Uniform([0.0, 1.0]); dimension];
+    Known { priors, log_likelihood: Box::new(log_likelihood), log_evidence }
+}
+
 /// A whole run: what it brings home, and its evaluations of the density.
 pub(super) fn run(sampler: &dyn Sampler, target: &dyn Target, seed: u64) -> (Harvest, u64) {
     let root = Stream::root(seed);

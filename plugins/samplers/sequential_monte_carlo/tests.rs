@@ -5,7 +5,7 @@ use lacuna::math::moments::{mean, variance};
 
 use super::super::known_evidence::{
     Calibration, assert_evidence, calibration, divergence, peak, regression, run, shells, two_data,
-    two_peaks,
+    two_peaks, unit_cube,
 };
 use super::*;
 
@@ -115,6 +115,12 @@ fn too_little_work_is_doubted() {
     assert!(harvest.doubts.iter().any(|d| d.contains(few)), "{:?}", harvest.doubts);
     let (harvest, _) = run(&with(1000), &regression(), 1);
     assert!(harvest.doubts.is_empty(), "{:?}", harvest.doubts);
+}
+
+#[test]
+fn a_likelihood_that_is_zero_on_most_of_the_prior_is_no_obstacle() {
+    let function = |x: &[f64]| if x[0] < 0.02 { 0.0 } else { f64::NEG_INFINITY };
+    calibration(&with(200), &unit_cube(2, 0.02_f64.ln(), function), 20).assert("support", 20);
 }
 
 #[test]
