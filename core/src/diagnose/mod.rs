@@ -13,6 +13,7 @@
 
 pub mod autocorrelation;
 pub mod chains;
+pub mod pareto;
 pub mod walkers;
 
 use serde::{Deserialize, Serialize};

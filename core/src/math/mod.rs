@@ -1,4 +1,4 @@
-//! Distributions, streams of random numbers, moments of samples, optimisation.
+//! Distributions, streams of random numbers, moments of samples, optimisation, changes of coordinates.
 
 pub mod distribution;
 pub mod fit;
@@ -6,3 +6,4 @@ pub mod moments;
 pub mod optimise;
 pub mod random;
 pub mod special;
+pub mod transform;

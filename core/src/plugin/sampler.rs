@@ -59,6 +59,12 @@ pub trait Sampler: Component {
         Ok(None)
     }
 
+    /// Reasons not to trust the draws of a run that ended in this state, each with what would help; none
+    /// when all is well.
+    fn doubts(&self, _state: &State) -> Vec<String> {
+        Vec::new()
+    }
+
     /// What is worth telling about the method.
     fn facts(&self) -> Vec<Fact> {
         Vec::new()
