@@ -15,3 +15,8 @@ mod snooker;
 #[cfg(test)]
 mod truth;
 pub mod variational;
+mod evaluated;
+mod known_evidence;
+mod moves;
+pub mod nested;
+pub mod sequential_monte_carlo;

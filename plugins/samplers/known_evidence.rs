@@ -1,0 +1,240 @@
+//! Problems whose evidence is known in closed form, and a whole run of a sampler on one.
+
+use lacuna::linalg::{Cholesky, Matrix, multiply_transposed};
+use lacuna::math::distribution::Distribution;
+use lacuna::math::moments::Moments;
+use lacuna::math::random::{Stream, normal};
+use lacuna::math::special::HALF_LN_TWO_PI;
+use lacuna::plugin::sampler::Harvest;
+use lacuna::plugin::{Sampler, Target};
+
+type Likelihood = Box<dyn Fn(&[f64]) -> f64 + Sync>;
+
+/// Independent priors and a likelihood.
+pub(super) struct Known {
+    priors: Vec<Distribution>,
+    log_likelihood: Likelihood,
+    /// The log of the evidence.
+    pub log_evidence: f64,
+}
+
+impl Target for Known {
+    fn dimension(&self) -> usize {
+        self.priors.len()
+    }
+
+    fn log_density(&self, points: &Matrix) -> Vec<f64> {
+        let prior = self.log_prior(points);
+        let at = |(point, prior): (&[f64], f64)| {
+            if prior.is_finite() { prior + (self.log_likelihood)(point) } else { prior }
+        };
+        points.iter_rows().zip(prior).map(at).collect()
+    }
+
+    fn log_prior(&self, points: &Matrix) -> Vec<f64> {
+        let at = |point: &[f64]| {
+            self.priors.iter().zip(point).map(|(prior, &x)| prior.log_density(x)).sum()
+        };
+        points.iter_rows().map(at).collect()
+    }
+
+    fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
+        (f64::NAN, vec![f64::NAN; point.len()])
+    }
+
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        self.priors.iter().map(Distribution::support).collect()
+    }
+
+    fn prior_draws(&self, count: usize, stream: &Stream) -> Matrix {
+        let mut rng = stream.generator();
+        Matrix::from_fn(count, self.priors.len(), |_, j| self.priors[j].sample(&mut rng))
+    }
+}
+
+/// The mean of two data with a normal prior, as in the self-test of UQLab: prior N(7, variance 2), data
+/// 9.1241 and 8.151 with variance 3; the posterior is N(7.935743, variance 0.857143).
+pub(super) fn two_data() -> Known {
+    let log_likelihood = |x: &[f64]| {
+        let misfit = (9.1241 - x[0]).powi(2) + (8.151 - x[0]).powi(2);
+        -misfit / 6.0 - 3.0_f64.ln() - 2.0 * HALF_LN_TWO_PI
+    };
+    // The data are normal with mean 7, variance 5 and covariance 2.
+    let (a, b) = (9.1241 - 7.0, 8.151 - 7.0);
+    let quadratic = (5.0 * (a * a + b * b) - 4.0 * a * b) / 21.0;
+    Known {
+        priors: vec![Distribution::Normal([7.0, 2.0_f64.sqrt()])],
+        log_likelihood: Box::new(log_likelihood),
+        log_evidence: -0.5 * (quadratic + 21.0_f64.ln()) - 2.0 * HALF_LN_TWO_PI,
+    }
+}
+
+/// Linear regression of 40 data on 5 functions with normal priors and known noise: the data are
+/// normal with covariance `s^2 I + t^2 X X'`.
+pub(super) fn regression() -> Known {
+    let (n, d, noise, width) = (40, 5, 0.3, 2.0);
+    let mut rng = Stream::root(11).named("regression").generator();
+    let x = Matrix::from_fn(n, d, |i, j| (i as f64 / n as f64).powi(j as i32));
+    let truth: Vec<f64> = (0..d).map(|_| normal(&mut rng)).collect();
+    let mean = |row: &[f64], b: &[f64]| row.iter().zip(b).map(|(x, b)| x * b).sum::<f64>();
+    let y: Vec<f64> =
+        x.iter_rows().map(|row| mean(row, &truth) + noise * normal(&mut rng)).collect();
+    let mut covariance = multiply_transposed(&x, &x);
+    covariance.as_mut_slice().iter_mut().for_each(|c| *c *= width * width);
+    (0..n).for_each(|i| covariance[(i, i)] += noise * noise);
+    let factor = Cholesky::new(&covariance).unwrap();
+    let log_evidence =
+        -0.5 * (factor.quadratic(&y) + factor.log_determinant()) - n as f64 * HALF_LN_TWO_PI;
+    let log_likelihood = move |b: &[f64]| {
+        let misfit: f64 = x.iter_rows().zip(&y).map(|(row, y)| (y - mean(row, b)).powi(2)).sum();
+        -0.5 * misfit / (noise * noise) - n as f64 * (noise.ln() + HALF_LN_TWO_PI)
+    };
+    let priors = vec![Distribution::Normal([0.0, width]); d];
+    Known { priors, log_likelihood: Box::new(log_likelihood), log_evidence }
+}
+
+/// Two thin spherical shells in a box: Feroz and Hobson, MNRAS 384 (2008) 449, section 5.2 and table 1, with radius 2,
+/// width 0.1, centres at 3.5 and -3.5 on the first axis, prior uniform on (-6, 6). Their values of the log evidence are
+/// -1.75, -5.67 and -14.59 in 2, 5 and 10 dimensions.
+pub(super) fn shells(dimension: usize) -> Known {
+    let log_likelihood = |x: &[f64]| {
+        let shell = |centre: f64| {
+            let rest: f64 = x[1..].iter().map(|x| x * x).sum();
+            let radius = ((x[0] - centre).powi(2) + rest).sqrt();
+            -0.5 * ((radius - 2.0) / 0.1).powi(2) - 0.1_f64.ln() - HALF_LN_TWO_PI
+        };
+        let (a, b) = (shell(-3.5), shell(3.5));
+        a.max(b) + (-(a - b).abs()).exp().ln_1p()
+    };
+    let log_evidence = match dimension {
+        2 => -1.75,
+        5 => -5.67,
+        10 => -14.59,
+        _ => panic!("no published value for {dimension} dimensions"),
+    };
+    let priors = vec![Distribution::Uniform([-6.0, 6.0]); dimension];
+    Known { priors, log_likelihood: Box::new(log_likelihood), log_evidence }
+}
+
+/// A normal likelihood deep inside a uniform prior on the unit cube, correlated by 0.8 between neighbours: the
+/// evidence is its integral, 1, and the posterior takes up `information` nats.
+pub(super) fn peak(dimension: usize, information: f64) -> Known {
+    // The entropy of a normal law with covariance s^2 R is d (ln s + 1/2 ln 2 pi e) + 1/2 ln det R.
+    let correlation =
+        Matrix::from_fn(dimension, dimension, |i, j| 0.8_f64.powi((i as i32 - j as i32).abs()));
+    let factor = Cholesky::new(&correlation).unwrap();
+    let half = 0.5 * factor.log_determinant();
+    let d = dimension as f64;
+    let ln_sd = -(information + half) / d - HALF_LN_TWO_PI - 0.5;
+    let log_likelihood = move |x: &[f64]| {
+        let z: Vec<f64> = x.iter().map(|x| (x - 0.4) / ln_sd.exp()).collect();
+        -0.5 * factor.quadratic(&z) - d * (ln_sd + HALF_LN_TWO_PI) - half
+    };
+    let priors = vec![Distribution::Uniform([0.0, 1.0]); dimension];
+    Known { priors, log_likelihood: Box::new(log_likelihood), log_evidence: 0.0 }
+}
+
+/// Two normal peaks on the unit square, one with three quarters of the mass, thirty of its widths apart.
+pub(super) fn two_peaks() -> Known {
+    let log_likelihood = |x: &[f64]| {
+        let peak = |share: f64, centre: f64, sd: f64| {
+            let square: f64 = x.iter().map(|x| ((x - centre) / sd).powi(2)).sum();
+            share.ln() - 0.5 * square - 2.0 * (sd.ln() + HALF_LN_TWO_PI)
+        };
+        let (a, b) = (peak(0.75, 0.25, 0.01), peak(0.25, 0.7, 0.02));
+        a.max(b) + (-(a - b).abs()).exp().ln_1p()
+    };
+    let priors = vec![Distribution::Uniform([0.0, 1.0]); 2];
+    Known { priors, log_likelihood: Box::new(log_likelihood), log_evidence: 0.0 }
+}
+
+/// Any likelihood with a uniform prior on the unit cube.
+pub(super) fn unit_cube(
+    dimension: usize,
+    log_evidence: f64,
+    log_likelihood: impl Fn(&[f64]) -> f64 + Sync + 'static,
+) -> Known {
+    let priors = vec![Distribution::Uniform([0.0, 1.0]); dimension];
+    Known { priors, log_likelihood: Box::new(log_likelihood), log_evidence }
+}
+
+/// A whole run: what it brings home, and its evaluations of the density.
+pub(super) fn run(sampler: &dyn Sampler, target: &dyn Target, seed: u64) -> (Harvest, u64) {
+    let root = Stream::root(seed);
+    let plan = sampler.plan(target.dimension());
+    let points = target.prior_draws(plan.chains, &root.named("start"));
+    let mut state = sampler.start(target, points).unwrap();
+    for step in 0..plan.steps {
+        if sampler.finished(&state) {
+            break;
+        }
+        sampler.step(target, &mut state, &root.named("step").at(step as u64)).unwrap();
+    }
+    let harvest = sampler.harvest(target, &state, &root.named("harvest")).unwrap();
+    (harvest.unwrap(), state.evaluations)
+}
+
+/// The evidence of a run and its error.
+pub(super) fn evidence(harvest: &Harvest) -> (f64, f64) {
+    let evidence = harvest.evidence.as_ref().unwrap();
+    (evidence.log, evidence.error)
+}
+
+/// Asserts that the evidence is within 0.1 of the truth, and within four of its errors.
+pub(super) fn assert_evidence(what: &str, sampler: &dyn Sampler, target: &Known, seed: u64) {
+    let (harvest, _) = run(sampler, target, seed);
+    let (log, error) = evidence(&harvest);
+    let off = log - target.log_evidence;
+    assert!(off.abs() < 0.1, "{what}: off by {off} +- {error}");
+    // Published values have two decimals.
+    assert!(off.abs() < 4.0 * error + 0.005, "{what}: off by {off} +- {error}");
+}
+
+/// The divergence of a normal law with the moments of the draws from that of [`two_data`].
+pub(super) fn divergence(harvest: &Harvest) -> f64 {
+    let moments = Moments::of_rows(&harvest.points);
+    let ratio = moments.covariance()[(0, 0)] / 0.857_143;
+    let mean = moments.mean()[0] - 7.935_743;
+    0.5 * (ratio - 1.0 - ratio.ln() + mean * mean / 0.857_143)
+}
+
+/// Evidences of runs with different seeds beside the truth.
+#[derive(Debug)]
+pub(super) struct Calibration {
+    /// The mean of the errors.
+    pub bias: f64,
+    /// The root of the mean square of the errors in units of the stated ones.
+    pub rms: f64,
+    /// The mean stated error.
+    pub error: f64,
+    /// The mean number of evaluations.
+    pub evaluations: f64,
+}
+
+pub(super) fn calibration(sampler: &dyn Sampler, target: &Known, runs: u64) -> Calibration {
+    let mut sums = [0.0; 4];
+    for seed in 0..runs {
+        let (harvest, evaluations) = run(sampler, target, seed);
+        let (log, error) = evidence(&harvest);
+        let off = log - target.log_evidence;
+        for (sum, value) in
+            sums.iter_mut().zip([off, (off / error).powi(2), error, evaluations as f64])
+        {
+            *sum += value / runs as f64;
+        }
+    }
+    Calibration { bias: sums[0], rms: sums[1].sqrt(), error: sums[2], evaluations: sums[3] }
+}
+
+impl Calibration {
+    /// Asserts that the stated errors hold: the sum of the squared standardised errors of `runs` runs is
+    /// chi-square distributed, whose mean square has the standard deviation `sqrt(2 / runs)`. Three of them, and
+    /// the errors' own errors of a fifth, give the bounds.
+    pub fn assert(&self, what: &str, runs: u64) {
+        let three = 3.0 * (2.0 / runs as f64).sqrt();
+        let (low, high) = ((1.0 - three).sqrt() / 1.2, (1.0 + three).sqrt() * 1.2);
+        assert!((low..high).contains(&self.rms), "{what}: {self:?}, not in {low} to {high}");
+        let of_mean = self.error / (runs as f64).sqrt();
+        assert!(self.bias.abs() < 4.0 * of_mean, "{what}: {self:?}");
+    }
+}

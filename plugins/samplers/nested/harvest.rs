@@ -1,0 +1,138 @@
+//! What the dead and the living bring home.
+
+use lacuna::linalg::Matrix;
+use lacuna::math::moments::kolmogorov_probability;
+use lacuna::math::random::{Stream, permutation, uniform};
+use lacuna::plugin::sampler::{Evidence, Harvest, State};
+use lacuna::plugin::{Fact, Target};
+use lacuna::run::Stop;
+use rand::Rng;
+
+use super::volumes::{Ladder, log_sum};
+use super::{Memory, Nested};
+
+/// Sequences of volumes that are drawn for the error of the evidence.
+const SEQUENCES: usize = 200;
+/// A probability of the ranks below this speaks against the draws.
+const IMPROBABLE: f64 = 1e-3;
+
+impl Nested {
+    pub(super) fn bring_home(
+        &self,
+        target: &dyn Target,
+        state: &State,
+        memory: &Memory,
+        stream: &Stream,
+    ) -> Result<Harvest, Stop> {
+        let log_prior = target.log_prior(&state.points);
+        let likelihood = |i: usize| state.log_density[i] - log_prior[i];
+        let mut living: Vec<usize> = (0..self.live).collect();
+        living.sort_by(|&a, &b| likelihood(a).total_cmp(&likelihood(b)));
+        let mut rungs = memory.dead.clone();
+        rungs.extend(living.iter().map(|&i| likelihood(i)));
+        let ladder = Ladder { rungs: &rungs, live: self.live };
+        let log_weights = ladder.mean_weights();
+        let log_evidence = log_sum(&log_weights);
+        let weights: Vec<f64> = log_weights.iter().map(|w| (w - log_evidence).exp()).collect();
+        let information: f64 =
+            weights.iter().zip(&rungs).filter(|(w, _)| **w > 0.0).map(|(w, l)| w * l).sum::<f64>()
+                - log_evidence;
+
+        let gone = memory.dead.len() - memory.log_density.len();
+        let kept = &weights[gone..];
+        let size = effective_size(kept);
+        let mut rng = stream.named("draws").generator();
+        let mut places = systematic(kept, size.round().max(1.0) as usize, &mut rng);
+        let order = permutation(&mut rng, places.len());
+        places = order.into_iter().map(|i| places[i]).collect();
+        let d = state.points.columns();
+        let dead = memory.log_density.len();
+        let point = |&place: &usize| match place.checked_sub(dead) {
+            None => &memory.points[place * d..(place + 1) * d],
+            Some(alive) => state.points.row(living[alive]),
+        };
+        let density = |&place: &usize| match place.checked_sub(dead) {
+            None => memory.log_density[place],
+            Some(alive) => state.log_density[living[alive]],
+        };
+        let shrinkage = ladder.scatter(SEQUENCES, &stream.named("volumes"));
+        let by_information = (information.max(0.0) / self.live as f64).sqrt();
+        let error = shrinkage.max(by_information).hypot(memory.share_variance.sqrt());
+        let evidence = Evidence {
+            log: log_evidence + memory.log_share,
+            error,
+            method: format!("nested sampling: {} live points", self.live),
+        };
+        let ranks = rank_probability(&memory.ranks);
+        Ok(Harvest {
+            points: Matrix::from_rows(d, places.iter().map(point)),
+            log_density: places.iter().map(density).collect(),
+            effective_size: size,
+            evidence: memory.finished.then_some(evidence),
+            doubts: self.doubts(memory, ranks),
+            facts: vec![
+                Fact::new("information gained, in nats", format!("{:.2}", information - memory.log_share)),
+                Fact::new("dead points", memory.dead.len()),
+                Fact::new("moves of each point", memory.moves.moves),
+                Fact::new("acceptance of the last moves", format!("{:.3}", memory.moves.acceptance)),
+                Fact::new("probability of the ranks of new points", format!("{ranks:.3}")),
+            ],
+        })
+    }
+
+    fn doubts(&self, memory: &Memory, ranks: f64) -> Vec<String> {
+        let mut doubts = Vec::new();
+        if !memory.finished {
+            doubts.push(format!(
+                "the live points still hold evidence after {} halvings of the prior volume: the draws do \
+                 not cover the peak; raise `halvings`",
+                self.halvings
+            ));
+        }
+        if ranks < IMPROBABLE {
+            doubts.push(format!(
+                "new points do not fall evenly among the survivors (probability {ranks:.1e}): lower \
+                 `correlation` or raise `moves`"
+            ));
+        }
+        doubts
+    }
+}
+
+/// The effective number of weighted points, `(sum w)^2 / sum w^2` (Kish 1965).
+fn effective_size(weights: &[f64]) -> f64 {
+    let sum: f64 = weights.iter().sum();
+    sum * sum / weights.iter().map(|w| w * w).sum::<f64>()
+}
+
+/// `count` places in proportion to weights, equally spaced behind one random start.
+fn systematic(weights: &[f64], count: usize, rng: &mut impl Rng) -> Vec<usize> {
+    let sum: f64 = weights.iter().sum();
+    let step = sum / count as f64;
+    let start = uniform(rng);
+    let (mut place, mut reached) = (0, weights[0]);
+    (0..count)
+        .map(|k| {
+            while (k as f64 + start) * step > reached && place + 1 < weights.len() {
+                place += 1;
+                reached += weights[place];
+            }
+            place
+        })
+        .collect()
+}
+
+/// The probability that evenly spread ranks leave the even distribution as far as these, by the test of
+/// Kolmogorov and Smirnov; survivors and new points are two samples of about the same size.
+fn rank_probability(ranks: &[u64]) -> f64 {
+    let total = ranks.iter().sum::<u64>() as f64;
+    if total == 0.0 {
+        return 1.0;
+    }
+    let mut sum = 0;
+    let distance = ranks.iter().enumerate().map(|(bin, count)| {
+        sum += count;
+        (sum as f64 / total - (bin + 1) as f64 / ranks.len() as f64).abs()
+    });
+    kolmogorov_probability(distance.fold(0.0, f64::max), 0.5 * total)
+}

@@ -1,0 +1,127 @@
+//! Evidence and draws against closed forms and published values.
+
+use lacuna::contract;
+use lacuna::math::moments::{mean, variance};
+
+use super::super::known_evidence::{
+    assert_evidence, calibration, divergence, peak, regression, run, shells, two_data, two_peaks,
+    unit_cube,
+};
+use super::*;
+
+fn with(live: usize) -> Nested {
+    Nested { live, ..Nested::default() }
+}
+
+#[test]
+fn it_keeps_the_contract_of_samplers() {
+    assert_eq!(contract::sampler("nested", &with(300)), Ok(()));
+}
+
+#[test]
+fn evidences_in_closed_form_are_found() {
+    assert_evidence("two data", &with(1000), &two_data(), 1);
+    assert_evidence("regression", &with(3000), &regression(), 2);
+    let sampler = Nested { mutation: Mutation::DifferentialEvolution, ..with(3000) };
+    assert_evidence("regression by differences", &sampler, &regression(), 3);
+    let sampler = Nested { mutation: Mutation::RandomWalk, ..with(3000) };
+    assert_evidence("regression by random walks", &sampler, &regression(), 4);
+}
+
+#[test]
+fn both_shells_are_found_with_the_published_evidence() {
+    for (dimension, live, seed) in [(2, 2000, 1), (5, 3000, 2), (10, 4000, 4)] {
+        let sampler = with(live);
+        assert_evidence(&format!("shells in {dimension}"), &sampler, &shells(dimension), seed);
+        let (harvest, _) = run(&sampler, &shells(dimension), seed);
+        let right = harvest.points.iter_rows().filter(|x| x[0] > 0.0).count() as f64;
+        let share = right / harvest.points.rows() as f64;
+        assert!((share - 0.5).abs() < 0.1, "{dimension}: {share}");
+    }
+}
+
+#[test]
+fn a_conjugate_normal_posterior_is_found() {
+    let mut divergences: Vec<f64> =
+        (0..20).map(|seed| divergence(&run(&with(500), &two_data(), seed).0)).collect();
+    divergences.sort_by(f64::total_cmp);
+    assert!(divergences[10] < 0.01, "{divergences:?}");
+}
+
+#[test]
+fn separated_peaks_keep_their_shares() {
+    let shares: Vec<f64> = (0..20)
+        .map(|seed| {
+            let (harvest, _) = run(&with(400), &two_peaks(), seed);
+            let large = harvest.points.iter_rows().filter(|x| x[0] < 0.45).count();
+            large as f64 / harvest.points.rows() as f64
+        })
+        .collect();
+    let error = (variance(&shares) / 20.0).sqrt();
+    assert!((mean(&shares) - 0.75).abs() < 4.0 * error, "{} +- {error}", mean(&shares));
+    assert!(error < 0.03, "{error}");
+}
+
+#[test]
+fn stated_errors_of_the_evidence_hold() {
+    for (name, target, live) in [
+        ("two data", two_data(), 200),
+        ("regression", regression(), 200),
+        ("peak", peak(4, 30.0), 200),
+        ("shells", shells(2), 200),
+    ] {
+        calibration(&with(live), &target, 40).assert(name, 40);
+    }
+}
+
+#[test]
+fn the_effective_size_is_that_of_the_posterior_mean() {
+    // Over many runs the mean of the draws scatters by the posterior's width over the root of the size.
+    let target = two_data();
+    let runs: Vec<_> = (0..60).map(|seed| run(&with(200), &target, seed).0).collect();
+    let means: Vec<f64> = runs.iter().map(|h| mean(&h.points.column(0))).collect();
+    let sizes: Vec<f64> = runs.iter().map(|h| h.effective_size).collect();
+    let real = 0.857_143 / variance(&means);
+    let stated = mean(&sizes);
+    // The variance of 60 means is known to sqrt(2 / 59) = 18 %.
+    assert!((stated / real - 1.0).abs() < 0.6, "stated {stated}, real {real}");
+}
+
+#[test]
+fn evidence_and_information_are_those_of_the_peak() {
+    let (harvest, _) = run(&with(500), &peak(4, 30.0), 1);
+    let information = &harvest.facts[0];
+    assert!(information.name.starts_with("information"));
+    let found: f64 = information.value.parse().unwrap();
+    let error = harvest.evidence.unwrap().error;
+    assert!((found - 30.0).abs() < 4.0 * error, "{found} +- {error}");
+}
+
+#[test]
+fn too_little_work_is_doubted() {
+    let sampler = Nested { halvings: 3, ..with(200) };
+    let (harvest, _) = run(&sampler, &peak(4, 30.0), 1);
+    assert_eq!(harvest.evidence, None);
+    assert!(harvest.doubts[0].contains("after 3 halvings"), "{:?}", harvest.doubts);
+    // A single small move leaves new points beside their parents, where the likelihood falls behind.
+    let sampler = Nested { mutation: Mutation::RandomWalk, moves: 1, ..with(1000) };
+    let (harvest, _) = run(&sampler, &peak(10, 60.0), 1);
+    let uneven = "do not fall evenly among the survivors";
+    assert!(harvest.doubts.iter().any(|d| d.contains(uneven)), "{:?}", harvest.facts);
+    let (harvest, _) = run(&with(500), &regression(), 1);
+    assert!(harvest.doubts.is_empty(), "{:?}", harvest.doubts);
+}
+
+#[test]
+fn equal_likelihoods_are_no_obstacle() {
+    // The likelihood is one on half of the prior and e^-5 on the other: Z = (1 + e^-5) / 2.
+    let function = |x: &[f64]| if x[0] < 0.5 { 0.0 } else { -5.0 };
+    let expected = 0.5 * (1.0 + (-5.0_f64).exp());
+    calibration(&with(400), &unit_cube(1, expected.ln(), function), 20).assert("plateaus", 20);
+}
+
+#[test]
+fn a_likelihood_that_is_zero_on_most_of_the_prior_is_no_obstacle() {
+    let function = |x: &[f64]| if x[0] < 0.02 { 0.0 } else { f64::NEG_INFINITY };
+    calibration(&with(200), &unit_cube(2, 0.02_f64.ln(), function), 20).assert("support", 20);
+}

@@ -1,0 +1,219 @@
+//! `sequential_monte_carlo`: a population of particles that is cooled from the prior to the posterior.
+
+mod genealogy;
+mod harvest;
+mod temperature;
+
+use lacuna::linalg::Matrix;
+use lacuna::math::random::Stream;
+use lacuna::plugin::sampler::{Harvest, Plan, State};
+use lacuna::plugin::{Component, Context, Fact, Sampler, Target};
+use lacuna::run::Stop;
+use lacuna::study::Complaints;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::evaluated::{Evaluated, Shape, check_start, from_prior};
+use super::moves::{Learned, Movement, Mutation};
+
+/// Sequential Monte Carlo: a population of particles that is led from the prior to the posterior by
+/// raising the likelihood to a power that grows from 0 to 1.
+///
+/// It needs no starting point, finds several modes where the prior reaches them, and gives the evidence (the
+/// probability of the data, from which Bayes factors follow) with its standard error. At each
+/// temperature the particles are weighted, drawn anew in proportion to their weights, and moved by
+/// Metropolis steps whose size is learned from the population. Choose it for comparing models and for
+/// posteriors with several modes; for one well-shaped posterior a Markov chain gives more draws for
+/// the same work.
+///
+/// The standard error of the evidence comes from the family tree of the particles: from how unequally the
+/// draws of the prior are represented at the end (Lee and Whiteley). It is too small when
+/// few families are left, and the report says so.
+///
+/// References: Neal, Statistics and Computing 11 (2001) 125; Del Moral, Doucet and Jasra, J. R. Stat.
+/// Soc. B 68 (2006) 411; Lee and Whiteley, Biometrika 105 (2018) 609 (errors); Ter Braak, Statistics
+/// and Computing 16 (2006) 239 (differential evolution).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SequentialMonteCarlo {
+    /// The number of particles; the error of the evidence falls as one over its root.
+    pub particles: usize,
+    /// The share of the particles that a change of temperature leaves effective: the next temperature is the
+    /// highest one at which the weights are still so equal.
+    pub effective_share: f64,
+    /// How particles move at one temperature.
+    pub mutation: Mutation,
+    /// Particles move until the correlation of each coordinate, and of the likelihood, with its value
+    /// before the moves has fallen to this.
+    pub correlation: f64,
+    /// The most moves of each particle at one temperature.
+    pub moves: usize,
+    /// The most temperatures.
+    pub temperatures: usize,
+}
+
+impl Default for SequentialMonteCarlo {
+    fn default() -> Self {
+        Self {
+            particles: 1000,
+            effective_share: 0.5,
+            mutation: Mutation::Automatic,
+            correlation: 0.2,
+            moves: 50,
+            temperatures: 200,
+        }
+    }
+}
+
+impl Component for SequentialMonteCarlo {
+    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        let least = 10 * (context.parameters.len() + 1);
+        if self.particles < least {
+            let spot = complaints.at("particles");
+            spot.say("too few particles to learn their covariance")
+                .expected(format!("at least {least}"))
+                .found(self.particles);
+        }
+        for (name, value) in
+            [("effective_share", self.effective_share), ("correlation", self.correlation)]
+        {
+            if !(value > 0.0 && value < 1.0) {
+                let spot = complaints.at(name);
+                spot.say("not a share").expected("a number between 0 and 1").found(value);
+            }
+        }
+        for (name, value) in [("moves", self.moves), ("temperatures", self.temperatures)] {
+            if value == 0 {
+                complaints.at(name).say("nothing to do").expected("at least 1").found(0);
+            }
+        }
+    }
+}
+
+/// What is kept from temperature to temperature.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(default)]
+struct Memory {
+    /// The power of the likelihood.
+    temperature: f64,
+    /// The log of the evidence at that power.
+    log_evidence: f64,
+    /// The variance that this would have, were the particles independent at each temperature.
+    independent_variance: f64,
+    /// How often the particles were drawn anew.
+    generations: usize,
+    /// From which draw of the prior each particle descends.
+    families: Vec<usize>,
+    /// What is learned about the moves.
+    moves: Learned,
+}
+
+impl Sampler for SequentialMonteCarlo {
+    fn plan(&self, _dimension: usize) -> Plan {
+        Plan { chains: self.particles, steps: self.temperatures, warm_up: 0, ensemble: true }
+    }
+
+    fn start(&self, target: &dyn Target, points: Matrix) -> Result<State, Stop> {
+        let log_density = check_start(target, &points, self.particles)?;
+        Ok(State {
+            points,
+            log_density,
+            accepted: vec![false; self.particles],
+            evaluations: self.particles as u64,
+            memory: serde_json::Value::Null,
+        })
+    }
+
+    fn step(&self, target: &dyn Target, state: &mut State, stream: &Stream) -> Result<(), Stop> {
+        let mut memory = recall(state)?;
+        let mut population = match &mut memory {
+            Some(_) => {
+                let (points, log_density) =
+                    (std::mem::take(&mut state.points), std::mem::take(&mut state.log_density));
+                let log_prior = target.log_prior(&points);
+                Evaluated { points, log_prior, log_density, evaluations: 0 }
+            }
+            none => {
+                let (drawn, tried) = from_prior(target, self.particles, &stream.named("prior"))?;
+                *none = Some(Memory::first(self.particles, tried));
+                drawn
+            }
+        };
+        let mut memory = memory.unwrap_or_default();
+        let shape = if memory.temperature < 1.0 {
+            self.cool(&mut population, &mut memory, &stream.named("cool"))?
+        } else {
+            let equal = vec![1.0 / self.particles as f64; self.particles];
+            Shape::of(&population.points, &equal)?
+        };
+        let stream = stream.named("move");
+        let power = memory.temperature;
+        let movement = Movement {
+            target,
+            mutation: self.mutation,
+            correlation: self.correlation,
+            most: self.moves,
+            shape: &shape,
+            law: &|old, i, new, j| {
+                new.log_prior[j] - old.log_prior[i]
+                    + power * (new.log_likelihood(j) - old.log_likelihood(i))
+            },
+            fixed: None,
+        };
+        state.accepted = movement.run(&mut population, &mut memory.moves, &stream);
+        state.evaluations += population.evaluations;
+        state.points = population.points;
+        state.log_density = population.log_density;
+        state.memory = serde_json::to_value(memory).map_err(|e| Stop::new(e.to_string()))?;
+        Ok(())
+    }
+
+    fn finished(&self, state: &State) -> bool {
+        state.memory.get("temperature").and_then(serde_json::Value::as_f64) == Some(1.0)
+    }
+
+    fn harvest(
+        &self,
+        target: &dyn Target,
+        state: &State,
+        stream: &Stream,
+    ) -> Result<Option<Harvest>, Stop> {
+        let memory = recall(&mut state.clone())?.ok_or_else(|| {
+            Stop::new("the particles have not left their starting points, which are no draws")
+        })?;
+        self.bring_home(target, state, &memory, stream).map(Some)
+    }
+
+    fn facts(&self) -> Vec<Fact> {
+        vec![
+            Fact::new("particles", self.particles),
+            Fact::new("effective share", self.effective_share),
+            Fact::new("correlation after moves", self.correlation),
+        ]
+    }
+}
+
+/// The memory of a state, which loses it; none before the first step.
+fn recall(state: &mut State) -> Result<Option<Memory>, Stop> {
+    serde_json::from_value(std::mem::take(&mut state.memory))
+        .map_err(|error| Stop::new(format!("the saved state of the sampler is damaged: {error}")))
+}
+
+impl Memory {
+    /// Before the first temperature, when `tried` draws of the prior gave `particles` inside the support.
+    fn first(particles: usize, tried: u64) -> Self {
+        let mut memory = Self { families: (0..particles).collect(), ..Self::default() };
+        if tried > particles as u64 {
+            // The draws stop at the last point that is needed: a negative binomial number of them.
+            let share = (particles as f64 - 1.0) / (tried as f64 - 1.0);
+            memory.log_evidence = share.ln();
+            memory.independent_variance = (1.0 - share) / particles as f64;
+        }
+        memory
+    }
+}
+
+lacuna::register!(Sampler, "sequential_monte_carlo", SequentialMonteCarlo);
+
+#[cfg(test)]
+mod tests;
