@@ -2,6 +2,7 @@
 
 mod call;
 mod density;
+mod value;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -14,30 +15,7 @@ use super::program::{Action, Instruction, Place, Program, Tables, WIDE};
 use super::scope::{Data, Scope, element};
 use super::tree::{Id, Node, NodeKind, Tree};
 use crate::study::nearest::nearest;
-
-/// What a part of an expression has become.
-#[derive(Clone, Copy, Debug)]
-struct Value {
-    kind: Kind,
-    place: Place,
-    /// Whether it is a vector, perhaps of one element, and not one number.
-    vector: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
-    Number,
-    Condition,
-    /// One of the matrices of the data.
-    Matrix(usize),
-}
-
-/// A value and where it stands in the text.
-#[derive(Clone, Debug)]
-struct Argument {
-    value: Value,
-    span: Range<usize>,
-}
+use value::{Argument, Kind, Value, fit};
 
 pub(super) struct Compiler {
     names: BTreeMap<String, Value>,
@@ -131,13 +109,16 @@ impl Compiler {
     }
 
     /// The program of what the outputs need.
-    pub fn finish(self, outputs: &[&str]) -> Result<Program, Fault> {
+    pub fn finish(self, scope: &Scope, outputs: &[&str]) -> Result<Program, Fault> {
         let mut places = Vec::new();
         for name in outputs {
-            let value = self.names.get(*name).filter(|value| value.kind == Kind::Number);
-            let value = value.ok_or_else(|| {
-                Fault::new(0..0, format!("`{name}` is not a number")).within(name)
-            })?;
+            let value = self.names.get(*name).copied();
+            let tree = scope.definitions.get(*name);
+            let (Some(value), Some(tree)) = (value, tree) else {
+                return Err(Fault::new(0..0, format!("there is no definition `{name}`")));
+            };
+            let whole = Argument { value, span: 0..tree.text.len() };
+            let value = whole.number().map_err(|fault| fault.within(name))?;
             places.push(value.place);
         }
         let mut needed = vec![false; self.registers];
@@ -177,8 +158,7 @@ impl Compiler {
     }
 
     fn vector(&mut self, elements: &[f64]) -> Value {
-        let place =
-            Place { constant: true, start: self.constants.len(), length: elements.len() };
+        let place = Place { constant: true, start: self.constants.len(), length: elements.len() };
         self.constants.extend(elements.iter().map(|x| [*x]));
         Value { kind: Kind::Number, place, vector: true }
     }
@@ -296,7 +276,8 @@ impl Compiler {
             return Err(fault.help(format!("a function is called as `{}`", function.usage())));
         }
         // Constants of mathematics are too short to be what was meant.
-        let names = self.names.keys().map(String::as_str).filter(|name| !matches!(*name, "e" | "pi"));
+        let names =
+            self.names.keys().map(String::as_str).filter(|name| !matches!(*name, "e" | "pi"));
         if let Some(near) = nearest(name, names.clone()) {
             return Err(fault.help(format!("did you mean `{near}`?")));
         }
@@ -377,56 +358,4 @@ fn simple_power(exponent: f64) -> Option<&'static [Unary]> {
         (-2.0, &[Unary::Square, Unary::Reciprocal]),
     ];
     POWERS.into_iter().find(|(power, _)| *power == exponent).map(|(_, operations)| operations)
-}
-
-impl Argument {
-    fn number(&self) -> Result<Value, Fault> {
-        match self.value.kind {
-            Kind::Number => Ok(self.value),
-            Kind::Condition => Err(Fault::new(self.span.clone(), "a condition is not a number")
-                .help("`if(condition, 1, 0)` makes a number of it")),
-            Kind::Matrix(_) => Err(Fault::new(self.span.clone(), "a matrix is not a number")
-                .help("`matrix_product(matrix, vector)` makes a vector of it")),
-        }
-    }
-
-    fn condition(&self) -> Result<Value, Fault> {
-        match self.value.kind {
-            Kind::Condition => Ok(self.value),
-            _ => Err(Fault::new(self.span.clone(), "a number is not a condition")
-                .expected("a comparison such as `x > 0`")),
-        }
-    }
-
-    fn scalar(&self) -> Result<Value, Fault> {
-        let value = self.number()?;
-        if !value.vector {
-            return Ok(value);
-        }
-        Err(Fault::new(self.span.clone(), "a vector stands where one number belongs")
-            .expected("one number")
-            .found(format!("a vector of {}", value.place.length)))
-    }
-
-    fn vector(&self) -> Result<Value, Fault> {
-        let value = self.number()?;
-        if value.vector {
-            return Ok(value);
-        }
-        Err(Fault::new(self.span.clone(), "one number stands where a vector belongs")
-            .expected("a vector"))
-    }
-}
-
-/// Demands that all vectors have one length.
-fn fit(arguments: &[&Argument], span: &Range<usize>) -> Result<(), Fault> {
-    let vectors = arguments.iter().filter(|argument| argument.value.vector);
-    let mut lengths = vectors.map(|argument| argument.value.place.length);
-    let Some(first) = lengths.next() else { return Ok(()) };
-    match lengths.find(|length| *length != first) {
-        None => Ok(()),
-        Some(other) => Err(Fault::new(span.clone(), "vectors of different lengths")
-            .expected("vectors of one length")
-            .found(format!("{first} and {other} elements"))),
-    }
 }

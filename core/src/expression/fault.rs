@@ -80,7 +80,8 @@ impl Fault {
         let line = text[from..].lines().next().unwrap_or("").replace('\t', " ");
         let left = text[from..start].chars().count();
         let width = text[start..end].lines().next().unwrap_or("").chars().count().max(1);
-        let mut shown = format!("{}\n| {line}\n| {:left$}{}\n", self.message, "", "^".repeat(width));
+        let mut shown =
+            format!("{}\n| {line}\n| {:left$}{}\n", self.message, "", "^".repeat(width));
         let note = match (&self.expected, &self.found) {
             (Some(expected), Some(found)) => format!("= expected {expected}, found {found}\n"),
             (Some(expected), None) => format!("= expected {expected}\n"),

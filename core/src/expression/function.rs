@@ -146,12 +146,7 @@ static FUNCTIONS: [Function; 46] = [
          and values are data",
         Action::Interpolate,
     ),
-    density(
-        "normal_log_density",
-        &["x", "mean", "sd"],
-        "of a normal law",
-        Density::Normal,
-    ),
+    density("normal_log_density", &["x", "mean", "sd"], "of a normal law", Density::Normal),
     density(
         "log_normal_log_density",
         &["x", "mu", "sigma"],
@@ -164,13 +159,13 @@ static FUNCTIONS: [Function; 46] = [
         "of Student's t with these degrees of freedom",
         Density::StudentT,
     ),
+    density("cauchy_log_density", &["x", "location", "scale"], "of a Cauchy law", Density::Cauchy),
     density(
-        "cauchy_log_density",
-        &["x", "location", "scale"],
-        "of a Cauchy law",
-        Density::Cauchy,
+        "exponential_log_density",
+        &["x", "mean"],
+        "of an exponential law",
+        Density::Exponential,
     ),
-    density("exponential_log_density", &["x", "mean"], "of an exponential law", Density::Exponential),
     density(
         "gamma_log_density",
         &["x", "shape", "scale"],
@@ -190,12 +185,7 @@ static FUNCTIONS: [Function; 46] = [
         "of a uniform law on an interval",
         Density::Uniform,
     ),
-    density(
-        "poisson_log_density",
-        &["count", "mean"],
-        "of a Poisson law",
-        Density::Poisson,
-    ),
+    density("poisson_log_density", &["count", "mean"], "of a Poisson law", Density::Poisson),
     density(
         "binomial_log_density",
         &["count", "trials", "probability"],

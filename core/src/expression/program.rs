@@ -252,8 +252,7 @@ impl Curve {
             return (self.nodes[last], self.values[last], 0.0);
         }
         let i = after - 1;
-        let slope =
-            (self.values[after] - self.values[i]) / (self.nodes[after] - self.nodes[i]);
+        let slope = (self.values[after] - self.values[i]) / (self.nodes[after] - self.nodes[i]);
         (self.nodes[i], self.values[i], slope)
     }
 

@@ -1,8 +1,8 @@
 //! Derivatives in reverse mode: from the outputs back to the unknowns.
 //!
 //! A. Griewank and A. Walther, Evaluating Derivatives, 2nd edition, SIAM 2008, chapter 3. What has no weight
-//! in the result passes nothing on, whatever its derivative: the branch of an `if` that is not taken
-//! may be undefined.
+//! in the result passes nothing on, and what has no slope takes nothing, whatever the other factor: the branch of an
+//! `if` that is not taken may be undefined.
 
 use super::function::Reduction;
 use super::operator::{Lanes, Visit};
@@ -43,7 +43,11 @@ impl Visit for Pull<'_> {
     fn visit(self, slope: impl Fn(f64, f64, f64) -> f64) {
         let (a, b) = (Stretch::of(self.a), Stretch::of(self.b));
         let share = |i: usize, w: f64| {
-            if w == 0.0 { 0.0 } else { w * slope(a.at(i), b.at(i), self.result[i][0]) }
+            if w == 0.0 {
+                return 0.0;
+            }
+            let slope = slope(a.at(i), b.at(i), self.result[i][0]);
+            if slope == 0.0 { 0.0 } else { w * slope }
         };
         let shares = self.weights.iter().enumerate().map(|(i, w)| share(i, *w));
         if let [into] = self.into {

@@ -35,9 +35,13 @@ impl Visit for Push<'_> {
     fn visit(self, slope: impl Fn(f64, f64, f64) -> f64) {
         for (i, out) in self.out.iter_mut().enumerate() {
             let t = self.tangent[at(self.tangent, i)];
-            if t != 0.0 {
-                let (a, b) = (self.a[at(self.a, i)][0], self.b[at(self.b, i)][0]);
-                *out += t * slope(a, b, self.result[i][0]);
+            if t == 0.0 {
+                continue;
+            }
+            let slope =
+                slope(self.a[at(self.a, i)][0], self.b[at(self.b, i)][0], self.result[i][0]);
+            if slope != 0.0 {
+                *out += t * slope;
             }
         }
     }
@@ -84,7 +88,8 @@ impl<'a> Step<'a> {
                 out.iter_mut().zip(indices).for_each(|(out, &i)| *out = self.tangent(*a, i));
             }
             Action::Join(parts) => {
-                let elements = parts.iter().flat_map(|p| (0..p.length).map(|i| self.tangent(*p, i)));
+                let elements =
+                    parts.iter().flat_map(|p| (0..p.length).map(|i| self.tangent(*p, i)));
                 out.iter_mut().zip(elements).for_each(|(out, t)| *out = t);
             }
             Action::MatrixProduct(matrix, a) => {

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use super::Fault;
 use super::function::{Action, Density, Function};
 use super::operator::{Binary, Unary};
 use super::scope::Scope;
 use super::tree::{Id, NodeKind, Tree};
-use super::Fault;
 use crate::data::Unit;
 
 /// What is known of the unit of a part.
@@ -61,7 +61,8 @@ impl Scope {
         for name in self.order()? {
             let tree = &self.definitions[name];
             // What uses a definition of no known unit waits until that one is right.
-            let settled = |used: &str| !self.definitions.contains_key(used) || found.contains_key(used);
+            let settled =
+                |used: &str| !self.definitions.contains_key(used) || found.contains_key(used);
             if !tree.names().all(settled) {
                 continue;
             }

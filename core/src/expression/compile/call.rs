@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use super::{Argument, Compiler, Fault, Kind, Value, fit};
+use super::value::{Argument, Kind, Value, fit};
+use super::{Compiler, Fault};
 use crate::expression::function::{Action as Does, Function, Reduction};
 use crate::expression::operator::Binary;
 use crate::expression::program::{Action, Curve};
@@ -71,7 +72,8 @@ impl Compiler {
             return self.reduced(reduction, only);
         }
         let values = numbers(arguments, span)?;
-        let (first, rest) = values.split_first().unwrap_or_else(|| unreachable!("arity is checked"));
+        let (first, rest) =
+            values.split_first().unwrap_or_else(|| unreachable!("arity is checked"));
         Ok(rest.iter().fold(*first, |folded, value| self.binary(operation, folded, *value)))
     }
 
@@ -121,9 +123,12 @@ impl Compiler {
         let curve = Curve { nodes: table(nodes)?, values: table(values)? };
         if curve.nodes.len() != curve.values.len() {
             let (nodes, found) = (curve.nodes.len(), curve.values.len());
-            return Err(Fault::new(values.span.clone(), "the table has another length than its nodes")
-                .expected(format!("{nodes} values"))
-                .found(format!("{found}")));
+            return Err(Fault::new(
+                values.span.clone(),
+                "the table has another length than its nodes",
+            )
+            .expected(format!("{nodes} values"))
+            .found(format!("{found}")));
         }
         if let Some(pair) = curve.nodes.windows(2).find(|pair| pair[0] >= pair[1]) {
             return Err(Fault::new(nodes.span.clone(), "the nodes do not ascend")

@@ -3,7 +3,8 @@
 //! Parameters are those of [`Distribution`](crate::math::distribution::Distribution). Outside the support the value is
 //! minus infinity; for parameters that make no distribution it is undefined (not a number).
 
-use super::{Compiler, Value};
+use super::Compiler;
+use super::value::Value;
 use crate::expression::function::Density;
 use crate::expression::operator::{Binary, Unary};
 use crate::math::special::HALF_LN_TWO_PI;
