@@ -113,6 +113,15 @@ impl Program {
         self.instructions.len()
     }
 
+    /// The number of operations on numbers that one point costs.
+    pub fn operations(&self) -> usize {
+        let products = |action: &Action| match action {
+            Action::Reduce(_, a) | Action::MatrixProduct(_, a) => a.length,
+            _ => 1,
+        };
+        self.instructions.iter().map(|i| i.length * products(&i.action)).sum()
+    }
+
     /// Whether any output depends on the unknown of this index.
     pub fn depends_on(&self, unknown: usize) -> bool {
         let instructions = self.instructions.iter().flat_map(|i| i.action.places());
