@@ -7,3 +7,4 @@ pub mod models;
 pub mod readers;
 pub mod samplers;
 pub mod surrogates;
+pub mod targets;

@@ -22,14 +22,14 @@ const MACHINE: [&str; 6] = ["/home/", "/Users/", "/root/", "/work/", "/tmp/", "C
 /// Modules of the core from the top down: each may use those beside and below it.
 ///
 /// A study chooses plugins and plugins complain about their part of a study; both stop with what a run
-/// says: these three are one layer.
+/// says, and expressions guess at names as a study does: these four are one layer.
 const LAYERS: [&[&str]; 9] = [
     &["stage"],
     &["contract"],
     &["report"],
     &["diagnose"],
     &["posterior"],
-    &["plugin", "study", "run"],
+    &["plugin", "study", "run", "expression"],
     &["data"],
     &["math"],
     &["linalg"],

@@ -2,6 +2,7 @@
 //!
 //! A suite gives every breach it finds in words; it never panics.
 
+mod density;
 mod design;
 mod discrepancy;
 mod effect;
@@ -12,6 +13,7 @@ mod reader;
 mod sampler;
 mod surrogate;
 
+pub use density::density;
 pub use design::design;
 pub use discrepancy::discrepancy;
 pub use effect::effect;

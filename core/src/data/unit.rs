@@ -133,6 +133,34 @@ impl Unit {
         self.meaning.sixths == [0; BASES]
     }
 
+    /// The unit of a product; `None` for a unit with its own zero (`degC`).
+    pub fn times(&self, other: &Self) -> Option<Self> {
+        if [self, other].iter().any(|unit| unit.meaning.offset != 0.0) {
+            return None;
+        }
+        let text = match [self, other].map(|unit| unit.text.as_str()) {
+            ["" | "1", text] | [text, "" | "1"] => text.to_owned(),
+            both => both.map(in_parentheses).join(" "),
+        };
+        Some(Self { text, meaning: self.meaning.times(other.meaning) })
+    }
+
+    /// The unit of a power; `None` when the exponents of the result are no sixths, and for a unit with its own
+    /// zero (`degC`).
+    pub fn power(&self, exponent: f64) -> Option<Self> {
+        let sixths = 6.0 * exponent;
+        let fits = sixths.fract() == 0.0 && sixths.abs() <= 120.0 && self.meaning.offset == 0.0;
+        let meaning = self.meaning.power(fits.then_some(sixths as i16)?)?;
+        let text = if exponent == 1.0 || matches!(self.text.as_str(), "" | "1") {
+            self.text.clone()
+        } else if sixths % 6.0 == 0.0 {
+            format!("{}^{exponent}", in_parentheses(&self.text))
+        } else {
+            format!("{}^({sixths}/6)", in_parentheses(&self.text))
+        };
+        Some(Self { text, meaning })
+    }
+
     /// What a number in this unit is multiplied by to be in the other unit.
     ///
     /// `None` when the dimensions differ, and when the zero points do (`degC` and `K`).
@@ -157,6 +185,15 @@ impl Unit {
         let si = |unit: &Self| unit.meaning.factor * 10f64.powi(unit.meaning.decimals);
         self.same_dimension(other)
             .then(|| (x * si(self) + self.meaning.offset - other.meaning.offset) / si(other))
+    }
+}
+
+/// A unit that a product or a power may hold: in parentheses unless it is one symbol.
+fn in_parentheses(text: &str) -> String {
+    if text.chars().all(|c| c.is_alphabetic() || c == '%') {
+        text.to_owned()
+    } else {
+        format!("({text})")
     }
 }
 

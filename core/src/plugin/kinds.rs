@@ -1,6 +1,6 @@
 //! The kinds of plugins, and the sections of a study that choose one.
 
-use super::{Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate};
+use super::{Density, Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate};
 
 crate::kind!(Reader, "reader", ["simulations", "measurements"]);
 crate::kind!(Design, "design", ["design"]);
@@ -10,3 +10,4 @@ crate::kind!(Surrogate, "surrogate", ["surrogate"]);
 crate::kind!(Discrepancy, "discrepancy", ["discrepancy"]);
 crate::kind!(Sampler, "sampler", ["sampler"]);
 crate::kind!(Effect, "effect", ["effect"]);
+crate::kind!(Density, "target", ["target"]);

@@ -4,6 +4,7 @@
 //! the trait of its kind; one `register!` line at the end of its file lists it.
 
 pub mod component;
+pub mod density;
 pub mod design;
 pub mod discrepancy;
 pub mod effect;
@@ -17,6 +18,7 @@ pub mod sampler;
 pub mod surrogate;
 
 pub use component::{Component, Context, Fact};
+pub use density::Density;
 pub use design::Design;
 pub use discrepancy::{Discrepancy, Hyperparameter, Likelihood};
 pub use effect::Effect;

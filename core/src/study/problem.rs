@@ -1,6 +1,7 @@
 //! What is wrong with a study: one complaint, its place, what would be right.
 
 use std::fmt::Write as _;
+use std::ops::Range;
 
 use super::node::Node;
 use super::source::{Place, Sources};
@@ -10,6 +11,8 @@ use super::source::{Place, Sources};
 pub struct Problem {
     /// Where, if anywhere in particular.
     pub place: Option<Place>,
+    /// Which bytes of the value of a string at that place, if it is about a part of one.
+    pub part: Option<Range<usize>>,
     /// Dotted path of the key it is about; empty when there is none.
     pub path: String,
     /// What is wrong, in one line.
@@ -27,6 +30,7 @@ impl Problem {
     pub fn new(message: impl Into<String>) -> Self {
         Self {
             place: None,
+            part: None,
             path: String::new(),
             message: message.into(),
             expected: None,
@@ -69,7 +73,10 @@ impl Problem {
         match &self.place {
             None if self.path.is_empty() => text.push_str(&self.message),
             None => write_text(&mut text, format_args!("`{}`: {}", self.path, self.message)),
-            Some(place) => gutter = self.render_place(place, sources, &mut text),
+            Some(place) => {
+                let part = self.part.as_ref().map(|part| sources.inside(place, part));
+                gutter = self.render_place(part.as_ref().unwrap_or(place), sources, &mut text);
+            }
         }
         text.push('\n');
         for note in self.notes() {
@@ -226,7 +233,7 @@ impl<'a> Complaints<'a> {
     pub fn at(&mut self, path: &str) -> Spot<'_> {
         let place = Some(self.section.nearest_place(path));
         let path = self.problems.path(path);
-        Spot { place, path, problems: self.problems }
+        Spot { place, part: None, path, problems: self.problems }
     }
 }
 
@@ -234,14 +241,20 @@ impl<'a> Complaints<'a> {
 #[must_use = "nothing is reported until `say`"]
 pub struct Spot<'a> {
     place: Option<Place>,
+    part: Option<Range<usize>>,
     path: String,
     problems: &'a mut Problems,
 }
 
 impl<'a> Spot<'a> {
+    /// Narrows the complaint to these bytes of the value, which is a string.
+    pub fn inside(self, part: Range<usize>) -> Self {
+        Self { part: Some(part), ..self }
+    }
+
     /// Reports the problem and hands it back to say more.
     pub fn say(self, message: impl Into<String>) -> &'a mut Problem {
-        let Self { place, path, problems } = self;
-        problems.push(Problem { place, path, ..Problem::new(message) })
+        let Self { place, part, path, problems } = self;
+        problems.push(Problem { place, part, path, ..Problem::new(message) })
     }
 }

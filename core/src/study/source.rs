@@ -90,6 +90,17 @@ impl Sources {
         self.get(place.source).text.get(place.span.clone()).unwrap_or("")
     }
 
+    /// The place of some bytes of the value of the string at `place`, quotes and escapes counted; the place itself
+    /// when no string is written there.
+    pub fn inside(&self, place: &Place, part: &Range<usize>) -> Place {
+        let text = self.text(place);
+        if !text.starts_with(['"', '\'']) {
+            return place.clone();
+        }
+        let at = |byte: usize| place.span.start + raw_offset(text, byte).min(text.len());
+        Place { source: place.source, span: at(part.start)..at(part.end) }
+    }
+
     /// Where a place begins.
     pub fn position(&self, place: &Place) -> Position {
         let text = &self.get(place.source).text;
@@ -111,6 +122,51 @@ impl Sources {
     }
 }
 
+/// Where byte `at` of a string's value stands in its text, which begins with quotes: TOML 1.0, section "String".
+fn raw_offset(text: &str, at: usize) -> usize {
+    let quotes = if text.starts_with("\"\"\"") || text.starts_with("'''") { 3 } else { 1 };
+    let mut raw = quotes;
+    if quotes == 3 {
+        let rest = &text[raw..];
+        raw += if rest.starts_with("\r\n") { 2 } else { usize::from(rest.starts_with('\n')) };
+    }
+    if text.starts_with('\'') {
+        return raw + at;
+    }
+    let mut value = 0;
+    loop {
+        let (length, meaning) = character(&text[raw..]);
+        // A line that ends in a backslash goes on behind it.
+        if length == 0 || (value >= at && meaning > 0) {
+            return raw;
+        }
+        raw += length;
+        value += meaning;
+    }
+}
+
+/// The bytes of the next character of a basic string: in its text and in its value.
+fn character(text: &str) -> (usize, usize) {
+    let mut characters = text.chars();
+    let Some(first) = characters.next() else { return (0, 0) };
+    if first != '\\' {
+        return (first.len_utf8(), first.len_utf8());
+    }
+    let digits = match characters.next() {
+        Some('u') => 4,
+        Some('U') => 8,
+        Some(c) if c.is_whitespace() => {
+            let rest = text[1..].trim_start();
+            return (text.len() - rest.len(), 0);
+        }
+        Some(_) => return (2, 1),
+        None => return (1, 0),
+    };
+    let code = text.get(2..2 + digits).and_then(|hex| u32::from_str_radix(hex, 16).ok());
+    let meaning = code.and_then(char::from_u32).map_or(1, char::len_utf8);
+    ((2 + digits).min(text.len()), meaning)
+}
+
 /// The last character boundary at or before `byte`.
 fn floor_char(text: &str, byte: usize) -> usize {
     let mut at = byte.min(text.len());
@@ -123,6 +179,28 @@ fn floor_char(text: &str, byte: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn parts_of_strings_are_found_behind_quotes_and_escapes() {
+        for (text, part, expected) in [
+            (r#""x + y""#, 4..5, "y"),
+            ("'x + y'", 4..5, "y"),
+            ("\"\"\"\nx +\ny\"\"\"", 4..5, "y"),
+            ("'''x +\r\ny'''", 5..6, "y"),
+            (r#""\tx \u00B5 \\ y""#, 8..9, "y"),
+            ("\"\"\"x + \\\n   y\"\"\"", 4..5, "y"),
+            (r#""µ + y""#, 5..6, "y"),
+            (r#""x +""#, 3..3, ""),
+            (r#""x""#, 9..12, ""),
+            ("12", 0..1, "12"),
+        ] {
+            let mut sources = Sources::default();
+            let id = sources.add_file(Path::new("a.toml"), format!("a = {text}"));
+            let place = Place { source: id, span: 4..4 + text.len() };
+            let inside = sources.inside(&place, &part);
+            assert_eq!(sources.text(&inside), expected, "{text}");
+        }
+    }
 
     #[test]
     fn positions_count_characters_from_one() {

@@ -1,0 +1,172 @@
+//! Derivatives in reverse mode: from the outputs back to the unknowns.
+//!
+//! A. Griewank and A. Walther, Evaluating Derivatives, 2nd edition, SIAM 2008, chapter 3. What has no weight
+//! in the result passes nothing on, and what has no slope takes nothing, whatever the other factor: the branch of an
+//! `if` that is not taken may be undefined.
+
+use super::function::Reduction;
+use super::operator::{Lanes, Visit};
+use super::program::{Action, Place, Program};
+use crate::linalg::Matrix;
+
+/// Adds to the adjoints of the unknowns what the adjoints of the outputs imply.
+pub(super) fn run(program: &Program, registers: &[Lanes<1>], adjoints: &mut [f64]) {
+    for instruction in program.instructions.iter().rev() {
+        let (before, rest) = adjoints.split_at_mut(instruction.start);
+        let weights = &rest[..instruction.length];
+        if weights.iter().all(|w| *w == 0.0) {
+            continue;
+        }
+        let result = &registers[instruction.start..instruction.start + instruction.length];
+        Step { program, registers, result, weights }.pull(&instruction.action, before);
+    }
+}
+
+/// One instruction on the way back.
+struct Step<'a> {
+    program: &'a Program,
+    registers: &'a [Lanes<1>],
+    result: &'a [Lanes<1>],
+    weights: &'a [f64],
+}
+
+/// Weights times a derivative, added to the adjoints of one argument.
+struct Pull<'a> {
+    a: &'a [Lanes<1>],
+    b: &'a [Lanes<1>],
+    result: &'a [Lanes<1>],
+    weights: &'a [f64],
+    into: &'a mut [f64],
+}
+
+impl Visit for Pull<'_> {
+    fn visit(self, slope: impl Fn(f64, f64, f64) -> f64) {
+        let (a, b) = (Stretch::of(self.a), Stretch::of(self.b));
+        let share = |i: usize, w: f64| {
+            if w == 0.0 {
+                return 0.0;
+            }
+            let slope = slope(a.at(i), b.at(i), self.result[i][0]);
+            if slope == 0.0 { 0.0 } else { w * slope }
+        };
+        let shares = self.weights.iter().enumerate().map(|(i, w)| share(i, *w));
+        if let [into] = self.into {
+            *into += shares.sum::<f64>();
+        } else {
+            self.into.iter_mut().zip(shares).for_each(|(into, share)| *into += share);
+        }
+    }
+}
+
+/// A value read as if it had as many elements as the result.
+struct Stretch<'a> {
+    values: &'a [Lanes<1>],
+    mask: usize,
+}
+
+impl<'a> Stretch<'a> {
+    fn of(values: &'a [Lanes<1>]) -> Self {
+        Self { values, mask: if values.len() == 1 { 0 } else { usize::MAX } }
+    }
+
+    fn at(&self, i: usize) -> f64 {
+        self.values[i & self.mask][0]
+    }
+}
+
+impl<'a> Step<'a> {
+    fn get(&self, place: Place) -> &'a [Lanes<1>] {
+        let from = if place.constant { &self.program.constants } else { self.registers };
+        &from[place.range()]
+    }
+
+    fn pull(&self, action: &Action, adjoints: &mut [f64]) {
+        match action {
+            Action::Unary(operation, a) => {
+                let a_values = self.get(*a);
+                self.visited(*a, a_values, a_values, adjoints, |pull| operation.slope(pull));
+            }
+            Action::Binary(operation, a, b) => {
+                let (left, right) = (self.get(*a), self.get(*b));
+                self.visited(*a, left, right, adjoints, |pull| operation.left_slope(pull));
+                self.visited(*b, left, right, adjoints, |pull| operation.right_slope(pull));
+            }
+            Action::Select(condition, yes, no) => self.select(*condition, *yes, *no, adjoints),
+            Action::Reduce(reduction, a) => self.reduce(*reduction, *a, adjoints),
+            Action::Gather(a, indices) => {
+                let indices = &self.program.tables.indices[*indices];
+                for (&i, w) in indices.iter().zip(self.weights) {
+                    adjoints[a.start + i] += w;
+                }
+            }
+            Action::Join(parts) => {
+                let mut weights = self.weights.iter();
+                for part in parts {
+                    for (i, w) in part.range().zip(weights.by_ref()) {
+                        if !part.constant {
+                            adjoints[i] += w;
+                        }
+                    }
+                }
+            }
+            Action::MatrixProduct(matrix, a) => {
+                let matrix: &Matrix = &self.program.tables.matrices[*matrix];
+                for (row, w) in matrix.iter_rows().zip(self.weights) {
+                    let into = &mut adjoints[a.range()];
+                    into.iter_mut().zip(row).for_each(|(into, x)| *into += w * x);
+                }
+            }
+            Action::Interpolate(curve, a) => {
+                let curve = &self.program.tables.curves[*curve];
+                for ((i, x), w) in a.range().zip(self.get(*a)).zip(self.weights) {
+                    adjoints[i] += w * curve.segment(x[0]).2;
+                }
+            }
+        }
+    }
+
+    /// Hands the adjoints of an argument that is not constant to what adds to them.
+    fn visited(
+        &self,
+        place: Place,
+        a: &[Lanes<1>],
+        b: &[Lanes<1>],
+        adjoints: &mut [f64],
+        add: impl FnOnce(Pull<'_>),
+    ) {
+        if !place.constant {
+            let into = &mut adjoints[place.range()];
+            add(Pull { a, b, result: self.result, weights: self.weights, into });
+        }
+    }
+
+    fn select(&self, condition: Place, yes: Place, no: Place, adjoints: &mut [f64]) {
+        let condition = Stretch::of(self.get(condition));
+        for (i, w) in self.weights.iter().enumerate() {
+            let chosen = if condition.at(i) == 0.0 { no } else { yes };
+            if !chosen.constant {
+                adjoints[chosen.start + if chosen.length == 1 { 0 } else { i }] += w;
+            }
+        }
+    }
+
+    fn reduce(&self, reduction: Reduction, a: Place, adjoints: &mut [f64]) {
+        let (w, total) = (self.weights[0], self.result[0][0]);
+        let into = &mut adjoints[a.range()];
+        let values = self.get(a);
+        match reduction {
+            Reduction::Sum => into.iter_mut().for_each(|into| *into += w),
+            // The first of equals is the one.
+            Reduction::Min | Reduction::Max => {
+                if let Some(i) = values.iter().position(|x| x[0] == total) {
+                    into[i] += w;
+                }
+            }
+            Reduction::LogSumExp => {
+                for (into, x) in into.iter_mut().zip(values) {
+                    *into += w * if x[0] == total { 1.0 } else { (x[0] - total).exp() };
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,3 @@
+//! Targets: log densities without data and surrogate.
+
+pub mod expression;
