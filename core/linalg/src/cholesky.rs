@@ -1,9 +1,10 @@
 //! The Cholesky factorisation of symmetric positive definite matrices.
 
-use faer::Side;
+use faer::linalg::triangular_inverse::invert_lower_triangular;
+use faer::{Par, Side};
 
 use crate::error::{Error, finite};
-use crate::faer_view::{on_one_thread, view};
+use crate::faer_view::{on_one_thread, view, view_mut};
 use crate::triangular::{solve_lower, solve_lower_matrix, solve_lower_transposed};
 use crate::{Matrix, vector};
 
@@ -112,11 +113,17 @@ impl Cholesky {
         solution
     }
 
+    /// `L^-1`, `n x n`, zero above the diagonal.
+    pub fn lower_inverse(&self) -> Matrix {
+        let n = self.size();
+        let mut inverse = Matrix::zeros(n, n);
+        invert_lower_triangular(view_mut(&mut inverse), view(&self.lower), Par::Seq);
+        inverse
+    }
+
     /// `A^-1`, `n x n`, exactly symmetric.
     pub fn inverse(&self) -> Matrix {
-        let n = self.size();
-        let unit = Matrix::from_fn(n, n, |i, j| f64::from(u8::from(i == j)));
-        crate::gram(&self.whiten_matrix(&unit))
+        crate::gram_lower(&self.lower_inverse())
     }
 
     /// The factorisation of `A` bordered by one more row and column, `n^2` operations.

@@ -17,6 +17,7 @@ mod matrix;
 mod packed;
 mod product;
 mod qr;
+pub mod radial;
 mod svd;
 mod triangular;
 pub mod vector;
@@ -27,8 +28,8 @@ pub use error::Error;
 pub use matrix::Matrix;
 pub use packed::PackedUpper;
 pub use product::{
-    gram, multiply, multiply_lower, multiply_transposed, multiply_vector, transposed_multiply,
-    transposed_multiply_vector,
+    gram, gram_lower, multiply, multiply_lower, multiply_transposed, multiply_vector,
+    transposed_multiply, transposed_multiply_vector,
 };
 pub use qr::{LeastSquares, Qr, least_squares, thin_qr};
 pub use svd::{Svd, thin_svd};

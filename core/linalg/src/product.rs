@@ -69,6 +69,18 @@ pub fn multiply_transposed(a: &Matrix, b: &Matrix) -> Matrix {
 
 /// `A' A`: `m x n` gives a symmetric `n x n`, exactly symmetric.
 pub fn gram(a: &Matrix) -> Matrix {
+    gram_of(a, BlockStructure::Rectangular, BlockStructure::Rectangular)
+}
+
+/// `L' L` for a square `L` with zeros above its diagonal, which are not multiplied; exactly symmetric.
+///
+/// # Panics
+/// When `L` is not square.
+pub fn gram_lower(l: &Matrix) -> Matrix {
+    gram_of(l, BlockStructure::TriangularUpper, BlockStructure::TriangularLower)
+}
+
+fn gram_of(a: &Matrix, left: BlockStructure, right: BlockStructure) -> Matrix {
     let n = a.columns();
     let mut product = Matrix::zeros(n, n);
     triangular::matmul(
@@ -76,9 +88,9 @@ pub fn gram(a: &Matrix) -> Matrix {
         BlockStructure::TriangularLower,
         Accum::Replace,
         view(a).transpose(),
-        BlockStructure::Rectangular,
+        left,
         view(a),
-        BlockStructure::Rectangular,
+        right,
         1.0,
         Par::Seq,
     );
@@ -141,6 +153,9 @@ mod tests {
             let full = wavy(k, n, 0.2);
             let l = Matrix::from_fn(k, n, |i, j| if i < j { 0.0 } else { full[(i, j)] });
             close(&multiply_lower(&a, &l), &plain(&a, &l));
+            let square: Vec<usize> = (0..k.min(n)).collect();
+            let l = l.select_rows(&square).select_columns(&square);
+            close(&gram_lower(&l), &plain(&l.transposed(), &l));
         }
     }
 

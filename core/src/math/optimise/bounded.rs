@@ -8,6 +8,7 @@ use basin::{
     FirstOrderState, Gradient, Lbfgs,
 };
 
+use super::Precision;
 use crate::linalg::vector::norm;
 use crate::plugin::Target;
 
@@ -40,8 +41,9 @@ impl<'a> Scaled<'a> {
         Self { target, origin: origin.to_vec(), scales: scales.to_vec(), bounds, lower, upper }
     }
 
-    /// Searches from the origin, where log density and gradient are known.
-    pub fn maximise(self, value: f64, gradient: &[f64]) -> Reached {
+    /// Searches from the origin, where log density and gradient are known, until the gradient is below
+    /// `precision.gradient` per unit of the coordinates or a step gains too little.
+    pub fn maximise(self, value: f64, gradient: &[f64], precision: Precision) -> Reached {
         let best = Evaluation {
             point: vec![0.0; self.origin.len()],
             cost: -value,
@@ -51,11 +53,11 @@ impl<'a> Scaled<'a> {
         let cost = Cost { scaled: &self, record: &record };
         // A step that gains no more than round-off is the last one: what follows is a walk in noise.
         let solver = Lbfgs::new()
-            .with_absolute_projected_gradient_tolerance(1e-9)
-            .with_relative_cost_reduction_tolerance(f64::EPSILON);
+            .with_absolute_projected_gradient_tolerance(precision.gradient)
+            .with_relative_cost_reduction_tolerance(precision.gain);
         let start = FirstOrderState::new(vec![0.0; self.origin.len()]);
         // The best point is taken from the record, so that a search that fails half-way counts too.
-        let _ = Executor::new(cost, solver, start).max_iter(500).run();
+        let _ = Executor::new(cost, solver, start).max_iter(precision.steps).run();
         let Record { best, count, .. } = record.into_inner();
         let gradient = best.gradient.iter().zip(&self.scales).map(|(g, s)| -g / s).collect();
         let point = self.natural(&best.point);

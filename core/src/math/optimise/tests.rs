@@ -74,6 +74,22 @@ fn rosenbrocks_valley_is_followed_to_its_end() {
 }
 
 #[test]
+fn one_ascent_spends_its_own_evaluations_only() {
+    let target = density(&[FREE, (-3.0, 0.25)], rosenbrock);
+    let precision = Precision { gradient: 1e-7, gain: None, steps: 200 };
+    let found = ascend(&target, &[-1.2, 1.0], &[1.0, 1.0], precision).unwrap();
+    // On the bound x_2 = 1/4 the maximum over x_1 solves 200 x_1^3 - 49 x_1 - 1 = 0.
+    let x = found.point[0];
+    assert!(found.converged && found.point[1] == 0.25 && found.evaluations < 60);
+    assert!((200.0 * x.powi(3) - 49.0 * x - 1.0).abs() < 1e-5, "{x}");
+    let rough = Precision { gradient: 0.0, gain: Some(1e-3), steps: 200 };
+    assert!(
+        ascend(&target, &[-1.2, 1.0], &[1.0, 1.0], rough).unwrap().evaluations < found.evaluations
+    );
+    assert!(ascend(&density(&[FREE], |_| (f64::NAN, vec![0.0])), &[0.0], &[1.0], rough).is_none());
+}
+
+#[test]
 fn bounds_hold_the_maximum() {
     // Source: Hock and Schittkowski (1981), problem 2: Rosenbrock's function with x2 >= 1.5 has
     // its minimum 0.0504261879 at x1 = 2 a cos(arccos(1 / b) / 3), and another, 4.9412293, at
