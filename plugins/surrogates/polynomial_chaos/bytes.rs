@@ -5,7 +5,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 /// The first bytes of a file; the last one is the version of its layout.
-const MAGIC: &[u8] = b"lacuna polynomial_chaos 1\n";
+const MAGIC: &[u8] = b"lacuna polynomial_chaos 2\n";
 
 /// The magic, the header's length (8 bytes, little-endian), the header, the numbers (little-endian).
 pub(super) fn write(header: &impl Serialize, numbers: &[&[f64]]) -> Result<Vec<u8>, Stop> {

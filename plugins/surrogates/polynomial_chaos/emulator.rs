@@ -6,7 +6,7 @@ use lacuna::plugin::{Emulator, Fact};
 use lacuna::run::Stop;
 use serde::{Deserialize, Serialize};
 
-use super::family::Coordinate;
+use super::coordinate::Coordinate;
 use super::options::Solver;
 use super::squares::Squares;
 use super::terms::{Basis, Terms};
@@ -93,6 +93,10 @@ impl Expansion {
         }
         let residuals = numbers.split_off((terms + 1) * outputs);
         let relative = numbers.split_off(terms * outputs);
+        let mut degrees = header.exponents.iter().enumerate();
+        if !degrees.all(|(k, &e)| header.coordinates[k % dimension].reaches(usize::from(e))) {
+            return Err(bytes::damaged());
+        }
         let terms_of = Terms::from_exponents(dimension, header.exponents);
         Ok(Self {
             basis: Basis::new(header.coordinates, terms_of),

@@ -6,8 +6,8 @@ use lacuna::run::{Progress, Stop};
 use rayon::prelude::*;
 
 use super::PolynomialChaos;
+use super::coordinate::Coordinate;
 use super::emulator::{Expansion, Summary};
-use super::family::Coordinate;
 use super::least_angle::{Dictionary, best_along_path};
 use super::least_squares::Regression;
 use super::options::Solver;
@@ -68,9 +68,7 @@ pub(super) fn fit(
             Stop::new(format!("`surrogate.{}`: {}", fault.key, fault.message)).help(fault.help)
         );
     }
-    let coordinates: Vec<Coordinate> = (training.parameters.iter())
-        .map(|p| options.basis.coordinate(p).map_err(Stop::new))
-        .collect::<Result<_, _>>()?;
+    let coordinates = options.coordinates(training.parameters).map_err(Stop::new)?;
     let nested = options.nested(coordinates.len());
     let outputs = outputs(training.responses);
     warn_of_constants(&outputs, progress);

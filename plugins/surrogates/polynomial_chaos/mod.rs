@@ -2,12 +2,15 @@
 
 mod bytes;
 mod candidates;
+mod coordinate;
 mod emulator;
 mod family;
 mod fit;
 mod least_angle;
 mod least_squares;
+mod measure;
 mod options;
+mod recurrence;
 mod sensitivity;
 mod squares;
 mod terms;
@@ -24,9 +27,11 @@ use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use coordinate::Coordinate;
 pub use emulator::{Expansion, Summary};
-pub use family::{Coordinate, Family};
+pub use family::Family;
 pub use options::{Degree, DegreeRange, EarlyStop, Solver};
+pub use recurrence::Recurrence;
 pub use terms::{Basis, Nested, Terms, Truncation};
 
 /// A polynomial chaos expansion: each output is a sum of products of orthonormal polynomials in the
@@ -83,6 +88,9 @@ impl Default for PolynomialChaos {
     }
 }
 
+/// The highest degree that may be asked for.
+const MOST_DEGREES: usize = 1000;
+
 /// What is wrong with the options in view of the rest of the study.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Fault {
@@ -102,6 +110,16 @@ impl PolynomialChaos {
         Nested::new(dimension, self.degree.range().max, truncation, self.max_terms)
     }
 
+    fn coordinate(&self, parameter: &Parameter) -> Result<Coordinate, String> {
+        // Among so many degrees there is always one that is too high.
+        Coordinate::new(self.basis, parameter, self.degree.range().max.min(MOST_DEGREES))
+    }
+
+    /// Where the parameters sit in their families.
+    fn coordinates(&self, parameters: &[Parameter]) -> Result<Vec<Coordinate>, String> {
+        parameters.iter().map(|p| self.coordinate(p)).collect()
+    }
+
     /// All that is wrong with the options for these parameters and runs.
     fn faults(&self, parameters: &[Parameter], runs: Option<usize>) -> Vec<Fault> {
         let mut faults = self.faults_alone();
@@ -109,10 +127,11 @@ impl PolynomialChaos {
             let message = "a polynomial chaos expansion needs at least one parameter".to_owned();
             faults.push(Fault { key: "use", message, help: "add a `[[parameter]]`".to_owned() });
         }
-        for message in parameters.iter().filter_map(|p| self.basis.coordinate(p).err()) {
-            let help =
-                "give the parameter `design = { uniform = [low, high] }`; its prior may differ";
-            faults.push(Fault { key: "basis", message, help: help.to_owned() });
+        for parameter in parameters {
+            if let Err(message) = self.coordinate(parameter) {
+                let help = "lower `degree`, or transform the parameter with `basis = \"hermite\"`";
+                faults.push(Fault { key: "basis", message, help: help.to_owned() });
+            }
         }
         if faults.is_empty() {
             faults.extend(self.fault_of_size(parameters.len(), runs));
@@ -126,7 +145,7 @@ impl PolynomialChaos {
             faults.push(Fault { key, message, help: help.to_owned() });
         };
         let DegreeRange { min, max } = self.degree.range();
-        if min == 0 || min > max || max > 1000 {
+        if min == 0 || min > max || max > MOST_DEGREES {
             let message = format!("the degrees {min} to {max} are no range between 1 and 1000");
             add("degree", message, "write `degree = { min = 1, max = 20 }` or a whole number");
         }

@@ -12,7 +12,7 @@ use lacuna::linalg::{Matrix, gram, multiply_vector};
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::surrogate::SumOfSquares;
 
-use super::family::Coordinate;
+use super::coordinate::Coordinate;
 use super::terms::{Basis, Terms};
 
 /// See the module.
@@ -43,7 +43,7 @@ const MOST_EXPONENTS: usize = 1 << 22;
 const MOST_TERMS: usize = 4000;
 
 impl Squares {
-    /// `None` where it would take more operations than the product, or too many to be found.
+    /// `None` where products have no short form, where it would take more operations than the product, or too many to be found.
     pub fn new(basis: &Basis, factor: &Matrix) -> Option<Self> {
         let terms = basis.terms();
         let dimension = basis.coordinates().len();
@@ -53,7 +53,7 @@ impl Squares {
         if terms.len() > MOST_TERMS || size > MOST_EXPONENTS {
             return None;
         }
-        let dense = Expanded::of(basis, sizes.clone(), size, &gram(factor)).weights;
+        let dense = Expanded::of(basis, sizes.clone(), size, &gram(factor))?.weights;
         let (levels, weights) = nested(&dense, &sizes);
         if 2 * weights.len() > factor.rows() * factor.columns() {
             return None;
@@ -76,7 +76,8 @@ impl Squares {
                 0 => -1.0,
                 _ => 1.0,
             };
-            self.coordinates[i].centre + z * self.coordinates[i].scale
+            let coordinate = &self.coordinates[i];
+            coordinate.parameter(z * coordinate.family().reach().floor())
         });
         let values = self.values(&probes);
         let extended = basis.values(&probes);
@@ -113,12 +114,13 @@ impl SumOfSquares for Squares {
                 let mut values = vec![0.0; table.len()];
                 let mut slopes = values.clone();
                 let z = coordinate.standard(point[i]);
-                coordinate.family.derivatives(z, &mut values, &mut slopes);
+                let stretch = coordinate.stretch(point[i]);
+                coordinate.derivatives(z, &mut values, &mut slopes);
                 for ((entry, value), slope) in table.iter_mut().zip(values).zip(slopes) {
                     *entry = [value; LANES];
                     // Side by side stand derivatives by one variable each.
                     if (first..end).contains(&i) {
-                        entry[i - first] = slope / coordinate.scale;
+                        entry[i - first] = slope / stretch;
                     }
                 }
             }
@@ -130,7 +132,7 @@ impl SumOfSquares for Squares {
 
     fn covers(&self, point: &[f64]) -> bool {
         let mut variables = point.iter().zip(&self.coordinates);
-        variables.all(|(&x, c)| c.family.supports(c.standard(x)))
+        variables.all(|(&x, c)| c.covers(x))
     }
 
     fn error(&self) -> f64 {
@@ -178,14 +180,16 @@ struct Expanded {
 
 impl Expanded {
     /// `sum_ij form_ij psi_i psi_j`, the last row and column of `form` belonging to the function 1.
-    fn of(basis: &Basis, sizes: Vec<usize>, size: usize, form: &Matrix) -> Self {
+    /// None where a family has no short products.
+    fn of(basis: &Basis, sizes: Vec<usize>, size: usize, form: &Matrix) -> Option<Self> {
         let products = basis.coordinates().iter().zip(&sizes);
         let products = products.map(|(coordinate, &size)| {
             let count = size / 2 + 1;
-            let pair = |k: usize| coordinate.family.product(k / count, k % count);
+            let pair = |k: usize| coordinate.family().product(k / count, k % count);
             (0..count * count).map(pair).collect()
         });
-        let mut expanded = Self { products: products.collect(), weights: vec![0.0; size], sizes };
+        let products = products.collect::<Option<_>>()?;
+        let mut expanded = Self { products, weights: vec![0.0; size], sizes };
         let terms = with_constant(basis.terms(), basis.coordinates().len());
         for i in 0..terms.len() {
             for j in 0..=i {
@@ -195,7 +199,7 @@ impl Expanded {
                 }
             }
         }
-        expanded
+        Some(expanded)
     }
 
     /// Adds `weight` times the product of two terms in the variables from `i` on, to exponents of
@@ -251,7 +255,6 @@ fn nested(dense: &[f64], sizes: &[usize]) -> (Vec<Level>, Vec<f64>) {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::surrogates::polynomial_chaos::family::Family;
     use crate::surrogates::polynomial_chaos::terms::{Nested, Truncation};
     use lacuna::linalg::transposed_multiply_vector;
     use lacuna::math::random::normal;
@@ -260,8 +263,7 @@ mod tests {
         let truncation = Truncation { q_norm: 0.9, max_interaction: dimension };
         let nested = Nested::new(dimension, degree, truncation, 10_000);
         let kept: Vec<usize> = (0..nested.terms.len()).filter(|t| t % skip < 2).collect();
-        let coordinate =
-            |i| Coordinate { family: Family::Legendre, centre: 3.0, scale: 1.0 + i as f64 };
+        let coordinate = |i| Coordinate::legendre(3.0, 1.0 + i as f64);
         Basis::new((0..dimension).map(coordinate).collect(), nested.terms.select(&kept))
     }
 

@@ -123,16 +123,25 @@ pub fn scaled(unit: &Matrix, ranges: &[[f64; 2]]) -> Matrix {
     })
 }
 
-pub fn parameters(ranges: &[[f64; 2]]) -> Vec<Parameter> {
-    let parameter = |(i, range): (usize, &[f64; 2])| Parameter {
-        name: format!("x{}", i + 1),
-        symbol: format!("x{}", i + 1),
+pub fn parameter(name: &str, design: Distribution) -> Parameter {
+    Parameter {
+        name: name.into(),
+        symbol: name.into(),
         unit: Unit::parse("1").unwrap(),
-        design: Distribution::Uniform(*range),
-        prior: Distribution::Uniform(*range),
+        prior: design.clone(),
+        design,
         reference: None,
-    };
-    ranges.iter().enumerate().map(parameter).collect()
+    }
+}
+
+pub fn parameters(ranges: &[[f64; 2]]) -> Vec<Parameter> {
+    let laws: Vec<_> = ranges.iter().map(|range| Distribution::Uniform(*range)).collect();
+    parameters_of(&laws)
+}
+
+pub fn parameters_of(laws: &[Distribution]) -> Vec<Parameter> {
+    let named = |(i, law): (usize, &Distribution)| parameter(&format!("x{}", i + 1), law.clone());
+    laws.iter().enumerate().map(named).collect()
 }
 
 pub fn layout(outputs: usize) -> Layout {
@@ -150,8 +159,17 @@ pub fn fitted(
     points: &Matrix,
     responses: &Matrix,
 ) -> Result<Expansion, Stop> {
-    let (parameters, layout) = (parameters(ranges), layout(responses.columns()));
-    let training = Training { parameters: &parameters, layout: &layout, points, responses };
+    fitted_to(options, &parameters(ranges), points, responses)
+}
+
+pub fn fitted_to(
+    options: &PolynomialChaos,
+    parameters: &[Parameter],
+    points: &Matrix,
+    responses: &Matrix,
+) -> Result<Expansion, Stop> {
+    let layout = layout(responses.columns());
+    let training = Training { parameters, layout: &layout, points, responses };
     fit::fit(options, &training, &Progress::new(&Silent))
 }
 

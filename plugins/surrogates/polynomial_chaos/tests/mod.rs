@@ -2,7 +2,10 @@
 #![allow(clippy::unwrap_used)]
 
 mod accuracy;
+mod baseline;
 mod behaviour;
 mod bench;
+mod families;
+mod laws;
 mod options;
 mod textbook;

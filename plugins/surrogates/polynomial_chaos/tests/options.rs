@@ -3,7 +3,7 @@
 use lacuna::math::distribution::Distribution;
 
 use super::bench::{of_degree, parameters, up_to};
-use crate::surrogates::polynomial_chaos::{Degree, DegreeRange, PolynomialChaos, Solver};
+use crate::surrogates::polynomial_chaos::{Degree, DegreeRange, Family, PolynomialChaos, Solver};
 
 fn parsed(json: &str) -> Result<PolynomialChaos, String> {
     serde_json::from_str(json).map_err(|e| e.to_string())
@@ -49,13 +49,15 @@ fn options_that_cannot_work_are_named() {
 }
 
 #[test]
-fn a_design_that_is_not_uniform_is_refused_by_the_parameters_name() {
+fn a_design_with_too_few_moments_is_refused_by_the_parameters_name() {
     let mut parameters = parameters(&[[0.0, 1.0]; 3]);
-    parameters[1].design = Distribution::Normal([0.0, 1.0]);
+    parameters[1].design = Distribution::StudentT([4.0, 0.0, 1.0]);
     let faults = PolynomialChaos::default().faults(&parameters, Some(100));
     assert_eq!((faults.len(), faults[0].key), (1, "basis"));
-    assert_eq!(
-        faults[0].message,
-        "basis `legendre` needs a uniform design, but that of parameter `x2` is `normal`"
+    assert!(
+        faults[0].message.starts_with("the design of parameter `x2` (Student t with 4 degrees")
     );
+    assert!(faults[0].message.ends_with("has orthogonal polynomials up to degree 1 only, not 20"));
+    let forced = PolynomialChaos { basis: Family::Hermite, ..Default::default() };
+    assert!(forced.faults(&parameters, Some(100)).is_empty());
 }

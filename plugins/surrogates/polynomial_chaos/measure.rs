@@ -1,0 +1,168 @@
+//! Laws as sums over many nodes, fine enough for the moments that orthogonal polynomials need.
+
+use lacuna::math::distribution::Distribution;
+
+use super::recurrence::Recurrence;
+
+/// A change of variable `x(s)` after which the law's density is smooth and falls at least like an
+/// exponential.
+#[derive(Debug, Clone, Copy)]
+enum Change {
+    /// `x = origin + unit s`.
+    Affine { origin: f64, unit: f64 },
+    /// `x = unit exp(s)`.
+    Exponential { unit: f64 },
+    /// `x = origin + unit sinh(s)`.
+    Sine { origin: f64, unit: f64 },
+}
+
+/// A piece of a law: where it starts, how far it may reach and how fine it is cut.
+#[derive(Debug, Clone, Copy)]
+struct Piece {
+    change: Change,
+    start: f64,
+    low: f64,
+    high: f64,
+    /// The width of a panel.
+    width: f64,
+}
+
+/// Nodes of each panel.
+const NODES: usize = 32;
+/// A piece ends where what the highest moment has there is below `exp(-NEGLIGIBLE)` of its largest part.
+const NEGLIGIBLE: f64 = 80.0;
+/// Moments closer than this to the first infinite one are not computed: their tail is too long.
+const NEAR_INFINITE: f64 = 0.1;
+
+impl Change {
+    fn at(self, s: f64) -> f64 {
+        match self {
+            Self::Affine { origin, unit } => origin + unit * s,
+            Self::Exponential { unit } => unit * s.exp(),
+            Self::Sine { origin, unit } => origin + unit * s.sinh(),
+        }
+    }
+
+    /// `ln dx/ds`.
+    fn ln_slope(self, s: f64) -> f64 {
+        match self {
+            Self::Affine { unit, .. } => unit.ln(),
+            Self::Exponential { unit } => unit.ln() + s,
+            Self::Sine { unit, .. } => unit.ln() + s.cosh().ln(),
+        }
+    }
+}
+
+/// The largest degree of which the law has orthogonal polynomials: twice the degree must be a moment.
+pub fn largest_degree(law: &Distribution) -> Option<usize> {
+    let below = |moments: f64| Some((0.5 * (moments - NEAR_INFINITE)).max(0.0).floor() as usize);
+    match *law {
+        Distribution::StudentT([dof, ..]) => below(dof),
+        Distribution::InverseGamma([shape, _]) => below(shape),
+        // The squares of the recurrence's entries grow like exp(4 n sigma^2).
+        Distribution::LogNormal([_, sigma]) => Some((150.0 / (sigma * sigma)).floor() as usize),
+        _ => None,
+    }
+}
+
+/// The recurrence of the polynomials that are orthonormal under a law, in the variable
+/// `(x - centre) / scale`, by quadrature.
+pub fn recurrence(law: &Distribution, degree: usize, centre: f64, scale: f64) -> Recurrence {
+    let (mut nodes, mut weights) = (Vec::new(), Vec::new());
+    // A rule of so few nodes exists for any degree.
+    let rule = Recurrence::legendre(NODES).gauss(NODES).unwrap_or_default();
+    for piece in pieces(law, degree) {
+        let (low, high) = piece.reach(law, degree, centre, scale);
+        let panels = ((high - low) / piece.width).ceil().max(1.0);
+        let width = (high - low) / panels;
+        for panel in 0..panels as usize {
+            for (node, weight) in &rule {
+                let s = low + width * (panel as f64 + 0.5 * (1.0 + node));
+                nodes.push((piece.change.at(s) - centre) / scale);
+                weights.push(weight * width * piece.ln_weight(law, s).exp());
+            }
+        }
+    }
+    Recurrence::stieltjes(degree, &nodes, &weights)
+}
+
+fn pieces(law: &Distribution, degree: usize) -> Vec<Piece> {
+    const ALL: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
+    let piece = |change, start, (low, high), width| Piece { change, start, low, high, width };
+    let between = |from: f64, to: f64| {
+        let change = Change::Affine { origin: from, unit: to - from };
+        piece(change, 0.0, (0.0, 1.0), 16.0 / degree.max(16) as f64)
+    };
+    match *law {
+        Distribution::LogUniform([low, high]) => {
+            let bounds = (low.ln(), high.ln());
+            let width = 16.0 / (2 * degree + 1) as f64;
+            vec![piece(Change::Exponential { unit: 1.0 }, bounds.0, bounds, width)]
+        }
+        Distribution::InverseGamma([shape, scale]) => {
+            let width = 0.5 / shape.max(1.0).sqrt();
+            vec![piece(Change::Exponential { unit: scale }, -shape.ln(), ALL, width)]
+        }
+        Distribution::Exponential(scale) => pieces(&Distribution::Gamma([1.0, scale]), degree),
+        Distribution::Gamma([shape, scale]) => {
+            let width = 0.5 / shape.max(1.0).sqrt();
+            vec![piece(Change::Exponential { unit: scale }, shape.ln(), ALL, width)]
+        }
+        Distribution::LogNormal([mu, sigma]) => {
+            vec![piece(Change::Exponential { unit: mu.exp() }, 0.0, ALL, 0.5 * sigma)]
+        }
+        Distribution::StudentT([_, location, scale]) => {
+            vec![piece(Change::Sine { origin: location, unit: scale }, 0.0, ALL, 0.25)]
+        }
+        Distribution::Normal([mean, sd]) => {
+            vec![piece(Change::Affine { origin: mean, unit: sd }, 0.0, ALL, 0.5)]
+        }
+        Distribution::HalfNormal(scale) => {
+            let change = Change::Affine { origin: 0.0, unit: scale };
+            vec![piece(change, 0.0, (0.0, f64::INFINITY), 0.5)]
+        }
+        Distribution::TruncatedNormal([mean, sd, low, high]) => {
+            let mode = mean.clamp(low, high);
+            // Far from the mean the law falls like an exponential one of this scale.
+            let unit = sd / (1.0 + ((mode - mean) / sd).abs());
+            let bounds = ((low - mode) / unit, (high - mode) / unit);
+            vec![piece(Change::Affine { origin: mode, unit }, 0.0, bounds, 0.5)]
+        }
+        Distribution::Uniform([low, high]) | Distribution::Beta([_, _, low, high]) => {
+            vec![between(low, high)]
+        }
+        Distribution::Triangular([low, mode, high]) => {
+            let halves = [(low, mode), (mode, high)].into_iter();
+            halves.filter(|(from, to)| from < to).map(|(from, to)| between(from, to)).collect()
+        }
+    }
+}
+
+impl Piece {
+    fn ln_weight(&self, law: &Distribution, s: f64) -> f64 {
+        law.log_density(self.change.at(s)) + self.change.ln_slope(s)
+    }
+
+    /// Where the piece begins and ends for moments up to `2 degree`.
+    fn reach(&self, law: &Distribution, degree: usize, centre: f64, scale: f64) -> (f64, f64) {
+        let size = |s: f64| {
+            let z = ((self.change.at(s) - centre) / scale).abs().max(1.0);
+            self.ln_weight(law, s) + (2 * degree + 1) as f64 * z.ln()
+        };
+        let end = |bound: f64, step: f64| {
+            if bound.is_finite() && ((bound - self.start) / step) < 64.0 {
+                return bound;
+            }
+            let (mut s, mut largest) = (self.start, f64::NEG_INFINITY);
+            loop {
+                let here = size(s);
+                largest = largest.max(here);
+                if here < largest - NEGLIGIBLE || (bound - s) * step <= 0.0 {
+                    return if (bound - s) * step <= 0.0 { bound } else { s };
+                }
+                s += step;
+            }
+        };
+        (end(self.low, -self.width), end(self.high, self.width))
+    }
+}
