@@ -85,6 +85,11 @@ pub struct Layout {
 }
 
 impl Layout {
+    /// A single number without a unit.
+    pub fn number(name: &str) -> Self {
+        Self { name: name.to_owned(), unit: Unit::dimensionless(), axes: Vec::new() }
+    }
+
     /// The number of values of a response (1 without axes).
     pub fn len(&self) -> usize {
         self.axes.iter().map(Axis::len).product()

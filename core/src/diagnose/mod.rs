@@ -129,6 +129,14 @@ impl Diagnosis {
         diagnosis
     }
 
+    /// The same with the method's own reasons not to trust the draws, which come first.
+    #[must_use]
+    pub fn with_doubts(mut self, doubts: Vec<String>) -> Self {
+        self.converged &= doubts.is_empty();
+        self.advice.splice(0..0, doubts);
+        self
+    }
+
     fn holds(&self) -> bool {
         let reached = self.stranded.to_the_end.is_empty() && self.stranded.late.is_empty();
         reached && self.more_steps == 0

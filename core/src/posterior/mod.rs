@@ -14,8 +14,10 @@ use crate::math::random::{Stream, uniform};
 use crate::plugin::{Hyperparameter, Target};
 
 mod emulated;
+mod given;
 
 pub use emulated::Emulated;
+pub use given::Given;
 
 /// Points that are evaluated together. Fixed, because the rounding of a matrix product depends on the
 /// number of its rows and results must not depend on the number of threads.

@@ -199,12 +199,25 @@ pub fn stage(
     ]);
     let parts = Parts::of(study, measured, known)?;
     let posterior = parts.posterior(study, known);
+    draw(study, &posterior, folder, &inputs, run, observer).map(Some)
+}
+
+/// Draws from any posterior, kept in a folder.
+pub fn draw(
+    study: &Study,
+    posterior: &Posterior<'_>,
+    folder: &str,
+    inputs: &impl Serialize,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Kept<Calibrated>, Stop> {
+    let section = study.sampler.as_ref().ok_or_else(|| Stop::new("the study has no sampler"))?;
     let plan = section.built.plugin.plan(posterior.dimension());
     observer.begin("calibrate", "step", plan.steps as u64);
-    let kept = run
-        .keep(folder, &inputs, observer, |folder| calibrate(study, &posterior, folder, observer))?;
+    let kept =
+        run.keep(folder, inputs, observer, |folder| calibrate(study, posterior, folder, observer))?;
     observer.end("calibrate", &summary(&kept.value));
-    Ok(Some(kept))
+    Ok(kept)
 }
 
 fn summary(calibrated: &Calibrated) -> String {
@@ -260,7 +273,10 @@ fn calibrate(
     let kept = draws.from_step(sampled.burn_in);
     let diagnosis = match &sampled.harvest {
         Some(harvest) => Diagnosis::of_harvest(&kept, harvest.effective_size, &harvest.doubts),
-        None => Diagnosis::of(&kept, plan.ensemble),
+        None => {
+            let doubts = section.built.plugin.doubts(&sampled.state);
+            Diagnosis::of(&kept, plan.ensemble).with_doubts(doubts)
+        }
     };
     let (harvested, mut evidence) =
         sampled.harvest.map_or_else(Default::default, |h| (h.facts, h.evidence));

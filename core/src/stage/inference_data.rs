@@ -19,7 +19,7 @@ use super::validate::Validated;
 pub fn encode(
     study: &Study,
     calibrated: &Calibrated,
-    measured: &Measured,
+    measured: Option<&Measured>,
     validated: Option<&Kept<Validated>>,
 ) -> Result<Vec<u8>, Error> {
     let mut file = File { builder: NcFileBuilder::new() };
@@ -28,7 +28,9 @@ pub fn encode(
     file.text_attribute("inference_library", "lacuna")?;
     file.text_attribute("inference_library_version", version)?;
     file.posterior(calibrated)?;
-    file.observed(measured)?;
+    if let Some(measured) = measured {
+        file.observed(measured)?;
+    }
     if let Some(validated) = validated {
         file.predictive(&study.layout, &validated.value)?;
     }

@@ -16,6 +16,7 @@ pub mod screen;
 pub mod simulate;
 pub mod simulator;
 pub mod surrogate;
+pub mod target;
 pub mod validate;
 
 use crate::math::random::Stream;
@@ -36,6 +37,9 @@ pub fn run(
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {
     manifest::begin(study, run)?;
+    if let Some(given) = &study.target {
+        return target::run(study, given, run, observer);
+    }
     let design = design::stage(study, run, observer)?;
     let simulated = simulate::stage(study, design.as_ref(), run, observer)?;
     let data = read::stage(study, simulated.as_ref(), run, observer)?;
@@ -47,7 +51,8 @@ pub fn run(
     let (learned, calibrated) = refine::stage(study, first, run, observer)?;
     let known = learned.known();
     let validated = validate::stage(study, &known, calibrated.as_ref(), run, observer)?;
-    let findings = report::stage(study, &known, calibrated.as_ref(), validated.as_ref(), run)?;
+    let findings =
+        report::stage(study, Some(&known), calibrated.as_ref(), validated.as_ref(), run)?;
     manifest::end(study, run)?;
     Ok(findings)
 }

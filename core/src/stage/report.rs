@@ -21,7 +21,7 @@ use super::{Known, inference_data};
 /// Writes report, summary and posterior file; returns the findings.
 pub fn stage(
     study: &Study,
-    known: &Known<'_>,
+    known: Option<&Known<'_>>,
     calibrated: Option<&Kept<Calibrated>>,
     validated: Option<&Kept<Validated>>,
     run: &RunDirectory,
@@ -33,7 +33,8 @@ pub fn stage(
     let page = render(&findings);
     files::write_atomic(&run.stage_folder("8-report").join("report.html"), page.as_bytes())?;
     files::write_atomic(&root.join("report.html"), page.as_bytes())?;
-    if let (Some(calibrated), Some(measured)) = (all.calibrated, &all.known.data.value.measured) {
+    if let Some(calibrated) = all.calibrated {
+        let measured = all.measured();
         let bytes = inference_data::encode(study, &calibrated.value, measured, all.validated)
             .map_err(|error| Stop::new(format!("cannot write posterior.nc: {error}")))?;
         files::write_atomic(&root.join("posterior.nc"), &bytes)?;
@@ -43,14 +44,19 @@ pub fn stage(
 
 /// The artifacts of all stages.
 struct Artifacts<'a> {
-    known: &'a Known<'a>,
+    known: Option<&'a Known<'a>>,
     calibrated: Option<&'a Kept<Calibrated>>,
     validated: Option<&'a Kept<Validated>>,
 }
 
+impl<'a> Artifacts<'a> {
+    fn measured(&self) -> Option<&'a Measured> {
+        self.known.and_then(|known| known.data.value.measured.as_ref())
+    }
+}
+
 fn findings(study: &Study, all: &Artifacts<'_>, run: &RunDirectory) -> Findings {
-    let data = &all.known.data.value;
-    let measured = data.measured.as_ref();
+    let measured = all.measured();
     let calibration = all.calibrated.map(|c| calibration(&c.value));
     let validation =
         all.validated.zip(measured).map(|(kept, measured)| kept.value.findings(measured));
@@ -67,10 +73,10 @@ fn findings(study: &Study, all: &Artifacts<'_>, run: &RunDirectory) -> Findings 
         components: components(study),
         parameters: study.parameters.clone(),
         layout: study.layout.clone(),
-        ensemble: Some(ensemble(study, data)),
+        ensemble: all.known.map(|known| ensemble(study, &known.data.value)),
         measured: measured.map(|m| measurements(study, m)),
-        surrogate: Some(surrogate(all)),
-        warnings: warnings(data, all, calibration.as_ref()),
+        surrogate: all.known.map(|known| surrogate(known, all.validated)),
+        warnings: warnings(all, calibration.as_ref()),
         calibration,
         validation,
         seconds,
@@ -87,7 +93,17 @@ fn components(study: &Study) -> Vec<(String, String)> {
             })+
         };
     }
-    name!(model, design, executor, simulations, measurements, surrogate, discrepancy, sampler);
+    name!(
+        target,
+        model,
+        design,
+        executor,
+        simulations,
+        measurements,
+        surrogate,
+        discrepancy,
+        sampler
+    );
     list.extend(study.effects.iter().map(|e| ("effect".to_owned(), e.built.name.to_owned())));
     list
 }
@@ -117,14 +133,14 @@ fn measurements(study: &Study, measured: &Measured) -> MeasuredFindings {
     }
 }
 
-fn surrogate(all: &Artifacts<'_>) -> SurrogateFindings {
-    let errors = &all.known.fitted.value.errors;
-    let sobol = all.known.emulator.sensitivity().map(|s| {
+fn surrogate(known: &Known<'_>, validated: Option<&Kept<Validated>>) -> SurrogateFindings {
+    let errors = &known.fitted.value.errors;
+    let sobol = known.emulator.sensitivity().map(|s| {
         let total = s.aggregated.total.row(0).iter();
         s.aggregated.first.row(0).iter().zip(total).map(|(f, t)| (*f, *t)).collect()
     });
     SurrogateFindings {
-        refinement: all.known.refinement.map(|r| (r.rounds, r.ratio, r.reached)),
+        refinement: known.refinement.map(|r| (r.rounds, r.ratio, r.reached)),
         facts: errors.facts.clone(),
         training: errors.training,
         validation: errors.validation,
@@ -132,7 +148,7 @@ fn surrogate(all: &Artifacts<'_>) -> SurrogateFindings {
         rmse: errors.rmse,
         loo: errors.loo,
         by_group: errors.by_group.clone(),
-        near_posterior: all.validated.and_then(|v| v.value.emulator_at_posterior),
+        near_posterior: validated.and_then(|v| v.value.emulator_at_posterior),
         pairs: errors.pairs.clone(),
         sobol,
     }
@@ -208,11 +224,7 @@ fn correlation(kept: &Draws) -> Matrix {
     Moments::of_rows(&kept.points()).correlation()
 }
 
-fn warnings(
-    data: &Data,
-    all: &Artifacts<'_>,
-    calibration: Option<&CalibrationFindings>,
-) -> Vec<String> {
+fn warnings(all: &Artifacts<'_>, calibration: Option<&CalibrationFindings>) -> Vec<String> {
     let mut warnings = Vec::new();
     if let Some(c) = calibration {
         if !c.converged {
@@ -228,12 +240,12 @@ fn warnings(
             ));
         }
     }
-    if !data.ensemble.failed.is_empty() {
-        let count = data.ensemble.failed.len();
-        warnings.push(if count == 1 {
+    let failed = all.known.map_or(0, |known| known.data.value.ensemble.failed.len());
+    if failed > 0 {
+        warnings.push(if failed == 1 {
             "1 simulation run has no usable response and is left out".to_owned()
         } else {
-            format!("{count} simulation runs have no usable response and are left out")
+            format!("{failed} simulation runs have no usable response and are left out")
         });
     }
     if let Some(others) = all.calibrated.map(|c| c.value.outcome.other_maxima.len())

@@ -10,7 +10,11 @@ use crate::plugin::{Surrogate, registry};
 /// Reports everything that is inconsistent.
 pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     let mut complaints = Complaints::new(root, problems);
-    sections(study, &mut complaints);
+    if study.target.is_some() {
+        beside_a_target(study, root, &mut complaints);
+    } else {
+        sections(study, &mut complaints);
+    }
     parameters(study, &mut complaints);
     runs(study, &mut complaints);
     refinement(study, &mut complaints);
@@ -23,6 +27,23 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     study.each_plugin(root, problems, |component, context, complaints| {
         component.check(context, complaints);
     });
+}
+
+/// A target takes the place of all that makes a likelihood.
+fn beside_a_target(study: &Study, root: &Node, complaints: &mut Complaints<'_>) {
+    const ALONE: [&str; 5] = ["study", "parameter", "target", "executor", "sampler"];
+    for (key, _) in root.entries().iter().filter(|(key, _)| !ALONE.contains(&key.name.as_str())) {
+        complaints
+            .at(&key.name)
+            .say(format!("a study with `[target]` has no use for `[{}]`", key.name))
+            .help("the target is the whole log density: take one of the two out");
+    }
+    if study.sampler.is_none() {
+        complaints
+            .at("")
+            .say("the study has no `[sampler]`")
+            .help("a target is there to be sampled: add `[sampler]`");
+    }
 }
 
 /// What a section needs of the others.

@@ -11,7 +11,9 @@ use super::file::{
 use super::schema::Language;
 use crate::plugin::manual::{Manual, generator, resolve};
 use crate::plugin::registry::NoKeys;
-use crate::plugin::{Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate};
+use crate::plugin::{
+    Density, Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate,
+};
 
 /// The schema, for editors that complete and check a study (`lacuna schema`).
 pub fn schema() -> Value {
@@ -21,8 +23,8 @@ pub fn schema() -> Value {
         .required("study")
         .tables::<ParameterSection>("parameter")
         .required("parameter")
+        .section::<dyn Density, NoKeys>("target")
         .table::<ResponseSection>("response")
-        .required("response")
         .section::<dyn Model, ModelKeys>("model")
         .section::<dyn Design, DesignKeys>("design")
         .section::<dyn Executor, NoKeys>("executor")

@@ -17,7 +17,7 @@ use super::{Complaints, Node, Problems, Sources, inherit, overrides, resolved};
 use crate::data::{Layout, Parameter};
 use crate::plugin::registry::{Kind, NoKeys, Section, section};
 use crate::plugin::{
-    Context, Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate,
+    Context, Density, Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate,
 };
 
 /// A study that can be run.
@@ -34,6 +34,8 @@ pub struct Study {
     pub parameters: Vec<Parameter>,
     /// The shape of the response.
     pub layout: Layout,
+    /// `[target]`.
+    pub target: Option<Section<dyn Density, NoKeys>>,
     /// `[model]`.
     pub model: Option<Section<dyn Model, ModelKeys>>,
     /// `[design]`.
@@ -71,9 +73,10 @@ pub struct NumericalError {
 }
 
 /// The sections of the study language, in the order in which a study is written.
-pub const SECTIONS: [&str; 14] = [
+pub const SECTIONS: [&str; 15] = [
     "study",
     "parameter",
+    "target",
     "response",
     "model",
     "design",
@@ -164,9 +167,18 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
     unknown_sections(root, problems);
     let about = table::<StudySection>(root, "study", problems);
     let parameters = parameters(root, problems);
-    let response = table::<ResponseSection>(root, "response", problems);
-    let layout = response.as_ref().and_then(|r| layout(r, root, problems));
+    let response = match root.get("response") {
+        // A target has no response, so that nothing is said of its shape.
+        None if root.get("target").is_some() => Some(None),
+        _ => table::<ResponseSection>(root, "response", problems).map(Some),
+    };
+    let layout = match &response {
+        Some(Some(response)) => layout(response, root, problems),
+        Some(None) => Some(Layout::number("log_density")),
+        None => None,
+    };
     let before = problems.len();
+    let target = chosen(root, "target", None, problems);
     let model = chosen(root, "model", None, problems);
     let design = chosen(root, "design", None, problems);
     let executor = chosen_or(root, "executor", "local", problems);
@@ -195,6 +207,7 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
         about,
         parameters: parameters?.iter().map(parameter).collect(),
         layout: layout?,
+        target,
         model,
         design,
         executor,
@@ -208,7 +221,7 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
         validate: validate?,
         resolved: Table::new(),
     };
-    match resolved::table(&study, &response?) {
+    match resolved::table(&study, response?.as_ref()) {
         Ok(resolved) => study.resolved = resolved,
         Err(error) => {
             problems.report(None, format!("the study with its defaults {error}"));
@@ -399,6 +412,7 @@ impl Study {
             };
         }
         visit_sections!(
+            target,
             model,
             design,
             executor,

@@ -8,7 +8,10 @@ use super::resolve::Study;
 use crate::plugin::registry::Section;
 
 /// The study with every default filled in.
-pub(super) fn table(study: &Study, response: &ResponseSection) -> Result<Table, Unwritable> {
+pub(super) fn table(
+    study: &Study,
+    response: Option<&ResponseSection>,
+) -> Result<Table, Unwritable> {
     let mut about = to_table(&study.about)?;
     about.insert("name".to_owned(), study.name.clone().into());
     let directory = std::path::absolute(&study.directory).unwrap_or(study.directory.clone());
@@ -17,7 +20,9 @@ pub(super) fn table(study: &Study, response: &ResponseSection) -> Result<Table, 
     let mut whole = Table::new();
     whole.insert("study".to_owned(), about.into());
     whole.insert("parameter".to_owned(), parameters?.into());
-    whole.insert("response".to_owned(), to_table(response)?.into());
+    if let Some(response) = response {
+        whole.insert("response".to_owned(), to_table(response)?.into());
+    }
     macro_rules! sections {
         ($($field:ident),+) => {
             $(if let Some(section) = &study.$field {
@@ -25,7 +30,7 @@ pub(super) fn table(study: &Study, response: &ResponseSection) -> Result<Table, 
             })+
         };
     }
-    sections!(model, design, executor, simulations, measurements, surrogate, discrepancy);
+    sections!(target, model, design, executor, simulations, measurements, surrogate, discrepancy);
     if let Some(numerical_error) = &study.numerical_error {
         let table = to_table(&numerical_error.written)?;
         whole.insert("numerical_error".to_owned(), table.into());

@@ -71,10 +71,16 @@ impl Nested {
             evidence: memory.finished.then_some(evidence),
             doubts: self.doubts(memory, ranks),
             facts: vec![
-                Fact::new("information gained, in nats", format!("{:.2}", information - memory.log_share)),
+                Fact::new(
+                    "information gained, in nats",
+                    format!("{:.2}", information - memory.log_share),
+                ),
                 Fact::new("dead points", memory.dead.len()),
                 Fact::new("moves of each point", memory.moves.moves),
-                Fact::new("acceptance of the last moves", format!("{:.3}", memory.moves.acceptance)),
+                Fact::new(
+                    "acceptance of the last moves",
+                    format!("{:.3}", memory.moves.acceptance),
+                ),
                 Fact::new("probability of the ranks of new points", format!("{ranks:.3}")),
             ],
         })

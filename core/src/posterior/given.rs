@@ -1,0 +1,50 @@
+//! A log density that a study gives in place of measurements.
+
+use crate::data::Parameter;
+use crate::linalg::Matrix;
+use crate::plugin::Hyperparameter;
+use crate::plugin::density::BoundDensity;
+
+use super::LogLikelihood;
+
+/// See the module.
+pub struct Given<'a> {
+    density: &'a dyn BoundDensity,
+    /// The parameters whose priors the density includes already; none when it does not.
+    included: &'a [Parameter],
+}
+
+impl<'a> Given<'a> {
+    /// A density that is multiplied by the priors.
+    pub fn likelihood(density: &'a dyn BoundDensity) -> Self {
+        Self { density, included: &[] }
+    }
+
+    /// A density that includes the priors of these parameters.
+    pub fn posterior(density: &'a dyn BoundDensity, parameters: &'a [Parameter]) -> Self {
+        Self { density, included: parameters }
+    }
+}
+
+impl LogLikelihood for Given<'_> {
+    fn hyperparameters(&self) -> &[Hyperparameter] {
+        &[]
+    }
+
+    fn values(&self, theta: &Matrix, _hyper: &Matrix) -> Vec<f64> {
+        let mut values = self.density.log_density(theta);
+        for (value, point) in values.iter_mut().zip(theta.iter_rows()) {
+            let priors = self.included.iter().zip(point);
+            *value -= priors.map(|(p, &x)| p.prior.log_density(x)).sum::<f64>();
+        }
+        values
+    }
+
+    fn gradient(&self, theta: &[f64], _hyper: &[f64]) -> Vec<f64> {
+        let (_, mut gradient) = self.density.gradient(theta);
+        for ((slope, p), &x) in gradient.iter_mut().zip(self.included).zip(theta) {
+            *slope -= p.prior.log_density_derivative(x);
+        }
+        gradient
+    }
+}

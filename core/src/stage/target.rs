@@ -1,0 +1,50 @@
+//! A study of a log density that is given: nothing is run, read or emulated; the density is sampled.
+
+use serde_json::json;
+
+use crate::plugin::Density;
+use crate::plugin::registry::{NoKeys, Section};
+use crate::posterior::{Given, Posterior};
+use crate::report::findings::Findings;
+use crate::run::{Kept, Observer, RunDirectory, Stop};
+use crate::study::Study;
+
+use super::calibrate::{self, Calibrated};
+use super::{manifest, report};
+
+/// Samples the target and reports.
+pub fn run(
+    study: &Study,
+    target: &Section<dyn Density, NoKeys>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Findings, Stop> {
+    let calibrated = stage(study, target, run, observer)?;
+    let findings = report::stage(study, None, Some(&calibrated), None, run)?;
+    manifest::end(study, run)?;
+    Ok(findings)
+}
+
+fn stage(
+    study: &Study,
+    target: &Section<dyn Density, NoKeys>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Kept<Calibrated>, Stop> {
+    let section = study.sampler.as_ref().ok_or_else(|| Stop::new("the study has no sampler"))?;
+    let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.prior, p.reference)).collect();
+    let inputs = json!([
+        (target.built.name, &target.built.options),
+        laws,
+        (section.built.name, &section.built.options, &section.common),
+        study.about.seed
+    ]);
+    let density = target.built.plugin.bind(&study.parameters)?;
+    let likelihood = if target.built.plugin.includes_prior() {
+        Given::posterior(&*density, &study.parameters)
+    } else {
+        Given::likelihood(&*density)
+    };
+    let posterior = Posterior::new(&study.parameters, likelihood);
+    calibrate::draw(study, &posterior, "5-calibrate", &inputs, run, observer)
+}
