@@ -110,7 +110,14 @@ fn samplers() {
     // With fewer steps the suite's own Monte Carlo error is too rough to judge by.
     let options =
         &["walkers = 40\nsteps = 2000", "walkers = 20\nsteps = 2000\nupdate = \"sequential\""];
-    let table: &Table = &[("affine_invariant_ensemble", options)];
+    let table: &Table = &[
+        ("affine_invariant_ensemble", options),
+        ("nested", &["live = 300", "live = 300\nmutation = \"differential_evolution\""]),
+        (
+            "sequential_monte_carlo",
+            &["particles = 400", "particles = 400\nmutation = \"random_walk\""],
+        ),
+    ];
     all::<dyn Sampler>(table, |case, plugin| contract::sampler(&case.label, plugin));
 }
 

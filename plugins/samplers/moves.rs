@@ -188,12 +188,7 @@ impl Movement<'_> {
 }
 
 /// Normal steps with the covariance of the population (Roberts, Gelman and Gilks 1997).
-fn random_walk(
-    population: &Evaluated,
-    shape: &Shape,
-    size: f64,
-    rng: &mut impl Rng,
-) -> Proposal {
+fn random_walk(population: &Evaluated, shape: &Shape, size: f64, rng: &mut impl Rng) -> Proposal {
     let d = shape.centre.len();
     let scale = size * 2.38 / (d as f64).sqrt();
     let step = |point: &[f64]| -> Vec<f64> {
@@ -269,8 +264,8 @@ impl Watch {
             None => return false,
         };
         (0..last.len()).all(|q| {
-            let stalled = rest.len() >= PATIENCE
-                && rest[rest.len() - PATIENCE][q] - last[q] < STALL;
+            let stalled =
+                rest.len() >= PATIENCE && rest[rest.len() - PATIENCE][q] - last[q] < STALL;
             last[q] <= threshold || stalled
         })
     }

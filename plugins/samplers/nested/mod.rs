@@ -57,7 +57,7 @@ impl Default for Nested {
             live: 500,
             remaining: 0.01,
             mutation: Mutation::Automatic,
-            correlation: 0.1,
+            correlation: 0.05,
             moves: 100,
             halvings: 1000,
         }
@@ -220,10 +220,8 @@ impl Memory {
         let d = self.points.len() / self.log_density.len().max(1);
         let gone = self.dead.len() - self.log_density.len();
         let weights = volumes::log_weights(&self.dead, live);
-        let light = weights[gone..]
-            .iter()
-            .take_while(|&&weight| weight < evidence + NEGLIGIBLE)
-            .count();
+        let light =
+            weights[gone..].iter().take_while(|&&weight| weight < evidence + NEGLIGIBLE).count();
         self.points.drain(..light * d);
         self.log_density.drain(..light);
     }

@@ -44,7 +44,10 @@ impl SequentialMonteCarlo {
             facts: vec![
                 Fact::new("temperatures", memory.generations),
                 Fact::new("moves of each particle", memory.moves.moves),
-                Fact::new("acceptance at the last temperature", format!("{:.3}", memory.moves.acceptance)),
+                Fact::new(
+                    "acceptance at the last temperature",
+                    format!("{:.3}", memory.moves.acceptance),
+                ),
                 Fact::new(
                     "largest correlation that the last moves left",
                     format!("{:.3}", memory.moves.of_coordinates),
