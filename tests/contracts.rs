@@ -132,7 +132,12 @@ fn samplers() {
         ),
         ("hamiltonian", &["warm_up = 300", "warm_up = 300\ntrajectory = { leapfrog_steps = 8 }"]),
         ("metropolis", &["steps = 4000", "proposal = { prior = 0.5 }"]),
+        ("nested", &["live = 300", "live = 300\nmutation = \"differential_evolution\""]),
         ("no_u_turn", &["warm_up = 300", "warm_up = 300\nmetric = \"diagonal\""]),
+        (
+            "sequential_monte_carlo",
+            &["particles = 400", "particles = 400\nmutation = \"random_walk\""],
+        ),
         ("variational", &["", "refine = false"]),
     ];
     all::<dyn Sampler>(table, |case, plugin| contract::sampler(&case.label, plugin));

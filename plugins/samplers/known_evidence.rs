@@ -162,7 +162,11 @@ pub(super) fn unit_cube(
 pub(super) fn run(sampler: &dyn Sampler, target: &dyn Target, seed: u64) -> (Harvest, u64) {
     let root = Stream::root(seed);
     let plan = sampler.plan(target.dimension());
-    let points = target.prior_draws(plan.chains, &root.named("start"));
+    // Some priors reach far beyond the support of their likelihood.
+    let drawn = target.prior_draws(200 * plan.chains, &root.named("start"));
+    let inside = target.log_density(&drawn).into_iter().map(f64::is_finite);
+    let inside = inside.enumerate().filter(|(_, is)| *is).map(|(i, _)| i);
+    let points = drawn.select_rows(&inside.take(plan.chains).collect::<Vec<_>>());
     let mut state = sampler.start(target, points).unwrap();
     for step in 0..plan.steps {
         if sampler.finished(&state) {

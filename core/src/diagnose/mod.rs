@@ -12,7 +12,9 @@
 //! that of the series of ensemble means, [`autocorrelation::ensemble_error`].
 
 pub mod autocorrelation;
+pub mod bridge;
 pub mod chains;
+pub mod leave_one_out;
 pub mod pareto;
 pub mod walkers;
 

@@ -13,6 +13,8 @@ use super::{Memory, Nested};
 
 /// Sequences of volumes that are drawn for the error of the evidence.
 const SEQUENCES: usize = 200;
+/// Draws for each effective one: so many that drawing in proportion to weights adds little noise.
+const REPEATS: f64 = 4.0;
 /// A probability of the ranks below this speaks against the draws.
 const IMPROBABLE: f64 = 1e-3;
 
@@ -42,7 +44,7 @@ impl Nested {
         let kept = &weights[gone..];
         let size = effective_size(kept);
         let mut rng = stream.named("draws").generator();
-        let mut places = systematic(kept, size.round().max(1.0) as usize, &mut rng);
+        let mut places = systematic(kept, (REPEATS * size).ceil() as usize, &mut rng);
         let order = permutation(&mut rng, places.len());
         places = order.into_iter().map(|i| places[i]).collect();
         let d = state.points.columns();

@@ -57,7 +57,7 @@ impl Default for Nested {
             live: 500,
             remaining: 0.01,
             mutation: Mutation::Automatic,
-            correlation: 0.1,
+            correlation: 0.05,
             moves: 100,
             halvings: 1000,
         }
