@@ -13,10 +13,13 @@ mod gain;
 use std::path::{Path, PathBuf};
 
 use lacuna::contract::{self, Sample};
-use lacuna::data::{Axis, Layout, Unit};
+use lacuna::data::{Axis, Layout, Parameter, Unit};
+use lacuna::math::distribution::Distribution;
 use lacuna::plugin::model::Response;
 use lacuna::plugin::registry::{self, Kind};
-use lacuna::plugin::{Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate};
+use lacuna::plugin::{
+    Density, Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate,
+};
 use lacuna::run::write_response;
 // Without this line the linker leaves the plugins out.
 use lacuna_plugins as _;
@@ -54,8 +57,17 @@ fn all<K: Kind + ?Sized>(table: &Table, suite: impl Fn(&Case<'_>, &K) -> Result<
 #[test]
 fn every_kind_has_a_suite() {
     let kinds: Vec<&str> = registry::kinds().iter().map(|kind| kind.name).collect();
-    let suites =
-        ["design", "discrepancy", "effect", "executor", "model", "reader", "sampler", "surrogate"];
+    let suites = [
+        "design",
+        "discrepancy",
+        "effect",
+        "executor",
+        "model",
+        "reader",
+        "sampler",
+        "surrogate",
+        "target",
+    ];
     assert_eq!(kinds, suites);
     assert!(registry::audit().is_empty());
 }
@@ -146,6 +158,34 @@ fn samplers() {
 #[test]
 fn effects() {
     all::<dyn Effect>(&[("gain", &[""])], |case, effect| contract::effect(&case.label, effect));
+}
+
+#[test]
+fn targets() {
+    let parameter = |name: &str, prior: Distribution| Parameter {
+        name: name.to_owned(),
+        symbol: name.to_owned(),
+        unit: Unit::dimensionless(),
+        design: prior.clone(),
+        prior,
+        reference: None,
+    };
+    let parameters = [
+        parameter("intercept", Distribution::Normal([0.0, 10.0])),
+        parameter("slope", Distribution::Uniform([-10.0, 10.0])),
+        parameter("sigma", Distribution::HalfNormal(2.0)),
+    ];
+    let table: &Table = &[(
+        "expression",
+        &[
+            "log_density = '-(intercept^2 + slope^2) / 2 - exp(sigma)'\nincludes_prior = true",
+            "log_density = 'sum(normal_log_density(y, intercept + slope * x, sigma))'\n\
+             data = { x = [0, 1, 2, 3], y = [0.9, 3.1, 5.0, 6.8] }",
+            "log_density = 'if(slope > 0, log(slope), log(-1)) + student_t_log_density(z, 4, 0, 1)'\n\
+             where = { z = 'hypot(intercept, sigma) - atan2(sigma, slope)' }",
+        ],
+    )];
+    all::<dyn Density>(table, |case, plugin| contract::density(&case.label, plugin, &parameters));
 }
 
 /// Two gauges at one hundred times, as `samples/base.csv` holds them in microstrain.

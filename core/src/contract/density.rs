@@ -74,7 +74,7 @@ fn bears_strange_points(bound: &dyn BoundDensity, parameters: &[Parameter]) -> R
             if !sound(value) {
                 return Err(format!("it is {value} for {what}"));
             }
-            if same.to_bits() != value.to_bits() {
+            if same != value {
                 return Err(format!("it is {value}, with its gradient {same}, for {what}"));
             }
             if value.is_infinite() && gradient.iter().any(|slope| *slope != 0.0) {

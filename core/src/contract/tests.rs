@@ -1,13 +1,14 @@
 //! Faults are found: each suite names what a plugin with a planted fault does wrong.
 
 use super::*;
-use crate::data::{Layout, Unit};
+use crate::data::{Layout, Parameter, Unit};
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::math::random::{Stream, uniform};
+use crate::plugin::density::BoundDensity;
 use crate::plugin::effect::Description;
 use crate::plugin::executor::{Batch, Finished};
-use crate::plugin::{Component, Design, Effect, Executor, Hyperparameter};
+use crate::plugin::{Component, Density, Design, Effect, Executor, Hyperparameter};
 use crate::run::Stop;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -99,6 +100,63 @@ fn faults_of_effects_are_found() {
         assert!(breaches.iter().any(|b| b.contains(expected)), "{expected}: {breaches:?}");
     }
     assert_eq!(effect("shift", &Shift(Fault::None)), Ok(()));
+}
+
+/// A half normal law beside a normal one, wrong in the way asked for.
+#[derive(Clone, Copy)]
+struct Law(Fault);
+
+impl Component for Law {}
+
+impl Density for Law {
+    fn bind(&self, parameters: &[Parameter]) -> Result<Box<dyn BoundDensity>, Stop> {
+        assert_eq!(parameters.len(), 2);
+        Ok(Box::new(*self))
+    }
+}
+
+impl BoundDensity for Law {
+    fn log_density(&self, points: &Matrix) -> Vec<f64> {
+        let neighbours = if self.0 == Fault::Hidden { points.rows() as f64 } else { 0.0 };
+        points.iter_rows().map(|point| self.gradient(point).0 + neighbours).collect()
+    }
+    fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
+        assert!(self.0 != Fault::Panics || point[0] >= 0.0, "a planted panic");
+        let scale = if self.0 == Fault::OffCentre { 1.01 } else { 1.0 };
+        let value = -0.5 * (point[0] * point[0] + point[1] * point[1]);
+        let outside = point[0] < 0.0;
+        if outside || (value.is_nan() && self.0 != Fault::Edge) || value.is_infinite() {
+            return (f64::NEG_INFINITY, vec![0.0; 2]);
+        }
+        (value, vec![-point[0], -point[1] * scale])
+    }
+}
+
+#[test]
+fn faults_of_targets_are_found() {
+    let parameter = |name: &str, prior: Distribution| Parameter {
+        name: name.to_owned(),
+        symbol: name.to_owned(),
+        unit: Unit::dimensionless(),
+        design: prior.clone(),
+        prior,
+        reference: None,
+    };
+    let parameters = [
+        parameter("a", Distribution::Normal([0.0, 1.0])),
+        parameter("b", Distribution::Uniform([-1.0, 1.0])),
+    ];
+    for (fault, expected) in [
+        (Fault::Edge, "it is NaN for `a` = NaN"),
+        (Fault::Hidden, "a point alone has"),
+        (Fault::Panics, "makes it panic"),
+        (Fault::OffCentre, "the derivative by parameter 2"),
+    ] {
+        let breaches = density("law", &Law(fault), &parameters).unwrap_err();
+        assert!(breaches.iter().any(|b| b.contains(expected)), "{expected}: {breaches:?}");
+        assert!(breaches[0].starts_with("target `law`, "));
+    }
+    assert_eq!(density("law", &Law(Fault::None), &parameters), Ok(()));
 }
 
 /// Runs nothing.
