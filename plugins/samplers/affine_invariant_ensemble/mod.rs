@@ -32,8 +32,8 @@ use super::chains;
 /// is the only one that minds how the unknowns are scaled, and takes their spread at the start for a unit.
 ///
 /// References: Goodman and Weare, Comm. App. Math. Comp. Sci. 5 (2010) 65; Foreman-Mackey, Hogg, Lang
-/// and Goodman, PASP 125 (2013) 306 (the update by halves); Nelson, Ford and Payne, ApJS 210 (2014) 11
-/// (differential evolution within an ensemble).
+/// and Goodman, PASP 125 (2013) 306 (the update by halves); Nelson, Ford and Payne, Astrophys. J. Suppl. 210
+/// (2014) 11 (differential evolution within an ensemble).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct AffineInvariantEnsemble {

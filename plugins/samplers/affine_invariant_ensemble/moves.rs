@@ -247,7 +247,9 @@ fn walk(points: &Matrix, from: &[f64], subset: &[usize], new: &mut [f64], rng: &
     let mut weights: Vec<f64> = subset.iter().map(|_| normal(rng) / size.sqrt()).collect();
     // The mean's share taken off each weight leaves a combination of the places themselves.
     let mean = weights.iter().sum::<f64>() / size;
-    weights.iter_mut().for_each(|weight| *weight -= mean);
+    for weight in &mut weights {
+        *weight -= mean;
+    }
     new.copy_from_slice(from);
     for (&k, weight) in subset.iter().zip(weights) {
         for (new, other) in new.iter_mut().zip(points.row(k)) {
