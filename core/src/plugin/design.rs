@@ -1,6 +1,7 @@
 //! Designs: where the simulator is run.
 
 use super::Component;
+use crate::data::Parameter;
 use crate::linalg::Matrix;
 use crate::math::random::Stream;
 use crate::run::Stop;
@@ -9,4 +10,15 @@ use crate::run::Stop;
 pub trait Design: Component {
     /// `count` points in the open unit cube of `dimension` axes, one a row.
     fn points(&self, count: usize, dimension: usize, stream: &Stream) -> Result<Matrix, Stop>;
+
+    /// `count` points of the cube for these parameters: a design whose points depend on the laws that
+    /// will map them (the nodes of a quadrature rule) overrides this.
+    fn place(
+        &self,
+        parameters: &[Parameter],
+        count: usize,
+        stream: &Stream,
+    ) -> Result<Matrix, Stop> {
+        self.points(count, parameters.len(), stream)
+    }
 }

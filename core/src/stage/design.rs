@@ -46,7 +46,7 @@ pub fn stage(
     observer.begin("design", "run", 0);
     let kept = run.keep("1-design", &inputs, observer, |_| {
         let plugin = &section.built.plugin;
-        let cube = plugin.points(runs, study.parameters.len(), &stream(study, "design"))?;
+        let cube = plugin.place(&study.parameters, runs, &stream(study, "design"))?;
         Ok(Design { points: physical(&cube, &study.parameters) })
     })?;
     observer.end("design", &format!("{runs} runs by {}", section.built.name));

@@ -7,7 +7,7 @@ use lacuna::run::Stop;
 use serde::{Deserialize, Serialize};
 
 use super::coordinate::Coordinate;
-use super::options::Solver;
+use super::options::{Selection, Solver};
 use super::squares::Squares;
 use super::terms::{Basis, Terms};
 use super::{bytes, sensitivity};
@@ -23,18 +23,39 @@ pub struct Expansion {
 }
 
 /// How the expansion came about.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
     /// The solver that chose the terms.
     pub solver: Solver,
-    /// The degree chosen for each output; zero for constant outputs.
+    /// The error by which they were chosen.
+    pub selection: Selection,
+    /// The quadrature rule that the runs are, in words.
+    pub rule: Option<String>,
+    /// The degree chosen for each output (or component); zero for those that do not vary.
     pub degrees: Vec<usize>,
-    /// The number of terms of each output, the constant included.
+    /// The norm chosen for each output (or component) that varies.
+    pub q_norms: Vec<f64>,
+    /// The number of terms of each output (or component), the constant included.
     pub terms: Vec<usize>,
     /// The number of terms among which they were chosen.
     pub candidates: usize,
     /// The number of outputs that do not vary over the runs.
     pub constant: usize,
+    /// The number of outputs whose error is not below that of their mean.
+    pub poor: usize,
+    /// The number of outputs (or components) with fewer than three runs a term.
+    pub optimistic: usize,
+    /// The principal components, where they were fitted instead of the outputs.
+    pub reduction: Option<Reduction>,
+}
+
+/// What was fitted instead of the outputs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Reduction {
+    /// The number of principal components.
+    pub components: usize,
+    /// The share of the outputs' variance over the runs that they leave out.
+    pub left_out: f64,
 }
 
 /// All of an expansion but its large arrays.
@@ -137,18 +158,7 @@ impl Emulator for Expansion {
     }
 
     fn facts(&self) -> Vec<Fact> {
-        let Summary { solver, degrees, terms, candidates, constant } = &self.summary;
-        let mut facts = vec![
-            Fact::new("solver", solver.name()),
-            Fact::new("degrees (least, median, largest)", spread(degrees)),
-            Fact::new("terms of an output (least, median, largest)", spread(terms)),
-            Fact::new("terms of all outputs together", self.basis.terms().len()),
-            Fact::new("terms to choose from", candidates),
-        ];
-        if *constant > 0 {
-            facts.push(Fact::new("outputs that do not vary over the runs", constant));
-        }
-        facts
+        self.summary.facts(self.basis.terms().len())
     }
 
     fn save(&self) -> Result<Vec<u8>, Stop> {
@@ -184,6 +194,51 @@ impl Linear for Expansion {
     fn sum_of_squares(&self, factor: &Matrix) -> Option<Box<dyn SumOfSquares>> {
         let squares = Squares::new(&self.basis, factor)?;
         Some(Box::new(squares))
+    }
+}
+
+impl Summary {
+    /// What is worth telling; `union` is the number of terms of all outputs together.
+    fn facts(&self, union: usize) -> Vec<Fact> {
+        let one = if self.reduction.is_some() { "a component" } else { "an output" };
+        let mut facts = vec![
+            Fact::new("solver", self.solver.name()),
+            Fact::new("degrees (least, median, largest)", spread(&self.degrees)),
+            Fact::new(format!("terms of {one} (least, median, largest)"), spread(&self.terms)),
+            Fact::new("terms of all outputs together", union),
+            Fact::new("terms to choose from", self.candidates),
+        ];
+        let mut tell = |name: &str, value: String| facts.push(Fact::new(name, value));
+        let range =
+            |a: f64, b: f64| if a == b { format!("{a:.3}") } else { format!("{a:.3} to {b:.3}") };
+        let least = self.q_norms.iter().copied().fold(f64::INFINITY, f64::min);
+        let largest = self.q_norms.iter().copied().fold(0.0, f64::max);
+        if least < 1.0 {
+            tell("q-norms", range(least, largest));
+        }
+        if let Selection::KFold(folds) = self.selection {
+            tell("selection", format!("each of {folds} parts of the runs left out once"));
+        }
+        if let Some(rule) = &self.rule {
+            tell("quadrature rule", rule.clone());
+        }
+        if let Some(Reduction { components, left_out }) = self.reduction {
+            tell("principal components", components.to_string());
+            tell("share of the variance that they leave out", format!("{left_out:.2e}"));
+        }
+        if self.constant > 0 {
+            tell("outputs that do not vary over the runs", self.constant.to_string());
+        }
+        if self.poor > 0 {
+            tell("outputs emulated no better than by their mean", self.poor.to_string());
+        }
+        if self.optimistic > 0 {
+            let name = if self.reduction.is_some() { "components" } else { "outputs" };
+            let name =
+                format!("{name} with fewer than 3 runs a term, whose error is likely too small");
+            tell(&name, self.optimistic.to_string());
+        }
+        facts
     }
 }
 

@@ -1,64 +1,41 @@
 //! From runs to an expansion: one problem for all outputs.
 
 use lacuna::linalg::{Matrix, multiply_transposed};
+use lacuna::math::random::Stream;
+use lacuna::plugin::Emulator;
 use lacuna::plugin::surrogate::{FitError, Training};
 use lacuna::run::{Progress, Stop};
-use rayon::prelude::*;
 
 use super::PolynomialChaos;
 use super::coordinate::Coordinate;
-use super::emulator::{Expansion, Summary};
-use super::least_angle::{Dictionary, best_along_path};
-use super::least_squares::Regression;
+use super::emulator::{Expansion, Reduction, Summary};
+use super::judge::Criterion;
+use super::least_squares::Fit;
 use super::options::Solver;
-use super::terms::{Basis, Nested};
+use super::quadrature::Projection;
+use super::search::{Best, Output, Search};
+use super::terms::{Basis, Sets};
+use crate::surrogates::principal_components::PrincipalComponents;
 
 /// Outputs whose standard deviation over the runs is below this share of the largest response do not
 /// vary: what is left is round-off (the strain of a sensor before the wave arrives).
 const ROUND_OFF: f64 = 1e-13;
-/// A fit whose relative error is below this is exact; no higher degree is tried.
-const EXACT: f64 = 1e-26;
-/// A search whose best relative error is above this has found nothing yet and must not be ended.
-const USELESS: f64 = 0.5;
 
-/// One output over the runs.
-struct Output {
-    mean: f64,
-    /// The values less their mean.
-    centred: Vec<f64>,
-    /// Divided by the number of runs; zero for outputs that do not vary.
-    variance: f64,
-}
-
-/// The best fit of one output so far.
-#[derive(Debug, Clone, Default)]
-struct Search {
-    best: Option<Best>,
-    /// Degrees in a row that were worse than the best.
-    worse: usize,
-    done: bool,
-}
-
-#[derive(Debug, Clone)]
-struct Best {
-    error: f64,
-    degree: usize,
-    /// Positions in the nested set, the constant first.
-    terms: Vec<usize>,
-}
-
-/// The fit of one output, ready to be put beside the others.
-struct Refit {
-    terms: Vec<usize>,
-    degree: usize,
-    coefficients: Vec<f64>,
-    relative: f64,
-    residuals: Vec<f64>,
+/// The fits of all outputs, or of all components, side by side.
+struct Fits {
+    terms: Basis,
+    /// `terms x outputs`.
+    coefficients: Matrix,
+    relative: Vec<f64>,
+    /// `runs x outputs`.
+    residuals: Matrix,
+    summary: Summary,
 }
 
 pub(super) fn fit(
     options: &PolynomialChaos,
     training: &Training<'_>,
+    stream: &Stream,
     progress: &Progress<'_>,
 ) -> Result<Expansion, Stop> {
     check_numbers(training)?;
@@ -68,17 +45,31 @@ pub(super) fn fit(
             Stop::new(format!("`surrogate.{}`: {}", fault.key, fault.message)).help(fault.help)
         );
     }
-    let coordinates = options.coordinates(training.parameters).map_err(Stop::new)?;
-    let nested = options.nested(coordinates.len());
+    let problem = Problem {
+        options,
+        points: training.points,
+        coordinates: options.coordinates(training.parameters).map_err(Stop::new)?,
+        sets: options.sets(training.parameters.len()),
+        criterion: Criterion::new(options.selection, runs, stream),
+        projection: match options.solver {
+            Solver::Quadrature => {
+                Some(Projection::of(options.basis, training.parameters, training.points)?)
+            }
+            _ => None,
+        },
+    };
+    problem.check_level()?;
     let outputs = outputs(training.responses);
-    warn_of_constants(&outputs, progress);
-
-    let search = Degrees { options, training, coordinates: &coordinates, nested: &nested };
-    let found = search.run(&outputs, progress)?;
-    let refits: Vec<Refit> = (outputs.par_iter().zip(&found))
-        .map(|(output, found)| search.refit(output, found.best.as_ref()))
-        .collect::<Result<_, _>>()?;
-    Ok(assemble(options.solver, coordinates, &nested, runs, &refits))
+    let expansion = match options.components {
+        Some(components) => {
+            let components = components.of(training.responses)?;
+            let scores = self::outputs(&components.scores);
+            problem.fits(&scores, progress)?.multiplied_back(&outputs, &components)
+        }
+        None => problem.fits(&outputs, progress)?.expansion(None),
+    };
+    warn(&expansion, runs, training.parameters.len(), progress);
+    Ok(expansion)
 }
 
 /// Refuses numbers that no regression can take, naming where they are.
@@ -132,195 +123,179 @@ fn outputs(responses: &Matrix) -> Vec<Output> {
     columns.iter_rows().map(output).collect()
 }
 
-fn warn_of_constants(outputs: &[Output], progress: &Progress<'_>) {
-    let constant = outputs.iter().filter(|o| o.variance == 0.0).count();
-    if constant > 0 {
+/// Warns of what the user should know about the fit.
+fn warn(expansion: &Expansion, runs: usize, dimension: usize, progress: &Progress<'_>) {
+    let Summary { constant, poor, optimistic, .. } = expansion.summary();
+    let outputs = expansion.fit_error().relative.len();
+    if *constant > 0 {
         progress.warn(&format!(
-            "{constant} of {} outputs do not vary over the runs and are emulated by their mean",
-            outputs.len()
+            "{constant} of {outputs} outputs do not vary over the runs and are emulated by their mean"
+        ));
+    }
+    if *poor > 0 {
+        progress.warn(&format!(
+            "{poor} of {outputs} outputs are emulated no better than by their mean"
+        ));
+    }
+    let few = runs < 10 * dimension;
+    if few || 2 * optimistic > outputs {
+        let why = if few { "ten runs a parameter" } else { "three runs a term in most outputs" };
+        progress.warn(&format!(
+            "{runs} runs are fewer than {why}: the surrogate's leave-one-out errors are likely too small; \
+             judge it by runs kept aside"
         ));
     }
 }
 
-/// The search over degrees.
-struct Degrees<'a> {
+/// What the fits of all outputs share.
+struct Problem<'a> {
     options: &'a PolynomialChaos,
-    training: &'a Training<'a>,
-    coordinates: &'a [Coordinate],
-    nested: &'a Nested,
+    points: &'a Matrix,
+    coordinates: Vec<Coordinate>,
+    sets: Sets,
+    criterion: Criterion,
+    projection: Option<Projection>,
 }
 
-impl Degrees<'_> {
-    /// Tries one degree after the other for all outputs that still improve.
-    fn run(&self, outputs: &[Output], progress: &Progress<'_>) -> Result<Vec<Search>, Stop> {
-        let mut searches = vec![Search::default(); outputs.len()];
-        for (search, output) in searches.iter_mut().zip(outputs) {
-            search.done = output.variance == 0.0;
-        }
-        let count = |searches: &[Search]| searches.iter().filter(|s| s.done).count() as u64;
-        let mut reported = count(&searches);
-        progress.add(reported);
-        for degree in self.degrees() {
-            let active: Vec<usize> = (0..outputs.len()).filter(|&o| !searches[o].done).collect();
-            if active.is_empty() {
-                break;
-            }
-            for (&o, found) in active.iter().zip(self.at_degree(degree, outputs, &active)?) {
-                searches[o].take(found, self.options.early_stop.degrees);
-            }
-            progress.add(count(&searches) - reported);
-            reported = count(&searches);
-        }
-        progress.add(outputs.len() as u64 - reported);
-        Ok(searches)
-    }
-
-    /// The degrees to be tried: those whose set differs from the one before.
-    fn degrees(&self) -> impl Iterator<Item = usize> {
-        let range = self.options.degree.range();
-        let counts = &self.nested.counts;
-        (range.min..=range.max.min(counts.len() - 1))
-            .filter(move |&p| p == range.min || counts[p] > counts[p - 1])
-    }
-
-    /// The basis functions of a degree at the runs, `runs x terms`.
-    fn basis(&self, degree: usize) -> Matrix {
-        let terms = self.nested.terms.prefix(self.nested.counts[degree]);
-        Basis::new(self.coordinates.to_vec(), terms).values(self.training.points)
-    }
-
-    /// The best fit of each active output at one degree.
-    fn at_degree(
-        &self,
-        degree: usize,
-        outputs: &[Output],
-        active: &[usize],
-    ) -> Result<Vec<Option<Best>>, Stop> {
-        let basis = self.basis(degree);
-        match self.options.solver {
-            Solver::LeastAngleRegression => Ok(self.sparse(degree, &basis, outputs, active)),
-            Solver::LeastSquares => {
-                let regression = Regression::new(&basis).ok_or_else(|| dependent(degree))?;
-                let terms: Vec<usize> = (0..basis.columns()).collect();
-                let best = |&o: &usize| {
-                    let Output { mean, centred, variance } = &outputs[o];
-                    let error = regression.fit(*mean, centred, *variance).relative;
-                    Some(Best { error, degree, terms: terms.clone() })
-                };
-                Ok(active.par_iter().map(best).collect())
-            }
+impl Problem<'_> {
+    /// Refuses degrees of which the quadrature rule finds none.
+    fn check_level(&self) -> Result<(), Stop> {
+        let least = self.options.degree.range().min;
+        match &self.projection {
+            Some(projection) if projection.level < least => Err(Stop::new(format!(
+                "`surrogate.degree`: the runs are a {} rule of level {}, which finds no expansion of degree \
+                 {least}",
+                projection.rule.name(),
+                projection.level
+            ))
+            .help("lower `degree`, or make the runs with a higher `level`")),
+            _ => Ok(()),
         }
     }
 
-    fn sparse(
-        &self,
-        degree: usize,
-        basis: &Matrix,
-        outputs: &[Output],
-        active: &[usize],
-    ) -> Vec<Option<Best>> {
-        let dictionary = Dictionary::new(basis);
-        let centred = Matrix::from_rows(basis.rows(), active.iter().map(|&o| &outputs[o].centred));
-        let correlations = multiply_transposed(&centred, dictionary.columns());
-        let window = self.options.early_stop.window(basis.rows());
-        let best = |i: usize| {
-            let choice = best_along_path(&dictionary, centred.row(i), correlations.row(i), window)?;
-            let mut terms = vec![0];
-            terms.extend(choice.terms);
-            terms.sort_unstable();
-            Some(Best { error: choice.error, degree, terms })
+    /// The best fit of each output.
+    fn fits(&self, outputs: &[Output], progress: &Progress<'_>) -> Result<Fits, Stop> {
+        let search = Search {
+            options: self.options,
+            points: self.points,
+            coordinates: &self.coordinates,
+            sets: &self.sets,
+            criterion: &self.criterion,
+            projection: self.projection.as_ref(),
         };
-        (0..active.len()).into_par_iter().map(best).collect()
+        let found = search.run(outputs, progress)?;
+        let unexplained = outputs.iter().zip(&found).any(|(o, b)| o.variance > 0.0 && b.is_none());
+        if unexplained {
+            return Err(unexplained_output());
+        }
+        let fits = search.refit(outputs, &found)?;
+        let fits: Vec<Fit> =
+            outputs.iter().zip(fits).map(|(o, fit)| fit.unwrap_or_else(|| constant(o))).collect();
+        Ok(self.assembled(outputs, &found, &fits))
     }
 
-    /// The least-squares fit of an output on its chosen terms; on the constant alone without any.
-    fn refit(&self, output: &Output, best: Option<&Best>) -> Result<Refit, Stop> {
-        let Some(best) = best else {
-            if output.variance > 0.0 {
-                return Err(unexplained());
+    /// Puts the outputs' terms into their union.
+    fn assembled(&self, outputs: &[Output], found: &[Option<Best>], fits: &[Fit]) -> Fits {
+        let all = &self.sets.terms;
+        let terms_of = |best: &Option<Best>| best.as_ref().map_or(vec![0], |b| b.terms.clone());
+        let own: Vec<Vec<usize>> = found.iter().map(terms_of).collect();
+        let mut used = vec![false; all.len()];
+        own.iter().flatten().for_each(|&t| used[t] = true);
+        // The constant is there even without outputs.
+        used[0] = true;
+        let union: Vec<usize> = (0..used.len()).filter(|&t| used[t]).collect();
+        let mut position = vec![0; used.len()];
+        union.iter().enumerate().for_each(|(i, &t)| position[t] = i);
+        let mut coefficients = Matrix::zeros(union.len(), fits.len());
+        for (o, (fit, terms)) in fits.iter().zip(&own).enumerate() {
+            for (&t, &c) in terms.iter().zip(&fit.coefficients) {
+                coefficients[(position[t], o)] = c;
             }
-            let n = output.centred.len() as f64;
-            let residuals = output.centred.iter().map(|y| y / (1.0 - 1.0 / n)).collect();
-            return Ok(Refit {
-                terms: vec![0],
-                degree: 0,
-                coefficients: vec![output.mean],
-                relative: 0.0,
-                residuals,
-            });
+        }
+        let runs = self.points.rows();
+        let best = || found.iter().flatten();
+        let summary = Summary {
+            solver: self.options.solver,
+            selection: self.options.selection,
+            rule: self.projection.as_ref().map(|p| format!("{}, level {}", p.rule.name(), p.level)),
+            degrees: found.iter().map(|b| b.as_ref().map_or(0, |b| b.degree)).collect(),
+            q_norms: best().map(|b| b.q_norm).collect(),
+            terms: own.iter().map(Vec::len).collect(),
+            candidates: all.len(),
+            constant: outputs.iter().filter(|o| o.variance == 0.0).count(),
+            poor: fits.iter().filter(|f| f.relative >= 1.0).count(),
+            optimistic: best().filter(|b| 3 * b.terms.len() > runs).count(),
+            reduction: None,
         };
-        let terms = self.nested.terms.select(&best.terms);
-        let basis = Basis::new(self.coordinates.to_vec(), terms).values(self.training.points);
-        let regression = Regression::new(&basis).ok_or_else(|| dependent(best.degree))?;
-        let fit = regression.fit(output.mean, &output.centred, output.variance);
-        Ok(Refit {
-            terms: best.terms.clone(),
-            degree: best.degree,
-            coefficients: fit.coefficients,
-            relative: fit.relative,
-            residuals: fit.residuals,
-        })
+        Fits {
+            terms: Basis::new(self.coordinates.clone(), all.select(&union)),
+            coefficients,
+            relative: fits.iter().map(|f| f.relative).collect(),
+            residuals: Matrix::from_fn(runs, fits.len(), |r, o| fits[o].residuals[r]),
+            summary,
+        }
     }
 }
 
-fn unexplained() -> Stop {
+impl Fits {
+    fn expansion(self, reduction: Option<Reduction>) -> Expansion {
+        let fit_error = FitError { relative: self.relative, residuals: self.residuals };
+        let summary = Summary { reduction, ..self.summary };
+        Expansion::new(self.terms, self.coefficients, fit_error, summary)
+    }
+
+    /// The outputs' expansion from that of their components. What the components leave out of the outputs is
+    /// part of the residuals, and so of all that is said about the emulator's error.
+    fn multiplied_back(self, outputs: &[Output], components: &PrincipalComponents) -> Expansion {
+        let PrincipalComponents { mean, directions, scores, remainder } = components;
+        let runs = self.residuals.rows();
+        let mut coefficients = multiply_transposed(&self.coefficients, directions);
+        // The constant is the first term of every set.
+        coefficients.row_mut(0).iter_mut().zip(mean).for_each(|(c, m)| *c += m);
+        let square = |column: Vec<f64>| column.iter().map(|x| x * x).sum::<f64>();
+        // The correction for the number of terms differs from component to component.
+        let corrections: Vec<f64> = (0..scores.columns())
+            .map(|k| {
+                let plain = square(self.residuals.column(k));
+                let corrected = self.relative[k] * square(scores.column(k));
+                if plain > 0.0 { (corrected / plain).sqrt() } else { 1.0 }
+            })
+            .collect();
+        let corrected =
+            Matrix::from_fn(runs, scores.columns(), |i, k| self.residuals[(i, k)] * corrections[k]);
+        let back = |scores: &Matrix| {
+            let product = multiply_transposed(scores, directions);
+            Matrix::from_fn(runs, outputs.len(), |i, j| product[(i, j)] + remainder[(i, j)])
+        };
+        let (residuals, enlarged) = (back(&self.residuals), back(&corrected));
+        let relative: Vec<f64> = (outputs.iter().enumerate())
+            .map(|(o, output)| {
+                let error = square(enlarged.column(o)) / runs as f64;
+                if output.variance > 0.0 { error / output.variance } else { 0.0 }
+            })
+            .collect();
+        let total: f64 = outputs.iter().map(|o| o.variance).sum();
+        let reduction = Reduction {
+            components: scores.columns(),
+            left_out: components.truncation().iter().sum::<f64>() / total.max(f64::MIN_POSITIVE),
+        };
+        let summary = Summary {
+            constant: outputs.iter().filter(|o| o.variance == 0.0).count(),
+            poor: relative.iter().filter(|e| **e >= 1.0).count(),
+            ..self.summary
+        };
+        Fits { coefficients, relative, residuals, summary, ..self }.expansion(Some(reduction))
+    }
+}
+
+/// The fit of an output that does not vary.
+fn constant(output: &Output) -> Fit {
+    let n = output.centred.len() as f64;
+    let residuals = output.centred.iter().map(|y| y / (1.0 - 1.0 / n)).collect();
+    Fit { coefficients: vec![output.mean], relative: 0.0, residuals }
+}
+
+fn unexplained_output() -> Stop {
     Stop::new("the responses vary over the runs, but no basis function does so with them")
         .help("check that the runs' parameters and responses belong together")
-}
-
-fn dependent(degree: usize) -> Stop {
-    Stop::new(format!(
-        "the basis functions of degree {degree} are linearly dependent on these runs"
-    ))
-    .help("lower `surrogate.degree`, or use a design without repeated points")
-}
-
-impl Search {
-    /// Compares the fit of one more degree with the best so far.
-    fn take(&mut self, found: Option<Best>, patience: usize) {
-        let least = self.best.as_ref().map_or(f64::INFINITY, |b| b.error);
-        match found {
-            Some(found) if self.best.is_none() || found.error < least => {
-                self.done = found.error <= EXACT;
-                self.worse = 0;
-                self.best = Some(found);
-            }
-            _ => {
-                self.worse += 1;
-                self.done = patience > 0 && self.worse >= patience && least < USELESS;
-            }
-        }
-    }
-}
-
-/// Puts the outputs' terms into their union.
-fn assemble(
-    solver: Solver,
-    coordinates: Vec<Coordinate>,
-    nested: &Nested,
-    runs: usize,
-    refits: &[Refit],
-) -> Expansion {
-    let mut used = vec![false; nested.terms.len()];
-    refits.iter().flat_map(|r| &r.terms).for_each(|&t| used[t] = true);
-    let union: Vec<usize> = (0..used.len()).filter(|&t| used[t]).collect();
-    let mut position = vec![0; used.len()];
-    union.iter().enumerate().for_each(|(i, &t)| position[t] = i);
-    let mut coefficients = Matrix::zeros(union.len(), refits.len());
-    for (o, refit) in refits.iter().enumerate() {
-        for (&t, &c) in refit.terms.iter().zip(&refit.coefficients) {
-            coefficients[(position[t], o)] = c;
-        }
-    }
-    let residuals = Matrix::from_fn(runs, refits.len(), |r, o| refits[o].residuals[r]);
-    let relative = refits.iter().map(|r| r.relative).collect();
-    let summary = Summary {
-        solver,
-        degrees: refits.iter().map(|r| r.degree).collect(),
-        terms: refits.iter().map(|r| r.terms.len()).collect(),
-        candidates: nested.terms.len(),
-        constant: refits.iter().filter(|r| r.degree == 0).count(),
-    };
-    let basis = Basis::new(coordinates, nested.terms.select(&union));
-    Expansion::new(basis, coefficients, FitError { relative, residuals }, summary)
 }

@@ -1,8 +1,11 @@
 //! Ordinary least squares with its leave-one-out error.
 
 use lacuna::linalg::{
-    Matrix, multiply_vector, solve_upper, solve_upper_matrix, thin_qr, transposed_multiply_vector,
+    Matrix, multiply_transposed, multiply_vector, solve_upper, solve_upper_matrix, thin_qr,
+    transposed_multiply_vector,
 };
+
+use super::judge::{Criterion, correction, left_out};
 
 /// Regression on a fixed set of basis functions, factored once for any number of outputs.
 pub(super) struct Regression {
@@ -12,31 +15,24 @@ pub(super) struct Regression {
     leverage: Vec<f64>,
     /// The correction for the number of terms.
     correction: f64,
+    /// The runs of each fold and their part of `1 - H`, `H` the hat matrix.
+    folds: Vec<(Vec<usize>, Matrix)>,
 }
 
 /// One output's regression.
 pub(super) struct Fit {
     /// One coefficient a basis function.
     pub coefficients: Vec<f64>,
-    /// The corrected leave-one-out error relative to the output's variance.
+    /// The error by the criterion, relative to the output's variance.
     pub relative: f64,
     /// The leave-one-out residuals `r_i / (1 - h_i)`.
     pub residuals: Vec<f64>,
 }
 
-/// `N / (N - P) (1 + tr (Psi' Psi)^-1)`: corrects the leave-one-out error for the number of terms
-/// (Chapelle, Vapnik and Bengio 2002; Blatman and Sudret 2011). Infinite when `P >= N`.
-pub(super) fn correction(runs: usize, terms: usize, trace: f64) -> f64 {
-    if terms >= runs {
-        return f64::INFINITY;
-    }
-    runs as f64 / (runs - terms) as f64 * (1.0 + trace)
-}
-
 impl Regression {
     /// Factors the basis functions at the runs (`runs x terms`); none when they are linearly dependent
     /// to working precision.
-    pub fn new(basis: &Matrix) -> Option<Self> {
+    pub fn new(basis: &Matrix, criterion: &Criterion) -> Option<Self> {
         let (n, p) = (basis.rows(), basis.columns());
         let qr = thin_qr(basis).ok()?;
         let largest = (0..p).map(|i| qr.r[(i, i)].abs()).fold(0.0, f64::max);
@@ -48,7 +44,12 @@ impl Regression {
         solve_upper_matrix(&qr.r, &mut inverse);
         let trace = inverse.as_slice().iter().map(|x| x * x).sum();
         let leverage = qr.q.iter_rows().map(|row| row.iter().map(|x| x * x).sum()).collect();
-        Some(Self { q: qr.q, r: qr.r, leverage, correction: correction(n, p, trace) })
+        let folds = match criterion {
+            Criterion::LeaveOneOut => Vec::new(),
+            Criterion::Folds(folds) => folds.iter().map(|fold| block(&qr.q, fold)).collect(),
+        };
+        let correction = correction(n, p, trace);
+        Some(Self { q: qr.q, r: qr.r, leverage, correction, folds })
     }
 
     /// Fits one output, given as its mean and what is left; `variance` is that of its values, divided
@@ -62,12 +63,27 @@ impl Regression {
         let residuals: Vec<f64> = (centred.iter().zip(&model).zip(&self.leverage))
             .map(|((y, m), h)| (y - m) / (1.0 - h))
             .collect();
-        let squares = residuals.iter().map(|r| r * r).sum::<f64>() / centred.len() as f64;
-        let relative = squares / variance * self.correction;
+        let relative = if self.folds.is_empty() {
+            let squares = residuals.iter().map(|r| r * r).sum::<f64>() / centred.len() as f64;
+            squares / variance * self.correction
+        } else {
+            let plain: Vec<f64> = centred.iter().zip(&model).map(|(y, m)| y - m).collect();
+            let squares = self.folds.iter().map(|(runs, block)| left_out(runs, block, &plain));
+            squares.sum::<f64>() / centred.len() as f64 / variance
+        };
         Fit {
             coefficients,
             relative: if relative.is_nan() { f64::INFINITY } else { relative },
             residuals,
         }
     }
+}
+
+/// The runs of a fold and their part of `1 - H`.
+fn block(q: &Matrix, fold: &[usize]) -> (Vec<usize>, Matrix) {
+    let own = q.select_rows(fold);
+    let hat = multiply_transposed(&own, &own);
+    let m = fold.len();
+    let part = Matrix::from_fn(m, m, |i, j| f64::from(u8::from(i == j)) - hat[(i, j)]);
+    (fold.to_vec(), part)
 }

@@ -1,18 +1,25 @@
 //! `polynomial_chaos`: expansions in orthonormal polynomials of the parameters.
 
+mod bayesian;
 mod bytes;
 mod candidates;
 mod coordinate;
+mod dictionary;
 mod emulator;
 mod family;
 mod fit;
+mod judge;
 mod least_angle;
 mod least_squares;
+mod matching_pursuit;
 mod measure;
 mod options;
+mod quadrature;
 mod recurrence;
+mod search;
 mod sensitivity;
 mod squares;
+mod subspace_pursuit;
 mod terms;
 
 #[cfg(test)]
@@ -27,12 +34,14 @@ use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::surrogates::principal_components::Components;
+
 pub use coordinate::Coordinate;
-pub use emulator::{Expansion, Summary};
+pub use emulator::{Expansion, Reduction, Summary};
 pub use family::Family;
-pub use options::{Degree, DegreeRange, EarlyStop, Solver};
+pub use options::{Degree, DegreeRange, EarlyStop, QNorm, QNormRange, Selection, Solver};
 pub use recurrence::Recurrence;
-pub use terms::{Basis, Nested, Terms, Truncation};
+pub use terms::{Basis, Nested, Sets, TermSet, Terms, Truncation};
 
 /// A polynomial chaos expansion: each output is a sum of products of orthonormal polynomials in the
 /// parameters.
@@ -56,7 +65,7 @@ pub use terms::{Basis, Nested, Terms, Truncation};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PolynomialChaos {
-    /// The family of polynomials.
+    /// The families of polynomials.
     pub basis: Family,
     /// How the coefficients are found.
     pub solver: Solver,
@@ -64,14 +73,21 @@ pub struct PolynomialChaos {
     pub degree: Degree,
     /// Which products belong to a degree `p`: those whose exponents have
     /// `(sum of exponent^q_norm)^(1 / q_norm) <= p`. With 1 this is the total degree; smaller values
-    /// leave out products of many parameters.
-    pub q_norm: f64,
+    /// leave out products of many parameters. Of a list, or of a range such as `{ min = 0.5, max = 1.0, step =
+    /// 0.1 }`, each output takes the one with the least error.
+    pub q_norm: QNorm,
     /// The most parameters that may appear together in a product; all when not given.
     pub max_interaction: Option<usize>,
     /// Degrees with more terms than this are not tried.
     pub max_terms: usize,
     /// When to stop looking for something better.
     pub early_stop: EarlyStop,
+    /// The error by which terms, degrees and norms are chosen.
+    pub selection: Selection,
+    /// Principal components of the outputs that are fitted instead of the outputs: `{ variance = 0.9999 }` for as
+    /// many as carry this share, or `{ count = 20 }`. Saves time with thousands of outputs; what they
+    /// leave out becomes part of the emulator's error. All outputs themselves when not given.
+    pub components: Option<Components>,
 }
 
 impl Default for PolynomialChaos {
@@ -80,10 +96,12 @@ impl Default for PolynomialChaos {
             basis: Family::default(),
             solver: Solver::default(),
             degree: Degree::default(),
-            q_norm: 1.0,
+            q_norm: QNorm::Fixed(1.0),
             max_interaction: None,
             max_terms: 4000,
             early_stop: EarlyStop::default(),
+            selection: Selection::default(),
+            components: None,
         }
     }
 }
@@ -101,13 +119,19 @@ struct Fault {
 }
 
 impl PolynomialChaos {
-    /// The nested sets of terms for so many parameters.
-    fn nested(&self, dimension: usize) -> Nested {
-        let truncation = Truncation {
-            q_norm: self.q_norm,
-            max_interaction: self.max_interaction.unwrap_or(dimension),
-        };
+    /// The nested sets of terms of one norm for so many parameters.
+    fn nested(&self, dimension: usize, q_norm: f64) -> Nested {
+        let max_interaction = self.max_interaction.unwrap_or(dimension);
+        let truncation = Truncation { q_norm, max_interaction };
         Nested::new(dimension, self.degree.range().max, truncation, self.max_terms)
+    }
+
+    /// The sets of terms that are to be tried.
+    fn sets(&self, dimension: usize) -> Sets {
+        let norms = self.q_norm.values().unwrap_or_default();
+        let families: Vec<(f64, Nested)> =
+            norms.into_iter().map(|q| (q, self.nested(dimension, q))).collect();
+        Sets::new(dimension, self.degree.range().min, &families)
     }
 
     fn coordinate(&self, parameter: &Parameter) -> Result<Coordinate, String> {
@@ -149,8 +173,7 @@ impl PolynomialChaos {
             let message = format!("the degrees {min} to {max} are no range between 1 and 1000");
             add("degree", message, "write `degree = { min = 1, max = 20 }` or a whole number");
         }
-        if !(self.q_norm > 0.0 && self.q_norm <= 1.0) {
-            let message = format!("`q_norm` is {}, but must be above 0 and at most 1", self.q_norm);
+        if let Err(message) = self.q_norm.values() {
             add("q_norm", message, "1 is the total degree; values from 0.4 to 1 are usual");
         }
         if self.max_interaction == Some(0) {
@@ -158,13 +181,28 @@ impl PolynomialChaos {
                 "`max_interaction` is 0, which leaves no term but the constant".to_owned();
             add("max_interaction", message, "1 allows no products, 2 products of two parameters");
         }
+        if let Some(message) = self.components.as_ref().and_then(Components::fault) {
+            add("components", message, "`{ variance = 0.9999 }` is a usual choice");
+        }
+        if let Selection::KFold(folds) = self.selection {
+            if folds < 2 {
+                let message =
+                    format!("`selection` by {folds} parts of the runs leaves none to fit");
+                add("selection", message, "5 or 10 parts are usual");
+            } else if self.solver == Solver::Quadrature {
+                let message = "no part of a quadrature rule's nodes can be left out".to_owned();
+                add("selection", message, "use `selection = \"leave_one_out\"`");
+            }
+        }
         faults
     }
 
     /// Whether the basis is too large: for the option's limit, or for the runs.
     fn fault_of_size(&self, dimension: usize, runs: Option<usize>) -> Option<Fault> {
         let DegreeRange { min, max } = self.degree.range();
-        let counts = self.nested(dimension).counts;
+        // The smallest norm has the fewest terms.
+        let norm = self.q_norm.values().ok()?.into_iter().next()?;
+        let counts = self.nested(dimension, norm).counts;
         if counts.len() <= min {
             return Some(Fault {
                 key: "degree",
@@ -175,7 +213,19 @@ impl PolynomialChaos {
                 help: format!("the largest degree that fits is {}", counts.len() - 1),
             });
         }
-        let runs = runs.filter(|_| self.solver == Solver::LeastSquares)?;
+        let runs = runs?;
+        if let Selection::KFold(folds) = self.selection
+            && folds > runs
+        {
+            return Some(Fault {
+                key: "selection",
+                message: format!("{runs} runs cannot be cut into {folds} parts"),
+                help: "5 or 10 parts are usual".to_owned(),
+            });
+        }
+        if self.solver != Solver::LeastSquares {
+            return None;
+        }
         let fits = counts.iter().take_while(|&&terms| terms < runs).count().max(1) - 1;
         if fits >= max {
             return None;
@@ -208,10 +258,10 @@ impl Surrogate for PolynomialChaos {
     fn fit(
         &self,
         training: &Training<'_>,
-        _stream: &Stream,
+        stream: &Stream,
         progress: &Progress<'_>,
     ) -> Result<Box<dyn Emulator>, Stop> {
-        Ok(Box::new(fit::fit(self, training, progress)?))
+        Ok(Box::new(fit::fit(self, training, stream, progress)?))
     }
 
     fn load(&self, bytes: &[u8]) -> Result<Box<dyn Emulator>, Stop> {

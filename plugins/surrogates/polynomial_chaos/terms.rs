@@ -53,6 +53,56 @@ impl Nested {
     }
 }
 
+/// The sets of all degrees and norms that are to be tried.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sets {
+    /// The members of all sets.
+    pub terms: Terms,
+    /// By degree, and of one degree by norm, without those that repeat the one before.
+    pub sets: Vec<TermSet>,
+}
+
+/// The terms of one degree and norm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TermSet {
+    /// The degree.
+    pub degree: usize,
+    /// The norm.
+    pub q_norm: f64,
+    /// Positions in the terms of all sets.
+    pub members: Vec<usize>,
+}
+
+impl Sets {
+    /// The sets of degree `min` and more of nested families, one a norm, the smallest norm first.
+    pub fn new(dimension: usize, min: usize, families: &[(f64, Nested)]) -> Self {
+        let mut known: BTreeMap<&[u16], usize> = BTreeMap::new();
+        let (mut exponents, mut sets) = (Vec::new(), Vec::<TermSet>::new());
+        let mut members = vec![Vec::new(); families.len()];
+        let degrees = families.iter().map(|(_, nested)| nested.counts.len()).max().unwrap_or(0);
+        for degree in 0..degrees {
+            for ((q_norm, nested), members) in families.iter().zip(&mut members) {
+                let Some(&count) = nested.counts.get(degree) else { continue };
+                let grows = count > members.len();
+                for t in members.len()..count {
+                    let term = nested.terms.term(t);
+                    members.push(*known.entry(term).or_insert_with(|| {
+                        exponents.extend(term);
+                        exponents.len() / dimension - 1
+                    }));
+                }
+                let last = sets.last();
+                let repeats = last.is_some_and(|l| l.degree == degree && l.members.len() == count);
+                if degree >= min && (grows || degree == min) && !repeats {
+                    let members = members.clone();
+                    sets.push(TermSet { degree, q_norm: *q_norm, members });
+                }
+            }
+        }
+        Self { terms: Terms { dimension, exponents }, sets }
+    }
+}
+
 /// The members of degree `p` that are not of degree `p - 1`.
 struct Shell {
     truncation: Truncation,

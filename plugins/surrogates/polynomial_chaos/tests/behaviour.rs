@@ -30,7 +30,7 @@ fn waves(n: usize, outputs: usize) -> (Matrix, Matrix) {
 fn a_planted_sparse_expansion_is_recovered() {
     let planted = [(0, 3.0), (4, -1.25), (17, 0.5), (60, 2.0), (200, -0.75)];
     let probe = ISHIGAMI.fit(&of_degree(1), &sobol(20, 3));
-    let nested = of_degree(10).nested(3);
+    let nested = of_degree(10).nested(3, 1.0);
     let basis = Basis::new(probe.basis_coordinates(), nested.terms.clone());
     for seed in 0..5 {
         let points = scaled(&latin_hypercube(80, 3, seed), ISHIGAMI.ranges);
@@ -72,7 +72,7 @@ fn an_output_that_varies_never_becomes_a_constant() {
 fn low_degrees_that_explain_nothing_do_not_end_the_search() {
     // P6(x1) P6(x2) is orthogonal to all terms of degree 11 and less.
     let probe = ISHIGAMI.fit(&of_degree(1), &sobol(20, 3));
-    let nested = of_degree(12).nested(3);
+    let nested = of_degree(12).nested(3, 1.0);
     let basis = Basis::new(probe.basis_coordinates(), nested.terms.clone());
     let points = scaled(&sobol(400, 3), ISHIGAMI.ranges);
     let t = (0..nested.terms.len()).find(|&t| nested.terms.term(t) == [6, 6, 0]).unwrap();

@@ -170,7 +170,7 @@ pub fn fitted_to(
 ) -> Result<Expansion, Stop> {
     let layout = layout(responses.columns());
     let training = Training { parameters, layout: &layout, points, responses };
-    fit::fit(options, &training, &Progress::new(&Silent))
+    fit::fit(options, &training, &Stream::root(1), &Progress::new(&Silent))
 }
 
 impl Function {

@@ -3,7 +3,9 @@
 use lacuna::math::distribution::Distribution;
 
 use super::bench::{of_degree, parameters, up_to};
-use crate::surrogates::polynomial_chaos::{Degree, DegreeRange, Family, PolynomialChaos, Solver};
+use crate::surrogates::polynomial_chaos::{
+    Degree, DegreeRange, Family, PolynomialChaos, QNorm, Solver,
+};
 
 fn parsed(json: &str) -> Result<PolynomialChaos, String> {
     serde_json::from_str(json).map_err(|e| e.to_string())
@@ -39,7 +41,8 @@ fn options_that_cannot_work_are_named() {
         options.faults(&three, runs).iter().map(|f| f.key).collect()
     };
     assert!(keys(&PolynomialChaos::default(), Some(100)).is_empty());
-    let wrong = PolynomialChaos { q_norm: 0.0, max_interaction: Some(0), ..of_degree(0) };
+    let wrong =
+        PolynomialChaos { q_norm: QNorm::Fixed(0.0), max_interaction: Some(0), ..of_degree(0) };
     assert_eq!(keys(&wrong, None), ["degree", "q_norm", "max_interaction"]);
     assert_eq!(keys(&PolynomialChaos { max_terms: 100, ..of_degree(20) }, None), ["degree"]);
     let dense = PolynomialChaos { solver: Solver::LeastSquares, ..of_degree(8) };

@@ -7,7 +7,9 @@ use lacuna::plugin::Emulator;
 use lacuna::plugin::surrogate::Linear;
 
 use super::bench::{fitted, latin_hypercube, of_degree, scaled};
-use crate::surrogates::polynomial_chaos::least_angle::{Dictionary, best_along_path};
+use crate::surrogates::polynomial_chaos::dictionary::Dictionary;
+use crate::surrogates::polynomial_chaos::judge::{Criterion, best_along};
+use crate::surrogates::polynomial_chaos::least_angle::LeastAngle;
 use crate::surrogates::polynomial_chaos::{EarlyStop, Expansion, PolynomialChaos, Solver};
 
 type Rows = Vec<Vec<f64>>;
@@ -259,7 +261,9 @@ fn terms_enter_in_the_order_of_the_explicit_path_when_there_are_more_terms_than_
         let mean = y.iter().sum::<f64>() / 150.0;
         let centred: Vec<f64> = y.iter().map(|v| v - mean).collect();
         let correlations = multiply_vector(dictionary.columns(), &centred);
-        let choice = best_along_path(&dictionary, &centred, &correlations, usize::MAX).unwrap();
+        let mut path = LeastAngle::new(&dictionary, &correlations);
+        let choice =
+            best_along(&mut path, &centred, &Criterion::LeaveOneOut, 148, usize::MAX).unwrap();
         assert!(choice.terms.len() > 25, "only {} terms", choice.terms.len());
         assert_eq!(choice.terms, slow_path(&psi, &y, choice.terms.len()), "seed {seed}");
     }

@@ -1,0 +1,147 @@
+//! `quadrature`: the nodes of a Gauss rule.
+
+mod rule;
+#[cfg(test)]
+mod tests;
+
+use lacuna::data::{Parameter, Unit};
+use lacuna::linalg::Matrix;
+use lacuna::math::distribution::Distribution;
+use lacuna::math::random::{Stream, uniform};
+use lacuna::plugin::{Component, Context, Design};
+use lacuna::run::Stop;
+use lacuna::study::problem::Complaints;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use rule::{Nodes, Rule};
+
+use crate::surrogates::polynomial_chaos::{Coordinate, Family, Recurrence};
+
+/// The nodes of a Gauss rule, for a `polynomial_chaos` surrogate with `solver = "quadrature"`.
+///
+/// The first runs are the nodes; runs beyond them are random points, which the surrogate can keep aside for
+/// validation: with 64 nodes, `runs = 80` here and `training = 64`, `validation = 16` in `[surrogate]`. A rule of level
+/// `l` integrates polynomials of total degree up to `2 l + 1` exactly, so that it finds an expansion of degree
+/// `l`. Good for smooth responses of few parameters; a run that fails cannot be left out.
+///
+/// References: Golub and Welsch, Mathematics of Computation 23 (1969) 221; Novak and Ritter, Numerische Mathematik
+/// 75 (1996) 79.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Quadrature {
+    /// How the parameters' rules make one.
+    pub rule: Rule,
+    /// The level: `level + 1` nodes of each parameter in the tensor rule. The largest with no more nodes
+    /// than runs when not given.
+    pub level: Option<usize>,
+    /// The polynomials of the rule; the same as the surrogate's `basis`.
+    pub basis: Family,
+}
+
+/// Levels beyond this are not looked for.
+const MOST_LEVELS: usize = 100;
+
+impl Quadrature {
+    fn coordinates(
+        &self,
+        parameters: &[Parameter],
+        level: usize,
+    ) -> Result<Vec<Coordinate>, String> {
+        parameters.iter().map(|p| Coordinate::new(self.basis, p, level + 1)).collect()
+    }
+
+    /// The rule with no more nodes than runs; none without runs or where one node has no place.
+    fn rule(
+        &self,
+        parameters: &[Parameter],
+        runs: usize,
+    ) -> Result<Option<(Vec<Coordinate>, Nodes)>, String> {
+        let of_level = |level: usize, limit: usize| {
+            let coordinates = self.coordinates(parameters, level)?;
+            let axes: Vec<Recurrence> =
+                coordinates.iter().map(|c| c.recurrence(level + 1)).collect();
+            Ok::<_, String>(self.rule.nodes(&axes, level, limit).map(|nodes| (coordinates, nodes)))
+        };
+        let Some(level) = self.level else {
+            let mut found = None;
+            for level in 0..MOST_LEVELS {
+                // A law with few moments ends the search; without the first level it has none.
+                match of_level(level, runs) {
+                    Ok(Some(rule)) => found = Some(rule),
+                    Err(fault) if level == 0 => return Err(fault),
+                    _ => break,
+                }
+            }
+            return Ok(found);
+        };
+        if let Some(rule) = of_level(level, runs)? {
+            return Ok(Some(rule));
+        }
+        let name = self.rule.name();
+        Err(match of_level(level, 1_000_000)? {
+            Some((_, Nodes { weights, .. })) => format!(
+                "the {name} rule of level {level} has {} nodes, but the design has {runs} runs",
+                weights.len()
+            ),
+            None => format!("the {name} rule of level {level} has more than a million nodes"),
+        })
+    }
+}
+
+impl Component for Quadrature {
+    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        let Some(runs) = context.runs else { return };
+        if let Err(fault) = self.rule(context.parameters, runs) {
+            let help = "give as many `runs` as there are nodes, or lower the `level`";
+            complaints.at("level").say(fault).help(help);
+        }
+    }
+}
+
+impl Design for Quadrature {
+    fn points(&self, count: usize, dimension: usize, stream: &Stream) -> Result<Matrix, Stop> {
+        // Without laws the coordinates themselves are uniform.
+        let parameter = |i: usize| Parameter {
+            name: format!("coordinate {}", i + 1),
+            symbol: String::new(),
+            unit: Unit::dimensionless(),
+            design: Distribution::Uniform([0.0, 1.0]),
+            prior: Distribution::Uniform([0.0, 1.0]),
+            reference: None,
+        };
+        let parameters: Vec<Parameter> = (0..dimension).map(parameter).collect();
+        self.place(&parameters, count, stream)
+    }
+
+    fn place(
+        &self,
+        parameters: &[Parameter],
+        count: usize,
+        stream: &Stream,
+    ) -> Result<Matrix, Stop> {
+        let mut points = Matrix::zeros(0, parameters.len());
+        if count > 0 && !parameters.is_empty() {
+            let rule = self.rule(parameters, count).map_err(Stop::new)?;
+            for (coordinates, nodes) in rule.iter() {
+                for node in nodes.points.iter_rows() {
+                    let unit = |((z, c), p): ((&f64, &Coordinate), &Parameter)| {
+                        // Inside the open cube, however far out the node lies.
+                        p.design.cdf(c.parameter(*z)).clamp(f64::MIN_POSITIVE, 1.0 - 1e-16)
+                    };
+                    let place: Vec<f64> =
+                        node.iter().zip(coordinates).zip(parameters).map(unit).collect();
+                    points.push_row(&place);
+                }
+            }
+        }
+        for i in points.rows()..count {
+            let mut rng = stream.at(i as u64).generator();
+            let place: Vec<f64> = parameters.iter().map(|_| uniform(&mut rng)).collect();
+            points.push_row(&place);
+        }
+        Ok(points)
+    }
+}
+
+lacuna::register!(Design, "quadrature", Quadrature);

@@ -1,0 +1,154 @@
+//! The basis functions at the runs, and sets of them that grow one by one.
+
+use lacuna::linalg::{Matrix, PackedUpper, gram, multiply, vector};
+
+/// A new column whose share outside the span of the active ones is below this is dependent on them.
+const DEPENDENT: f64 = 1e-8;
+
+/// The basis functions of one set at the runs, standardised, with all that outputs share.
+pub(super) struct Dictionary {
+    /// Standardised basis functions, `terms x runs`; zero for those that are constant over the runs.
+    columns: Matrix,
+    gram: Matrix,
+    means: Vec<f64>,
+    /// The length of each centred basis function; zero marks a constant.
+    lengths: Vec<f64>,
+}
+
+impl Dictionary {
+    /// From the basis functions at the runs, `runs x terms`.
+    pub fn new(basis: &Matrix) -> Self {
+        let mut columns = basis.transposed();
+        let runs = columns.columns();
+        let (mut means, mut lengths) = (Vec::new(), Vec::new());
+        for t in 0..columns.rows() {
+            let column = columns.row_mut(t);
+            let size = vector::norm(column);
+            let mean = column.iter().sum::<f64>() / runs as f64;
+            for x in &mut *column {
+                *x -= mean;
+            }
+            let length = vector::norm(column);
+            let varies = length > 1e-10 * size;
+            for x in column {
+                *x = if varies { *x / length } else { 0.0 };
+            }
+            means.push(mean);
+            lengths.push(if varies { length } else { 0.0 });
+        }
+        let gram = gram(&columns.transposed());
+        Self { columns, gram, means, lengths }
+    }
+
+    /// The standardised basis functions, `terms x runs`.
+    pub fn columns(&self) -> &Matrix {
+        &self.columns
+    }
+
+    /// Their inner products.
+    pub fn gram(&self) -> &Matrix {
+        &self.gram
+    }
+
+    /// Whether each basis function varies over the runs.
+    pub fn varies(&self) -> impl Iterator<Item = bool> {
+        self.lengths.iter().map(|length| *length > 0.0)
+    }
+
+    /// The most terms that a fit may have besides the constant, with a run to spare.
+    pub fn most_terms(&self) -> usize {
+        let runs = self.columns.columns();
+        runs.saturating_sub(2).min(self.varies().filter(|varies| *varies).count())
+    }
+}
+
+/// Some columns of a dictionary and the factors of their Gram matrix, kept up to date while columns
+/// are added.
+#[derive(Clone)]
+pub(super) struct ActiveSet<'a> {
+    dictionary: &'a Dictionary,
+    terms: Vec<usize>,
+    /// The active columns, `active x runs`.
+    columns: Matrix,
+    /// The inverse `R^-1` of the Cholesky factor of the active Gram matrix `G = R' R`.
+    inverse: PackedUpper,
+    /// `tr (Psi' Psi)^-1` after each step, for the basis functions as they are and the constant.
+    traces: Vec<f64>,
+}
+
+impl<'a> ActiveSet<'a> {
+    pub fn new(dictionary: &'a Dictionary) -> Self {
+        Self {
+            dictionary,
+            terms: Vec::new(),
+            columns: Matrix::zeros(0, dictionary.columns.columns()),
+            inverse: PackedUpper::new(),
+            traces: Vec::new(),
+        }
+    }
+
+    /// The active terms in the order in which they entered.
+    pub fn terms(&self) -> &[usize] {
+        &self.terms
+    }
+
+    /// Adds a term; the new column of `R^-1`, or none when the term depends linearly on those there.
+    pub fn enter(&mut self, term: usize) -> Option<Vec<f64>> {
+        let gram = self.dictionary.gram.row(term);
+        let products: Vec<f64> = self.terms.iter().map(|&t| gram[t]).collect();
+        let projections = self.inverse.transposed_multiply(&products);
+        let outside = 1.0 - vector::dot(&projections, &projections);
+        if outside < DEPENDENT {
+            return None;
+        }
+        let scale = outside.sqrt().recip();
+        let mut next = self.inverse.multiply(&projections);
+        for x in &mut next {
+            *x *= -scale;
+        }
+        next.push(scale);
+
+        self.terms.push(term);
+        self.columns.push_row(self.dictionary.columns.row(term));
+        self.traces.push(self.traces.last().copied().unwrap_or(0.0) + self.trace_of(&next));
+        self.inverse.push(&next);
+        Some(next)
+    }
+
+    /// What one column of `R^-1` adds to `tr (Psi' Psi)^-1` of the basis functions as they are.
+    ///
+    /// With `D` the lengths and `m` the means of the centred functions, the inverse Gram matrix with
+    /// the constant has the trace `1/N + |D^-1 R^-1|^2 + |m' D^-1 R^-1|^2`.
+    fn trace_of(&self, column: &[f64]) -> f64 {
+        let (mut squares, mut shift) = (0.0, 0.0);
+        for (x, &t) in column.iter().zip(&self.terms) {
+            let scaled = x / self.dictionary.lengths[t];
+            squares += scaled * scaled;
+            shift += scaled * self.dictionary.means[t];
+        }
+        squares + shift * shift
+    }
+
+    /// `tr (Psi' Psi)^-1` of the first `k` active terms and the constant.
+    pub fn trace(&self, k: usize) -> f64 {
+        1.0 / self.columns.columns() as f64 + if k == 0 { 0.0 } else { self.traces[k - 1] }
+    }
+
+    /// The orthonormal columns that the steps from `first` on added, one a row.
+    pub fn orthonormal(&self, first: usize) -> Matrix {
+        let k = self.terms.len();
+        let mut block = Matrix::zeros(k - first, k);
+        for i in first..k {
+            block.row_mut(i - first)[..=i].copy_from_slice(self.inverse.column(i));
+        }
+        multiply(&block, &self.columns)
+    }
+
+    /// The least-squares weights of the active columns for an output with these products with all
+    /// columns, and the sum of squares that they explain.
+    pub fn solve(&self, correlations: &[f64]) -> (Vec<f64>, f64) {
+        let own: Vec<f64> = self.terms.iter().map(|&t| correlations[t]).collect();
+        let projections = self.inverse.transposed_multiply(&own);
+        (self.inverse.multiply(&projections), vector::dot(&projections, &projections))
+    }
+}

@@ -1,0 +1,263 @@
+//! The search for each output's best terms over degrees and norms.
+
+use std::collections::BTreeMap;
+
+use lacuna::linalg::{Matrix, multiply_transposed};
+use lacuna::run::{Progress, Stop};
+use rayon::prelude::*;
+
+use super::PolynomialChaos;
+use super::bayesian::bayesian;
+use super::coordinate::Coordinate;
+use super::dictionary::Dictionary;
+use super::judge::{Choice, Criterion, best_along};
+use super::least_angle::LeastAngle;
+use super::least_squares::{Fit, Regression};
+use super::matching_pursuit::MatchingPursuit;
+use super::options::Solver;
+use super::quadrature::Projection;
+use super::subspace_pursuit::subspace_pursuit;
+use super::terms::{Basis, Sets, TermSet};
+
+/// A fit whose relative error is below this is exact; no higher degree is tried.
+const EXACT: f64 = 1e-26;
+/// A search whose best relative error is above this has found nothing yet and must not be ended.
+const USELESS: f64 = 0.5;
+/// Norms of one degree that were worse in a row before the next degree is tried.
+const WORSE_NORMS: usize = 2;
+
+/// One output over the runs.
+pub(super) struct Output {
+    pub mean: f64,
+    /// The values less their mean.
+    pub centred: Vec<f64>,
+    /// Divided by the number of runs; zero for outputs that do not vary.
+    pub variance: f64,
+}
+
+/// The terms of one output.
+#[derive(Debug, Clone)]
+pub(super) struct Best {
+    pub error: f64,
+    pub degree: usize,
+    pub q_norm: f64,
+    /// Positions in the terms of all sets, the constant first.
+    pub terms: Vec<usize>,
+}
+
+/// The best fit of one output so far.
+#[derive(Debug, Clone, Default)]
+struct State {
+    best: Option<Best>,
+    /// Degrees in a row that were worse than the best.
+    worse: usize,
+    done: bool,
+    /// The same for the norms of the present degree.
+    of_degree: Option<Best>,
+    worse_norms: usize,
+}
+
+/// The search and all that outputs share in it.
+pub(super) struct Search<'a> {
+    pub options: &'a PolynomialChaos,
+    pub points: &'a Matrix,
+    pub coordinates: &'a [Coordinate],
+    pub sets: &'a Sets,
+    pub criterion: &'a Criterion,
+    /// The weights of the runs, for projections.
+    pub projection: Option<&'a Projection>,
+}
+
+impl Search<'_> {
+    /// Tries one set after the other for all outputs that still improve. None for outputs that do not
+    /// vary, or with which no basis function varies.
+    pub fn run(
+        &self,
+        outputs: &[Output],
+        progress: &Progress<'_>,
+    ) -> Result<Vec<Option<Best>>, Stop> {
+        let mut states = vec![State::default(); outputs.len()];
+        for (state, output) in states.iter_mut().zip(outputs) {
+            state.done = output.variance == 0.0;
+        }
+        let count = |states: &[State]| states.iter().filter(|s| s.done).count() as u64;
+        let mut reported = count(&states);
+        progress.add(reported);
+        for of_degree in self.sets.sets.chunk_by(|a, b| a.degree == b.degree) {
+            let tried: Vec<usize> = (0..outputs.len()).filter(|&o| !states[o].done).collect();
+            if tried.is_empty() {
+                break;
+            }
+            for set in of_degree.iter().filter(|set| self.is_possible(set)) {
+                let active: Vec<usize> = tried
+                    .iter()
+                    .copied()
+                    .filter(|&o| states[o].worse_norms < WORSE_NORMS)
+                    .collect();
+                for (&o, found) in active.iter().zip(self.on_set(set, outputs, &active)?) {
+                    states[o].take_norm(found);
+                }
+            }
+            tried.iter().for_each(|&o| states[o].take_degree(self.options.early_stop.degrees));
+            progress.add(count(&states) - reported);
+            reported = count(&states);
+        }
+        progress.add(outputs.len() as u64 - reported);
+        Ok(states.into_iter().map(|s| s.best).collect())
+    }
+
+    /// Whether the runs determine all terms, where all are fitted.
+    fn is_possible(&self, set: &TermSet) -> bool {
+        match (self.options.solver, self.projection) {
+            (Solver::LeastSquares, _) => set.members.len() < self.points.rows(),
+            (Solver::Quadrature, Some(projection)) => set.degree <= projection.level,
+            _ => true,
+        }
+    }
+
+    /// The basis functions of some terms at the runs, `runs x terms`.
+    fn basis(&self, terms: &[usize]) -> Matrix {
+        Basis::new(self.coordinates.to_vec(), self.sets.terms.select(terms)).values(self.points)
+    }
+
+    /// The best fit of each active output on one set.
+    fn on_set(
+        &self,
+        set: &TermSet,
+        outputs: &[Output],
+        active: &[usize],
+    ) -> Result<Vec<Option<Best>>, Stop> {
+        let all = |o: usize, fit: Fit| {
+            let terms = set.members.clone();
+            (outputs[o].variance > 0.0).then_some(Best {
+                error: fit.relative,
+                degree: set.degree,
+                q_norm: set.q_norm,
+                terms,
+            })
+        };
+        match self.options.solver {
+            Solver::LeastSquares | Solver::Quadrature => {
+                let fits = self.fits(&set.members, outputs, active)?;
+                Ok(active.iter().zip(fits).map(|(&o, fit)| all(o, fit)).collect())
+            }
+            _ => Ok(self.sparse(set, outputs, active)),
+        }
+    }
+
+    fn sparse(&self, set: &TermSet, outputs: &[Output], active: &[usize]) -> Vec<Option<Best>> {
+        let dictionary = Dictionary::new(&self.basis(&set.members));
+        let runs = self.points.rows();
+        let centred = Matrix::from_rows(runs, active.iter().map(|&o| &outputs[o].centred));
+        let correlations = multiply_transposed(&centred, dictionary.columns());
+        let best = |i: usize| {
+            let choice = self.choose(&dictionary, centred.row(i), correlations.row(i))?;
+            let mut terms = vec![set.members[0]];
+            terms.extend(choice.terms.iter().map(|&t| set.members[t]));
+            terms.sort_unstable();
+            Some(Best { error: choice.error, degree: set.degree, q_norm: set.q_norm, terms })
+        };
+        (0..active.len()).into_par_iter().map(best).collect()
+    }
+
+    /// The solver's choice for one output.
+    fn choose(
+        &self,
+        dictionary: &Dictionary,
+        centred: &[f64],
+        correlations: &[f64],
+    ) -> Option<Choice> {
+        let (most, criterion) = (dictionary.most_terms(), self.criterion);
+        let window = self.options.early_stop.window(centred.len());
+        match self.options.solver {
+            Solver::OrthogonalMatchingPursuit => {
+                let mut path = MatchingPursuit::new(dictionary, correlations);
+                best_along(&mut path, centred, criterion, most, window)
+            }
+            Solver::SubspacePursuit => {
+                subspace_pursuit(dictionary, centred, correlations, criterion)
+            }
+            Solver::BayesianCompressiveSensing => {
+                bayesian(dictionary, centred, correlations, criterion)
+            }
+            _ => {
+                let mut path = LeastAngle::new(dictionary, correlations);
+                best_along(&mut path, centred, criterion, most, window)
+            }
+        }
+    }
+
+    /// The fits of all outputs on their chosen terms; outputs with the same terms share the work. None
+    /// for outputs without any.
+    pub fn refit(
+        &self,
+        outputs: &[Output],
+        found: &[Option<Best>],
+    ) -> Result<Vec<Option<Fit>>, Stop> {
+        let mut groups: BTreeMap<&[usize], Vec<usize>> = BTreeMap::new();
+        for (o, best) in found.iter().enumerate() {
+            if let Some(best) = best {
+                groups.entry(&best.terms).or_default().push(o);
+            }
+        }
+        let fitted: Vec<Vec<Fit>> = (groups.par_iter())
+            .map(|(terms, members)| self.fits(terms, outputs, members))
+            .collect::<Result<_, _>>()?;
+        let mut fits: Vec<Option<Fit>> = outputs.iter().map(|_| None).collect();
+        for (&o, fit) in groups.values().flatten().zip(fitted.into_iter().flatten()) {
+            fits[o] = Some(fit);
+        }
+        Ok(fits)
+    }
+
+    /// The fits of some outputs on the same terms.
+    fn fits(&self, terms: &[usize], outputs: &[Output], which: &[usize]) -> Result<Vec<Fit>, Stop> {
+        let basis = self.basis(terms);
+        if let Some(projection) = self.projection {
+            let projected = projection.on(&basis);
+            return Ok(which.par_iter().map(|&o| projected.fit(&outputs[o])).collect());
+        }
+        let regression = Regression::new(&basis, self.criterion).ok_or_else(dependent)?;
+        let fit = |&o: &usize| {
+            let Output { mean, centred, variance } = &outputs[o];
+            regression.fit(*mean, centred, *variance)
+        };
+        Ok(which.par_iter().map(fit).collect())
+    }
+}
+
+fn dependent() -> Stop {
+    Stop::new("the basis functions are linearly dependent on these runs")
+        .help("lower `surrogate.degree`, or use a design without repeated points")
+}
+
+impl State {
+    /// Compares the fit with one more norm with the best of this degree.
+    fn take_norm(&mut self, found: Option<Best>) {
+        let least = self.of_degree.as_ref().map_or(f64::INFINITY, |b| b.error);
+        match found {
+            Some(found) if self.of_degree.is_none() || found.error < least => {
+                self.worse_norms = 0;
+                self.of_degree = Some(found);
+            }
+            _ => self.worse_norms += 1,
+        }
+    }
+
+    /// Compares the best of one more degree with the best so far.
+    fn take_degree(&mut self, patience: usize) {
+        self.worse_norms = 0;
+        let least = self.best.as_ref().map_or(f64::INFINITY, |b| b.error);
+        match self.of_degree.take() {
+            Some(found) if self.best.is_none() || found.error < least => {
+                self.done = found.error <= EXACT;
+                self.worse = 0;
+                self.best = Some(found);
+            }
+            _ => {
+                self.worse += 1;
+                self.done = patience > 0 && self.worse >= patience && least < USELESS;
+            }
+        }
+    }
+}
