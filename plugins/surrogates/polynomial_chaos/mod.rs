@@ -1,6 +1,6 @@
 //! `polynomial_chaos`: expansions in orthonormal polynomials of the parameters.
 
-mod bytes;
+pub(super) mod bytes;
 mod candidates;
 mod emulator;
 mod family;
@@ -11,6 +11,7 @@ mod options;
 mod sensitivity;
 mod squares;
 mod terms;
+mod trend;
 
 #[cfg(test)]
 mod tests;
@@ -26,6 +27,7 @@ use serde::{Deserialize, Serialize};
 
 pub use emulator::{Expansion, Summary};
 pub use family::{Coordinate, Family};
+pub(super) use fit::check_numbers;
 pub use options::{Degree, DegreeRange, EarlyStop, Solver};
 pub use terms::{Basis, Nested, Terms, Truncation};
 
