@@ -1,4 +1,7 @@
 //! Surrogates.
 
+pub mod gaussian_process;
+pub mod kriging;
 pub mod polynomial_chaos;
+pub mod polynomial_chaos_kriging;
 pub mod principal_components;

@@ -9,6 +9,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum Components {
+    /// The outputs themselves, each of which that varies is its own component.
+    None,
     /// As many as carry this share of the variance of all outputs over the runs, such as `{ variance = 0.9999 }`.
     Variance(f64),
     /// This many, such as `{ count = 20 }`.
@@ -46,6 +48,9 @@ impl Components {
         let mean: Vec<f64> =
             (0..outputs).map(|j| responses.column(j).iter().sum::<f64>() / runs as f64).collect();
         let centred = Matrix::from_fn(runs, outputs, |i, j| responses[(i, j)] - mean[j]);
+        if *self == Self::None {
+            return Ok(PrincipalComponents::of_outputs(mean, &centred));
+        }
         let svd = linalg::thin_svd(&centred)
             .map_err(|e| Stop::new(format!("the principal components of the outputs: {e}")))?;
         let rank = self.rank(&svd.values);
@@ -61,6 +66,7 @@ impl Components {
         let largest = singular_values.first().copied().unwrap_or(0.0);
         let real = singular_values.iter().take_while(|&&s| s > 1e-14 * largest).count();
         match *self {
+            Self::None => real,
             Self::Count(count) => count.min(real),
             Self::Variance(share) => {
                 let total: f64 = singular_values.iter().map(|s| s * s).sum();
@@ -77,6 +83,22 @@ impl Components {
 }
 
 impl PrincipalComponents {
+    /// Each output that varies by more than round-off as its own component, in the order of the outputs.
+    fn of_outputs(mean: Vec<f64>, centred: &Matrix) -> Self {
+        let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
+        let size = largest(centred.as_slice()).max(largest(&mean));
+        let varies = |j: &usize| largest(&centred.column(*j)) > 1e-13 * size;
+        let varying: Vec<usize> = (0..mean.len()).filter(varies).collect();
+        let scores = centred.select_columns(&varying);
+        let entry = |j: usize, k: usize| f64::from(u8::from(varying[k] == j));
+        let directions = Matrix::from_fn(mean.len(), varying.len(), entry);
+        let mut remainder = centred.clone();
+        for i in 0..remainder.rows() {
+            varying.iter().for_each(|&j| remainder[(i, j)] = 0.0);
+        }
+        Self { mean, directions, scores, remainder }
+    }
+
     /// The mean square of what the components leave out of each output over the runs.
     pub fn truncation(&self) -> Vec<f64> {
         let runs = self.remainder.rows() as f64;
@@ -103,6 +125,21 @@ mod tests {
         let left: f64 = two.truncation().iter().sum();
         let third: f64 = found.scores.column(2).iter().map(|s| s * s).sum::<f64>() / 40.0;
         assert!((left - third).abs() < 1e-12 * third);
+    }
+
+    #[test]
+    fn outputs_can_be_their_own_components() {
+        let responses =
+            Matrix::from_fn(6, 3, |i, j| if j == 1 { 5.0 } else { (i * (j + 2)) as f64 });
+        let found = Components::None.of(&responses).unwrap();
+        assert_eq!((found.scores.columns(), found.mean[1]), (2, 5.0));
+        let back = linalg::multiply_transposed(&found.scores, &found.directions);
+        for i in 0..6 {
+            for j in 0..3 {
+                let whole = found.mean[j] + back[(i, j)] + found.remainder[(i, j)];
+                assert!((whole - responses[(i, j)]).abs() < 1e-14);
+            }
+        }
     }
 
     #[test]

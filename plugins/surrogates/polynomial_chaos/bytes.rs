@@ -4,24 +4,51 @@ use lacuna::run::Stop;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// The first bytes of a file; the last one is the version of its layout.
-const MAGIC: &[u8] = b"lacuna polynomial_chaos 2\n";
+const NAME: &str = "polynomial_chaos";
+
+/// [`write_as`] for this plugin.
+pub(super) fn write(header: &impl Serialize, numbers: &[&[f64]]) -> Result<Vec<u8>, Stop> {
+    write_as(NAME, header, numbers)
+}
+
+/// [`read_as`] for this plugin.
+pub(super) fn read<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Vec<f64>), Stop> {
+    read_as(NAME, bytes)
+}
+
+/// [`damaged_as`] for this plugin.
+pub(super) fn damaged() -> Stop {
+    damaged_as(NAME)
+}
+
+/// The first bytes of a plugin's file; the last one is the version of its layout.
+fn magic(plugin: &str) -> Vec<u8> {
+    format!("lacuna {plugin} 2\n").into_bytes()
+}
 
 /// The magic, the header's length (8 bytes, little-endian), the header, the numbers (little-endian).
-pub(super) fn write(header: &impl Serialize, numbers: &[&[f64]]) -> Result<Vec<u8>, Stop> {
+pub(in crate::surrogates) fn write_as(
+    plugin: &str,
+    header: &impl Serialize,
+    numbers: &[&[f64]],
+) -> Result<Vec<u8>, Stop> {
     let header = serde_json::to_vec(header)
         .map_err(|error| Stop::new(format!("the surrogate cannot be saved: {error}")))?;
-    let mut bytes = MAGIC.to_vec();
+    let mut bytes = magic(plugin);
     bytes.extend((header.len() as u64).to_le_bytes());
     bytes.extend(header);
     bytes.extend(numbers.iter().copied().flatten().flat_map(|x| x.to_le_bytes()));
     Ok(bytes)
 }
 
-/// The header and the numbers of what [`write`] wrote.
-pub(super) fn read<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Vec<f64>), Stop> {
-    let rest = bytes.strip_prefix(MAGIC).ok_or_else(|| {
-        Stop::new("the saved surrogate is no `polynomial_chaos` surrogate of this version")
+/// The header and the numbers of what [`write_as`] wrote.
+pub(in crate::surrogates) fn read_as<H: DeserializeOwned>(
+    plugin: &str,
+    bytes: &[u8],
+) -> Result<(H, Vec<f64>), Stop> {
+    let damaged = || damaged_as(plugin);
+    let rest = bytes.strip_prefix(&magic(plugin)[..]).ok_or_else(|| {
+        Stop::new(format!("the saved surrogate is no `{plugin}` surrogate of this version"))
             .help("remove it, so that it is fitted again")
     })?;
     let (length, rest) = rest.split_first_chunk::<8>().ok_or_else(damaged)?;
@@ -35,8 +62,8 @@ pub(super) fn read<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Vec<f64>), S
     Ok((header, numbers.iter().map(|x| f64::from_le_bytes(*x)).collect()))
 }
 
-/// The file is not whole.
-pub(super) fn damaged() -> Stop {
-    Stop::new("the saved `polynomial_chaos` surrogate is damaged")
+/// A plugin's file is not whole.
+pub(in crate::surrogates) fn damaged_as(plugin: &str) -> Stop {
+    Stop::new(format!("the saved `{plugin}` surrogate is damaged"))
         .help("remove it, so that it is fitted again")
 }

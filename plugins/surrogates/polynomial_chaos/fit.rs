@@ -73,7 +73,7 @@ pub(super) fn fit(
 }
 
 /// Refuses numbers that no regression can take, naming where they are.
-fn check_numbers(training: &Training<'_>) -> Result<(), Stop> {
+pub(in crate::surrogates) fn check_numbers(training: &Training<'_>) -> Result<(), Stop> {
     let Training { parameters, layout, points, responses } = training;
     if points.rows() != responses.rows() || points.rows() < 3 {
         return Err(Stop::new(format!(

@@ -1,7 +1,7 @@
 //! `polynomial_chaos`: expansions in orthonormal polynomials of the parameters.
 
 mod bayesian;
-mod bytes;
+pub(super) mod bytes;
 mod candidates;
 mod coordinate;
 mod dictionary;
@@ -21,6 +21,7 @@ mod sensitivity;
 mod squares;
 mod subspace_pursuit;
 mod terms;
+mod trend;
 
 #[cfg(test)]
 mod tests;
@@ -39,6 +40,7 @@ use crate::surrogates::principal_components::Components;
 pub use coordinate::Coordinate;
 pub use emulator::{Expansion, Reduction, Summary};
 pub use family::Family;
+pub(super) use fit::check_numbers;
 pub use options::{Degree, DegreeRange, EarlyStop, QNorm, QNormRange, Selection, Solver};
 pub use recurrence::Recurrence;
 pub use terms::{Basis, Nested, Sets, TermSet, Terms, Truncation};

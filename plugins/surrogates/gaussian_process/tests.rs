@@ -1,0 +1,223 @@
+//! Beside a peer: the figures of scikit-learn were made with version 1.9.1 on the same runs.
+
+use super::*;
+use lacuna::data::{Axis, Layout, Parameter, Unit};
+use lacuna::linalg::Matrix;
+use lacuna::math::distribution::Distribution;
+use lacuna::run::Silent;
+
+/// Points of the unit cube by the additive recurrence of Roberts (2018), which any language repeats.
+pub(in crate::surrogates) fn recurrence(skip: usize, count: usize, dimension: usize) -> Matrix {
+    let mut root = 2.0_f64;
+    for _ in 0..200 {
+        root = (1.0 + root).powf(1.0 / (dimension + 1) as f64);
+    }
+    Matrix::from_fn(count, dimension, |i, k| {
+        (0.5 + (skip + i + 1) as f64 / root.powi(k as i32 + 1)).fract()
+    })
+}
+
+pub(in crate::surrogates) fn unit_parameters(dimension: usize) -> Vec<Parameter> {
+    let parameter = |k: usize| Parameter {
+        name: format!("x{k}"),
+        symbol: format!("x{k}"),
+        unit: Unit::dimensionless(),
+        design: Distribution::Uniform([0.0, 1.0]),
+        prior: Distribution::Uniform([0.0, 1.0]),
+        reference: None,
+    };
+    (1..=dimension).map(parameter).collect()
+}
+
+pub(in crate::surrogates) fn layout(outputs: usize) -> Layout {
+    let places = (0..outputs).map(|j| j as f64).collect();
+    Layout {
+        name: "y".into(),
+        unit: Unit::dimensionless(),
+        axes: vec![Axis::grid("place", places, Unit::dimensionless())],
+    }
+}
+
+/// Ten outputs of three inputs in the manner of Ishigami and Homma.
+fn ten(points: &Matrix) -> Matrix {
+    use std::f64::consts::PI;
+    let rows = points.iter_rows().map(|u| {
+        let x: Vec<f64> = u.iter().map(|u| (2.0 * u - 1.0) * PI).collect();
+        let output = |j: usize| {
+            let j = j as f64;
+            (x[0] + 0.15 * j).sin()
+                + (7.0 - 0.3 * j) * (x[1] + 0.05 * j).sin().powi(2)
+                + 0.1 * x[2].powi(4) * x[0].sin() / (1.0 + 0.1 * j)
+                + (x[1] * x[2] / (2.0 + j)).tanh()
+        };
+        (0..10).map(output).collect::<Vec<f64>>()
+    });
+    Matrix::from_rows(10, rows)
+}
+
+pub(in crate::surrogates) fn rmse(found: &Matrix, exact: &Matrix) -> Vec<f64> {
+    let error = |j: usize| {
+        let pairs = found.column(j).into_iter().zip(exact.column(j));
+        (pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>() / found.rows() as f64).sqrt()
+    };
+    (0..found.columns()).map(error).collect()
+}
+
+/// Branin's function (Dixon and Szego 1978), its domain the unit square.
+fn branin(u: &[f64]) -> f64 {
+    use std::f64::consts::PI;
+    let (x, y) = (15.0 * u[0] - 5.0, 15.0 * u[1]);
+    let bent = y - 5.1 / (4.0 * PI * PI) * x * x + 5.0 / PI * x - 6.0;
+    bent * bent + 10.0 * (1.0 - 1.0 / (8.0 * PI)) * x.cos() + 10.0
+}
+
+/// The function of Ishigami and Homma (1990), its domain the unit cube.
+pub(in crate::surrogates) fn ishigami(u: &[f64]) -> f64 {
+    let x: Vec<f64> = u.iter().map(|u| (2.0 * u - 1.0) * std::f64::consts::PI).collect();
+    x[0].sin() + 7.0 * x[1].sin().powi(2) + 0.1 * x[2].powi(4) * x[0].sin()
+}
+
+/// A function at 100 runs of the recurrence, and at 2000 further points.
+pub(in crate::surrogates) struct Case {
+    pub parameters: Vec<Parameter>,
+    pub layout: Layout,
+    pub points: Matrix,
+    pub responses: Matrix,
+    pub fresh: Matrix,
+    pub exact: Matrix,
+}
+
+impl Case {
+    pub fn new(dimension: usize, f: impl Fn(&[f64]) -> f64) -> Self {
+        let (points, fresh) = (recurrence(0, 100, dimension), recurrence(100, 2000, dimension));
+        let at = |points: &Matrix| Matrix::from_rows(1, points.iter_rows().map(|u| [f(u)]));
+        let (responses, exact) = (at(&points), at(&fresh));
+        let (parameters, layout) = (unit_parameters(dimension), layout(1));
+        Self { parameters, layout, points, responses, fresh, exact }
+    }
+
+    pub fn training(&self) -> Training<'_> {
+        let Self { parameters, layout, points, responses, .. } = self;
+        Training { parameters, layout, points, responses }
+    }
+}
+
+/// Source: scikit-learn 1.9.1, `GaussianProcessRegressor(ConstantKernel(1, (1e-3, 1e6)) * k, alpha=1e-10,
+/// normalize_y=True, n_restarts_optimizer=8, random_state=0)` with `k` of length scales 0.5 between 1e-2 and 1e2.
+#[test]
+fn errors_are_not_above_those_of_a_peer() {
+    let cases = [
+        (Case::new(2, branin), [0.038_527, 0.740_454, 0.000_614_06]),
+        (Case::new(3, ishigami), [1.153_070, 1.225_075, 0.871_071]),
+    ];
+    let kernels = [Kernel::Matern52, Kernel::Matern32, Kernel::SquaredExponential];
+    for (case, peers) in &cases {
+        for (kernel, peer) in kernels.into_iter().zip(peers) {
+            let options = GaussianProcess { kernel, ..GaussianProcess::default() };
+            let emulator =
+                options.krige(&case.training(), &Stream::root(1), &Progress::new(&Silent)).unwrap();
+            let error = rmse(&emulator.mean(&case.fresh), &case.exact)[0];
+            println!("{kernel:?}: {error:.3e}, peer {peer:.3e}, {:?}", emulator.facts());
+            assert!(error < 1.05 * peer, "{kernel:?}: {error} {peer}");
+        }
+    }
+}
+
+/// Within how many standard errors the truth lies: of 2000 points about 95 % within 1.96 if the variance is
+/// right; a likelihood estimate from 100 runs of one function is not that exact.
+#[test]
+fn the_variance_covers_the_error() {
+    for trend in [Trend::Constant, Trend::Linear] {
+        let case = Case::new(3, ishigami);
+        let options = GaussianProcess { trend, ..GaussianProcess::default() };
+        let emulator =
+            options.krige(&case.training(), &Stream::root(1), &Progress::new(&Silent)).unwrap();
+        let (mean, variance) =
+            (emulator.mean(&case.fresh), emulator.variance(&case.fresh).unwrap());
+        let inside = (0..2000).filter(|&i| {
+            (mean[(i, 0)] - case.exact[(i, 0)]).abs() < 1.96 * variance[(i, 0)].sqrt()
+        });
+        let share = inside.count() as f64 / 2000.0;
+        assert!((0.85..=0.999).contains(&share), "{share}");
+    }
+}
+
+/// Noise of a known variance that the nugget must find: its share of the process's variance times that variance.
+#[test]
+fn noise_is_found() {
+    let mut case = Case::new(2, |u| 3.0 * (4.0 * u[0]).sin() + u[1]);
+    let mut rng = Stream::root(3).generator();
+    for y in case.responses.as_mut_slice() {
+        *y += 0.2 * lacuna::math::random::normal(&mut rng);
+    }
+    let emulator = GaussianProcess::default()
+        .krige(&case.training(), &Stream::root(1), &Progress::new(&Silent))
+        .unwrap();
+    // The variance of a new run is that of the noise where runs are dense; 100 runs tell it to 1/sqrt(50).
+    let variance = emulator.variance(&case.fresh).unwrap();
+    let typical = variance.as_slice().iter().sum::<f64>() / 2000.0;
+    assert!((0.6..1.5).contains(&(typical / 0.04)), "{typical}");
+    assert!(rmse(&emulator.mean(&case.fresh), &case.exact)[0] < 0.1);
+    // Left out runs carry their noise.
+    let error = emulator.fit_error();
+    let left_out: f64 = error.residuals.as_slice().iter().map(|e| e * e).sum::<f64>() / 100.0;
+    assert!((0.6..1.6).contains(&(left_out / 0.04)), "{left_out}");
+}
+
+#[test]
+fn options_are_read_as_written() {
+    let read = |text: &str| lacuna::plugin::registry::from_text::<dyn Surrogate>(NAME, text);
+    for sound in [
+        "nugget = \"estimated\"",
+        "nugget = 0",
+        "nugget = 1e-6",
+        "components = \"none\"",
+        "components = { count = 3 }",
+        "bounds = { length_scale = [0.1, 10.0] }",
+    ] {
+        assert!(read(sound).is_ok(), "{sound}");
+    }
+    for wrong in ["nugget = \"guessed\"", "kernel = \"cubic\"", "components = { share = 1 }"] {
+        assert!(read(wrong).is_err(), "{wrong}");
+    }
+}
+
+#[test]
+#[ignore = "a timing; run it alone with RAYON_NUM_THREADS=1"]
+fn ten_outputs_of_480_runs() {
+    let (points, fresh) = (recurrence(0, 480, 3), recurrence(480, 200, 3));
+    let (responses, exact) = (ten(&points), ten(&fresh));
+    let (parameters, layout) = (unit_parameters(3), layout(10));
+    let training = Training {
+        parameters: &parameters,
+        layout: &layout,
+        points: &points,
+        responses: &responses,
+    };
+    for kernel in [Kernel::Matern52, Kernel::SquaredExponential] {
+        for (length_scales, components) in [
+            (LengthScales::Each, Components::None),
+            (LengthScales::Each, Components::Variance(0.99999)),
+            (LengthScales::Shared, Components::None),
+        ] {
+            let options =
+                GaussianProcess { kernel, length_scales, components, ..GaussianProcess::default() };
+            let start = std::time::Instant::now();
+            let emulator =
+                options.krige(&training, &Stream::root(1), &Progress::new(&Silent)).unwrap();
+            let seconds = start.elapsed().as_secs_f64();
+            let start = std::time::Instant::now();
+            let errors = rmse(&emulator.mean(&fresh), &exact);
+            let predict = start.elapsed().as_secs_f64();
+            println!(
+                "{kernel:?} {length_scales:?} {components:?}: {:.1} ms an output, 200 means in {:.2} ms, \
+                 root mean square errors {errors:.4?}",
+                seconds * 100.0,
+                predict * 1e3
+            );
+            for fact in emulator.facts() {
+                println!("    {}: {}", fact.name, fact.value);
+            }
+        }
+    }
+}

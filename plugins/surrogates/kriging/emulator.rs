@@ -1,0 +1,284 @@
+//! Gaussian processes over the components of the outputs.
+
+use lacuna::linalg::{Matrix, multiply, transposed_multiply};
+use lacuna::plugin::surrogate::{FitError, Linear};
+use lacuna::plugin::{Emulator, Fact};
+use lacuna::run::Stop;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::field::{Choice, Field, Runs};
+use super::kernel::Kernel;
+use super::regressors::{Regressors, Written};
+use super::standard::{Standard, standardised};
+use crate::surrogates::polynomial_chaos::bytes;
+
+/// So many points are emulated at a time, so that their correlations stay in the cache.
+const BLOCK: usize = 64;
+
+/// The fitted surrogate: `y(x) = mean + sum_c t_c(x) loadings_c`, each score `t_c` a Gaussian process.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Kriging {
+    /// The plugin that fitted it.
+    pub plugin: &'static str,
+    /// The correlation function of all fields.
+    pub kernel: Kernel,
+    /// The names of the parameters.
+    pub names: Vec<String>,
+    /// Their standard variables.
+    pub standards: Vec<Standard>,
+    /// The functions of which the fields' trends are made.
+    pub regressors: Regressors,
+    /// The processes.
+    pub fields: Vec<Field>,
+    /// The runs' parameters in physical units, one run a row.
+    pub points: Matrix,
+    /// The scores of the components, one run a row.
+    pub scores: Matrix,
+    /// The mean of each output over the runs, then what one unit of each score adds: `(1 + components) x outputs`.
+    pub loadings: Matrix,
+    /// The mean square of what the components leave out of each output.
+    pub truncation: Vec<f64>,
+    /// The leave-one-out errors.
+    pub fit_error: FitError,
+}
+
+/// All of a surrogate but its large arrays.
+#[derive(Debug, Serialize, Deserialize)]
+struct Header {
+    kernel: Kernel,
+    names: Vec<String>,
+    standards: Vec<Standard>,
+    regressors: Written,
+    choices: Vec<Choice>,
+    runs: usize,
+    components: usize,
+    outputs: usize,
+}
+
+/// The processes of these choices given the runs; none where one of them cannot be.
+pub fn condition(
+    kernel: Kernel,
+    choices: Vec<Choice>,
+    standards: &[Standard],
+    regressors: &Regressors,
+    points: &Matrix,
+    scores: &Matrix,
+) -> Option<Vec<Field>> {
+    let (points, regressors) = (standardised(standards, points), regressors.values(points));
+    let runs = Runs { points: &points, regressors: &regressors, scores };
+    choices.into_par_iter().map(|choice| Field::new(kernel, choice, runs)).collect()
+}
+
+impl Kriging {
+    /// Calls `give` for blocks of points with their standard variables (one a column) and regressors.
+    fn in_blocks(&self, points: &Matrix, mut give: impl FnMut(usize, &Matrix, &Matrix)) {
+        for first in (0..points.rows()).step_by(BLOCK) {
+            let rows: Vec<usize> = (first..points.rows().min(first + BLOCK)).collect();
+            let block = points.select_rows(&rows);
+            give(first, &standardised(&self.standards, &block), &self.regressors.values(&block));
+        }
+    }
+
+    /// The file that [`Emulator::save`] of the plugin's surrogate wrote.
+    pub fn from_bytes(plugin: &'static str, bytes: &[u8]) -> Result<Self, Stop> {
+        let damaged = || bytes::damaged_as(plugin);
+        let (header, mut numbers) = bytes::read_as::<Header>(plugin, bytes)?;
+        let Header { kernel, names, standards, regressors, choices, runs, components, outputs } =
+            header;
+        let d = standards.len();
+        let shapes = [(runs, d), (runs, components), (components + 1, outputs), (1, outputs)];
+        let shapes = [&shapes[..], &[(1, outputs), (runs, outputs)]].concat();
+        let sizes: Option<Vec<usize>> = shapes.iter().map(|(m, n)| m.checked_mul(*n)).collect();
+        let total = sizes
+            .as_ref()
+            .and_then(|sizes| sizes.iter().try_fold(0_usize, |sum, size| sum.checked_add(*size)));
+        if d == 0 || names.len() != d || total != Some(numbers.len()) {
+            return Err(damaged());
+        }
+        let mut parts = shapes.iter().map(|&(m, n)| {
+            let rest = numbers.split_off(m * n);
+            Matrix::from_vec(m, n, std::mem::replace(&mut numbers, rest))
+        });
+        let mut part = || parts.next().ok_or_else(damaged);
+        let (points, scores, loadings) = (part()?, part()?, part()?);
+        let (truncation, relative) = (part()?.into_vec(), part()?.into_vec());
+        let fit_error = FitError { relative, residuals: part()? };
+        let regressors = regressors.read(&standards).ok_or_else(damaged)?;
+        let sound = |choice: &Choice| {
+            choice.length_scales.len() == d
+                && choice.length_scales.iter().all(|l| *l > 0.0 && l.is_finite())
+                && choice.terms.iter().all(|t| *t < regressors.count())
+                && choice.components.iter().all(|c| *c < components)
+        };
+        if !choices.iter().all(sound) {
+            return Err(damaged());
+        }
+        let fields = condition(kernel, choices, &standards, &regressors, &points, &scores);
+        let fields = fields.ok_or_else(damaged)?;
+        Ok(Self {
+            plugin,
+            kernel,
+            names,
+            standards,
+            regressors,
+            fields,
+            points,
+            scores,
+            loadings,
+            truncation,
+            fit_error,
+        })
+    }
+}
+
+impl Emulator for Kriging {
+    fn dimension(&self) -> usize {
+        self.standards.len()
+    }
+
+    fn outputs(&self) -> usize {
+        self.loadings.columns()
+    }
+
+    fn mean(&self, points: &Matrix) -> Matrix {
+        multiply(&self.basis(points), &self.loadings)
+    }
+
+    fn variance(&self, points: &Matrix) -> Option<Matrix> {
+        let mut scores = Matrix::zeros(points.rows(), self.scores.columns());
+        self.in_blocks(points, |first, standard, regressors| {
+            for field in &self.fields {
+                let variance = field.variance(standard, regressors);
+                for (i, row) in variance.iter_rows().enumerate() {
+                    for (&c, v) in field.choice.components.iter().zip(row) {
+                        scores[(first + i, c)] = *v;
+                    }
+                }
+            }
+        });
+        let squares = Matrix::from_fn(self.scores.columns(), self.outputs(), |c, j| {
+            self.loadings[(c + 1, j)].powi(2)
+        });
+        let mut variance = multiply(&scores, &squares);
+        for i in 0..points.rows() {
+            variance.row_mut(i).iter_mut().zip(&self.truncation).for_each(|(v, t)| *v += t);
+        }
+        Some(variance)
+    }
+
+    fn jacobian(&self, point: &[f64]) -> Matrix {
+        transposed_multiply(&self.loadings, &self.basis_gradient(point))
+    }
+
+    fn linear(&self) -> Option<&dyn Linear> {
+        Some(self)
+    }
+
+    fn fit_error(&self) -> &FitError {
+        &self.fit_error
+    }
+
+    fn facts(&self) -> Vec<Fact> {
+        let all = |value: &dyn Fn(&Field) -> f64| spread(self.fields.iter().map(value).collect());
+        let mut facts = vec![
+            Fact::new("kernel", self.kernel.name()),
+            Fact::new("components", self.scores.columns()),
+            Fact::new(
+                "terms of the trend (least, median, largest)",
+                all(&|f| f.choice.terms.len() as f64),
+            ),
+        ];
+        for (k, name) in self.names.iter().enumerate() {
+            let what =
+                format!("length scale of `{name}` (least, median, largest; 1 is the design)");
+            facts.push(Fact::new(what, all(&|f| f.choice.length_scales[k])));
+        }
+        facts.push(Fact::new("nugget (least, median, largest)", all(&|f| f.nugget)));
+        let total: f64 = self.fields.iter().map(|f| f.log_likelihood).sum();
+        facts.push(Fact::new("log marginal likelihood of the scores", format!("{total:.2}")));
+        facts
+    }
+
+    fn save(&self) -> Result<Vec<u8>, Stop> {
+        let header = Header {
+            kernel: self.kernel,
+            names: self.names.clone(),
+            standards: self.standards.clone(),
+            regressors: self.regressors.written(),
+            choices: self.fields.iter().map(|f| f.choice.clone()).collect(),
+            runs: self.points.rows(),
+            components: self.scores.columns(),
+            outputs: self.outputs(),
+        };
+        let numbers = [
+            self.points.as_slice(),
+            self.scores.as_slice(),
+            self.loadings.as_slice(),
+            &self.truncation,
+            &self.fit_error.relative,
+            self.fit_error.residuals.as_slice(),
+        ];
+        bytes::write_as(self.plugin, &header, &numbers)
+    }
+}
+
+/// The scores and the constant are the basis functions: few, whatever the number of outputs and runs.
+impl Linear for Kriging {
+    fn coefficients(&self) -> &Matrix {
+        &self.loadings
+    }
+
+    fn basis(&self, points: &Matrix) -> Matrix {
+        let mut basis = Matrix::zeros(points.rows(), self.scores.columns() + 1);
+        self.in_blocks(points, |first, standard, regressors| {
+            for i in 0..standard.columns() {
+                basis[(first + i, 0)] = 1.0;
+            }
+            for field in &self.fields {
+                let mean = field.mean(standard, regressors);
+                for (i, row) in mean.iter_rows().enumerate() {
+                    for (&c, t) in field.choice.components.iter().zip(row) {
+                        basis[(first + i, c + 1)] = *t;
+                    }
+                }
+            }
+        });
+        basis
+    }
+
+    fn basis_gradient(&self, point: &[f64]) -> Matrix {
+        let trend = self.regressors.gradient(point);
+        let (standards, d) = (&self.standards, point.len());
+        let place: Vec<f64> = (0..d).map(|k| standards[k].at(point[k])).collect();
+        let slopes: Vec<f64> = (0..d).map(|k| standards[k].slope(point[k])).collect();
+        let mut gradient = Matrix::zeros(self.scores.columns() + 1, d);
+        for field in &self.fields {
+            let (process, beta) = field.gradient(&place);
+            let along = multiply(beta, &trend.select_rows(&field.choice.terms));
+            for (row, &c) in field.choice.components.iter().enumerate() {
+                for k in 0..d {
+                    gradient[(c + 1, k)] = process[(row, k)] * slopes[k] + along[(row, k)];
+                }
+            }
+        }
+        gradient
+    }
+}
+
+/// The least, the median and the largest of some numbers, in three digits.
+fn spread(mut numbers: Vec<f64>) -> String {
+    numbers.sort_by(f64::total_cmp);
+    let text = |x: f64| {
+        let plain = x == 0.0 || (1e-2..1e4).contains(&x);
+        if plain { format!("{}", (x * 1e3).round() / 1e3) } else { format!("{x:.2e}") }
+    };
+    match numbers[..] {
+        [] => "none".to_owned(),
+        [least, .., largest] => {
+            let median = numbers[numbers.len() / 2];
+            format!("{}, {}, {}", text(least), text(median), text(largest))
+        }
+        [one] => text(one),
+    }
+}

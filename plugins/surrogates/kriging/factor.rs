@@ -1,0 +1,133 @@
+//! A covariance and a trend, factored: everything that universal kriging asks of them.
+
+use lacuna::linalg::{
+    self, Cholesky, Matrix, gram_lower, multiply, solve_upper_matrix, thin_qr, transposed_multiply,
+};
+
+/// `K = L L'` and `L^-1 F = Q R`, with which the projection of universal kriging is
+/// `P = K^-1 - K^-1 F (F' K^-1 F)^-1 F' K^-1 = L^-T (I - Q Q') L^-1`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Factor {
+    /// `L^-1`, `N x N`.
+    pub lower_inverse: Matrix,
+    /// `Q`, `N x p`.
+    pub q: Matrix,
+    /// `R^-1`, `p x p`, upper triangular.
+    pub r_inverse: Matrix,
+    /// `log |K|`.
+    pub log_determinant: f64,
+    /// `log |F' K^-1 F|`.
+    pub log_information: f64,
+}
+
+/// Scores seen through the factors.
+pub struct Weights {
+    /// `P Y`, `N x C`.
+    pub alpha: Matrix,
+    /// The coefficients of the trend by generalised least squares, `p x C`.
+    pub beta: Matrix,
+    /// `Y' P Y`, its diagonal.
+    pub squares: Vec<f64>,
+}
+
+/// The jitters that are tried one after the other where a covariance has no factor to working precision.
+const JITTERS: [f64; 8] = [0.0, 1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8];
+
+impl Factor {
+    /// The factors of a covariance (its lower triangle, of unit size) and a trend `F` (`N x p`), with the jitter that had to
+    /// be added to the covariance's diagonal; `None` when no jitter helps or the trend's columns are dependent.
+    pub fn new(mut covariance: Matrix, trend: &Matrix) -> Option<(Self, f64)> {
+        let mut added = 0.0;
+        for jitter in JITTERS {
+            for i in 0..covariance.rows() {
+                covariance[(i, i)] += jitter - added;
+            }
+            added = jitter;
+            if let Ok(cholesky) = Cholesky::new(&covariance) {
+                return Some((Self::of(&cholesky, trend)?, jitter));
+            }
+        }
+        None
+    }
+
+    fn of(cholesky: &Cholesky, trend: &Matrix) -> Option<Self> {
+        let lower_inverse = cholesky.lower_inverse();
+        let white = multiply(&lower_inverse, trend);
+        let linalg::Qr { q, r } = thin_qr(&white).ok()?;
+        let p = r.rows();
+        let size = |i: usize| r[(i, i)].abs();
+        let largest = (0..p).map(size).fold(0.0, f64::max);
+        if p < trend.columns() || (0..p).any(|i| size(i) <= 1e-12 * largest) {
+            return None;
+        }
+        let mut r_inverse = Matrix::from_fn(p, p, |i, j| f64::from(u8::from(i == j)));
+        solve_upper_matrix(&r, &mut r_inverse);
+        Some(Self {
+            lower_inverse,
+            q,
+            r_inverse,
+            log_determinant: cholesky.log_determinant(),
+            log_information: 2.0 * (0..p).map(|i| size(i).ln()).sum::<f64>(),
+        })
+    }
+
+    /// `N`.
+    pub fn size(&self) -> usize {
+        self.lower_inverse.rows()
+    }
+
+    /// `p`.
+    pub fn terms(&self) -> usize {
+        self.q.columns()
+    }
+
+    /// `P Y`, the trend's coefficients and the squares for scores `Y`, `N x C`.
+    pub fn weights(&self, scores: &Matrix) -> Weights {
+        let (white, along) = self.split(scores);
+        let mut squares = vec![0.0; scores.columns()];
+        for row in white.iter_rows() {
+            squares.iter_mut().zip(row).for_each(|(sum, w)| *sum += w * w);
+        }
+        Weights {
+            alpha: transposed_multiply(&self.lower_inverse, &white),
+            beta: multiply(&self.r_inverse, &along),
+            squares,
+        }
+    }
+
+    /// `(I - Q Q') L^-1 Y`: inner products of its columns are those of `P`.
+    pub fn whitened(&self, scores: &Matrix) -> Matrix {
+        self.split(scores).0
+    }
+
+    /// `(I - Q Q') L^-1 Y` and `Q' L^-1 Y`.
+    fn split(&self, scores: &Matrix) -> (Matrix, Matrix) {
+        let mut white = multiply(&self.lower_inverse, scores);
+        let along = transposed_multiply(&self.q, &white);
+        let fitted = multiply(&self.q, &along);
+        white.as_mut_slice().iter_mut().zip(fitted.as_slice()).for_each(|(w, f)| *w -= f);
+        (white, along)
+    }
+
+    /// `B` with `K^-1 F (F' K^-1 F)^-1 F' K^-1 = B B'`, `N x p`.
+    pub fn trend_directions(&self) -> Matrix {
+        transposed_multiply(&self.lower_inverse, &self.q)
+    }
+
+    /// `K^-1`.
+    pub fn inverse(&self) -> Matrix {
+        gram_lower(&self.lower_inverse)
+    }
+
+    /// The diagonals of `P` and of `K^-1`.
+    pub fn precisions(&self) -> Vec<(f64, f64)> {
+        let n = self.size();
+        let mut diagonal = vec![0.0; n];
+        for row in self.lower_inverse.iter_rows() {
+            diagonal.iter_mut().zip(row).for_each(|(sum, l)| *sum += l * l);
+        }
+        let directions = self.trend_directions();
+        let taken = directions.iter_rows().map(|row| row.iter().map(|b| b * b).sum::<f64>());
+        diagonal.into_iter().zip(taken).map(|(k, t)| (k - t, k)).collect()
+    }
+}

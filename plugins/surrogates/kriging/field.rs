@@ -1,0 +1,146 @@
+//! Gaussian processes with given hyperparameters, conditioned on their scores: universal kriging.
+
+use lacuna::linalg::vector::dot;
+use lacuna::linalg::{Matrix, multiply, multiply_transposed};
+use serde::{Deserialize, Serialize};
+
+use super::factor::{Factor, Weights};
+use super::kernel::Kernel;
+use super::likelihood::{Hyperparameters, measured, restricted};
+
+/// What of a field is chosen; the rest follows from the runs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Choice {
+    /// Which components it gives.
+    pub components: Vec<usize>,
+    /// Which regressors make its trend.
+    pub terms: Vec<usize>,
+    /// One a parameter, in units of the standard variable.
+    pub length_scales: Vec<f64>,
+    /// The noise, as a share of the variance of the process.
+    pub nugget: f64,
+}
+
+/// The runs as fields see them.
+#[derive(Debug, Clone, Copy)]
+pub struct Runs<'a> {
+    /// The standard variables, one run a column.
+    pub points: &'a Matrix,
+    /// All regressors at the runs, `runs x regressors`.
+    pub regressors: &'a Matrix,
+    /// The scores of all components, `runs x components`.
+    pub scores: &'a Matrix,
+}
+
+/// Independent Gaussian processes of one covariance and trend, one for each of its components.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Field {
+    pub choice: Choice,
+    kernel: Kernel,
+    /// The nugget with the jitter that the factorisation needed.
+    pub nugget: f64,
+    /// The runs in length scales, one a column.
+    points: Matrix,
+    factor: Factor,
+    /// One component a row: `components x runs` and `components x terms`.
+    alpha: Matrix,
+    beta: Matrix,
+    /// The variance of each process.
+    variances: Vec<f64>,
+    /// The restricted log-likelihood of the scores.
+    pub log_likelihood: f64,
+}
+
+impl Field {
+    /// The processes given the runs; none where the covariance has no factor, or the runs do not determine the trend.
+    pub fn new(kernel: Kernel, choice: Choice, runs: Runs<'_>) -> Option<Self> {
+        let points = measured(runs.points, &choice.length_scales);
+        let trend = runs.regressors.select_columns(&choice.terms);
+        let (covariance, _) = kernel.among(&points, choice.nugget);
+        let (factor, jitter) = Factor::new(covariance, &trend)?;
+        if factor.size() <= factor.terms() {
+            return None;
+        }
+        let Weights { alpha, beta, squares } =
+            factor.weights(&runs.scores.select_columns(&choice.components));
+        let (log_likelihood, variances) = restricted(&factor, &squares);
+        let nugget = choice.nugget + jitter;
+        let (alpha, beta) = (alpha.transposed(), beta.transposed());
+        Some(Self {
+            choice,
+            kernel,
+            nugget,
+            points,
+            factor,
+            alpha,
+            beta,
+            variances,
+            log_likelihood,
+        })
+    }
+
+    /// The mean of each component at points in standard variables (one a column) where the regressors
+    /// have these values, `points x components`.
+    ///
+    /// Each point by itself, so that its bits do not depend on its neighbours: the sums cancel.
+    pub fn mean(&self, points: &Matrix, regressors: &Matrix) -> Matrix {
+        let correlations = self.correlations(points);
+        let trend = regressors.select_columns(&self.choice.terms);
+        Matrix::from_fn(points.columns(), self.alpha.rows(), |i, c| {
+            dot(correlations.row(i), self.alpha.row(c)) + dot(trend.row(i), self.beta.row(c))
+        })
+    }
+
+    /// The variance of a new run's score about the mean, with the share that the trend's estimate has in it, `points x
+    /// components`: `s^2 (1 + nugget - k' K^-1 k + u' (F' K^-1 F)^-1 u)` with `u = f - F' K^-1 k`.
+    pub fn variance(&self, points: &Matrix, regressors: &Matrix) -> Matrix {
+        let white = multiply_transposed(&self.correlations(points), &self.factor.lower_inverse);
+        let trend = regressors.select_columns(&self.choice.terms);
+        let own = multiply(&trend, &self.factor.r_inverse);
+        let shared = multiply(&white, &self.factor.q);
+        let share = |i: usize| {
+            let known = dot(white.row(i), white.row(i));
+            let unknown = own.row(i).iter().zip(shared.row(i)).map(|(a, b)| (a - b) * (a - b));
+            (1.0 + self.nugget - known).max(0.0) + unknown.sum::<f64>()
+        };
+        let shares: Vec<f64> = (0..points.columns()).map(share).collect();
+        Matrix::from_fn(shares.len(), self.variances.len(), |i, c| self.variances[c] * shares[i])
+    }
+
+    /// The derivatives of each component (rows) by the standard variables at a point, and by the regressors
+    /// (`terms` of its choice).
+    pub fn gradient(&self, point: &[f64]) -> (Matrix, &Matrix) {
+        let scales = &self.choice.length_scales;
+        let place: Vec<f64> = point.iter().zip(scales).map(|(z, l)| z / l).collect();
+        let correlations = self.kernel.gradient(&place, &self.points);
+        let mut gradient = multiply_transposed(&self.alpha, &correlations);
+        for c in 0..gradient.rows() {
+            gradient.row_mut(c).iter_mut().zip(scales).for_each(|(slope, l)| *slope /= l);
+        }
+        (gradient, &self.beta)
+    }
+
+    /// What each run's score is above the mean that the other runs give it, the hyperparameters kept and the
+    /// trend fitted anew, `runs x components`: `(P y)_i / P_ii` (Dubrule 1983; Rasmussen and Williams 2006,
+    /// equation 5.12).
+    pub fn left_out(&self) -> Matrix {
+        // A run that alone determines a term of the trend has no other runs to predict it.
+        let precisions: Vec<f64> =
+            self.factor.precisions().into_iter().map(|(p, k)| p.max(1e-13 * k)).collect();
+        Matrix::from_fn(precisions.len(), self.alpha.rows(), |i, c| {
+            self.alpha[(c, i)] / precisions[i]
+        })
+    }
+
+    fn correlations(&self, points: &Matrix) -> Matrix {
+        self.kernel.between(&measured(points, &self.choice.length_scales), &self.points)
+    }
+}
+
+impl Choice {
+    /// The choice of these hyperparameters.
+    pub fn new(components: Vec<usize>, terms: Vec<usize>, found: Hyperparameters) -> Self {
+        let Hyperparameters { length_scales, nugget } = found;
+        Self { components, terms, length_scales, nugget }
+    }
+}

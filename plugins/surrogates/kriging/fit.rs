@@ -1,0 +1,263 @@
+//! From runs to Gaussian processes.
+
+use lacuna::linalg::{Matrix, multiply};
+use lacuna::math::random::Stream;
+use lacuna::plugin::surrogate::{FitError, Training};
+use lacuna::run::{Progress, Stop};
+use rayon::prelude::*;
+
+use super::emulator::{Kriging, condition};
+use super::field::{Choice, Field, Runs};
+use super::kernel::Kernel;
+use super::likelihood::Restricted;
+use super::options::{Bounds, LengthScales, Nugget};
+use super::regressors::Regressors;
+use super::search::search;
+use super::standard::{Standard, standardised};
+use crate::surrogates::polynomial_chaos::check_numbers;
+use crate::surrogates::principal_components::{Components, PrincipalComponents};
+
+/// What all surrogates of Gaussian processes are told.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// The plugin's name.
+    pub plugin: &'static str,
+    /// The correlation function.
+    pub kernel: Kernel,
+    /// Whether all components share one set of hyperparameters.
+    pub length_scales: LengthScales,
+    /// The noise.
+    pub nugget: Nugget,
+    /// What stands for the outputs.
+    pub components: Components,
+    /// The number of starts of the search.
+    pub starts: usize,
+    /// Where it searches.
+    pub bounds: Bounds,
+}
+
+/// The trends from which each component takes the best.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trends {
+    /// The functions of which all trends are made.
+    pub regressors: Regressors,
+    /// For each component sets of regressors, one at least.
+    pub candidates: Vec<Vec<Vec<usize>>>,
+}
+
+impl Trends {
+    /// The same trend for all components: all of these regressors.
+    pub fn all(regressors: Regressors, components: usize) -> Self {
+        let terms: Vec<usize> = (0..regressors.count()).collect();
+        Self { regressors, candidates: vec![vec![terms]; components] }
+    }
+}
+
+/// Outputs whose standard deviation over the runs is below this share of the largest response do not vary.
+const ROUND_OFF: f64 = 1e-13;
+
+impl Settings {
+    /// What is wrong with the settings: the option, and in words.
+    pub fn faults(&self) -> Vec<(&'static str, String)> {
+        let mut faults = self.bounds.faults();
+        faults.extend(self.components.fault().map(|words| ("components", words)));
+        faults.extend(self.nugget.fault().map(|words| ("nugget", words)));
+        if self.starts == 0 {
+            faults.push(("starts", "the search needs at least one start".to_owned()));
+        }
+        faults
+    }
+
+    /// Fits the processes; `trends` makes them from the standard variables and the scores.
+    pub fn fit(
+        &self,
+        training: &Training<'_>,
+        trends: impl FnOnce(&[Standard], &Matrix) -> Result<Trends, Stop>,
+        stream: &Stream,
+        progress: &Progress<'_>,
+    ) -> Result<Kriging, Stop> {
+        check_numbers(training)?;
+        if let Some((key, message)) = self.faults().into_iter().next() {
+            return Err(Stop::new(format!("`surrogate.{key}`: {message}")));
+        }
+        let standards = standards(training)?;
+        let parts = self.components.of(training.responses)?;
+        let (scores, sizes) = unit_scores(&parts.scores);
+        let Trends { regressors, candidates } = trends(&standards, &scores)?;
+        let points = standardised(&standards, training.points);
+        let values = regressors.values(training.points);
+        let runs = Runs { points: &points, regressors: &values, scores: &scores };
+        let choices = self.choices(runs, &candidates, stream, progress, parts.mean.len())?;
+        let fields =
+            condition(self.kernel, choices, &standards, &regressors, training.points, &scores)
+                .ok_or_else(impossible)?;
+        let loadings = Matrix::from_fn(sizes.len() + 1, parts.mean.len(), |c, j| match c {
+            0 => parts.mean[j],
+            c => sizes[c - 1] * parts.directions[(j, c - 1)],
+        });
+        let fit_error = fit_error(training.responses, &fields, &loadings, &parts);
+        Ok(Kriging {
+            plugin: self.plugin,
+            kernel: self.kernel,
+            names: training.parameters.iter().map(|p| p.name.clone()).collect(),
+            standards,
+            regressors,
+            fields,
+            points: training.points.clone(),
+            scores,
+            loadings,
+            truncation: parts.truncation(),
+            fit_error,
+        })
+    }
+
+    /// The hyperparameters and the trend of each field.
+    fn choices(
+        &self,
+        runs: Runs<'_>,
+        candidates: &[Vec<Vec<usize>>],
+        stream: &Stream,
+        progress: &Progress<'_>,
+        outputs: usize,
+    ) -> Result<Vec<Choice>, Stop> {
+        let groups: Vec<Vec<usize>> = match self.length_scales {
+            LengthScales::Each => (0..candidates.len()).map(|c| vec![c]).collect(),
+            LengthScales::Shared if candidates.is_empty() => Vec::new(),
+            LengthScales::Shared => vec![(0..candidates.len()).collect()],
+        };
+        if groups.is_empty() {
+            progress.add(outputs as u64);
+        }
+        let count = groups.len();
+        let choose = |(g, components): (usize, Vec<usize>)| {
+            let trends = &candidates[components[0]];
+            let choice = self.choose(runs, components, trends, &stream.at(g as u64));
+            progress.add((outputs * (g + 1) / count - outputs * g / count) as u64);
+            choice.ok_or_else(impossible)
+        };
+        groups.into_par_iter().enumerate().map(choose).collect()
+    }
+
+    /// The best trend of a field with its hyperparameters: that with the least error of the runs left out, corrected for
+    /// the choice of the terms by the same runs with `N / (N - p) (1 + p / N)` (Chapelle, Vapnik and Bengio
+    /// 2002, for orthonormal regressors).
+    fn choose(
+        &self,
+        runs: Runs<'_>,
+        components: Vec<usize>,
+        trends: &[Vec<usize>],
+        stream: &Stream,
+    ) -> Option<Choice> {
+        let found = |terms: &Vec<usize>| {
+            let choice = self.maximise(runs, components.clone(), terms.clone(), stream)?;
+            if trends.len() == 1 {
+                return Some((0.0, choice));
+            }
+            let field = Field::new(self.kernel, choice, runs)?;
+            let (n, p) = (runs.scores.rows() as f64, terms.len() as f64);
+            let squares: f64 = field.left_out().as_slice().iter().map(|e| e * e).sum();
+            Some((squares * n / (n - p) * (1.0 + p / n), field.choice))
+        };
+        let found: Vec<(f64, Choice)> = trends.par_iter().filter_map(found).collect();
+        let better = |a: (f64, Choice), b: (f64, Choice)| if b.0 < a.0 { b } else { a };
+        found.into_iter().reduce(better).map(|(_, choice)| choice)
+    }
+
+    /// The hyperparameters of the largest likelihood for a trend.
+    fn maximise(
+        &self,
+        runs: Runs<'_>,
+        components: Vec<usize>,
+        terms: Vec<usize>,
+        stream: &Stream,
+    ) -> Option<Choice> {
+        let trend = runs.regressors.select_columns(&terms);
+        if trend.columns() + 1 >= trend.rows() {
+            return None;
+        }
+        let problem = Restricted {
+            kernel: self.kernel,
+            points: runs.points,
+            trend: &trend,
+            scores: &runs.scores.select_columns(&components),
+            bounds: self.bounds,
+            nugget: self.nugget,
+        };
+        let found = search(&problem, self.starts, stream)?;
+        Some(Choice::new(components, terms, found))
+    }
+}
+
+fn standards(training: &Training<'_>) -> Result<Vec<Standard>, Stop> {
+    if training.parameters.is_empty() {
+        return Err(Stop::new("a Gaussian process needs at least one parameter")
+            .help("add a `[[parameter]]`"));
+    }
+    let parameters = training.parameters.iter().enumerate();
+    let standard = |(k, parameter): (usize, &lacuna::data::Parameter)| {
+        let standard = Standard::of(parameter).map_err(Stop::new)?;
+        let column = training.points.column(k);
+        match column.iter().position(|x| !standard.covers(*x)) {
+            None => Ok(standard),
+            Some(run) => Err(Stop::new(format!(
+                "parameter `{}` of run {} is {}, but its design is {}",
+                parameter.name,
+                run + 1,
+                column[run],
+                parameter.design
+            ))
+            .help("leave the run out, or correct the parameter's `design`")),
+        }
+    };
+    parameters.map(standard).collect()
+}
+
+/// Scores of root mean square 1, and what they were divided by.
+fn unit_scores(scores: &Matrix) -> (Matrix, Vec<f64>) {
+    let size = |c| {
+        let column = scores.column(c);
+        (column.iter().map(|t| t * t).sum::<f64>() / column.len() as f64).sqrt()
+    };
+    let sizes: Vec<f64> = (0..scores.columns()).map(size).collect();
+    (Matrix::from_fn(scores.rows(), sizes.len(), |i, c| scores[(i, c)] / sizes[c]), sizes)
+}
+
+/// The error of each run's outputs when the run is left out: that of the scores, and what the components leave out.
+fn fit_error(
+    responses: &Matrix,
+    fields: &[Field],
+    loadings: &Matrix,
+    parts: &PrincipalComponents,
+) -> FitError {
+    let (runs, outputs) = (responses.rows(), responses.columns());
+    let mut errors = Matrix::zeros(runs, loadings.rows());
+    for field in fields {
+        for (i, row) in field.left_out().iter_rows().enumerate() {
+            for (&c, e) in field.choice.components.iter().zip(row) {
+                errors[(i, c + 1)] = *e;
+            }
+        }
+    }
+    let mut residuals = multiply(&errors, loadings);
+    for (e, r) in residuals.as_mut_slice().iter_mut().zip(parts.remainder.as_slice()) {
+        *e += r;
+    }
+    let largest = responses.as_slice().iter().fold(0.0_f64, |most, y| most.max(y.abs()));
+    let mean_square = |column: Vec<f64>, mean: f64| {
+        column.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / runs as f64
+    };
+    let relative = |j: usize| {
+        let variance = mean_square(responses.column(j), parts.mean[j]);
+        if variance.sqrt() > ROUND_OFF * largest {
+            mean_square(residuals.column(j), 0.0) / variance
+        } else {
+            0.0
+        }
+    };
+    FitError { relative: (0..outputs).map(relative).collect(), residuals }
+}
+
+fn impossible() -> Stop {
+    Stop::new("no Gaussian process with this trend has a likelihood given these runs")
+        .help("use more runs, a simpler trend or a larger `surrogate.nugget`")
+}

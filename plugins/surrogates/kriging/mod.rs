@@ -1,0 +1,23 @@
+//! Gaussian processes with a trend, conditioned on runs: what `gaussian_process` and `polynomial_chaos_kriging` share.
+
+mod emulator;
+mod factor;
+mod field;
+mod fit;
+mod kernel;
+mod likelihood;
+mod options;
+mod regressors;
+mod scoring;
+mod search;
+mod standard;
+
+#[cfg(test)]
+mod tests;
+
+pub use emulator::Kriging;
+pub use fit::{Settings, Trends};
+pub use kernel::Kernel;
+pub use options::{Bounds, Estimated, LengthScales, Nugget};
+pub use regressors::Regressors;
+pub use standard::Standard;

@@ -1,0 +1,103 @@
+//! The search for the hyperparameters of the largest likelihood.
+
+use lacuna::linalg::Matrix;
+use lacuna::math::optimise::{Precision, ascend};
+use lacuna::math::random::{Stream, permutation, uniform};
+use lacuna::plugin::Target;
+use rayon::prelude::*;
+
+use super::likelihood::{Hyperparameters, Restricted};
+use super::options::Nugget;
+use super::scoring::score;
+
+/// Several starts are followed on so many runs, where there are at least twice as many.
+const FEW: usize = 120;
+/// Enough to tell one maximum from another.
+const ROUGH: Precision = Precision { gradient: 0.05, gain: Some(1e-5), steps: 30 };
+/// The rest moves no length scale by a tenth of its standard error.
+const FINE: Precision = Precision { gradient: 1e-2, gain: Some(1e-6), steps: 100 };
+/// Where starts are drawn: length scales and nuggets.
+const REGION: [[f64; 2]; 2] = [[0.1, 3.0], [1e-8, 1e-2]];
+/// The usual standard error of a logarithm.
+const SCALE: f64 = 0.3;
+
+/// The hyperparameters of the largest restricted likelihood that `starts` searches find; none where no start has a
+/// likelihood.
+///
+/// The starts are followed by L-BFGS-B; with many runs on some of them, drawn at random, because a likelihood costs the cube
+/// of the number of runs. All runs then choose among the ends (and the usual start), and one search from there, by
+/// scoring, gives the result, which is a maximum of the whole likelihood.
+pub fn search(problem: &Restricted<'_>, starts: usize, stream: &Stream) -> Option<Hyperparameters> {
+    let starts = starting_points(problem, starts, &stream.named("starts"));
+    let runs = problem.points.columns();
+    let few = FEW.max(3 * problem.trend.columns());
+    let start = if runs < 2 * few {
+        climbs(problem, &starts, ROUGH).into_iter().next()?.0
+    } else {
+        let mut chosen = permutation(&mut stream.named("runs").generator(), runs);
+        chosen.truncate(few);
+        let mut ends = climbs_on(problem, &chosen, &starts);
+        ends.push(starts.row(0).to_vec());
+        ends.dedup_by(|a, b| near(a, b));
+        let on_all = |end: &Vec<f64>| (end.clone(), problem.value(end));
+        let ends: Vec<(Vec<f64>, f64)> = ends.par_iter().map(on_all).collect();
+        let better = |a: (Vec<f64>, f64), b: (Vec<f64>, f64)| if b.1 > a.1 { b } else { a };
+        ends.into_iter().reduce(better).filter(|(_, value)| value.is_finite())?.0
+    };
+    let (mut point, reached) = score(problem, &start)?;
+    if !reached {
+        let scales = vec![SCALE; point.len()];
+        point = ascend(problem, &point, &scales, FINE)?.point;
+    }
+    Some(problem.at(&point))
+}
+
+/// Where the searches on some of the runs end, the best first.
+fn climbs_on(problem: &Restricted<'_>, runs: &[usize], starts: &Matrix) -> Vec<Vec<f64>> {
+    let part = Restricted {
+        points: &problem.points.select_columns(runs),
+        trend: &problem.trend.select_rows(runs),
+        scores: &problem.scores.select_rows(runs),
+        ..*problem
+    };
+    climbs(&part, starts, ROUGH).into_iter().map(|(point, _)| point).collect()
+}
+
+/// Where the searches from all starts end, the best first.
+fn climbs(problem: &Restricted<'_>, starts: &Matrix, precision: Precision) -> Vec<(Vec<f64>, f64)> {
+    let scales = vec![SCALE; Target::dimension(problem)];
+    let mut ends: Vec<(Vec<f64>, f64)> = (0..starts.rows())
+        .into_par_iter()
+        .filter_map(|i| ascend(problem, starts.row(i), &scales, precision))
+        .map(|optimum| (optimum.point, optimum.value))
+        .collect();
+    ends.sort_by(|a, b| b.1.total_cmp(&a.1));
+    ends
+}
+
+/// Ends of rough searches so near to each other belong to one maximum.
+fn near(a: &[f64], b: &[f64]) -> bool {
+    a.iter().zip(b).all(|(x, y)| (x - y).abs() < SCALE)
+}
+
+/// The usual start, half of the design's diagonal, and draws around it.
+fn starting_points(problem: &Restricted<'_>, count: usize, stream: &Stream) -> Matrix {
+    let d = problem.points.rows();
+    let mut rng = stream.generator();
+    let diagonal = (d as f64).sqrt();
+    let mut logarithm =
+        |[low, high]: [f64; 2]| f64::ln(low) + (f64::ln(high) - f64::ln(low)) * uniform(&mut rng);
+    let mut starts = Matrix::zeros(0, Target::dimension(problem));
+    for i in 0..count.max(1) {
+        let mut start: Vec<f64> = (0..d).map(|_| logarithm(REGION[0]) + diagonal.ln()).collect();
+        let nugget = logarithm(REGION[1]);
+        if i == 0 {
+            start.fill((0.5 * diagonal).ln());
+        }
+        if matches!(problem.nugget, Nugget::Estimated(_)) {
+            start.push(if i == 0 { 1e-6_f64.ln() } else { nugget });
+        }
+        starts.push_row(&start);
+    }
+    starts
+}

@@ -1,0 +1,94 @@
+//! Parameters of all units and sizes on one scale.
+
+use lacuna::data::Parameter;
+use lacuna::linalg::Matrix;
+use lacuna::math::distribution::Distribution;
+use serde::{Deserialize, Serialize};
+
+/// The standard variable `z = (x - centre) / width` of a parameter: 0 at the median of its design, and 1 is the range
+/// of a uniform design. Laws whose logarithm is the simple thing, log-uniform and log-normal, are measured by
+/// logarithms.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Standard {
+    centre: f64,
+    width: f64,
+    logarithm: bool,
+}
+
+impl Standard {
+    /// That of a parameter, or what stands against it in words.
+    pub fn of(parameter: &Parameter) -> Result<Self, String> {
+        let design = &parameter.design;
+        let logarithm = matches!(design, Distribution::LogUniform(_) | Distribution::LogNormal(_));
+        let measured = |p: f64| {
+            let x = design.quantile(p);
+            if logarithm { x.ln() } else { x }
+        };
+        // Between these quantiles lie 0.8 of the range of a uniform law.
+        let width = (measured(0.9) - measured(0.1)) / 0.8;
+        let standard = Self { centre: measured(0.5), width, logarithm };
+        if width > 0.0 && width.is_finite() && standard.centre.is_finite() {
+            return Ok(standard);
+        }
+        Err(format!("the design of parameter `{}`, {design}, has no width", parameter.name))
+    }
+
+    /// The standard variable at a value of the parameter.
+    pub fn at(&self, x: f64) -> f64 {
+        // Outside the support of a positive law the least positive number stands for the value.
+        let measured = if self.logarithm { x.max(f64::MIN_POSITIVE).ln() } else { x };
+        (measured - self.centre) / self.width
+    }
+
+    /// Its derivative by the parameter.
+    pub fn slope(&self, x: f64) -> f64 {
+        match self.logarithm {
+            true if x > f64::MIN_POSITIVE => 1.0 / (x * self.width),
+            true => 0.0,
+            false => 1.0 / self.width,
+        }
+    }
+
+    /// Whether it tells values of the parameter apart there.
+    pub fn covers(&self, x: f64) -> bool {
+        !self.logarithm || x > 0.0
+    }
+}
+
+/// The standard variables of points (one a row), one point a column: `parameters x points`.
+pub fn standardised(standards: &[Standard], points: &Matrix) -> Matrix {
+    Matrix::from_fn(standards.len(), points.rows(), |k, i| standards[k].at(points[(i, k)]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lacuna::data::Unit;
+
+    fn parameter(design: Distribution) -> Parameter {
+        let prior = design.clone();
+        let (name, symbol) = ("a".to_owned(), "a".to_owned());
+        Parameter { name, symbol, unit: Unit::dimensionless(), design, prior, reference: None }
+    }
+
+    #[test]
+    fn a_uniform_design_has_the_width_one() {
+        let standard = Standard::of(&parameter(Distribution::Uniform([2e4, 6e4]))).unwrap();
+        assert!((standard.at(2e4) + 0.5).abs() < 1e-14 && (standard.at(6e4) - 0.5).abs() < 1e-14);
+        let decades = Standard::of(&parameter(Distribution::LogUniform([1e-6, 1e2]))).unwrap();
+        assert!((decades.at(1e-6) + 0.5).abs() < 1e-12 && decades.at(1e-2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn slopes_are_those_of_differences() {
+        for law in [
+            Distribution::Uniform([-1.0, 3.0]),
+            Distribution::LogNormal([0.3, 2.0]),
+            Distribution::StudentT([1.5, 0.0, 2.0]),
+        ] {
+            let standard = Standard::of(&parameter(law)).unwrap();
+            let difference = (standard.at(1.2 + 1e-6) - standard.at(1.2 - 1e-6)) / 2e-6;
+            assert!((standard.slope(1.2) - difference).abs() < 1e-8);
+        }
+    }
+}

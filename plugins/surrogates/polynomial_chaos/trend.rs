@@ -1,0 +1,36 @@
+//! An expansion as a part of other surrogates.
+
+use lacuna::math::random::Stream;
+use lacuna::plugin::Context;
+use lacuna::plugin::surrogate::Training;
+use lacuna::run::{Progress, Stop};
+use lacuna::study::problem::Complaints;
+
+use super::PolynomialChaos;
+use super::emulator::Expansion;
+use super::fit::fit;
+
+impl PolynomialChaos {
+    /// The expansion of all outputs.
+    pub fn expand(
+        &self,
+        training: &Training<'_>,
+        stream: &Stream,
+        progress: &Progress<'_>,
+    ) -> Result<Expansion, Stop> {
+        fit(self, training, stream, progress)
+    }
+
+    /// All that is wrong with the options where they stand in a table of another plugin's options.
+    pub(in crate::surrogates) fn check_within(
+        &self,
+        table: &str,
+        context: &Context<'_>,
+        complaints: &mut Complaints<'_>,
+    ) {
+        for fault in self.faults(context.parameters, context.runs) {
+            let place = format!("{table}.{}", fault.key);
+            complaints.at(&place).say(fault.message).help(fault.help);
+        }
+    }
+}
