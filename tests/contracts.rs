@@ -124,7 +124,7 @@ fn discrepancies() {
          variance = { measured = { known = 1 } }",
     ];
     let multiplicative_gaussian = &[
-        "relative = { half_normal = 1.0 }",
+        "relative = { half_normal = 1.0 }\nfloor = { known = 0.2 }",
         "relative = { half_normal = 1.0 }\nby = \"sensor\"\nfloor = { half_normal = 1.0 }",
         "relative = { known = 0.1 }\nfloor = { known = 0.1 }",
     ];

@@ -1,10 +1,12 @@
 //! The likelihood, step by step.
 //!
-//! With `rho = exp(-gap / tau)`, `w = 1 / (1 - rho^2)` and standard deviations `s`, a value `y` after `x` adds
-//! `log(2 pi s_y^2 / w) + w ((y - m_y)/s_y - rho (x - m_x)/s_x)^2` to minus twice the log density of a replicate. Summed over the
-//! replicates of a step only its [statistics](super::steps::Step) remain. The common errors `F zeta` make the whitened residuals of the means a
-//! regression on `zeta`, whose best value and whose covariance `C^-1` follow from a Cholesky factor. Derivatives
-//! are those of the density of data and `zeta` together, averaged over `zeta` given the data (Fisher's identity).
+//! With `rho = exp(-gap / tau)`, `w = 1 / (1 - rho^2)` and standard deviations `s`, a value `y`
+//! after `x` adds `log(2 pi s_y^2 / w) + w ((y - m_y)/s_y - rho (x - m_x)/s_x)^2` to minus twice
+//! the log density of a replicate. Summed over the replicates of a step only its
+//! [statistics](super::steps::Step) remain. The common errors `F zeta` make the whitened residuals
+//! of the means a regression on `zeta`, whose best value and whose covariance `C^-1` follow from a
+//! Cholesky factor. Derivatives are those of the density of data and `zeta` together, averaged over
+//! `zeta` given the data (Fisher's identity).
 
 use std::f64::consts::TAU;
 

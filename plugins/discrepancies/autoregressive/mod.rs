@@ -15,31 +15,37 @@ use serde::{Deserialize, Serialize};
 use super::common::{By, Groups, Quantity, Series, Variance};
 use likelihood::AutoregressiveLikelihood;
 
-/// Normal differences that are correlated along an axis within each replicate: a first-order autoregressive process.
+/// Normal differences that are correlated along an axis within each replicate: a first-order
+/// autoregressive process.
 ///
-/// Within one replicate and one series (one sensor, say) the differences between data and model are a stationary normal
-/// process with the correlation `exp(-|t - t'| / correlation_time)` at two times, of the given `variance` at each (the Ornstein-Uhlenbeck
-/// process; in discrete time autoregressive of order one with the coefficient `exp(-dt / correlation_time)`; Box and Jenkins, Time
-/// Series Analysis (1976), 3.2, and Jones, Technometrics 22 (1980) 389 for gaps). Replicates and series are independent. Take it when
-/// residuals of neighbouring times resemble each other in each replicate on its own; what all replicates have in
-/// common is the business of `gaussian_process`.
+/// Within one replicate and one series (one sensor, say) the differences between data and model are
+/// a stationary normal process with the correlation `exp(-|t - t'| / correlation_time)` at two
+/// times, of the given `variance` at each (the Ornstein-Uhlenbeck process; in discrete time
+/// autoregressive of order one with the coefficient `exp(-dt / correlation_time)`; Box and Jenkins,
+/// Time Series Analysis (1976), 3.2, and Jones, Technometrics 22 (1980) 389 for gaps). Replicates
+/// and series are independent. Take it when residuals of neighbouring times resemble each other in
+/// each replicate on its own; what all replicates have in common is the business of
+/// `gaussian_process`.
 ///
-/// Uneven grids and gaps are exact: each value depends only on the one measured before it. Since the law of a value
-/// given the one before has the same form in all replicates that measured both, the likelihood uses counts, means,
-/// scatters and co-scatters of such pairs. Errors that all replicates share enter once, as for `gaussian`.
+/// Uneven grids and gaps are exact: each value depends only on the one measured before it. Since
+/// the law of a value given the one before has the same form in all replicates that measured both,
+/// the likelihood uses counts, means, scatters and co-scatters of such pairs. Errors that all
+/// replicates share enter once, as for `gaussian`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Autoregressive {
-    /// The variance of a single value: a prior such as `{ half_normal = 1e-6 }`, `{ known = 2.5e-11 }`, or a multiple of the
-    /// measured one, `{ measured = { inverse_gamma = [3, 4] } }`, as for `gaussian`.
+    /// The variance of a single value: a prior such as `{ half_normal = 1e-6 }`,
+    /// `{ known = 2.5e-11 }`, or a multiple of the measured one,
+    /// `{ measured = { inverse_gamma = [3, 4] } }`, as for `gaussian`.
     pub variance: Variance,
     /// Which outputs share a variance: `"all"`, an axis such as `"sensor"`, windows, or a list of these.
     #[serde(default)]
     pub by: By,
-    /// The time over which correlations fall by a factor e, in the unit of the axis: a prior such as `{ log_uniform = [1e-6, 1e-3]
-    /// }`, or `{ known = 5e-5 }`.
+    /// The time over which correlations fall by a factor e, in the unit of the axis: a prior such
+    /// as `{ log_uniform = [1e-6, 1e-3] }`, or `{ known = 5e-5 }`.
     pub correlation_time: Quantity,
-    /// Which series share a correlation time: `"all"`, or another axis than the one they run along, such as `"sensor"`.
+    /// Which series share a correlation time: `"all"`, or another axis than the one they run along,
+    /// such as `"sensor"`.
     #[serde(default)]
     pub correlation_by: By,
     /// The axis of numbers along which differences are correlated; the last one when it is left away.

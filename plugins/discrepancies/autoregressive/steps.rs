@@ -51,8 +51,8 @@ pub(super) fn places(outputs: usize, replicates: &Replicates) -> Vec<usize> {
     place
 }
 
-/// Visits each measured value of each series with the one before it: the replicate, the value with its output, the one
-/// before, and their distance.
+/// Visits each measured value of each series with the one before it: the replicate, the value with
+/// its output, the one before, and their distance.
 pub(super) fn for_each_step(
     data: &Measurements,
     series: &Series,

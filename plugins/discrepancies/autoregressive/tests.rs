@@ -1,4 +1,5 @@
-//! The likelihood against the multivariate normal density written out, and the process against its covariance.
+//! The likelihood against the multivariate normal density written out, and the process against its
+//! covariance.
 #![allow(clippy::unwrap_used)]
 
 use lacuna::math::random::Stream;

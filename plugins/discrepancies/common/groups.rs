@@ -25,7 +25,8 @@ pub enum By {
 pub enum Division {
     /// Each value of this axis.
     Axis(String),
-    /// Windows of a grid, such as `{ axis = "time", windows = 5 }` or `{ axis = "time", edges = [2e-4, 5e-4] }`.
+    /// Windows of a grid, such as `{ axis = "time", windows = 5 }` or
+    /// `{ axis = "time", edges = [2e-4, 5e-4] }`.
     Windows(AxisWindows),
 }
 
@@ -38,7 +39,8 @@ pub struct AxisWindows {
     /// So many windows, which hold equal numbers of grid values as nearly as possible.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub windows: Option<usize>,
-    /// The edges between windows, increasing, in the unit of the axis. A value on an edge belongs to the window after it.
+    /// The edges between windows, increasing, in the unit of the axis. A value on an edge belongs
+    /// to the window after it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edges: Option<Vec<f64>>,
 }
@@ -213,7 +215,8 @@ impl Groups {
     /// The number of each output's group; the mean of all where the group was never measured.
     pub fn spread(&self, values: &[f64]) -> Vec<f64> {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
-        self.of.iter().map(|g| g.map_or(mean, |g| values[g])).collect()
+        let of = |g: usize| values.get(g).copied().unwrap_or(f64::NAN);
+        self.of.iter().map(|g| g.map_or(mean, of)).collect()
     }
 
     /// The sums over the groups of numbers that belong to these outputs.

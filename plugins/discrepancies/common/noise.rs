@@ -90,8 +90,9 @@ impl Setting {
         }
     }
 
-    /// The parts of a new replicate's variance: what the replicates show of it, the rest as the model's form, and
-    /// the common errors that a new replicate has too. Without replicates the first two are one, `discrepancy`.
+    /// The parts of a new replicate's variance: what the replicates show of it, the rest as the
+    /// model's form, and the common errors that a new replicate has too. Without replicates the
+    /// first two are one, `discrepancy`.
     pub fn parts(&self, variance: &[f64]) -> Vec<VariancePart> {
         let mut parts = self.own_parts(variance);
         parts.extend(self.common_parts());
@@ -160,8 +161,8 @@ pub fn part(origin: &str, variance: Vec<f64>) -> VariancePart {
     VariancePart { origin: origin.to_owned(), variance }
 }
 
-/// Where the variance of a group starts: the one of the replicates about their means, or a hundredth of the mean square
-/// where there are no replicates.
+/// Where the variance of a group starts: the one of the replicates about their means, or a
+/// hundredth of the mean square where there are no replicates.
 pub fn start(groups: &Groups, replicates: &Replicates, scale: &[f64], group: usize) -> f64 {
     let (mut scatter, mut freedom, mut square, mut outputs) = (0.0, 0.0, 0.0, 0.0);
     for (k, &i) in replicates.measured.iter().enumerate() {
@@ -189,7 +190,8 @@ impl Pooled {
         }
     }
 
-    /// The variance of each group; that of all where a group has no replicates; `None` where no group has any.
+    /// The variance of each group; that of all where a group has no replicates; `None` where no
+    /// group has any.
     fn variances(&self) -> Option<Vec<f64>> {
         let freedom: f64 = self.freedom.iter().sum();
         let overall = self.scatter.iter().sum::<f64>() / freedom;
@@ -205,7 +207,7 @@ impl Pooled {
     /// replicates, or two that are equal.
     fn measured(&self, groups: &Groups, replicates: &Replicates) -> Result<Vec<f64>, Stop> {
         let refuse = || {
-            Stop::new("the measurements hold no two different values of one output, from which `measured` variances are taken")
+            Stop::new("no output has two replicates that differ, which `measured` needs")
                 .help("give the variance itself, such as `variance = { half_normal = 1e-6 }`")
         };
         let variances = self.variances().ok_or_else(refuse)?;

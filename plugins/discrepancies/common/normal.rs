@@ -1,17 +1,18 @@
 //! The normal density of replicates with a variance for each output and errors that they share.
 //!
-//! With `n_i` replicates of output `i`, their mean `ybar_i` and scatter `S_i`, the response `m` and the common
-//! errors `F zeta`, `zeta` standard normal,
+//! With `n_i` replicates of output `i`, their mean `ybar_i` and scatter `S_i`, the response `m` and
+//! the common errors `F zeta`, `zeta` standard normal,
 //!
 //! ```text
 //! log L = -1/2 [ sum_i (n_i log(2 pi v_i) + (S_i + n_i e_i^2) / v_i) + |zeta|^2 + log det C ]
 //! ```
 //!
-//! at the `zeta` that makes the bracket smallest, with `e = ybar - m - F zeta` and `C = I + F' N V^-1 F` (Woodbury; Rasmussen
-//! and Williams, Gaussian Processes for Machine Learning (2006), A.3). As a sum of squares it has no cancellation.
+//! at the `zeta` that makes the bracket smallest, with `e = ybar - m - F zeta` and
+//! `C = I + F' N V^-1 F` (Woodbury; Rasmussen and Williams, Gaussian Processes for Machine Learning
+//! (2006), A.3). As a sum of squares it has no cancellation.
 //!
-//! Derivatives follow from Fisher's identity: those of the density of data and `zeta` together, averaged over
-//! `zeta` given the data, whose mean is the above and whose covariance is `C^-1`.
+//! Derivatives follow from Fisher's identity: those of the density of data and `zeta` together,
+//! averaged over `zeta` given the data, whose mean is the above and whose covariance is `C^-1`.
 
 use std::f64::consts::TAU;
 
@@ -46,8 +47,8 @@ impl Normal {
         Ok(Self { factor: replicates.common_factor(common)?, replicates: replicates.clone() })
     }
 
-    /// The density of the data about a response, given the variance of each measured output; `None` where it is
-    /// zero or beyond the range of numbers.
+    /// The density of the data about a response, given the variance of each measured output; `None`
+    /// where it is zero or beyond the range of numbers.
     pub fn solve(&self, response: &[f64], variance: &[f64]) -> Option<Solved> {
         let r = &self.replicates;
         let mut error = r.residual(response);
@@ -136,8 +137,8 @@ pub fn values(data: &lacuna::data::Measurements) -> impl Iterator<Item = (usize,
     })
 }
 
-/// The log density of a value given all others, from its entry of the precision matrix times the residuals, and
-/// from the diagonal entry (Bürkner, Gabry and Vehtari 2021, equation 8).
+/// The log density of a value given all others, from its entry of the precision matrix times the
+/// residuals, and from the diagonal entry (Bürkner, Gabry and Vehtari 2021, equation 8).
 pub fn conditional(pull: f64, precision: f64) -> f64 {
     0.5 * ((precision / TAU).ln() - pull * pull / precision)
 }

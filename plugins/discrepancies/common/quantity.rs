@@ -13,8 +13,9 @@ use serde_json::Value;
 
 use super::Groups;
 
-/// A number that is known, `{ known = 2.5e-11 }` (or one for each group, `{ known = [1e-11, 4e-11] }`), or the
-/// prior of one that is not, such as `{ half_normal = 1e-6 }`.
+/// A number that is known, `{ known = 2.5e-11 }` (or one for each group,
+/// `{ known = [1e-11, 4e-11] }`), or the prior of one that is not, such as
+/// `{ half_normal = 1e-6 }`.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Quantity {
     /// The number, or one for each group.

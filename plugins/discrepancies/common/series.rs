@@ -26,7 +26,7 @@ impl Series {
         let Some(position) = position else {
             return Err(match along {
                 Some(name) => format!("the response has no axis `{name}`"),
-                None => "the response has no axis of numbers along which differences could be correlated".to_owned(),
+                None => "the response has no axis of numbers, such as times".to_owned(),
             });
         };
         let axis = &layout.axes[position];

@@ -34,7 +34,11 @@ impl PerGroup {
         let (first, count) = (hyper.len(), groups.count());
         let prior = match quantity {
             Quantity::Known(values) => {
-                let of = |&g: &usize| if values.len() == 1 { values[0] } else { values[g] };
+                // What is missing is no number, and makes the likelihood zero.
+                let of = |&g: &usize| match values.as_slice() {
+                    [one] => *one,
+                    many => many.get(g).copied().unwrap_or(f64::NAN),
+                };
                 let known = groups.position.iter().map(of);
                 return Self { known: Some(known.collect()), first, count };
             }

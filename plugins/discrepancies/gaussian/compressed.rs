@@ -1,13 +1,14 @@
 //! The likelihood reduced to a small form in the basis functions of a linear emulator.
 //!
-//! With `m = C' psi` the weighted residual of a group is `z = -B (psi, 1)`, `B = [W C', -W ybar]`. Its part along the
-//! directions `U` of the common errors is `-(U'B)(psi, 1)`; for the rest, the thin factorisation
-//! `(I - U U') B = Q R` gives `|z_rest| = |R (psi, 1)|` with `R` upper trapezoidal: exact, since an orthogonal
-//! factor does not change a length.
+//! With `m = C' psi` the weighted residual of a group is `z = -B (psi, 1)`, `B = [W C', -W ybar]`.
+//! Its part along the directions `U` of the common errors is `-(U'B)(psi, 1)`; for the rest, the
+//! thin factorisation `(I - U U') B = Q R` gives `|z_rest| = |R (psi, 1)|` with `R` upper
+//! trapezoidal: exact, since an orthogonal factor does not change a length.
 //!
-//! Only the length of the rest matters, and a polynomial basis gives its square as one polynomial. That form
-//! carries the round-off of its largest values into its smallest, so that it is used only where
-//! this cannot be seen: against the scatter of the replicates and what no coefficients can explain.
+//! Only the length of the rest matters, and a polynomial basis gives its square as one polynomial.
+//! That form carries the round-off of its largest values into its smallest, so that it is used only
+//! where this cannot be seen: against the scatter of the replicates and what no coefficients can
+//! explain.
 
 use lacuna::linalg::vector::dot;
 use lacuna::linalg::{self, Matrix};

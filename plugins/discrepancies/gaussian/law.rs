@@ -1,4 +1,5 @@
-//! What is done with the variances of the groups: given, integrated out, or given and coupled by common errors.
+//! What is done with the variances of the groups: given, integrated out, or given and coupled by
+//! common errors.
 
 use lacuna::linalg::vector::dot;
 use lacuna::linalg::{self, Cholesky, Matrix};
@@ -21,9 +22,9 @@ pub(super) enum Law {
     Coupled(Coupled),
 }
 
-/// Common errors over several groups: with `W F = Q_g T_g` in group `g`, `Q_g` its orthonormal directions,
-/// the least of `sum_g |a_g - T_g zeta|^2 / v_g + |zeta|^2` is the quadratic form and `C = I + sum_g T_g'T_g / v_g` has
-/// the determinant (Woodbury).
+/// Common errors over several groups: with `W F = Q_g T_g` in group `g`, `Q_g` its orthonormal
+/// directions, the least of `sum_g |a_g - T_g zeta|^2 / v_g + |zeta|^2` is the quadratic form and
+/// `C = I + sum_g T_g'T_g / v_g` has the determinant (Woodbury).
 #[derive(Debug, Clone)]
 pub(super) struct Coupled {
     variance: PerGroup,

@@ -78,7 +78,8 @@ impl GaussianLikelihood {
         self.law.variances(&self.spreads(), hyper, &residuals(&split))
     }
 
-    /// The log density of each value of a group given all others, by measured output: a function of the value.
+    /// The log density of each value of a group given all others, by measured output: a function of
+    /// the value.
     fn left_out_of(
         group: &Statistics,
         along: &[f64],
@@ -115,7 +116,7 @@ fn residuals(split: &Split) -> Vec<Residual<'_>> {
 
 fn not_integrable() -> Stop {
     Stop::new("several variances cannot be integrated out together with errors that all replicates share")
-        .help("give `marginal = false`, one variance for all outputs (`by = \"all\"`), or turn the common errors off")
+        .help("give `marginal = false`, or one variance for all outputs (`by = \"all\"`)")
 }
 
 impl Likelihood for GaussianLikelihood {

@@ -1,15 +1,16 @@
 //! The sufficient statistics of outputs that share a variance.
 //!
-//! With `n_i` replicates of output `i`, mean `ybar_i` and scatter `S_i = sum_r (y_ir - ybar_i)^2`, and the
-//! residual `z_i = sqrt(n_i) (ybar_i - m_i)`, the data are distributed as
+//! With `n_i` replicates of output `i`, mean `ybar_i` and scatter `S_i = sum_r (y_ir - ybar_i)^2`,
+//! and the residual `z_i = sqrt(n_i) (ybar_i - m_i)`, the data are distributed as
 //!
 //! ```text
 //! log L = -1/2 [ N log(2 pi v) + (sum_i S_i)/v + log det(I + K/v) + z' (v I + K)^-1 z ]
 //! ```
 //!
-//! where `K = W F F' W`, `W = diag(sqrt(n_i))`, is the covariance `F F'` of the common errors as it enters `z`. The
-//! thin singular value decomposition `W F = U diag(s) V'` diagonalises `K` once for all `v`. A variance that is a
-//! multiple of a known one makes all of these those of data divided by its root.
+//! where `K = W F F' W`, `W = diag(sqrt(n_i))`, is the covariance `F F'` of the common errors as it
+//! enters `z`. The thin singular value decomposition `W F = U diag(s) V'` diagonalises `K` once for
+//! all `v`. A variance that is a multiple of a known one makes all of these those of data divided
+//! by its root.
 
 use lacuna::linalg::vector::dot;
 use lacuna::linalg::{self, Matrix};

@@ -1,7 +1,8 @@
 //! The prior covariance of the bias.
 //!
-//! Each series has its own block `C_s`. With `G` an orthonormal basis of the derivatives by the parameters, the prior
-//! that is orthogonal to them is `C - H S^-1 H'` with `H = C G` and `S = G' C G`.
+//! Each series has its own block `C_s`. With `G` an orthonormal basis of the derivatives by the
+//! parameters, the prior that is orthogonal to them is `C - H S^-1 H'` with `H = C G` and
+//! `S = G' C G`.
 
 use lacuna::linalg::{self, Cholesky, Matrix};
 use lacuna::run::Stop;
@@ -69,7 +70,8 @@ impl Bias {
         Some((self.sd.values(hyper)?, self.length.values(hyper)?))
     }
 
-    /// The standard deviation and the length of a series; those of a series never measured are the means of all.
+    /// The standard deviation and the length of a series; those of a series never measured are the
+    /// means of all.
     pub fn of_block(&self, block: &Block, (sd, length): (&[f64], &[f64])) -> (f64, f64) {
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         match block.group {

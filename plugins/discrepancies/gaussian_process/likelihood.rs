@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use lacuna::data::Measurements;
 use lacuna::linalg::vector::dot;
-use lacuna::linalg::{self, Matrix, symmetric_eigen};
+use lacuna::linalg::{Matrix, symmetric_eigen};
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::Fact;
 use lacuna::plugin::discrepancy::{Hyperparameter, Known, Likelihood, VariancePart};
@@ -172,7 +172,8 @@ impl Likelihood for BiasedLikelihood {
         (r.over_all(&solved.pull, response.len()), by_hyper)
     }
 
-    /// With `V` the covariance of the means, the precision of a value of output `i` is `(1 - 1/n_i) / v_i + (V^-1)_ii / n_i^2`.
+    /// With `V` the covariance of the means, the precision of a value of output `i` is
+    /// `(1 - 1/n_i) / v_i + (V^-1)_ii / n_i^2`.
     fn left_out(&self, response: &[f64], hyper: &[f64]) -> Option<Vec<f64>> {
         let variance = self.variance(hyper)?;
         let solved = self.solve(response, hyper, &variance)?;
@@ -223,6 +224,7 @@ impl BiasedLikelihood {
     /// The prior covariance of the bias at the measured outputs, written out.
     pub(super) fn written_bias(&self, hyper: &[f64]) -> Matrix {
         #![allow(clippy::unwrap_used)]
+        use lacuna::linalg;
         let values = self.bias.values(hyper).unwrap();
         let n = self.replicates.measured.len();
         let mut plain = Matrix::zeros(n, n);

@@ -20,29 +20,35 @@ use likelihood::BiasedLikelihood;
 
 /// A smooth bias of the model, the same in all replicates, plus independent normal noise.
 ///
-/// A measured value is the model's response, plus a bias that is a smooth random function along an axis (of time, for each
-/// sensor its own), plus noise of the given `variance` that is new in each replicate (Kennedy and O'Hagan, J. Royal Statistical Society B 63 (2001)
-/// 425). The bias is a Gaussian process of mean zero with a Matérn covariance. Averaging over replicates makes the noise smaller, but not
-/// the bias: this is how a study says that the model is wrong by more than chance.
+/// A measured value is the model's response, plus a bias that is a smooth random function along an
+/// axis (of time, for each sensor its own), plus noise of the given `variance` that is new in each
+/// replicate (Kennedy and O'Hagan, J. Royal Statistical Society B 63 (2001) 425). The bias is a
+/// Gaussian process of mean zero with a Matérn covariance. Averaging over replicates makes the
+/// noise smaller, but not the bias: this is how a study says that the model is wrong by more than
+/// chance.
 ///
-/// A bias that may take the shape of what the parameters do to the response leaves the parameters unknown. With
-/// `orthogonal = true` its prior is conditioned to be orthogonal to the derivatives of the response by
-/// the parameters at the best fit, over all measured outputs (Plumlee, J. American Statistical Association 112 (2017) 1274): what the
-/// parameters can explain is explained by them. The covariance `C` becomes `C - C G (G'CG)^-1 G'C` with `G` the derivatives.
+/// A bias that may take the shape of what the parameters do to the response leaves the parameters
+/// unknown. With `orthogonal = true` its prior is conditioned to be orthogonal to the derivatives
+/// of the response by the parameters at the best fit, over all measured outputs (Plumlee, J.
+/// American Statistical Association 112 (2017) 1274): what the parameters can explain is explained
+/// by them. The covariance `C` becomes `C - C G (G'CG)^-1 G'C` with `G` the derivatives.
 ///
-/// The variance of a new replicate is told as `measurement` (the noise), `model_form` (the bias before data), and the
-/// common errors. One evaluation takes the Cholesky factor of each series: the cube of its length in operations.
+/// The variance of a new replicate is told as `measurement` (the noise), `model_form` (the bias
+/// before data), and the common errors. One evaluation takes the Cholesky factor of each series:
+/// the cube of its length in operations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GaussianProcess {
-    /// The standard deviation of the bias in the unit of the response: a prior such as `{ half_normal = 1e-5 }`, or `{ known = 1e-5
-    /// }`. Unknown ones are called `bias`, or `bias[B]`.
+    /// The standard deviation of the bias in the unit of the response: a prior such as
+    /// `{ half_normal = 1e-5 }`, or `{ known = 1e-5 }`. Unknown ones are called `bias`, or
+    /// `bias[B]`.
     pub bias: Quantity,
-    /// The length over which the bias is correlated, in the unit of the axis: a prior such as `{ log_normal = [-9.2, 0.7] }`, or
-    /// `{ known = 1e-4 }`. Unknown ones are called `correlation_length`, or `correlation_length[B]`.
+    /// The length over which the bias is correlated, in the unit of the axis: a prior such as
+    /// `{ log_normal = [-9.2, 0.7] }`, or `{ known = 1e-4 }`. Unknown ones are called
+    /// `correlation_length`, or `correlation_length[B]`.
     pub correlation_length: Quantity,
-    /// Which series share the standard deviation and the length of their biases: `"all"`, or another axis than the one
-    /// they run along, such as `"sensor"`.
+    /// Which series share the standard deviation and the length of their biases: `"all"`, or
+    /// another axis than the one they run along, such as `"sensor"`.
     #[serde(default)]
     pub bias_by: By,
     /// How smooth the bias is.
@@ -54,10 +60,11 @@ pub struct GaussianProcess {
     /// The axis of numbers along which the bias is smooth; the last one when it is left away.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub along: Option<String>,
-    /// The variance of the noise: a prior such as `{ half_normal = 1e-6 }`, `{ known = 2.5e-11 }`, or a multiple of the
-    /// measured one, `{ measured = { known = 1 } }`, as for `gaussian`.
+    /// The variance of the noise: a prior such as `{ half_normal = 1e-6 }`, `{ known = 2.5e-11 }`,
+    /// or a multiple of the measured one, `{ measured = { known = 1 } }`, as for `gaussian`.
     pub variance: Variance,
-    /// Which outputs share a variance of the noise: `"all"`, an axis such as `"sensor"`, windows, or a list of these.
+    /// Which outputs share a variance of the noise: `"all"`, an axis such as `"sensor"`, windows,
+    /// or a list of these.
     #[serde(default)]
     pub by: By,
 }

@@ -1,7 +1,7 @@
 //! The covariance of the mean curve, factored without ever being formed.
 //!
-//! With `A = C + D` (`D` the noise of the means, both block-diagonal by series) the covariance of the mean curve is `V = A - H S^-1 H' + F F'`.
-//! Twice Woodbury (Rasmussen and Williams 2006, A.3):
+//! With `A = C + D` (`D` the noise of the means, both block-diagonal by series) the covariance of
+//! the mean curve is `V = A - H S^-1 H' + F F'`. Twice Woodbury (Rasmussen and Williams 2006, A.3):
 //!
 //! ```text
 //! B = A - H S^-1 H':   B^-1 = A^-1 + Y N^-1 Y',  Y = A^-1 H,  N = S - H'A^-1 H = (A^-1 D G)' H,
@@ -148,8 +148,8 @@ impl Solved {
         diagonal
     }
 
-    /// Twice the derivative of the log density by the entries of `C`, by series: `P' (pull pull' - V^-1) P` with the
-    /// projection `P = I - H S^-1 G'`.
+    /// Twice the derivative of the log density by the entries of `C`, by series:
+    /// `P' (pull pull' - V^-1) P` with the projection `P = I - H S^-1 G'`.
     pub fn by_covariance(&self, bias: &Bias, inverses: &[Matrix]) -> Vec<Matrix> {
         let (mut added, mut taken) = self.corrections();
         let mut pull = Matrix::from_vec(self.pull.len(), 1, self.pull.clone());

@@ -16,24 +16,27 @@ use super::common::{By, Groups, Normal, PerGroup, Quantity, Replicates, Setting,
 
 /// Normal differences in proportion to the model's response, with a floor.
 ///
-/// Every measured value is `y = m (1 + e1) + e0` with the model's response `m`, a relative error `e1` of mean zero and
-/// standard deviation `relative`, and an absolute one `e0` of standard deviation `floor`: a normal number of
-/// variance `relative^2 m^2 + floor^2` (the proportional and the combined error model of Gelman et al., Bayesian Data
-/// Analysis (2013), and of pharmacometrics). Take it for sensors and models whose errors are a share of the signal.
+/// Every measured value is `y = m (1 + e1) + e0` with the model's response `m`, a relative error
+/// `e1` of mean zero and standard deviation `relative`, and an absolute one `e0` of standard
+/// deviation `floor`: a normal number of variance `relative^2 m^2 + floor^2` (the proportional and
+/// the combined error model of Gelman et al., Bayesian Data Analysis (2013), and of
+/// pharmacometrics). Take it for sensors and models whose errors are a share of the signal.
 ///
-/// Without a floor a response of exactly zero has no error, and its likelihood is zero unless
-/// the data are zero as well: give a floor where a signal starts at rest.
-/// Since the variance follows the response, the likelihood is not reduced to an emulator's basis.
+/// Without a floor a response of exactly zero has no error, and its likelihood is zero unless the
+/// data are zero as well: give a floor where a signal starts at rest. Since the variance follows
+/// the response, the likelihood is not reduced to an emulator's basis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MultiplicativeGaussian {
-    /// The relative standard deviation: a prior such as `{ half_normal = 0.2 }`, or `{ known = 0.05 }`. Unknown ones are
-    /// called `relative`, or `relative[B]`.
+    /// The relative standard deviation: a prior such as `{ half_normal = 0.2 }`, or
+    /// `{ known = 0.05 }`. Unknown ones are called `relative`, or `relative[B]`.
     pub relative: Quantity,
-    /// Which outputs share a relative standard deviation: `"all"`, an axis such as `"sensor"`, windows, or a list of these.
+    /// Which outputs share a relative standard deviation: `"all"`, an axis such as `"sensor"`,
+    /// windows, or a list of these.
     #[serde(default)]
     pub by: By,
-    /// The absolute standard deviation, in the unit of the response, called `floor`; none when it is left away.
+    /// The absolute standard deviation, in the unit of the response, called `floor`; none when it
+    /// is left away.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub floor: Option<Quantity>,
 }

@@ -10,9 +10,9 @@ use lacuna::run::Stop;
 use super::Directions;
 use crate::discrepancies::common::Replicates;
 
-/// A common error `F zeta` with `zeta` standard normal, of which the leading directions are kept: with the
-/// singular value decomposition `W F = U diag(s) V'`, `W` the roots of the counts, it is `F V` times as many standard
-/// normal numbers, the first of which matter most to the mean curve.
+/// A common error `F zeta` with `zeta` standard normal, of which the leading directions are kept:
+/// with the singular value decomposition `W F = U diag(s) V'`, `W` the roots of the counts, it is
+/// `F V` times as many standard normal numbers, the first of which matter most to the mean curve.
 #[derive(Debug, Clone)]
 pub(super) struct Latent {
     pub origin: String,

@@ -181,7 +181,8 @@ impl Likelihood for StudentLikelihood {
         Some(values(&self.setting.data).map(one).collect())
     }
 
-    /// Since the weights of the common errors are known here, their parts are the squares of the errors themselves.
+    /// Since the weights of the common errors are known here, their parts are the squares of the
+    /// errors themselves.
     fn predictive(&self, _response: &[f64], hyper: &[f64]) -> Vec<VariancePart> {
         let mut parts = self.setting.own_parts(&self.variance(hyper).unwrap_or_default());
         for latent in self.latent.iter().filter(|l| l.predictive) {

@@ -201,8 +201,8 @@ fn gradients_of_all_forms_are_the_derivatives() {
     }
 }
 
-/// Simpson's rule in the logarithm of the variance, whose error is of the fourth order in the step; a prior with
-/// a corner is given as two ranges.
+/// Simpson's rule in the logarithm of the variance, whose error is of the fourth order in the step;
+/// a prior with a corner is given as two ranges.
 fn by_simpson(prior: &Distribution, ranges: &[f64], density: impl Fn(f64) -> f64) -> f64 {
     const COUNT: usize = 6000;
     let mut values = Vec::new();
