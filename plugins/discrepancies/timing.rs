@@ -53,14 +53,14 @@ fn data() -> Measurements {
     Measurements { layout, replicates: (0..20).map(replicate).collect() }
 }
 
-/// Microseconds of one call, the least of five rounds.
+/// Microseconds of one call, the least of forty rounds.
 fn microseconds(count: usize, mut act: impl FnMut()) -> f64 {
     let round = |act: &mut dyn FnMut()| {
         let begin = Instant::now();
         (0..count).for_each(|_| act());
         1e6 * begin.elapsed().as_secs_f64() / count as f64
     };
-    (0..5).map(|_| round(&mut act)).fold(f64::INFINITY, f64::min)
+    (0..40).map(|_| round(&mut act)).fold(f64::INFINITY, f64::min)
 }
 
 #[test]
@@ -95,15 +95,15 @@ fn one_evaluation() {
             let likelihood = plugin.likelihood(known).unwrap();
             let hyper: Vec<f64> = likelihood.hyperparameters().iter().map(|h| h.start).collect();
             let m = response.row(0);
-            let full = microseconds(10, || {
+            let full = microseconds(2, || {
                 std::hint::black_box(likelihood.log_likelihood(m, &hyper));
             });
-            let gradient = microseconds(3, || {
+            let gradient = microseconds(1, || {
                 std::hint::black_box(likelihood.gradient(m, &hyper));
             });
             let compressed = likelihood.compress(&emulated).map(|compressed| {
                 let hyper = Matrix::from_rows(hyper.len(), (0..30).map(|_| &hyper[..]));
-                let batch = microseconds(10, || {
+                let batch = microseconds(1, || {
                     std::hint::black_box(compressed.log_likelihood(&basis, &hyper));
                 });
                 format!(", compressed {:.1}", batch / 30.0)

@@ -77,6 +77,7 @@ fn common(origin: &str, predictive: bool) -> CommonError {
 }
 
 /// Slopes of two parameters, of which the second hardly matters.
+#[expect(clippy::unnecessary_wraps, reason = "slopes may fail where a study computes them")]
 fn slopes() -> Result<Matrix, Stop> {
     Ok(Matrix::from_fn(OUTPUTS, 2, |i, j| (0.3 * i as f64).cos() / (1.0 + 100.0 * j as f64)))
 }

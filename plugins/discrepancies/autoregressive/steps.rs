@@ -23,16 +23,29 @@ pub(super) struct Step {
     pub scatter: [f64; 3],
 }
 
+/// A value and the one before it, among the measured outputs.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+struct Key {
+    at: usize,
+    before: Option<usize>,
+}
+
+/// The values of the replicates that measured both, at and before.
+struct Pairs {
+    gap: f64,
+    values: Vec<[f64; 2]>,
+}
+
 /// The steps of all series, in a fixed order.
 pub(super) fn steps(data: &Measurements, replicates: &Replicates, series: &Series) -> Vec<Step> {
-    let mut found: BTreeMap<(usize, Option<usize>), (f64, Vec<[f64; 2]>)> = BTreeMap::new();
+    let mut found: BTreeMap<Key, Pairs> = BTreeMap::new();
     let place = places(data.layout.len(), replicates);
     for_each_step(data, series, |_, (at, y), before, gap| {
-        let key = (place[at], before.map(|(i, _)| place[i]));
-        let pairs = &mut found.entry(key).or_insert_with(|| (gap, Vec::new())).1;
-        pairs.push([y, before.map_or(0.0, |(_, y)| y)]);
+        let key = Key { at: place[at], before: before.map(|(i, _)| place[i]) };
+        let pairs = found.entry(key).or_insert_with(|| Pairs { gap, values: Vec::new() });
+        pairs.values.push([y, before.map_or(0.0, |(_, y)| y)]);
     });
-    let step = |((at, before), (gap, pairs)): ((usize, Option<usize>), (f64, Vec<[f64; 2]>))| {
+    let step = |(Key { at, before }, Pairs { gap, values: pairs }): (Key, Pairs)| {
         let count = pairs.len() as f64;
         let mean = [0, 1].map(|k| pairs.iter().map(|p| p[k]).sum::<f64>() / count);
         let sum = |a: usize, b: usize| {

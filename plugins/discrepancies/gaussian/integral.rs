@@ -97,7 +97,9 @@ pub(super) fn integrate(spread: &Spread, residual: Residual<'_>, prior: &Distrib
             (from, width) = (to, width * GROWTH);
         }
     }
-    nodes.iter_mut().for_each(|(_, p)| *p /= total);
+    for (_, p) in &mut nodes {
+        *p /= total;
+    }
     Integral { log: highest + total.ln(), nodes }
 }
 
@@ -151,9 +153,9 @@ fn summit(slope: impl Fn(f64) -> f64, start: f64, (low, high): (f64, f64)) -> f6
         let c = if inside { secant } else { middle };
         let fc = slope(c);
         if (fc > 0.0) == (fa > 0.0) {
-            (a, fa) = (c, fc)
+            (a, fa) = (c, fc);
         } else {
-            (b, fb) = (c, fc)
+            (b, fb) = (c, fc);
         }
         if fc == 0.0 {
             return c;

@@ -65,7 +65,7 @@ impl Law {
                 .sum(),
             Self::Coupled(coupled) => coupled
                 .solve(hyper, residuals)
-                .map_or(f64::NEG_INFINITY, |solved| coupled.log_likelihood(&solved, spreads)),
+                .map_or(f64::NEG_INFINITY, |solved| solved.log_likelihood(spreads)),
         }
     }
 
@@ -148,6 +148,17 @@ struct Solved<'a> {
     squares: Vec<f64>,
 }
 
+impl Solved<'_> {
+    fn log_likelihood(&self, spreads: &[&Spread]) -> f64 {
+        let mut twice = dot(&self.zeta, &self.zeta) + self.capacitance.log_determinant();
+        for ((spread, &v), squares) in spreads.iter().zip(self.variance).zip(&self.squares) {
+            twice += spread.count * (std::f64::consts::TAU * v).ln() + spread.log_scale;
+            twice += (spread.scatter + squares) / v;
+        }
+        -0.5 * twice
+    }
+}
+
 impl Coupled {
     /// The common errors over groups; each group's statistics are given its directions.
     pub fn new(
@@ -195,15 +206,6 @@ impl Coupled {
         let rest: Vec<Vec<f64>> = self.factors.iter().zip(residuals).map(rest).collect();
         let squares = residuals.iter().zip(&rest).map(|(r, a)| r.outside + dot(a, a)).collect();
         Some(Solved { variance, zeta, capacitance, rest, squares })
-    }
-
-    fn log_likelihood(&self, solved: &Solved<'_>, spreads: &[&Spread]) -> f64 {
-        let mut twice = dot(&solved.zeta, &solved.zeta) + solved.capacitance.log_determinant();
-        for ((spread, &v), squares) in spreads.iter().zip(solved.variance).zip(&solved.squares) {
-            twice += spread.count * (std::f64::consts::TAU * v).ln() + spread.log_scale;
-            twice += (spread.scatter + squares) / v;
-        }
-        -0.5 * twice
     }
 
     /// By Fisher's identity: the derivative at fixed common errors, averaged over them given the data.

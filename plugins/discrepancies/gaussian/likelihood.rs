@@ -115,8 +115,10 @@ fn residuals(split: &Split) -> Vec<Residual<'_>> {
 }
 
 fn not_integrable() -> Stop {
-    Stop::new("several variances cannot be integrated out together with errors that all replicates share")
-        .help("give `marginal = false`, or one variance for all outputs (`by = \"all\"`)")
+    Stop::new(
+        "several variances cannot be integrated out together with errors that all replicates share",
+    )
+    .help("give `marginal = false`, or one variance for all outputs (`by = \"all\"`)")
 }
 
 impl Likelihood for GaussianLikelihood {

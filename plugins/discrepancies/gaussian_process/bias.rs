@@ -72,7 +72,7 @@ impl Bias {
 
     /// The standard deviation and the length of a series; those of a series never measured are the
     /// means of all.
-    pub fn of_block(&self, block: &Block, (sd, length): (&[f64], &[f64])) -> (f64, f64) {
+    pub fn of_block(block: &Block, (sd, length): (&[f64], &[f64])) -> (f64, f64) {
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         match block.group {
             Some(g) => (sd[g], length[g]),
@@ -84,12 +84,11 @@ impl Bias {
     pub fn covariances(&self, values: (&[f64], &[f64])) -> Vec<Matrix> {
         let mut all: Vec<Matrix> = Vec::with_capacity(self.blocks.len());
         for block in &self.blocks {
-            let covariance = match block.twin {
-                Some(twin) => all[twin].clone(),
-                None => {
-                    let (sd, length) = self.of_block(block, values);
-                    self.covariance(&block.grid, &block.grid, sd, length)
-                }
+            let covariance = if let Some(twin) = block.twin {
+                all[twin].clone()
+            } else {
+                let (sd, length) = Self::of_block(block, values);
+                self.covariance(&block.grid, &block.grid, sd, length)
             };
             all.push(covariance);
         }
@@ -122,7 +121,7 @@ impl Bias {
     /// `H` at all outputs of each series, and the factor of `S`.
     pub fn projection(&self, values: (&[f64], &[f64])) -> Option<(Vec<Matrix>, Cholesky)> {
         let image = |grid: &[f64], block: &Block| {
-            let (sd, length) = self.of_block(block, values);
+            let (sd, length) = Self::of_block(block, values);
             linalg::multiply(&self.covariance(grid, &block.grid, sd, length), &self.basis_of(block))
         };
         let measured: Vec<Matrix> = self.blocks.iter().map(|b| image(&b.grid, b)).collect();

@@ -77,7 +77,7 @@ impl BiasedLikelihood {
         let (images, inner) = self.bias.projection(values)?;
         let mut variance = vec![0.0; self.place.len()];
         for (block, image) in self.bias.blocks.iter().zip(&images) {
-            let (sd, _) = self.bias.of_block(block, values);
+            let (sd, _) = Bias::of_block(block, values);
             for (&i, row) in block.outputs.iter().zip(image.iter_rows()) {
                 variance[i] = (sd * sd - inner.quadratic(row)).max(0.0);
             }
@@ -91,7 +91,7 @@ impl BiasedLikelihood {
         let mut bias = vec![0.0; self.place.len()];
         let mut along = vec![0.0; self.bias.basis.columns()];
         for (s, block) in self.bias.blocks.iter().enumerate() {
-            let (sd, length) = self.bias.of_block(block, values);
+            let (sd, length) = Bias::of_block(block, values);
             let grid = &self.bias.grid;
             let eigen = symmetric_eigen(&self.bias.covariance(grid, grid, sd, length)).ok()?;
             let mut rng = stream.at(s as u64).generator();

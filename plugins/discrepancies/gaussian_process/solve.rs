@@ -23,11 +23,11 @@ pub(super) struct Solved {
     /// `H`.
     pub image: Matrix,
     /// `Y`.
-    pub solved_image: Matrix,
+    pub inverse_image: Matrix,
     /// `S` and `N`; `None` where the bias need not be orthogonal.
     pub inner: Option<(Cholesky, Cholesky)>,
     /// `B^-1 F`.
-    pub solved_factor: Matrix,
+    pub inverse_factor: Matrix,
     /// `Q`.
     pub capacitance: Cholesky,
     /// `V^-1 d` for the residual `d` of the means.
@@ -81,7 +81,7 @@ impl Solved {
         }
         let pick =
             |m: &Matrix, from: usize, to: usize| m.select_columns(&(from..to).collect::<Vec<_>>());
-        let (image, solved_image) = (pick(&right, 0, p), pick(&solved, 0, p));
+        let (image, inverse_image) = (pick(&right, 0, p), pick(&solved, 0, p));
         let mut rest = pick(&solved, 2 * p, width);
         let inner = if p == 0 {
             None
@@ -89,20 +89,20 @@ impl Solved {
             let outer = bias.inner(&images)?;
             let reduced = linalg::transposed_multiply(&pick(&solved, p, 2 * p), &image);
             let reduced = Cholesky::new(&reduced).ok()?;
-            let along = linalg::transposed_multiply(&solved_image, &pick(&right, 2 * p, width));
-            add(&mut rest, 1.0, &linalg::multiply(&solved_image, &reduced.solve_matrix(&along)));
+            let along = linalg::transposed_multiply(&inverse_image, &pick(&right, 2 * p, width));
+            add(&mut rest, 1.0, &linalg::multiply(&inverse_image, &reduced.solve_matrix(&along)));
             twice += reduced.log_determinant() - outer.log_determinant();
             Some((outer, reduced))
         };
-        let (solved_factor, mut pull) = (pick(&rest, 0, r), rest.column(r));
-        let mut capacitance = linalg::transposed_multiply(factor, &solved_factor);
+        let (inverse_factor, mut pull) = (pick(&rest, 0, r), rest.column(r));
+        let mut capacitance = linalg::transposed_multiply(factor, &inverse_factor);
         for k in 0..r {
             capacitance[(k, k)] += 1.0;
         }
         let capacitance = Cholesky::new(&capacitance).ok()?;
-        let mut zeta = linalg::transposed_multiply_vector(&solved_factor, residual);
+        let mut zeta = linalg::transposed_multiply_vector(&inverse_factor, residual);
         capacitance.solve(&mut zeta);
-        for (x, row) in pull.iter_mut().zip(solved_factor.iter_rows()) {
+        for (x, row) in pull.iter_mut().zip(inverse_factor.iter_rows()) {
             *x -= dot(row, &zeta);
         }
         twice += capacitance.log_determinant() + dot(residual, &pull);
@@ -110,9 +110,9 @@ impl Solved {
             blocks,
             covariances,
             image,
-            solved_image,
+            inverse_image,
             inner,
-            solved_factor,
+            inverse_factor,
             capacitance,
             pull,
             twice,
@@ -124,10 +124,10 @@ impl Solved {
         let half =
             |m: &Matrix, factor: &Cholesky| factor.whiten_matrix(&m.transposed()).transposed();
         let added = match &self.inner {
-            Some((_, reduced)) => half(&self.solved_image, reduced),
+            Some((_, reduced)) => half(&self.inverse_image, reduced),
             None => Matrix::zeros(self.pull.len(), 0),
         };
-        (added, half(&self.solved_factor, &self.capacitance))
+        (added, half(&self.inverse_factor, &self.capacitance))
     }
 
     /// The inverses of the blocks of `A`.
@@ -161,7 +161,7 @@ impl Solved {
                 add(x, -1.0, &linalg::multiply(&bias.basis, &along));
             }
             // P' A^-1 P = A^-1 - G (Y S^-1)' - (Y S^-1) G' + G (S^-1 H'Y S^-1) G'.
-            let turned = outer.solve_matrix(&self.solved_image.transposed()).transposed();
+            let turned = outer.solve_matrix(&self.inverse_image.transposed()).transposed();
             let middle = linalg::transposed_multiply(&self.image, &turned);
             cross = Some((turned, outer.solve_matrix(&middle)));
         }

@@ -15,6 +15,7 @@ use crate::discrepancies::common::testing::{
 };
 
 /// Slopes of three parameters, of which the last is a combination of the others.
+#[expect(clippy::unnecessary_wraps, reason = "slopes may fail where a study computes them")]
 fn slopes() -> Result<Matrix, Stop> {
     let random = random_matrix(OUTPUTS, 2, 77);
     Ok(Matrix::from_fn(OUTPUTS, 3, |i, j| match j {

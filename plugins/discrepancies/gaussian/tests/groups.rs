@@ -1,6 +1,7 @@
 //! Several variances, multipliers of measured ones, and variances integrated out.
 
 use lacuna::data::Measurements;
+use lacuna::data::measurements::Summary;
 use lacuna::linalg::{self, Matrix};
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::discrepancy::{CommonError, Known, Likelihood};
@@ -116,7 +117,7 @@ fn known_and_measured_variances_equal_the_density_written_out() {
     let data = data(5, 4);
     let error = [common(6)];
     let response = random_matrix(1, OUTPUTS, 7);
-    let sds: Vec<Option<f64>> = data.summaries().iter().map(|s| s.sd()).collect();
+    let sds: Vec<Option<f64>> = data.summaries().iter().map(Summary::sd).collect();
     let hyper = [0.5, 1.5, 2.5];
     for error in [&[][..], &error[..]] {
         let known = build(&data, error, "variance = { known = [1.0, 2.0, 3.0] }\nby = \"sensor\"");
@@ -170,8 +171,8 @@ fn the_compressed_forms_of_groups_equal_the_full_ones() {
                 let hyper = Matrix::from_fn(3, count, |i, j| 0.2 + (i + j) as f64);
                 let found = compressed.log_likelihood(&basis, &hyper);
                 let responses = linalg::multiply(&basis, &emulated.coefficients);
-                for i in 0..3 {
-                    close(found[i], full.log_likelihood(responses.row(i), hyper.row(i)), 1e-10);
+                for (i, &found) in found.iter().enumerate() {
+                    close(found, full.log_likelihood(responses.row(i), hyper.row(i)), 1e-10);
                     let (by_basis, by_hyper) = compressed.gradient(basis.row(i), hyper.row(i));
                     let (by_response, expected) = full.gradient(responses.row(i), hyper.row(i));
                     let chained = linalg::multiply_vector(&emulated.coefficients, &by_response);
