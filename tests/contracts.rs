@@ -121,10 +121,48 @@ fn surrogates() {
 
 #[test]
 fn discrepancies() {
-    let table: &Table = &[(
-        "gaussian",
-        &["variance = { half_normal = 1.0 }", "variance = { uniform = [0.0, 10.0] }"],
-    )];
+    let autoregressive = &[
+        "variance = { half_normal = 1.0 }\ncorrelation_time = { log_normal = [-9, 1] }",
+        "variance = { half_normal = 1.0 }\nby = \"sensor\"\ncorrelation_time = { known = 1e-4 }",
+        "variance = { measured = { half_normal = 4 } }\nby = [\"sensor\", { axis = \"time\", windows = 2 }]\n\
+         correlation_time = { log_normal = [-9, 1] }\ncorrelation_by = \"sensor\"",
+    ];
+    let gaussian = &[
+        "variance = { half_normal = 1.0 }",
+        "variance = { uniform = [0.0, 10.0] }",
+        "variance = { known = 0.04 }",
+        "variance = { measured = { inverse_gamma = [3, 4] } }",
+        "variance = { half_normal = 1.0 }\nby = \"sensor\"",
+        "variance = { half_normal = 1.0 }\nby = [\"sensor\", { axis = \"time\", windows = 2 }]",
+        "variance = { measured = { half_normal = 4 } }\nby = \"time\"",
+        "variance = { half_normal = 1.0 }\nmarginal = true",
+        "variance = { inverse_gamma = [2, 0.1] }\nmarginal = true",
+    ];
+    let gaussian_process = &[
+        "bias = { half_normal = 1.0 }\ncorrelation_length = { log_normal = [-9, 1] }\n\
+         variance = { half_normal = 1.0 }",
+        "bias = { half_normal = 1.0 }\ncorrelation_length = { log_normal = [-9, 1] }\nbias_by = \"sensor\"\n\
+         kernel = \"matern_3_2\"\nvariance = { half_normal = 1.0 }\nby = \"sensor\"",
+        "bias = { known = 0.1 }\ncorrelation_length = { known = 1e-4 }\northogonal = false\n\
+         variance = { measured = { known = 1 } }",
+    ];
+    let multiplicative_gaussian = &[
+        "relative = { half_normal = 1.0 }\nfloor = { known = 0.2 }",
+        "relative = { half_normal = 1.0 }\nby = \"sensor\"\nfloor = { half_normal = 1.0 }",
+        "relative = { known = 0.1 }\nfloor = { known = 0.1 }",
+    ];
+    let student_t = &[
+        "scale = { half_normal = 1.0 }",
+        "scale = { half_normal = 1.0 }\nby = \"sensor\"\ndegrees_of_freedom = { known = 5 }",
+        "scale = { known = 0.2 }\ncommon = { share = 0.9, most = 1 }",
+    ];
+    let table: &Table = &[
+        ("autoregressive", autoregressive),
+        ("gaussian", gaussian),
+        ("gaussian_process", gaussian_process),
+        ("multiplicative_gaussian", multiplicative_gaussian),
+        ("student_t", student_t),
+    ];
     all::<dyn Discrepancy>(table, |case, plugin| contract::discrepancy(&case.label, plugin));
 }
 

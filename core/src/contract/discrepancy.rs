@@ -16,9 +16,12 @@ use crate::run::Stop;
 /// - the likelihood is finite at the start, the same each time, larger for a response that fits than for one far
 ///   off, and never a number for hyperparameters that are none;
 /// - its derivatives are those that differences give, and none by what was not measured;
+/// - the density of a value given all others, where it is known, is the quotient of the likelihoods with and
+///   without the value;
 /// - reduced to a linear emulator it is the same function, with the same derivatives;
 /// - simulated data have the gaps of the measurements, and the variance that is predicted for a new replicate,
 ///   within five Monte Carlo errors;
+/// - slopes of the model that cannot be had do not make it panic;
 /// - data without a value, with a value that is not finite or of another shape are refused.
 pub fn discrepancy(name: &str, discrepancy: &dyn Discrepancy) -> Result<(), Vec<String>> {
     let over = |check: fn(&dyn Likelihood) -> Result<(), String>, last: CommonError| {
@@ -33,10 +36,11 @@ pub fn discrepancy(name: &str, discrepancy: &dyn Discrepancy) -> Result<(), Vec<
     };
     // An error of the data's mean belongs to data that are there, not to a replicate that is new.
     let (of_data, of_model) = (|| common("replicates", false), || common("numerics", true));
-    let checks: [Check<'_>; 6] = [
+    let checks: [Check<'_>; 7] = [
         ("has sound hyperparameters", Box::new(over(has_sound_hyperparameters, of_data()))),
         ("judges responses", Box::new(over(judges_responses, of_data()))),
         ("knows its derivatives", Box::new(over(knows_its_derivatives, of_data()))),
+        ("leaves values out", Box::new(|| leaves_values_out(discrepancy))),
         ("compresses exactly", Box::new(over(compresses_exactly, of_data()))),
         ("simulates what it predicts", Box::new(over(simulates_what_it_predicts, of_model()))),
         ("refuses bad data", Box::new(|| refuses_bad_data(discrepancy))),
@@ -73,7 +77,7 @@ fn common(origin: &str, predictive: bool) -> CommonError {
 }
 
 /// Slopes of two parameters, of which the second hardly matters.
-#[expect(clippy::unnecessary_wraps, reason = "the shape of `Known::slopes`")]
+#[expect(clippy::unnecessary_wraps, reason = "slopes may fail where a study computes them")]
 fn slopes() -> Result<Matrix, Stop> {
     Ok(Matrix::from_fn(OUTPUTS, 2, |i, j| (0.3 * i as f64).cos() / (1.0 + 100.0 * j as f64)))
 }
@@ -144,6 +148,48 @@ fn knows_its_derivatives(likelihood: &dyn Likelihood) -> Result<(), String> {
     };
     let differences: Vec<f64> = (0..start.len()).map(by).collect();
     agree("the derivative by hyperparameter", &by_hyper, &differences, 1e-5)
+}
+
+/// The likelihood of other data is comparable only where it stands for the same law: a discrepancy may take
+/// variances from the data, which its predictions then show.
+fn leaves_values_out(discrepancy: &dyn Discrepancy) -> Result<(), String> {
+    let (data, truth, errors) = (data(), truth(), [common("emulator", true)]);
+    let build = |data: &Measurements| {
+        let built = discrepancy.likelihood(&known(data, &errors));
+        built.map_err(|stop| format!("sound data are refused: {stop}"))
+    };
+    let whole = build(&data)?;
+    let hyper = start(&*whole);
+    let Some(given) = whole.left_out(&truth, &hyper) else { return Ok(()) };
+    if given.len() != data.count() {
+        return Err(format!("{} densities of {} values", given.len(), data.count()));
+    }
+    let total = |likelihood: &dyn Likelihood| -> Vec<f64> {
+        let parts = likelihood.predictive(&truth, &hyper);
+        (0..OUTPUTS).map(|i| parts.iter().map(|p| p.variance[i]).sum()).collect()
+    };
+    let (law, value) = (total(&*whole), whole.log_likelihood(&truth, &hyper));
+    let (mut densities, mut quotients) = (Vec::new(), Vec::new());
+    let mut next = given.iter();
+    for (r, replicate) in data.replicates.iter().enumerate() {
+        for i in (0..OUTPUTS).filter(|&i| replicate.values[i].is_some()) {
+            let density = next.next().copied().unwrap_or(f64::NAN);
+            let mut less = data.clone();
+            less.replicates[r].values[i] = None;
+            let less = build(&less)?;
+            let same_names = || {
+                let names = |l: &dyn Likelihood| -> Vec<String> {
+                    l.hyperparameters().iter().map(|h| h.name.clone()).collect()
+                };
+                names(&*less) == names(&*whole)
+            };
+            if same_names() && agree("the law", &total(&*less), &law, 1e-9).is_ok() {
+                densities.push(density);
+                quotients.push(value - less.log_likelihood(&truth, &hyper));
+            }
+        }
+    }
+    agree("the density of value", &densities, &quotients, 1e-8)
 }
 
 /// Coefficients of four terms, whose values are the coordinates themselves.
@@ -239,6 +285,9 @@ fn refuses_bad_data(discrepancy: &dyn Discrepancy) -> Result<(), String> {
     ] {
         refused(what, || discrepancy.likelihood(&known(&data, &[])).map(|_| ()))?;
     }
+    let sound = data();
+    let without_slopes = || discrepancy.likelihood(&Known::without_slopes(&sound, &[])).is_ok();
+    calm("a model without slopes", without_slopes)?;
     let rank = |rows: usize, columns: usize| {
         [CommonError { factor: Matrix::zeros(rows, columns), ..common("emulator", true) }]
     };

@@ -106,7 +106,8 @@ pub trait Likelihood: Send + Sync {
 /// A part of the variance of a new replicate.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct VariancePart {
-    /// Its origin: `discrepancy`, `emulator`, `measurement`.
+    /// Its origin: `measurement` (what replicates show), `model_form` (the rest of the discrepancy), or `discrepancy`
+    /// where the two cannot be told apart; `emulator` and other common errors.
     pub origin: String,
     /// One variance an output.
     pub variance: Vec<f64>,

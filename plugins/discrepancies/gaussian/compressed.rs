@@ -1,23 +1,32 @@
 //! The likelihood reduced to a small form in the basis functions of a linear emulator.
 //!
-//! With `m = C' psi` the weighted residual is `z = -B (psi, 1)`, `B = [W C', -W ybar]`. Its part along the
-//! directions `U` of the common errors is `-(U'B)(psi, 1)`; for the rest, the thin factorisation
-//! `(I - U U') B = Q R` gives `|z_rest| = |R (psi, 1)|` with `R` upper trapezoidal: exact, since an orthogonal
-//! factor does not change a length.
+//! With `m = C' psi` the weighted residual of a group is `z = -B (psi, 1)`, `B = [W C', -W ybar]`.
+//! Its part along the directions `U` of the common errors is `-(U'B)(psi, 1)`; for the rest, the
+//! thin factorisation `(I - U U') B = Q R` gives `|z_rest| = |R (psi, 1)|` with `R` upper
+//! trapezoidal: exact, since an orthogonal factor does not change a length.
 //!
-//! Only the length of the rest matters, and a polynomial basis gives its square as one polynomial. That form
-//! carries the round-off of its largest values into its smallest, so that it is used only where
-//! this cannot be seen: against the scatter of the replicates and what no coefficients can explain.
+//! Only the length of the rest matters, and a polynomial basis gives its square as one polynomial.
+//! That form carries the round-off of its largest values into its smallest, so that it is used only
+//! where this cannot be seen: against the scatter of the replicates and what no coefficients can
+//! explain.
 
 use lacuna::linalg::vector::dot;
 use lacuna::linalg::{self, Matrix};
 use lacuna::plugin::discrepancy::Compressed;
 use lacuna::plugin::surrogate::{Linear, SumOfSquares};
 
-use super::likelihood::{Spread, Statistics};
+use super::law::Law;
+use super::likelihood::GaussianLikelihood;
+use super::statistics::{Residual, Spread, Statistics};
 
 /// See the module.
 pub(super) struct CompressedGaussian {
+    law: Law,
+    pub(super) groups: Vec<CompressedGroup>,
+}
+
+/// The residual of one group.
+pub(super) struct CompressedGroup {
     spread: Spread,
     /// `(U'B)'`, `(terms + 1) x rank`.
     along: Matrix,
@@ -27,12 +36,18 @@ pub(super) struct CompressedGaussian {
     pub(super) squares: Option<Box<dyn SumOfSquares>>,
 }
 
+/// The residuals of a group at several points, those along the directions but for their sign.
+struct Residuals {
+    along: Matrix,
+    squares: Vec<f64>,
+}
+
 /// The largest error of the sum of squares, relative to the least sum that can occur: a tenth of what
 /// the log-likelihood may differ from the sum over all data.
 const TOLERANCE: f64 = 1e-11;
 
-impl CompressedGaussian {
-    pub(super) fn new(s: &Statistics, linear: &dyn Linear) -> Result<Self, linalg::Error> {
+impl CompressedGroup {
+    fn new(s: &Statistics, linear: &dyn Linear) -> Result<Self, linalg::Error> {
         let coefficients = linear.coefficients();
         let terms = coefficients.rows();
         let mut b = Matrix::from_fn(s.measured.len(), terms + 1, |i, j| {
@@ -56,29 +71,51 @@ impl CompressedGaussian {
         Ok(Self { spread: s.spread.clone(), along, outside, squares })
     }
 
-    /// The residual along the directions of the common errors, but for its sign, and what it
-    /// contributes to the derivatives by the basis functions.
-    fn pull(&self, basis: &[f64], v: f64) -> (Vec<f64>, Vec<f64>) {
-        let extended: Vec<f64> = basis.iter().copied().chain([1.0]).collect();
-        let along = linalg::transposed_multiply_vector(&self.along, &extended);
-        let eigenvalues = &self.spread.eigenvalues;
-        let weights: Vec<f64> =
-            along.iter().zip(eigenvalues).map(|(a, lambda)| -a / (v + lambda)).collect();
-        let mut pull = linalg::multiply_vector(&self.along, &weights);
-        pull.truncate(basis.len());
-        (along, pull)
+    fn residuals(&self, extended: &Matrix) -> Residuals {
+        let along = linalg::multiply(extended, &self.along);
+        let outside = linalg::multiply_lower(extended, &self.outside);
+        Residuals { along, squares: outside.iter_rows().map(|row| dot(row, row)).collect() }
     }
 
-    fn with_squares(&self, along: &Matrix, squares: &[f64], hyper: &Matrix) -> Vec<f64> {
-        (squares.iter().enumerate())
-            .map(|(i, &squares)| {
-                let v = hyper[(i, 0)];
-                if v.is_nan() || v <= 0.0 {
-                    return f64::NEG_INFINITY;
-                }
-                self.spread.log_likelihood(v, squares, along.row(i))
-            })
-            .collect()
+    /// The polynomial of the squares, where it holds at all points.
+    fn covering(&self, points: &Matrix) -> Option<&dyn SumOfSquares> {
+        let covering = |s: &&dyn SumOfSquares| points.iter_rows().all(|p| s.covers(p));
+        self.squares.as_deref().filter(covering)
+    }
+
+    /// What pulls along the directions contribute to the derivatives by the basis functions.
+    fn pull(&self, along: &[f64], terms: usize) -> Vec<f64> {
+        let opposite: Vec<f64> = along.iter().map(|a| -a).collect();
+        let mut pull = linalg::multiply_vector(&self.along, &opposite);
+        pull.truncate(terms);
+        pull
+    }
+}
+
+impl CompressedGaussian {
+    pub(super) fn new(
+        likelihood: &GaussianLikelihood,
+        linear: &dyn Linear,
+    ) -> Result<Self, linalg::Error> {
+        let groups = likelihood.groups.iter().map(|s| CompressedGroup::new(s, linear));
+        Ok(Self { law: likelihood.law.clone(), groups: groups.collect::<Result<_, _>>()? })
+    }
+
+    fn spreads(&self) -> Vec<&Spread> {
+        self.groups.iter().map(|g| &g.spread).collect()
+    }
+
+    fn values(&self, residuals: &[Residuals], hyper: &Matrix) -> Vec<f64> {
+        let spreads = self.spreads();
+        let mut at_point = Vec::with_capacity(residuals.len());
+        let one = |i: usize| {
+            at_point.clear();
+            at_point.extend(
+                residuals.iter().map(|r| Residual { outside: r.squares[i], along: r.along.row(i) }),
+            );
+            self.law.log_likelihood(&spreads, hyper.row(i), &at_point)
+        };
+        (0..hyper.rows()).map(one).collect()
     }
 }
 
@@ -96,33 +133,55 @@ fn with_one(basis: &Matrix) -> Matrix {
 impl Compressed for CompressedGaussian {
     fn log_likelihood(&self, basis: &Matrix, hyper: &Matrix) -> Vec<f64> {
         let extended = with_one(basis);
-        let along = linalg::multiply(&extended, &self.along);
-        let outside = linalg::multiply_lower(&extended, &self.outside);
-        let squares: Vec<f64> = outside.iter_rows().map(|row| dot(row, row)).collect();
-        self.with_squares(&along, &squares, hyper)
+        let residuals: Vec<Residuals> =
+            self.groups.iter().map(|g| g.residuals(&extended)).collect();
+        self.values(&residuals, hyper)
     }
 
     fn log_likelihood_at(&self, linear: &dyn Linear, points: &Matrix, hyper: &Matrix) -> Vec<f64> {
-        let covering = |s: &&dyn SumOfSquares| points.iter_rows().all(|p| s.covers(p));
-        let Some(squares) = self.squares.as_deref().filter(covering) else {
-            return self.log_likelihood(&linear.basis(points), hyper);
-        };
-        let along = if self.along.columns() == 0 {
-            Matrix::zeros(points.rows(), 0)
+        let needed = |g: &CompressedGroup| g.along.columns() > 0 || g.covering(points).is_none();
+        let extended = if self.groups.iter().any(needed) {
+            with_one(&linear.basis(points))
         } else {
-            linalg::multiply(&with_one(&linear.basis(points)), &self.along)
+            Matrix::zeros(points.rows(), 0)
         };
-        self.with_squares(&along, &squares.values(points), hyper)
+        let residuals = |group: &CompressedGroup| {
+            let Some(squares) = group.covering(points) else { return group.residuals(&extended) };
+            let along = if group.along.columns() == 0 {
+                Matrix::zeros(points.rows(), 0)
+            } else {
+                linalg::multiply(&extended, &group.along)
+            };
+            Residuals { along, squares: squares.values(points) }
+        };
+        let residuals: Vec<Residuals> = self.groups.iter().map(residuals).collect();
+        self.values(&residuals, hyper)
     }
 
     fn gradient(&self, basis: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let v = hyper[0];
-        let (along, pull) = self.pull(basis, v);
         let extended: Vec<f64> = basis.iter().copied().chain([1.0]).collect();
-        let outside = linalg::transposed_multiply_vector(&self.outside, &extended);
-        let rest = linalg::multiply_vector(&self.outside, &outside);
-        let by_basis = pull.iter().zip(rest).map(|(p, r)| p - r / v).collect();
-        (by_basis, vec![self.spread.by_variance(v, dot(&outside, &outside), &along)])
+        let parts: Vec<(Vec<f64>, Vec<f64>)> = (self.groups.iter())
+            .map(|g| {
+                let along = linalg::transposed_multiply_vector(&g.along, &extended);
+                (along, linalg::transposed_multiply_vector(&g.outside, &extended))
+            })
+            .collect();
+        let residuals: Vec<Residual<'_>> = parts
+            .iter()
+            .map(|(along, outside)| Residual { outside: dot(outside, outside), along })
+            .collect();
+        let mut by_basis = vec![0.0; basis.len()];
+        let Some(slopes) = self.law.slopes(&self.spreads(), hyper, &residuals) else {
+            return (by_basis, vec![0.0; hyper.len()]);
+        };
+        for (g, (group, (_, outside))) in self.groups.iter().zip(&parts).enumerate() {
+            let pull = group.pull(&slopes.along[g], basis.len());
+            let rest = linalg::multiply_vector(&group.outside, outside);
+            for (sum, (p, r)) in by_basis.iter_mut().zip(pull.iter().zip(rest)) {
+                *sum += p - r / slopes.outside[g];
+            }
+        }
+        (by_basis, slopes.by_hyper)
     }
 
     fn gradient_at(
@@ -131,22 +190,44 @@ impl Compressed for CompressedGaussian {
         point: &[f64],
         hyper: &[f64],
     ) -> (Vec<f64>, Vec<f64>) {
-        let v = hyper[0];
         let row = Matrix::from_rows(point.len(), [point]);
-        let Some(squares) = self.squares.as_deref().filter(|s| s.covers(point)) else {
+        let all: Option<Vec<_>> = self.groups.iter().map(|g| g.covering(&row)).collect();
+        let Some(squares) = all else {
             let (by_basis, by_hyper) = self.gradient(linear.basis(&row).row(0), hyper);
             let slopes = linear.basis_gradient(point);
             return (linalg::transposed_multiply_vector(&slopes, &by_basis), by_hyper);
         };
-        let mut by_point: Vec<f64> = squares.gradient(point).iter().map(|g| -0.5 * g / v).collect();
-        let mut along = Vec::new();
-        if self.along.columns() > 0 {
-            let pull;
-            (along, pull) = self.pull(linear.basis(&row).row(0), v);
-            let slopes = linear.basis_gradient(point);
-            let added = linalg::transposed_multiply_vector(&slopes, &pull);
+        let directions = self.groups.iter().any(|g| g.along.columns() > 0);
+        let extended = directions.then(|| with_one(&linear.basis(&row)));
+        let along = |group: &CompressedGroup| {
+            let along = extended
+                .as_ref()
+                .map(|e| linalg::transposed_multiply_vector(&group.along, e.row(0)));
+            along.unwrap_or_default()
+        };
+        let along: Vec<Vec<f64>> = self.groups.iter().map(along).collect();
+        let residuals: Vec<Residual<'_>> = squares
+            .iter()
+            .zip(&along)
+            .map(|(s, along)| Residual { outside: s.values(&row)[0], along })
+            .collect();
+        let mut by_point = vec![0.0; point.len()];
+        let Some(slopes) = self.law.slopes(&self.spreads(), hyper, &residuals) else {
+            return (by_point, vec![0.0; hyper.len()]);
+        };
+        for (s, v) in squares.iter().zip(&slopes.outside) {
+            let gradient = s.gradient(point);
+            by_point.iter_mut().zip(gradient).for_each(|(sum, g)| *sum += -0.5 * g / v);
+        }
+        if let Some(extended) = extended {
+            let terms = extended.columns() - 1;
+            let mut pull = vec![0.0; terms];
+            for (group, along) in self.groups.iter().zip(&slopes.along) {
+                pull.iter_mut().zip(group.pull(along, terms)).for_each(|(sum, p)| *sum += p);
+            }
+            let added = linalg::transposed_multiply_vector(&linear.basis_gradient(point), &pull);
             by_point.iter_mut().zip(added).for_each(|(g, a)| *g += a);
         }
-        (by_point, vec![self.spread.by_variance(v, squares.values(&row)[0], &along)])
+        (by_point, slopes.by_hyper)
     }
 }

@@ -1,11 +1,13 @@
-//! `gaussian`: independent normal differences of one unknown variance.
+//! `gaussian`: independent normal differences.
 
 mod compressed;
+mod integral;
+mod law;
 mod likelihood;
+mod statistics;
 #[cfg(test)]
 mod tests;
 
-use lacuna::math::distribution::Distribution;
 use lacuna::plugin::component::{Component, Context};
 use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood};
 use lacuna::run::Stop;
@@ -13,42 +15,67 @@ use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::common::{By, Groups, Variance};
 use likelihood::GaussianLikelihood;
 
-/// Independent normal differences between data and model, all of one unknown variance.
+/// Independent normal differences between data and model, of one unknown variance or of one for
+/// each group of outputs.
 ///
-/// Every measured value is the model's response plus a normal number of mean zero and the
-/// unknown `variance` (homoscedastic; Radaideh et al. arXiv 2202.03959, equation of the likelihood). Errors that
-/// all replicates share, such as the emulator's own, are further normal errors, correlated between
-/// outputs: their covariance is added once to that of the mean curve.
+/// Every measured value is the model's response plus a normal number of mean zero. Its variance is
+/// unknown and the same for all outputs (homoscedastic; Radaideh et al. arXiv 2202.03959, equation
+/// of the likelihood), or by sensor, by time window, or known, as `variance` and `by` say. Errors
+/// that all replicates share, such as the emulator's own, are further normal errors, correlated
+/// between outputs: their covariance is added once to that of the mean curve.
 ///
 /// The likelihood uses the count, mean and scatter of the replicates of each output, which are
-/// sufficient; with a linear emulator it is reduced further, by an orthogonal factorisation, to
-/// the size of the emulator's basis. Both are exact.
+/// sufficient; with a linear emulator it is reduced further, by an orthogonal factorisation, to the
+/// size of the emulator's basis. Both are exact.
+///
+/// The variance of a new replicate is told in parts: `measurement` is what the replicates of the
+/// group show, `model_form` is the rest, `emulator` and others are the common errors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Gaussian {
-    /// Prior of the variance, in the squared unit of the response, such as `{ half_normal = 1e-6 }`. It is sampled
-    /// as its logarithm, with the Jacobian, so that the prior keeps its meaning.
-    pub variance: Distribution,
+    /// The variance. The prior of an unknown one is in the squared unit of the response, such as
+    /// `{ half_normal = 1e-6 }`, `{ uniform = [0, 1e-8] }`, `{ inverse_gamma = [2, 1e-10] }` or
+    /// `{ log_uniform = [1e-14, 1e-6] }`; it is sampled as its logarithm, with the Jacobian, so
+    /// that the prior keeps its meaning. A known one is `{ known = 2.5e-11 }`. With
+    /// `{ measured = { inverse_gamma = [102, 103] } }` the variance of each output is the one
+    /// between its replicates times an unknown `multiplier` (the error multipliers of Dakota, with
+    /// a prior whose mean and mode are about 1); with `{ measured = { known = 1 } }` it is the
+    /// measured variance itself. An output with fewer than two different values takes the measured
+    /// variance of its group.
+    pub variance: Variance,
+    /// Which outputs share a variance, or a multiplier: `"all"`; `"sensor"` or another axis, one
+    /// for each of its values; `["sensor", { axis = "time", windows = 5 }]`, one for each sensor
+    /// and time window. The unknowns are called `variance[B]`, `variance[B, 0.0002..0.0004 s]`
+    /// (first and last value in the window). A group that was not measured has none.
+    #[serde(default)]
+    pub by: By,
+    /// Integrates unknown variances out of the likelihood, so that they are not sampled: in closed
+    /// form for an inverse gamma prior without common errors, else by quadrature to ten digits. One
+    /// variance can always be integrated out, several only without common errors. What is predicted
+    /// then uses the mean of the variance given the data.
+    #[serde(default)]
+    pub marginal: bool,
 }
 
 impl Component for Gaussian {
-    fn check(&self, _context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        let (low, high) = self.variance.support();
-        if low < 0.0 || high <= 0.0 {
+    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        self.by.check("by", context.layout, complaints);
+        self.variance.check(Groups::of(context.layout, &self.by).ok().as_ref(), complaints);
+        if self.marginal && self.variance.prior().is_none() {
             complaints
-                .at("variance")
-                .say("a variance is never negative")
-                .expected("a prior on positive values, such as `{ half_normal = 1e-6 }`")
-                .found(&self.variance);
+                .at("marginal")
+                .say("a known variance cannot be integrated out")
+                .help("leave `marginal` away, or give the variance a prior");
         }
     }
 }
 
 impl Discrepancy for Gaussian {
     fn likelihood(&self, known: &Known<'_>) -> Result<Box<dyn Likelihood>, Stop> {
-        Ok(Box::new(GaussianLikelihood::new(known.data, known.common, self.variance.clone())?))
+        Ok(Box::new(GaussianLikelihood::new(self, known)?))
     }
 }
 

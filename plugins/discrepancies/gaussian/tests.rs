@@ -3,13 +3,15 @@
 
 use lacuna::data::{Axis, Layout, Measurements, Replicate, Scenario, Unit};
 use lacuna::linalg::{self, Cholesky, Matrix};
-use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal, uniform};
-use lacuna::plugin::discrepancy::{CommonError, Likelihood};
+use lacuna::plugin::discrepancy::{CommonError, Known, Likelihood};
 use lacuna::plugin::surrogate::Linear;
 
+use super::Gaussian;
 use super::likelihood::GaussianLikelihood;
+use crate::discrepancies::common::testing::options;
 
+mod groups;
 mod smooth;
 
 const OUTPUTS: usize = 7;
@@ -65,8 +67,14 @@ fn common(seed: u64) -> CommonError {
     CommonError { origin: "emulator".to_owned(), factor, predictive: true }
 }
 
+/// The likelihood of these options.
+fn build(data: &Measurements, error: &[CommonError], text: &str) -> GaussianLikelihood {
+    let chosen: Gaussian = options("gaussian", text).unwrap();
+    GaussianLikelihood::new(&chosen, &Known::without_slopes(data, error)).unwrap()
+}
+
 fn likelihood(data: &Measurements, error: &[CommonError]) -> GaussianLikelihood {
-    GaussianLikelihood::new(data, error, Distribution::Uniform([0.0, 10.0])).unwrap()
+    build(data, error, "variance = { uniform = [0.0, 10.0] }")
 }
 
 /// The log density of all data as one normal vector with covariance `v I + E F F' E'`, where `E` repeats each

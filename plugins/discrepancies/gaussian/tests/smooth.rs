@@ -3,13 +3,14 @@
 use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Scenario, Unit};
 use lacuna::linalg::{self, Matrix};
 use lacuna::math::distribution::Distribution;
+
 use lacuna::math::random::{Stream, normal, uniform};
 use lacuna::plugin::Emulator;
 use lacuna::plugin::discrepancy::{CommonError, Compressed, Likelihood};
 use lacuna::plugin::surrogate::{Surrogate, Training};
 use lacuna::run::{Progress, Silent};
 
-use super::{GaussianLikelihood, random_matrix};
+use super::{GaussianLikelihood, build, random_matrix};
 use crate::discrepancies::gaussian::compressed::CompressedGaussian;
 use crate::surrogates::polynomial_chaos::{Degree, PolynomialChaos, Solver};
 
@@ -88,7 +89,7 @@ fn measured(emulator: &dyn Emulator, replicates: usize, sd: f64) -> Measurements
 }
 
 fn likelihood(data: &Measurements, common: &[CommonError]) -> GaussianLikelihood {
-    GaussianLikelihood::new(data, common, Distribution::HalfNormal(1e-6)).unwrap()
+    build(data, common, "variance = { half_normal = 1e-6 }")
 }
 
 /// Points of the box and its corners, and a variance for each, from far below to far above the noise.
@@ -119,8 +120,8 @@ fn the_fast_form_is_the_sum_over_all_data() {
     let sd = 5e-6;
     let data = measured(&*emulator, 20, sd);
     let full = likelihood(&data, &[]);
-    let compressed = CompressedGaussian::new(&full.statistics, linear).unwrap();
-    assert!(compressed.squares.is_some());
+    let compressed = CompressedGaussian::new(&full, linear).unwrap();
+    assert!(compressed.groups[0].squares.is_some());
     let (theta, hyper) = cases(sd);
     let fast = compressed.log_likelihood_at(linear, &theta, &hyper);
     let product = compressed.log_likelihood(&linear.basis(&theta), &hyper);
@@ -143,8 +144,8 @@ fn common_errors_do_not_change_that() {
     }
     let common = [CommonError { origin: "emulator".to_owned(), factor, predictive: true }];
     let full = likelihood(&data, &common);
-    let compressed = CompressedGaussian::new(&full.statistics, linear).unwrap();
-    assert!(compressed.squares.is_some());
+    let compressed = CompressedGaussian::new(&full, linear).unwrap();
+    assert!(compressed.groups[0].squares.is_some());
     let (theta, hyper) = cases(sd);
     let fast = compressed.log_likelihood_at(linear, &theta, &hyper);
     for (i, response) in emulator.mean(&theta).iter_rows().enumerate() {
@@ -173,8 +174,8 @@ fn exact_data_are_compared_without_expanding_the_square() {
     let sd = 1e-10;
     let data = measured(&*emulator, 1, sd);
     let full = likelihood(&data, &[]);
-    let compressed = CompressedGaussian::new(&full.statistics, linear).unwrap();
-    assert!(compressed.squares.is_none());
+    let compressed = CompressedGaussian::new(&full, linear).unwrap();
+    assert!(compressed.groups[0].squares.is_none());
     let theta = Matrix::from_rows(3, [&[4e5, 1.1e4, 1500.0][..], &[4e5, 1.1e4, 1500.001]]);
     let hyper = Matrix::from_fn(2, 1, |_, _| sd * sd);
     let found = compressed.log_likelihood_at(linear, &theta, &hyper);
@@ -190,7 +191,7 @@ fn points_outside_the_design_are_evaluated_by_the_product() {
     let linear = emulator.linear().unwrap();
     let data = measured(&*emulator, 20, 5e-6);
     let full = likelihood(&data, &[]);
-    let compressed = CompressedGaussian::new(&full.statistics, linear).unwrap();
+    let compressed = CompressedGaussian::new(&full, linear).unwrap();
     let theta = Matrix::from_rows(3, [&[1.2e6, 1.1e4, 1500.0][..], &[4e5, 1.5e4, 1500.0]]);
     let hyper = Matrix::from_fn(2, 1, |_, _| 1e-10);
     let found = compressed.log_likelihood_at(linear, &theta, &hyper);

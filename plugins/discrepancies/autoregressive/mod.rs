@@ -1,0 +1,85 @@
+//! `autoregressive`: normal differences that are correlated in time.
+
+mod likelihood;
+mod steps;
+#[cfg(test)]
+mod tests;
+
+use lacuna::plugin::component::{Component, Context};
+use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood};
+use lacuna::run::Stop;
+use lacuna::study::problem::Complaints;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::common::{By, Groups, Quantity, Series, Variance};
+use likelihood::AutoregressiveLikelihood;
+
+/// Normal differences that are correlated along an axis within each replicate: a first-order
+/// autoregressive process.
+///
+/// Within one replicate and one series (one sensor, say) the differences between data and model are
+/// a stationary normal process with the correlation `exp(-|t - t'| / correlation_time)` at two
+/// times, of the given `variance` at each (the Ornstein-Uhlenbeck process; in discrete time
+/// autoregressive of order one with the coefficient `exp(-dt / correlation_time)`; Box and Jenkins,
+/// Time Series Analysis (1976), 3.2, and Jones, Technometrics 22 (1980) 389 for gaps). Replicates
+/// and series are independent. Take it when residuals of neighbouring times resemble each other in
+/// each replicate on its own; what all replicates have in common is the business of
+/// `gaussian_process`.
+///
+/// Uneven grids and gaps are exact: each value depends only on the one measured before it. Since
+/// the law of a value given the one before has the same form in all replicates that measured both,
+/// the likelihood uses counts, means, scatters and co-scatters of such pairs. Errors that all
+/// replicates share enter once, as for `gaussian`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Autoregressive {
+    /// The variance of a single value: a prior such as `{ half_normal = 1e-6 }`,
+    /// `{ known = 2.5e-11 }`, or a multiple of the measured one,
+    /// `{ measured = { inverse_gamma = [3, 4] } }`, as for `gaussian`.
+    pub variance: Variance,
+    /// Which outputs share a variance: `"all"`, an axis such as `"sensor"`, windows, or a list of these.
+    #[serde(default)]
+    pub by: By,
+    /// The time over which correlations fall by a factor e, in the unit of the axis: a prior such
+    /// as `{ log_uniform = [1e-6, 1e-3] }`, or `{ known = 5e-5 }`.
+    pub correlation_time: Quantity,
+    /// Which series share a correlation time: `"all"`, or another axis than the one they run along,
+    /// such as `"sensor"`.
+    #[serde(default)]
+    pub correlation_by: By,
+    /// The axis of numbers along which differences are correlated; the last one when it is left away.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub along: Option<String>,
+}
+
+impl Component for Autoregressive {
+    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        let layout = context.layout;
+        self.by.check("by", layout, complaints);
+        self.variance.check(Groups::of(layout, &self.by).ok().as_ref(), complaints);
+        self.correlation_by.check("correlation_by", layout, complaints);
+        let groups = Groups::of(layout, &self.correlation_by).map_or(1, |g| g.count());
+        self.correlation_time.check_positive("correlation_time", groups, complaints);
+        match Series::of(layout, self.along.as_deref()) {
+            Err(text) => {
+                complaints.at("along").say(text);
+            }
+            Ok(series) if self.correlation_by.divides(&series.axis) => {
+                complaints
+                    .at("correlation_by")
+                    .say("a correlation time belongs to a whole series")
+                    .expected(format!("another axis than `{}`", series.axis));
+            }
+            Ok(_) => {}
+        }
+    }
+}
+
+impl Discrepancy for Autoregressive {
+    fn likelihood(&self, known: &Known<'_>) -> Result<Box<dyn Likelihood>, Stop> {
+        Ok(Box::new(AutoregressiveLikelihood::new(self, known)?))
+    }
+}
+
+lacuna::register!(Discrepancy, "autoregressive", Autoregressive);

@@ -1,0 +1,228 @@
+//! Independent noise with a variance for each group of outputs.
+
+use lacuna::data::{Measurements, Unit};
+use lacuna::linalg::vector::dot;
+use lacuna::math::random::{Stream, normal};
+use lacuna::plugin::discrepancy::{CommonError, Hyperparameter, Known, VariancePart};
+use lacuna::run::Stop;
+
+use super::{By, Groups, PerGroup, Replicates, Unknown, Variance, squared};
+
+/// The data of a study with the errors that replicates share: what it takes to predict and to simulate them.
+#[derive(Debug, Clone)]
+pub struct Setting {
+    /// The data.
+    pub data: Measurements,
+    common: Vec<CommonError>,
+    /// The pooled variance between the replicates of each output's group, where there are any.
+    replicated: Option<Vec<f64>>,
+}
+
+/// The noise of a study's data.
+#[derive(Debug, Clone)]
+pub struct Noise {
+    /// The data and what is common.
+    pub setting: Setting,
+    /// The groups that share a variance.
+    pub groups: Groups,
+    /// The variance of each group, or its multiplier.
+    pub variance: PerGroup,
+    /// By what each output multiplies it: the variance between replicates, or one.
+    pub scale: Vec<f64>,
+}
+
+impl Noise {
+    /// The noise of data; its unknown variances are added to the hyperparameters.
+    pub fn new(
+        known: &Known<'_>,
+        replicates: &Replicates,
+        variance: &Variance,
+        by: &By,
+        hyper: &mut Vec<Hyperparameter>,
+    ) -> Result<Self, Stop> {
+        let layout = &known.data.layout;
+        let groups = Groups::of(layout, by).map_err(Stop::new)?.with_data(&replicates.measured);
+        let (quantity, scale, unknown) = match variance {
+            Variance::Of(quantity) => {
+                let unknown = Unknown { name: "variance", unit: squared(&layout.unit)? };
+                (quantity, vec![1.0; layout.len()], unknown)
+            }
+            Variance::Measured(quantity) => {
+                let unknown = Unknown { name: "multiplier", unit: Unit::dimensionless() };
+                let scale = Pooled::of(&groups, replicates).measured(&groups, replicates)?;
+                (quantity, scale, unknown)
+            }
+        };
+        let start = |g: usize| start(&groups, replicates, &scale, g);
+        Ok(Self {
+            variance: PerGroup::new(quantity, &groups, &unknown, start, hyper),
+            setting: Setting::new(known, replicates, &groups),
+            groups,
+            scale,
+        })
+    }
+
+    /// The variance of each output, given those of the groups.
+    pub fn by_output(&self, groups: &[f64]) -> Vec<f64> {
+        self.groups.spread(groups).iter().zip(&self.scale).map(|(v, s)| v * s).collect()
+    }
+
+    /// The variance of each measured output, given those of the groups.
+    pub fn by_measured(&self, replicates: &Replicates, groups: &[f64]) -> Vec<f64> {
+        let of = |&i: &usize| self.groups.of[i].map_or(f64::NAN, |g| groups[g] * self.scale[i]);
+        replicates.measured.iter().map(of).collect()
+    }
+
+    /// The derivatives by the groups' variances, given those by the variances of the measured outputs.
+    pub fn by_group(&self, replicates: &Replicates, by_measured: &[f64]) -> Vec<f64> {
+        let scaled = replicates.measured.iter().zip(by_measured).map(|(&i, g)| g * self.scale[i]);
+        self.groups.sums(&replicates.measured, scaled)
+    }
+}
+
+impl Setting {
+    /// The setting of data whose replicates are pooled over these groups.
+    pub fn new(known: &Known<'_>, replicates: &Replicates, groups: &Groups) -> Self {
+        Self {
+            data: known.data.clone(),
+            common: known.common.to_vec(),
+            replicated: Pooled::of(groups, replicates).by_output(groups),
+        }
+    }
+
+    /// The parts of a new replicate's variance: what the replicates show of it, the rest as the
+    /// model's form, and the common errors that a new replicate has too. Without replicates the
+    /// first two are one, `discrepancy`.
+    pub fn parts(&self, variance: &[f64]) -> Vec<VariancePart> {
+        let mut parts = self.own_parts(variance);
+        parts.extend(self.common_parts());
+        parts
+    }
+
+    /// The parts without the common errors.
+    pub fn own_parts(&self, variance: &[f64]) -> Vec<VariancePart> {
+        let Some(replicated) = &self.replicated else {
+            return vec![part("discrepancy", variance.to_vec())];
+        };
+        let shown: Vec<f64> = variance.iter().zip(replicated).map(|(v, r)| v.min(*r)).collect();
+        let rest = variance.iter().zip(&shown).map(|(v, s)| v - s).collect();
+        vec![part("measurement", shown), part("model_form", rest)]
+    }
+
+    /// The parts that are common errors.
+    pub fn common_parts(&self) -> Vec<VariancePart> {
+        let predictive = self.common.iter().filter(|error| error.predictive);
+        let variance = |e: &CommonError| e.factor.iter_rows().map(|row| dot(row, row)).collect();
+        predictive.map(|error| part(&error.origin, variance(error))).collect()
+    }
+
+    /// The response with common errors as they could be.
+    pub fn with_common_errors(&self, response: &[f64], stream: &Stream) -> Vec<f64> {
+        let mut mean = response.to_vec();
+        for (k, error) in self.common.iter().enumerate() {
+            let mut rng = stream.named("common").at(k as u64).generator();
+            let weights: Vec<f64> = (0..error.factor.columns()).map(|_| normal(&mut rng)).collect();
+            for (m, row) in mean.iter_mut().zip(error.factor.iter_rows()) {
+                *m += dot(row, &weights);
+            }
+        }
+        mean
+    }
+
+    /// The data with new values: for each replicate those that `values` makes of its own stream.
+    pub fn replaced(&self, stream: &Stream, values: impl Fn(&Stream) -> Vec<f64>) -> Measurements {
+        let mut data = self.data.clone();
+        for (r, replicate) in data.replicates.iter_mut().enumerate() {
+            let new = values(&stream.named("replicate").at(r as u64));
+            for (value, new) in replicate.values.iter_mut().zip(new) {
+                *value = value.map(|_| new);
+            }
+        }
+        data
+    }
+
+    /// Data with independent normal noise of these variances about a mean curve.
+    pub fn noisy(&self, mean: &[f64], variance: &[f64], stream: &Stream) -> Measurements {
+        let sd: Vec<f64> = variance.iter().map(|v| v.sqrt()).collect();
+        self.replaced(stream, |own| {
+            let mut rng = own.generator();
+            mean.iter().zip(&sd).map(|(m, sd)| m + sd * normal(&mut rng)).collect()
+        })
+    }
+
+    /// The same about a response and its common errors.
+    pub fn simulate(&self, response: &[f64], variance: &[f64], stream: &Stream) -> Measurements {
+        self.noisy(&self.with_common_errors(response, stream), variance, stream)
+    }
+}
+
+/// A part of a variance.
+pub fn part(origin: &str, variance: Vec<f64>) -> VariancePart {
+    VariancePart { origin: origin.to_owned(), variance }
+}
+
+/// Where the variance of a group starts: the one of the replicates about their means, or a
+/// hundredth of the mean square where there are no replicates.
+pub fn start(groups: &Groups, replicates: &Replicates, scale: &[f64], group: usize) -> f64 {
+    let (mut scatter, mut freedom, mut square, mut outputs) = (0.0, 0.0, 0.0, 0.0);
+    for (k, &i) in replicates.measured.iter().enumerate() {
+        if groups.of[i] == Some(group) {
+            scatter += replicates.scatter[k] / scale[i];
+            freedom += replicates.count[k] - 1.0;
+            square += replicates.count[k] * replicates.mean[k].powi(2) / scale[i];
+            outputs += 1.0;
+        }
+    }
+    if freedom > 0.0 && scatter > 0.0 { scatter / freedom } else { 0.01 * square / outputs }
+}
+
+/// Scatter and degrees of freedom by group.
+struct Pooled {
+    scatter: Vec<f64>,
+    freedom: Vec<f64>,
+}
+
+impl Pooled {
+    fn of(groups: &Groups, replicates: &Replicates) -> Self {
+        Self {
+            scatter: groups.sums(&replicates.measured, replicates.scatter.iter().copied()),
+            freedom: groups.sums(&replicates.measured, replicates.count.iter().map(|n| n - 1.0)),
+        }
+    }
+
+    /// The variance of each group; that of all where a group has no replicates; `None` where no
+    /// group has any.
+    fn variances(&self) -> Option<Vec<f64>> {
+        let freedom: f64 = self.freedom.iter().sum();
+        let overall = self.scatter.iter().sum::<f64>() / freedom;
+        let one = |(s, f): (&f64, &f64)| if *f > 0.0 { s / f } else { overall };
+        (freedom > 0.0).then(|| self.scatter.iter().zip(&self.freedom).map(one).collect())
+    }
+
+    fn by_output(&self, groups: &Groups) -> Option<Vec<f64>> {
+        Some(groups.spread(&self.variances()?))
+    }
+
+    /// The variance between the replicates of each output; its group's where an output has fewer than two
+    /// replicates, or two that are equal.
+    fn measured(&self, groups: &Groups, replicates: &Replicates) -> Result<Vec<f64>, Stop> {
+        let refuse = || {
+            Stop::new("no output has two replicates that differ, which `measured` needs")
+                .help("give the variance itself, such as `variance = { half_normal = 1e-6 }`")
+        };
+        let variances = self.variances().ok_or_else(refuse)?;
+        let overall = self.scatter.iter().sum::<f64>() / self.freedom.iter().sum::<f64>();
+        if overall <= 0.0 {
+            return Err(refuse());
+        }
+        let positive: Vec<f64> =
+            variances.iter().map(|&v| if v > 0.0 { v } else { overall }).collect();
+        let mut measured = groups.spread(&positive);
+        for (k, &i) in replicates.measured.iter().enumerate() {
+            if replicates.count[k] > 1.0 && replicates.scatter[k] > 0.0 {
+                measured[i] = replicates.scatter[k] / (replicates.count[k] - 1.0);
+            }
+        }
+        Ok(measured)
+    }
+}

@@ -1,0 +1,110 @@
+//! The replicates of each output as counts, means and scatters, and the factor of the common errors.
+
+use lacuna::data::{Measurements, Unit};
+use lacuna::linalg::{self, Matrix};
+use lacuna::plugin::discrepancy::CommonError;
+use lacuna::run::Stop;
+
+/// The outputs that were measured at least once.
+#[derive(Debug, Clone)]
+pub struct Replicates {
+    /// Their flat indices.
+    pub measured: Vec<usize>,
+    /// The number of replicates of each.
+    pub count: Vec<f64>,
+    /// Their means.
+    pub mean: Vec<f64>,
+    /// Their sums of squared deviations from the mean.
+    pub scatter: Vec<f64>,
+}
+
+impl Replicates {
+    /// The replicates of data that belong to the layout, with common errors that do.
+    pub fn of(data: &Measurements, common: &[CommonError]) -> Result<Self, Stop> {
+        check(data, common)?;
+        let summaries = data.summaries();
+        let measured: Vec<usize> =
+            (0..summaries.len()).filter(|&i| summaries[i].count > 0).collect();
+        if measured.is_empty() {
+            return Err(Stop::new("the measurements hold no value"));
+        }
+        let kept = || measured.iter().map(|&i| &summaries[i]);
+        Ok(Self {
+            count: kept().map(|s| s.count as f64).collect(),
+            mean: kept().map(|s| s.mean).collect(),
+            scatter: kept().map(|s| s.scatter).collect(),
+            measured,
+        })
+    }
+
+    /// The differences between the means and a response.
+    pub fn residual(&self, response: &[f64]) -> Vec<f64> {
+        self.measured.iter().zip(&self.mean).map(|(&i, mean)| mean - response[i]).collect()
+    }
+
+    /// Derivatives by the measured outputs as derivatives by all.
+    pub fn over_all(&self, by_measured: &[f64], outputs: usize) -> Vec<f64> {
+        let mut all = vec![0.0; outputs];
+        for (&i, g) in self.measured.iter().zip(by_measured) {
+            all[i] = *g;
+        }
+        all
+    }
+
+    /// The factor of all common errors at the measured outputs, with no more columns than its rank:
+    /// by the singular value decomposition of the factor weighted with the roots of the counts.
+    pub fn common_factor(&self, common: &[CommonError]) -> Result<Matrix, Stop> {
+        let columns: Vec<(&Matrix, usize)> = common
+            .iter()
+            .flat_map(|error| (0..error.factor.columns()).map(move |k| (&error.factor, k)))
+            .collect();
+        let rows = self.measured.len();
+        if columns.is_empty() {
+            return Ok(Matrix::zeros(rows, 0));
+        }
+        let weighted = Matrix::from_fn(rows, columns.len(), |i, k| {
+            let (factor, column) = columns[k];
+            self.count[i].sqrt() * factor[(self.measured[i], column)]
+        });
+        let svd = linalg::thin_svd(&weighted)
+            .map_err(|e| Stop::new(format!("the covariance of the common errors: {e}")))?;
+        let rank = svd.values.iter().filter(|&&s| s > 1e-12 * svd.values[0]).count();
+        Ok(Matrix::from_fn(rows, rank, |i, k| svd.u[(i, k)] * svd.values[k] / self.count[i].sqrt()))
+    }
+}
+
+/// Refuses data and errors that are not on the layout, and values that no density is made for.
+fn check(data: &Measurements, common: &[CommonError]) -> Result<(), Stop> {
+    let outputs = data.layout.len();
+    for replicate in &data.replicates {
+        let (name, count) = (&replicate.name, replicate.values.len());
+        if count != outputs {
+            let text = format!("replicate `{name}` has {count} values and not {outputs}");
+            return Err(Stop::new(text));
+        }
+        let bad = |value: &Option<f64>| value.is_some_and(|y| !y.is_finite());
+        if let Some(i) = replicate.values.iter().position(bad) {
+            let place = data.layout.describe(i);
+            return Err(Stop::new(format!("replicate `{name}` is not finite at {place}")));
+        }
+    }
+    for CommonError { origin, factor, .. } in common {
+        let rows = factor.rows();
+        if rows != outputs {
+            let text = format!("the common error `{origin}` has {rows} outputs and not {outputs}");
+            return Err(Stop::new(text));
+        }
+    }
+    Ok(())
+}
+
+/// The unit of a variance.
+pub fn squared(unit: &Unit) -> Result<Unit, Stop> {
+    let text = unit.to_string();
+    let squared = match text.as_str() {
+        "1" => "1".to_owned(),
+        t if t.chars().all(char::is_alphabetic) => format!("{t}^2"),
+        t => format!("({t})^2"),
+    };
+    Unit::parse(&squared).map_err(|e| Stop::new(format!("the unit of the variance: {e}")))
+}

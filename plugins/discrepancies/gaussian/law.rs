@@ -1,0 +1,222 @@
+//! What is done with the variances of the groups: given, integrated out, or given and coupled by
+//! common errors.
+
+use lacuna::linalg::vector::dot;
+use lacuna::linalg::{self, Cholesky, Matrix};
+use lacuna::math::distribution::Distribution;
+use lacuna::plugin::discrepancy::CommonError;
+use lacuna::run::Stop;
+
+use super::integral::{Integral, conjugate, integrate};
+use super::statistics::{Residual, Spread, Statistics};
+use crate::discrepancies::common::PerGroup;
+
+/// See the module.
+#[derive(Debug, Clone)]
+pub(super) enum Law {
+    /// Each group has its own variance, and at most one of them common errors.
+    Given(PerGroup),
+    /// The variance of each group is integrated out under this prior.
+    Integrated(Distribution),
+    /// The common errors reach several groups.
+    Coupled(Coupled),
+}
+
+/// Common errors over several groups: with `W F = Q_g T_g` in group `g`, `Q_g` its orthonormal
+/// directions, the least of `sum_g |a_g - T_g zeta|^2 / v_g + |zeta|^2` is the quadratic form and
+/// `C = I + sum_g T_g'T_g / v_g` has the determinant (Woodbury).
+#[derive(Debug, Clone)]
+pub(super) struct Coupled {
+    variance: PerGroup,
+    /// `T_g`.
+    factors: Vec<Matrix>,
+    /// `T_g' T_g`.
+    grams: Vec<Matrix>,
+}
+
+/// How the log-likelihood changes with the residual of each group.
+pub(super) struct Slopes {
+    /// What a residual outside the directions is divided by.
+    pub outside: Vec<f64>,
+    /// Half the derivative by each residual along a direction, its sign changed.
+    pub along: Vec<Vec<f64>>,
+    /// The derivatives by the hyperparameters.
+    pub by_hyper: Vec<f64>,
+}
+
+impl Law {
+    /// The log-likelihood; minus infinity where a variance is not above zero.
+    pub fn log_likelihood(
+        &self,
+        spreads: &[&Spread],
+        hyper: &[f64],
+        residuals: &[Residual<'_>],
+    ) -> f64 {
+        let groups = spreads.iter().zip(residuals);
+        match self {
+            Self::Given(variance) => {
+                let Some(v) = variance.values(hyper) else { return f64::NEG_INFINITY };
+                groups.zip(v).map(|((s, r), &v)| s.log_likelihood(v, *r)).sum()
+            }
+            Self::Integrated(prior) => groups
+                .map(|(s, r)| {
+                    conjugate(s, r.outside, prior).unwrap_or_else(|| integrate(s, *r, prior).log)
+                })
+                .sum(),
+            Self::Coupled(coupled) => coupled
+                .solve(hyper, residuals)
+                .map_or(f64::NEG_INFINITY, |solved| solved.log_likelihood(spreads)),
+        }
+    }
+
+    /// The derivatives; `None` where a variance is not above zero.
+    pub fn slopes(
+        &self,
+        spreads: &[&Spread],
+        hyper: &[f64],
+        residuals: &[Residual<'_>],
+    ) -> Option<Slopes> {
+        let groups = spreads.iter().zip(residuals);
+        let mut by_hyper = vec![0.0; hyper.len()];
+        match self {
+            Self::Given(variance) => {
+                let v = variance.values(hyper)?;
+                let by_v: Vec<f64> =
+                    groups.clone().zip(v).map(|((s, r), &v)| s.by_variance(v, *r)).collect();
+                variance.add_gradient(&by_v, &mut by_hyper);
+                let along = |((s, r), &v): ((&&Spread, &Residual<'_>), &f64)| {
+                    r.along.iter().zip(&s.eigenvalues).map(|(a, l)| a / (v + l)).collect()
+                };
+                Some(Slopes {
+                    outside: v.to_vec(),
+                    along: groups.zip(v).map(along).collect(),
+                    by_hyper,
+                })
+            }
+            Self::Integrated(prior) => {
+                let mut slopes = Slopes { outside: Vec::new(), along: Vec::new(), by_hyper };
+                for (spread, residual) in groups {
+                    let Integral { nodes, .. } = integrate(spread, *residual, prior);
+                    let average = |l: f64| nodes.iter().map(|(v, p)| p / (v + l)).sum::<f64>();
+                    slopes.outside.push(1.0 / average(0.0));
+                    let pairs = residual.along.iter().zip(&spread.eigenvalues);
+                    slopes.along.push(pairs.map(|(a, &l)| a * average(l)).collect());
+                }
+                Some(slopes)
+            }
+            Self::Coupled(coupled) => {
+                let solved = coupled.solve(hyper, residuals)?;
+                let by_v = coupled.by_variance(&solved, spreads);
+                coupled.variance.add_gradient(&by_v, &mut by_hyper);
+                let along = |(rest, &v): (&Vec<f64>, &f64)| rest.iter().map(|a| a / v).collect();
+                Some(Slopes {
+                    outside: solved.variance.to_vec(),
+                    along: solved.rest.iter().zip(solved.variance).map(along).collect(),
+                    by_hyper,
+                })
+            }
+        }
+    }
+
+    /// The variance of each group as points with probabilities.
+    pub fn variances(
+        &self,
+        spreads: &[&Spread],
+        hyper: &[f64],
+        residuals: &[Residual<'_>],
+    ) -> Option<Vec<Vec<(f64, f64)>>> {
+        match self {
+            Self::Integrated(prior) => {
+                let groups = spreads.iter().zip(residuals);
+                Some(groups.map(|(s, r)| integrate(s, *r, prior).nodes).collect())
+            }
+            Self::Given(variance) | Self::Coupled(Coupled { variance, .. }) => {
+                Some(variance.values(hyper)?.iter().map(|&v| vec![(v, 1.0)]).collect())
+            }
+        }
+    }
+}
+
+/// The common errors that explain the residuals best.
+struct Solved<'a> {
+    variance: &'a [f64],
+    zeta: Vec<f64>,
+    capacitance: Cholesky,
+    /// `a_g - T_g zeta`.
+    rest: Vec<Vec<f64>>,
+    /// The squared residual of each group without the common errors.
+    squares: Vec<f64>,
+}
+
+impl Solved<'_> {
+    fn log_likelihood(&self, spreads: &[&Spread]) -> f64 {
+        let mut twice = dot(&self.zeta, &self.zeta) + self.capacitance.log_determinant();
+        for ((spread, &v), squares) in spreads.iter().zip(self.variance).zip(&self.squares) {
+            twice += spread.count * (std::f64::consts::TAU * v).ln() + spread.log_scale;
+            twice += (spread.scatter + squares) / v;
+        }
+        -0.5 * twice
+    }
+}
+
+impl Coupled {
+    /// The common errors over groups; each group's statistics are given its directions.
+    pub fn new(
+        groups: &mut [Statistics],
+        common: &[CommonError],
+        variance: PerGroup,
+    ) -> Result<Self, Stop> {
+        let failed = |e| Stop::new(format!("the covariance of the common errors: {e}"));
+        let weighted: Vec<Matrix> = groups.iter().map(|g| g.weighted(common)).collect();
+        let columns = weighted.first().map_or(0, Matrix::columns);
+        let all = Matrix::from_rows(columns, weighted.iter().flat_map(Matrix::iter_rows));
+        // The right singular vectors turn the common errors so that as few as possible are needed.
+        let svd = linalg::thin_svd(&all).map_err(failed)?;
+        let rank = svd.values.iter().filter(|&&s| s > 1e-12 * svd.values[0]).count();
+        let turn = svd.v.select_columns(&(0..rank).collect::<Vec<_>>());
+        let mut factors = Vec::new();
+        for (group, weighted) in groups.iter_mut().zip(&weighted) {
+            let qr = linalg::thin_qr(&linalg::multiply(weighted, &turn)).map_err(failed)?;
+            group.directions = qr.q.transposed();
+            factors.push(qr.r);
+        }
+        Ok(Self { variance, grams: factors.iter().map(linalg::gram).collect(), factors })
+    }
+
+    fn solve<'a>(&'a self, hyper: &'a [f64], residuals: &[Residual<'_>]) -> Option<Solved<'a>> {
+        let variance = self.variance.values(hyper)?;
+        let rank = self.factors.first().map_or(0, Matrix::columns);
+        let mut capacitance = Matrix::zeros(rank, rank);
+        let mut zeta = vec![0.0; rank];
+        for (g, &v) in variance.iter().enumerate() {
+            let entries = capacitance.as_mut_slice().iter_mut().zip(self.grams[g].as_slice());
+            entries.for_each(|(c, m)| *c += m / v);
+            let pull = linalg::transposed_multiply_vector(&self.factors[g], residuals[g].along);
+            zeta.iter_mut().zip(pull).for_each(|(z, p)| *z += p / v);
+        }
+        for k in 0..rank {
+            capacitance[(k, k)] += 1.0;
+        }
+        let capacitance = Cholesky::new(&capacitance).ok()?;
+        capacitance.solve(&mut zeta);
+        let rest = |(factor, residual): (&Matrix, &Residual<'_>)| -> Vec<f64> {
+            let made = factor.iter_rows().map(|row| dot(row, &zeta));
+            residual.along.iter().zip(made).map(|(a, m)| a - m).collect()
+        };
+        let rest: Vec<Vec<f64>> = self.factors.iter().zip(residuals).map(rest).collect();
+        let squares = residuals.iter().zip(&rest).map(|(r, a)| r.outside + dot(a, a)).collect();
+        Some(Solved { variance, zeta, capacitance, rest, squares })
+    }
+
+    /// By Fisher's identity: the derivative at fixed common errors, averaged over them given the data.
+    fn by_variance(&self, solved: &Solved<'_>, spreads: &[&Spread]) -> Vec<f64> {
+        let inverse = solved.capacitance.inverse();
+        let one = |(g, spread): (usize, &&Spread)| {
+            let v = solved.variance[g];
+            let trace = dot(inverse.as_slice(), self.grams[g].as_slice());
+            let squares = spread.scatter + solved.squares[g] + trace;
+            -0.5 * (spread.count / v - squares / (v * v))
+        };
+        spreads.iter().enumerate().map(one).collect()
+    }
+}

@@ -1,0 +1,201 @@
+//! The sufficient statistics of outputs that share a variance.
+//!
+//! With `n_i` replicates of output `i`, mean `ybar_i` and scatter `S_i = sum_r (y_ir - ybar_i)^2`,
+//! and the residual `z_i = sqrt(n_i) (ybar_i - m_i)`, the data are distributed as
+//!
+//! ```text
+//! log L = -1/2 [ N log(2 pi v) + (sum_i S_i)/v + log det(I + K/v) + z' (v I + K)^-1 z ]
+//! ```
+//!
+//! where `K = W F F' W`, `W = diag(sqrt(n_i))`, is the covariance `F F'` of the common errors as it
+//! enters `z`. The thin singular value decomposition `W F = U diag(s) V'` diagonalises `K` once for
+//! all `v`. A variance that is a multiple of a known one makes all of these those of data divided
+//! by its root.
+
+use lacuna::linalg::vector::dot;
+use lacuna::linalg::{self, Matrix};
+use lacuna::plugin::discrepancy::CommonError;
+use lacuna::run::Stop;
+
+use crate::discrepancies::common::Replicates;
+
+/// What the likelihood needs of the data of one group, and of the common errors.
+#[derive(Debug, Clone)]
+pub(super) struct Statistics {
+    /// The outputs that were measured at least once.
+    pub measured: Vec<usize>,
+    /// `sqrt(n_i)` of each of them, over the root of its scale.
+    pub weight: Vec<f64>,
+    /// The weight times `ybar_i` of each of them.
+    pub weighted_mean: Vec<f64>,
+    /// Number of data and total scatter.
+    pub spread: Spread,
+    /// `U'`: the directions of the common errors, `rank x measured`.
+    pub directions: Matrix,
+}
+
+/// The part of the statistics that does not depend on the response.
+#[derive(Debug, Clone)]
+pub(super) struct Spread {
+    /// The number of data.
+    pub count: f64,
+    /// The sum of squared deviations of the replicates from their means.
+    pub scatter: f64,
+    /// The sum of the logarithms of the data's scales.
+    pub log_scale: f64,
+    /// The eigenvalues of `K`.
+    pub eigenvalues: Vec<f64>,
+}
+
+/// The residual of a group: its squared length outside the directions of the common errors, and its
+/// component along each.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Residual<'a> {
+    pub outside: f64,
+    pub along: &'a [f64],
+}
+
+/// How many directions are summed side by side.
+const LANES: usize = 8;
+
+impl Spread {
+    /// The log-likelihood given the variance and the residual.
+    pub fn log_likelihood(&self, v: f64, residual: Residual<'_>) -> f64 {
+        let (log_determinant, squares) = self.common(v, residual.along);
+        let own = self.count * (std::f64::consts::TAU * v).ln() + self.log_scale;
+        -0.5 * (own + log_determinant + (self.scatter + residual.outside + squares) / v)
+    }
+
+    /// `log det(I + K/v)`, and the sum of the squared residuals along the directions, each divided by
+    /// `1 + lambda / v`.
+    ///
+    /// Logarithms cost more than all the rest: one is taken of a product of as many factors as cannot
+    /// overflow.
+    fn common(&self, v: f64, along: &[f64]) -> (f64, f64) {
+        let largest = 1.0 + self.eigenvalues.iter().copied().fold(0.0, f64::max) / v;
+        let factors = ((600.0 / largest.ln()).min(1e6) as usize).max(1);
+        let (mut log_determinant, mut squares) = (0.0, [0.0; LANES]);
+        let runs = self.eigenvalues.chunks(LANES * factors);
+        for (lambda, along) in runs.zip(along.chunks(LANES * factors)) {
+            let mut product = [1.0; LANES];
+            let (lambda, rest_lambda) = lambda.as_chunks::<LANES>();
+            let (along, rest_along) = along.as_chunks::<LANES>();
+            for (lambda, a) in lambda.iter().zip(along) {
+                for l in 0..LANES {
+                    let factor = 1.0 + lambda[l] / v;
+                    product[l] *= factor;
+                    squares[l] += a[l] * a[l] / factor;
+                }
+            }
+            log_determinant += product.iter().map(|p| p.ln()).sum::<f64>();
+            for (lambda, a) in rest_lambda.iter().zip(rest_along) {
+                log_determinant += (lambda / v).ln_1p();
+                squares[0] += a * a / (1.0 + lambda / v);
+            }
+        }
+        (log_determinant, squares.iter().sum())
+    }
+
+    /// Its derivative by the variance.
+    pub fn by_variance(&self, v: f64, residual: Residual<'_>) -> f64 {
+        let mut twice = self.count / v - (self.scatter + residual.outside) / (v * v);
+        for (&a, &lambda) in residual.along.iter().zip(&self.eigenvalues) {
+            twice -= lambda / (v * (v + lambda)) + (a / (v + lambda)).powi(2);
+        }
+        -0.5 * twice
+    }
+}
+
+impl Statistics {
+    /// The statistics of the outputs for which `chosen` holds; directions and eigenvalues are those
+    /// of the common errors of these outputs alone.
+    pub fn of(
+        replicates: &Replicates,
+        common: &[CommonError],
+        scale: &[f64],
+        chosen: impl Fn(usize) -> bool,
+    ) -> Result<Self, Stop> {
+        let mut statistics = Self::without_common(replicates, scale, chosen);
+        let (directions, eigenvalues) =
+            common_directions(common, &statistics.measured, &statistics.weight)?;
+        statistics.directions = directions;
+        statistics.spread.eigenvalues = eigenvalues;
+        Ok(statistics)
+    }
+
+    /// The same without common errors.
+    pub fn without_common(
+        replicates: &Replicates,
+        scale: &[f64],
+        chosen: impl Fn(usize) -> bool,
+    ) -> Self {
+        let r = replicates;
+        let kept: Vec<usize> = (0..r.measured.len()).filter(|&k| chosen(r.measured[k])).collect();
+        let scales = || kept.iter().map(|&k| scale[r.measured[k]]);
+        let counts = || kept.iter().map(|&k| r.count[k]);
+        let weight: Vec<f64> = counts().zip(scales()).map(|(n, s)| n.sqrt() / s.sqrt()).collect();
+        let spread = Spread {
+            count: counts().sum(),
+            scatter: kept.iter().zip(scales()).map(|(&k, s)| r.scatter[k] / s).sum(),
+            log_scale: counts().zip(scales()).map(|(n, s)| n * s.ln()).sum(),
+            eigenvalues: Vec::new(),
+        };
+        Self {
+            measured: kept.iter().map(|&k| r.measured[k]).collect(),
+            weighted_mean: kept.iter().zip(&weight).map(|(&k, w)| w * r.mean[k]).collect(),
+            directions: Matrix::zeros(0, kept.len()),
+            weight,
+            spread,
+        }
+    }
+
+    /// The factor of common errors as it enters the residual, `measured x columns`.
+    pub fn weighted(&self, common: &[CommonError]) -> Matrix {
+        weighted_factor(common, &self.measured, &self.weight)
+    }
+
+    /// The residual along the directions of the common errors, and what remains of it outside them.
+    pub fn split(&self, response: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let outputs = self.measured.iter().zip(&self.weight).zip(&self.weighted_mean);
+        let mut outside: Vec<f64> = outputs.map(|((&i, w), mean)| mean - w * response[i]).collect();
+        let mut along = Vec::with_capacity(self.directions.rows());
+        for direction in self.directions.iter_rows() {
+            along.push(dot(direction, &outside));
+        }
+        for (direction, &a) in self.directions.iter_rows().zip(&along) {
+            for (z, u) in outside.iter_mut().zip(direction) {
+                *z -= a * u;
+            }
+        }
+        (along, outside)
+    }
+}
+
+fn weighted_factor(common: &[CommonError], measured: &[usize], weight: &[f64]) -> Matrix {
+    let columns: Vec<(&Matrix, usize)> = common
+        .iter()
+        .flat_map(|error| (0..error.factor.columns()).map(move |k| (&error.factor, k)))
+        .collect();
+    Matrix::from_fn(measured.len(), columns.len(), |i, k| {
+        let (factor, column) = columns[k];
+        weight[i] * factor[(measured[i], column)]
+    })
+}
+
+/// The eigenvectors (as rows) and eigenvalues of the covariance `K` of all common errors.
+fn common_directions(
+    common: &[CommonError],
+    measured: &[usize],
+    weight: &[f64],
+) -> Result<(Matrix, Vec<f64>), Stop> {
+    let weighted = weighted_factor(common, measured, weight);
+    if weighted.columns() == 0 {
+        return Ok((Matrix::zeros(0, measured.len()), Vec::new()));
+    }
+    let svd = linalg::thin_svd(&weighted)
+        .map_err(|e| Stop::new(format!("the covariance of the common errors: {e}")))?;
+    let rank = svd.values.iter().filter(|&&s| s > 1e-12 * svd.values[0]).count();
+    let kept: Vec<usize> = (0..rank).collect();
+    let directions = svd.u.select_columns(&kept).transposed();
+    Ok((directions, svd.values[..rank].iter().map(|s| s * s).collect()))
+}

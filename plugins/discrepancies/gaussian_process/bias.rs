@@ -1,0 +1,137 @@
+//! The prior covariance of the bias.
+//!
+//! Each series has its own block `C_s`. With `G` an orthonormal basis of the derivatives by the
+//! parameters, the prior that is orthogonal to them is `C - H S^-1 H'` with `H = C G` and
+//! `S = G' C G`.
+
+use lacuna::linalg::{self, Cholesky, Matrix};
+use lacuna::run::Stop;
+
+use super::Kernel;
+use crate::discrepancies::common::{Groups, PerGroup, Replicates, Series};
+
+/// One series.
+#[derive(Debug, Clone)]
+pub(super) struct Block {
+    /// Its measured outputs, among the measured ones.
+    pub rows: Vec<usize>,
+    /// Their values of the axis.
+    pub grid: Vec<f64>,
+    /// All its outputs.
+    pub outputs: Vec<usize>,
+    /// The group of its standard deviation and length.
+    pub group: Option<usize>,
+    /// An earlier series on the same grid in the same group.
+    pub twin: Option<usize>,
+}
+
+/// The bias of all series.
+#[derive(Debug, Clone)]
+pub(super) struct Bias {
+    pub kernel: Kernel,
+    pub blocks: Vec<Block>,
+    /// The values of the axis of a whole series.
+    pub grid: Vec<f64>,
+    /// `G` at the measured outputs; without columns where the bias need not be orthogonal.
+    pub basis: Matrix,
+    pub sd: PerGroup,
+    pub length: PerGroup,
+}
+
+/// The directions of the derivatives by the parameters at the measured outputs.
+pub(super) fn basis(slopes: &Matrix, replicates: &Replicates) -> Result<Matrix, Stop> {
+    let measured = slopes.select_rows(&replicates.measured);
+    let failed = |e| Stop::new(format!("the slopes of the model at the best fit: {e}"));
+    let svd = linalg::thin_svd(&measured).map_err(failed)?;
+    let largest = svd.values.first().copied().unwrap_or(0.0);
+    // A parameter without any effect has no direction.
+    let rank = svd.values.iter().filter(|&&s| s > 1e-8 * largest).count();
+    Ok(svd.u.select_columns(&(0..rank).collect::<Vec<_>>()))
+}
+
+/// The blocks of all series that were measured.
+pub(super) fn blocks(series: &Series, place: &[usize], groups: &Groups) -> Vec<Block> {
+    let mut blocks: Vec<Block> = Vec::new();
+    for outputs in &series.outputs {
+        let kept: Vec<usize> =
+            (0..outputs.len()).filter(|&j| place[outputs[j]] != usize::MAX).collect();
+        let rows: Vec<usize> = kept.iter().map(|&j| place[outputs[j]]).collect();
+        let grid: Vec<f64> = kept.iter().map(|&j| series.grid[j]).collect();
+        let group = outputs.first().and_then(|&i| groups.of[i]);
+        let twin = blocks.iter().position(|b: &Block| b.group == group && b.grid == grid);
+        blocks.push(Block { rows, grid, outputs: outputs.clone(), group, twin });
+    }
+    blocks
+}
+
+impl Bias {
+    /// The standard deviation and the length of each group.
+    pub fn values<'a>(&'a self, hyper: &'a [f64]) -> Option<(&'a [f64], &'a [f64])> {
+        Some((self.sd.values(hyper)?, self.length.values(hyper)?))
+    }
+
+    /// The standard deviation and the length of a series; those of a series never measured are the
+    /// means of all.
+    pub fn of_block(block: &Block, (sd, length): (&[f64], &[f64])) -> (f64, f64) {
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        match block.group {
+            Some(g) => (sd[g], length[g]),
+            None => (mean(sd), mean(length)),
+        }
+    }
+
+    /// The covariance of each series at its measured outputs.
+    pub fn covariances(&self, values: (&[f64], &[f64])) -> Vec<Matrix> {
+        let mut all: Vec<Matrix> = Vec::with_capacity(self.blocks.len());
+        for block in &self.blocks {
+            let covariance = if let Some(twin) = block.twin {
+                all[twin].clone()
+            } else {
+                let (sd, length) = Self::of_block(block, values);
+                self.covariance(&block.grid, &block.grid, sd, length)
+            };
+            all.push(covariance);
+        }
+        all
+    }
+
+    /// The covariance between two sets of values of the axis.
+    pub fn covariance(&self, rows: &[f64], columns: &[f64], sd: f64, length: f64) -> Matrix {
+        Matrix::from_fn(rows.len(), columns.len(), |i, j| {
+            sd * sd * self.kernel.at((rows[i] - columns[j]).abs(), length).0
+        })
+    }
+
+    /// `G` at the measured outputs of a series.
+    pub fn basis_of(&self, block: &Block) -> Matrix {
+        self.basis.select_rows(&block.rows)
+    }
+
+    /// `S = sum_s G_s' H_s`, factored; `None` where it is singular.
+    pub fn inner(&self, images: &[Matrix]) -> Option<Cholesky> {
+        let p = self.basis.columns();
+        let mut inner = Matrix::zeros(p, p);
+        for (block, image) in self.blocks.iter().zip(images) {
+            let part = linalg::transposed_multiply(&self.basis_of(block), image);
+            add(&mut inner, 1.0, &part);
+        }
+        Cholesky::new(&inner).ok()
+    }
+
+    /// `H` at all outputs of each series, and the factor of `S`.
+    pub fn projection(&self, values: (&[f64], &[f64])) -> Option<(Vec<Matrix>, Cholesky)> {
+        let image = |grid: &[f64], block: &Block| {
+            let (sd, length) = Self::of_block(block, values);
+            linalg::multiply(&self.covariance(grid, &block.grid, sd, length), &self.basis_of(block))
+        };
+        let measured: Vec<Matrix> = self.blocks.iter().map(|b| image(&b.grid, b)).collect();
+        let all = self.blocks.iter().map(|b| image(&self.grid, b)).collect();
+        Some((all, self.inner(&measured)?))
+    }
+}
+
+/// `sum += factor * part`.
+pub(super) fn add(sum: &mut Matrix, factor: f64, part: &Matrix) {
+    let entries = sum.as_mut_slice().iter_mut().zip(part.as_slice());
+    entries.for_each(|(s, p)| *s += factor * p);
+}

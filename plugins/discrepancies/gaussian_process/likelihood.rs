@@ -1,0 +1,248 @@
+//! The likelihood of the mean curve and of the scatter about it.
+
+use std::f64::consts::TAU;
+
+use lacuna::data::Measurements;
+use lacuna::linalg::vector::dot;
+use lacuna::linalg::{Matrix, symmetric_eigen};
+use lacuna::math::random::{Stream, normal};
+use lacuna::plugin::Fact;
+use lacuna::plugin::discrepancy::{Hyperparameter, Known, Likelihood, VariancePart};
+use lacuna::run::Stop;
+
+use super::GaussianProcess;
+use super::bias::{Bias, basis, blocks};
+use super::solve::Solved;
+use crate::discrepancies::common::{
+    Groups, Noise, PerGroup, Replicates, Series, Unknown, conditional, part, start, values,
+};
+
+/// See the module.
+pub(super) struct BiasedLikelihood {
+    noise: Noise,
+    hyper: Vec<Hyperparameter>,
+    replicates: Replicates,
+    /// The place of each output among the measured ones.
+    place: Vec<usize>,
+    pub(super) bias: Bias,
+    factor: Matrix,
+}
+
+impl BiasedLikelihood {
+    pub(super) fn new(options: &GaussianProcess, known: &Known<'_>) -> Result<Self, Stop> {
+        let replicates = Replicates::of(known.data, known.common)?;
+        let layout = &known.data.layout;
+        let series = Series::of(layout, options.along.as_deref()).map_err(Stop::new)?;
+        let groups = Groups::of(layout, &options.bias_by).map_err(Stop::new)?;
+        let groups = groups.with_data(&replicates.measured);
+        let mut hyper = Vec::new();
+        let unit = vec![1.0; layout.len()];
+        let name = Unknown { name: "bias", unit: layout.unit.clone() };
+        let size = |g: usize| start(&groups, &replicates, &unit, g).sqrt();
+        let sd = PerGroup::new(&options.bias, &groups, &name, size, &mut hyper);
+        let name = Unknown { name: "correlation_length", unit: series.unit.clone() };
+        let reach = series.grid.last().zip(series.grid.first()).map_or(0.0, |(b, a)| b - a);
+        let tenth = |_| if reach > 0.0 { 0.1 * reach } else { 1.0 };
+        let length = PerGroup::new(&options.correlation_length, &groups, &name, tenth, &mut hyper);
+        let noise = Noise::new(known, &replicates, &options.variance, &options.by, &mut hyper)?;
+        let basis = if options.orthogonal {
+            basis(&(known.slopes)()?, &replicates)?
+        } else {
+            Matrix::zeros(replicates.measured.len(), 0)
+        };
+        let mut place = vec![usize::MAX; layout.len()];
+        replicates.measured.iter().enumerate().for_each(|(k, &i)| place[i] = k);
+        let blocks = blocks(&series, &place, &groups);
+        let kernel = options.kernel;
+        let bias = Bias { kernel, blocks, grid: series.grid, basis, sd, length };
+        let factor = replicates.common_factor(known.common)?;
+        Ok(Self { noise, hyper, replicates, place, bias, factor })
+    }
+
+    /// The variance of each measured output.
+    fn variance(&self, hyper: &[f64]) -> Option<Vec<f64>> {
+        Some(self.noise.by_measured(&self.replicates, self.noise.variance.values(hyper)?))
+    }
+
+    fn solve(&self, response: &[f64], hyper: &[f64], variance: &[f64]) -> Option<Solved> {
+        let means: Vec<f64> =
+            variance.iter().zip(&self.replicates.count).map(|(v, n)| v / n).collect();
+        let residual = self.replicates.residual(response);
+        Solved::new(&self.bias, self.bias.values(hyper)?, &means, &self.factor, &residual)
+    }
+
+    /// The prior variance of the bias at each output.
+    fn bias_variance(&self, hyper: &[f64]) -> Option<Vec<f64>> {
+        let values = self.bias.values(hyper)?;
+        let (images, inner) = self.bias.projection(values)?;
+        let mut variance = vec![0.0; self.place.len()];
+        for (block, image) in self.bias.blocks.iter().zip(&images) {
+            let (sd, _) = Bias::of_block(block, values);
+            for (&i, row) in block.outputs.iter().zip(image.iter_rows()) {
+                variance[i] = (sd * sd - inner.quadratic(row)).max(0.0);
+            }
+        }
+        Some(variance)
+    }
+
+    /// A bias as it could be: a process, less the part along the derivatives by the parameters.
+    fn draw(&self, hyper: &[f64], stream: &Stream) -> Option<Vec<f64>> {
+        let values = self.bias.values(hyper)?;
+        let mut bias = vec![0.0; self.place.len()];
+        let mut along = vec![0.0; self.bias.basis.columns()];
+        for (s, block) in self.bias.blocks.iter().enumerate() {
+            let (sd, length) = Bias::of_block(block, values);
+            let grid = &self.bias.grid;
+            let eigen = symmetric_eigen(&self.bias.covariance(grid, grid, sd, length)).ok()?;
+            let mut rng = stream.at(s as u64).generator();
+            let weights: Vec<f64> =
+                eigen.values.iter().map(|l| l.max(0.0).sqrt() * normal(&mut rng)).collect();
+            for (&i, row) in block.outputs.iter().zip(eigen.vectors.iter_rows()) {
+                bias[i] = dot(row, &weights);
+                if self.place[i] != usize::MAX {
+                    let basis = self.bias.basis.row(self.place[i]);
+                    along.iter_mut().zip(basis).for_each(|(sum, g)| *sum += g * bias[i]);
+                }
+            }
+        }
+        let (images, inner) = self.bias.projection(values)?;
+        inner.solve(&mut along);
+        for (block, image) in self.bias.blocks.iter().zip(&images) {
+            for (&i, row) in block.outputs.iter().zip(image.iter_rows()) {
+                bias[i] -= dot(row, &along);
+            }
+        }
+        Some(bias)
+    }
+}
+
+impl Likelihood for BiasedLikelihood {
+    fn hyperparameters(&self) -> &[Hyperparameter] {
+        &self.hyper
+    }
+
+    /// The scatter of the replicates knows only the noise; their means have bias and common errors too.
+    fn log_likelihood(&self, response: &[f64], hyper: &[f64]) -> f64 {
+        let Some(variance) = self.variance(hyper) else { return f64::NEG_INFINITY };
+        let Some(solved) = self.solve(response, hyper, &variance) else {
+            return f64::NEG_INFINITY;
+        };
+        let r = &self.replicates;
+        let mut twice = solved.twice;
+        for (i, v) in variance.iter().enumerate() {
+            let n = r.count[i];
+            twice += TAU.ln() + (n - 1.0) * (TAU * v).ln() + n.ln() + r.scatter[i] / v;
+        }
+        if twice.is_nan() { f64::NEG_INFINITY } else { -0.5 * twice }
+    }
+
+    fn gradient(&self, response: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let mut by_hyper = vec![0.0; hyper.len()];
+        let solved = self.variance(hyper).and_then(|v| Some((self.solve(response, hyper, &v)?, v)));
+        let values = self.bias.values(hyper);
+        let Some(((solved, variance), values)) = solved.zip(values) else {
+            return (vec![0.0; response.len()], by_hyper);
+        };
+        let r = &self.replicates;
+        let inverses = solved.inverses();
+        let diagonal = solved.diagonal(&self.bias, &inverses);
+        let by_variance: Vec<f64> = (0..variance.len())
+            .map(|k| {
+                let (n, v) = (r.count[k], variance[k]);
+                let own = (n - 1.0) / v - r.scatter[k] / (v * v);
+                -0.5 * (own + (diagonal[k] - solved.pull[k].powi(2)) / n)
+            })
+            .collect();
+        self.noise.variance.add_gradient(&self.noise.by_group(r, &by_variance), &mut by_hyper);
+        let (mut by_sd, mut by_length) = (vec![0.0; values.0.len()], vec![0.0; values.0.len()]);
+        let by_covariance = solved.by_covariance(&self.bias, &inverses);
+        for (s, (block, by)) in self.bias.blocks.iter().zip(&by_covariance).enumerate() {
+            let Some(g) = block.group else { continue };
+            let (sd, length) = (values.0[g], values.1[g]);
+            by_sd[g] += dot(by.as_slice(), solved.covariances[s].as_slice()) / sd;
+            for (i, row) in by.iter_rows().enumerate() {
+                for (j, m) in row.iter().enumerate() {
+                    let distance = (block.grid[i] - block.grid[j]).abs();
+                    by_length[g] += 0.5 * m * sd * sd * self.bias.kernel.at(distance, length).1;
+                }
+            }
+        }
+        self.bias.sd.add_gradient(&by_sd, &mut by_hyper);
+        self.bias.length.add_gradient(&by_length, &mut by_hyper);
+        (r.over_all(&solved.pull, response.len()), by_hyper)
+    }
+
+    /// With `V` the covariance of the means, the precision of a value of output `i` is
+    /// `(1 - 1/n_i) / v_i + (V^-1)_ii / n_i^2`.
+    fn left_out(&self, response: &[f64], hyper: &[f64]) -> Option<Vec<f64>> {
+        let variance = self.variance(hyper)?;
+        let solved = self.solve(response, hyper, &variance)?;
+        let diagonal = solved.diagonal(&self.bias, &solved.inverses());
+        let r = &self.replicates;
+        let one = |(i, y): (usize, f64)| {
+            let k = self.place[i];
+            let (n, v) = (r.count[k], variance[k]);
+            let pull = (y - r.mean[k]) / v + solved.pull[k] / n;
+            conditional(pull, (1.0 - 1.0 / n) / v + diagonal[k] / (n * n))
+        };
+        Some(values(&self.noise.setting.data).map(one).collect())
+    }
+
+    fn predictive(&self, response: &[f64], hyper: &[f64]) -> Vec<VariancePart> {
+        let unknown = || vec![f64::NAN; response.len()];
+        let noise = self.noise.variance.values(hyper).map(|g| self.noise.by_output(g));
+        let mut parts = vec![
+            part("measurement", noise.unwrap_or_else(unknown)),
+            part("model_form", self.bias_variance(hyper).unwrap_or_else(unknown)),
+        ];
+        parts.extend(self.noise.setting.common_parts());
+        parts
+    }
+
+    fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Measurements {
+        let setting = &self.noise.setting;
+        let mut mean = setting.with_common_errors(response, stream);
+        let bias = self.draw(hyper, &stream.named("bias")).unwrap_or_default();
+        mean.iter_mut().zip(bias).for_each(|(m, b)| *m += b);
+        let noise = self.noise.by_output(self.noise.variance.values(hyper).unwrap_or_default());
+        setting.noisy(&mean, &noise, stream)
+    }
+
+    fn facts(&self) -> Vec<Fact> {
+        vec![
+            Fact::new("data", self.replicates.count.iter().sum::<f64>()),
+            Fact::new("measured outputs", self.replicates.measured.len()),
+            Fact::new("series with a bias", self.bias.blocks.len()),
+            Fact::new("directions the bias is orthogonal to", self.bias.basis.columns()),
+            Fact::new("directions of the common errors", self.factor.columns()),
+        ]
+    }
+}
+
+#[cfg(test)]
+impl BiasedLikelihood {
+    /// The prior covariance of the bias at the measured outputs, written out.
+    pub(super) fn written_bias(&self, hyper: &[f64]) -> Matrix {
+        #![allow(clippy::unwrap_used)]
+        use lacuna::linalg;
+        let values = self.bias.values(hyper).unwrap();
+        let n = self.replicates.measured.len();
+        let mut plain = Matrix::zeros(n, n);
+        for (block, c) in self.bias.blocks.iter().zip(self.bias.covariances(values)) {
+            for (i, &a) in block.rows.iter().enumerate() {
+                for (j, &b) in block.rows.iter().enumerate() {
+                    plain[(a, b)] = c[(i, j)];
+                }
+            }
+        }
+        if self.bias.basis.columns() == 0 {
+            return plain;
+        }
+        let image = linalg::multiply(&plain, &self.bias.basis);
+        let inner = linalg::transposed_multiply(&self.bias.basis, &image);
+        let solved = linalg::Cholesky::new(&inner).unwrap().solve_matrix(&image.transposed());
+        let taken = linalg::multiply(&image, &solved);
+        super::bias::add(&mut plain, -1.0, &taken);
+        plain
+    }
+}

@@ -1,0 +1,221 @@
+//! The likelihood, value by value.
+
+use std::f64::consts::PI;
+
+use lacuna::data::{Measurements, Unit};
+use lacuna::math::distribution::Distribution;
+use lacuna::math::random::{Stream, normal};
+use lacuna::math::special::ln_gamma;
+use lacuna::plugin::Fact;
+use lacuna::plugin::discrepancy::{Hyperparameter, Known, Likelihood, VariancePart};
+use lacuna::run::Stop;
+
+use super::StudentT;
+use super::latent::Latent;
+use crate::discrepancies::common::{
+    By, Groups, PerGroup, Replicates, Setting, Unknown, part, start, values,
+};
+
+/// See the module.
+pub(super) struct StudentLikelihood {
+    setting: Setting,
+    hyper: Vec<Hyperparameter>,
+    groups: Groups,
+    scale: PerGroup,
+    freedom: PerGroup,
+    latent: Vec<Latent>,
+    /// The measured outputs with all their values.
+    outputs: Vec<(usize, Vec<f64>)>,
+}
+
+/// The mean of each output, the scale of each group and the degrees of freedom.
+struct At<'a> {
+    mean: Vec<f64>,
+    scale: &'a [f64],
+    freedom: f64,
+}
+
+impl StudentLikelihood {
+    pub(super) fn new(options: &StudentT, known: &Known<'_>) -> Result<Self, Stop> {
+        let replicates = Replicates::of(known.data, known.common)?;
+        let layout = &known.data.layout;
+        let groups =
+            Groups::of(layout, &options.by).map_err(Stop::new)?.with_data(&replicates.measured);
+        let mut hyper = Vec::new();
+        let unit = vec![1.0; layout.len()];
+        let name = Unknown { name: "scale", unit: layout.unit.clone() };
+        let begin = |g: usize| start(&groups, &replicates, &unit, g).sqrt();
+        let scale = PerGroup::new(&options.scale, &groups, &name, begin, &mut hyper);
+        let one = Groups::of(layout, &By::default()).map_err(Stop::new)?;
+        let name = Unknown { name: "degrees_of_freedom", unit: Unit::dimensionless() };
+        let freedom = PerGroup::new(&options.degrees_of_freedom, &one, &name, |_| 5.0, &mut hyper);
+        let latent = known.common.iter().filter(|error| error.factor.columns() > 0);
+        let latent: Vec<Latent> = latent
+            .map(|error| Latent::new(error, &replicates, options.common, &mut hyper))
+            .collect::<Result<_, _>>()?;
+        let outputs = replicates.measured.iter().map(|&i| (i, known.data.values(i))).collect();
+        let setting = Setting::new(known, &replicates, &groups);
+        Ok(Self { setting, hyper, groups, scale, freedom, latent, outputs })
+    }
+
+    /// `None` where a scale is not above zero or there is no variance.
+    fn at<'a>(&'a self, response: &[f64], hyper: &'a [f64]) -> Option<At<'a>> {
+        let freedom = self.freedom.values(hyper)?[0];
+        let scale = self.scale.values(hyper)?;
+        if freedom <= 2.0 || hyper.iter().any(|h| h.is_nan()) {
+            return None;
+        }
+        Some(At { mean: self.mean(response, hyper), scale, freedom })
+    }
+
+    /// The response with the common errors.
+    fn mean(&self, response: &[f64], hyper: &[f64]) -> Vec<f64> {
+        let mut mean = response.to_vec();
+        for latent in &self.latent {
+            mean.iter_mut().zip(latent.error(hyper)).for_each(|(m, e)| *m += e);
+        }
+        mean
+    }
+
+    fn scale_of(&self, output: usize, at: &At<'_>) -> f64 {
+        self.groups.of[output].map_or(f64::NAN, |g| at.scale[g])
+    }
+
+    /// The variance of each output without the common errors.
+    fn variance(&self, hyper: &[f64]) -> Option<Vec<f64>> {
+        let freedom = self.freedom.values(hyper)?[0];
+        let squares: Vec<f64> = self.scale.values(hyper)?.iter().map(|s| s * s).collect();
+        let factor = freedom / (freedom - 2.0);
+        Some(self.groups.spread(&squares).iter().map(|s| factor * s).collect())
+    }
+}
+
+/// The logarithm of the density at its centre, for scale one.
+fn log_height(freedom: f64) -> f64 {
+    ln_gamma(0.5 * (freedom + 1.0)) - ln_gamma(0.5 * freedom) - 0.5 * (freedom * PI).ln()
+}
+
+/// `sum log(1 + (y - m)^2 / w)`, with one logarithm for as many factors as cannot overflow.
+fn log_factors(values: &[f64], mean: f64, w: f64) -> f64 {
+    let (mut sum, mut product) = (0.0, 1.0_f64);
+    for y in values {
+        let factor = 1.0 + (y - mean) * (y - mean) / w;
+        product *= factor;
+        if product > 1e150 {
+            sum += if product.is_finite() {
+                product.ln()
+            } else {
+                (product / factor).ln() + factor.ln()
+            };
+            product = 1.0;
+        }
+    }
+    sum + product.ln()
+}
+
+/// The derivative of `ln_gamma` (Abramowitz and Stegun 6.3.5 and 6.3.18).
+fn digamma(x: f64) -> f64 {
+    let (mut x, mut sum) = (x, 0.0);
+    while x < 10.0 {
+        sum -= 1.0 / x;
+        x += 1.0;
+    }
+    let m = 1.0 / (x * x);
+    let series =
+        m * (1.0 / 12.0 - m * (1.0 / 120.0 - m * (1.0 / 252.0 - m * (1.0 / 240.0 - m / 132.0))));
+    sum + x.ln() - 0.5 / x - series
+}
+
+impl Likelihood for StudentLikelihood {
+    fn hyperparameters(&self) -> &[Hyperparameter] {
+        &self.hyper
+    }
+
+    fn log_likelihood(&self, response: &[f64], hyper: &[f64]) -> f64 {
+        let Some(at) = self.at(response, hyper) else { return f64::NEG_INFINITY };
+        let height = log_height(at.freedom);
+        let of = |(i, values): &(usize, Vec<f64>)| {
+            let s = self.scale_of(*i, &at);
+            let factors = log_factors(values, at.mean[*i], at.freedom * s * s);
+            values.len() as f64 * (height - s.ln()) - 0.5 * (at.freedom + 1.0) * factors
+        };
+        let value: f64 = self.outputs.iter().map(of).sum();
+        if value.is_nan() { f64::NEG_INFINITY } else { value }
+    }
+
+    fn gradient(&self, response: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let (mut by_mean, mut by_hyper) = (vec![0.0; response.len()], vec![0.0; hyper.len()]);
+        let Some(at) = self.at(response, hyper) else { return (by_mean, by_hyper) };
+        let f = at.freedom;
+        let (mut by_scale, mut by_freedom) = (vec![0.0; at.scale.len()], 0.0);
+        let height = 0.5 * (digamma(0.5 * (f + 1.0)) - digamma(0.5 * f) - 1.0 / f);
+        for (i, values) in &self.outputs {
+            let Some(g) = self.groups.of[*i] else { continue };
+            let s = at.scale[g];
+            for y in values {
+                let d = y - at.mean[*i];
+                let w = f * s * s + d * d;
+                by_mean[*i] += (f + 1.0) * d / w;
+                by_scale[g] += ((f + 1.0) * d * d / w - 1.0) / s;
+                let q = d * d / (f * s * s);
+                by_freedom += height - 0.5 * q.ln_1p() + 0.5 * (f + 1.0) * d * d / (f * w);
+            }
+        }
+        self.scale.add_gradient(&by_scale, &mut by_hyper);
+        self.freedom.add_gradient(&[by_freedom], &mut by_hyper);
+        for latent in &self.latent {
+            latent.add_gradient(&by_mean, &mut by_hyper);
+        }
+        (by_mean, by_hyper)
+    }
+
+    /// Given the weights of the common errors the values are independent.
+    fn left_out(&self, response: &[f64], hyper: &[f64]) -> Option<Vec<f64>> {
+        let at = self.at(response, hyper)?;
+        let height = log_height(at.freedom);
+        let one = |(i, y): (usize, f64)| {
+            let s = self.scale_of(i, &at);
+            let z = (y - at.mean[i]) / s;
+            height - s.ln() - 0.5 * (at.freedom + 1.0) * (z * z / at.freedom).ln_1p()
+        };
+        Some(values(&self.setting.data).map(one).collect())
+    }
+
+    /// Since the weights of the common errors are known here, their parts are the squares of the
+    /// errors themselves.
+    fn predictive(&self, _response: &[f64], hyper: &[f64]) -> Vec<VariancePart> {
+        let mut parts = self.setting.own_parts(&self.variance(hyper).unwrap_or_default());
+        for latent in self.latent.iter().filter(|l| l.predictive) {
+            parts.push(part(&latent.origin, latent.error(hyper).iter().map(|e| e * e).collect()));
+        }
+        parts
+    }
+
+    /// Student's number is a normal one over the root of a chi-squared one over its degrees of freedom.
+    fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Measurements {
+        let mean = self.mean(response, hyper);
+        let freedom = self.freedom.values(hyper).map_or(f64::NAN, |f| f[0]);
+        let scale = self.groups.spread(self.scale.values(hyper).unwrap_or_default());
+        let law = Distribution::Gamma([0.5 * freedom, 2.0 / freedom]);
+        self.setting.replaced(stream, |own| {
+            let mut rng = own.generator();
+            let mut value = |(m, s): (&f64, &f64)| {
+                let z = normal(&mut rng);
+                m + s * z / law.sample(&mut rng).sqrt()
+            };
+            mean.iter().zip(&scale).map(&mut value).collect()
+        })
+    }
+
+    fn facts(&self) -> Vec<Fact> {
+        let count: usize = self.outputs.iter().map(|(_, values)| values.len()).sum();
+        let mut facts =
+            vec![Fact::new("data", count), Fact::new("measured outputs", self.outputs.len())];
+        facts.extend(self.latent.iter().map(|l| {
+            let (kept, share) = (l.factor.columns(), 100.0 * l.share);
+            let name = format!("directions of the common error `{}`", l.origin);
+            Fact::new(name, format!("{kept}, with {share:.1} % of its variance"))
+        }));
+        facts
+    }
+}
