@@ -59,6 +59,15 @@ enum Verb {
         /// The run directory.
         run: PathBuf,
     },
+    /// Put finished runs side by side: posteriors, errors, evidences, predictions.
+    Compare {
+        /// The run directories, two or more.
+        #[arg(required = true, num_args = 2.., value_name = "RUN")]
+        runs: Vec<PathBuf>,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
+    },
     /// List the plugins that a study can name, with their options, defaults and references.
     Plugins {
         /// A kind, such as `surrogate`, or one plugin, such as `surrogate.polynomial_chaos`.
@@ -101,6 +110,7 @@ fn main() -> ExitCode {
         Verb::Check { study, settings } => study::check(&study, &settings),
         Verb::Resume { run } => study::resume(&run),
         Verb::Report { run } => study::report(&run),
+        Verb::Compare { runs, json } => study::compare(&runs, json),
         Verb::Plugins { name, markdown } => plugins::list(name.as_deref(), markdown),
         Verb::Schema => plugins::schema(),
         Verb::Inspect { file, variable, csv, reader } => {

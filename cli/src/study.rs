@@ -1,7 +1,8 @@
-//! `run`, `check`, `resume`, `report`.
+//! `run`, `check`, `resume`, `report`, `compare`.
 
 use std::path::{Path, PathBuf};
 
+use lacuna::compare::{self, Finished};
 use lacuna::report::summary_text;
 use lacuna::run::{RunDirectory, Stop, files};
 use lacuna::stage;
@@ -53,6 +54,20 @@ pub fn report(folder: &Path) -> Result<(), Failure> {
             .into());
     }
     execute(&study, folder)
+}
+
+/// Prints finished runs side by side.
+pub fn compare(folders: &[PathBuf], json: bool) -> Result<(), Failure> {
+    let runs: Result<Vec<Finished>, Stop> = folders.iter().map(|f| Finished::read(f)).collect();
+    let comparison = compare::compare(&runs?);
+    if json {
+        let text = serde_json::to_string_pretty(&comparison)
+            .map_err(|error| Stop::new(format!("the comparison cannot be written: {error}")))?;
+        print(&text);
+    } else {
+        print(&compare::text(&comparison));
+    }
+    Ok(())
 }
 
 fn load(path: &Path, settings: &Settings) -> Result<Study, Failure> {

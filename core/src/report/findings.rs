@@ -6,6 +6,7 @@ use crate::data::{FailedRun, Layout, Measurements, Parameter, Unit};
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::plugin::Fact;
+use crate::plugin::sampler::Evidence;
 
 /// The results of one run of a study.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,6 +65,8 @@ pub struct MeasuredFindings {
     pub flagged: Vec<FlaggedCurve>,
     /// The number of data in the likelihood, added curves included.
     pub data_count: usize,
+    /// A hash of those data: two runs with the same one saw the same data.
+    pub fingerprint: String,
     /// Curves per sensor that were added to the replicates (`mean`, `q025`, `q975`).
     pub added_curves: Vec<String>,
 }
@@ -140,6 +143,25 @@ pub struct CalibrationFindings {
     pub best_draw: Vec<f64>,
     /// Facts about the sampler.
     pub facts: Vec<Fact>,
+    /// The probability of the data.
+    pub evidence: Option<Evidence>,
+    /// How well each datum is predicted from all others.
+    pub left_out: Option<LeftOutFindings>,
+}
+
+/// How well data are predicted from all others (PSIS-LOO).
+#[derive(Debug, Clone, PartialEq)]
+pub struct LeftOutFindings {
+    /// The expected log predictive density, summed over the data.
+    pub elpd: f64,
+    /// Its standard error.
+    pub error: f64,
+    /// The effective number of parameters.
+    pub parameters: f64,
+    /// How many data have estimates that cannot be trusted.
+    pub unreliable: usize,
+    /// The number of data.
+    pub count: usize,
 }
 
 /// One coordinate of the posterior.

@@ -6,13 +6,13 @@
 mod chart;
 mod curve;
 pub mod findings;
-mod number;
+pub(crate) mod number;
 mod page;
 mod scale;
 mod section;
 mod summary;
 mod svg;
-mod table;
+pub(crate) mod table;
 mod terminal;
 
 pub use page::render;

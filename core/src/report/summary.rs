@@ -3,7 +3,8 @@
 use serde_json::{Map, Value, json};
 
 use super::findings::{
-    CalibrationFindings, CoordinateFindings, Findings, SurrogateFindings, ValidationCase,
+    CalibrationFindings, CoordinateFindings, Findings, LeftOutFindings, SurrogateFindings,
+    ValidationCase,
 };
 
 /// The version of the keys and their meaning.
@@ -18,9 +19,11 @@ pub const SCHEMA: u64 = 1;
 /// |---|---|
 /// | `schema` | version of this table: 1 |
 /// | `study`, `title`, `seed`, `version` | the study's name and title, its seed, the version of Lacuna |
+/// | `components.KIND` | the plugin that the study chose, such as `sampler`: `affine_invariant_ensemble` |
 /// | `warnings` | what a reader must know first, in words |
 /// | `runs.used`, `.failed`, `.invalid`, `.in_prior` | simulation runs with a response, without one, outside the model's validity, inside the prior's support |
 /// | `data.replicates`, `.values`, `.count` | replicates used, their measured values, the number of data in the likelihood |
+/// | `data.sha256` | hash of those data: evidences and predictions are comparable where it is the same |
 /// | `data.added_curves` | curves per group that the likelihood counts beside the replicates |
 /// | `data.flagged` | how many curves the screen flagged; `data.left_out`: how many of them were left out |
 /// | `surrogate.mae`, `.rmse` | mean absolute and root mean square error over the validation runs, in `surrogate.unit` |
@@ -42,6 +45,8 @@ pub const SCHEMA: u64 = 1;
 /// | `chains.count`, `.steps`, `.burn_in`, `.stranded` | the chains; `stranded` lists those that stayed far below the bulk of the density, from 0 |
 /// | `converged`, `verdict` | whether the run converged, and why in words |
 /// | `log_density.map`, `.best_draw` | log posterior density at the MAP and at the best draw |
+/// | `evidence.log`, `.error`, `.method` | log probability of the data, its standard error, how it was found |
+/// | `loo.elpd`, `.error`, `.parameters`, `.unreliable`, `.count` | log predictive density of each datum from all others, summed (PSIS-LOO), its standard error, the effective number of parameters, how many of the data have estimates not to trust, and how many data there are |
 /// | `accuracy.CASE.GROUP` | share of points inside the replicates' 95 % interval; cases `map`, `reference`; `average` is the mean over the groups |
 /// | `rmse.CASE` | root mean square difference from the replicates' mean, in the response's unit |
 /// | `simulated.CASE` | whether the model itself was run there (else the emulator answered) |
@@ -55,6 +60,7 @@ pub fn summary(findings: &Findings) -> Value {
     put("title", json!(findings.title));
     put("seed", json!(findings.seed));
     put("version", json!(findings.version));
+    put("components", components(findings));
     put("warnings", json!(findings.warnings));
     if let Some(runs) = runs(findings) {
         put("runs", runs);
@@ -74,6 +80,12 @@ pub fn summary(findings: &Findings) -> Value {
         put("verdict", json!(calibration.verdict));
         let (map, best) = calibration.log_density;
         put("log_density", json!({ "map": map, "best_draw": best }));
+        if let Some(e) = &calibration.evidence {
+            put("evidence", json!({ "log": e.log, "error": e.error, "method": e.method }));
+        }
+        if let Some(loo) = &calibration.left_out {
+            put("loo", left_out(loo));
+        }
     }
     if let Some(validation) = &findings.validation {
         let cases = &validation.cases;
@@ -89,6 +101,11 @@ pub fn summary(findings: &Findings) -> Value {
 /// The text of `summary.json`.
 pub fn summary_json(findings: &Findings) -> String {
     format!("{:#}\n", summary(findings))
+}
+
+fn components(findings: &Findings) -> Value {
+    let named = findings.components.iter().map(|(kind, plugin)| (kind.clone(), json!(plugin)));
+    named.collect::<Map<_, _>>().into()
 }
 
 fn runs(findings: &Findings) -> Option<Value> {
@@ -107,6 +124,7 @@ fn data(findings: &Findings) -> Option<Value> {
         "replicates": measured.used.replicates.len(),
         "values": measured.used.count(),
         "count": measured.data_count,
+        "sha256": measured.fingerprint,
         "added_curves": measured.added_curves,
         "flagged": measured.flagged.len(),
         "left_out": measured.flagged.iter().filter(|curve| curve.left_out).count(),
@@ -174,6 +192,16 @@ fn correlation(calibration: &CalibrationFindings) -> Value {
     let names: Vec<&str> = calibration.coordinates.iter().map(|c| c.name.as_str()).collect();
     let matrix: Vec<&[f64]> = calibration.correlation.iter_rows().collect();
     json!({ "names": names, "matrix": matrix })
+}
+
+fn left_out(loo: &LeftOutFindings) -> Value {
+    json!({
+        "elpd": loo.elpd,
+        "error": loo.error,
+        "parameters": loo.parameters,
+        "unreliable": loo.unreliable,
+        "count": loo.count,
+    })
 }
 
 fn acceptance(calibration: &CalibrationFindings) -> Value {

@@ -4,9 +4,11 @@ pub mod best_fit;
 pub mod calibrate;
 pub mod common_error;
 pub mod design;
+pub mod evidence;
 pub mod inference_data;
 pub mod manifest;
 pub mod numerical_error;
+pub mod predict;
 pub mod read;
 pub mod refine;
 pub mod report;
@@ -25,6 +27,8 @@ use crate::report::findings::Findings;
 use crate::run::{Kept, Observer, RunDirectory, Stop};
 use crate::study::Study;
 
+use calibrate::Calibrated;
+use evidence::{Predicting, Weighed};
 use numerical_error::NumericalError;
 use read::Data;
 use refine::Refinement;
@@ -50,11 +54,34 @@ pub fn run(
     let first = Learned { data, fitted, numerics, emulator, region: None, refinement: None };
     let (learned, calibrated) = refine::stage(study, first, run, observer)?;
     let known = learned.known();
+    let weighed = weigh(study, &known, calibrated.as_ref(), run, observer)?;
     let validated = validate::stage(study, &known, calibrated.as_ref(), run, observer)?;
-    let findings =
-        report::stage(study, Some(&known), calibrated.as_ref(), validated.as_ref(), run)?;
+    let made = report::Artifacts {
+        known: Some(&known),
+        calibrated: calibrated.as_ref(),
+        weighed: weighed.as_ref(),
+        validated: validated.as_ref(),
+    };
+    let findings = report::stage(study, &made, run)?;
     manifest::end(study, run)?;
     Ok(findings)
+}
+
+/// The evidence of a calibration, where there is one.
+fn weigh(
+    study: &Study,
+    known: &Known<'_>,
+    calibrated: Option<&Kept<Calibrated>>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Option<Kept<Weighed>>, Stop> {
+    let (Some(calibrated), Some(measured)) = (calibrated, &known.data.value.measured) else {
+        return Ok(None);
+    };
+    let parts = calibrate::Parts::of(study, measured, known)?;
+    let posterior = parts.posterior(study, known);
+    let predicting = Predicting { emulator: known.emulator, likelihood: parts.likelihood() };
+    evidence::stage(study, &posterior, calibrated, Some(predicting), run, observer).map(Some)
 }
 
 /// What is known before the posterior: the data, the emulator and its errors.

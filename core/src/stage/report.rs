@@ -1,33 +1,27 @@
 //! Stage 8: what was found, for people (`report.html`) and for scripts (`summary.json`, `posterior.nc`).
 
-use crate::data::Draws;
+use crate::data::{Draws, Measurements};
 use crate::diagnose::Diagnosis;
 use crate::linalg::Matrix;
 use crate::math::fit;
 use crate::math::moments::{self, Moments};
 use crate::report::findings::{
     CalibrationFindings, CoordinateFindings, EnsembleFindings, Findings, FittedDistribution,
-    MeasuredFindings, SurrogateFindings,
+    LeftOutFindings, MeasuredFindings, SurrogateFindings,
 };
 use crate::report::{render, summary_json};
 use crate::run::{Kept, RunDirectory, Stop, files};
 use crate::study::Study;
 
 use super::calibrate::Calibrated;
+use super::evidence::Weighed;
 use super::read::{Data, Measured};
 use super::validate::Validated;
 use super::{Known, inference_data};
 
 /// Writes report, summary and posterior file; returns the findings.
-pub fn stage(
-    study: &Study,
-    known: Option<&Known<'_>>,
-    calibrated: Option<&Kept<Calibrated>>,
-    validated: Option<&Kept<Validated>>,
-    run: &RunDirectory,
-) -> Result<Findings, Stop> {
-    let all = Artifacts { known, calibrated, validated };
-    let findings = findings(study, &all, run);
+pub fn stage(study: &Study, all: &Artifacts<'_>, run: &RunDirectory) -> Result<Findings, Stop> {
+    let findings = findings(study, all, run);
     let root = run.root();
     files::write_atomic(&root.join("summary.json"), summary_json(&findings).as_bytes())?;
     let page = render(&findings);
@@ -42,11 +36,17 @@ pub fn stage(
     Ok(findings)
 }
 
-/// The artifacts of all stages.
-struct Artifacts<'a> {
-    known: Option<&'a Known<'a>>,
-    calibrated: Option<&'a Kept<Calibrated>>,
-    validated: Option<&'a Kept<Validated>>,
+/// The artifacts of all stages, as far as the study has them.
+#[derive(Clone, Copy)]
+pub struct Artifacts<'a> {
+    /// Runs, measurements and emulator.
+    pub known: Option<&'a Known<'a>>,
+    /// The posterior.
+    pub calibrated: Option<&'a Kept<Calibrated>>,
+    /// What speaks for the study as a whole.
+    pub weighed: Option<&'a Kept<Weighed>>,
+    /// The calibrated model against the data.
+    pub validated: Option<&'a Kept<Validated>>,
 }
 
 impl<'a> Artifacts<'a> {
@@ -57,7 +57,8 @@ impl<'a> Artifacts<'a> {
 
 fn findings(study: &Study, all: &Artifacts<'_>, run: &RunDirectory) -> Findings {
     let measured = all.measured();
-    let calibration = all.calibrated.map(|c| calibration(&c.value));
+    let weighed = all.weighed.map(|w| &w.value);
+    let calibration = all.calibrated.map(|c| calibration(&c.value, weighed));
     let validation =
         all.validated.zip(measured).map(|(kept, measured)| kept.value.findings(measured));
     let seconds = run
@@ -129,8 +130,16 @@ fn measurements(study: &Study, measured: &Measured) -> MeasuredFindings {
         used: measured.used.clone(),
         flagged: measured.flagged.clone(),
         data_count: measured.likelihood.count(),
+        fingerprint: fingerprint(&measured.likelihood),
         added_curves: curves.map(|r| r.name.clone()).collect(),
     }
+}
+
+/// What two runs must share for their evidences to be compared: a hash of the data in the likelihood.
+fn fingerprint(data: &Measurements) -> String {
+    let values = data.replicates.iter().flat_map(|r| &r.values);
+    let bytes: Vec<u8> = values.flat_map(|y| y.unwrap_or(f64::NAN).to_le_bytes()).collect();
+    files::hash(&bytes)
 }
 
 fn surrogate(known: &Known<'_>, validated: Option<&Kept<Validated>>) -> SurrogateFindings {
@@ -154,7 +163,7 @@ fn surrogate(known: &Known<'_>, validated: Option<&Kept<Validated>>) -> Surrogat
     }
 }
 
-fn calibration(calibrated: &Calibrated) -> CalibrationFindings {
+fn calibration(calibrated: &Calibrated, weighed: Option<&Weighed>) -> CalibrationFindings {
     let outcome = &calibrated.outcome;
     let kept = calibrated.draws.from_step(outcome.burn_in);
     let coordinates = (0..kept.dimension()).map(|j| coordinate(calibrated, &kept, j)).collect();
@@ -172,6 +181,14 @@ fn calibration(calibrated: &Calibrated) -> CalibrationFindings {
         log_density: (outcome.map_log_density, outcome.best_draw.1),
         best_draw: outcome.best_draw.0.clone(),
         facts: outcome.facts.clone(),
+        evidence: weighed.and_then(|w| w.evidence.clone()),
+        left_out: weighed.and_then(|w| w.left_out.as_ref()).map(|loo| LeftOutFindings {
+            elpd: loo.elpd,
+            error: loo.error,
+            parameters: loo.parameters,
+            unreliable: loo.unreliable,
+            count: loo.data.len(),
+        }),
     }
 }
 

@@ -10,7 +10,7 @@ use crate::run::{Kept, Observer, RunDirectory, Stop};
 use crate::study::Study;
 
 use super::calibrate::{self, Calibrated};
-use super::{manifest, report};
+use super::{evidence, manifest, report};
 
 /// Samples the target and reports.
 pub fn run(
@@ -19,8 +19,22 @@ pub fn run(
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {
-    let calibrated = stage(study, target, run, observer)?;
-    let findings = report::stage(study, None, Some(&calibrated), None, run)?;
+    let density = target.built.plugin.bind(&study.parameters)?;
+    let likelihood = if target.built.plugin.includes_prior() {
+        Given::posterior(&*density, &study.parameters)
+    } else {
+        Given::likelihood(&*density)
+    };
+    let posterior = Posterior::new(&study.parameters, likelihood);
+    let calibrated = stage(study, target, &posterior, run, observer)?;
+    let weighed = evidence::stage(study, &posterior, &calibrated, None, run, observer)?;
+    let made = report::Artifacts {
+        known: None,
+        calibrated: Some(&calibrated),
+        weighed: Some(&weighed),
+        validated: None,
+    };
+    let findings = report::stage(study, &made, run)?;
     manifest::end(study, run)?;
     Ok(findings)
 }
@@ -28,6 +42,7 @@ pub fn run(
 fn stage(
     study: &Study,
     target: &Section<dyn Density, NoKeys>,
+    posterior: &Posterior<'_>,
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Kept<Calibrated>, Stop> {
@@ -39,12 +54,5 @@ fn stage(
         (section.built.name, &section.built.options, &section.common),
         study.about.seed
     ]);
-    let density = target.built.plugin.bind(&study.parameters)?;
-    let likelihood = if target.built.plugin.includes_prior() {
-        Given::posterior(&*density, &study.parameters)
-    } else {
-        Given::likelihood(&*density)
-    };
-    let posterior = Posterior::new(&study.parameters, likelihood);
-    calibrate::draw(study, &posterior, "5-calibrate", &inputs, run, observer)
+    calibrate::draw(study, posterior, "5-calibrate", &inputs, run, observer)
 }

@@ -20,7 +20,7 @@ use super::calibrate::{Calibrated, Parts};
 use super::read::Measured;
 use super::screen::Z975;
 use super::simulator::Simulator;
-use super::{Known, stream};
+use super::{Known, predict, stream};
 
 /// What the validation found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -221,7 +221,7 @@ impl Work<'_> {
         let rows: Vec<usize> =
             (0..count).map(|k| (2 * k + 1) * draws.len() / (2 * count)).collect();
         let chosen = points.select_rows(&rows);
-        let mut responses = self.responses(&chosen);
+        let mut responses = predict::responses(self.study, self.emulator, &chosen);
         for (i, response) in responses.iter_mut().enumerate() {
             let hyper = &chosen.row(i)[chosen.columns() - own..];
             let variance = total(&likelihood.predictive(response, hyper));
@@ -236,7 +236,11 @@ impl Work<'_> {
             (0..outputs).map(|j| moments::quantile(&moments::sorted(&column(j)), p)).collect()
         };
         let map = &calibrated.outcome.map;
-        let at_map = &self.responses(&Matrix::from_vec(1, map.len(), map.clone()))[0];
+        let at_map = &predict::responses(
+            self.study,
+            self.emulator,
+            &Matrix::from_vec(1, map.len(), map.clone()),
+        )[0];
         let parts = likelihood.predictive(at_map, &map[map.len() - own..]);
         let mut spread: Vec<(String, f64)> = parts
             .iter()
@@ -254,28 +258,6 @@ impl Work<'_> {
         }
         debug_assert!(d + own <= map.len());
         Prediction { band: Some((ends(0.025), ends(0.975))), spread }
-    }
-
-    /// The emulated responses with the effects applied, natural units.
-    fn responses(&self, points: &Matrix) -> Vec<Vec<f64>> {
-        let d = self.study.parameters.len();
-        let theta = Matrix::from_rows(d, points.iter_rows().map(|p| &p[..d]));
-        let mean = self.emulator.mean(&theta);
-        let layout = &self.study.layout;
-        mean.iter_rows()
-            .zip(points.iter_rows())
-            .map(|(mean, point)| {
-                let mut response = mean.to_vec();
-                let mut from = d;
-                for effect in &self.study.effects {
-                    let plugin = &effect.built.plugin;
-                    let count = plugin.parameters(layout).len();
-                    response = plugin.apply(layout, &response, &point[from..from + count]);
-                    from += count;
-                }
-                response
-            })
-            .collect()
     }
 }
 

@@ -177,6 +177,7 @@ fn measured(layout: &Layout) -> MeasuredFindings {
         left_out,
     };
     MeasuredFindings {
+        fingerprint: String::from("0123456789abcdef"),
         data_count: used.count(),
         used,
         flagged: vec![flagged("pulse 6", "R", 9.4, false), flagged("pulse 17", "B", 31.0, true)],
@@ -246,6 +247,18 @@ fn calibration() -> CalibrationFindings {
         .map(|c| if c == 17 || c == 77 { 0.02 } else { 0.45 + 0.02 * normal(&mut rng) })
         .collect();
     CalibrationFindings {
+        evidence: Some(crate::plugin::sampler::Evidence {
+            log: -1234.5,
+            error: 0.05,
+            method: String::from("bridge sampling"),
+        }),
+        left_out: Some(crate::report::findings::LeftOutFindings {
+            elpd: -1200.0,
+            error: 20.0,
+            parameters: 3.9,
+            unreliable: 0,
+            count: 500,
+        }),
         coordinates: coordinates(),
         best_draw: MEAN.to_vec(),
         draws,

@@ -1,0 +1,179 @@
+//! Several finished runs side by side: posteriors, errors, evidences, predictions.
+
+mod show;
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use crate::diagnose::leave_one_out::{LeaveOneOut, compare as difference};
+use crate::run::{Stop, files};
+use crate::stage::evidence;
+
+pub use show::text;
+
+/// What is compared of one run.
+#[derive(Debug, Clone)]
+pub struct Finished {
+    /// Its directory.
+    pub directory: PathBuf,
+    /// Its `summary.json`.
+    pub summary: Value,
+    /// Its predictions of left-out data.
+    left_out: Option<LeaveOneOut>,
+}
+
+impl Finished {
+    /// Reads the directory of a finished run.
+    pub fn read(directory: &Path) -> Result<Self, Stop> {
+        let path = directory.join("summary.json");
+        let summary: Value = files::read_json(&path).map_err(|stop| {
+            stop.help("give the directories of finished runs, such as `runs/study`")
+        })?;
+        let known = summary.get("loo").is_some();
+        let folder = directory.join(evidence::FOLDER);
+        let left_out = known.then(|| evidence::left_out(&folder)).transpose()?;
+        Ok(Self { directory: directory.to_owned(), summary, left_out })
+    }
+
+    /// A number of the summary by its path.
+    fn number(&self, path: &[&str]) -> Option<f64> {
+        path.iter().try_fold(&self.summary, |value, key| value.get(key))?.as_f64()
+    }
+
+    fn word(&self, path: &[&str]) -> Option<&str> {
+        path.iter().try_fold(&self.summary, |value, key| value.get(key))?.as_str()
+    }
+
+    /// The parameters and hyperparameters by name.
+    fn parameters(&self) -> Option<&Map<String, Value>> {
+        self.summary.get("parameters")?.as_object()
+    }
+}
+
+/// Runs side by side.
+#[derive(Debug, Clone, Serialize)]
+pub struct Comparison {
+    /// One entry a run, in the order given.
+    pub runs: Vec<Entry>,
+    /// What makes them hard to compare.
+    pub notes: Vec<String>,
+}
+
+/// One run beside the others.
+#[derive(Debug, Clone, Serialize)]
+pub struct Entry {
+    /// Its directory, as it was given.
+    pub directory: String,
+    /// The study's name and title.
+    pub study: String,
+    /// See `study`.
+    pub title: String,
+    /// Whether it converged.
+    pub converged: bool,
+    /// Kind and plugin of its components.
+    pub components: Value,
+    /// Its posterior, as in `summary.json`.
+    pub parameters: Value,
+    /// The surrogate's error, as in `summary.json`.
+    pub surrogate: Value,
+    /// The accuracy at the MAP, average over the groups.
+    pub accuracy: Option<f64>,
+    /// The standard deviation of a new replicate by origin.
+    pub spread: Value,
+    /// The log evidence and its standard error.
+    pub evidence: Option<[f64; 2]>,
+    /// How much less the log evidence is than the best one's, and the standard error of that.
+    pub evidence_behind: Option<[f64; 2]>,
+    /// The posterior probability of the study among those compared, all being equally probable before.
+    pub probability: Option<f64>,
+    /// The log predictive density of left-out data and its standard error.
+    pub loo: Option<[f64; 2]>,
+    /// How much less that is than the best one's, and the standard error of the difference datum by datum.
+    pub loo_behind: Option<[f64; 2]>,
+    /// How many of its predictions cannot be trusted.
+    pub loo_unreliable: Option<f64>,
+}
+
+/// Puts runs side by side.
+pub fn compare(runs: &[Finished]) -> Comparison {
+    let same_data = same(runs, |run| run.word(&["data", "sha256"]).map(str::to_owned));
+    let same_priors = same(runs, |run| Some(run.parameters()?.keys().cloned().collect::<Vec<_>>()));
+    let mut notes = Vec::new();
+    if !same_data {
+        notes.push(
+            "the runs do not have the same data: their evidences and predictions are not compared"
+                .to_owned(),
+        );
+    } else if !same_priors {
+        notes.push(
+            "the runs have different unknowns: an evidence depends on the priors of all of them"
+                .to_owned(),
+        );
+    }
+    let mut entries: Vec<Entry> = runs.iter().map(entry).collect();
+    for (run, entry) in runs.iter().zip(&entries).filter(|(_, e)| !e.converged) {
+        let verdict = run.word(&["verdict"]).unwrap_or("no reason is given");
+        notes.push(format!("`{}` has not converged: {verdict}", entry.directory));
+    }
+    if same_data {
+        rank_evidences(&mut entries);
+        rank_predictions(runs, &mut entries);
+    }
+    Comparison { runs: entries, notes }
+}
+
+fn same<T: PartialEq>(runs: &[Finished], value: impl Fn(&Finished) -> Option<T>) -> bool {
+    runs.windows(2).all(|pair| value(&pair[0]) == value(&pair[1]))
+}
+
+fn entry(run: &Finished) -> Entry {
+    let part = |key: &str| run.summary.get(key).cloned().unwrap_or(Value::Null);
+    let pair =
+        |key: &str, value: &str| Some([run.number(&[key, value])?, run.number(&[key, "error"])?]);
+    Entry {
+        directory: run.directory.display().to_string(),
+        study: run.word(&["study"]).unwrap_or_default().to_owned(),
+        title: run.word(&["title"]).unwrap_or_default().to_owned(),
+        converged: run.summary.get("converged").and_then(Value::as_bool).unwrap_or(false),
+        components: part("components"),
+        parameters: part("parameters"),
+        surrogate: part("surrogate"),
+        accuracy: run.number(&["accuracy", "map", "average"]),
+        spread: part("spread"),
+        evidence: pair("evidence", "log"),
+        evidence_behind: None,
+        probability: None,
+        loo: pair("loo", "elpd"),
+        loo_behind: None,
+        loo_unreliable: run.number(&["loo", "unreliable"]),
+    }
+}
+
+/// Bayes factors against the best, and probabilities when all studies were equally probable before.
+fn rank_evidences(entries: &mut [Entry]) {
+    let known: Vec<[f64; 2]> = entries.iter().filter_map(|e| e.evidence).collect();
+    let Some(best) = known.iter().copied().reduce(|a, b| if b[0] > a[0] { b } else { a }) else {
+        return;
+    };
+    let total: f64 = known.iter().map(|e| (e[0] - best[0]).exp()).sum();
+    for entry in entries.iter_mut() {
+        let Some([log, error]) = entry.evidence else { continue };
+        let of_difference = if log == best[0] { 0.0 } else { error.hypot(best[1]) };
+        entry.evidence_behind = Some([best[0] - log, of_difference]);
+        entry.probability = Some((log - best[0]).exp() / total);
+    }
+}
+
+fn rank_predictions(runs: &[Finished], entries: &mut [Entry]) {
+    let known = runs.iter().filter_map(|run| run.left_out.as_ref());
+    let Some(best) = known.reduce(|a, b| if b.elpd > a.elpd { b } else { a }) else { return };
+    for (run, entry) in runs.iter().zip(entries) {
+        let behind = run.left_out.as_ref().and_then(|own| difference(best, own).ok());
+        entry.loo_behind = behind.map(|d| [d.elpd, d.error]);
+    }
+}
+
+#[cfg(test)]
+mod tests;
