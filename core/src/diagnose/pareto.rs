@@ -40,7 +40,9 @@ pub fn smooth(log_ratios: &[f64]) -> Smoothed {
     let mut logs: Vec<f64> = log_ratios.iter().map(|l| l - largest).collect();
     let k_hat = if logs.iter().all(|l| *l > -ROUNDING) { 0.0 } else { smooth_tail(&mut logs) };
     let total = logs.iter().map(|l| l.exp()).sum::<f64>().ln();
-    logs.iter_mut().for_each(|l| *l -= total);
+    for log in &mut logs {
+        *log -= total;
+    }
     let squares: f64 = logs.iter().map(|l| (2.0 * l).exp()).sum();
     Smoothed { log_weights: logs, k_hat, effective_size: 1.0 / squares }
 }

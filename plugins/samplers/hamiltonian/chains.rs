@@ -259,10 +259,8 @@ where
         let spreads: Vec<Spread> =
             memory.chains.iter_mut().filter_map(|chain| chain.spread.take()).collect();
         memory.metric.learn(shape, &spreads);
-        for chain in &mut memory.chains {
-            if windows.last(step) {
-                chain.pace.iter_mut().for_each(Pace::renew);
-            } else {
+        if windows.seek(step) {
+            for chain in &mut memory.chains {
                 chain.pace = None;
             }
         }

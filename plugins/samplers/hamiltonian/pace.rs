@@ -60,13 +60,6 @@ impl Pace {
         self.step = step.exp();
     }
 
-    /// Begins anew from the average. A step size changes little when a metric that is nearly right is
-    /// made anew, and a search from ten times as far would leave the average too small after few steps.
-    pub fn renew(&mut self) {
-        let centre = self.average;
-        *self = Self { step: centre.exp(), centre, average: centre, lack: 0.0, count: 0 };
-    }
-
     /// Ends the search with the average.
     pub fn settle(&mut self) {
         self.step = self.average.exp();

@@ -42,9 +42,13 @@ impl Windows {
         self.ends.contains(&step)
     }
 
-    /// Whether that is the last time.
-    pub fn last(&self, step: usize) -> bool {
-        self.ends.last() == Some(&step)
+    /// Whether the step size is sought anew after this step.
+    ///
+    /// Not after the last of several windows, unlike Stan: the metric was nearly right before, and a
+    /// search that begins again swings so widely in the few steps that are left that its average comes
+    /// out too small.
+    pub fn seek(&self, step: usize) -> bool {
+        self.end(step) && (self.ends.len() == 1 || self.ends.last() != Some(&step))
     }
 }
 
@@ -59,6 +63,8 @@ mod tests {
         assert_eq!((windows.first, &windows.ends[..]), (75, &[99, 149, 249, 449, 949][..]));
         assert!(!windows.measure(74) && windows.measure(75) && windows.measure(949));
         assert!(!windows.measure(950) && windows.end(99) && !windows.end(100));
+        assert!(windows.seek(449) && !windows.seek(949) && !windows.seek(450));
+        assert!(Windows::new(150).seek(99));
         assert_eq!(Windows::new(150).ends, [99]);
         assert_eq!((Windows::new(100).first, Windows::new(100).ends), (15, vec![89]));
         assert_eq!(Windows::new(0).ends, Vec::<usize>::new());

@@ -39,7 +39,9 @@ pub(super) fn nodes(dimension: usize, path: usize) -> Matrix {
     let mut rng = Stream::root(0).named("nodes").at(path as u64).generator();
     let draws = Matrix::from_fn(half, dimension, |_, _| normal(&mut rng));
     let mut covariance = transposed_multiply(&draws, &draws);
-    covariance.as_mut_slice().iter_mut().for_each(|c| *c /= half as f64);
+    for entry in covariance.as_mut_slice() {
+        *entry /= half as f64;
+    }
     let mut nodes = Matrix::zeros(0, dimension);
     let cholesky = Cholesky::new(&covariance).ok();
     for row in draws.iter_rows() {
@@ -48,8 +50,7 @@ pub(super) fn nodes(dimension: usize, path: usize) -> Matrix {
             solve_lower(cholesky.lower(), &mut z);
         }
         nodes.push_row(&z);
-        z.iter_mut().for_each(|z| *z = -*z);
-        nodes.push_row(&z);
+        nodes.extend_row(z.iter().map(|z| -z));
     }
     nodes
 }
@@ -72,7 +73,9 @@ pub(super) fn iterate(target: &Unconstrained<'_>, fit: Fit, nodes: &Matrix) -> R
     if !present.is_finite() {
         // Some node has no density: a smaller law may have one everywhere.
         let mut law = fit.law;
-        law.factor.as_mut_slice().iter_mut().for_each(|entry| *entry *= 0.5);
+        for entry in law.factor.as_mut_slice() {
+            *entry *= 0.5;
+        }
         let on = law.log_volume().is_finite();
         return Refined { fit: Fit { law, bound: fit.bound }, on, evaluations };
     }
