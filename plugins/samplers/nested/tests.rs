@@ -64,10 +64,12 @@ fn separated_peaks_keep_their_shares() {
 
 #[test]
 fn stated_errors_of_the_evidence_hold() {
-    for (name, target) in
-        [("two data", two_data()), ("regression", regression()), ("peak", peak(4, 30.0))]
-    {
-        calibration(&with(300), &target, 40).assert(name, 40);
+    for (name, target, runs) in [
+        ("two data", two_data(), 40),
+        ("regression", regression(), 40),
+        ("peak", peak(4, 30.0), 20),
+    ] {
+        calibration(&with(300), &target, runs).assert(name, runs);
     }
 }
 
