@@ -112,7 +112,7 @@ fn samplers() {
         &["walkers = 40\nsteps = 2000", "walkers = 20\nsteps = 2000\nupdate = \"sequential\""];
     let table: &Table = &[
         ("affine_invariant_ensemble", options),
-        ("nested", &["live = 300", "live = 300\nmutation = \"differential_evolution\""]),
+        ("nested", &["live = 300", "live = 300\nmutation = \"automatic\""]),
         (
             "sequential_monte_carlo",
             &["particles = 400", "particles = 400\nmutation = \"random_walk\""],

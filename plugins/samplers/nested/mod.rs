@@ -57,8 +57,8 @@ impl Default for Nested {
         Self {
             live: 500,
             remaining: 0.01,
-            mutation: Mutation::Automatic,
-            correlation: 0.05,
+            mutation: Mutation::DifferentialEvolution,
+            correlation: 0.1,
             moves: 100,
             halvings: 1000,
         }

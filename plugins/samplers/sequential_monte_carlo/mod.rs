@@ -58,7 +58,7 @@ impl Default for SequentialMonteCarlo {
             particles: 1000,
             effective_share: 0.5,
             mutation: Mutation::Automatic,
-            correlation: 0.2,
+            correlation: 0.1,
             moves: 50,
             temperatures: 200,
         }
