@@ -193,7 +193,7 @@ fn samplers() {
         ),
         ("hamiltonian", &["warm_up = 300", "warm_up = 300\ntrajectory = { leapfrog_steps = 8 }"]),
         ("metropolis", &["steps = 4000", "proposal = { prior = 0.5 }"]),
-        ("nested", &["live = 300", "live = 300\nmutation = \"differential_evolution\""]),
+        ("nested", &["live = 300", "live = 300\nmutation = \"automatic\""]),
         ("no_u_turn", &["warm_up = 300", "warm_up = 300\nmetric = \"diagonal\""]),
         (
             "sequential_monte_carlo",

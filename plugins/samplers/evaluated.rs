@@ -3,6 +3,7 @@
 use lacuna::linalg::{Cholesky, Matrix};
 use lacuna::math::random::Stream;
 use lacuna::plugin::Target;
+use lacuna::plugin::sampler::State;
 use lacuna::run::Stop;
 
 /// Points with their log densities.
@@ -32,6 +33,14 @@ impl Evaluated {
             }
         }
         Self { points, log_prior, log_density, evaluations: inside.len() as u64 }
+    }
+
+    /// The points of a state, which loses them.
+    pub fn take(target: &dyn Target, state: &mut State) -> Self {
+        let points = std::mem::take(&mut state.points);
+        let log_density = std::mem::take(&mut state.log_density);
+        let log_prior = target.log_prior(&points);
+        Self { points, log_prior, log_density, evaluations: 0 }
     }
 
     /// The log-likelihood of one point; minus infinity outside the support.

@@ -9,6 +9,7 @@ pub mod delayed_rejection_adaptive_metropolis;
 pub mod differential_evolution;
 mod evaluated;
 pub mod hamiltonian;
+#[cfg(test)]
 mod known_evidence;
 pub mod metropolis;
 mod moves;

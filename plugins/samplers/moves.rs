@@ -259,10 +259,7 @@ impl Watch {
         let present: Vec<f64> =
             self.before.iter().zip(&now).map(|(x, y)| correlation(x, y)).collect();
         self.history.push(present);
-        let (last, rest) = match self.history.split_last() {
-            Some(split) => split,
-            None => return false,
-        };
+        let Some((last, rest)) = self.history.split_last() else { return false };
         (0..last.len()).all(|q| {
             let stalled =
                 rest.len() >= PATIENCE && rest[rest.len() - PATIENCE][q] - last[q] < STALL;

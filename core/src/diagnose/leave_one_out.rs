@@ -67,8 +67,7 @@ impl LeaveOneOut {
             elpd: elpd.iter().sum(),
             error: error_of_sum(&elpd),
             parameters: data.iter().map(|left| left.with_it - left.elpd).sum(),
-            // A shape without a value is none to trust.
-            unreliable: data.iter().filter(|left| !(left.k_hat <= LARGEST_K)).count(),
+            unreliable: data.iter().filter(|left| left.k_hat > LARGEST_K).count(),
             data,
         }
     }

@@ -5,14 +5,13 @@ use lacuna::math::moments::kolmogorov_probability;
 use lacuna::math::random::{Stream, permutation, uniform};
 use lacuna::plugin::sampler::{Evidence, Harvest, State};
 use lacuna::plugin::{Fact, Target};
-use lacuna::run::Stop;
 use rand::Rng;
 
 use super::volumes::{Ladder, log_sum};
 use super::{Memory, Nested};
 
 /// Sequences of volumes that are drawn for the error of the evidence.
-const SEQUENCES: usize = 200;
+const SEQUENCES: usize = 100;
 /// Draws for each effective one: so many that drawing in proportion to weights adds little noise.
 const REPEATS: f64 = 4.0;
 /// A probability of the ranks below this speaks against the draws.
@@ -25,38 +24,20 @@ impl Nested {
         state: &State,
         memory: &Memory,
         stream: &Stream,
-    ) -> Result<Harvest, Stop> {
+    ) -> Harvest {
         let log_prior = target.log_prior(&state.points);
         let likelihood = |i: usize| state.log_density[i] - log_prior[i];
         let mut living: Vec<usize> = (0..self.live).collect();
         living.sort_by(|&a, &b| likelihood(a).total_cmp(&likelihood(b)));
         let mut rungs = memory.dead.clone();
         rungs.extend(living.iter().map(|&i| likelihood(i)));
-        let ladder = Ladder { rungs: &rungs, live: self.live };
+        let forgotten = memory.forgotten;
+        let ladder = Ladder { forgotten, rungs: &rungs, live: self.live, ended: true };
         let log_weights = ladder.mean_weights();
         let log_evidence = log_sum(&log_weights);
         let weights: Vec<f64> = log_weights.iter().map(|w| (w - log_evidence).exp()).collect();
-        let information: f64 =
-            weights.iter().zip(&rungs).filter(|(w, _)| **w > 0.0).map(|(w, l)| w * l).sum::<f64>()
-                - log_evidence;
-
-        let gone = memory.dead.len() - memory.log_density.len();
-        let kept = &weights[gone..];
-        let size = effective_size(kept);
-        let mut rng = stream.named("draws").generator();
-        let mut places = systematic(kept, (REPEATS * size).ceil() as usize, &mut rng);
-        let order = permutation(&mut rng, places.len());
-        places = order.into_iter().map(|i| places[i]).collect();
-        let d = state.points.columns();
-        let dead = memory.log_density.len();
-        let point = |&place: &usize| match place.checked_sub(dead) {
-            None => &memory.points[place * d..(place + 1) * d],
-            Some(alive) => state.points.row(living[alive]),
-        };
-        let density = |&place: &usize| match place.checked_sub(dead) {
-            None => memory.log_density[place],
-            Some(alive) => state.log_density[living[alive]],
-        };
+        let weighted = weights.iter().zip(&rungs).filter(|(w, _)| **w > 0.0);
+        let information = weighted.map(|(w, l)| w * l).sum::<f64>() - log_evidence;
         let shrinkage = ladder.scatter(SEQUENCES, &stream.named("volumes"));
         let by_information = (information.max(0.0) / self.live as f64).sqrt();
         let error = shrinkage.max(by_information).hypot(memory.share_variance.sqrt());
@@ -66,10 +47,11 @@ impl Nested {
             method: format!("nested sampling: {} live points", self.live),
         };
         let ranks = rank_probability(&memory.ranks);
-        Ok(Harvest {
-            points: Matrix::from_rows(d, places.iter().map(point)),
-            log_density: places.iter().map(density).collect(),
-            effective_size: size,
+        let (points, log_density) = equal_weights(state, memory, &living, &weights, stream);
+        Harvest {
+            points,
+            log_density,
+            effective_size: effective_size(&weights),
             evidence: memory.finished.then_some(evidence),
             doubts: self.doubts(memory, ranks),
             facts: vec![
@@ -77,7 +59,7 @@ impl Nested {
                     "information gained, in nats",
                     format!("{:.2}", information - memory.log_share),
                 ),
-                Fact::new("dead points", memory.dead.len()),
+                Fact::new("dead points", forgotten + memory.dead.len()),
                 Fact::new("moves of each point", memory.moves.moves),
                 Fact::new(
                     "acceptance of the last moves",
@@ -85,7 +67,7 @@ impl Nested {
                 ),
                 Fact::new("probability of the ranks of new points", format!("{ranks:.3}")),
             ],
-        })
+        }
     }
 
     fn doubts(&self, memory: &Memory, ranks: f64) -> Vec<String> {
@@ -105,6 +87,33 @@ impl Nested {
         }
         doubts
     }
+}
+
+/// Draws of equal weight in random order, with their log densities, from the weights of the dead and then of the
+/// living.
+fn equal_weights(
+    state: &State,
+    memory: &Memory,
+    living: &[usize],
+    weights: &[f64],
+    stream: &Stream,
+) -> (Matrix, Vec<f64>) {
+    let mut rng = stream.named("draws").generator();
+    let count = (REPEATS * effective_size(weights)).ceil() as usize;
+    let places = systematic(weights, count, &mut rng);
+    let (d, dead) = (state.points.columns(), memory.dead.len());
+    let mut points = Matrix::zeros(0, d);
+    let mut log_density = Vec::with_capacity(count);
+    for i in permutation(&mut rng, count) {
+        if let Some(alive) = places[i].checked_sub(dead) {
+            points.push_row(state.points.row(living[alive]));
+            log_density.push(state.log_density[living[alive]]);
+        } else {
+            points.push_row(&memory.points[places[i] * d..(places[i] + 1) * d]);
+            log_density.push(memory.log_density[places[i]]);
+        }
+    }
+    (points, log_density)
 }
 
 /// The effective number of weighted points, `(sum w)^2 / sum w^2` (Kish 1965).

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::evaluated::{Evaluated, Shape, check_start, from_prior};
 use super::moves::{Learned, Movement, Mutation};
+use volumes::Ladder;
 
 /// Nested sampling: live points, spread over the prior, that climb to ever higher likelihood while the prior
 /// volume in which they live shrinks at a known rate.
@@ -56,8 +57,8 @@ impl Default for Nested {
         Self {
             live: 500,
             remaining: 0.01,
-            mutation: Mutation::Automatic,
-            correlation: 0.05,
+            mutation: Mutation::DifferentialEvolution,
+            correlation: 0.1,
             moves: 100,
             halvings: 1000,
         }
@@ -98,9 +99,11 @@ const NEGLIGIBLE: f64 = -40.0;
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(default)]
 struct Memory {
-    /// The log-likelihood of each dead point in the order of their deaths.
+    /// How many dead points are forgotten, because they weigh nothing.
+    forgotten: usize,
+    /// The log-likelihood of each other dead point in the order of their deaths.
     dead: Vec<f64>,
-    /// The coordinates of the last of them, point by point.
+    /// The coordinates of those, point by point.
     points: Vec<f64>,
     /// The log density of those.
     log_density: Vec<f64>,
@@ -136,17 +139,11 @@ impl Sampler for Nested {
     }
 
     fn step(&self, target: &dyn Target, state: &mut State, stream: &Stream) -> Result<(), Stop> {
-        let (mut live, mut memory) = match recall(state)? {
-            Some(memory) => {
-                let points = std::mem::take(&mut state.points);
-                let log_density = std::mem::take(&mut state.log_density);
-                let log_prior = target.log_prior(&points);
-                (Evaluated { points, log_prior, log_density, evaluations: 0 }, memory)
-            }
-            None => {
-                let (drawn, tried) = from_prior(target, self.live, &stream.named("prior"))?;
-                (drawn, Memory::first(self.live, tried))
-            }
+        let (mut live, mut memory) = if let Some(memory) = recall(state)? {
+            (Evaluated::take(target, state), memory)
+        } else {
+            let (drawn, tried) = from_prior(target, self.live, &stream.named("prior"))?;
+            (drawn, Memory::first(self.live, tried))
         };
         state.accepted = vec![false; self.live];
         if !memory.finished {
@@ -172,7 +169,7 @@ impl Sampler for Nested {
         let memory = recall(&mut state.clone())?.ok_or_else(|| {
             Stop::new("the live points have not left their starting points, which are no draws")
         })?;
-        self.bring_home(target, state, &memory, stream).map(Some)
+        Ok(Some(self.bring_home(target, state, &memory, stream)))
     }
 
     fn facts(&self) -> Vec<Fact> {
@@ -214,16 +211,17 @@ impl Memory {
         self.log_density.push(log_density);
     }
 
-    /// Forgets the coordinates of dead points that weigh nothing; they are the earliest.
+    /// Forgets the dead points that weigh nothing; they are the earliest.
     fn forget(&mut self, live: usize) {
         let Some(evidence) = self.log_evidence else { return };
-        let d = self.points.len() / self.log_density.len().max(1);
-        let gone = self.dead.len() - self.log_density.len();
-        let weights = volumes::log_weights(&self.dead, live);
-        let light =
-            weights[gone..].iter().take_while(|&&weight| weight < evidence + NEGLIGIBLE).count();
-        self.points.drain(..light * d);
+        let d = self.points.len() / self.dead.len().max(1);
+        let ladder = Ladder { forgotten: self.forgotten, rungs: &self.dead, live, ended: false };
+        let weighs_nothing = |weight: &&f64| **weight < evidence + NEGLIGIBLE;
+        let light = ladder.mean_weights().iter().take_while(weighs_nothing).count();
+        self.forgotten += light;
+        self.dead.drain(..light);
         self.log_density.drain(..light);
+        self.points.drain(..light * d);
     }
 }
 

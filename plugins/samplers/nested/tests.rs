@@ -15,15 +15,18 @@ fn with(live: usize) -> Nested {
 
 #[test]
 fn it_keeps_the_contract_of_samplers() {
-    assert_eq!(contract::sampler("nested", &with(300)), Ok(()));
+    for mutation in [Mutation::DifferentialEvolution, Mutation::Automatic] {
+        let sampler = Nested { mutation, ..with(300) };
+        assert_eq!(contract::sampler(&format!("{mutation:?}"), &sampler), Ok(()));
+    }
 }
 
 #[test]
 fn evidences_in_closed_form_are_found() {
     assert_evidence("two data", &with(1000), &two_data(), 1);
     assert_evidence("regression", &with(3000), &regression(), 2);
-    let sampler = Nested { mutation: Mutation::DifferentialEvolution, ..with(3000) };
-    assert_evidence("regression by differences", &sampler, &regression(), 3);
+    let sampler = Nested { mutation: Mutation::Automatic, correlation: 0.05, ..with(3000) };
+    assert_evidence("regression by turns", &sampler, &regression(), 3);
     let sampler = Nested { mutation: Mutation::RandomWalk, ..with(3000) };
     assert_evidence("regression by random walks", &sampler, &regression(), 4);
 }
@@ -64,10 +67,12 @@ fn separated_peaks_keep_their_shares() {
 
 #[test]
 fn stated_errors_of_the_evidence_hold() {
-    for (name, target) in
-        [("two data", two_data()), ("regression", regression()), ("peak", peak(4, 30.0))]
-    {
-        calibration(&with(300), &target, 40).assert(name, 40);
+    for (name, target, runs) in [
+        ("two data", two_data(), 40),
+        ("regression", regression(), 40),
+        ("peak", peak(4, 30.0), 20),
+    ] {
+        calibration(&with(300), &target, runs).assert(name, runs);
     }
 }
 

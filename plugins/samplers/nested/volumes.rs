@@ -5,9 +5,9 @@
 //! `K, K - 1, ..., K - K/2 + 1` alive; then the living are `K` again; at the end of the run the rest die one by
 //! one.
 
-use lacuna::math::random::{Stream, uniform};
+use lacuna::math::moments::variance;
+use lacuna::math::random::{Stream, normal, uniform};
 use lacuna::math::special::ln_one_minus_exp;
-use rand::Rng;
 
 /// The log of the volume between the lowest of `alive` points and the one before, and that above it.
 pub(super) fn shell(log_volume: f64, alive: usize) -> (f64, f64) {
@@ -19,67 +19,63 @@ fn cut(log_volume: f64, log_share: f64) -> (f64, f64) {
     (log_volume + ln_one_minus_exp(log_share), log_volume + log_share)
 }
 
-/// How many points are alive when each of `dead` points dies in steps that replace half of `live`.
-fn alive(dead: usize, live: usize) -> impl Iterator<Item = usize> {
-    (0..dead).map(move |i| live - i % (live / 2))
-}
-
-/// The log weight, likelihood times width, of each dead point.
-pub(super) fn log_weights(dead: &[f64], live: usize) -> Vec<f64> {
-    let mut volume = 0.0;
-    let weight = |(likelihood, alive): (&f64, usize)| {
-        let (width, next) = shell(volume, alive);
-        volume = next;
-        likelihood + width
-    };
-    dead.iter().zip(alive(dead.len(), live)).map(weight).collect()
-}
-
-/// All points of a run in rising order, the last `live` of them alive at its end.
+/// Points in the order of their deaths.
 pub(super) struct Ladder<'a> {
-    /// Their log-likelihoods.
+    /// How many died before those that are listed.
+    pub forgotten: usize,
+    /// The log-likelihoods of the others.
     pub rungs: &'a [f64],
     /// The number of live points.
     pub live: usize,
+    /// Whether the last `live` rungs are the living.
+    pub ended: bool,
 }
 
 impl Ladder<'_> {
-    fn alive(&self) -> impl Iterator<Item = usize> {
-        let dead = self.rungs.len() - self.live;
-        alive(dead, self.live).chain((1..=self.live).rev())
+    /// How many are alive when a point dies.
+    fn alive(&self, index: usize) -> usize {
+        let total = self.forgotten + self.rungs.len();
+        if self.ended && index + self.live >= total {
+            total - index
+        } else {
+            self.live - index % (self.live / 2)
+        }
     }
 
-    /// The log weight of each rung, when `share` gives the log of the enclosed share from the number alive.
-    fn weights(&self, mut share: impl FnMut(usize) -> f64) -> Vec<f64> {
-        let mut volume = 0.0;
-        let weight = |(rung, alive): (&f64, usize)| {
-            let (width, next) = cut(volume, share(alive));
+    /// The log weight of each rung, from the log of the volume before the first and that of the share
+    /// which a number of points alive leaves.
+    fn weights(&self, before: f64, mut share: impl FnMut(usize) -> f64) -> Vec<f64> {
+        let mut volume = before;
+        let weight = |(i, rung): (usize, &f64)| {
+            let (width, next) = cut(volume, share(self.alive(self.forgotten + i)));
             volume = next;
             rung + width
         };
-        self.rungs.iter().zip(self.alive()).map(weight).collect()
+        self.rungs.iter().enumerate().map(weight).collect()
     }
 
-    /// The log weight of each rung for the mean volumes.
+    /// The sum over the forgotten of a power of the number alive.
+    fn sum_of_forgotten(&self, power: i32) -> f64 {
+        (0..self.forgotten).map(|i| (self.alive(i) as f64).powi(power)).sum()
+    }
+
+    /// The log weight of each rung, likelihood times width, for the mean volumes.
     pub fn mean_weights(&self) -> Vec<f64> {
-        self.weights(|alive| -1.0 / alive as f64)
+        self.weights(-self.sum_of_forgotten(-1), |alive| -1.0 / alive as f64)
     }
 
     /// The standard deviation of the log evidence over `count` sequences of volumes drawn from their
-    /// law: the largest of `n` uniform numbers is `u^(1/n)`.
+    /// law: the largest of `n` uniform numbers is `u^(1/n)`, and the product of the many shares of the
+    /// forgotten is log-normal.
     pub fn scatter(&self, count: usize, stream: &Stream) -> f64 {
-        let evidences: Vec<f64> = (0..count)
-            .map(|k| {
-                let mut rng = stream.at(k as u64).generator();
-                log_sum(&self.weights(|alive| log_share(alive, &mut rng)))
-            })
-            .collect();
-        lacuna::math::moments::variance(&evidences).sqrt()
+        let (centre, spread) = (-self.sum_of_forgotten(-1), self.sum_of_forgotten(-2).sqrt());
+        let evidence = |k: usize| {
+            let mut rng = stream.at(k as u64).generator();
+            let before = centre + spread * normal(&mut rng);
+            log_sum(&self.weights(before, |alive| uniform(&mut rng).ln() / alive as f64))
+        };
+        variance(&(0..count).map(evidence).collect::<Vec<f64>>()).sqrt()
     }
-}
-
-fn log_share(alive: usize, rng: &mut impl Rng) -> f64 {
-    uniform(rng).ln() / alive as f64
 }
 
 /// The log of the sum of exponentials.

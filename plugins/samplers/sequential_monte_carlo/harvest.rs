@@ -3,7 +3,6 @@
 use lacuna::math::random::{Stream, permutation};
 use lacuna::plugin::sampler::{Evidence, Harvest, State};
 use lacuna::plugin::{Fact, Target};
-use lacuna::run::Stop;
 
 use super::genealogy::{effective_families, effective_size, evidence_variance};
 use super::{Memory, SequentialMonteCarlo};
@@ -18,7 +17,7 @@ impl SequentialMonteCarlo {
         state: &State,
         memory: &Memory,
         stream: &Stream,
-    ) -> Result<Harvest, Stop> {
+    ) -> Harvest {
         let order = permutation(&mut stream.generator(), self.particles);
         let log_prior = target.log_prior(&state.points);
         let mean_likelihood =
@@ -35,7 +34,7 @@ impl SequentialMonteCarlo {
         };
         let information = mean_likelihood - evidence.log;
         let finished = memory.temperature == 1.0;
-        Ok(Harvest {
+        Harvest {
             points: state.points.select_rows(&order),
             log_density: order.iter().map(|&i| state.log_density[i]).collect(),
             effective_size: worth(state, memory),
@@ -55,7 +54,7 @@ impl SequentialMonteCarlo {
                 Fact::new("families of particles that are left", format!("{families:.0}")),
                 Fact::new("information gained, in nats", format!("{information:.2}")),
             ],
-        })
+        }
     }
 
     fn doubts(&self, state: &State, memory: &Memory, families: f64) -> Vec<String> {

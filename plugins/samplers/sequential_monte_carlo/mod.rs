@@ -58,7 +58,7 @@ impl Default for SequentialMonteCarlo {
             particles: 1000,
             effective_share: 0.5,
             mutation: Mutation::Automatic,
-            correlation: 0.2,
+            correlation: 0.1,
             moves: 50,
             temperatures: 200,
         }
@@ -125,21 +125,12 @@ impl Sampler for SequentialMonteCarlo {
     }
 
     fn step(&self, target: &dyn Target, state: &mut State, stream: &Stream) -> Result<(), Stop> {
-        let mut memory = recall(state)?;
-        let mut population = match &mut memory {
-            Some(_) => {
-                let (points, log_density) =
-                    (std::mem::take(&mut state.points), std::mem::take(&mut state.log_density));
-                let log_prior = target.log_prior(&points);
-                Evaluated { points, log_prior, log_density, evaluations: 0 }
-            }
-            none => {
-                let (drawn, tried) = from_prior(target, self.particles, &stream.named("prior"))?;
-                *none = Some(Memory::first(self.particles, tried));
-                drawn
-            }
+        let (mut population, mut memory) = if let Some(memory) = recall(state)? {
+            (Evaluated::take(target, state), memory)
+        } else {
+            let (drawn, tried) = from_prior(target, self.particles, &stream.named("prior"))?;
+            (drawn, Memory::first(self.particles, tried))
         };
-        let mut memory = memory.unwrap_or_default();
         let shape = if memory.temperature < 1.0 {
             self.cool(&mut population, &mut memory, &stream.named("cool"))?
         } else {
@@ -181,7 +172,7 @@ impl Sampler for SequentialMonteCarlo {
         let memory = recall(&mut state.clone())?.ok_or_else(|| {
             Stop::new("the particles have not left their starting points, which are no draws")
         })?;
-        self.bring_home(target, state, &memory, stream).map(Some)
+        Ok(Some(self.bring_home(target, state, &memory, stream)))
     }
 
     fn facts(&self) -> Vec<Fact> {

@@ -22,7 +22,10 @@ const ALL: [Mutation; 4] = [
 
 #[test]
 fn it_keeps_the_contract_of_samplers() {
-    assert_eq!(contract::sampler("sequential_monte_carlo", &with(400)), Ok(()));
+    for mutation in ALL {
+        let sampler = SequentialMonteCarlo { mutation, ..with(400) };
+        assert_eq!(contract::sampler(&format!("{mutation:?}"), &sampler), Ok(()));
+    }
 }
 
 #[test]
