@@ -39,7 +39,11 @@ fn main() -> Fallible<()> {
     let (parameters, layout) = (parameters()?, layout()?);
     let emulator = emulator(&parameters, &layout, degree)?;
     let data = measured(&*emulator, &layout);
-    let gaussian = Gaussian { variance: Distribution::HalfNormal(1e-6) };
+    let gaussian = Gaussian {
+        variance: Distribution::HalfNormal(1e-6).into(),
+        by: lacuna_plugins::discrepancies::common::By::default(),
+        marginal: false,
+    };
     let likelihood = gaussian.likelihood(&Known::without_slopes(&data, &error(rank)))?;
     let begun = processor_seconds()?;
     let posterior =
