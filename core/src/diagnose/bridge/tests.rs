@@ -37,7 +37,9 @@ impl Regression {
         (0..3).for_each(|i| precision[(i, i)] += 1.0 / (WIDTH * WIDTH));
         let factor = Cholesky::new(&precision).unwrap();
         let mut mean = crate::linalg::transposed_multiply_vector(&self.x, &self.y);
-        mean.iter_mut().for_each(|m| *m /= NOISE * NOISE);
+        for m in &mut mean {
+            *m /= NOISE * NOISE;
+        }
         factor.solve(&mut mean);
         let spread = Cholesky::new(&factor.inverse()).unwrap();
         let mut draws = Draws {
@@ -51,8 +53,9 @@ impl Regression {
             let mut rng = Stream::root(seed).at(chain as u64).generator();
             let mut z: Vec<f64> = (0..3).map(|_| normal(&mut rng)).collect();
             for _ in 0..steps {
-                z.iter_mut()
-                    .for_each(|z| *z = phi * *z + (1.0 - phi * phi).sqrt() * normal(&mut rng));
+                for z in &mut z {
+                    *z = phi * *z + (1.0 - phi * phi).sqrt() * normal(&mut rng);
+                }
                 draws.values.extend(spread.colour(&z).iter().zip(&mean).map(|(s, m)| s + m));
             }
         }
