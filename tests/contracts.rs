@@ -67,6 +67,7 @@ fn designs() {
             "latin_hypercube",
             &["", "optimise = \"maximin\"", "optimise = \"correlation\"", "centred = true"],
         ),
+        ("quadrature", &["", "rule = \"smolyak\""]),
         ("random", &[""]),
         ("sobol", &["", "scramble = \"none\""]),
     ];
@@ -91,7 +92,16 @@ fn executors() {
 fn surrogates() {
     let table: &Table = &[(
         "polynomial_chaos",
-        &["degree = { max = 8 }", "degree = 5\nsolver = \"least_squares\""],
+        &[
+            "degree = { max = 8 }",
+            "degree = 5\nsolver = \"least_squares\"",
+            "degree = { max = 8 }\nsolver = \"orthogonal_matching_pursuit\"",
+            "degree = { max = 8 }\nsolver = \"subspace_pursuit\"",
+            "degree = { max = 8 }\nsolver = \"bayesian_compressive_sensing\"",
+            "degree = { max = 8 }\nq_norm = { min = 0.6, step = 0.2 }\nselection = { k_fold = 5 }",
+            "degree = { max = 6 }\nbasis = \"hermite\"",
+            "degree = { max = 6 }\nbasis = \"jacobi\"\ncomponents = { variance = 0.9999 }",
+        ],
     )];
     all::<dyn Surrogate>(table, |case, plugin| contract::surrogate(&case.label, plugin));
 }
