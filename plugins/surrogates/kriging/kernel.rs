@@ -107,11 +107,15 @@ impl Kernel {
             squared_distances(&points.column(i), others, row);
             let farthest = row.iter().fold(0.0_f64, |most, s| if *s > most { *s } else { most });
             if self.argument(farthest) < 1.0 {
-                row.iter_mut().for_each(|square| *square = self.argument(*square));
+                for square in row.iter_mut() {
+                    *square = self.argument(*square);
+                }
                 polynomials(row, &series);
             } else {
                 self.evaluate(row, &mut slopes);
-                row.iter_mut().for_each(|correlation| *correlation -= 1.0);
+                for correlation in row.iter_mut() {
+                    *correlation -= 1.0;
+                }
             }
         }
         above
