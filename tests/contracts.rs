@@ -106,7 +106,7 @@ fn surrogates() {
         (
             "gaussian_process",
             &[
-                "",
+                "nugget = 1e-8",
                 "kernel = \"matern_3_2\"\ntrend = \"linear\"\ncomponents = \"none\"",
                 "kernel = \"squared_exponential\"\nlength_scales = \"shared\"\nnugget = 1e-8",
             ],
@@ -126,7 +126,10 @@ fn surrogates() {
         ),
         (
             "polynomial_chaos_kriging",
-            &["", "selection = \"sequential\"\ntrend = { degree = { max = 3 } }"],
+            &[
+                "nugget = 1e-8",
+                "kernel = \"matern_3_2\"\nselection = \"sequential\"\ntrend = { degree = { max = 3 } }",
+            ],
         ),
     ];
     all::<dyn Surrogate>(table, |case, plugin| contract::surrogate(&case.label, plugin));

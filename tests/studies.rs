@@ -11,7 +11,7 @@ fn run(folder: &Path, settings: &[&str], out: &str) -> Ran {
     quick::run(&folder.join("study.toml"), settings, &out).unwrap_or_else(|stop| panic!("{stop}"))
 }
 
-const STAGES: [&str; 6] =
+const STAGES: [&str; 7] =
     ["1-design", "2-simulate", "3-read", "4-surrogate", "5-calibrate", "6-evidence", "6-validate"];
 
 #[test]

@@ -10,7 +10,6 @@ use crate::diagnose::Diagnosis;
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::math::optimise;
-use crate::math::random::Stream;
 use crate::plugin::discrepancy;
 use crate::plugin::sampler::Evidence;
 use crate::plugin::{Effect, Emulator, Fact, Likelihood, Target};
