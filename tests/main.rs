@@ -9,4 +9,3 @@ mod python;
 mod quick;
 mod studies;
 mod tidy;
-mod truth;
