@@ -1,7 +1,6 @@
 //! Common errors by the weights of their leading directions.
 
 use lacuna::data::Unit;
-use lacuna::linalg::vector::dot;
 use lacuna::linalg::{self, Matrix};
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::discrepancy::{CommonError, Hyperparameter};
@@ -17,8 +16,8 @@ use crate::discrepancies::common::Replicates;
 pub(super) struct Latent {
     pub origin: String,
     pub predictive: bool,
-    /// The kept columns of `F V`, over all outputs.
-    pub factor: Matrix,
+    /// The kept columns of `F V`, one a row, over all outputs.
+    pub directions: Matrix,
     /// The position of the first weight among the hyperparameters.
     first: usize,
     /// The share of the variance of the mean curve that is kept.
@@ -62,25 +61,24 @@ impl Latent {
         Ok(Self {
             origin: error.origin.clone(),
             predictive: error.predictive,
-            factor: linalg::multiply(&error.factor, &turn),
+            directions: linalg::multiply(&error.factor, &turn).transposed(),
             first,
             share: if total > 0.0 { carried / total } else { 1.0 },
         })
     }
 
     fn range(&self) -> std::ops::Range<usize> {
-        self.first..self.first + self.factor.columns()
+        self.first..self.first + self.directions.rows()
     }
 
     /// The error at each output.
     pub fn error(&self, hyper: &[f64]) -> Vec<f64> {
-        let weights = &hyper[self.range()];
-        self.factor.iter_rows().map(|row| dot(row, weights)).collect()
+        linalg::transposed_multiply_vector(&self.directions, &hyper[self.range()])
     }
 
     /// Adds the derivatives by the weights, given those by the outputs.
     pub fn add_gradient(&self, by_output: &[f64], by_hyper: &mut [f64]) {
-        let by_weight = linalg::transposed_multiply_vector(&self.factor, by_output);
+        let by_weight = linalg::multiply_vector(&self.directions, by_output);
         let own = &mut by_hyper[self.range()];
         own.iter_mut().zip(by_weight).for_each(|(sum, g)| *sum += g);
     }

@@ -212,7 +212,7 @@ impl Likelihood for StudentLikelihood {
         let mut facts =
             vec![Fact::new("data", count), Fact::new("measured outputs", self.outputs.len())];
         facts.extend(self.latent.iter().map(|l| {
-            let (kept, share) = (l.factor.columns(), 100.0 * l.share);
+            let (kept, share) = (l.directions.rows(), 100.0 * l.share);
             let name = format!("directions of the common error `{}`", l.origin);
             Fact::new(name, format!("{kept}, with {share:.1} % of its variance"))
         }));

@@ -10,11 +10,15 @@ use lacuna::plugin::{Fact, Target};
 use lacuna::run::Stop;
 use rand::Rng;
 
-use super::law::Law;
+use super::law::{self, Law};
 use super::{Fit, Path, Stage, Variational};
 
 /// The share of the mixture that goes to all laws alike, however low their bounds.
-const DEFENCE: f64 = 0.1;
+const EVEN: f64 = 0.1;
+/// The tails that are tried in turn: those of the normal law, then of Student's with ever fewer degrees of
+/// freedom. The logarithm of a variance falls off like an exponential law on one side, where a normal law
+/// would give weights without a mean.
+const TAILS: [Option<u32>; 4] = [None, Some(8), Some(4), Some(2)];
 /// Bounds that differ by more than this belong to different laws.
 const DIFFERENT: f64 = 1.0;
 
@@ -29,17 +33,22 @@ pub(super) fn harvest(
         return Err(Stop::new("no path has a normal law yet").help("raise `iterations`"));
     }
     let free = Unconstrained::new(target);
-    let mixture = Mixture::of(&fits);
-    let mut rng = stream.generator();
+    let tails = if options.importance { &TAILS[..] } else { &TAILS[..1] };
     // Twice as many as are wanted, so that few of them are drawn twice.
-    let proposals = mixture.draws(2 * options.draws, &mut rng);
-    let density = free.log_density(&proposals);
-    let ratios: Vec<f64> = density
-        .iter()
-        .zip(proposals.iter_rows())
-        .map(|(p, u)| p - mixture.log_density(u))
-        .collect();
-    let smoothed = pareto::smooth(&ratios);
+    let count = 2 * options.draws;
+    let mut weighed = Weighed::of(&free, Mixture::of(&fits, None), count, &stream.named("normal"));
+    for &tail in &tails[1..] {
+        if weighed.smoothed.k_hat <= LARGEST_K {
+            break;
+        }
+        let stream = stream.named("heavy").at(u64::from(tail.unwrap_or(0)));
+        let other = Weighed::of(&free, Mixture::of(&fits, tail), count, &stream);
+        if other.smoothed.k_hat < weighed.smoothed.k_hat {
+            weighed = other;
+        }
+    }
+    let Weighed { tail, proposals, ratios, smoothed } = weighed;
+    let mut rng = stream.named("draw").generator();
     let chosen = if options.importance && smoothed.effective_size > 0.0 {
         resample(&smoothed.log_weights, options.draws, &mut rng)
     } else {
@@ -56,23 +65,45 @@ pub(super) fn harvest(
         effective_size: worth(&smoothed, options.draws),
         evidence: (smoothed.k_hat <= LARGEST_K).then(|| evidence(&ratios)),
         doubts: doubts(options, paths, &fits, &smoothed),
-        facts: facts(&fits, &smoothed),
+        facts: facts(&fits, &smoothed, tail),
     })
 }
 
-/// Normal laws with weights.
+/// Independent draws of a mixture with the ratios of the posterior to it, as logarithms.
+struct Weighed {
+    tail: Option<u32>,
+    proposals: Matrix,
+    ratios: Vec<f64>,
+    smoothed: Smoothed,
+}
+
+impl Weighed {
+    fn of(target: &Unconstrained<'_>, mixture: Mixture<'_>, count: usize, stream: &Stream) -> Self {
+        let proposals = mixture.draws(count, &mut stream.generator());
+        let density = target.log_density(&proposals);
+        let pairs = density.iter().zip(proposals.iter_rows());
+        let ratios: Vec<f64> = pairs.map(|(p, u)| p - mixture.log_density(u)).collect();
+        let smoothed = pareto::smooth(&ratios);
+        Self { tail: mixture.tail, proposals, ratios, smoothed }
+    }
+}
+
+/// Laws with weights.
 struct Mixture<'a> {
     laws: Vec<(f64, &'a Law)>,
+    /// The degrees of freedom of Student's law; `None` for the normal law.
+    tail: Option<u32>,
 }
 
 impl<'a> Mixture<'a> {
     /// Each law by the evidence that its bound promises, and none below a small share.
-    fn of(fits: &[&'a Fit]) -> Self {
+    fn of(fits: &[&'a Fit], tail: Option<u32>) -> Self {
         let largest = fits.iter().map(|fit| fit.bound).fold(f64::NEG_INFINITY, f64::max);
         let shares: Vec<f64> = fits.iter().map(|fit| (fit.bound - largest).exp()).collect();
-        let (total, even) = (shares.iter().sum::<f64>(), DEFENCE / fits.len() as f64);
-        let weight = |share: f64| (1.0 - DEFENCE) * share / total + even;
-        Self { laws: shares.iter().zip(fits).map(|(&s, fit)| (weight(s), &fit.law)).collect() }
+        let (total, even) = (shares.iter().sum::<f64>(), EVEN / fits.len() as f64);
+        let weight = |share: f64| (1.0 - EVEN) * share / total + even;
+        let laws = shares.iter().zip(fits).map(|(&s, fit)| (weight(s), &fit.law)).collect();
+        Self { laws, tail }
     }
 
     fn draws(&self, count: usize, rng: &mut impl Rng) -> Matrix {
@@ -84,14 +115,22 @@ impl<'a> Mixture<'a> {
                 left <= 0.0
             });
             let (_, law) = law.unwrap_or(&self.laws[0]);
-            let z: Vec<f64> = (0..dimension).map(|_| normal(rng)).collect();
+            let stretch = self.tail.map_or(1.0, |freedom| law::stretch(freedom, rng));
+            let z: Vec<f64> = (0..dimension).map(|_| stretch * normal(rng)).collect();
             law.point(&z)
         };
         Matrix::from_rows(dimension, (0..count).map(draw))
     }
 
     fn log_density(&self, point: &[f64]) -> f64 {
-        let terms = self.laws.iter().map(|(weight, law)| weight.ln() + law.log_density(point));
+        let terms = self.laws.iter().map(|(weight, law)| {
+            let z = law.whitened(point);
+            let density = match self.tail {
+                None => law.log_density_of(&z),
+                Some(freedom) => law.log_student_density_of(freedom, &z),
+            };
+            weight.ln() + density
+        });
         terms.fold(f64::NEG_INFINITY, ln_sum_exp)
     }
 }
@@ -167,10 +206,15 @@ fn doubts(
     doubts
 }
 
-fn facts(fits: &[&Fit], smoothed: &Smoothed) -> Vec<Fact> {
+fn facts(fits: &[&Fit], smoothed: &Smoothed, tail: Option<u32>) -> Vec<Fact> {
     let largest = fits.iter().map(|fit| fit.bound).fold(f64::NEG_INFINITY, f64::max);
+    let tails = match tail {
+        None => "normal".to_owned(),
+        Some(freedom) => format!("Student's with {freedom} degrees of freedom"),
+    };
     vec![
         Fact::new("Pareto k-hat", format!("{:.2}", smoothed.k_hat)),
+        Fact::new("tails of the law", tails),
         Fact::new("evidence lower bound", format!("{largest:.3}")),
         Fact::new("effective draws by importance", format!("{:.0}", smoothed.effective_size)),
     ]

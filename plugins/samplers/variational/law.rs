@@ -2,7 +2,9 @@
 
 use lacuna::linalg::vector::dot;
 use lacuna::linalg::{Cholesky, Matrix, multiply_vector, solve_lower};
-use lacuna::math::special::HALF_LN_TWO_PI;
+use lacuna::math::random::normal;
+use lacuna::math::special::{HALF_LN_TWO_PI, ln_gamma};
+use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 /// A normal law with the covariance `L L'`.
@@ -19,6 +21,15 @@ impl Law {
         let cholesky = Cholesky::new(covariance).ok()?;
         let finite = mean.iter().all(|m| m.is_finite());
         finite.then(|| Self { mean, factor: cholesky.lower().clone() })
+    }
+
+    /// The law whose standard deviations are `factor` times as large.
+    pub fn widened(&self, factor: f64) -> Self {
+        let mut law = self.clone();
+        for entry in law.factor.as_mut_slice() {
+            *entry *= factor;
+        }
+        law
     }
 
     /// `mean + L z`.
@@ -42,10 +53,24 @@ impl Law {
         -0.5 * dot(z, z) - z.len() as f64 * HALF_LN_TWO_PI - self.log_volume()
     }
 
-    /// The log density at a point.
-    pub fn log_density(&self, point: &[f64]) -> f64 {
+    /// `z` of a point.
+    pub fn whitened(&self, point: &[f64]) -> Vec<f64> {
         let mut z: Vec<f64> = point.iter().zip(&self.mean).map(|(x, m)| x - m).collect();
         solve_lower(&self.factor, &mut z);
-        self.log_density_of(&z)
+        z
     }
+
+    /// The log density at `point(z)` of Student's law with this centre, factor and degrees of freedom.
+    pub fn log_student_density_of(&self, freedom: u32, z: &[f64]) -> f64 {
+        let (nu, d) = (f64::from(freedom), z.len() as f64);
+        let kernel = -0.5 * (nu + d) * (dot(z, z) / nu).ln_1p();
+        let scale = 0.5 * d * (nu * std::f64::consts::PI).ln() + self.log_volume();
+        ln_gamma(0.5 * (nu + d)) - ln_gamma(0.5 * nu) + kernel - scale
+    }
+}
+
+/// The factor that turns a standard normal `z` into a draw of Student's law.
+pub(super) fn stretch(freedom: u32, rng: &mut impl Rng) -> f64 {
+    let squares: f64 = (0..freedom).map(|_| normal(rng).powi(2)).sum();
+    (f64::from(freedom) / squares).sqrt()
 }

@@ -32,7 +32,8 @@ use refine::Refined;
 /// Several paths climb to the maximum (Pathfinder); along each, the normal law of the curvature gathered
 /// so far is the candidate, and the one with the largest evidence lower bound is kept. Natural gradients
 /// on fixed points then raise the bound over mean and full covariance. The draws come from the mixture
-/// of all paths.
+/// of the laws of all paths; where the k-hat of normal laws is too large, Student's laws with ever heavier
+/// tails are tried in their place.
 ///
 /// References: Zhang, Carpenter, Gelman and Vehtari, J. Mach. Learn. Res. 23 (2022) 306 (Pathfinder);
 /// Kucukelbir et al., J. Mach. Learn. Res. 18 (2017) 14 (normal laws in free coordinates); Khan and Rue,

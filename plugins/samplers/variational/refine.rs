@@ -72,10 +72,7 @@ pub(super) fn iterate(target: &Unconstrained<'_>, fit: Fit, nodes: &Matrix) -> R
     let present = bound(&fit.law, &values);
     if !present.is_finite() {
         // Some node has no density: a smaller law may have one everywhere.
-        let mut law = fit.law;
-        for entry in law.factor.as_mut_slice() {
-            *entry *= 0.5;
-        }
+        let law = fit.law.widened(0.5);
         let on = law.log_volume().is_finite();
         return Refined { fit: Fit { law, bound: fit.bound }, on, evaluations };
     }

@@ -40,7 +40,7 @@ fn a_conjugate_normal_posterior_is_found() {
     let peak = conjugate().gradient(&[7.935_742_857_142_857]).0;
     let expected = peak + 0.5 * (2.0 * std::f64::consts::PI * 6.0 / 7.0).ln();
     let found = reap(&sampler, &conjugate(), 1).0.evidence.unwrap();
-    assert!((found.log - expected).abs() < 1e-6, "{} and {expected}", found.log);
+    assert!((found.log - expected).abs() < 1e-6, "{found:?} and {expected}");
 }
 
 #[test]
@@ -66,8 +66,11 @@ fn a_normal_law_of_any_scale_is_found_exactly() {
 
 #[test]
 fn unknowns_with_bounds_come_out_by_importance() {
+    for seed in 3..8 {
+        let doubts = reap(&Variational::default(), &bounded(), seed).0.doubts;
+        assert!(doubts.is_empty(), "{seed}: {doubts:?}");
+    }
     let (harvest, _) = reap(&Variational::default(), &bounded(), 2);
-    assert!(harvest.doubts.is_empty(), "{:?}", harvest.doubts);
     let beta_variance = 1e4 * 10.0 / (49.0 * 8.0);
     for (j, centre, spread) in [(0, 1.5e-4, 7.5e-9), (1, 100.0 + 200.0 / 7.0, beta_variance)] {
         let values = harvest.points.column(j);
@@ -86,13 +89,27 @@ fn unknowns_with_bounds_come_out_by_importance() {
 
 #[test]
 fn a_law_that_is_not_normal_is_told() {
-    for (name, harvest) in [
-        ("banana", reap(&Variational::default(), &banana(), 3).0),
-        ("funnel", reap(&Variational::default(), &funnel(), 3).0),
+    // Cauchy's law in three independent coordinates, whose densities integrate to pi each.
+    let cauchy = Law::free(vec![[0.0, 1.0]; 3], |x: &[f64]| {
+        let value = -x.iter().map(|x| (x * x).ln_1p()).sum::<f64>();
+        (value, x.iter().map(|x| -2.0 * x / (1.0 + x * x)).collect())
+    });
+    let plain = Variational { importance: false, ..Variational::default() };
+    let (harvest, _) = reap(&plain, &cauchy, 3);
+    assert!(harvest.doubts.iter().any(|d| d.contains("k-hat")), "{:?}", harvest.facts);
+    assert!(harvest.evidence.is_none());
+    // Student's laws have tails for it.
+    let (harvest, _) = reap(&Variational::default(), &cauchy, 3);
+    assert!(harvest.facts[1].value.contains("Student"), "{:?}", harvest.facts);
+    let evidence = harvest.evidence.unwrap();
+    let expected = 3.0 * std::f64::consts::PI.ln();
+    assert!((evidence.log - expected).abs() < 4.0 * evidence.error, "{evidence:?}");
+    // What weights cost on a curved ridge and in a funnel is told.
+    for harvest in [
+        reap(&Variational::default(), &banana(), 3).0,
+        reap(&Variational::default(), &funnel(), 3).0,
     ] {
-        assert!(harvest.doubts.iter().any(|d| d.contains("k-hat")), "{name}: {harvest:?}");
-        assert!(harvest.evidence.is_none());
-        assert!(harvest.effective_size < 1000.0, "{name}: {}", harvest.effective_size);
+        assert!(harvest.effective_size < 1500.0, "{:?}", harvest.facts);
     }
 }
 
