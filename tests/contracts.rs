@@ -79,6 +79,7 @@ fn designs() {
             "latin_hypercube",
             &["", "optimise = \"maximin\"", "optimise = \"correlation\"", "centred = true"],
         ),
+        ("quadrature", &["", "rule = \"smolyak\""]),
         ("random", &[""]),
         ("sobol", &["", "scramble = \"none\""]),
     ];
@@ -105,15 +106,30 @@ fn surrogates() {
         (
             "gaussian_process",
             &[
-                "",
+                "nugget = 1e-8",
                 "kernel = \"matern_3_2\"\ntrend = \"linear\"\ncomponents = \"none\"",
                 "kernel = \"squared_exponential\"\nlength_scales = \"shared\"\nnugget = 1e-8",
             ],
         ),
-        ("polynomial_chaos", &["degree = { max = 8 }", "degree = 5\nsolver = \"least_squares\""]),
+        (
+            "polynomial_chaos",
+            &[
+                "degree = { max = 8 }",
+                "degree = 5\nsolver = \"least_squares\"",
+                "degree = { max = 8 }\nsolver = \"orthogonal_matching_pursuit\"",
+                "degree = { max = 8 }\nsolver = \"subspace_pursuit\"",
+                "degree = { max = 8 }\nsolver = \"bayesian_compressive_sensing\"",
+                "degree = { max = 8 }\nq_norm = { min = 0.6, step = 0.2 }\nselection = { k_fold = 5 }",
+                "degree = { max = 6 }\nbasis = \"hermite\"",
+                "degree = { max = 6 }\nbasis = \"jacobi\"\ncomponents = { variance = 0.9999 }",
+            ],
+        ),
         (
             "polynomial_chaos_kriging",
-            &["", "selection = \"sequential\"\ntrend = { degree = { max = 3 } }"],
+            &[
+                "nugget = 1e-8",
+                "kernel = \"matern_3_2\"\nselection = \"sequential\"\ntrend = { degree = { max = 3 } }",
+            ],
         ),
     ];
     all::<dyn Surrogate>(table, |case, plugin| contract::surrogate(&case.label, plugin));

@@ -12,8 +12,8 @@ fn run(folder: &Path, settings: &[&str], out: &str) -> Ran {
     quick::run(&folder.join("study.toml"), settings, &out).unwrap_or_else(|stop| panic!("{stop}"))
 }
 
-const STAGES: [&str; 6] =
-    ["1-design", "2-simulate", "3-read", "4-surrogate", "5-calibrate", "6-validate"];
+const STAGES: [&str; 7] =
+    ["1-design", "2-simulate", "3-read", "4-surrogate", "5-calibrate", "6-evidence", "6-validate"];
 
 #[test]
 fn a_study_runs_from_nothing_to_its_report() {
@@ -68,7 +68,7 @@ fn check_summary(out: &Path) {
             assert!((0.0..=1.0).contains(&share), "accuracy.{case}.{group}");
         }
     }
-    for stage in ["design", "simulate", "read", "surrogate", "calibrate", "validate"] {
+    for stage in ["design", "simulate", "read", "surrogate", "calibrate", "evidence", "validate"] {
         assert!(summary["seconds"][stage].as_f64().unwrap() >= 0.0, "seconds.{stage}");
     }
 }
@@ -116,7 +116,10 @@ fn what_is_kept_is_taken_and_only_what_depends_on_a_change_is_made_again() {
     assert!(begun.elapsed().as_secs_f64() < 10.0, "{:?}", begun.elapsed());
 
     let longer = ["sampler.steps=80"];
-    assert_eq!(run(folder.path(), &longer, "run").made, ["5-calibrate", "6-validate"]);
+    assert_eq!(
+        run(folder.path(), &longer, "run").made,
+        ["5-calibrate", "6-evidence", "6-validate"]
+    );
     let changed = quick::results(&out);
     assert_ne!(changed["5-calibrate/draws.nc"], first["5-calibrate/draws.nc"]);
     assert_eq!(changed["4-surrogate/emulator.bin"], first["4-surrogate/emulator.bin"]);
@@ -164,7 +167,7 @@ fn results_do_not_depend_on_the_number_of_threads() {
 fn a_study_of_tables_runs_without_a_model() {
     let folder = quick::tables();
     let ran = run(folder.path(), &["sampler.steps=300"], "run");
-    assert_eq!(ran.made, ["3-read", "4-surrogate", "5-calibrate", "6-validate"]);
+    assert_eq!(ran.made, ["3-read", "4-surrogate", "5-calibrate", "6-evidence", "6-validate"]);
     let summary = quick::summary(&folder.path().join("run"));
     assert_eq!(summary["simulated"]["map"], false);
     let findings = ran.findings.calibration.unwrap();

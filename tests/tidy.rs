@@ -23,7 +23,8 @@ const MACHINE: [&str; 6] = ["/home/", "/Users/", "/root/", "/work/", "/tmp/", "C
 ///
 /// A study chooses plugins and plugins complain about their part of a study; both stop with what a run
 /// says, and expressions guess at names as a study does: these four are one layer.
-const LAYERS: [&[&str]; 9] = [
+const LAYERS: [&[&str]; 10] = [
+    &["compare"],
     &["stage"],
     &["contract"],
     &["report"],
@@ -36,7 +37,8 @@ const LAYERS: [&[&str]; 9] = [
 ];
 
 /// Uses that go up a layer, with the reason.
-const UPWARD: [(&str, &str, &str); 2] = [
+const UPWARD: [(&str, &str, &str); 3] = [
+    ("math/transform", "plugin", "what changes its coordinates is a `Target` too"),
     (
         "math/optimise",
         "plugin",

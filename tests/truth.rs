@@ -3,6 +3,10 @@
 
 #[path = "truth/calibration.rs"]
 mod calibration;
+#[path = "truth/posteriordb/mod.rs"]
+mod posteriordb;
+#[path = "truth/posteriors.rs"]
+mod posteriors;
 #[path = "truth/runs.rs"]
 mod runs;
 

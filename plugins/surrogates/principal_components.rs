@@ -94,7 +94,9 @@ impl PrincipalComponents {
         let directions = Matrix::from_fn(mean.len(), varying.len(), entry);
         let mut remainder = centred.clone();
         for i in 0..remainder.rows() {
-            varying.iter().for_each(|&j| remainder[(i, j)] = 0.0);
+            for &j in &varying {
+                remainder[(i, j)] = 0.0;
+            }
         }
         Self { mean, directions, scores, remainder }
     }

@@ -6,6 +6,7 @@
 use faer::traits::pulp::{Arch, Simd, WithSimd};
 
 use crate::Matrix;
+use crate::lanes::LANES;
 
 /// The squared distance of a point from each of some points, the columns of `points` (`dimension x
 /// count`); the first `out.len()` of them.
@@ -35,6 +36,37 @@ impl WithSimd for SquaredDistances<'_> {
                 let difference = x - y;
                 *sum += difference * difference;
             }
+        }
+    }
+}
+
+/// Replaces each number `x` by `sum_n coefficients[n] x^n`, by Horner's rule.
+pub fn polynomials(x: &mut [f64], coefficients: &[f64]) {
+    Arch::new().dispatch(Polynomials { x, coefficients });
+}
+
+struct Polynomials<'a> {
+    x: &'a mut [f64],
+    coefficients: &'a [f64],
+}
+
+impl WithSimd for Polynomials<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let (chunks, rest) = self.x.as_chunks_mut::<LANES>();
+        for x in chunks {
+            let mut sums = [0.0; LANES];
+            for c in self.coefficients.iter().rev() {
+                for l in 0..LANES {
+                    sums[l] = sums[l] * x[l] + c;
+                }
+            }
+            *x = sums;
+        }
+        for x in rest {
+            *x = self.coefficients.iter().rev().fold(0.0, |sum, c| sum * *x + c);
         }
     }
 }
@@ -113,6 +145,14 @@ mod tests {
         exponentials(&mut special);
         assert_eq!(special[0], 1.0);
         assert!(special[1] > 0.0 && special[1] < 1e-306 && special[2].is_finite());
+    }
+
+    #[test]
+    fn polynomials_are_those_of_horner() {
+        let mut x: Vec<f64> = (0..37).map(|i| 0.1 * f64::from(i)).collect();
+        let plain: Vec<f64> = x.iter().map(|x| 2.0 - x + 0.5 * x.powi(3)).collect();
+        polynomials(&mut x, &[2.0, -1.0, 0.0, 0.5]);
+        assert!(x.iter().zip(plain).all(|(a, b)| (a - b).abs() < 1e-12));
     }
 
     #[test]

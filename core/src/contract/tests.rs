@@ -150,7 +150,7 @@ fn faults_of_targets_are_found() {
         (Fault::Edge, "it is NaN for `a` = NaN"),
         (Fault::Hidden, "a point alone has"),
         (Fault::Panics, "makes it panic"),
-        (Fault::OffCentre, "the derivative by parameter 2"),
+        (Fault::OffCentre, "the derivative by `b`"),
     ] {
         let breaches = density("law", &Law(fault), &parameters).unwrap_err();
         assert!(breaches.iter().any(|b| b.contains(expected)), "{expected}: {breaches:?}");

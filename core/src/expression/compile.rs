@@ -67,15 +67,12 @@ impl Compiler {
     fn unknowns(&mut self, unknowns: &[String]) -> Result<(), Vec<Fault>> {
         let mut vectors: BTreeMap<&str, BTreeMap<usize, usize>> = BTreeMap::new();
         for (register, name) in unknowns.iter().enumerate() {
-            match element(name) {
-                Some((base, index)) => {
-                    vectors.entry(base).or_default().insert(index, register);
-                }
-                None => {
-                    let place = Place { constant: false, start: register, length: 1 };
-                    let value = Value { kind: Kind::Number, place, vector: false };
-                    self.names.insert(name.clone(), value);
-                }
+            if let Some((base, index)) = element(name) {
+                vectors.entry(base).or_default().insert(index, register);
+            } else {
+                let place = Place { constant: false, start: register, length: 1 };
+                let value = Value { kind: Kind::Number, place, vector: false };
+                self.names.insert(name.clone(), value);
             }
         }
         for (base, elements) in vectors {
@@ -127,7 +124,9 @@ impl Compiler {
                 needed[place.range()].fill(true);
             }
         };
-        places.iter().for_each(|place| mark(&mut needed, place));
+        for place in &places {
+            mark(&mut needed, place);
+        }
         let mut instructions = Vec::new();
         for instruction in self.instructions.into_iter().rev() {
             let results = instruction.start..instruction.start + instruction.length;

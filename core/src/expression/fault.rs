@@ -13,11 +13,11 @@ pub struct Fault {
     /// What is wrong, in one line.
     pub message: String,
     /// What would be right, as it reads after "expected".
-    pub expected: Option<String>,
+    pub expected: Option<Box<str>>,
     /// What stands there instead, as it reads after "found".
-    pub found: Option<String>,
+    pub found: Option<Box<str>>,
     /// What to do about it.
-    pub help: Option<String>,
+    pub help: Option<Box<str>>,
 }
 
 impl Fault {
@@ -36,21 +36,21 @@ impl Fault {
     /// The same fault, saying what would be right.
     #[must_use]
     pub fn expected(mut self, expected: impl Into<String>) -> Self {
-        self.expected = Some(expected.into());
+        self.expected = Some(expected.into().into());
         self
     }
 
     /// The same fault, saying what stands there.
     #[must_use]
     pub fn found(mut self, found: impl Into<String>) -> Self {
-        self.found = Some(found.into());
+        self.found = Some(found.into().into());
         self
     }
 
     /// The same fault, with advice.
     #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Self {
-        self.help = Some(help.into());
+        self.help = Some(help.into().into());
         self
     }
 

@@ -252,7 +252,7 @@ impl Parser<'_> {
                 .found("the end"));
         }
         let fault = self.misplaced();
-        Err(Fault { expected: Some(format!("`{closing}` or an operator")), ..fault })
+        Err(Fault { expected: Some(format!("`{closing}` or an operator").into()), ..fault })
     }
 
     /// The complaint about a word after a finished value.

@@ -196,9 +196,8 @@ impl Program {
         let mut tangents = vec![0.0; self.registers];
         tangents[..self.unknowns].copy_from_slice(direction);
         tangent::run(self, &registers, &mut tangents);
-        let of = |place: &Place| match place.constant {
-            true => vec![0.0; place.length],
-            false => tangents[place.range()].to_vec(),
+        let of = |place: &Place| {
+            if place.constant { vec![0.0; place.length] } else { tangents[place.range()].to_vec() }
         };
         (values, self.outputs.iter().flat_map(of).collect())
     }

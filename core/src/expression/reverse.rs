@@ -41,36 +41,38 @@ struct Pull<'a> {
 
 impl Visit for Pull<'_> {
     fn visit(self, slope: impl Fn(f64, f64, f64) -> f64) {
-        let (a, b) = (Stretch::of(self.a), Stretch::of(self.b));
-        let share = |i: usize, w: f64| {
-            if w == 0.0 {
-                return 0.0;
-            }
-            let slope = slope(a.at(i), b.at(i), self.result[i][0]);
-            if slope == 0.0 { 0.0 } else { w * slope }
+        let share = |w: f64, a: f64, b: f64, z: f64| {
+            let slope = slope(a, b, z);
+            if w == 0.0 || slope == 0.0 { 0.0 } else { w * slope }
         };
-        let shares = self.weights.iter().enumerate().map(|(i, w)| share(i, *w));
-        if let [into] = self.into {
-            *into += shares.sum::<f64>();
-        } else {
-            self.into.iter_mut().zip(shares).for_each(|(into, share)| *into += share);
+        let results = self.weights.iter().zip(self.result);
+        // An argument of one element goes with all of the other.
+        match (self.a, self.b) {
+            ([a], [b]) => pour(results.map(|(w, z)| share(*w, a[0], b[0], z[0])), self.into),
+            ([a], b) => {
+                let shares = results.zip(b).map(|((w, z), b)| share(*w, a[0], b[0], z[0]));
+                pour(shares, self.into);
+            }
+            (a, [b]) => {
+                let shares = results.zip(a).map(|((w, z), a)| share(*w, a[0], b[0], z[0]));
+                pour(shares, self.into);
+            }
+            (a, b) => {
+                let shares = results.zip(a).zip(b);
+                pour(shares.map(|(((w, z), a), b)| share(*w, a[0], b[0], z[0])), self.into);
+            }
         }
     }
 }
 
-/// A value read as if it had as many elements as the result.
-struct Stretch<'a> {
-    values: &'a [Lanes<1>],
-    mask: usize,
-}
-
-impl<'a> Stretch<'a> {
-    fn of(values: &'a [Lanes<1>]) -> Self {
-        Self { values, mask: if values.len() == 1 { 0 } else { usize::MAX } }
-    }
-
-    fn at(&self, i: usize) -> f64 {
-        self.values[i & self.mask][0]
+/// Adds each share to its element, all shares to a single one.
+fn pour(shares: impl Iterator<Item = f64>, into: &mut [f64]) {
+    if let [into] = into {
+        let mut partial = [0.0; 4];
+        shares.enumerate().for_each(|(i, share)| partial[i % 4] += share);
+        *into += (partial[0] + partial[1]) + (partial[2] + partial[3]);
+    } else {
+        into.iter_mut().zip(shares).for_each(|(into, share)| *into += share);
     }
 }
 
@@ -141,9 +143,10 @@ impl<'a> Step<'a> {
     }
 
     fn select(&self, condition: Place, yes: Place, no: Place, adjoints: &mut [f64]) {
-        let condition = Stretch::of(self.get(condition));
+        let condition = self.get(condition);
         for (i, w) in self.weights.iter().enumerate() {
-            let chosen = if condition.at(i) == 0.0 { no } else { yes };
+            let decided = condition[if condition.len() == 1 { 0 } else { i }][0];
+            let chosen = if decided == 0.0 { no } else { yes };
             if !chosen.constant {
                 adjoints[chosen.start + if chosen.length == 1 { 0 } else { i }] += w;
             }

@@ -140,7 +140,7 @@ impl Scope {
         loop {
             let waits = |name: &&str| self.definitions[*name].names().any(|n| left.contains(&n));
             let (waiting, ready): (Vec<&str>, Vec<&str>) =
-                left.iter().copied().partition(|name| waits(&name));
+                left.iter().copied().partition(|name| waits(name));
             order.extend(&ready);
             if waiting.is_empty() {
                 return Ok(order);

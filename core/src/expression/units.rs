@@ -101,7 +101,7 @@ fn measure(
     let part = |id: &Id| &parts[*id];
     match kind {
         NodeKind::Number(x, None) if *x == 0.0 => Ok(Measure::Any),
-        NodeKind::Number(_, None) => Ok(plain()),
+        NodeKind::Number(_, None) | NodeKind::Unary(Unary::Not, _) => Ok(plain()),
         NodeKind::Number(_, Some(written)) => {
             let unit = Unit::parse(&tree.text[written.clone()]).map_err(|error| {
                 let at = written.start + error.range.start..written.start + error.range.end;
@@ -114,7 +114,6 @@ fn measure(
             Ok(Measure::Of(unit))
         }
         NodeKind::Name(name) => Ok(units.get(name).map_or_else(plain, |u| Measure::Of(u.clone()))),
-        NodeKind::Unary(Unary::Not, _) => Ok(plain()),
         NodeKind::Unary(_, a) | NodeKind::Slice(a, ..) => Ok(part(a).measure.clone()),
         NodeKind::Index(base, index) => {
             part(index).demand_plain("an index")?;
@@ -150,8 +149,9 @@ fn call(function: &Function, arguments: &[&Part], span: &Range<usize>) -> Result
         Action::Unary(Unary::Sqrt) => raised(&first(), 0.5, span),
         Action::Binary(Binary::Power) => power(arguments[0], arguments[1], span),
         Action::Binary(Binary::Atan2) => same(arguments.iter().copied()).map(|_| plain()),
-        Action::Binary(Binary::Hypot) => same(arguments.iter().copied()),
-        Action::Fold(Binary::Min | Binary::Max, _) => same(arguments.iter().copied()),
+        Action::Binary(Binary::Hypot) | Action::Fold(Binary::Min | Binary::Max, _) => {
+            same(arguments.iter().copied())
+        }
         Action::If => same(arguments[1..].iter().copied()),
         Action::Dot | Action::MatrixProduct => {
             product(&arguments[0].measure, &arguments[1].measure, 1.0, span)
@@ -182,8 +182,7 @@ fn call(function: &Function, arguments: &[&Part], span: &Range<usize>) -> Result
 /// The arguments of a density that have the unit of its variable.
 fn of_one_unit(density: Density) -> &'static [usize] {
     match density {
-        Density::Normal | Density::Uniform => &[0, 1, 2],
-        Density::Cauchy => &[0, 1, 2],
+        Density::Normal | Density::Uniform | Density::Cauchy => &[0, 1, 2],
         Density::StudentT => &[0, 2, 3],
         Density::Exponential => &[0, 1],
         Density::Gamma | Density::InverseGamma => &[0, 2],

@@ -10,7 +10,7 @@ use crate::posterior::{Emulated, Posterior};
 use crate::run::Stop;
 use crate::study::Study;
 
-use super::calibrate::maxima;
+use super::start::maxima;
 use super::stream;
 
 /// The parameters at the largest of prior times `|y - m|^-N`: the normal likelihood of independent data

@@ -17,6 +17,7 @@ pub mod sampling;
 pub mod screen;
 pub mod simulate;
 pub mod simulator;
+mod start;
 pub mod surrogate;
 pub mod target;
 pub mod validate;

@@ -13,6 +13,7 @@ pub mod problem;
 pub mod read;
 pub mod resolve;
 mod resolved;
+pub mod response;
 pub mod schema;
 pub mod source;
 pub mod values;

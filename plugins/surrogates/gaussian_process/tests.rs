@@ -103,7 +103,8 @@ impl Case {
 }
 
 /// Source: scikit-learn 1.9.1, `GaussianProcessRegressor(ConstantKernel(1, (1e-3, 1e6)) * k, alpha=1e-10,
-/// normalize_y=True, n_restarts_optimizer=8, random_state=0)` with `k` of length scales 0.5 between 1e-2 and 1e2.
+/// normalize_y=True, n_restarts_optimizer=8, random_state=0)` with `k` of length scales 0.5 between 1e-2 and 1e2. Its
+/// noise may be 1e-16 of the process's variance, so that the nugget here must be allowed to be small too.
 #[test]
 fn errors_are_not_above_those_of_a_peer() {
     let cases = [
@@ -113,11 +114,11 @@ fn errors_are_not_above_those_of_a_peer() {
     let kernels = [Kernel::Matern52, Kernel::Matern32, Kernel::SquaredExponential];
     for (case, peers) in &cases {
         for (kernel, peer) in kernels.into_iter().zip(peers) {
-            let options = GaussianProcess { kernel, ..GaussianProcess::default() };
+            let bounds = Bounds { nugget: [1e-14, 1.0], ..Bounds::default() };
+            let options = GaussianProcess { kernel, bounds, ..GaussianProcess::default() };
             let emulator =
                 options.krige(&case.training(), &Stream::root(1), &Progress::new(&Silent)).unwrap();
             let error = rmse(&emulator.mean(&case.fresh), &case.exact)[0];
-            println!("{kernel:?}: {error:.3e}, peer {peer:.3e}, {:?}", emulator.facts());
             assert!(error < 1.05 * peer, "{kernel:?}: {error} {peer}");
         }
     }
@@ -182,6 +183,9 @@ fn options_are_read_as_written() {
     }
 }
 
+/// scikit-learn 1.9.1 on the same runs (`ConstantKernel * Matern(nu=2.5)`, one start, one core beside the same load) took
+/// 0.84 s of processor time an output with hyperparameters of its own (1.25 s with a `WhiteKernel`), 0.12 s (0.27 s)
+/// with one set for all ten, at a mean root mean square error of 0.1313.
 #[test]
 #[ignore = "a timing; run it alone with RAYON_NUM_THREADS=1"]
 fn ten_outputs_of_480_runs() {
@@ -215,9 +219,6 @@ fn ten_outputs_of_480_runs() {
                 seconds * 100.0,
                 predict * 1e3
             );
-            for fact in emulator.facts() {
-                println!("    {}: {}", fact.name, fact.value);
-            }
         }
     }
 }

@@ -84,10 +84,13 @@ impl Field {
     ///
     /// Each point by itself, so that its bits do not depend on its neighbours: the sums cancel.
     pub fn mean(&self, points: &Matrix, regressors: &Matrix) -> Matrix {
-        let correlations = self.correlations(points);
+        let place = measured(points, &self.choice.length_scales);
+        let above = self.kernel.above_one(&place, &self.points);
         let trend = regressors.select_columns(&self.choice.terms);
-        Matrix::from_fn(points.columns(), self.alpha.rows(), |i, c| {
-            dot(correlations.row(i), self.alpha.row(c)) + dot(trend.row(i), self.beta.row(c))
+        let ones: Vec<f64> = self.alpha.iter_rows().map(|alpha| alpha.iter().sum()).collect();
+        Matrix::from_fn(points.columns(), ones.len(), |i, c| {
+            let process = dot(above.row(i), self.alpha.row(c)) + ones[c];
+            process + dot(trend.row(i), self.beta.row(c))
         })
     }
 

@@ -1,7 +1,7 @@
 //! Correlation functions of distance.
 
 use lacuna::linalg::Matrix;
-use lacuna::linalg::radial::{exponentials, squared_distances};
+use lacuna::linalg::radial::{exponentials, polynomials, squared_distances};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -94,6 +94,58 @@ impl Kernel {
         correlations
     }
 
+    /// What the correlations of some points (one a column) with others are above 1, `points x others`.
+    ///
+    /// Weights of smooth responses are large and of both signs, so that in their sum with the correlations the ones
+    /// cancel and leave round-off. Near points have these numbers to their own last digit.
+    pub fn above_one(self, points: &Matrix, others: &Matrix) -> Matrix {
+        let mut above = Matrix::zeros(points.columns(), others.columns());
+        let mut slopes = vec![0.0; others.columns()];
+        let series = self.series();
+        for i in 0..points.columns() {
+            let row = above.row_mut(i);
+            squared_distances(&points.column(i), others, row);
+            let farthest = row.iter().fold(0.0_f64, |most, s| if *s > most { *s } else { most });
+            if self.argument(farthest) < 1.0 {
+                for square in row.iter_mut() {
+                    *square = self.argument(*square);
+                }
+                polynomials(row, &series);
+            } else {
+                self.evaluate(row, &mut slopes);
+                for correlation in row.iter_mut() {
+                    *correlation -= 1.0;
+                }
+            }
+        }
+        above
+    }
+
+    /// The variable of the [series](Self::series) at a squared distance.
+    fn argument(self, square: f64) -> f64 {
+        match self {
+            Self::Matern52 => (5.0 * square).sqrt(),
+            Self::Matern32 => (3.0 * square).sqrt(),
+            Self::SquaredExponential => 0.5 * square,
+        }
+    }
+
+    /// The Taylor coefficients of the correlation less 1, enough of them for arguments below 1.
+    fn series(self) -> [f64; 22] {
+        let mut factorial = 1.0;
+        std::array::from_fn(|n| {
+            let k = n as f64;
+            factorial *= k.max(1.0);
+            let alternating = if n % 2 == 0 { 1.0 / factorial } else { -1.0 / factorial };
+            match self {
+                _ if n == 0 => 0.0,
+                Self::Matern52 => alternating * (k - 1.0) * (k - 3.0) / 3.0,
+                Self::Matern32 => alternating * (1.0 - k),
+                Self::SquaredExponential => alternating,
+            }
+        })
+    }
+
     /// The derivatives of the correlations of one point with others (one a column) by the point's coordinates,
     /// `coordinates x others`, all in length scales.
     pub fn gradient(self, point: &[f64], others: &Matrix) -> Matrix {
@@ -141,6 +193,26 @@ mod tests {
                 assert!(j == 0 || (gradient[(0, j)] - difference).abs() < 1e-9);
             }
         }
+    }
+
+    /// Beside the closed form; for near points, where its difference from 1 keeps few digits, beside the first term of
+    /// the series.
+    #[test]
+    fn what_is_above_one_keeps_its_digits() {
+        for kernel in ALL {
+            for (far, step) in [(0.3, 0.3), (40.0, 0.05)] {
+                let others = Matrix::from_fn(1, 30, |_, j| (far * 0.04 + step * j as f64) / 30.0);
+                let found = kernel.above_one(&Matrix::zeros(1, 1), &others);
+                for j in 0..30 {
+                    let expected = closed_form(kernel, others[(0, j)]) - 1.0;
+                    assert!((found[(0, j)] - expected).abs() < 4e-16);
+                }
+            }
+        }
+        // -5/6 r^2 + 25/24 r^4 - ... at r = 1e-6.
+        let near = Matrix::from_vec(1, 1, vec![1e-6]);
+        let found = Kernel::Matern52.above_one(&Matrix::zeros(1, 1), &near)[(0, 0)];
+        assert!((found + 5.0 / 6.0 * 1e-12).abs() < 1e-23, "{found:e}");
     }
 
     #[test]

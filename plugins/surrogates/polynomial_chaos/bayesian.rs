@@ -3,9 +3,12 @@
 //!
 //! The ascent is that of Tipping and Faul (2003): at each step the one term whose variance changes the
 //! marginal likelihood most enters, changes or leaves. The variance of the noise is not known; it is tried
-//! from large to small, and the terms of least error are taken.
+//! from large to small, and taken where runs that were left out are predicted best by the posterior mean.
 
-use lacuna::linalg::{Matrix, vector};
+use std::sync::OnceLock;
+
+use lacuna::linalg::{Matrix, gram, vector};
+use lacuna::math::random::{Stream, permutation};
 
 use super::dictionary::{ActiveSet, Dictionary};
 use super::judge::{Choice, Criterion, judged};
@@ -13,33 +16,79 @@ use super::judge::{Choice, Criterion, judged};
 /// The ascent ends when no step gains more than this in twice the log marginal likelihood.
 const GAIN: f64 = 1e-4;
 /// Variances of the noise that were worse in a row before the search among them ends.
-const WORSE: usize = 3;
+const WORSE: usize = 2;
 /// The least share of the output's variance that noise is taken to have, as a power of ten.
 const LEAST_NOISE: i32 = 14;
+/// The parts of the runs that are left out to find the noise.
+const PARTS: usize = 5;
 
-/// The best set of terms for an output, given as its values less their mean and their products with the
+/// What all outputs share: the parts of the runs that are left out and the Gram matrices of the others.
+#[derive(Default)]
+pub(super) struct Parts(OnceLock<Vec<Part>>);
+
+struct Part {
+    runs: Vec<usize>,
+    /// The dictionary's columns at these runs, `runs x terms`.
+    columns: Matrix,
+    gram: Matrix,
+}
+
+impl Parts {
+    fn of(&self, dictionary: &Dictionary) -> &[Part] {
+        self.0.get_or_init(|| {
+            let columns = dictionary.columns().transposed();
+            let order =
+                permutation(&mut Stream::root(0).named("parts").generator(), columns.rows());
+            let part = |first: usize| {
+                let runs: Vec<usize> = order.iter().copied().skip(first).step_by(PARTS).collect();
+                let own = columns.select_rows(&runs);
+                let mut others = dictionary.gram().clone();
+                let squares = gram(&own);
+                vector::add_scaled(others.as_mut_slice(), -1.0, squares.as_slice());
+                Part { runs, columns: own, gram: others }
+            };
+            (0..PARTS).map(part).collect()
+        })
+    }
+}
+
+impl Part {
+    /// The sum of squares of what the fit to the other runs leaves of these.
+    fn error(&self, open: &[bool], centred: &[f64], all: &[f64], noise: f64, most: usize) -> f64 {
+        let own: Vec<f64> = self.runs.iter().map(|&i| centred[i]).collect();
+        let mut correlations = all.to_vec();
+        for (row, y) in self.columns.iter_rows().zip(&own) {
+            vector::add_scaled(&mut correlations, -y, row);
+        }
+        let posterior = Ascent::new(&self.gram, open, &correlations, noise).run(most);
+        let left = |(row, y): (&[f64], &f64)| {
+            let model: f64 = posterior.iter().map(|w| w.mean * row[w.term]).sum();
+            (y - model).powi(2)
+        };
+        self.columns.iter_rows().zip(&own).map(left).sum()
+    }
+}
+
+/// The set of terms for an output, given as its values less their mean and their products with the
 /// dictionary's columns.
 pub(super) fn bayesian(
     dictionary: &Dictionary,
+    parts: &Parts,
     centred: &[f64],
     correlations: &[f64],
     criterion: &Criterion,
 ) -> Option<Choice> {
     let variance = vector::dot(centred, centred) / centred.len() as f64;
-    let mut best: Option<Choice> = None;
-    let mut worse = 0;
+    let (open, most): (Vec<bool>, _) =
+        (dictionary.varies().collect(), dictionary.most_greedy_terms());
+    let parts = parts.of(dictionary);
+    let (mut noise, mut least, mut worse) = (0.1 * variance, f64::INFINITY, 0);
     for power in 1..=LEAST_NOISE {
-        let noise = variance * 10.0_f64.powi(-power);
-        let terms = Ascent::new(dictionary, correlations, noise).run(dictionary.most_terms());
-        let mut set = ActiveSet::new(dictionary);
-        for term in terms {
-            set.enter(term);
-        }
-        if set.terms().is_empty() {
-            continue;
-        }
-        if Choice::improve(&mut best, judged(&set, centred, criterion)) {
-            worse = 0;
+        let tried = variance * 10.0_f64.powi(-power);
+        let error: f64 =
+            parts.iter().map(|part| part.error(&open, centred, correlations, tried, most)).sum();
+        if error < least {
+            (noise, least, worse) = (tried, error, 0);
         } else {
             worse += 1;
         }
@@ -47,14 +96,33 @@ pub(super) fn bayesian(
             break;
         }
     }
-    best
+    let mut set = ActiveSet::new(dictionary);
+    for weight in Ascent::new(dictionary.gram(), &open, correlations, noise).run(most) {
+        set.enter(weight.term);
+    }
+    if set.terms().is_empty() {
+        // Nothing rises above the noise; the strongest term must do.
+        let size = |t: &usize| correlations[*t].abs();
+        let strongest =
+            (0..open.len()).filter(|&t| open[t]).max_by(|a, b| size(a).total_cmp(&size(b)))?;
+        set.enter(strongest);
+    }
+    Some(judged(&set, centred, criterion))
+}
+
+/// A term's weight: its posterior mean and the precision of its prior.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Weight {
+    pub term: usize,
+    pub mean: f64,
+    pub alpha: f64,
 }
 
 /// The posterior of the active weights and the two statistics of every term, in the notation of Tipping and
 /// Faul: `S = phi' C^-1 phi` and `Q = phi' C^-1 y` with `C` the covariance of the output.
-struct Ascent<'a> {
-    dictionary: &'a Dictionary,
-    open: Vec<bool>,
+pub(super) struct Ascent<'a> {
+    gram: &'a Matrix,
+    open: &'a [bool],
     /// The noise's precision.
     beta: f64,
     active: Vec<usize>,
@@ -75,24 +143,25 @@ enum Change {
 }
 
 impl<'a> Ascent<'a> {
-    fn new(dictionary: &'a Dictionary, correlations: &[f64], noise: f64) -> Self {
+    /// From the inner products of the columns, which of them are open, and their products with the output.
+    pub fn new(gram: &'a Matrix, open: &'a [bool], correlations: &[f64], noise: f64) -> Self {
         let beta = noise.recip();
         Self {
-            dictionary,
-            open: dictionary.varies().collect(),
+            gram,
+            open,
             beta,
             active: Vec::new(),
             alpha: Vec::new(),
             mean: Vec::new(),
             covariance: Matrix::zeros(0, 0),
-            s: vec![beta; correlations.len()],
+            s: (0..correlations.len()).map(|t| beta * gram[(t, t)]).collect(),
             q: correlations.iter().map(|c| beta * c).collect(),
             scratch: vec![0.0; correlations.len()],
         }
     }
 
-    /// Ascends to the maximum; the active terms there.
-    fn run(mut self, most: usize) -> Vec<usize> {
+    /// Ascends to the maximum; the active weights there.
+    pub fn run(mut self, most: usize) -> Vec<Weight> {
         for _ in 0..20 * most.max(1) {
             let Some((gain, change)) = self.best() else { break };
             let full = self.active.len() >= most;
@@ -113,7 +182,8 @@ impl<'a> Ascent<'a> {
                 }
             }
         }
-        self.active
+        let weights = self.active.iter().zip(&self.mean).zip(&self.alpha);
+        weights.map(|((&term, &mean), &alpha)| Weight { term, mean, alpha }).collect()
     }
 
     /// The change that gains most.
@@ -153,7 +223,7 @@ impl<'a> Ascent<'a> {
     }
 
     fn enter(&mut self, term: usize, alpha: f64) {
-        let gram = self.dictionary.gram();
+        let gram = self.gram;
         let own: Vec<f64> = self.active.iter().map(|&t| gram[(term, t)]).collect();
         let weights: Vec<f64> =
             self.covariance.iter_rows().map(|row| self.beta * vector::dot(row, &own)).collect();
@@ -183,7 +253,7 @@ impl<'a> Ascent<'a> {
         let column = self.covariance.column(place);
         let mean = self.mean[place];
         let weights: Vec<f64> = column.iter().map(|x| self.beta * x).collect();
-        let gram = self.dictionary.gram();
+        let gram = self.gram;
         vector::combine_rows(gram, &self.active, &weights, &mut self.scratch);
         for (t, x) in self.scratch.iter().enumerate() {
             self.s[t] += size * x * x;

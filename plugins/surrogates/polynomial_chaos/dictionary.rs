@@ -60,6 +60,13 @@ impl Dictionary {
         let runs = self.columns.columns();
         runs.saturating_sub(2).min(self.varies().filter(|varies| *varies).count())
     }
+
+    /// The most terms of a greedy choice: half of the others. Each greedy term fits the noise that the
+    /// ones before have left, so that near as many terms as runs the leave-one-out error deceives.
+    pub fn most_greedy_terms(&self) -> usize {
+        let runs = self.columns.columns();
+        self.most_terms().min((runs / 2).max(1))
+    }
 }
 
 /// Some columns of a dictionary and the factors of their Gram matrix, kept up to date while columns

@@ -14,14 +14,14 @@ pub enum Solver {
     /// with the least error is taken. There may be more terms to choose from than runs. The usual choice.
     #[default]
     LeastAngleRegression,
-    /// As before, but the term most correlated with what is not yet explained comes next: greedier, good
-    /// where few terms carry nearly everything.
+    /// The term most correlated with what is not yet explained comes next, up to half as many as runs: greedier,
+    /// good where few terms carry nearly everything. Its leave-one-out error is too small where they do not.
     OrthogonalMatchingPursuit,
     /// Sets of so many terms at once, improved by exchange; the number of terms with the least error is
     /// taken. Often the best where runs are few and dimensions many, and slower.
     SubspacePursuit,
-    /// Sparse Bayesian learning: terms stay whose weights the data need; the noise is the one whose terms
-    /// have the least error. Few terms, and slower.
+    /// Sparse Bayesian learning: terms stay whose weights the data need; the noise is found by five-fold
+    /// cross-validation. Few terms, and slower.
     BayesianCompressiveSensing,
     /// All terms of a degree. There must be more runs than terms; twice as many is a usual rule.
     LeastSquares,

@@ -7,7 +7,7 @@ use lacuna::run::{Progress, Stop};
 use rayon::prelude::*;
 
 use super::PolynomialChaos;
-use super::bayesian::bayesian;
+use super::bayesian::{Parts, bayesian};
 use super::coordinate::Coordinate;
 use super::dictionary::Dictionary;
 use super::judge::{Choice, Criterion, best_along};
@@ -150,8 +150,9 @@ impl Search<'_> {
         let runs = self.points.rows();
         let centred = Matrix::from_rows(runs, active.iter().map(|&o| &outputs[o].centred));
         let correlations = multiply_transposed(&centred, dictionary.columns());
+        let parts = Parts::default();
         let best = |i: usize| {
-            let choice = self.choose(&dictionary, centred.row(i), correlations.row(i))?;
+            let choice = self.choose(&dictionary, &parts, centred.row(i), correlations.row(i))?;
             let mut terms = vec![set.members[0]];
             terms.extend(choice.terms.iter().map(|&t| set.members[t]));
             terms.sort_unstable();
@@ -164,25 +165,27 @@ impl Search<'_> {
     fn choose(
         &self,
         dictionary: &Dictionary,
+        parts: &Parts,
         centred: &[f64],
         correlations: &[f64],
     ) -> Option<Choice> {
-        let (most, criterion) = (dictionary.most_terms(), self.criterion);
+        let criterion = self.criterion;
         let window = self.options.early_stop.window(centred.len());
         match self.options.solver {
             Solver::OrthogonalMatchingPursuit => {
                 let mut path = MatchingPursuit::new(dictionary, correlations);
+                let most = dictionary.most_greedy_terms();
                 best_along(&mut path, centred, criterion, most, window)
             }
             Solver::SubspacePursuit => {
                 subspace_pursuit(dictionary, centred, correlations, criterion)
             }
             Solver::BayesianCompressiveSensing => {
-                bayesian(dictionary, centred, correlations, criterion)
+                bayesian(dictionary, parts, centred, correlations, criterion)
             }
             _ => {
                 let mut path = LeastAngle::new(dictionary, correlations);
-                best_along(&mut path, centred, criterion, most, window)
+                best_along(&mut path, centred, criterion, dictionary.most_terms(), window)
             }
         }
     }

@@ -24,7 +24,7 @@ pub(super) fn subspace_pursuit(
     correlations: &[f64],
     criterion: &Criterion,
 ) -> Option<Choice> {
-    let most = dictionary.most_terms().div_ceil(2);
+    let most = dictionary.most_terms().div_ceil(2).min(dictionary.most_greedy_terms());
     let mut tried: BTreeMap<usize, f64> = BTreeMap::new();
     let mut best: Option<Choice> = None;
     let mut attempt = |terms: usize, best: &mut Option<Choice>| {

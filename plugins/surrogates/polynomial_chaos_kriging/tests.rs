@@ -11,7 +11,6 @@ fn errors(case: &Case) -> [f64; 3] {
     let plain = GaussianProcess::default().krige(&training, &stream, &progress).unwrap();
     let chaos = PolynomialChaos::default().expand(&training, &stream, &progress).unwrap();
     let both = PolynomialChaosKriging::default().krige(&training, &stream, &progress).unwrap();
-    println!("{:?}", both.facts());
     let error = |emulator: &dyn Emulator| rmse(&emulator.mean(&case.fresh), &case.exact)[0];
     [error(&plain), error(&chaos), error(&both)]
 }
@@ -33,7 +32,6 @@ fn it_is_as_good_as_the_better_of_the_two() {
         ("cubic", Case::new(3, cubic)),
     ] {
         let [plain, chaos, both] = errors(&case);
-        println!("{name}: gaussian process {plain:.3e}, expansion {chaos:.3e}, both {both:.3e}");
         assert!(both <= 1.1 * plain.min(chaos) + 1e-9, "{name}: {both} {plain} {chaos}");
     }
 }

@@ -120,9 +120,9 @@ impl Component for Expression {
         let Err(faults) = self.compile(context.parameters) else { return };
         for (option, fault) in faults {
             let problem = complaints.at(&option).inside(fault.span).say(fault.message);
-            problem.expected = fault.expected;
-            problem.found = fault.found;
-            problem.help.extend(fault.help);
+            problem.expected = fault.expected.map(String::from);
+            problem.found = fault.found.map(String::from);
+            problem.help.extend(fault.help.map(String::from));
         }
     }
 }

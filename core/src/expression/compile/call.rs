@@ -21,8 +21,8 @@ impl Compiler {
                 Ok(self.unary(operation, a))
             }
             Does::Binary(operation) => {
-                let [a, b] = self.elementwise(arguments, span)?;
-                Ok(self.binary(operation, a, b))
+                let values = numbers(arguments, span)?;
+                Ok(self.binary(operation, values[0], values[1]))
             }
             Does::Fold(operation, reduction) => self.fold(operation, reduction, arguments, span),
             Does::If => self.choose(arguments, span),
@@ -49,16 +49,6 @@ impl Compiler {
                 Ok(self.density(density, &values))
             }
         }
-    }
-
-    /// Two numbers or vectors that fit.
-    fn elementwise(
-        &mut self,
-        arguments: &[Argument],
-        span: &Range<usize>,
-    ) -> Result<[Value; 2], Fault> {
-        let values = numbers(arguments, span)?;
-        Ok([values[0], values[1]])
     }
 
     fn fold(
@@ -130,10 +120,11 @@ impl Compiler {
             .expected(format!("{nodes} values"))
             .found(format!("{found}")));
         }
-        if let Some(pair) = curve.nodes.windows(2).find(|pair| pair[0] >= pair[1]) {
+        let falling = curve.nodes.windows(2).find(|pair| pair[0] >= pair[1]);
+        if let Some(&[before, after]) = falling {
             return Err(Fault::new(nodes.span.clone(), "the nodes do not ascend")
                 .expected("each node above the one before")
-                .found(format!("{} after {}", pair[1], pair[0])));
+                .found(format!("{after} after {before}")));
         }
         self.tables.curves.push(curve);
         let action = Action::Interpolate(self.tables.curves.len() - 1, at.place);

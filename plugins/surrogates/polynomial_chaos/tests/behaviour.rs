@@ -156,6 +156,43 @@ fn constant_outputs_have_their_mean_and_no_error() {
     assert!(fit.facts().iter().any(|f| f.name.contains("do not vary") && f.value == "3"));
 }
 
+/// Round-off of 1e-15 of the response's scale before the pulse is no signal, whatever the solver.
+#[test]
+fn a_channel_of_round_off_has_no_error() {
+    let (points, mut responses) = waves(60, 4);
+    let scale = responses.as_slice().iter().fold(0.0_f64, |most, y| most.max(y.abs()));
+    for i in 0..60 {
+        responses[(i, 1)] = 1e-15 * scale * (7.0 * i as f64).sin();
+    }
+    for solver in [
+        Solver::LeastAngleRegression,
+        Solver::OrthogonalMatchingPursuit,
+        Solver::SubspacePursuit,
+        Solver::BayesianCompressiveSensing,
+        Solver::LeastSquares,
+    ] {
+        let options = PolynomialChaos { solver, ..up_to(1, 4) };
+        let fit = fitted(&options, &BOX, &points, &responses).unwrap();
+        assert_eq!((fit.fit_error().relative[1], fit.summary().constant), (0.0, 1));
+        assert!(fit.fit_error().relative[3] > 0.0);
+    }
+}
+
+#[test]
+fn fits_that_are_not_to_be_trusted_say_so() {
+    let points = scaled(&monte_carlo(24, 3, 1), ISHIGAMI.ranges);
+    let mut rng = Stream::root(4).generator();
+    let noise = Matrix::from_fn(24, 2, |_, _| normal(&mut rng));
+    let fit = fitted(&up_to(1, 4), ISHIGAMI.ranges, &points, &noise).unwrap();
+    let told = |fit: &Expansion, what: &str| fit.facts().iter().any(|f| f.name.contains(what));
+    assert_eq!(fit.summary().poor > 0, told(&fit, "no better than by their mean"));
+    assert!(fit.fit_error().relative.iter().any(|e| *e >= 1.0) && fit.summary().poor > 0);
+    let few = ISHIGAMI.fit(&up_to(1, 10), &sobol(50, 3));
+    assert!(told(&few, "fewer than 3 runs a term"), "{:?}", few.facts());
+    let many = ISHIGAMI.fit(&up_to(1, 10), &sobol(300, 3));
+    assert!(!told(&many, "fewer than 3 runs a term"));
+}
+
 #[test]
 fn the_emulator_is_its_linear_form_and_its_gradient_the_limit_of_differences() {
     let (points, responses) = waves(90, 6);

@@ -55,6 +55,18 @@ pub const BOREHOLE: Function = Function {
     },
 };
 
+/// The g-function of Sobol' with eight parameters, a = 1, 2, 5, 10, 20, 50, 100, 500.
+pub const SOBOL_G: Function = Function {
+    ranges: &[[0.0, 1.0]; 8],
+    value: |x| {
+        let factor = |(x, a): (&f64, f64)| ((4.0 * x - 2.0).abs() + a) / (1.0 + a);
+        x.iter().zip(SOBOL_G_WEIGHTS).map(factor).product()
+    },
+};
+
+/// `a` of [`SOBOL_G`].
+pub const SOBOL_G_WEIGHTS: [f64; 8] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 500.0];
+
 /// Direction numbers of Joe and Kuo (2008), file new-joe-kuo-6.21201: degree, polynomial, m.
 const DIRECTIONS: [(usize, u32, &[u32]); 7] = [
     (1, 0, &[1]),

@@ -2,10 +2,12 @@
 #![allow(clippy::unwrap_used)]
 
 mod accuracy;
-mod baseline;
 mod behaviour;
 mod bench;
+mod components;
 mod families;
 mod laws;
 mod options;
+mod solvers;
+mod speed;
 mod textbook;

@@ -1,15 +1,17 @@
 //! The same figures by slow, independent textbook code: explicit inverses, the explicit hat matrix,
 //! runs really left out, and the equiangular vector of Efron et al. (2004), section 2, literally.
 
-use lacuna::linalg::{Matrix, multiply_vector};
+use lacuna::linalg::{Cholesky, Matrix, multiply_vector};
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::Emulator;
 use lacuna::plugin::surrogate::Linear;
 
 use super::bench::{fitted, latin_hypercube, of_degree, scaled};
+use crate::surrogates::polynomial_chaos::bayesian::Ascent;
 use crate::surrogates::polynomial_chaos::dictionary::Dictionary;
 use crate::surrogates::polynomial_chaos::judge::{Criterion, best_along};
 use crate::surrogates::polynomial_chaos::least_angle::LeastAngle;
+use crate::surrogates::polynomial_chaos::matching_pursuit::MatchingPursuit;
 use crate::surrogates::polynomial_chaos::{EarlyStop, Expansion, PolynomialChaos, Solver};
 
 type Rows = Vec<Vec<f64>>;
@@ -127,7 +129,13 @@ fn close(a: f64, b: f64, scale: f64) {
 #[test]
 fn coefficients_and_errors_equal_the_explicit_ones() {
     let (unit, responses) = runs(60);
-    for solver in [Solver::LeastAngleRegression, Solver::LeastSquares] {
+    for solver in [
+        Solver::LeastAngleRegression,
+        Solver::OrthogonalMatchingPursuit,
+        Solver::SubspacePursuit,
+        Solver::BayesianCompressiveSensing,
+        Solver::LeastSquares,
+    ] {
         let expansion = fit(&PolynomialChaos { solver, ..of_degree(6) }, &unit, &responses);
         for o in 0..3 {
             let (exponents, coefficients) = own_terms(&expansion, o);
@@ -266,5 +274,94 @@ fn terms_enter_in_the_order_of_the_explicit_path_when_there_are_more_terms_than_
             best_along(&mut path, &centred, &Criterion::LeaveOneOut, 148, usize::MAX).unwrap();
         assert!(choice.terms.len() > 25, "only {} terms", choice.terms.len());
         assert_eq!(choice.terms, slow_path(&psi, &y, choice.terms.len()), "seed {seed}");
+    }
+}
+
+/// The order in which terms enter by matching pursuit, from the definition: the residual of an explicit
+/// least-squares fit at each step.
+fn slow_pursuit(psi: &Rows, y: &[f64], steps: usize) -> Vec<usize> {
+    let n = y.len() as f64;
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / n;
+    let columns = transpose(psi);
+    let mut active = vec![0];
+    while active.len() <= steps {
+        let own: Rows = psi.iter().map(|row| active.iter().map(|&t| row[t]).collect()).collect();
+        let c = textbook(&own, y).coefficients;
+        let residual: Vec<f64> = (own.iter().zip(y))
+            .map(|(row, y)| y - row.iter().zip(&c).map(|(p, c)| p * c).sum::<f64>())
+            .collect();
+        let correlation = |t: &usize| {
+            let m = mean(&columns[*t]);
+            let length = columns[*t].iter().map(|x| (x - m).powi(2)).sum::<f64>().sqrt();
+            let sum: f64 = columns[*t].iter().zip(&residual).map(|(x, r)| (x - m) * r).sum();
+            (sum / length).abs()
+        };
+        let open = (1..columns.len()).filter(|t| !active.contains(t));
+        active.push(open.max_by(|a, b| correlation(a).total_cmp(&correlation(b))).unwrap());
+    }
+    active[1..].to_vec()
+}
+
+#[test]
+fn matching_pursuit_follows_the_explicit_one() {
+    let (unit, responses) = runs(60);
+    let all: Vec<Vec<u16>> =
+        (0..8_u16).flat_map(|p| (0..=p).map(move |j| vec![p - j, j])).collect();
+    let psi = basis(&all, &unit);
+    let dictionary = Dictionary::new(&Matrix::from_rows(all.len(), &psi));
+    for o in 0..3 {
+        let y = responses.column(o);
+        let mean = y.iter().sum::<f64>() / 60.0;
+        let centred: Vec<f64> = y.iter().map(|v| v - mean).collect();
+        let correlations = multiply_vector(dictionary.columns(), &centred);
+        let mut path = MatchingPursuit::new(&dictionary, &correlations);
+        let window = usize::MAX;
+        let choice = best_along(&mut path, &centred, &Criterion::LeaveOneOut, 25, window).unwrap();
+        let slow = slow_pursuit(&psi, &y, choice.terms.len());
+        assert_eq!(choice.terms, slow, "output {o}");
+        let mut own: Vec<usize> = slow.into_iter().chain([0]).collect();
+        own.sort_unstable();
+        let columns: Rows = psi.iter().map(|row| own.iter().map(|&t| row[t]).collect()).collect();
+        close(choice.error / textbook(&columns, &y).relative, 1.0, 1.0);
+    }
+}
+
+/// At its maximum the marginal likelihood `-(ln |C| + y' C^-1 y) / 2` of the weights' variances, written
+/// out, falls when any variance is changed, a term left out, or one let in.
+#[test]
+fn bayesian_sensing_ends_at_a_maximum_of_the_marginal_likelihood() {
+    let (unit, responses) = runs(40);
+    let all: Vec<Vec<u16>> =
+        (0..5_u16).flat_map(|p| (0..=p).map(move |j| vec![p - j, j])).collect();
+    let psi = basis(&all, &unit);
+    let dictionary = Dictionary::new(&Matrix::from_rows(all.len(), &psi));
+    let y = responses.column(2);
+    let mean = y.iter().sum::<f64>() / 40.0;
+    let centred: Vec<f64> = y.iter().map(|v| v - mean).collect();
+    let correlations = multiply_vector(dictionary.columns(), &centred);
+    let noise = 0.1 * centred.iter().map(|v| v * v).sum::<f64>() / 40.0;
+    let open: Vec<bool> = dictionary.varies().collect();
+    let found = Ascent::new(dictionary.gram(), &open, &correlations, noise).run(30);
+    let evidence = |variances: &[f64]| {
+        let covariance = Matrix::from_fn(40, 40, |i, j| {
+            let column = |t: usize| dictionary.columns()[(t, i)] * dictionary.columns()[(t, j)];
+            let sum: f64 = variances.iter().enumerate().map(|(t, v)| v * column(t)).sum();
+            sum + if i == j { noise } else { 0.0 }
+        });
+        let factor = Cholesky::new(&covariance).unwrap();
+        -factor.log_determinant() - factor.quadratic(&centred)
+    };
+    let mut variances = vec![0.0; all.len()];
+    found.iter().for_each(|w| variances[w.term] = w.alpha.recip());
+    let best = evidence(&variances);
+    assert!((2..14).contains(&found.len()), "{}", found.len());
+    for t in 1..all.len() {
+        let own = variances[t];
+        let others = if own > 0.0 { [0.0, 0.7 * own, 1.4 * own] } else { [1e-6, 1e-3, 1e-1] };
+        for other in others {
+            variances[t] = other;
+            assert!(evidence(&variances) < best + 1e-3, "term {t}: {own} {other}");
+        }
+        variances[t] = own;
     }
 }

@@ -1,0 +1,81 @@
+//! Principal components of the outputs.
+
+use lacuna::linalg::{Matrix, multiply};
+use lacuna::plugin::Emulator;
+use lacuna::plugin::surrogate::Linear;
+
+use super::bench::{fitted, latin_hypercube, of_degree, scaled, up_to};
+use crate::surrogates::polynomial_chaos::{Expansion, PolynomialChaos, Solver};
+use crate::surrogates::principal_components::Components;
+
+const BOX: [[f64; 2]; 2] = [[0.0, 2.0], [5.0, 6.0]];
+
+fn response(x: &[f64], output: usize) -> f64 {
+    let t = output as f64 / 20.0;
+    if output == 3 { 1.5 } else { (2.0 * x[0] * t).sin() + x[1] * t + (-t * x[0] * x[1]).exp() }
+}
+
+fn runs(n: usize, seed: u64) -> (Matrix, Matrix) {
+    let unit = latin_hypercube(n, 2, seed);
+    (scaled(&unit, &BOX), Matrix::from_fn(n, 40, |i, o| response(unit.row(i), o)))
+}
+
+/// With the same terms for all outputs a fit of all components is the fit of the outputs: least squares is linear.
+#[test]
+fn all_components_are_all_outputs() {
+    let (points, responses) = runs(80, 1);
+    let plain = PolynomialChaos { solver: Solver::LeastSquares, ..of_degree(5) };
+    let reduced = PolynomialChaos { components: Some(Components::Count(40)), ..plain.clone() };
+    let plain = fitted(&plain, &BOX, &points, &responses).unwrap();
+    let reduced = fitted(&reduced, &BOX, &points, &responses).unwrap();
+    let close = |a: &Matrix, b: &Matrix, tolerance: f64| {
+        a.as_slice().iter().zip(b.as_slice()).all(|(x, y)| (x - y).abs() < tolerance)
+    };
+    assert!(close(plain.coefficients(), reduced.coefficients(), 1e-11));
+    assert!(close(&plain.fit_error().residuals, &reduced.fit_error().residuals, 1e-11));
+    for (a, b) in plain.fit_error().relative.iter().zip(&reduced.fit_error().relative) {
+        assert!(*a == *b || (a / b - 1.0).abs() < 1e-4, "{a} {b}");
+    }
+}
+
+#[test]
+fn what_components_leave_out_is_part_of_the_error() {
+    let (points, responses) = runs(100, 2);
+    let components = Some(Components::Count(2));
+    let options = PolynomialChaos { components, ..up_to(1, 8) };
+    let fit = fitted(&options, &BOX, &points, &responses).unwrap();
+    let found = Components::Count(2).of(&responses).unwrap();
+    let truncation = found.truncation();
+    let residuals = &fit.fit_error().residuals;
+    for o in 0..40 {
+        let mean_square = residuals.column(o).iter().map(|r| r * r).sum::<f64>() / 100.0;
+        assert!(mean_square >= 0.9 * truncation[o], "{o}: {mean_square} {}", truncation[o]);
+    }
+    let (fresh, truth) = runs(400, 3);
+    let emulated = fit.mean(&fresh);
+    let errors = |o: usize| (0..400).map(move |i| (i, o));
+    for o in (0..40).filter(|&o| truncation[o] > 1e-6) {
+        let square: f64 = errors(o).map(|k| (truth[k] - emulated[k]).powi(2)).sum::<f64>() / 400.0;
+        let own = residuals.column(o).iter().map(|r| r * r).sum::<f64>() / 100.0;
+        assert!((0.5..2.0).contains(&(square / own)), "{o}: {square} {own}");
+    }
+    assert_eq!(fit.fit_error().relative[3], 0.0);
+    assert!((fit.mean(&fresh)[(0, 3)] - 1.5).abs() < 1e-12);
+    let left_out = fit.summary().reduction.unwrap().left_out;
+    assert!((0.0..0.1).contains(&left_out) && left_out > 0.0);
+    assert!(fit.facts().iter().any(|f| f.name == "principal components" && f.value == "2"));
+    assert_eq!(Expansion::from_bytes(&fit.save().unwrap()).unwrap(), fit);
+    let product = multiply(&fit.basis(&points), fit.coefficients());
+    assert_eq!(product, fit.mean(&points));
+}
+
+#[test]
+fn outputs_that_do_not_vary_have_no_component() {
+    let (points, _) = runs(30, 4);
+    let responses = Matrix::from_fn(30, 3, |_, o| o as f64);
+    let components = Some(Components::Variance(0.99));
+    let options = PolynomialChaos { components, ..up_to(1, 3) };
+    let fit = fitted(&options, &BOX, &points, &responses).unwrap();
+    assert_eq!(fit.mean(&points).row(7), [0.0, 1.0, 2.0]);
+    assert_eq!(fit.fit_error().relative, [0.0; 3]);
+}

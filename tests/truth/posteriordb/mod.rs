@@ -1,0 +1,232 @@
+//! Posteriors of posteriordb (Magnusson et al., github.com/stan-dev/posteriordb, commit 28f8d3d) as targets.
+//!
+//! The log densities are those that posteriordb's Stan programs define, in natural units and so without the
+//! Jacobians of Stan's transformations, priors included; each is written once over [`Real`] numbers, of
+//! which dual numbers give the gradient. Solutions of differential equations are differentiated step by step.
+
+mod linear;
+mod mixture;
+mod pharmacology;
+mod populations;
+mod process;
+mod real;
+mod schools;
+mod series;
+
+use std::sync::Arc;
+
+use lacuna::data::{Parameter, Unit};
+use lacuna::linalg::Matrix;
+use lacuna::math::distribution::Distribution;
+use lacuna::plugin::Component;
+use lacuna::plugin::density::{BoundDensity, Density};
+use lacuna::run::Stop;
+use serde_json::Value;
+
+pub use real::{Dual, Real};
+
+/// A posterior with published figures.
+pub struct Posterior {
+    /// Its name in posteriordb, such as `sblrc-blr`.
+    pub name: &'static str,
+    /// The unknowns that are sampled. Their priors are for starting points and bounds: the density includes the
+    /// priors of the Stan program.
+    pub parameters: Vec<Parameter>,
+    /// The posterior density.
+    pub density: Box<dyn Density>,
+    /// From a sampled point to the quantities that have published figures, in the order of `reference`.
+    pub reported: fn(&[f64]) -> Vec<f64>,
+    /// The published figures.
+    pub reference: Vec<Reference>,
+}
+
+/// The published figures of one quantity.
+pub struct Reference {
+    pub name: String,
+    pub mean: f64,
+    pub sd: f64,
+    /// The Monte Carlo error of the mean.
+    pub mean_error: f64,
+}
+
+/// All of them, in the order of their names.
+pub fn posteriors() -> Vec<Posterior> {
+    let mut all = linear::posteriors();
+    all.extend(series::posteriors());
+    all.extend([
+        schools::posterior(),
+        mixture::posterior(),
+        process::posterior(),
+        populations::posterior(),
+        pharmacology::posterior(),
+    ]);
+    all.sort_by_key(|posterior| posterior.name);
+    all
+}
+
+/// A log density over any kind of number; anything but a finite number outside the support.
+trait Model: Send + Sync + 'static {
+    fn log_density<R: Real>(&self, point: &[R]) -> R;
+}
+
+/// A model as a target.
+struct Natural<M>(Arc<M>);
+
+impl<M: Model> Component for Natural<M> {}
+
+impl<M: Model> Density for Natural<M> {
+    fn bind(&self, _: &[Parameter]) -> Result<Box<dyn BoundDensity>, Stop> {
+        Ok(Box::new(Self(self.0.clone())))
+    }
+
+    fn includes_prior(&self) -> bool {
+        true
+    }
+}
+
+impl<M: Model> BoundDensity for Natural<M> {
+    fn log_density(&self, points: &Matrix) -> Vec<f64> {
+        let finite = |value: f64| if value.is_finite() { value } else { f64::NEG_INFINITY };
+        points.iter_rows().map(|point| finite(self.0.log_density(point))).collect()
+    }
+
+    fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
+        let duals: Vec<Dual> =
+            point.iter().enumerate().map(|(j, x)| Dual::unknown(*x, j)).collect();
+        let result = self.0.log_density(&duals);
+        if result.value.is_finite() {
+            (result.value, result.slopes[..point.len()].to_vec())
+        } else {
+            (f64::NEG_INFINITY, vec![0.0; point.len()])
+        }
+    }
+}
+
+/// The file of a posterior.
+struct File {
+    name: &'static str,
+    content: Value,
+}
+
+impl File {
+    fn new(name: &'static str, text: &str) -> Self {
+        Self { name, content: serde_json::from_str(text).unwrap() }
+    }
+
+    fn number(&self, key: &str) -> f64 {
+        self.content["data"][key].as_f64().unwrap()
+    }
+
+    fn vector(&self, key: &str) -> Vec<f64> {
+        numbers(&self.content["data"][key])
+    }
+
+    fn rows(&self, key: &str) -> Vec<Vec<f64>> {
+        self.content["data"][key].as_array().unwrap().iter().map(numbers).collect()
+    }
+
+    /// A posterior whose published quantities are the sampled ones.
+    fn posterior<M: Model>(self, model: M, parameters: Vec<(&str, Distribution)>) -> Posterior {
+        let parameter = |(name, prior): (&str, Distribution)| Parameter {
+            name: name.to_owned(),
+            symbol: name.to_owned(),
+            unit: Unit::dimensionless(),
+            design: prior.clone(),
+            prior,
+            reference: None,
+        };
+        let reference = self.content["reference"].as_object().unwrap().iter().map(|(name, f)| {
+            let figure = |key: &str| f[key].as_f64().unwrap();
+            Reference {
+                name: name.clone(),
+                mean: figure("mean"),
+                sd: figure("sd"),
+                mean_error: figure("mcse_mean"),
+            }
+        });
+        Posterior {
+            name: self.name,
+            reference: reference.collect(),
+            parameters: parameters.into_iter().map(parameter).collect(),
+            density: Box::new(Natural(Arc::new(model))),
+            reported: <[f64]>::to_vec,
+        }
+    }
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
+}
+
+/// The file of this name.
+macro_rules! file {
+    ($name:literal) => {
+        super::File::new($name, include_str!(concat!("data/", $name, ".json")))
+    };
+}
+use file;
+
+/// The logarithm of a normal density, its constant left out.
+fn normal<R: Real>(x: R, mean: R, sd: R) -> R {
+    let z = (x - mean) / sd;
+    z * z * R::from(-0.5) - sd.ln()
+}
+
+/// The same where mean and standard deviation are numbers.
+fn normal_prior<R: Real>(x: R, mean: f64, sd: f64) -> R {
+    normal(x, R::from(mean), R::from(sd))
+}
+
+/// The logarithm of a Cauchy density around zero on positive numbers, its constant left out.
+fn half_cauchy<R: Real>(x: R, scale: f64) -> R {
+    let z = x / R::from(scale);
+    positive(x) - (z * z + R::from(1.0)).ln()
+}
+
+/// Zero for a positive number, minus infinity for others.
+fn positive<R: Real>(x: R) -> R {
+    R::from(if x.number() > 0.0 { 0.0 } else { f64::NEG_INFINITY })
+}
+
+/// Every target obeys the contract, and knows its published quantities.
+#[test]
+fn the_posteriors_are_sound() {
+    let all = posteriors();
+    assert_eq!(all.len(), 15);
+    for posterior in &all {
+        let breaches =
+            lacuna::contract::density(posterior.name, &*posterior.density, &posterior.parameters);
+        assert_eq!(breaches, Ok(()));
+        let middle: Vec<f64> = posterior.parameters.iter().map(|p| p.prior.quantile(0.5)).collect();
+        assert!(posterior.reference.iter().all(|r| r.mean_error > 0.0 && r.mean_error < r.sd));
+        let names: Vec<&str> = posterior.reference.iter().map(|r| r.name.as_str()).collect();
+        assert_eq!(
+            (posterior.reported)(&middle).len(),
+            names.len(),
+            "{}: {names:?}",
+            posterior.name
+        );
+    }
+}
+
+/// At the published means the density is much larger than ten standard deviations to either side in any coordinate.
+#[test]
+fn the_published_means_have_a_high_density() {
+    for posterior in posteriors() {
+        if posterior.name.starts_with("eight_schools") {
+            continue;
+        }
+        let bound = posterior.density.bind(&posterior.parameters).unwrap();
+        let mean: Vec<f64> = posterior.reference.iter().map(|r| r.mean).collect();
+        let at = bound.gradient(&mean).0;
+        assert!(at.is_finite(), "{}", posterior.name);
+        for (j, figures) in posterior.reference.iter().enumerate() {
+            for side in [-10.0, 10.0] {
+                let mut moved = mean.clone();
+                moved[j] += side * figures.sd;
+                let away = bound.gradient(&moved).0;
+                assert!(away < at - 1.0, "{}, {}: {away} and {at}", posterior.name, figures.name);
+            }
+        }
+    }
+}
