@@ -1,7 +1,8 @@
 //! A small study from nothing to its report, and again: the same bits, whatever is kept, on any number of threads.
 
+use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use crate::quick::{self, Ran};
@@ -172,4 +173,107 @@ fn a_study_of_tables_runs_without_a_model() {
     let findings = ran.findings.calibration.unwrap();
     let names: Vec<&str> = findings.coordinates.iter().map(|c| c.name.as_str()).collect();
     assert_eq!(names, ["frequency", "damping", "variance"]);
+}
+
+/// Every study below a folder, in the order of the paths.
+fn studies(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(studies(&path));
+        } else if path.extension().is_some_and(|extension| extension == "toml") {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn shipped_studies_are_sound_and_have_run_directories_of_their_own() {
+    let mut names = BTreeMap::new();
+    for path in studies(&quick::root().join("configs")) {
+        let study = quick::load(&path, &[]);
+        assert!(study.about.title.len() > 10, "{} has no title", path.display());
+        if let Some(other) = names.insert(study.name.clone(), path.clone()) {
+            panic!("{} and {} are both called {}", other.display(), path.display(), study.name);
+        }
+    }
+    assert!(names.len() >= 17, "{names:?}");
+}
+
+/// The quick study in the place of the focused one, and the shipped variants of that in their folders.
+fn variants(kind: &str) -> (tempfile::TempDir, Vec<PathBuf>) {
+    let folder = quick::simulated();
+    fs::rename(folder.path().join("study.toml"), folder.path().join("focused.toml")).unwrap();
+    let copies = folder.path().join(kind);
+    fs::create_dir(&copies).unwrap();
+    for path in studies(&quick::root().join("configs/sns").join(kind)) {
+        fs::copy(&path, copies.join(path.file_name().unwrap())).unwrap();
+    }
+    let copied = studies(&copies);
+    (folder, copied)
+}
+
+/// Runs the shipped variants in one directory, which simulates once.
+fn each_variant_runs(kind: &str, count: usize, made: &[&str]) {
+    let (folder, paths) = variants(kind);
+    assert_eq!(paths.len(), count);
+    let out = folder.path().join("run");
+    quick::run(&folder.path().join("focused.toml"), &[], &out).unwrap();
+    for path in paths {
+        let sampler = quick::load(&path, &[]).sampler.unwrap().built.name;
+        let short: &[&str] = match sampler {
+            "no_u_turn" => &["sampler.steps=40", "sampler.warm_up=20", "sampler.depth=4"],
+            _ => &["sampler.steps=60"],
+        };
+        let ran = quick::run(&path, short, &out);
+        let ran = ran.unwrap_or_else(|stop| panic!("{}: {stop}", path.display()));
+        assert_eq!(ran.made, made, "{}", path.display());
+    }
+}
+
+#[test]
+fn every_shipped_discrepancy_runs_on_the_runs_and_the_surrogate_that_are_there() {
+    each_variant_runs("discrepancies", 8, &STAGES[4..]);
+}
+
+#[test]
+fn every_shipped_surrogate_runs_on_the_runs_that_are_there() {
+    each_variant_runs("surrogates", 3, &STAGES[3..]);
+}
+
+/// The posterior and the evidence in closed form of `configs/target/regression.toml`, as its README has them.
+#[test]
+fn a_regression_has_the_evidence_that_it_must_have() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let path = quick::root().join("configs/target/regression.toml");
+    quick::run(&path, &[], &out).unwrap_or_else(|stop| panic!("{stop}"));
+    let summary = quick::summary(&out);
+    assert_eq!(summary["converged"], true, "{}", summary["verdict"]);
+    let number = |part: &str, key: &str| summary[part][key].as_f64().unwrap();
+    let (log, error) = (number("evidence", "log"), number("evidence", "error"));
+    assert!((log + 213.091_967_607_017).abs() < 3.0 * error && error < 0.1, "{log} ± {error}");
+    for (name, mean, sd) in [("intercept", -17.181_624, 6.530_366), ("slope", 3.908_607, 0.401_818)]
+    {
+        let found = &summary["parameters"][name];
+        let size = found["ess_bulk"].as_f64().unwrap();
+        let [m, s] = ["mean", "sd"].map(|key| found[key].as_f64().unwrap());
+        assert!((m - mean).abs() < 4.0 * sd / size.sqrt(), "{name}: mean {m}");
+        assert!((s / sd - 1.0).abs() < 4.0 / (2.0 * size).sqrt(), "{name}: sd {s}");
+    }
+}
+
+/// The truth behind `configs/borehole/measurements.csv`: see `examples/borehole_data.rs`.
+#[test]
+fn what_the_borehole_data_determine_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let path = quick::root().join("configs/borehole/study.toml");
+    let short = ["surrogate.degree=2", "surrogate.q_norm=1.0", "sampler.stop={effective_sample_size=100}"];
+    let ran = quick::run(&path, &short, &out).unwrap_or_else(|stop| panic!("{stop}"));
+    let calibration = ran.findings.calibration.unwrap();
+    assert_eq!(calibration.coordinates.len(), 12);
 }

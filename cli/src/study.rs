@@ -29,13 +29,12 @@ pub fn run(path: &Path, settings: &Settings, out: Option<&Path>) -> Result<(), F
 /// `lacuna check STUDY`
 pub fn check(path: &Path, settings: &Settings) -> Result<(), Failure> {
     let study = load(path, settings)?;
-    let layout = &study.layout;
-    print(&format!(
-        "{}: no problems; {} parameters, {} values a response",
-        path.display(),
-        study.parameters.len(),
-        layout.len()
-    ));
+    let response = match &study.target {
+        Some(_) => String::new(),
+        None => format!(", {} values a response", study.layout.len()),
+    };
+    let parameters = study.parameters.len();
+    print(&format!("{}: no problems; {parameters} parameters{response}", path.display()));
     Ok(())
 }
 

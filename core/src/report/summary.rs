@@ -74,7 +74,9 @@ pub fn summary(findings: &Findings) -> Value {
     if let Some(calibration) = &findings.calibration {
         put("parameters", parameters(findings, calibration));
         put("correlation", correlation(calibration));
-        put("acceptance", acceptance(calibration));
+        if !calibration.acceptance.is_empty() {
+            put("acceptance", acceptance(calibration));
+        }
         put("chains", chains(calibration));
         put("converged", json!(calibration.converged));
         put("verdict", json!(calibration.verdict));

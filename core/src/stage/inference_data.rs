@@ -84,7 +84,11 @@ impl File {
         let chain = self.counted("sample_stats", "chain", kept.chains)?;
         let draw = self.counted("sample_stats", "draw", kept.steps)?;
         self.numbers("sample_stats/lp", &[chain, draw], &kept.log_density, None)?;
-        self.numbers("sample_stats/acceptance_rate", &[chain], &calibrated.outcome.acceptance, None)
+        let acceptance = &calibrated.outcome.acceptance;
+        if acceptance.is_empty() {
+            return Ok(());
+        }
+        self.numbers("sample_stats/acceptance_rate", &[chain], acceptance, None)
     }
 
     fn observed(&mut self, measured: &Measured) -> Result<(), Error> {

@@ -25,7 +25,7 @@ use log::Log;
 pub struct Sampled {
     /// The draws, in the target's coordinates.
     pub draws: Draws,
-    /// The share of accepted moves of each chain.
+    /// The share of accepted moves of each chain; empty where the draws are those of a harvest.
     pub acceptance: Vec<f64>,
     /// The number of first steps that are left out.
     pub burn_in: usize,
@@ -101,6 +101,8 @@ pub fn sample(
     Ok(match harvest {
         Some(harvest) => {
             let draws = dealt(&harvest);
+            // The moves are those of particles, which the chains of the draws are not.
+            let acceptance = Vec::new();
             Sampled { draws, acceptance, burn_in: 0, harvest: Some(harvest), state }
         }
         None => Sampled { draws, acceptance, burn_in, harvest: None, state },
