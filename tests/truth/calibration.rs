@@ -22,8 +22,8 @@ use super::runs;
 
 /// Ranks among this many draws fall into [`BINS`] bins of equal probability.
 const DRAWS: usize = 63;
-const BINS: usize = 16;
-const SIMULATIONS: u64 = 160;
+const BINS: usize = 8;
+const SIMULATIONS: u64 = 96;
 
 /// The straight line `y = a + b t` of each sensor, as an emulator with the basis `(1, a, b)`.
 struct Line {
@@ -171,7 +171,9 @@ fn p_value(sampler: (&str, &str), discrepancy: (&str, &str), count: u64, stream:
     let coordinates = each[0].len();
     let chi_square = |j: usize| -> f64 {
         let mut counts = [0.0; BINS];
-        each.iter().for_each(|bins| counts[bins[j]] += 1.0);
+        for bins in &each {
+            counts[bins[j]] += 1.0;
+        }
         counts.iter().map(|n| (n - expected).powi(2) / expected).sum()
     };
     let law = Distribution::Gamma([0.5 * (BINS - 1) as f64, 2.0]);
