@@ -12,20 +12,25 @@ from posterior import Posterior
 
 STEPS = 1200
 
-starts = array("start", 4)
-theirs = array("start_log_density", 1)[:, 0]
-np.random.seed(1)
-figures = {}
-for name in ["sufficient", "reduced"]:
-    density = Posterior(HEADER, name)
+
+
+def walk(emulator, squares):
+    """One run and its figures."""
+    starts = array(f"{emulator}_start", 4)
+    theirs = array(f"{emulator}_start_log_density", 1)[:, 0]
+    density = Posterior(HEADER, emulator, squares)
+    np.random.seed(1)
     sampler = emcee.EnsembleSampler(len(starts), 4, density, vectorize=True)
     _, seconds = timed(lambda: sampler.run_mcmc(starts, STEPS))
     draws = sampler.get_chain(discard=STEPS // 2, flat=True)
-    figures[name] = {
+    return {
         "cpu_seconds": seconds,
         "largest_difference_at_start": np.abs(density(starts) - theirs).max(),
         "mean": draws.mean(axis=0).tolist(),
         "sd": draws.std(axis=0).tolist(),
     }
-    print(name, figures[name])
+
+
+kinds = ["sufficient", "reduced"]
+figures = {name: {k: walk(name, k) for k in kinds} for name in ["adaptive", "degree_10"]}
 write("emcee_ensemble", version=emcee.__version__, **figures)

@@ -9,8 +9,8 @@ from common import Basis, array, timed, write
 
 points = array("evaluation_points", 3)
 theirs = array("evaluation_values", 1000)
-coefficients = array("coefficients", 1000)
-basis = Basis(array("exponents", 3))
+coefficients = array("adaptive_coefficients", 1000)
+basis = Basis(array("adaptive_exponents", 3))
 
 
 def evaluate(size):

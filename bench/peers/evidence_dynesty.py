@@ -1,6 +1,7 @@
 """The evidence by dynesty: 500 live points, random walks, until 0.1 of the logarithm remains.
 
-The density is the one with the QR reduction; dynesty asks for one point at a time.
+The density is the one with the QR reduction; dynesty asks for one point at a time. The emulator is the
+smaller one, of degree 10.
 """
 
 import dynesty
@@ -10,7 +11,7 @@ from scipy.special import ndtri
 from common import HEADER, HIGH, LOW, timed, write
 from posterior import Posterior
 
-density = Posterior(HEADER, "reduced")
+density = Posterior(HEADER, "degree_10", "reduced")
 
 
 def log_likelihood(natural):

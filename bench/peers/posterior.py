@@ -2,7 +2,8 @@
 
 Coordinates are the three parameters and the logarithm of the variance, whose Jacobian the density carries.
 `sufficient` uses count, mean and scatter of the curves of each output; `reduced` further replaces the residual of
-the mean curve, `mean - C' psi`, by the triangular factor of `[C' mean]`, which has as many rows as terms.
+the mean curve, `mean - C' psi`, by the triangular factor of `[C' mean]`, which has as many rows as terms, and
+then leaves out the directions in it that are below round-off.
 """
 
 import numpy as np
@@ -12,27 +13,29 @@ from common import HIGH, LOW, Basis, array
 CURVES = array("curves")
 COUNT, MEAN = len(CURVES), CURVES.mean(axis=0)
 SCATTER = float(np.sum((CURVES - MEAN) ** 2))
-COEFFICIENTS = array("coefficients", CURVES.shape[1])
-BASIS = Basis(array("exponents", len(LOW)))
 
 
 class Posterior:
-    """The log density with one of the two sums of squares."""
+    """The log density through one of the emulators with one of the two sums of squares."""
 
-    def __init__(self, header, squares):
+    def __init__(self, header, emulator, squares):
+        self.coefficients = array(f"{emulator}_coefficients", CURVES.shape[1])
+        self.basis = Basis(array(f"{emulator}_exponents", len(LOW)))
         self.squares = {"sufficient": self.sufficient, "reduced": self.reduced}[squares]
         self.scale = header["variance_scale"]
         self.constant = -np.log(HIGH - LOW).sum() + 0.5 * np.log(2.0 / np.pi) - np.log(self.scale)
-        stacked = np.column_stack([COEFFICIENTS.T, MEAN])
-        self.factor = np.ascontiguousarray(np.linalg.qr(stacked, mode="r").T)
+        triangle = np.linalg.qr(np.column_stack([self.coefficients.T, MEAN]), mode="r")
+        _, sizes, directions = np.linalg.svd(triangle, full_matrices=False)
+        kept = sizes > 1e-14 * sizes[0]
+        self.factor = np.ascontiguousarray((sizes[kept, None] * directions[kept]).T)
 
     def sufficient(self, points):
-        difference = BASIS(points).T @ COEFFICIENTS
+        difference = self.basis(points).T @ self.coefficients
         difference -= MEAN
         return np.einsum("ij,ij->i", difference, difference)
 
     def reduced(self, points):
-        psi = BASIS(points)
+        psi = self.basis(points)
         extended = np.empty((len(points), len(psi) + 1))
         extended[:, :-1] = psi.T
         extended[:, -1] = -1.0

@@ -31,28 +31,50 @@ def compare_errors(job, peer, theirs, ours):
 
 
 def expansions():
-    ours = figures("lacuna_polynomial_chaos")
+    ours, theirs = figures("lacuna_polynomial_chaos"), figures("sklearn_polynomial_chaos")
     if ours is None:
         return
-    seconds, job = ours["cpu_seconds"], "sparse expansion, one output"
-    for name, peer, goal in [("openturns", "OpenTURNS", 100), ("sklearn", "scikit-learn", 20)]:
-        theirs = figures(f"{name}_polynomial_chaos")
-        if theirs is None:
-            continue
-        peer = f"{peer} {theirs['version']}"
-        row(job, peer, theirs["cpu_seconds_of_an_output"], seconds / ours["outputs"], goal)
-        same = np.array(ours["rmse"])[theirs["outputs"]]
+    job, adaptive, small = "sparse expansion, one output", ours["adaptive"], ours["degree_10"]
+    one = adaptive["cpu_seconds_of_an_output"]
+    if theirs is not None:
+        peer = f"scikit-learn {theirs['version']}, degree adaptive"
+        row(job, peer, theirs["cpu_seconds_of_an_output"], one, 20)
+        same = np.array(adaptive["rmse"])[theirs["outputs"]]
         compare_errors("its validation RMSE, microstrain", peer, theirs["rmse"], same)
-    row("sparse expansion, all 1000 outputs", "limit of 15 s", 15.0, seconds, 1)
+        ten = theirs["cpu_seconds_of_an_output_of_degree_10"]
+        peer = f"scikit-learn {theirs['version']}, both of degree 10"
+        row(job, peer, ten, small["cpu_seconds_of_an_output"], 20)
+    openturns(job, adaptive, small)
+    row("sparse expansion, all 1000 outputs", "limit of 15 s", 15.0, adaptive["cpu_seconds"], 1)
+
+
+def openturns(job, adaptive, small):
+    theirs = figures("openturns_polynomial_chaos")
+    if theirs is None:
+        return
+    peer = f"OpenTURNS {theirs['version']}"
+    for kind, name, ours in [
+        ("default", "degree 10; ours adaptive", adaptive),
+        ("default", "both of degree 10", small),
+        ("cholesky", "both of degree 10, Cholesky", small),
+        ("cholesky_20", "degree 20, Cholesky; ours adaptive", adaptive),
+    ]:
+        case = theirs[kind]
+        seconds = case["cpu_seconds_of_an_output"]
+        row(job, f"{peer}, {name}", seconds, ours["cpu_seconds_of_an_output"], 100)
+        same = np.array(ours["rmse"])[case["outputs"]]
+        compare_errors("its validation RMSE, microstrain", f"{peer}, {name}", case["rmse"], same)
 
 
 def ensembles():
     ours, theirs = figures("lacuna_ensemble"), figures("emcee_ensemble")
     if ours is None or theirs is None:
         return
-    job, peer = "ensemble, 120 x 1200", f"emcee {theirs['version']}"
-    for kind, name, goal in [("sufficient", "sufficient statistics", 20), ("reduced", "QR", 5)]:
-        row(job, f"{peer}, {name}", theirs[kind]["cpu_seconds"], ours["cpu_seconds"], goal)
+    for emulator in ["adaptive", "degree_10"]:
+        seconds = ours[emulator]["cpu_seconds"]
+        job, peer = f"ensemble, {emulator} emulator", f"emcee {theirs['version']}"
+        for kind, name, goal in [("sufficient", "sufficient statistics", 20), ("reduced", "QR", 5)]:
+            row(job, f"{peer}, {name}", theirs[emulator][kind]["cpu_seconds"], seconds, goal)
 
 
 def evaluations():

@@ -77,15 +77,15 @@ pub fn load(folder: &Path, name: &str, columns: usize) -> Fallible<Matrix> {
 /// It arrives at each sensor at a time that depends on the speed of sound, and where the wall would pull the liquid
 /// below the cutoff it stays there: a smooth function with a kink that is not quite sharp.
 fn response(point: &[f64]) -> Vec<f64> {
-    const ROUNDING: f64 = 60.0;
+    const ROUNDING: f64 = 15.0;
     let unit = |i: usize| (point[i] - RANGES[i][0]) / (RANGES[i][1] - RANGES[i][0]);
     let (cutoff, density, speed) = (120.0 + 600.0 * unit(0), point[1] / 1e4, point[2] / 1e3);
     let strain = |k: usize| {
         let (sensor, time) = ((k / TIMES) as f64, (k % TIMES) as f64 / TIMES as f64);
         let since = time - (0.05 + 0.03 * sensor) / speed;
         let front = 1.0 / (1.0 + (-since / 0.03).exp());
-        let turns = (1.2 + 0.08 * sensor) * (speed / density).sqrt() * since;
-        let wave = 700.0 / density * front * (-1.5 * since.max(-0.2)).exp();
+        let turns = (2.0 + 0.08 * sensor) * (speed / density).sqrt() * since;
+        let wave = 1400.0 / density * front * (-1.5 * since.max(-0.2)).exp();
         let free = wave * (std::f64::consts::TAU * turns).sin();
         ROUNDING * ((free + cutoff) / ROUNDING).exp().ln_1p() - cutoff
     };

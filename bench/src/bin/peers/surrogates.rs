@@ -11,13 +11,17 @@ use lacuna::plugin::{Emulator, Surrogate};
 use lacuna::run::{Progress, Silent};
 use lacuna_bench::clock::timed;
 use lacuna_plugins::surrogates::gaussian_process::GaussianProcess;
-use lacuna_plugins::surrogates::polynomial_chaos::PolynomialChaos;
+use lacuna_plugins::surrogates::polynomial_chaos::{Degree, PolynomialChaos};
 use lacuna_plugins::surrogates::principal_components::Components;
 use serde_json::{Value, json};
 
 use crate::Fallible;
 use crate::problem::{self, OUTPUTS, RANGES};
 
+/// The name of the expansion whose outputs each have a degree of their own.
+pub const ADAPTIVE: &str = "adaptive";
+/// The name of the one of degree 10.
+pub const SMALL: &str = "degree_10";
 /// The number of points at which the expansion is evaluated.
 const EVALUATIONS: usize = 100_000;
 /// Of how many of them the values are written for the other side to compare.
@@ -25,26 +29,34 @@ const COMPARED: usize = 1000;
 /// How many outputs are emulated by Gaussian processes: every hundredth, from the middle of the first sensor.
 const PROCESSES: usize = 10;
 
-/// Adaptive sparse expansions of all outputs; keeps the emulator for the other jobs.
+/// Sparse expansions of all outputs, of adaptive degree and of degree 10; keeps the emulators for the other jobs.
 pub fn polynomial_chaos(folder: &Path) -> Fallible<Value> {
-    let options = PolynomialChaos::default();
+    let small = PolynomialChaos { degree: Degree::Fixed(10), ..PolynomialChaos::default() };
+    Ok(json!({
+        ADAPTIVE: expansion(&PolynomialChaos::default(), folder, ADAPTIVE)?,
+        SMALL: expansion(&small, folder, SMALL)?,
+    }))
+}
+
+fn expansion(options: &PolynomialChaos, folder: &Path, name: &str) -> Fallible<Value> {
     let outputs: Vec<usize> = (0..OUTPUTS).collect();
-    let (emulator, seconds) = fit(&options, folder, &outputs)?;
+    let (emulator, seconds) = fit(options, folder, &outputs)?;
     let linear = emulator.linear().ok_or("the expansion is not linear")?;
     let bytes = emulator.save()?;
     let exponents = exponents(&bytes)?;
-    fs::write(folder.join("emulator.bin"), bytes)?;
-    problem::save(folder, "coefficients", linear.coefficients())?;
-    problem::save(folder, "exponents", &exponents)?;
+    fs::write(folder.join(format!("{name}.bin")), bytes)?;
+    problem::save(folder, &format!("{name}_coefficients"), linear.coefficients())?;
+    problem::save(folder, &format!("{name}_exponents"), &exponents)?;
     let used = linear.coefficients().as_slice().iter().filter(|c| **c != 0.0).count();
+    let facts = emulator.facts();
     Ok(json!({
         "cpu_seconds": seconds,
-        "outputs": OUTPUTS,
+        "cpu_seconds_of_an_output": seconds / OUTPUTS as f64,
         "loo": emulator.fit_error().relative,
         "rmse": validation(&*emulator, folder, &outputs)?,
         "terms_of_an_output": used as f64 / OUTPUTS as f64,
         "terms_of_all": exponents.rows(),
-        "facts": emulator.facts().iter().map(|f| format!("{f:?}")).collect::<Vec<_>>(),
+        "facts": facts.iter().map(|f| format!("{}: {}", f.name, f.value)).collect::<Vec<_>>(),
     }))
 }
 
@@ -60,7 +72,7 @@ pub fn gaussian_process(folder: &Path) -> Fallible<Value> {
 
 /// The expansion of all outputs at many points, in pieces.
 pub fn evaluation(folder: &Path) -> Fallible<Value> {
-    let emulator = emulator(folder)?;
+    let emulator = emulator(folder, ADAPTIVE)?;
     let mut rng = Stream::root(4).generator();
     let points = Matrix::from_fn(EVALUATIONS, RANGES.len(), |_, i| {
         RANGES[i][0] + uniform(&mut rng) * (RANGES[i][1] - RANGES[i][0])
@@ -84,9 +96,9 @@ pub fn evaluation(folder: &Path) -> Fallible<Value> {
     Ok(json!({ "points": EVALUATIONS, "cpu_seconds_by_chunk": seconds }))
 }
 
-/// The expansion that the first job kept.
-pub fn emulator(folder: &Path) -> Fallible<Box<dyn Emulator>> {
-    let bytes = fs::read(folder.join("emulator.bin"))
+/// An expansion that the first job kept.
+pub fn emulator(folder: &Path, name: &str) -> Fallible<Box<dyn Emulator>> {
+    let bytes = fs::read(folder.join(format!("{name}.bin")))
         .map_err(|e| format!("the job `polynomial_chaos` comes first: {e}"))?;
     Ok(PolynomialChaos::default().load(&bytes)?)
 }
