@@ -14,6 +14,7 @@ use crate::linalg::Matrix;
 use crate::plugin::sampler::Evidence;
 use crate::plugin::{Emulator, Likelihood};
 use crate::posterior::Posterior;
+use crate::report::number::significant;
 use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, RunDirectory, Stop, files};
 use crate::study::Study;
@@ -131,7 +132,7 @@ pub fn stage(
 fn summary(weighed: &Weighed) -> String {
     let evidence = weighed.evidence.as_ref();
     let mut parts: Vec<String> = evidence
-        .map(|e| format!("log evidence {:.2} ± {:.2}", e.log, e.error))
+        .map(|e| format!("log evidence {:.2} ± {}", e.log, significant(e.error, 2)))
         .into_iter()
         .collect();
     let loo = weighed.left_out.as_ref();

@@ -78,11 +78,30 @@ impl GaussianLikelihood {
         self.law.variances(&self.spreads(), hyper, &residuals(&split))
     }
 
-    /// The log density of each value of a group given all others, by measured output: a function of
-    /// the value.
+    /// What the density of a value given all others takes from the common errors: for each measured output of a
+    /// group, at each of the variances, the error that the residuals suggest and by how much it shrinks.
+    fn shares(group: &Statistics, along: &[f64], nodes: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
+        let at = |&(v, _): &(f64, f64)| {
+            let mut sums = vec![(0.0, 0.0); group.measured.len()];
+            for ((row, a), l) in
+                group.directions.iter_rows().zip(along).zip(&group.spread.eigenvalues)
+            {
+                let share = l / (v + l);
+                for ((common, shrink), u) in sums.iter_mut().zip(row) {
+                    *common += u * share * a;
+                    *shrink += u * u * share;
+                }
+            }
+            sums
+        };
+        nodes.iter().map(at).collect()
+    }
+
+    /// The log density of a value of the `k`-th measured output given all others, from its difference to the
+    /// response.
     fn left_out_of(
         group: &Statistics,
-        along: &[f64],
+        shares: &[Vec<(f64, f64)>],
         scale: &[f64],
         k: usize,
         nodes: &[(f64, f64)],
@@ -91,19 +110,12 @@ impl GaussianLikelihood {
         let scale = scale[group.measured[k]];
         let count = group.weight[k].powi(2) * scale;
         // The density of a value given the others is one over the average of its own inverse density.
-        let inverse = |&(v, p): &(f64, f64)| {
-            let (mut common, mut shrink) = (0.0, 0.0);
-            for ((row, a), l) in
-                group.directions.iter_rows().zip(along).zip(&group.spread.eigenvalues)
-            {
-                let share = l / (v + l);
-                common += row[k] * share * a;
-                shrink += row[k] * row[k] * share;
-            }
+        let inverse = |(&(v, p), shares): (&(f64, f64), &Vec<(f64, f64)>)| {
+            let (common, shrink) = shares[k];
             let pull = (difference / scale.sqrt() - common / count.sqrt()) / v;
             p * (-conditional(pull, (1.0 - shrink / count) / v)).exp()
         };
-        -nodes.iter().map(inverse).sum::<f64>().ln() - 0.5 * scale.ln()
+        -nodes.iter().zip(shares).map(inverse).sum::<f64>().ln() - 0.5 * scale.ln()
     }
 }
 
@@ -165,10 +177,13 @@ impl Likelihood for GaussianLikelihood {
         for (g, group) in self.groups.iter().enumerate() {
             group.measured.iter().enumerate().for_each(|(k, &i)| place[i] = (g, k));
         }
+        let groups = self.groups.iter().zip(&split).zip(&nodes);
+        let shares: Vec<_> =
+            groups.map(|((group, (along, _)), nodes)| Self::shares(group, along, nodes)).collect();
         let one = |(i, y): (usize, f64)| {
             let (g, k) = place[i];
-            let (group, along) = (&self.groups[g], &split[g].0);
-            Self::left_out_of(group, along, &self.noise.scale, k, &nodes[g], y - response[i])
+            let (group, scale) = (&self.groups[g], &self.noise.scale);
+            Self::left_out_of(group, &shares[g], scale, k, &nodes[g], y - response[i])
         };
         Some(values(data).map(one).collect())
     }
