@@ -65,8 +65,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     for i in 0..RUNS {
         let laws = parameters.iter().map(|(_, _, law, _)| law);
         // What is written is what is simulated.
-        let point: Result<Vec<f64>, _> =
-            laws.zip(cube.row(i)).map(|(law, u)| format!("{:.6e}", law.quantile(*u)).parse()).collect();
+        let point: Result<Vec<f64>, _> = laws
+            .zip(cube.row(i))
+            .map(|(law, u)| format!("{:.6e}", law.quantile(*u)).parse())
+            .collect();
         let point: Vec<f64> = point?;
         let cells: String = point.iter().map(|x| format!(",{x}")).collect();
         writeln!(runs, "r{:03}{cells}", i + 1)?;

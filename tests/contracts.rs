@@ -120,7 +120,7 @@ fn surrogates() {
                 "degree = { max = 8 }\nsolver = \"subspace_pursuit\"",
                 "degree = { max = 8 }\nsolver = \"bayesian_compressive_sensing\"",
                 "degree = { max = 8 }\nq_norm = { min = 0.6, step = 0.2 }\nselection = { k_fold = 5 }",
-                "degree = { max = 6 }\nbasis = \"hermite\"",
+                "degree = { max = 8 }\nbasis = \"arbitrary\"",
                 "degree = { max = 6 }\nbasis = \"jacobi\"\ncomponents = { variance = 0.9999 }",
             ],
         ),

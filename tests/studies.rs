@@ -272,7 +272,8 @@ fn what_the_borehole_data_determine_is_found() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("run");
     let path = quick::root().join("configs/borehole/study.toml");
-    let short = ["surrogate.degree=2", "surrogate.q_norm=1.0", "sampler.stop={effective_sample_size=100}"];
+    let short =
+        ["surrogate.degree=2", "surrogate.q_norm=1.0", "sampler.stop={effective_sample_size=100}"];
     let ran = quick::run(&path, &short, &out).unwrap_or_else(|stop| panic!("{stop}"));
     let calibration = ran.findings.calibration.unwrap();
     assert_eq!(calibration.coordinates.len(), 12);

@@ -6,7 +6,7 @@ use lacuna::linalg::Matrix;
 use lacuna::math::moments::{mean, variance};
 use lacuna::math::optimise;
 use lacuna::math::random::Stream;
-use lacuna::plugin::sampler::{Evidence, Harvest};
+use lacuna::plugin::sampler::Harvest;
 use lacuna::plugin::{Sampler, Target, registry};
 
 /// The draws of one run.
@@ -88,11 +88,6 @@ pub struct Estimate {
 }
 
 impl Run {
-    /// The evidence, where there is one.
-    pub fn evidence(&self) -> Option<&Evidence> {
-        self.harvest.as_ref()?.evidence.as_ref()
-    }
-
     /// The mean and the standard deviation of a function of the point.
     pub fn moments(&self, function: impl Fn(&[f64]) -> f64) -> (Estimate, Estimate) {
         let d = self.draws.dimension();

@@ -6,7 +6,6 @@
 //! with a product of large matrices on the same machine.
 
 use std::error::Error;
-use std::fs;
 use std::hint::black_box;
 
 use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Scenario, Unit};
@@ -19,6 +18,7 @@ use lacuna::plugin::surrogate::{Surrogate, Training};
 use lacuna::plugin::{Emulator, Target};
 use lacuna::posterior::{Emulated, Posterior};
 use lacuna::run::{Progress, Silent};
+use lacuna_bench::clock::{per_call, processor_seconds};
 use lacuna_plugins::discrepancies::gaussian::Gaussian;
 use lacuna_plugins::surrogates::polynomial_chaos::{Degree, PolynomialChaos, Solver};
 use serde_json::json;
@@ -176,33 +176,4 @@ fn product_speed() -> Fallible<f64> {
     let (a, b) = (matrix(0.0), matrix(1.0));
     let seconds = per_call(|| drop(black_box(multiply(&a, &b))))?;
     Ok(2.0 * (size as f64).powi(3) / seconds / 1e9)
-}
-
-/// The processor time of a call: the least of several means, since other programs only add.
-fn per_call(mut call: impl FnMut()) -> Fallible<f64> {
-    let (mut calls, mut least) = (1, f64::INFINITY);
-    let mut repeats = 0;
-    while repeats < 5 {
-        let begun = processor_seconds()?;
-        (0..calls).for_each(|_| call());
-        let seconds = processor_seconds()? - begun;
-        // The system counts in steps of milliseconds.
-        if seconds < 0.2 {
-            calls *= 2;
-        } else {
-            least = least.min(seconds / f64::from(calls));
-            repeats += 1;
-        }
-    }
-    Ok(least)
-}
-
-/// The processor time of all threads so far, as Linux tells it.
-fn processor_seconds() -> Fallible<f64> {
-    let mut nanoseconds = 0.0;
-    for task in fs::read_dir("/proc/self/task")? {
-        let text = fs::read_to_string(task?.path().join("schedstat"))?;
-        nanoseconds += text.split_whitespace().next().unwrap_or("0").parse::<f64>()?;
-    }
-    Ok(nanoseconds / 1e9)
 }

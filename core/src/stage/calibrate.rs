@@ -270,12 +270,11 @@ fn calibrate(
     let best_draw = best_draw(posterior, &sampled);
     let draws = natural(posterior, sampled.draws);
     let kept = draws.from_step(sampled.burn_in);
-    let diagnosis = match &sampled.harvest {
-        Some(harvest) => Diagnosis::of_harvest(&kept, harvest.effective_size, &harvest.doubts),
-        None => {
-            let doubts = section.built.plugin.doubts(&sampled.state);
-            Diagnosis::of(&kept, plan.ensemble).with_doubts(doubts)
-        }
+    let diagnosis = if let Some(harvest) = &sampled.harvest {
+        Diagnosis::of_harvest(&kept, harvest.effective_size, &harvest.doubts)
+    } else {
+        let doubts = section.built.plugin.doubts(&sampled.state);
+        Diagnosis::of(&kept, plan.ensemble).with_doubts(doubts)
     };
     let (harvested, mut evidence) =
         sampled.harvest.map_or_else(Default::default, |h| (h.facts, h.evidence));

@@ -123,7 +123,7 @@ impl Design for Quadrature {
         let mut points = Matrix::zeros(0, parameters.len());
         if count > 0 && !parameters.is_empty() {
             let rule = self.rule(parameters, count).map_err(Stop::new)?;
-            for (coordinates, nodes) in rule.iter() {
+            if let Some((coordinates, nodes)) = &rule {
                 for node in nodes.points.iter_rows() {
                     let unit = |((z, c), p): ((&f64, &Coordinate), &Parameter)| {
                         // Inside the open cube, however far out the node lies.

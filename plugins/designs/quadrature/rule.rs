@@ -79,7 +79,7 @@ impl Rule {
         let product = |t: usize| {
             let levels: Vec<usize> = nested.terms.term(t).iter().map(|&k| usize::from(k)).collect();
             let left = level - levels.iter().sum::<usize>();
-            let sign = if left % 2 == 0 { 1.0 } else { -1.0 };
+            let sign = if left.is_multiple_of(2) { 1.0 } else { -1.0 };
             (left < d).then(|| (levels, sign * choose(left)))
         };
         Some((0..nested.terms.len()).filter_map(product).collect())

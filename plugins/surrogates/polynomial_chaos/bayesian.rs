@@ -62,7 +62,8 @@ impl Part {
         }
         let posterior = Ascent::new(&self.gram, open, &correlations, noise).run(most);
         let left = |(row, y): (&[f64], &f64)| {
-            let model: f64 = posterior.iter().map(|w| w.mean * row[w.term]).sum();
+            let terms = posterior.mean.iter().zip(&posterior.active);
+            let model: f64 = terms.map(|(mean, &t)| mean * row[t]).sum();
             (y - model).powi(2)
         };
         self.columns.iter_rows().zip(&own).map(left).sum()
@@ -97,8 +98,8 @@ pub(super) fn bayesian(
         }
     }
     let mut set = ActiveSet::new(dictionary);
-    for weight in Ascent::new(dictionary.gram(), &open, correlations, noise).run(most) {
-        set.enter(weight.term);
+    for term in Ascent::new(dictionary.gram(), &open, correlations, noise).run(most).active {
+        set.enter(term);
     }
     if set.terms().is_empty() {
         // Nothing rises above the noise; the strongest term must do.
@@ -110,14 +111,6 @@ pub(super) fn bayesian(
     Some(judged(&set, centred, criterion))
 }
 
-/// A term's weight: its posterior mean and the precision of its prior.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Weight {
-    pub term: usize,
-    pub mean: f64,
-    pub alpha: f64,
-}
-
 /// The posterior of the active weights and the two statistics of every term, in the notation of Tipping and
 /// Faul: `S = phi' C^-1 phi` and `Q = phi' C^-1 y` with `C` the covariance of the output.
 pub(super) struct Ascent<'a> {
@@ -125,10 +118,11 @@ pub(super) struct Ascent<'a> {
     open: &'a [bool],
     /// The noise's precision.
     beta: f64,
-    active: Vec<usize>,
+    pub active: Vec<usize>,
     /// The precision of each active weight's prior.
-    alpha: Vec<f64>,
-    mean: Vec<f64>,
+    pub alpha: Vec<f64>,
+    /// The posterior mean of each active weight.
+    pub mean: Vec<f64>,
     covariance: Matrix,
     s: Vec<f64>,
     q: Vec<f64>,
@@ -160,8 +154,8 @@ impl<'a> Ascent<'a> {
         }
     }
 
-    /// Ascends to the maximum; the active weights there.
-    pub fn run(mut self, most: usize) -> Vec<Weight> {
+    /// Ascends to the maximum, or until so many weights are active.
+    pub fn run(mut self, most: usize) -> Self {
         for _ in 0..20 * most.max(1) {
             let Some((gain, change)) = self.best() else { break };
             let full = self.active.len() >= most;
@@ -182,8 +176,7 @@ impl<'a> Ascent<'a> {
                 }
             }
         }
-        let weights = self.active.iter().zip(&self.mean).zip(&self.alpha);
-        weights.map(|((&term, &mean), &alpha)| Weight { term, mean, alpha }).collect()
+        self
     }
 
     /// The change that gains most.

@@ -50,20 +50,29 @@ pub use terms::{Basis, Nested, Sets, TermSet, Terms, Truncation};
 ///
 /// The polynomials are orthonormal under the *design's* distribution, so that the coefficients give mean,
 /// variance and Sobol' indices without sampling. All outputs are fitted as one problem: they share the
-/// basis and its Gram matrix. For each output and each degree, least-angle regression proposes one term after the other;
+/// basis and its Gram matrix. For each output, degree and norm the solver proposes sets of terms;
 /// every proposed set is fitted by least squares and judged by its leave-one-out error,
-/// corrected for the number of terms by `N / (N - P) (1 + tr (Psi' Psi)^-1)`. The output keeps the set
-/// and the degree with the least error. Outputs that do not vary over the runs, but for round-off, are emulated by their
-/// mean and have the error 0.
+/// corrected for the number of terms by `N / (N - P) (1 + tr (Psi' Psi)^-1)`, or by cross-validation. The output keeps
+/// the set, the degree and the norm with the least error, and never only its mean where it varies. Outputs that
+/// do not vary over the runs, but for round-off, are emulated by their mean and have the error 0.
 ///
-/// Outside the design's range the polynomials are extrapolated, and grow quickly there.
+/// The error was used to choose, so that it is too small where runs are few: with fewer than three runs a term
+/// or ten a parameter believe the `validation` runs instead. The result tells when this is so.
+///
+/// Outside the design's range the polynomials are extrapolated, and grow quickly there; where a parameter is
+/// transformed they keep their values on the design's bounds.
 ///
 /// References: Blatman and Sudret, *Adaptive sparse polynomial chaos expansion based on least angle
 /// regression*, Journal of Computational Physics 230 (2011) 2345; Efron, Hastie, Johnstone and
 /// Tibshirani, *Least angle regression*, Annals of Statistics 32 (2004) 407; Chapelle, Vapnik and
 /// Bengio, *Model selection for small sample regression*, Machine Learning 48 (2002) 9; Sudret,
 /// *Global sensitivity analysis using polynomial chaos expansions*, Reliability Engineering and System
-/// Safety 93 (2008) 964.
+/// Safety 93 (2008) 964. Families: Xiu and Karniadakis, SIAM Journal on Scientific Computing 24 (2002) 619; Gautschi,
+/// *Orthogonal Polynomials*, Oxford (2004); Ernst, Mugler, Starkloff and Ullmann, ESAIM: Mathematical Modelling and
+/// Numerical Analysis 46 (2012) 317 (what log-normal parameters cannot reach). Solvers: Pati, Rezaiifar and
+/// Krishnaprasad, 27th Asilomar Conference (1993) 40; Dai and Milenkovic, IEEE Transactions on Information Theory 55
+/// (2009) 2230; Tipping and Faul, 9th Workshop on Artificial Intelligence and Statistics (2003); Lüthen, Marelli and
+/// Sudret, SIAM/ASA Journal on Uncertainty Quantification 9 (2021) 593 (a comparison).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PolynomialChaos {

@@ -83,7 +83,9 @@ impl Recurrence {
             }
             let size = dot(&next, &next).sqrt();
             recurrence.sizes.push(size);
-            next.iter_mut().for_each(|x| *x /= size);
+            for x in &mut next {
+                *x /= size;
+            }
             vectors.push(next);
         }
         recurrence

@@ -98,7 +98,9 @@ impl Search<'_> {
                     states[o].take_norm(found);
                 }
             }
-            tried.iter().for_each(|&o| states[o].take_degree(self.options.early_stop.degrees));
+            for &o in &tried {
+                states[o].take_degree(self.options.early_stop.degrees);
+            }
             progress.add(count(&states) - reported);
             reported = count(&states);
         }

@@ -78,8 +78,8 @@ fn hermite_and_laguerre_polynomials_have_their_closed_forms() {
         let [z2, z3, z4] = [z * z, z.powi(3), z.powi(4)];
         let four = (z4 - 16.0 * z3 + 72.0 * z2 - 96.0 * z + 24.0) / 24.0;
         let expected = [
-            (2, (z2 - 4.0 * z + 2.0) / 2.0, z - 2.0),
-            (3, (z3 - 9.0 * z2 + 18.0 * z - 6.0) / 6.0, (z2 - 6.0 * z + 6.0) / 2.0),
+            (2, 0.5 * (z2 - 4.0 * z + 2.0), z - 2.0),
+            (3, (z3 - 9.0 * z2 + 18.0 * z - 6.0) / 6.0, 0.5 * (z2 - 6.0 * z + 6.0)),
             (4, four, (z3 - 12.0 * z2 + 36.0 * z - 24.0) / 6.0),
         ];
         agrees(&laguerre, z, &expected);
@@ -146,7 +146,7 @@ fn arbitrary_polynomials_have_the_moments_of_their_law() {
     // Source: skewness and kurtosis as in Johnson, Kotz and Balakrishnan, Continuous Univariate Distributions.
     let pi = std::f64::consts::PI;
     let (a, c, b) = (1.0, 2.0, 5.0_f64);
-    let spread = (a * a + b * b + c * c - a * b - a * c - b * c) as f64;
+    let spread = a * a + b * b + c * c - a * b - a * c - b * c;
     let skew = 2.0_f64.sqrt() * (a + b - 2.0 * c) * (2.0 * a - b - c) * (a - 2.0 * b + c)
         / (5.0 * spread.powf(1.5));
     let moment = |k: i32| (8.0_f64.powi(k) - 1.0) / (f64::from(k) * 8.0_f64.ln());

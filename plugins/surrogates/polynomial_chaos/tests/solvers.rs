@@ -222,7 +222,7 @@ fn k_fold_errors_are_those_of_parts_really_left_out() {
     let responses = ISHIGAMI.values(&points);
     for solver in [Solver::LeastAngleRegression, Solver::LeastSquares, Solver::SubspacePursuit] {
         let selection = Selection::KFold(7);
-        let options = PolynomialChaos { selection, solver, ..of_degree(5) };
+        let options = PolynomialChaos { solver, selection, ..of_degree(5) };
         let fit = fitted_to(&options, &parameters, &points, &responses).unwrap();
         let Criterion::Folds(folds) = Criterion::new(selection, 90, &Stream::root(1)) else {
             panic!("folds")

@@ -1,0 +1,91 @@
+"""The ratios beside the goals, from the figures of all jobs: `python table.py FOLDER`."""
+
+import json
+
+import numpy as np
+
+from common import FOLDER, HEADER
+
+ROWS = [["job", "peer", "peer, CPU s", "Lacuna, CPU s", "ratio", "goal", ""]]
+
+
+def figures(name):
+    """What a job wrote; nothing when it has not run."""
+    path = FOLDER / f"{name}.json"
+    return json.loads(path.read_text()) if path.exists() else None
+
+
+def row(job, peer, theirs, ours, goal, scale=1.0):
+    """A line with the ratio of two times, the second one scaled to equal error."""
+    ratio = theirs / (ours * scale)
+    verdict = "met" if ratio >= goal else "**missed**"
+    ROWS.append([job, peer, f"{theirs:.3g}", f"{ours:.3g}", f"{ratio:.3g}", f">= {goal}", verdict])
+
+
+def compare_errors(job, peer, theirs, ours):
+    """A line with the means of two errors."""
+    theirs, ours = np.mean(theirs), np.mean(ours)
+    verdict = "met" if ours <= theirs else "**missed**"
+    goal = "no worse"
+    ROWS.append([job, peer, f"{theirs:.4g}", f"{ours:.4g}", f"{theirs / ours:.3g}", goal, verdict])
+
+
+def expansions():
+    ours = figures("lacuna_polynomial_chaos")
+    if ours is None:
+        return
+    seconds, job = ours["cpu_seconds"], "sparse expansion, one output"
+    for name, peer, goal in [("openturns", "OpenTURNS", 100), ("sklearn", "scikit-learn", 20)]:
+        theirs = figures(f"{name}_polynomial_chaos")
+        if theirs is None:
+            continue
+        peer = f"{peer} {theirs['version']}"
+        row(job, peer, theirs["cpu_seconds_of_an_output"], seconds / ours["outputs"], goal)
+        same = np.array(ours["rmse"])[theirs["outputs"]]
+        compare_errors("its validation RMSE, microstrain", peer, theirs["rmse"], same)
+    row("sparse expansion, all 1000 outputs", "limit of 15 s", 15.0, seconds, 1)
+
+
+def ensembles():
+    ours, theirs = figures("lacuna_ensemble"), figures("emcee_ensemble")
+    if ours is None or theirs is None:
+        return
+    job, peer = "ensemble, 120 x 1200", f"emcee {theirs['version']}"
+    for kind, name, goal in [("sufficient", "sufficient statistics", 20), ("reduced", "QR", 5)]:
+        row(job, f"{peer}, {name}", theirs[kind]["cpu_seconds"], ours["cpu_seconds"], goal)
+
+
+def evaluations():
+    ours, theirs = figures("lacuna_evaluation"), figures("numpy_evaluation")
+    if ours is None or theirs is None:
+        return
+    best = [min(f["cpu_seconds_by_chunk"].values()) for f in (theirs, ours)]
+    peer = f"NumPy {theirs['version']}, differs by {theirs['difference']:.0e}"
+    row("100,000 evaluations of 1000 outputs", peer, *best, 2)
+
+
+def processes():
+    ours, theirs = figures("lacuna_gaussian_process"), figures("sklearn_gaussian_process")
+    if ours is None or theirs is None:
+        return
+    peer = f"scikit-learn {theirs['version']}"
+    row("Gaussian processes, 10 outputs", peer, theirs["cpu_seconds"], ours["cpu_seconds"], 5)
+    compare_errors("their validation RMSE, microstrain", peer, theirs["rmse"], ours["rmse"])
+
+
+def evidences():
+    ours, theirs = figures("lacuna_evidence"), figures("dynesty_evidence")
+    if ours is None or theirs is None:
+        return
+    error = max(ours["error"], ours["error_seen"])
+    peer = f"dynesty {theirs['version']}, error {theirs['error']:.2f} beside {error:.2f}"
+    scale = (error / theirs["error"]) ** 2
+    row("evidence, at equal error", peer, theirs["cpu_seconds"], ours["cpu_seconds"], 10, scale)
+
+
+for part in [expansions, ensembles, evaluations, processes, evidences]:
+    part()
+ROWS.insert(1, ["---"] * len(ROWS[0]))
+print(f"Problem: {HEADER['shapes']}")
+for cells in ROWS:
+    print("| " + " | ".join(cells) + " |")
