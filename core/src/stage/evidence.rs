@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
@@ -176,7 +177,7 @@ fn predictions(study: &Study, p: Predicting<'_>, draws: &Draws) -> Option<LeaveO
     let own = p.likelihood.hyperparameters().len();
     let responses = predict::responses(study, p.emulator, &chosen);
     let densities: Option<Vec<Vec<f64>>> = responses
-        .iter()
+        .par_iter()
         .enumerate()
         .map(|(i, response)| {
             let hyper = &chosen.row(i)[chosen.columns() - own..];

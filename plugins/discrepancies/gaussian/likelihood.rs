@@ -2,6 +2,7 @@
 
 use lacuna::data::Measurements;
 use lacuna::linalg::vector::dot;
+use lacuna::linalg::{self, Matrix};
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::Fact;
 use lacuna::plugin::discrepancy::{Compressed, Hyperparameter, Known, Likelihood, VariancePart};
@@ -78,30 +79,26 @@ impl GaussianLikelihood {
         self.law.variances(&self.spreads(), hyper, &residuals(&split))
     }
 
-    /// What the density of a value given all others takes from the common errors: for each measured output of a
-    /// group, at each of the variances, the error that the residuals suggest and by how much it shrinks.
-    fn shares(group: &Statistics, along: &[f64], nodes: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
-        let at = |&(v, _): &(f64, f64)| {
-            let mut sums = vec![(0.0, 0.0); group.measured.len()];
-            for ((row, a), l) in
-                group.directions.iter_rows().zip(along).zip(&group.spread.eigenvalues)
-            {
-                let share = l / (v + l);
-                for ((common, shrink), u) in sums.iter_mut().zip(row) {
-                    *common += u * share * a;
-                    *shrink += u * u * share;
-                }
-            }
-            sums
-        };
-        nodes.iter().map(at).collect()
+    /// What the density of a value given all others takes from the common errors: at each variance, for each
+    /// measured output of the group, the error that the residuals suggest and by how much it shrinks.
+    fn shares(group: &Statistics, along: &[f64], nodes: &[(f64, f64)]) -> (Matrix, Matrix) {
+        let values = &group.spread.eigenvalues;
+        let share =
+            Matrix::from_fn(nodes.len(), values.len(), |n, r| values[r] / (nodes[n].0 + values[r]));
+        let pulled =
+            Matrix::from_fn(share.rows(), share.columns(), |n, r| share[(n, r)] * along[r]);
+        let directions = &group.directions;
+        let squares = Matrix::from_fn(directions.rows(), directions.columns(), |r, k| {
+            directions[(r, k)] * directions[(r, k)]
+        });
+        (linalg::multiply(&pulled, directions), linalg::multiply(&share, &squares))
     }
 
     /// The log density of a value of the `k`-th measured output given all others, from its difference to the
     /// response.
     fn left_out_of(
         group: &Statistics,
-        shares: &[Vec<(f64, f64)>],
+        (common, shrink): &(Matrix, Matrix),
         scale: &[f64],
         k: usize,
         nodes: &[(f64, f64)],
@@ -110,12 +107,11 @@ impl GaussianLikelihood {
         let scale = scale[group.measured[k]];
         let count = group.weight[k].powi(2) * scale;
         // The density of a value given the others is one over the average of its own inverse density.
-        let inverse = |(&(v, p), shares): (&(f64, f64), &Vec<(f64, f64)>)| {
-            let (common, shrink) = shares[k];
-            let pull = (difference / scale.sqrt() - common / count.sqrt()) / v;
-            p * (-conditional(pull, (1.0 - shrink / count) / v)).exp()
+        let inverse = |(n, &(v, p)): (usize, &(f64, f64))| {
+            let pull = (difference / scale.sqrt() - common[(n, k)] / count.sqrt()) / v;
+            p * (-conditional(pull, (1.0 - shrink[(n, k)] / count) / v)).exp()
         };
-        -nodes.iter().zip(shares).map(inverse).sum::<f64>().ln() - 0.5 * scale.ln()
+        -nodes.iter().enumerate().map(inverse).sum::<f64>().ln() - 0.5 * scale.ln()
     }
 }
 
