@@ -106,6 +106,10 @@ fn plain_line(current: &Current, first: u64, done: u64) -> String {
     if rate == 0.0 {
         return format!("{stage}: {done}/{total} {unit}s");
     }
-    let left = total.saturating_sub(done) as f64 / rate;
+    if done > *total {
+        // A run that goes on until it has enough draws does not know when that is.
+        return format!("{stage}: {done} {unit}s, {rate:.1} {unit}s/s");
+    }
+    let left = (total - done) as f64 / rate;
     format!("{stage}: {done}/{total} {unit}s, {rate:.1} {unit}s/s, {left:.0} s left")
 }

@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
@@ -14,6 +15,7 @@ use crate::linalg::Matrix;
 use crate::plugin::sampler::Evidence;
 use crate::plugin::{Emulator, Likelihood};
 use crate::posterior::Posterior;
+use crate::report::number::significant;
 use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, RunDirectory, Stop, files};
 use crate::study::Study;
@@ -131,7 +133,7 @@ pub fn stage(
 fn summary(weighed: &Weighed) -> String {
     let evidence = weighed.evidence.as_ref();
     let mut parts: Vec<String> = evidence
-        .map(|e| format!("log evidence {:.2} ± {:.2}", e.log, e.error))
+        .map(|e| format!("log evidence {:.2} ± {}", e.log, significant(e.error, 2)))
         .into_iter()
         .collect();
     let loo = weighed.left_out.as_ref();
@@ -175,7 +177,7 @@ fn predictions(study: &Study, p: Predicting<'_>, draws: &Draws) -> Option<LeaveO
     let own = p.likelihood.hyperparameters().len();
     let responses = predict::responses(study, p.emulator, &chosen);
     let densities: Option<Vec<Vec<f64>>> = responses
-        .iter()
+        .par_iter()
         .enumerate()
         .map(|(i, response)| {
             let hyper = &chosen.row(i)[chosen.columns() - own..];

@@ -2,6 +2,7 @@
 
 use lacuna::data::Measurements;
 use lacuna::linalg::vector::dot;
+use lacuna::linalg::{self, Matrix};
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::Fact;
 use lacuna::plugin::discrepancy::{Compressed, Hyperparameter, Known, Likelihood, VariancePart};
@@ -78,11 +79,26 @@ impl GaussianLikelihood {
         self.law.variances(&self.spreads(), hyper, &residuals(&split))
     }
 
-    /// The log density of each value of a group given all others, by measured output: a function of
-    /// the value.
+    /// What the density of a value given all others takes from the common errors: at each variance, for each
+    /// measured output of the group, the error that the residuals suggest and by how much it shrinks.
+    fn shares(group: &Statistics, along: &[f64], nodes: &[(f64, f64)]) -> (Matrix, Matrix) {
+        let values = &group.spread.eigenvalues;
+        let share =
+            Matrix::from_fn(nodes.len(), values.len(), |n, r| values[r] / (nodes[n].0 + values[r]));
+        let pulled =
+            Matrix::from_fn(share.rows(), share.columns(), |n, r| share[(n, r)] * along[r]);
+        let directions = &group.directions;
+        let squares = Matrix::from_fn(directions.rows(), directions.columns(), |r, k| {
+            directions[(r, k)] * directions[(r, k)]
+        });
+        (linalg::multiply(&pulled, directions), linalg::multiply(&share, &squares))
+    }
+
+    /// The log density of a value of the `k`-th measured output given all others, from its difference to the
+    /// response.
     fn left_out_of(
         group: &Statistics,
-        along: &[f64],
+        (common, shrink): &(Matrix, Matrix),
         scale: &[f64],
         k: usize,
         nodes: &[(f64, f64)],
@@ -91,19 +107,11 @@ impl GaussianLikelihood {
         let scale = scale[group.measured[k]];
         let count = group.weight[k].powi(2) * scale;
         // The density of a value given the others is one over the average of its own inverse density.
-        let inverse = |&(v, p): &(f64, f64)| {
-            let (mut common, mut shrink) = (0.0, 0.0);
-            for ((row, a), l) in
-                group.directions.iter_rows().zip(along).zip(&group.spread.eigenvalues)
-            {
-                let share = l / (v + l);
-                common += row[k] * share * a;
-                shrink += row[k] * row[k] * share;
-            }
-            let pull = (difference / scale.sqrt() - common / count.sqrt()) / v;
-            p * (-conditional(pull, (1.0 - shrink / count) / v)).exp()
+        let inverse = |(n, &(v, p)): (usize, &(f64, f64))| {
+            let pull = (difference / scale.sqrt() - common[(n, k)] / count.sqrt()) / v;
+            p * (-conditional(pull, (1.0 - shrink[(n, k)] / count) / v)).exp()
         };
-        -nodes.iter().map(inverse).sum::<f64>().ln() - 0.5 * scale.ln()
+        -nodes.iter().enumerate().map(inverse).sum::<f64>().ln() - 0.5 * scale.ln()
     }
 }
 
@@ -165,10 +173,13 @@ impl Likelihood for GaussianLikelihood {
         for (g, group) in self.groups.iter().enumerate() {
             group.measured.iter().enumerate().for_each(|(k, &i)| place[i] = (g, k));
         }
+        let groups = self.groups.iter().zip(&split).zip(&nodes);
+        let shares: Vec<_> =
+            groups.map(|((group, (along, _)), nodes)| Self::shares(group, along, nodes)).collect();
         let one = |(i, y): (usize, f64)| {
             let (g, k) = place[i];
-            let (group, along) = (&self.groups[g], &split[g].0);
-            Self::left_out_of(group, along, &self.noise.scale, k, &nodes[g], y - response[i])
+            let (group, scale) = (&self.groups[g], &self.noise.scale);
+            Self::left_out_of(group, &shares[g], scale, k, &nodes[g], y - response[i])
         };
         Some(values(data).map(one).collect())
     }
