@@ -1,11 +1,11 @@
 //! Where a parameter sits in its family of polynomials.
 
 use lacuna::data::Parameter;
-use lacuna::linalg::lanes::Lanes;
+use lacuna::linalg::lanes::{LANES, Lanes};
 use lacuna::math::distribution::Distribution;
 use serde::{Deserialize, Serialize};
 
-use super::family::{Family, legendre, legendre_derivatives};
+use super::family::{Family, legendre, legendre_derivatives, legendre_lanes};
 use super::measure;
 use super::recurrence::Recurrence;
 
@@ -226,6 +226,14 @@ impl Coordinate {
 
     /// The polynomials of degree `0..table.len()` at some values of the parameter, side by side.
     pub fn values(&self, parameter: impl Iterator<Item = f64>, table: &mut [Lanes]) {
+        if self.family == Family::Legendre {
+            let mut z = [0.0; LANES];
+            for (z, x) in z.iter_mut().zip(parameter) {
+                *z = self.standard(x);
+            }
+            legendre_lanes(&z, table);
+            return;
+        }
         let mut values = vec![0.0; table.len()];
         for (l, x) in parameter.enumerate() {
             self.polynomials(self.standard(x), &mut values);

@@ -1,5 +1,6 @@
 //! Families of orthonormal polynomials in one variable.
 
+use lacuna::linalg::lanes::{LANES, Lanes};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::special::ln_gamma;
 use schemars::JsonSchema;
@@ -83,6 +84,29 @@ impl Family {
 pub(super) fn legendre(z: f64, values: &mut [f64]) {
     legendre_raw(z, values);
     normalise(values);
+}
+
+/// The same at several values side by side, with the same bits.
+pub(super) fn legendre_lanes(z: &Lanes, table: &mut [Lanes]) {
+    for n in 0..table.len() {
+        table[n] = match n {
+            0 => [1.0; LANES],
+            1 => *z,
+            _ => {
+                let m = n as f64;
+                let (last, before) = (table[n - 1], table[n - 2]);
+                std::array::from_fn(|l| {
+                    ((2.0 * m - 1.0) * z[l] * last[l] - (m - 1.0) * before[l]) / m
+                })
+            }
+        };
+    }
+    for (n, row) in table.iter_mut().enumerate() {
+        let size = ((2 * n + 1) as f64).sqrt();
+        for value in row {
+            *value *= size;
+        }
+    }
 }
 
 /// With the derivatives by `P'_{n+1} = P'_{n-1} + (2 n + 1) P_n`, which holds at the ends too.

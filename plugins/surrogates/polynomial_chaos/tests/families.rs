@@ -1,6 +1,7 @@
 //! Families of polynomials against their closed forms.
 
 use lacuna::linalg::Matrix;
+use lacuna::linalg::lanes::LANES;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::special::ln_gamma;
 
@@ -303,4 +304,17 @@ fn laws_with_few_moments_say_so() {
         fault,
         "the design of parameter `x1`: expected the lower bound below the upper, found [2, 2]"
     );
+}
+
+#[test]
+fn values_side_by_side_have_the_bits_of_single_ones() {
+    let coordinate = Coordinate::legendre(0.3, 1.7);
+    let points: Vec<f64> = (0..LANES).map(|l| -1.4 + 0.21 * l as f64).collect();
+    let mut table = [[0.0; LANES]; 21];
+    coordinate.values(points.iter().copied(), &mut table);
+    for (l, x) in points.iter().enumerate() {
+        let mut single = [0.0; 21];
+        coordinate.polynomials(coordinate.standard(*x), &mut single);
+        assert!(table.iter().zip(single).all(|(row, value)| row[l] == value));
+    }
 }
