@@ -94,6 +94,8 @@ pub struct Entry {
     pub loo_behind: Option<[f64; 2]>,
     /// How many of its predictions cannot be trusted.
     pub loo_unreliable: Option<f64>,
+    /// The time its stages took when they were made, in seconds.
+    pub seconds: Value,
 }
 
 /// Puts runs side by side.
@@ -148,6 +150,7 @@ fn entry(run: &Finished) -> Entry {
         loo: pair("loo", "elpd"),
         loo_behind: None,
         loo_unreliable: run.number(&["loo", "unreliable"]),
+        seconds: part("seconds"),
     }
 }
 

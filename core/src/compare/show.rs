@@ -15,6 +15,7 @@ pub fn text(comparison: &Comparison) -> String {
         ("standard deviation of a new replicate by origin", spread(comparison, &names)),
         ("surrogate and fit", errors(comparison, &names)),
         ("evidence and prediction", weights(comparison, &names)),
+        ("time", times(comparison, &names)),
     ] {
         if !table.is_empty() {
             parts.push(format!("{title}\n{}", table.text()));
@@ -142,5 +143,16 @@ fn weights(comparison: &Comparison, names: &[String]) -> Table {
     row(&mut table, "data predicted unreliably", "", runs, |run| {
         run.loo_unreliable.map(|count| format!("{count}"))
     });
+    table
+}
+
+/// The stages that a choice of components changes.
+fn times(comparison: &Comparison, names: &[String]) -> Table {
+    let mut table = table("stage", names);
+    for stage in ["surrogate", "calibrate", "evidence"] {
+        row(&mut table, stage, "s", &comparison.runs, |run| {
+            Some(significant(run.seconds.get(stage)?.as_f64()?, 2))
+        });
+    }
     table
 }

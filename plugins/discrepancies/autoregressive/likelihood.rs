@@ -241,6 +241,8 @@ impl Likelihood for AutoregressiveLikelihood {
         // Precision times residual, the diagonal of the precision, and precision times common factor.
         let (mut pull, mut precision) = (vec![0.0; cells], vec![0.0; cells]);
         let mut rows = Matrix::zeros(cells, rank);
+        // The outputs that were measured before and after.
+        let mut neighbours = vec![[None, None]; cells];
         let left = |k: usize, y: f64| {
             y - response[self.replicates.measured[k]] - dot(self.factor.row(k), &solved.zeta)
         };
@@ -254,7 +256,9 @@ impl Likelihood for AutoregressiveLikelihood {
             if let Some((j, x)) = before {
                 residual += b * left(place[j], x);
                 add_scaled(&mut whitened, b, self.factor.row(place[j]));
+                neighbours[cell][0] = Some(j);
                 let cell = r * outputs + j;
+                neighbours[cell][1] = Some(i);
                 pull[cell] += b * residual;
                 precision[cell] += b * b;
                 add_scaled(rows.row_mut(cell), b, &whitened);
@@ -263,12 +267,19 @@ impl Likelihood for AutoregressiveLikelihood {
             precision[cell] += a * a;
             add_scaled(rows.row_mut(cell), a, &whitened);
         });
+        // What the common errors explain is the same in all replicates in which a value has the same neighbours.
+        let mut explained: Vec<Vec<([Option<usize>; 2], f64)>> = vec![Vec::new(); outputs];
         let mut densities = Vec::new();
         for (r, replicate) in data.replicates.iter().enumerate() {
             for i in (0..outputs).filter(|&i| replicate.values[i].is_some()) {
                 let cell = r * outputs + i;
-                let explained = solved.capacitance.quadratic(rows.row(cell));
-                densities.push(conditional(pull[cell], precision[cell] - explained));
+                let found = explained[i].iter().find(|(own, _)| *own == neighbours[cell]);
+                let share = found.map(|(_, share)| *share).unwrap_or_else(|| {
+                    let share = solved.capacitance.quadratic(rows.row(cell));
+                    explained[i].push((neighbours[cell], share));
+                    share
+                });
+                densities.push(conditional(pull[cell], precision[cell] - share));
             }
         }
         Some(densities)

@@ -22,11 +22,29 @@ pub use data::Known;
 /// A log density written as an expression of the study's parameters.
 ///
 /// ```toml
+/// [study]
+/// title = "A straight line"
+///
+/// [[parameter]]
+/// name = "intercept"
+/// prior = { normal = [0.0, 10.0] }
+///
+/// [[parameter]]
+/// name = "slope"
+/// prior = { normal = [0.0, 10.0] }
+///
+/// [[parameter]]
+/// name = "sigma"
+/// prior = { half_normal = 1.0 }
+///
 /// [target]
 /// use = "expression"
 /// log_density = "sum(normal_log_density(y, line, sigma))"
 /// where = { line = "intercept + slope * x" }
 /// data = { x = [0.0, 1.0, 2.0], y = [0.9, 3.1, 5.0] }
+///
+/// [sampler]
+/// use = "no_u_turn"
 /// ```
 ///
 /// An expression has the usual operators and functions (`+ - * / ^`, comparisons, `and`, `or`, `not`, `if(condition,
