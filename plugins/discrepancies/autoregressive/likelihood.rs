@@ -274,11 +274,14 @@ impl Likelihood for AutoregressiveLikelihood {
             for i in (0..outputs).filter(|&i| replicate.values[i].is_some()) {
                 let cell = r * outputs + i;
                 let found = explained[i].iter().find(|(own, _)| *own == neighbours[cell]);
-                let share = found.map(|(_, share)| *share).unwrap_or_else(|| {
+                let known = found.map(|(_, share)| *share);
+                let share = if let Some(share) = known {
+                    share
+                } else {
                     let share = solved.capacitance.quadratic(rows.row(cell));
                     explained[i].push((neighbours[cell], share));
                     share
-                });
+                };
                 densities.push(conditional(pull[cell], precision[cell] - share));
             }
         }
