@@ -86,27 +86,8 @@ fn findings(study: &Study, all: &Artifacts<'_>, run: &RunDirectory) -> Findings 
 }
 
 fn components(study: &Study) -> Vec<(String, String)> {
-    let mut list = Vec::new();
-    macro_rules! name {
-        ($($field:ident),+) => {
-            $(if let Some(section) = &study.$field {
-                list.push((stringify!($field).to_owned(), section.built.name.to_owned()));
-            })+
-        };
-    }
-    name!(
-        target,
-        model,
-        design,
-        executor,
-        simulations,
-        measurements,
-        surrogate,
-        discrepancy,
-        sampler
-    );
-    list.extend(study.effects.iter().map(|e| ("effect".to_owned(), e.built.name.to_owned())));
-    list
+    let chosen = study.components().into_iter();
+    chosen.map(|chosen| (chosen.section.to_owned(), chosen.name.to_owned())).collect()
 }
 
 fn ensemble(study: &Study, data: &Data) -> EnsembleFindings {

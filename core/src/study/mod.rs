@@ -1,5 +1,6 @@
 //! The study language: from TOML text to a study that can be run.
 
+pub mod components;
 mod context;
 pub mod decode;
 pub mod emit;
@@ -15,9 +16,11 @@ pub mod resolve;
 mod resolved;
 pub mod response;
 pub mod schema;
+mod sections;
 pub mod source;
 pub mod values;
 
+pub use components::Chosen;
 pub use decode::{decode, decode_beside};
 pub use node::{Key, Node, Value};
 pub use problem::{Complaints, Problem, Problems};

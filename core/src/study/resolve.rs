@@ -11,13 +11,17 @@ use super::context;
 use super::decode::{decode, fields};
 use super::file::{
     DesignKeys, DiscrepancyKeys, MeasurementKeys, ModelKeys, NumericalErrorSection,
-    ParameterSection, ResponseSection, SamplerKeys, StudySection, SurrogateKeys, ValidateSection,
+    ResponseSection, SamplerKeys, StudySection, SurrogateKeys, ValidateSection,
 };
-use super::{Complaints, Node, Problems, Sources, inherit, overrides, resolved};
+use super::sections::{
+    chosen, chosen_or, effects, layout, numerical_error, parameter, parameters, table,
+    unknown_sections,
+};
+use super::{Node, Problems, Sources, inherit, overrides, resolved};
 use crate::data::{Layout, Parameter};
-use crate::plugin::registry::{Kind, NoKeys, Section, section};
+use crate::plugin::registry::{NoKeys, Section};
 use crate::plugin::{
-    Context, Density, Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate,
+    Density, Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate,
 };
 
 /// A study that can be run.
@@ -231,203 +235,9 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
     Some(study)
 }
 
-fn unknown_sections(root: &Node, problems: &mut Problems) {
-    for (key, _) in root.entries() {
-        if !SECTIONS.contains(&key.name.as_str()) {
-            let problem =
-                problems.report(Some(key.place.clone()), format!("unknown section `{}`", key.name));
-            problem.expected(super::nearest::one_of(SECTIONS));
-            if let Some(near) = super::nearest::nearest(&key.name, SECTIONS) {
-                problem.help(format!("did you mean `{near}`?"));
-            }
-        }
-    }
-}
-
-fn table<T: serde::de::DeserializeOwned>(
-    root: &Node,
-    name: &str,
-    problems: &mut Problems,
-) -> Option<T> {
-    let Some(node) = root.get(name) else {
-        problems.report(Some(root.place.clone()), format!("the study has no `[{name}]`"));
-        return None;
-    };
-    problems.within(name, |problems| decode(node, problems))
-}
-
-fn chosen<K: Kind + ?Sized, C: serde::de::DeserializeOwned>(
-    root: &Node,
-    name: &str,
-    default: Option<&str>,
-    problems: &mut Problems,
-) -> Option<Section<K, C>> {
-    let node = root.get(name)?;
-    problems.within(name, |problems| section(node, default, problems))
-}
-
-/// A section that is there even when it is not written.
-fn chosen_or<K: Kind + ?Sized, C: serde::de::DeserializeOwned>(
-    root: &Node,
-    name: &str,
-    default: &str,
-    problems: &mut Problems,
-) -> Option<Section<K, C>> {
-    let unwritten = Node::table(root.place.clone());
-    let node = root.get(name).unwrap_or(&unwritten);
-    problems.within(name, |problems| section(node, Some(default), problems))
-}
-
-fn parameters(root: &Node, problems: &mut Problems) -> Option<Vec<ParameterSection>> {
-    let list = root.get("parameter").map(Node::elements).unwrap_or_default();
-    if list.is_empty() {
-        let place = root.get("parameter").map_or(&root.place, |node| &node.place).clone();
-        problems
-            .report(Some(place), "the study has no unknowns")
-            .expected("at least one `[[parameter]]` with `name` and `prior`");
-        return None;
-    }
-    let decoded: Vec<Option<ParameterSection>> = list
-        .iter()
-        .map(|node| {
-            let name = format!("parameter.{}", node.name().unwrap_or("?"));
-            problems.within(&name, |problems| decode(node, problems))
-        })
-        .collect();
-    decoded.into_iter().collect()
-}
-
-/// `[numerical_error]`: the study's model with some options changed.
-fn numerical_error(root: &Node, problems: &mut Problems) -> Option<NumericalError> {
-    let node = root.get("numerical_error")?;
-    problems.within("numerical_error", |problems| {
-        let written: NumericalErrorSection = decode(node, problems)?;
-        let Some(base) = root.get("model") else {
-            problems.report(Some(node.place.clone()), "the study has no model to run finer");
-            return None;
-        };
-        let mut finer = base.clone();
-        overlay(&mut finer, node.get("model")?);
-        let model = problems.within("model", |problems| section(&finer, None, problems))?;
-        Some(NumericalError { runs: written.runs.get(), model, written })
-    })
-}
-
-/// Puts the values of `over` in the place of those of `base`, table by table.
-fn overlay(base: &mut Node, over: &Node) {
-    for (key, value) in over.entries() {
-        match base.get_mut(&key.name) {
-            Some(old) if !old.entries().is_empty() && !value.entries().is_empty() => {
-                overlay(old, value);
-            }
-            _ => base.set(key.clone(), value.clone()),
-        }
-    }
-}
-
-fn effects(root: &Node, problems: &mut Problems) -> Option<Vec<Section<dyn Effect, NoKeys>>> {
-    let list = root.get("effect").map(Node::elements).unwrap_or_default();
-    let decoded: Vec<Option<_>> = list
-        .iter()
-        .map(|node| problems.within("effect", |problems| section(node, None, problems)))
-        .collect();
-    decoded.into_iter().collect()
-}
-
-fn parameter(section: &ParameterSection) -> Parameter {
-    let name = section.name.as_str().to_owned();
-    Parameter {
-        symbol: section.symbol.clone().unwrap_or_else(|| name.clone()),
-        name,
-        unit: section.unit.clone(),
-        design: section.design.clone().unwrap_or_else(|| section.prior.clone()),
-        prior: section.prior.clone(),
-        reference: section.reference,
-    }
-}
-
-fn layout(section: &ResponseSection, root: &Node, problems: &mut Problems) -> Option<Layout> {
-    let mut axes = Vec::new();
-    let node = root.get("response")?;
-    problems.within("response", |problems| {
-        for (name, axis) in &section.axes.0 {
-            let path = format!("axes.{}", name.as_str());
-            match axis.axis(name.as_str()) {
-                Ok(axis) => axes.push(axis),
-                Err(reason) => {
-                    let message = format!("the axis `{}`: {reason}", name.as_str());
-                    Complaints::new(node, problems).at(&path).say(message);
-                }
-            }
-        }
-    });
-    let whole = axes.len() == section.axes.0.len();
-    let name = section.name.as_str().to_owned();
-    whole.then(|| Layout { name, unit: section.unit.clone(), axes })
-}
-
 /// Third layer: what the plugins need of the machine.
 fn environment(study: &Study, root: &Node, problems: &mut Problems) {
     study.each_plugin(root, problems, |component, context, complaints| {
         component.environment(context, complaints);
     });
-}
-
-impl Study {
-    /// What a plugin sees of the study.
-    pub fn context(&self) -> Context<'_> {
-        let made = self.design.as_ref().map(|design| design.common.runs.get());
-        let kept = self.surrogate.as_ref().map_or(0, |s| s.common.validation);
-        let training = self.surrogate.as_ref().and_then(|s| s.common.training).map(usize::from);
-        let runs = training.or_else(|| made.map(|made| made.saturating_sub(kept)));
-        Context {
-            directory: &self.directory,
-            parameters: &self.parameters,
-            layout: &self.layout,
-            runs,
-        }
-    }
-
-    /// Calls `look` for every plugin with complaints about its own section.
-    pub(super) fn each_plugin(
-        &self,
-        root: &Node,
-        problems: &mut Problems,
-        look: impl Fn(&dyn crate::plugin::Component, &Context<'_>, &mut Complaints<'_>),
-    ) {
-        let context = self.context();
-        let mut visit =
-            |name: &str, node: Option<&Node>, component: &dyn crate::plugin::Component| {
-                let unwritten = Node::table(root.place.clone());
-                let node = node.unwrap_or(&unwritten);
-                problems.within(name, |problems| {
-                    look(component, &context, &mut Complaints::new(node, problems));
-                });
-            };
-        macro_rules! visit_sections {
-            ($($field:ident),+) => {
-                $(if let Some(section) = &self.$field {
-                    visit(stringify!($field), root.get(stringify!($field)), &*section.built.plugin);
-                })+
-            };
-        }
-        visit_sections!(
-            target,
-            model,
-            design,
-            executor,
-            simulations,
-            measurements,
-            surrogate,
-            discrepancy,
-            sampler
-        );
-        let nodes = root.get("effect").map(Node::elements).unwrap_or_default();
-        for (section, node) in self.effects.iter().zip(nodes) {
-            visit("effect", Some(node), &*section.built.plugin);
-        }
-        if let Some(finer) = &self.numerical_error {
-            visit("numerical_error", root.get("numerical_error"), &*finer.model.built.plugin);
-        }
-    }
 }

@@ -294,38 +294,3 @@ fn mixture_of_two_normal_laws() {
     };
     is(&*bound, formula, &[vec![-2.73, 2.87, 1.03, 1.02, 0.62], vec![-2.0, 2.0, 1.5, 0.7, 0.4]]);
 }
-
-/// Prints the time of one evaluation and one gradient; for people.
-#[test]
-#[ignore = "a measurement"]
-fn speed() {
-    let time = |what: &str, count: usize, run: &mut dyn FnMut()| {
-        let start = std::time::Instant::now();
-        run();
-        println!("{what}: {:.1} ns", start.elapsed().as_secs_f64() * 1e9 / count as f64);
-    };
-    let n = 434;
-    let x: Vec<f64> = (0..n).map(|i| 1.0 + 0.01 * f64::from(i)).collect();
-    let y: Vec<f64> = x.iter().map(|x| 1.0 + 2.0 * x + x.sin()).collect();
-    let data = [("x", Data::Vector(x)), ("y", Data::Vector(y))];
-    let regression = "sum(normal_log_density(y, a + b * x, s))";
-    let names = ["a", "b", "s"];
-    for (what, text, data) in [
-        ("polynomial (14 operations)", "-(1 - a)^2 - 100 * (b - a^2)^2 - (s - b^2)^2 / 3", &[][..]),
-        ("scalar with exp, log, sin", "-0.5 * exp(-a * b) + log(s) - sin(a)^2 / (1 + b^2)", &[]),
-        ("regression of 434 data", regression, &data),
-    ] {
-        let mut density = target(text, &[], data);
-        density.includes_prior = false;
-        let bound = density.bind(&parameters(&names)).unwrap();
-        let points = Matrix::from_fn(4096, 3, |i, j| 0.5 + 1e-4 * i as f64 + 0.1 * j as f64);
-        let mut sum = 0.0;
-        time(&format!("{what}, batch"), 4096 * 10, &mut || {
-            (0..10).for_each(|_| sum += bound.log_density(&points)[17]);
-        });
-        time(&format!("{what}, gradient"), 4096, &mut || {
-            points.iter_rows().for_each(|point| sum += bound.gradient(point).1[0]);
-        });
-        assert!(sum.is_finite());
-    }
-}

@@ -1,0 +1,75 @@
+//! The plugins that a study chose.
+
+use super::resolve::Study;
+use super::{Complaints, Node, Problems};
+use crate::plugin::{Component, Context};
+
+/// A plugin that a study chose.
+pub struct Chosen<'a> {
+    /// Its section: `"sampler"`.
+    pub section: &'static str,
+    /// Its name: `"nested"`.
+    pub name: &'static str,
+    /// The plugin with its options.
+    pub plugin: &'a dyn Component,
+}
+
+impl Study {
+    /// What a plugin sees of the study.
+    pub fn context(&self) -> Context<'_> {
+        let made = self.design.as_ref().map(|design| design.common.runs.get());
+        let kept = self.surrogate.as_ref().map_or(0, |s| s.common.validation);
+        let training = self.surrogate.as_ref().and_then(|s| s.common.training).map(usize::from);
+        let runs = training.or_else(|| made.map(|made| made.saturating_sub(kept)));
+        Context {
+            directory: &self.directory,
+            parameters: &self.parameters,
+            layout: &self.layout,
+            runs,
+        }
+    }
+
+    /// The plugins of all sections in the order in which a study is written; every `[[effect]]` is one.
+    pub fn components(&self) -> Vec<Chosen<'_>> {
+        let mut all = Vec::new();
+        macro_rules! add {
+            ($($section:ident),+) => {
+                $(if let Some(section) = &self.$section {
+                    let (name, plugin) = (section.built.name, &*section.built.plugin);
+                    all.push(Chosen { section: stringify!($section), name, plugin });
+                })+
+            };
+        }
+        add!(target, model, design, executor, simulations, measurements, surrogate, discrepancy);
+        add!(sampler);
+        all.extend(self.effects.iter().map(|effect| {
+            let (name, plugin) = (effect.built.name, &*effect.built.plugin);
+            Chosen { section: "effect", name, plugin }
+        }));
+        all
+    }
+
+    /// Calls `look` for every plugin with complaints about its own section.
+    pub(super) fn each_plugin(
+        &self,
+        root: &Node,
+        problems: &mut Problems,
+        look: impl Fn(&dyn Component, &Context<'_>, &mut Complaints<'_>),
+    ) {
+        let context = self.context();
+        let unwritten = Node::table(root.place.clone());
+        let mut effects = root.get("effect").map(Node::elements).unwrap_or_default().iter();
+        let finer = self.numerical_error.as_ref().map(|error| Chosen {
+            section: "numerical_error",
+            name: error.model.built.name,
+            plugin: &*error.model.built.plugin,
+        });
+        for Chosen { section, plugin, .. } in self.components().into_iter().chain(finer) {
+            let node = if section == "effect" { effects.next() } else { root.get(section) };
+            problems.within(section, |problems| {
+                let complaints = &mut Complaints::new(node.unwrap_or(&unwritten), problems);
+                look(plugin, &context, complaints);
+            });
+        }
+    }
+}
