@@ -4,7 +4,7 @@ use crate::data::Layout;
 use crate::linalg::{Matrix, transposed_multiply_vector};
 use crate::plugin::discrepancy::Compressed;
 use crate::plugin::surrogate::Linear;
-use crate::plugin::{Effect, Emulator, Hyperparameter, Likelihood};
+use crate::plugin::{Effect, Emulator, Fact, Hyperparameter, Likelihood};
 
 use super::LogLikelihood;
 
@@ -105,5 +105,9 @@ impl LogLikelihood for Emulated<'_> {
         }
         let by_theta = transposed_multiply_vector(&self.emulator.jacobian(theta), &weight);
         [by_theta, by_effects, by_own].concat()
+    }
+
+    fn facts(&self) -> Vec<Fact> {
+        self.likelihood.facts()
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::data::Parameter;
 use crate::linalg::Matrix;
-use crate::plugin::Hyperparameter;
 use crate::plugin::density::BoundDensity;
+use crate::plugin::{Fact, Hyperparameter};
 
 use super::LogLikelihood;
 
@@ -46,5 +46,9 @@ impl LogLikelihood for Given<'_> {
             *slope -= p.prior.log_density_derivative(x);
         }
         gradient
+    }
+
+    fn facts(&self) -> Vec<Fact> {
+        self.density.facts()
     }
 }

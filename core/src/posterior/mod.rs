@@ -11,7 +11,7 @@ use crate::data::Parameter;
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::math::random::{Stream, uniform};
-use crate::plugin::{Hyperparameter, Target};
+use crate::plugin::{Fact, Hyperparameter, Target};
 
 mod emulated;
 mod given;
@@ -33,6 +33,9 @@ pub trait LogLikelihood: Sync {
 
     /// Its derivatives at one point, by the parameters and then by the hyperparameters.
     fn gradient(&self, theta: &[f64], hyper: &[f64]) -> Vec<f64>;
+
+    /// What is worth telling.
+    fn facts(&self) -> Vec<Fact>;
 }
 
 /// The posterior of a study.
@@ -61,6 +64,11 @@ impl<'a> Posterior<'a> {
     /// The model's parameters.
     pub fn parameters(&self) -> &[Parameter] {
         self.parameters
+    }
+
+    /// What is worth telling of the likelihood.
+    pub fn facts(&self) -> Vec<Fact> {
+        self.likelihood.facts()
     }
 
     /// The unknowns beside the model's parameters.

@@ -1,7 +1,7 @@
 //! The closing summary that a terminal shows after a run.
 
 use super::findings::Findings;
-use super::section::{accuracy_table, group_word, headline, posterior_table};
+use super::section::{accuracy_table, evidence, group_word, headline, posterior_table};
 
 /// The result of a run in plain text: warnings, what came out, the posterior, the accuracy.
 pub fn summary_text(findings: &Findings) -> String {
@@ -14,6 +14,10 @@ pub fn summary_text(findings: &Findings) -> String {
     parts.push(headline::sentences(findings).join("\n") + "\n");
     if let Some(calibration) = &findings.calibration {
         parts.push(posterior_table(calibration).text());
+        let evidence = evidence::sentences(calibration);
+        if !evidence.is_empty() {
+            parts.push(evidence.join("\n") + "\n");
+        }
     }
     if let Some(validation) = findings.validation.as_ref().filter(|v| !v.cases.is_empty()) {
         let title = "points inside the replicates' 95 % interval";

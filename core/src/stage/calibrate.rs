@@ -291,7 +291,7 @@ fn calibrate(
         acceptance: sampled.acceptance,
         diagnosis,
         evaluations: sampled.state.evaluations,
-        facts: [section.built.plugin.facts(), harvested].concat(),
+        facts: [posterior.facts(), section.built.plugin.facts(), harvested].concat(),
         evidence,
     };
     Ok(Calibrated { draws, outcome })

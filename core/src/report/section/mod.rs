@@ -1,6 +1,7 @@
 //! The sections of the report, one a file; each is left out when the run has nothing for it.
 
 mod ensemble;
+pub mod evidence;
 pub mod headline;
 mod measurements;
 mod overview;
@@ -28,6 +29,7 @@ pub fn all(findings: &Findings, numbers: &mut Numbers) -> Vec<Section> {
         surrogate::section(findings, numbers),
         sampling::section(findings, numbers),
         posterior::section(findings, numbers),
+        evidence::section(findings),
         validation::section(findings, numbers),
         timing::section(findings, numbers),
     ];
