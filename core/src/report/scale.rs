@@ -277,7 +277,7 @@ fn pretty(unit: &str) -> String {
         } else {
             text.push_str(&superscript(&exponent));
             exponent.clear();
-            after_letter = c.is_alphabetic();
+            after_letter = c.is_alphabetic() || c == ')';
             text.push(c);
         }
     }
@@ -354,6 +354,7 @@ mod tests {
         assert_eq!(shown("strain", 3e-4), "x [microstrain]");
         assert_eq!(shown("1", 0.5), "x");
         assert_eq!(shown("strain^2", 1e-9), "x [10⁻⁹ strain²]");
+        assert_eq!(shown("(m3/d)^2", 25.0), "x [(m³/d)²]");
         assert_eq!(shown("1/s", 25.0), "x [1/s]");
         assert_eq!(shown("kPa", 3.0), "x [kPa]");
         assert_eq!(shown("Pa", 0.0), "x [Pa]");
