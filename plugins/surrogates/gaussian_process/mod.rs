@@ -125,12 +125,7 @@ impl GaussianProcess {
 
 impl Component for GaussianProcess {
     fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        for (key, message) in self.settings().faults() {
-            complaints.at(key).say(message);
-        }
-        for message in context.parameters.iter().filter_map(|p| Standard::of(p).err()) {
-            complaints.at("use").say(message);
-        }
+        self.settings().check(context, complaints);
     }
 }
 

@@ -2,8 +2,10 @@
 
 use lacuna::linalg::{Matrix, multiply};
 use lacuna::math::random::Stream;
+use lacuna::plugin::Context;
 use lacuna::plugin::surrogate::{FitError, Training};
 use lacuna::run::{Progress, Stop};
+use lacuna::study::problem::Complaints;
 use rayon::prelude::*;
 
 use super::emulator::{Kriging, condition};
@@ -57,8 +59,18 @@ impl Trends {
 const ROUND_OFF: f64 = 1e-13;
 
 impl Settings {
+    /// Complains about what is wrong with the options, and about designs that have no standard variable.
+    pub fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        for (key, message) in self.faults() {
+            complaints.at(key).say(message);
+        }
+        for message in context.parameters.iter().filter_map(|p| Standard::of(p).err()) {
+            complaints.at("use").say(message);
+        }
+    }
+
     /// What is wrong with the settings: the option, and in words.
-    pub fn faults(&self) -> Vec<(&'static str, String)> {
+    fn faults(&self) -> Vec<(&'static str, String)> {
         let mut faults = self.bounds.faults();
         faults.extend(self.components.fault().map(|words| ("components", words)));
         faults.extend(self.nugget.fault().map(|words| ("nugget", words)));

@@ -155,12 +155,7 @@ impl PolynomialChaosKriging {
 
 impl Component for PolynomialChaosKriging {
     fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        for (key, message) in self.settings().faults() {
-            complaints.at(key).say(message);
-        }
-        for message in context.parameters.iter().filter_map(|p| Standard::of(p).err()) {
-            complaints.at("use").say(message);
-        }
+        self.settings().check(context, complaints);
         self.trend.check_within("trend", context, complaints);
     }
 }

@@ -1,7 +1,8 @@
 //! The design as a matrix of scatter plots, with the box where the prior looks.
 
 use super::scatter::dots;
-use super::{Axis, Frame, WIDTH};
+use super::triangle::{Cell, triangle};
+use super::{Axis, Frame};
 use crate::report::curve::Histogram;
 use crate::report::scale::{extent, padded};
 use crate::report::svg::{Anchor, Area, Svg};
@@ -32,23 +33,13 @@ pub fn design_matrix(
     description: &str,
 ) -> String {
     let n = columns.len().min(MOST_CROSSED);
-    let grid = Grid::new(n);
-    let mut svg = Svg::new(WIDTH, grid.height());
-    let axes: Vec<Axis> = columns.iter().map(axis).collect();
-    for row in 0..n {
-        for column in 0..=row {
-            let area = grid.cell(row, column);
-            let x = axes[column].shown(row + 1 == n);
-            if row == column {
-                draw_diagonal(&mut svg, area, &columns[row], &axes[row], &x);
-                continue;
-            }
-            let frame = Frame::new(area, &axes[column], &axes[row]);
-            frame.axes(&mut svg, &x, &axes[row].shown(column == 0));
-            draw_pair(&mut svg, &frame, (&columns[column], &columns[row]), classes);
+    let axes: Vec<Axis> = columns[..n].iter().map(axis).collect();
+    triangle(&axes, description, |svg, cell| match cell {
+        Cell::Diagonal { index, area, shown } => {
+            draw_diagonal(svg, area, &columns[index], &axes[index], &shown);
         }
-    }
-    svg.finish(description)
+        Cell::Pair { x, y, frame } => draw_pair(svg, &frame, (&columns[x], &columns[y]), classes),
+    })
 }
 
 fn axis(column: &DesignColumn) -> Axis {
@@ -104,36 +95,4 @@ fn draw_diagonal(svg: &mut Svg, area: Area, column: &DesignColumn, domain: &Axis
         svg.rectangle("s-box", Area::new(left, area.y, right - left, area.height), "");
     }
     svg.text("panel-title", (area.x, area.y - 5.0), Anchor::Start, &column.label);
-}
-
-/// Square cells of a lower triangle.
-pub struct Grid {
-    n: usize,
-    side: f64,
-    left: f64,
-}
-
-impl Grid {
-    const GAP: f64 = 24.0;
-
-    /// The cells for `n` columns.
-    pub fn new(n: usize) -> Self {
-        let most = if n <= 3 { 210.0 } else { 180.0 };
-        let n_float = n.max(1) as f64;
-        let side = ((WIDTH - 80.0 - Self::GAP * (n_float - 1.0)) / n_float).min(most);
-        let width = side * n_float + Self::GAP * (n_float - 1.0);
-        Self { n, side, left: ((WIDTH - width) / 2.0).max(68.0) }
-    }
-
-    /// The height of the whole drawing.
-    pub fn height(&self) -> f64 {
-        20.0 + (self.side + Self::GAP) * self.n.max(1) as f64 + 26.0
-    }
-
-    /// The cell in this row and column.
-    pub fn cell(&self, row: usize, column: usize) -> Area {
-        let step = self.side + Self::GAP;
-        let (x, y) = (self.left + step * column as f64, 18.0 + step * row as f64);
-        Area::new(x, y, self.side, self.side)
-    }
 }

@@ -9,6 +9,7 @@ mod pairs;
 mod rows;
 mod scatter;
 mod trace;
+mod triangle;
 
 pub use bars::{BarChart, BarSeries, Level};
 pub use design::{DesignColumn, MOST_CROSSED, design_matrix};

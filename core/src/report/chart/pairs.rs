@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::design::Grid;
-use super::{Axis, Frame, Mark, WIDTH};
+use super::triangle::{Cell, triangle};
+use super::{Axis, Frame, Mark};
 use crate::report::curve::{quantile, smooth_density, sorted};
 use crate::report::scale::{extent, padded};
 use crate::report::svg::{Anchor, Area, Path, Svg};
@@ -30,26 +30,16 @@ const SHADES: usize = 6;
 /// Every pair of coordinates below the diagonal.
 pub fn pair_matrix(columns: &[PairColumn], description: &str) -> String {
     let n = columns.len().min(MOST_PAIRED);
-    let grid = Grid::new(n);
-    let mut svg = Svg::new(WIDTH, grid.height());
-    let axes: Vec<Axis> = columns.iter().map(axis).collect();
-    for row in 0..n {
-        for column in 0..=row {
-            let area = grid.cell(row, column);
-            let x = axes[column].shown(row + 1 == n);
-            if row == column {
-                draw_density(&mut svg, area, &columns[row], &axes[row], &x);
-                continue;
-            }
-            let frame = Frame::new(area, &axes[column], &axes[row]);
-            frame.axes(&mut svg, &x, &axes[row].shown(column == 0));
-            svg.clipped(area, |svg| {
-                draw_hexagons(svg, &frame, &columns[column].draws, &columns[row].draws);
-                draw_marks(svg, &frame, &columns[column].marks, &columns[row].marks);
-            });
+    let axes: Vec<Axis> = columns[..n].iter().map(axis).collect();
+    triangle(&axes, description, |svg, cell| match cell {
+        Cell::Diagonal { index, area, shown } => {
+            draw_density(svg, area, &columns[index], &axes[index], &shown);
         }
-    }
-    svg.finish(description)
+        Cell::Pair { x, y, frame } => svg.clipped(frame.area, |svg| {
+            draw_hexagons(svg, &frame, &columns[x].draws, &columns[y].draws);
+            draw_marks(svg, &frame, &columns[x].marks, &columns[y].marks);
+        }),
+    })
 }
 
 /// All but the outermost thousandth, so that a few stray draws do not shrink the rest.
