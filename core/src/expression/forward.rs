@@ -62,6 +62,17 @@ pub(super) fn step<const L: usize>(
                 }
             }
         }
+        Action::Recurrence(start, factor, input) => {
+            let (factor, input) = (get(*factor), get(*input));
+            let mut last = get(*start)[0];
+            for (i, out) in out.iter_mut().enumerate() {
+                let (f, u) = (element(factor, i), &input[i]);
+                for l in 0..L {
+                    last[l] = f[l] * last[l] + u[l];
+                }
+                *out = last;
+            }
+        }
         Action::Interpolate(curve, a) => {
             let curve = &tables.curves[*curve];
             for (out, a) in out.iter_mut().zip(get(*a)) {

@@ -31,6 +31,7 @@ pub(super) enum Action {
     Dot,
     Length,
     MatrixProduct,
+    Recurrence,
     Interpolate,
     Density(Density),
 }
@@ -84,7 +85,7 @@ const fn density(
 
 const MORE: &str = "…";
 
-static FUNCTIONS: [Function; 46] = [
+static FUNCTIONS: [Function; 47] = [
     unary("abs", "the magnitude", Unary::Abs),
     unary("sign", "-1, 0 or 1", Unary::Sign),
     unary("sqrt", "the square root", Unary::Sqrt),
@@ -138,6 +139,13 @@ static FUNCTIONS: [Function; 46] = [
         &["matrix", "vector"],
         "the product of a matrix of data and a vector",
         Action::MatrixProduct,
+    ),
+    function(
+        "recurrence",
+        &["start", "factor", "input"],
+        "the vector of `z[i] = factor * z[i - 1] + input[i]`, with `start` before its first element; the factor \
+         is one number or a vector as long as the input",
+        Action::Recurrence,
     ),
     function(
         "interpolate",

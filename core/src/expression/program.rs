@@ -48,6 +48,8 @@ pub(super) enum Action {
     Join(Vec<Place>),
     /// The product with one of `Tables::matrices`.
     MatrixProduct(usize, Place),
+    /// Start, factor, input: each element is the factor times the one before, plus the input.
+    Recurrence(Place, Place, Place),
     /// The height of one of `Tables::curves`.
     Interpolate(usize, Place),
 }
@@ -91,7 +93,7 @@ impl Action {
             | Self::MatrixProduct(_, a)
             | Self::Interpolate(_, a) => vec![*a],
             Self::Binary(_, a, b) => vec![*a, *b],
-            Self::Select(a, b, c) => vec![*a, *b, *c],
+            Self::Select(a, b, c) | Self::Recurrence(a, b, c) => vec![*a, *b, *c],
             Self::Join(parts) => parts.clone(),
         }
     }

@@ -118,6 +118,9 @@ impl<'a> Step<'a> {
                     into.iter_mut().zip(row).for_each(|(into, x)| *into += w * x);
                 }
             }
+            Action::Recurrence(start, factor, input) => {
+                self.recurrence(*start, *factor, *input, adjoints);
+            }
             Action::Interpolate(curve, a) => {
                 let curve = &self.program.tables.curves[*curve];
                 for ((i, x), w) in a.range().zip(self.get(*a)).zip(self.weights) {
@@ -151,6 +154,25 @@ impl<'a> Step<'a> {
                 adjoints[chosen.start + if chosen.length == 1 { 0 } else { i }] += w;
             }
         }
+    }
+
+    /// Each element passes to the one before what it was given itself and what the one behind has passed.
+    fn recurrence(&self, start: Place, factor: Place, input: Place, adjoints: &mut [f64]) {
+        let factors = self.get(factor);
+        let mut add = |place: Place, i: usize, share: f64| {
+            if !place.constant {
+                adjoints[place.start + if place.length == 1 { 0 } else { i }] += share;
+            }
+        };
+        let mut weight = 0.0;
+        for i in (0..self.weights.len()).rev() {
+            weight += self.weights[i];
+            let before = if i == 0 { self.get(start)[0][0] } else { self.result[i - 1][0] };
+            add(input, i, weight);
+            add(factor, i, weight * before);
+            weight *= factors[if factors.len() == 1 { 0 } else { i }][0];
+        }
+        add(start, 0, weight);
     }
 
     fn reduce(&self, reduction: Reduction, a: Place, adjoints: &mut [f64]) {

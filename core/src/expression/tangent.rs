@@ -98,6 +98,17 @@ impl<'a> Step<'a> {
                     *out = row.iter().enumerate().map(|(j, x)| x * self.tangent(*a, j)).sum();
                 }
             }
+            Action::Recurrence(start, factor, input) => {
+                let factors = self.get(*factor);
+                let (mut value, mut tangent) = (self.get(*start)[0][0], self.tangent(*start, 0));
+                for (i, out) in out.iter_mut().enumerate() {
+                    let f = factors[at(factors, i)][0];
+                    tangent =
+                        f * tangent + self.tangent(*factor, i) * value + self.tangent(*input, i);
+                    value = self.result[i][0];
+                    *out = tangent;
+                }
+            }
             Action::Interpolate(curve, a) => {
                 let curve = &self.program.tables.curves[*curve];
                 for (i, (out, x)) in out.iter_mut().zip(self.get(*a)).enumerate() {

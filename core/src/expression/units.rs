@@ -156,6 +156,10 @@ fn call(function: &Function, arguments: &[&Part], span: &Range<usize>) -> Result
         Action::Dot | Action::MatrixProduct => {
             product(&arguments[0].measure, &arguments[1].measure, 1.0, span)
         }
+        Action::Recurrence => {
+            arguments[1].demand_plain("the factor of `recurrence`")?;
+            same([arguments[0], arguments[2]].into_iter())
+        }
         Action::Interpolate => {
             same(arguments[..2].iter().copied())?;
             Ok(arguments[2].measure.clone())

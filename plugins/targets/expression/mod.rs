@@ -51,7 +51,8 @@ pub use data::Known;
 /// yes, no)`, `exp`, `log`, `sqrt`, trigonometry, `erf`, `log_gamma`, …) and log densities (`normal_log_density(x,
 /// mean, sd)`, and likewise `log_normal`, `student_t`, `cauchy`, `exponential`, `gamma`, `inverse_gamma`, `beta`,
 /// `uniform`, `poisson`, `binomial`, with the numbers that priors have). Vectors go element by element; `sum`, `mean`,
-/// `min`, `max`, `dot` and `log_sum_exp` make one number of them. Elements count from 1: `y[3]`, `y[2:10]`,
+/// `min`, `max`, `dot` and `log_sum_exp` make one number of them; `recurrence(start, factor, input)` is the vector of
+/// `z[i] = factor * z[i - 1] + input[i]`, for time series. Elements count from 1: `y[3]`, `y[2:10]`,
 /// `theta[school]` for a vector of whole numbers; `[a, b, c]` makes a vector.
 ///
 /// The posterior is the prior times the density. Where the expression is undefined, the density is zero.

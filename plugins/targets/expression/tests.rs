@@ -294,3 +294,30 @@ fn mixture_of_two_normal_laws() {
     };
     is(&*bound, formula, &[vec![-2.73, 2.87, 1.03, 1.02, 0.62], vec![-2.0, 2.0, 1.5, 0.7, 0.4]]);
 }
+
+/// posteriordb, `garch-garch11`: the variance of each value follows from the value and the variance before.
+#[test]
+fn recurrence_of_variances() {
+    let Some(data) = posteriordb("garch-garch11") else { return };
+    let (y, first) = (numbers(&data["y"]), data["sigma1"].as_f64().unwrap());
+    let n = y.len();
+    let density = target(
+        "normal_log_density(y[1], mu, sigma1)
+         + sum(normal_log_density(y[2:LAST], mu, sqrt(recurrence(sigma1^2, beta1, shock))))"
+            .replace("LAST", &n.to_string())
+            .as_str(),
+        &[("shock", &format!("alpha0 + alpha1 * (y[1:{}] - mu)^2", n - 1))],
+        &[("y", Data::Vector(y.clone())), ("sigma1", Data::Number(first))],
+    );
+    let bound = density.bind(&parameters(&["mu", "alpha0", "alpha1", "beta1"])).unwrap();
+    let formula = |p: &[f64]| {
+        let mut variance = first * first;
+        let mut total = normal(y[0], p[0], first);
+        for pair in y.windows(2) {
+            variance = p[1] + p[2] * (pair[0] - p[0]).powi(2) + p[3] * variance;
+            total += normal(pair[1], p[0], variance.sqrt());
+        }
+        total
+    };
+    is(&*bound, formula, &[vec![5.05, 1.5, 0.5, 0.3], vec![4.0, 0.3, 0.9, 0.05]]);
+}

@@ -43,6 +43,7 @@ impl Compiler {
                 Ok(self.number(length as f64))
             }
             Does::MatrixProduct => self.matrix_product(&arguments[0], &arguments[1]),
+            Does::Recurrence => self.recurrence(arguments, span),
             Does::Interpolate => self.interpolate(arguments),
             Does::Density(density) => {
                 let values = numbers(arguments, span)?;
@@ -99,6 +100,18 @@ impl Compiler {
         }
         let place = self.emit(Action::MatrixProduct(table, value.place), rows);
         Ok(Value { kind: Kind::Number, place, vector: true })
+    }
+
+    fn recurrence(&mut self, arguments: &[Argument], span: &Range<usize>) -> Result<Value, Fault> {
+        let [start, factor, input] = arguments else { unreachable!("arity is checked") };
+        let (first, factors, inputs) = (start.number()?, factor.number()?, input.vector()?);
+        if first.vector {
+            return Err(Fault::new(start.span.clone(), "a vector stands where one number belongs")
+                .expected("the number before the first element"));
+        }
+        fit(&[factor, input], span)?;
+        let action = Action::Recurrence(first.place, factors.place, inputs.place);
+        Ok(Value { place: self.emit(action, inputs.place.length), ..inputs })
     }
 
     fn interpolate(&mut self, arguments: &[Argument]) -> Result<Value, Fault> {

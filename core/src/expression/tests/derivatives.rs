@@ -75,7 +75,7 @@ fn kinks_have_the_slopes_that_are_documented() {
 }
 
 /// Expressions with every instruction, in vectors of unknowns.
-const VECTORS: [&str; 12] = [
+const VECTORS: [&str; 15] = [
     "sum(normal_log_density(y, a + b * x, s))",
     "a * x + b",
     "log_sum_exp(a * x)",
@@ -88,6 +88,9 @@ const VECTORS: [&str; 12] = [
     "hypot(a * x, b) + atan2(a, x * s)",
     "max(a, b * x, s) - min(x, s)",
     "sum(student_t_log_density(y, 4 + a, b * x, s))",
+    "recurrence(a, b, x * s)",
+    "sum(normal_log_density(y, recurrence(0, b * x, x), s))",
+    "recurrence(1, s, y)",
 ];
 
 fn regression() -> Scope {

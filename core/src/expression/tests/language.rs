@@ -68,6 +68,9 @@ fn vectors_go_element_by_element() {
         ("dot(v, [1, 2, 3] * x)", &[18.0]),
         ("if(v > 0, v, x)", &[1.0, 2.0, 4.0]),
         ("log_sum_exp([x, x])", &[2.0 + std::f64::consts::LN_2]),
+        // 3, 2 * 3 + 1, 2 * 7 + 1; and a factor for each step.
+        ("recurrence(1, 2, [1, 1, 1])", &[3.0, 7.0, 15.0]),
+        ("recurrence(1, [2, 0, 1], [1, 1, 1])", &[3.0, 1.0, 2.0]),
         ("interpolate([0, 1, 1.5, 2, 9], [1, 2, 4], [10, 20, 0])", &[10.0, 10.0, 15.0, 20.0, 0.0]),
         ("interpolate(y, [1, 2, 4], v)", &[1.0]),
     ] {

@@ -44,6 +44,7 @@ fn units_follow_the_expression() {
         ("hypot(x, y) * atan2(x, y) * sign(x)", "m"),
         ("sum(x * v) + mean(v * y)", "m"),
         ("[x, y][1] * dot(v, v)", "m"),
+        ("recurrence(1 {K}, 0.5, [1 {K}, 2 {K}])", "K"),
         ("interpolate(t, [0 {s}, 1 {s}], [1 {K}, 3 {K}])", "K"),
         ("normal_log_density(x, y, 2 {m})", "1"),
         ("gamma_log_density(x, n, y)", "1"),
