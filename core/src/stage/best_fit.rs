@@ -10,6 +10,7 @@ use crate::posterior::{Emulated, Posterior};
 use crate::run::Stop;
 use crate::study::Study;
 
+use super::left_out::Fit;
 use super::start::maxima;
 use super::stream;
 
@@ -27,11 +28,19 @@ pub fn point(
     Ok(maxima[0].point.clone())
 }
 
-/// The derivative of each output by each parameter at [`point`], per standard deviation of the prior.
-pub fn slopes(study: &Study, data: &Measurements, emulator: &dyn Emulator) -> Result<Matrix, Stop> {
-    let jacobian = emulator.jacobian(&point(study, data, emulator)?);
+/// The response at [`point`] and its derivative by each parameter, per standard deviation of the prior.
+pub fn fit(study: &Study, data: &Measurements, emulator: &dyn Emulator) -> Result<Fit, Stop> {
+    let point = point(study, data, emulator)?;
+    let jacobian = emulator.jacobian(&point);
     let sd: Vec<f64> = study.parameters.iter().map(|p| scale(&p.prior)).collect();
-    Ok(Matrix::from_fn(jacobian.rows(), jacobian.columns(), |i, j| jacobian[(i, j)] * sd[j]))
+    let slopes =
+        Matrix::from_fn(jacobian.rows(), jacobian.columns(), |i, j| jacobian[(i, j)] * sd[j]);
+    Ok(Fit { response: emulator.mean(&Matrix::from_vec(1, point.len(), point)).into_vec(), slopes })
+}
+
+/// The derivatives of [`fit`] alone.
+pub fn slopes(study: &Study, data: &Measurements, emulator: &dyn Emulator) -> Result<Matrix, Stop> {
+    Ok(fit(study, data, emulator)?.slopes)
 }
 
 /// The standard deviation of a law, or a quarter of the range of its middle 95 % where it has none.
