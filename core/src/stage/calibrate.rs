@@ -139,8 +139,9 @@ impl Parts {
         let common = if common.is_empty() {
             Vec::new()
         } else {
-            let fit = best_fit::fit(study, &measured.likelihood, known.emulator)?;
-            left_out::completed(common, &measured.likelihood, &fit)?
+            let data = &measured.likelihood;
+            let fit = best_fit::fit_with_errors(study, data, known.emulator, &common)?;
+            left_out::completed(common, data, &fit)?
         };
         let likelihood = section.built.plugin.likelihood(&discrepancy::Known {
             data: &measured.likelihood,

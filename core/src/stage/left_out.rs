@@ -71,7 +71,7 @@ pub fn completed(
 
 /// One over the variance of each output's mean: between the replicates, pooled over the curve; of the residuals where
 /// there are no replicates. `None` where neither is above zero.
-fn weights(data: &Measurements, response: &[f64]) -> Option<Vec<f64>> {
+pub(super) fn weights(data: &Measurements, response: &[f64]) -> Option<Vec<f64>> {
     let summaries = data.summaries();
     let pooled = |indices: &[usize]| {
         let of = indices.iter().map(|&i| &summaries[i]).filter(|s| s.count > 1);
@@ -246,3 +246,6 @@ fn beside(a: &Matrix, b: &Matrix) -> Matrix {
 fn failed(e: impl std::fmt::Display) -> Stop {
     Stop::new(format!("the errors left out of the common errors' covariance: {e}"))
 }
+
+#[cfg(test)]
+mod tests;
