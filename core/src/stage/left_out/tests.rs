@@ -104,10 +104,10 @@ fn mean_square(scores: &[f64]) -> f64 {
 /// and no more than twice as wide as need be.
 #[test]
 fn intervals_hold_the_truth_as_often_as_they_say() {
-    let [before, after] = studies(300, 0.02);
+    let [before, after] = studies(150, 0.02);
     for (width, nominal) in [(0.6745, 0.5), (1.6449, 0.9), (1.96, 0.95)] {
         let share = covered(&after, width);
-        let bound = 3.0 * (nominal * (1.0 - nominal) / 300.0_f64).sqrt();
+        let bound = 3.0 * (nominal * (1.0 - nominal) / 150.0_f64).sqrt();
         println!("{nominal}: {} {share}", covered(&before, width));
         assert!(share > nominal - bound, "{share} of {nominal}");
     }
@@ -119,7 +119,7 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
 /// Where the noise covers the errors nothing is missing, and next to nothing is added.
 #[test]
 fn little_is_added_where_the_noise_is_large() {
-    let [before, after] = studies(300, 30.0);
+    let [before, after] = studies(150, 30.0);
     let (before, after) = (mean_square(&before), mean_square(&after));
     println!("{before} {after}");
     assert!((after - before).abs() < 0.05, "{before} {after}");
