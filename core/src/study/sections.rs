@@ -81,6 +81,15 @@ pub(super) fn numerical_error(root: &Node, problems: &mut Problems) -> Option<Nu
     let node = root.get("numerical_error")?;
     problems.within("numerical_error", |problems| {
         let written: NumericalErrorSection = decode(node, problems)?;
+        if written.ratio.get() <= 1.0 {
+            let place = node.get("ratio").unwrap_or(node).place.clone();
+            let found = written.ratio.get();
+            problems
+                .report(Some(place), "the finer runs are no finer")
+                .expected("a `ratio` above 1")
+                .found(found.to_string());
+            return None;
+        }
         let Some(base) = root.get("model") else {
             problems.report(Some(node.place.clone()), "the study has no model to run finer");
             return None;
