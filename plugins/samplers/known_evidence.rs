@@ -13,6 +13,8 @@ type Likelihood = Box<dyn Fn(&[f64]) -> f64 + Sync>;
 /// Independent priors and a likelihood.
 pub(super) struct Known {
     priors: Vec<Distribution>,
+    /// How many of the last coordinates are logarithms of what has the prior.
+    logs: usize,
     log_likelihood: Likelihood,
     /// The log of the evidence.
     pub log_evidence: f64,
@@ -32,9 +34,10 @@ impl Target for Known {
     }
 
     fn log_prior(&self, points: &Matrix) -> Vec<f64> {
-        let at = |point: &[f64]| {
-            self.priors.iter().zip(point).map(|(prior, &x)| prior.log_density(x)).sum()
+        let of = |(j, (prior, &x)): (usize, (&Distribution, &f64))| {
+            if self.is_log(j) { prior.log_density(x.exp()) + x } else { prior.log_density(x) }
         };
+        let at = |point: &[f64]| self.priors.iter().zip(point).enumerate().map(of).sum();
         points.iter_rows().map(at).collect()
     }
 
@@ -43,12 +46,25 @@ impl Target for Known {
     }
 
     fn bounds(&self) -> Vec<(f64, f64)> {
-        self.priors.iter().map(Distribution::support).collect()
+        let of = |(j, prior): (usize, &Distribution)| match prior.support() {
+            (low, high) if self.is_log(j) => (low.ln(), high.ln()),
+            support => support,
+        };
+        self.priors.iter().enumerate().map(of).collect()
     }
 
     fn prior_draws(&self, count: usize, stream: &Stream) -> Matrix {
         let mut rng = stream.generator();
-        Matrix::from_fn(count, self.priors.len(), |_, j| self.priors[j].sample(&mut rng))
+        Matrix::from_fn(count, self.priors.len(), |_, j| {
+            let drawn = self.priors[j].sample(&mut rng);
+            if self.is_log(j) { drawn.ln() } else { drawn }
+        })
+    }
+}
+
+impl Known {
+    fn is_log(&self, coordinate: usize) -> bool {
+        coordinate + self.logs >= self.priors.len()
     }
 }
 
@@ -64,6 +80,7 @@ pub(super) fn two_data() -> Known {
     let quadratic = (5.0 * (a * a + b * b) - 4.0 * a * b) / 21.0;
     Known {
         priors: vec![Distribution::Normal([7.0, 2.0_f64.sqrt()])],
+        logs: 0,
         log_likelihood: Box::new(log_likelihood),
         log_evidence: -0.5 * (quadratic + 21.0_f64.ln()) - 2.0 * HALF_LN_TWO_PI,
     }
@@ -90,7 +107,50 @@ pub(super) fn regression() -> Known {
         -0.5 * misfit / (noise * noise) - n as f64 * (noise.ln() + HALF_LN_TWO_PI)
     };
     let priors = vec![Distribution::Normal([0.0, width]); d];
-    Known { priors, log_likelihood: Box::new(log_likelihood), log_evidence }
+    Known { priors, logs: 0, log_likelihood: Box::new(log_likelihood), log_evidence }
+}
+
+/// The founding posterior's shape: linear regression of 21,000 data on `unknowns` coefficients with wide
+/// uniform priors, beside the logarithm of the variance, which has a half-normal prior.
+///
+/// With the coefficients' prior volume `V` and their least-squares misfit `R` the evidence is
+/// `1/V int p(v) (2 pi v)^(-(n - d)/2) exp(-R / 2v) dv / sqrt(det X'X)` as long as the posterior keeps off the
+/// edges; the integral over the variance is a sum over its logarithm.
+pub(super) fn informative(unknowns: usize) -> Known {
+    let (n, noise, wide) = (21_000.0_f64, 32.0_f64, 1000.0);
+    let variance_prior = Distribution::HalfNormal(1e6);
+    // X'X / n, with neighbours correlated by 0.8.
+    let gram = Matrix::from_fn(unknowns, unknowns, |i, j| n * 0.8_f64.powi(i.abs_diff(j) as i32));
+    let factor = Cholesky::new(&gram).unwrap();
+    let misfit = (n - unknowns as f64) * noise * noise;
+    let best: Vec<f64> = (0..unknowns).map(|j| 300.0 * (1.7 * j as f64).sin()).collect();
+    let log_likelihood = move |x: &[f64]| {
+        let offset: Vec<f64> = x.iter().zip(&best).map(|(x, b)| x - b).collect();
+        let product = |row: &[f64]| row.iter().zip(&offset).map(|(g, o)| g * o).sum::<f64>();
+        let square: f64 = gram.iter_rows().zip(&offset).map(|(row, o)| o * product(row)).sum();
+        let log_variance = x[unknowns];
+        -0.5 * (misfit + square) / log_variance.exp() - n * (0.5 * log_variance + HALF_LN_TWO_PI)
+    };
+    let free = n - unknowns as f64;
+    let log_integrand = |t: f64| {
+        variance_prior.log_density(t.exp()) + t
+            - free * (0.5 * t + HALF_LN_TWO_PI)
+            - 0.5 * misfit / t.exp()
+    };
+    let (middle, sd, steps) = ((noise * noise).ln(), (2.0 / free).sqrt(), 2000);
+    let width = 20.0 * sd / f64::from(steps);
+    let values = (0..=steps).map(|k| log_integrand(middle - 10.0 * sd + width * f64::from(k)));
+    let values: Vec<f64> = values.collect();
+    let top = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let integral = top + (values.iter().map(|v| (v - top).exp()).sum::<f64>() * width).ln();
+    let mut priors = vec![Distribution::Uniform([-wide, wide]); unknowns];
+    priors.push(Distribution::HalfNormal(1e6));
+    Known {
+        priors,
+        logs: 1,
+        log_likelihood: Box::new(log_likelihood),
+        log_evidence: integral - unknowns as f64 * (2.0 * wide).ln() - 0.5 * factor.log_determinant(),
+    }
 }
 
 /// Two thin spherical shells in a box: Feroz and Hobson, MNRAS 384 (2008) 449, section 5.2 and table 1, with radius 2,
@@ -113,7 +173,7 @@ pub(super) fn shells(dimension: usize) -> Known {
         _ => panic!("no published value for {dimension} dimensions"),
     };
     let priors = vec![Distribution::Uniform([-6.0, 6.0]); dimension];
-    Known { priors, log_likelihood: Box::new(log_likelihood), log_evidence }
+    Known { priors, logs: 0, log_likelihood: Box::new(log_likelihood), log_evidence }
 }
 
 /// A normal likelihood deep inside a uniform prior on the unit cube, correlated by 0.8 between neighbours: the
@@ -131,7 +191,7 @@ pub(super) fn peak(dimension: usize, information: f64) -> Known {
         -0.5 * factor.quadratic(&z) - d * (ln_sd + HALF_LN_TWO_PI) - half
     };
     let priors = vec![Distribution::Uniform([0.0, 1.0]); dimension];
-    Known { priors, log_likelihood: Box::new(log_likelihood), log_evidence: 0.0 }
+    Known { priors, logs: 0, log_likelihood: Box::new(log_likelihood), log_evidence: 0.0 }
 }
 
 /// Two normal peaks on the unit square, one with three quarters of the mass, thirty of its widths apart.
@@ -145,7 +205,7 @@ pub(super) fn two_peaks() -> Known {
         a.max(b) + (-(a - b).abs()).exp().ln_1p()
     };
     let priors = vec![Distribution::Uniform([0.0, 1.0]); 2];
-    Known { priors, log_likelihood: Box::new(log_likelihood), log_evidence: 0.0 }
+    Known { priors, logs: 0, log_likelihood: Box::new(log_likelihood), log_evidence: 0.0 }
 }
 
 /// Any likelihood with a uniform prior on the unit cube.
@@ -155,7 +215,7 @@ pub(super) fn unit_cube(
     log_likelihood: impl Fn(&[f64]) -> f64 + Sync + 'static,
 ) -> Known {
     let priors = vec![Distribution::Uniform([0.0, 1.0]); dimension];
-    Known { priors, log_likelihood: Box::new(log_likelihood), log_evidence }
+    Known { priors, logs: 0, log_likelihood: Box::new(log_likelihood), log_evidence }
 }
 
 /// A whole run: what it brings home, and its evaluations of the density.

@@ -276,7 +276,7 @@ impl Nested {
                     f64::NEG_INFINITY
                 }
             },
-            fixed: Some(&survivors.points),
+            fixed: Some(&survivors),
         };
         movement.run(&mut born, &mut memory.moves, &stream.named("move"));
         let ranked: Vec<_> = surviving.iter().map(|&i| at(i)).collect();

@@ -1,5 +1,9 @@
 //! Metropolis moves of a population, repeated until it has forgotten where it was.
 
+mod levels;
+mod rescaling;
+mod watch;
+
 use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, below, normal, permutation, uniform};
 use lacuna::plugin::Target;
@@ -8,6 +12,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::evaluated::{Evaluated, Shape};
+use levels::Levels;
+use watch::Watch;
 
 /// How points move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -21,6 +27,9 @@ pub enum Mutation {
     Independent,
     /// Steps along the difference of two other points, which follow curved and split populations.
     DifferentialEvolution,
+    /// Maps between groups of points of similar likelihood, which change a point's scale; for funnels, and beside
+    /// other moves only.
+    Rescaling,
 }
 
 /// What is learned about the moves.
@@ -64,21 +73,31 @@ pub(super) struct Movement<'a> {
     pub law: Law<'a>,
     /// Draws of the law that stay where they are; without them each half of the population moves
     /// along differences of the other half.
-    pub fixed: Option<&'a Matrix>,
+    pub fixed: Option<&'a Evaluated>,
 }
 
 /// Degrees of freedom of independent draws: tails heavier than those of any likelihood that matters.
 const FREEDOM: usize = 5;
 /// Independent draws that are taken less often than this are not worth their evaluations.
 const USEFUL: f64 = 0.1;
-/// A correlation that falls by less than this in [`PATIENCE`] sweeps stays: separate modes do not mix.
-const STALL: f64 = 0.02;
-const PATIENCE: usize = 8;
 
-/// Proposed points, and the log of the proposal's density at the old point over that at the new.
+/// Proposed points.
 struct Proposal {
     points: Matrix,
+    /// The log of the proposal's density at the old point over that at the new, but for the choice of a group.
     ln_ratio: Vec<f64>,
+    /// The groups of points from which steps come, and the one that was chosen for each.
+    chosen: Option<(Levels, Vec<usize>)>,
+}
+
+impl Proposal {
+    /// The log of the probability of the way back over that of the way there.
+    fn ln_back(&self, row: usize, from: f64, to: f64) -> f64 {
+        let choice = self.chosen.as_ref().map_or(0.0, |(levels, chosen)| {
+            levels.ln_chance(chosen[row], to) - levels.ln_chance(chosen[row], from)
+        });
+        self.ln_ratio[row] + choice
+    }
 }
 
 impl Movement<'_> {
@@ -92,20 +111,17 @@ impl Movement<'_> {
         let count = population.points.rows();
         let mut moved = vec![false; count];
         let mut watch = Watch::new(population);
-        let (mut sweeps, mut taken, mut independent) = (0, 0.0, 1.0);
+        let (mut sweeps, mut taken) = (0, 0.0);
+        let mut turns = Turns::default();
         while sweeps < self.most {
             let mut rng = stream.at(sweeps as u64).generator();
             let kind = match self.mutation {
-                Mutation::Automatic if sweeps % 2 == 1 || independent < USEFUL => {
-                    Mutation::DifferentialEvolution
-                }
-                Mutation::Automatic => Mutation::Independent,
+                Mutation::Automatic => turns.next(),
                 given => given,
             };
             let share = self.sweep(kind, learned.size, population, &mut moved, &mut rng);
-            if kind == Mutation::Independent {
-                independent = share;
-            } else {
+            turns.learn(kind, share);
+            if matches!(kind, Mutation::DifferentialEvolution | Mutation::RandomWalk) {
                 // Robbins and Monro's steps towards the acceptance that suits random walks.
                 learned.size = (learned.size * (2.0 * (share - 0.25)).exp()).clamp(1e-6, 10.0);
             }
@@ -132,32 +148,48 @@ impl Movement<'_> {
     ) -> f64 {
         let count = population.points.rows();
         let all: Vec<usize> = (0..count).collect();
-        let taken = match (kind, self.fixed) {
-            (Mutation::DifferentialEvolution, Some(fixed)) => {
-                let proposal = differences(population, &all, fixed, size, rng);
-                self.decide(population, &all, proposal, moved, rng)
-            }
-            (Mutation::DifferentialEvolution, None) => {
-                let order = permutation(rng, count);
-                let (red, blue) = order.split_at(count / 2);
-                let mut taken = 0;
-                for (movers, others) in [(red, blue), (blue, red)] {
-                    let others = population.points.select_rows(others);
-                    let proposal = differences(population, movers, &others, size, rng);
-                    taken += self.decide(population, movers, proposal, moved, rng);
-                }
-                taken
-            }
-            (Mutation::Independent, _) => {
+        let taken = match kind {
+            Mutation::Independent => {
                 let proposal = independent(population, self.shape, rng);
                 self.decide(population, &all, proposal, moved, rng)
             }
-            _ => {
+            Mutation::RandomWalk => {
                 let proposal = random_walk(population, self.shape, size, rng);
                 self.decide(population, &all, proposal, moved, rng)
             }
+            _ => match self.fixed {
+                Some(fixed) => self.beside(kind, size, population, &all, fixed, moved, rng),
+                None => {
+                    let order = permutation(rng, count);
+                    let (red, blue) = order.split_at(count / 2);
+                    let mut taken = 0;
+                    for (movers, others) in [(red, blue), (blue, red)] {
+                        let others = population.select(others);
+                        taken += self.beside(kind, size, population, movers, &others, moved, rng);
+                    }
+                    taken
+                }
+            },
         };
         taken as f64 / count as f64
+    }
+
+    /// One move of each mover that learns from others, which stay; the number of those taken.
+    fn beside(
+        &self,
+        kind: Mutation,
+        size: f64,
+        population: &mut Evaluated,
+        movers: &[usize],
+        others: &Evaluated,
+        moved: &mut [bool],
+        rng: &mut impl Rng,
+    ) -> usize {
+        let proposal = match kind {
+            Mutation::Rescaling => rescaling::rescalings(population, movers, others, self.shape, rng),
+            _ => Some(differences(population, movers, others, size, rng)),
+        };
+        proposal.map_or(0, |proposal| self.decide(population, movers, proposal, moved, rng))
     }
 
     /// Takes or refuses the proposed points, one for each mover; the number of those taken.
@@ -165,11 +197,11 @@ impl Movement<'_> {
         &self,
         population: &mut Evaluated,
         movers: &[usize],
-        proposal: Proposal,
+        mut proposal: Proposal,
         moved: &mut [bool],
         rng: &mut impl Rng,
     ) -> usize {
-        let proposed = Evaluated::new(self.target, proposal.points);
+        let proposed = Evaluated::new(self.target, std::mem::take(&mut proposal.points));
         population.evaluations += proposed.evaluations;
         let mut taken = 0;
         for (row, &mover) in movers.iter().enumerate() {
@@ -177,13 +209,47 @@ impl Movement<'_> {
             if proposed.log_density[row] == f64::NEG_INFINITY {
                 continue;
             }
-            if ln_chance < (self.law)(population, mover, &proposed, row) + proposal.ln_ratio[row] {
+            let (from, to) = (population.log_likelihood(mover), proposed.log_likelihood(row));
+            let back = proposal.ln_back(row, from, to);
+            if ln_chance < (self.law)(population, mover, &proposed, row) + back {
                 population.replace(mover, &proposed, row);
                 moved[mover] = true;
                 taken += 1;
             }
         }
         taken
+    }
+}
+
+/// Which kind of move is next, when they take turns.
+struct Turns {
+    last: usize,
+    useful: [bool; 3],
+}
+
+const KINDS: [Mutation; 3] =
+    [Mutation::Independent, Mutation::DifferentialEvolution, Mutation::Rescaling];
+
+impl Default for Turns {
+    fn default() -> Self {
+        Self { last: KINDS.len() - 1, useful: [true; 3] }
+    }
+}
+
+impl Turns {
+    fn next(&mut self) -> Mutation {
+        loop {
+            self.last = (self.last + 1) % KINDS.len();
+            if self.useful[self.last] {
+                return KINDS[self.last];
+            }
+        }
+    }
+
+    fn learn(&mut self, kind: Mutation, share: f64) {
+        if let Some(place) = KINDS.iter().position(|k| *k == kind) {
+            self.useful[place] = share >= USEFUL || kind == Mutation::DifferentialEvolution;
+        }
     }
 }
 
@@ -196,7 +262,7 @@ fn random_walk(population: &Evaluated, shape: &Shape, size: f64, rng: &mut impl 
         point.iter().zip(shape.factor.colour(&z)).map(|(x, s)| x + s).collect()
     };
     let points = Matrix::from_rows(d, population.points.iter_rows().map(step));
-    Proposal { ln_ratio: vec![0.0; points.rows()], points }
+    Proposal { ln_ratio: vec![0.0; points.rows()], points, chosen: None }
 }
 
 /// Draws of Student's t law around the centre of the population.
@@ -215,85 +281,38 @@ fn independent(population: &Evaluated, shape: &Shape, rng: &mut impl Rng) -> Pro
         ln_ratio.push(ln_density(shape.factor.quadratic(&offset)) - ln_density(square));
         points.extend_row(shape.factor.colour(&z).iter().zip(&shape.centre).map(|(s, c)| c + s));
     }
-    Proposal { points, ln_ratio }
+    Proposal { points, ln_ratio, chosen: None }
 }
 
-/// Steps along differences of two other particles (Ter Braak 2006); one in ten is a whole difference, which
-/// leads from mode to mode.
+/// Steps along differences of two others of similar likelihood (Ter Braak 2006); one in ten is a whole difference
+/// of any two, which leads from mode to mode.
 fn differences(
     population: &Evaluated,
     movers: &[usize],
-    others: &Matrix,
+    others: &Evaluated,
     size: f64,
     rng: &mut impl Rng,
 ) -> Proposal {
     let d = population.points.columns();
+    let levels = Levels::of(others);
     let mut points = Matrix::zeros(0, d);
+    let mut chosen = Vec::with_capacity(movers.len());
     for &mover in movers {
-        let a = below(rng, others.rows());
-        let b = (a + 1 + below(rng, others.rows() - 1)) % others.rows();
         let whole = uniform(rng) < 0.1;
         let spread = size * 2.38 / (2.0 * d as f64).sqrt() * (0.1 * normal(rng)).exp();
         let length = if whole { 1.0 } else { spread };
-        let (a, b) = (others.row(a), others.row(b));
+        let level = levels.choose(population.log_likelihood(mover), rng);
+        let (a, b) = if whole {
+            levels::pair(others.points.rows(), rng)
+        } else {
+            let members = levels.members(level);
+            let (a, b) = levels::pair(members.len(), rng);
+            (members[a], members[b])
+        };
+        let (a, b) = (others.points.row(a), others.points.row(b));
         let from = population.points.row(mover);
         points.extend_row((0..d).map(|j| from[j] + length * (a[j] - b[j])));
+        chosen.push(level);
     }
-    Proposal { ln_ratio: vec![0.0; points.rows()], points }
-}
-
-/// How much the particles remember of where they were.
-struct Watch {
-    before: Vec<Vec<f64>>,
-    history: Vec<Vec<f64>>,
-}
-
-impl Watch {
-    fn new(population: &Evaluated) -> Self {
-        Self { before: quantities(population), history: Vec::new() }
-    }
-
-    /// Whether each quantity has forgotten its past, or will not within reach.
-    fn forgotten(&mut self, population: &Evaluated, threshold: f64) -> bool {
-        let now = quantities(population);
-        let present: Vec<f64> =
-            self.before.iter().zip(&now).map(|(x, y)| correlation(x, y)).collect();
-        self.history.push(present);
-        let Some((last, rest)) = self.history.split_last() else { return false };
-        (0..last.len()).all(|q| {
-            let stalled =
-                rest.len() >= PATIENCE && rest[rest.len() - PATIENCE][q] - last[q] < STALL;
-            last[q] <= threshold || stalled
-        })
-    }
-
-    /// The correlations that are left: the largest of a coordinate, and that of the likelihood.
-    fn left(&self) -> (f64, f64) {
-        let last = self.history.last().and_then(|last| last.split_last());
-        last.map_or((1.0, 1.0), |(likelihood, coordinates)| {
-            (coordinates.iter().copied().fold(0.0, f64::max), *likelihood)
-        })
-    }
-}
-
-/// The coordinates and the likelihood, one list each.
-fn quantities(population: &Evaluated) -> Vec<Vec<f64>> {
-    let d = population.points.columns();
-    let mut all: Vec<Vec<f64>> = (0..d).map(|j| population.points.column(j)).collect();
-    all.push(population.log_likelihoods());
-    all
-}
-
-/// The correlation of two lists; zero where one of them does not vary.
-fn correlation(x: &[f64], y: &[f64]) -> f64 {
-    let n = x.len() as f64;
-    let (mx, my) = (x.iter().sum::<f64>() / n, y.iter().sum::<f64>() / n);
-    let (mut xx, mut yy, mut xy) = (0.0, 0.0, 0.0);
-    for (a, b) in x.iter().zip(y) {
-        let (a, b) = (a - mx, b - my);
-        xx += a * a;
-        yy += b * b;
-        xy += a * b;
-    }
-    if xx > 0.0 && yy > 0.0 { xy / (xx * yy).sqrt() } else { 0.0 }
+    Proposal { ln_ratio: vec![0.0; points.rows()], points, chosen: Some((levels, chosen)) }
 }
