@@ -39,6 +39,11 @@ impl Levels {
         self.bounds.len() + 1
     }
 
+    /// The places of all points.
+    pub fn all(&self) -> &[usize] {
+        &self.rising
+    }
+
     /// The places of the points of one group.
     pub fn members(&self, level: usize) -> &[usize] {
         let n = self.rising.len();

@@ -32,6 +32,13 @@ pub enum Mutation {
     Rescaling,
 }
 
+impl Mutation {
+    /// Whether a move learns from other points than those that move.
+    fn needs_others(self) -> bool {
+        matches!(self, Self::DifferentialEvolution | Self::Rescaling)
+    }
+}
+
 /// What is learned about the moves.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Learned {
@@ -57,6 +64,14 @@ impl Default for Learned {
 /// that at a point of the first.
 pub(super) type Law<'a> = &'a dyn Fn(&Evaluated, usize, &Evaluated, usize) -> f64;
 
+/// Draws of the law that stay where they are, and the places of the points that learn from them; these points started
+/// from other draws, since a copy that learns from its own original is drawn towards the others.
+pub(super) struct Side {
+    pub movers: Vec<usize>,
+    pub others: Evaluated,
+    pub shape: Shape,
+}
+
 /// What the moves of one population have in common.
 pub(super) struct Movement<'a> {
     /// The density.
@@ -71,9 +86,8 @@ pub(super) struct Movement<'a> {
     pub shape: &'a Shape,
     /// The law.
     pub law: Law<'a>,
-    /// Draws of the law that stay where they are; without them each half of the population moves
-    /// along differences of the other half.
-    pub fixed: Option<&'a Evaluated>,
+    /// From what points learn; without it each half of the population learns from the other half.
+    pub sides: &'a [Side],
 }
 
 /// Degrees of freedom of independent draws: tails heavier than those of any likelihood that matters.
@@ -147,29 +161,26 @@ impl Movement<'_> {
         rng: &mut impl Rng,
     ) -> f64 {
         let count = population.points.rows();
-        let all: Vec<usize> = (0..count).collect();
-        let taken = match kind {
-            Mutation::Independent => {
-                let proposal = independent(population, self.shape, rng);
-                self.decide(population, &all, proposal, moved, rng)
+        let taken = if !self.sides.is_empty() {
+            let of = |side: &Side| {
+                let Side { movers, others, shape } = side;
+                self.beside(kind, size, population, movers, others, shape, moved, rng)
+            };
+            self.sides.iter().map(of).sum()
+        } else if kind.needs_others() {
+            let order = permutation(rng, count);
+            let (red, blue) = order.split_at(count / 2);
+            let mut taken = 0;
+            for (movers, others) in [(red, blue), (blue, red)] {
+                let others = population.select(others);
+                taken += self
+                    .beside(kind, size, population, movers, &others, self.shape, moved, rng);
             }
-            Mutation::RandomWalk => {
-                let proposal = random_walk(population, self.shape, size, rng);
-                self.decide(population, &all, proposal, moved, rng)
-            }
-            _ => match self.fixed {
-                Some(fixed) => self.beside(kind, size, population, &all, fixed, moved, rng),
-                None => {
-                    let order = permutation(rng, count);
-                    let (red, blue) = order.split_at(count / 2);
-                    let mut taken = 0;
-                    for (movers, others) in [(red, blue), (blue, red)] {
-                        let others = population.select(others);
-                        taken += self.beside(kind, size, population, movers, &others, moved, rng);
-                    }
-                    taken
-                }
-            },
+            taken
+        } else {
+            let all: Vec<usize> = (0..count).collect();
+            let none = population.select(&[]);
+            self.beside(kind, size, population, &all, &none, self.shape, moved, rng)
         };
         taken as f64 / count as f64
     }
@@ -182,11 +193,14 @@ impl Movement<'_> {
         population: &mut Evaluated,
         movers: &[usize],
         others: &Evaluated,
+        shape: &Shape,
         moved: &mut [bool],
         rng: &mut impl Rng,
     ) -> usize {
         let proposal = match kind {
-            Mutation::Rescaling => rescaling::rescalings(population, movers, others, self.shape, rng),
+            Mutation::Independent => Some(independent(population, movers, shape, rng)),
+            Mutation::RandomWalk => Some(random_walk(population, movers, shape, size, rng)),
+            Mutation::Rescaling => rescaling::rescalings(population, movers, others, shape, rng),
             _ => Some(differences(population, movers, others, size, rng)),
         };
         proposal.map_or(0, |proposal| self.decide(population, movers, proposal, moved, rng))
@@ -254,25 +268,36 @@ impl Turns {
 }
 
 /// Normal steps with the covariance of the population (Roberts, Gelman and Gilks 1997).
-fn random_walk(population: &Evaluated, shape: &Shape, size: f64, rng: &mut impl Rng) -> Proposal {
+fn random_walk(
+    population: &Evaluated,
+    movers: &[usize],
+    shape: &Shape,
+    size: f64,
+    rng: &mut impl Rng,
+) -> Proposal {
     let d = shape.centre.len();
     let scale = size * 2.38 / (d as f64).sqrt();
-    let step = |point: &[f64]| -> Vec<f64> {
+    let mut step = |point: &[f64]| -> Vec<f64> {
         let z: Vec<f64> = (0..d).map(|_| scale * normal(rng)).collect();
         point.iter().zip(shape.factor.colour(&z)).map(|(x, s)| x + s).collect()
     };
-    let points = Matrix::from_rows(d, population.points.iter_rows().map(step));
+    let points = Matrix::from_rows(d, movers.iter().map(|&i| step(population.points.row(i))));
     Proposal { ln_ratio: vec![0.0; points.rows()], points, chosen: None }
 }
 
 /// Draws of Student's t law around the centre of the population.
-fn independent(population: &Evaluated, shape: &Shape, rng: &mut impl Rng) -> Proposal {
+fn independent(
+    population: &Evaluated,
+    movers: &[usize],
+    shape: &Shape,
+    rng: &mut impl Rng,
+) -> Proposal {
     let d = shape.centre.len();
     let freedom = FREEDOM as f64;
     let ln_density = |square: f64| -0.5 * (freedom + d as f64) * (square / freedom).ln_1p();
     let mut points = Matrix::zeros(0, d);
-    let mut ln_ratio = Vec::with_capacity(population.points.rows());
-    for old in population.points.iter_rows() {
+    let mut ln_ratio = Vec::with_capacity(movers.len());
+    for old in movers.iter().map(|&i| population.points.row(i)) {
         let chi_square: f64 = (0..FREEDOM).map(|_| normal(rng).powi(2)).sum();
         let scale = (freedom / chi_square).sqrt();
         let z: Vec<f64> = (0..d).map(|_| scale * normal(rng)).collect();
@@ -302,14 +327,9 @@ fn differences(
         let spread = size * 2.38 / (2.0 * d as f64).sqrt() * (0.1 * normal(rng)).exp();
         let length = if whole { 1.0 } else { spread };
         let level = levels.choose(population.log_likelihood(mover), rng);
-        let (a, b) = if whole {
-            levels::pair(others.points.rows(), rng)
-        } else {
-            let members = levels.members(level);
-            let (a, b) = levels::pair(members.len(), rng);
-            (members[a], members[b])
-        };
-        let (a, b) = (others.points.row(a), others.points.row(b));
+        let members = if whole { levels.all() } else { levels.members(level) };
+        let (a, b) = levels::pair(members.len(), rng);
+        let (a, b) = (others.points.row(members[a]), others.points.row(members[b]));
         let from = population.points.row(mover);
         points.extend_row((0..d).map(|j| from[j] + length * (a[j] - b[j])));
         chosen.push(level);

@@ -14,7 +14,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::evaluated::{Evaluated, Shape, check_start, from_prior};
-use super::moves::{Learned, Movement, Mutation};
+use super::moves::{Learned, Movement, Mutation, Side};
 use volumes::Ladder;
 
 /// Nested sampling: live points, spread over the prior, that climb to ever higher likelihood while the prior
@@ -236,6 +236,18 @@ fn order(a: (f64, &[f64]), b: (f64, &[f64])) -> std::cmp::Ordering {
     a.0.total_cmp(&b.0).then_with(|| label(a.1).total_cmp(&label(b.1)))
 }
 
+/// The survivors in two halves: the copies of each half learn from the other half.
+fn sides(survivors: &Evaluated, parents: &[usize]) -> Result<[Side; 2], Stop> {
+    let (first, second) = parents.split_at(parents.len() / 2);
+    let side = |copies: std::ops::Range<usize>, others: &[usize]| {
+        let others = survivors.select(others);
+        let equal = vec![1.0 / others.points.rows() as f64; others.points.rows()];
+        let shape = Shape::of(&others.points, &equal)?;
+        Ok::<Side, Stop>(Side { movers: copies.collect(), others, shape })
+    };
+    Ok([side(0..first.len(), second)?, side(first.len()..parents.len(), first)?])
+}
+
 impl Nested {
     /// The lower half of the live points dies and is replaced; which points are new.
     fn halve(
@@ -260,14 +272,13 @@ impl Nested {
         let mut rng = stream.named("birth").generator();
         let parents = &permutation(&mut rng, survivors.points.rows())[..dying.len()];
         let mut born = survivors.select(parents);
-        let equal = vec![1.0 / surviving.len() as f64; surviving.len()];
-        let shape = Shape::of(&survivors.points, &equal)?;
+        let sides = sides(&survivors, parents)?;
         let movement = Movement {
             target,
             mutation: self.mutation,
             correlation: self.correlation,
             most: self.moves,
-            shape: &shape,
+            shape: &sides[0].shape,
             law: &|old, i, new, j| {
                 let place = (new.log_likelihood(j), new.points.row(j));
                 if order(place, (bound, &edge)).is_gt() {
@@ -276,7 +287,7 @@ impl Nested {
                     f64::NEG_INFINITY
                 }
             },
-            fixed: Some(&survivors),
+            sides: &sides,
         };
         movement.run(&mut born, &mut memory.moves, &stream.named("move"));
         let ranked: Vec<_> = surviving.iter().map(|&i| at(i)).collect();

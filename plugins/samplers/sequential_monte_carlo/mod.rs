@@ -149,7 +149,7 @@ impl Sampler for SequentialMonteCarlo {
                 new.log_prior[j] - old.log_prior[i]
                     + power * (new.log_likelihood(j) - old.log_likelihood(i))
             },
-            fixed: None,
+            sides: &[],
         };
         state.accepted = movement.run(&mut population, &mut memory.moves, &stream);
         state.evaluations += population.evaluations;
