@@ -149,7 +149,9 @@ pub(super) fn informative(unknowns: usize) -> Known {
         priors,
         logs: 1,
         log_likelihood: Box::new(log_likelihood),
-        log_evidence: integral - unknowns as f64 * (2.0 * wide).ln() - 0.5 * factor.log_determinant(),
+        log_evidence: integral
+            - unknowns as f64 * (2.0 * wide).ln()
+            - 0.5 * factor.log_determinant(),
     }
 }
 

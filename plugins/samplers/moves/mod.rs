@@ -5,7 +5,7 @@ mod rescaling;
 mod watch;
 
 use lacuna::linalg::Matrix;
-use lacuna::math::random::{Stream, below, normal, permutation, uniform};
+use lacuna::math::random::{Stream, normal, permutation, uniform};
 use lacuna::plugin::Target;
 use rand::Rng;
 use schemars::JsonSchema;
@@ -19,24 +19,27 @@ use watch::Watch;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Mutation {
-    /// Independent moves as long as they are taken often enough, by turns with differential evolution.
+    /// By turns: independent draws, differential evolution, and changes of scale between points of low and
+    /// of high likelihood, which lead into the neck of a funnel; the first and the last as long as they are taken often
+    /// enough.
     Automatic,
     /// Normal steps with the covariance of the population, their size adapted to the acceptance.
     RandomWalk,
     /// Draws of Student's t law with the population's mean and covariance.
     Independent,
-    /// Steps along the difference of two other points, which follow curved and split populations.
+    /// Steps along the difference of two other points of similar likelihood, which follow curved and split
+    /// populations.
     DifferentialEvolution,
-    /// Maps between groups of points of similar likelihood, which change a point's scale; for funnels, and beside
-    /// other moves only.
-    Rescaling,
 }
 
-impl Mutation {
-    /// Whether a move learns from other points than those that move.
-    fn needs_others(self) -> bool {
-        matches!(self, Self::DifferentialEvolution | Self::Rescaling)
-    }
+/// One kind of move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    RandomWalk,
+    Independent,
+    DifferentialEvolution,
+    /// Maps between groups of points of similar likelihood.
+    Rescaling,
 }
 
 /// What is learned about the moves.
@@ -64,12 +67,30 @@ impl Default for Learned {
 /// that at a point of the first.
 pub(super) type Law<'a> = &'a dyn Fn(&Evaluated, usize, &Evaluated, usize) -> f64;
 
-/// Draws of the law that stay where they are, and the places of the points that learn from them; these points started
-/// from other draws, since a copy that learns from its own original is drawn towards the others.
+/// From what moving points learn.
+#[derive(Clone, Copy)]
+pub(super) enum Others<'a> {
+    /// Each half of the population from the other half, and from this shape of all.
+    OtherHalf(&'a Shape),
+    /// From draws that do not move.
+    Apart(&'a [Side]),
+}
+
+/// Places of points that move, and draws of the law that stay, from which they learn.
+///
+/// The points started from other draws: a copy that learns from its own original is drawn towards the rest.
 pub(super) struct Side {
     pub movers: Vec<usize>,
     pub others: Evaluated,
     pub shape: Shape,
+}
+
+/// Points that move, and from what they learn.
+#[derive(Clone, Copy)]
+struct Group<'a> {
+    movers: &'a [usize],
+    others: &'a Evaluated,
+    shape: &'a Shape,
 }
 
 /// What the moves of one population have in common.
@@ -82,12 +103,10 @@ pub(super) struct Movement<'a> {
     pub correlation: f64,
     /// The most moves of each point.
     pub most: usize,
-    /// Centre and covariance of the law.
-    pub shape: &'a Shape,
     /// The law.
     pub law: Law<'a>,
-    /// From what points learn; without it each half of the population learns from the other half.
-    pub sides: &'a [Side],
+    /// From what points learn.
+    pub others: Others<'a>,
 }
 
 /// Degrees of freedom of independent draws: tails heavier than those of any likelihood that matters.
@@ -131,11 +150,13 @@ impl Movement<'_> {
             let mut rng = stream.at(sweeps as u64).generator();
             let kind = match self.mutation {
                 Mutation::Automatic => turns.next(),
-                given => given,
+                Mutation::RandomWalk => Kind::RandomWalk,
+                Mutation::Independent => Kind::Independent,
+                Mutation::DifferentialEvolution => Kind::DifferentialEvolution,
             };
             let share = self.sweep(kind, learned.size, population, &mut moved, &mut rng);
             turns.learn(kind, share);
-            if matches!(kind, Mutation::DifferentialEvolution | Mutation::RandomWalk) {
+            if matches!(kind, Kind::DifferentialEvolution | Kind::RandomWalk) {
                 // Robbins and Monro's steps towards the acceptance that suits random walks.
                 learned.size = (learned.size * (2.0 * (share - 0.25)).exp()).clamp(1e-6, 10.0);
             }
@@ -154,56 +175,51 @@ impl Movement<'_> {
     /// One move of each point; the share of those taken.
     fn sweep(
         &self,
-        kind: Mutation,
+        kind: Kind,
         size: f64,
         population: &mut Evaluated,
         moved: &mut [bool],
         rng: &mut impl Rng,
     ) -> f64 {
         let count = population.points.rows();
-        let taken = if !self.sides.is_empty() {
-            let of = |side: &Side| {
-                let Side { movers, others, shape } = side;
-                self.beside(kind, size, population, movers, others, shape, moved, rng)
-            };
-            self.sides.iter().map(of).sum()
-        } else if kind.needs_others() {
-            let order = permutation(rng, count);
-            let (red, blue) = order.split_at(count / 2);
-            let mut taken = 0;
-            for (movers, others) in [(red, blue), (blue, red)] {
-                let others = population.select(others);
-                taken += self
-                    .beside(kind, size, population, movers, &others, self.shape, moved, rng);
+        let mut taken = 0;
+        match self.others {
+            Others::OtherHalf(shape) => {
+                let order = permutation(rng, count);
+                let (red, blue) = order.split_at(count / 2);
+                for (movers, others) in [(red, blue), (blue, red)] {
+                    let others = &population.select(others);
+                    let group = Group { movers, others, shape };
+                    taken += self.learn_and_move(kind, size, group, population, moved, rng);
+                }
             }
-            taken
-        } else {
-            let all: Vec<usize> = (0..count).collect();
-            let none = population.select(&[]);
-            self.beside(kind, size, population, &all, &none, self.shape, moved, rng)
-        };
+            Others::Apart(sides) => {
+                for Side { movers, others, shape } in sides {
+                    let group = Group { movers, others, shape };
+                    taken += self.learn_and_move(kind, size, group, population, moved, rng);
+                }
+            }
+        }
         taken as f64 / count as f64
     }
 
-    /// One move of each mover that learns from others, which stay; the number of those taken.
-    fn beside(
+    /// One move of each mover of a group; the number of those taken.
+    fn learn_and_move(
         &self,
-        kind: Mutation,
+        kind: Kind,
         size: f64,
+        group: Group<'_>,
         population: &mut Evaluated,
-        movers: &[usize],
-        others: &Evaluated,
-        shape: &Shape,
         moved: &mut [bool],
         rng: &mut impl Rng,
     ) -> usize {
         let proposal = match kind {
-            Mutation::Independent => Some(independent(population, movers, shape, rng)),
-            Mutation::RandomWalk => Some(random_walk(population, movers, shape, size, rng)),
-            Mutation::Rescaling => rescaling::rescalings(population, movers, others, shape, rng),
-            _ => Some(differences(population, movers, others, size, rng)),
+            Kind::Independent => Some(independent(population, group, rng)),
+            Kind::RandomWalk => Some(random_walk(population, group, size, rng)),
+            Kind::DifferentialEvolution => Some(differences(population, group, size, rng)),
+            Kind::Rescaling => rescaling::rescalings(population, group, rng),
         };
-        proposal.map_or(0, |proposal| self.decide(population, movers, proposal, moved, rng))
+        proposal.map_or(0, |proposal| self.decide(population, group.movers, proposal, moved, rng))
     }
 
     /// Takes or refuses the proposed points, one for each mover; the number of those taken.
@@ -241,8 +257,7 @@ struct Turns {
     useful: [bool; 3],
 }
 
-const KINDS: [Mutation; 3] =
-    [Mutation::Independent, Mutation::DifferentialEvolution, Mutation::Rescaling];
+const KINDS: [Kind; 3] = [Kind::Independent, Kind::DifferentialEvolution, Kind::Rescaling];
 
 impl Default for Turns {
     fn default() -> Self {
@@ -251,7 +266,7 @@ impl Default for Turns {
 }
 
 impl Turns {
-    fn next(&mut self) -> Mutation {
+    fn next(&mut self) -> Kind {
         loop {
             self.last = (self.last + 1) % KINDS.len();
             if self.useful[self.last] {
@@ -260,9 +275,9 @@ impl Turns {
         }
     }
 
-    fn learn(&mut self, kind: Mutation, share: f64) {
+    fn learn(&mut self, kind: Kind, share: f64) {
         if let Some(place) = KINDS.iter().position(|k| *k == kind) {
-            self.useful[place] = share >= USEFUL || kind == Mutation::DifferentialEvolution;
+            self.useful[place] = share >= USEFUL || kind == Kind::DifferentialEvolution;
         }
     }
 }
@@ -270,8 +285,7 @@ impl Turns {
 /// Normal steps with the covariance of the population (Roberts, Gelman and Gilks 1997).
 fn random_walk(
     population: &Evaluated,
-    movers: &[usize],
-    shape: &Shape,
+    Group { movers, shape, .. }: Group<'_>,
     size: f64,
     rng: &mut impl Rng,
 ) -> Proposal {
@@ -288,8 +302,7 @@ fn random_walk(
 /// Draws of Student's t law around the centre of the population.
 fn independent(
     population: &Evaluated,
-    movers: &[usize],
-    shape: &Shape,
+    Group { movers, shape, .. }: Group<'_>,
     rng: &mut impl Rng,
 ) -> Proposal {
     let d = shape.centre.len();
@@ -313,8 +326,7 @@ fn independent(
 /// of any two, which leads from mode to mode.
 fn differences(
     population: &Evaluated,
-    movers: &[usize],
-    others: &Evaluated,
+    Group { movers, others, .. }: Group<'_>,
     size: f64,
     rng: &mut impl Rng,
 ) -> Proposal {

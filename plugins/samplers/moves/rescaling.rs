@@ -11,7 +11,7 @@ use lacuna::math::moments::variance;
 use rand::Rng;
 
 use super::levels::{Levels, pair};
-use super::{Evaluated, Proposal, Shape};
+use super::{Evaluated, Group, Proposal, Shape};
 
 /// The centre and the widths of each group of others, in the axes of a shape.
 struct Frames {
@@ -38,9 +38,7 @@ impl Frames {
 /// One step of each mover between two groups drawn at random; none with a single group.
 pub(super) fn rescalings(
     population: &Evaluated,
-    movers: &[usize],
-    others: &Evaluated,
-    shape: &Shape,
+    Group { movers, others, shape }: Group<'_>,
     rng: &mut impl Rng,
 ) -> Option<Proposal> {
     let levels = Levels::of(others);

@@ -13,8 +13,9 @@ use lacuna::study::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::evaluated::{Evaluated, Shape, check_start, from_prior};
-use super::moves::{Learned, Movement, Mutation, Side};
+use super::evaluated::{Evaluated, Shape};
+use super::moves::{Learned, Movement, Mutation, Others, Side};
+use super::population::{self, Share};
 use volumes::Ladder;
 
 /// Nested sampling: live points, spread over the prior, that climb to ever higher likelihood while the prior
@@ -58,7 +59,7 @@ impl Default for Nested {
             live: 500,
             remaining: 0.01,
             mutation: Mutation::DifferentialEvolution,
-            correlation: 0.1,
+            correlation: 0.05,
             moves: 100,
             halvings: 1000,
         }
@@ -128,32 +129,16 @@ impl Sampler for Nested {
     }
 
     fn start(&self, target: &dyn Target, points: Matrix) -> Result<State, Stop> {
-        let log_density = check_start(target, &points, self.live)?;
-        Ok(State {
-            points,
-            log_density,
-            accepted: vec![false; self.live],
-            evaluations: self.live as u64,
-            memory: serde_json::Value::Null,
-        })
+        population::start(target, points, self.live)
     }
 
     fn step(&self, target: &dyn Target, state: &mut State, stream: &Stream) -> Result<(), Stop> {
-        let (mut live, mut memory) = if let Some(memory) = recall(state)? {
-            (Evaluated::take(target, state), memory)
-        } else {
-            let (drawn, tried) = from_prior(target, self.live, &stream.named("prior"))?;
-            (drawn, Memory::first(self.live, tried))
-        };
+        let (mut live, mut memory) = population::resume(target, state, Memory::first, stream)?;
         state.accepted = vec![false; self.live];
         if !memory.finished {
             state.accepted = self.halve(target, &mut live, &mut memory, stream)?;
         }
-        state.evaluations += live.evaluations;
-        state.points = live.points;
-        state.log_density = live.log_density;
-        state.memory = serde_json::to_value(memory).map_err(|e| Stop::new(e.to_string()))?;
-        Ok(())
+        population::keep(state, live, &memory)
     }
 
     fn finished(&self, state: &State) -> bool {
@@ -166,9 +151,7 @@ impl Sampler for Nested {
         state: &State,
         stream: &Stream,
     ) -> Result<Option<Harvest>, Stop> {
-        let memory = recall(&mut state.clone())?.ok_or_else(|| {
-            Stop::new("the live points have not left their starting points, which are no draws")
-        })?;
+        let memory = population::remembered(state)?;
         Ok(Some(self.bring_home(target, state, &memory, stream)))
     }
 
@@ -181,23 +164,12 @@ impl Sampler for Nested {
     }
 }
 
-/// The memory of a state, which loses it; none before the first step.
-fn recall(state: &mut State) -> Result<Option<Memory>, Stop> {
-    serde_json::from_value(std::mem::take(&mut state.memory))
-        .map_err(|error| Stop::new(format!("the saved state of the sampler is damaged: {error}")))
-}
-
 impl Memory {
-    /// Before the first death, when `tried` draws of the prior gave `live` inside the support.
-    fn first(live: usize, tried: u64) -> Self {
-        let mut memory = Self { ranks: vec![0; BINS], ..Self::default() };
-        if tried > live as u64 {
-            // The draws stop at the last point that is needed: a negative binomial number of them.
-            let share = (live as f64 - 1.0) / (tried as f64 - 1.0);
-            memory.log_share = share.ln();
-            memory.share_variance = (1.0 - share) / live as f64;
-        }
-        memory
+    /// Before the first death.
+    fn first(support: Share) -> Self {
+        let Share { log, variance } = support;
+        let ranks = vec![0; BINS];
+        Self { log_share: log, share_variance: variance, ranks, ..Self::default() }
     }
 
     /// One more dead point, the lowest of `live`.
@@ -278,7 +250,6 @@ impl Nested {
             mutation: self.mutation,
             correlation: self.correlation,
             most: self.moves,
-            shape: &sides[0].shape,
             law: &|old, i, new, j| {
                 let place = (new.log_likelihood(j), new.points.row(j));
                 if order(place, (bound, &edge)).is_gt() {
@@ -287,7 +258,7 @@ impl Nested {
                     f64::NEG_INFINITY
                 }
             },
-            sides: &sides,
+            others: Others::Apart(&sides),
         };
         movement.run(&mut born, &mut memory.moves, &stream.named("move"));
         let ranked: Vec<_> = surviving.iter().map(|&i| at(i)).collect();

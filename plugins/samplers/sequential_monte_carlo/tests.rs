@@ -159,7 +159,11 @@ fn a_run_needs_one_start_a_particle() {
 fn explore() {
     use super::super::known_evidence::{evidence, informative};
     let n: usize = std::env::var("N").map_or(1000, |x| x.parse().unwrap());
-    for (name, target) in [("informative 3", informative(3)), ("informative 9", informative(9)), ("peak", peak(4,30.0))] {
+    for (name, target) in [
+        ("informative 3", informative(3)),
+        ("informative 9", informative(9)),
+        ("peak", peak(4, 30.0)),
+    ] {
         let (mut off, mut errs, mut zs) = (vec![], vec![], vec![]);
         for seed in 0..20 {
             let (h, e) = run(&with(n), &target, seed);
@@ -167,8 +171,23 @@ fn explore() {
             off.push(log - target.log_evidence);
             errs.push(err);
             zs.push((log - target.log_evidence) / err);
-            if seed < 2 { println!("{name} {:.3} {:.3} {e} {:?} {:?}", log - target.log_evidence, err, h.facts.iter().map(|f| f.value.to_string()).collect::<Vec<_>>(), h.doubts); }
+            if seed < 2 {
+                println!(
+                    "{name} {:.3} {:.3} {e} {:?} {:?}",
+                    log - target.log_evidence,
+                    err,
+                    h.facts.iter().map(|f| f.value.to_string()).collect::<Vec<_>>(),
+                    h.doubts
+                );
+            }
         }
-        println!("{name}: bias {:.3} sd {:.3} stated {:.3}; z mean {:.2} sd {:.2}", mean(&off), variance(&off).sqrt(), mean(&errs), mean(&zs), variance(&zs).sqrt());
+        println!(
+            "{name}: bias {:.3} sd {:.3} stated {:.3}; z mean {:.2} sd {:.2}",
+            mean(&off),
+            variance(&off).sqrt(),
+            mean(&errs),
+            mean(&zs),
+            variance(&zs).sqrt()
+        );
     }
 }
