@@ -55,11 +55,20 @@ pub(super) struct Learned {
     pub of_likelihood: f64,
     /// Moves of each point so far.
     pub moves: usize,
+    /// Moves after which the next population is expected to have forgotten its past.
+    planned: usize,
 }
 
 impl Default for Learned {
     fn default() -> Self {
-        Self { size: 1.0, acceptance: 0.0, of_coordinates: 0.0, of_likelihood: 0.0, moves: 0 }
+        Self {
+            size: 1.0,
+            acceptance: 0.0,
+            of_coordinates: 0.0,
+            of_likelihood: 0.0,
+            moves: 0,
+            planned: FIRST_PLAN,
+        }
     }
 }
 
@@ -107,12 +116,17 @@ pub(super) struct Movement<'a> {
     pub law: Law<'a>,
     /// From what points learn.
     pub others: Others<'a>,
+    /// Whether size and number of moves are settled before the population moves, from those before it. Where many
+    /// small errors add up this matters: moves that end when their own outcome looks right select outcomes.
+    pub ahead: bool,
 }
 
 /// Degrees of freedom of independent draws: tails heavier than those of any likelihood that matters.
 const FREEDOM: usize = 5;
 /// Independent draws that are taken less often than this are not worth their evaluations.
 const USEFUL: f64 = 0.1;
+/// Moves of the first population whose number is settled ahead.
+const FIRST_PLAN: usize = 20;
 
 /// Proposed points.
 struct Proposal {
@@ -146,7 +160,10 @@ impl Movement<'_> {
         let mut watch = Watch::new(population);
         let (mut sweeps, mut taken) = (0, 0.0);
         let mut turns = Turns::default();
-        while sweeps < self.most {
+        let mut size = learned.size;
+        let mut forgotten = None;
+        let most = if self.ahead { learned.planned.min(self.most) } else { self.most };
+        while sweeps < most && (self.ahead || forgotten.is_none()) {
             let mut rng = stream.at(sweeps as u64).generator();
             let kind = match self.mutation {
                 Mutation::Automatic => turns.next(),
@@ -154,18 +171,22 @@ impl Movement<'_> {
                 Mutation::Independent => Kind::Independent,
                 Mutation::DifferentialEvolution => Kind::DifferentialEvolution,
             };
-            let share = self.sweep(kind, learned.size, population, &mut moved, &mut rng);
+            let now = if self.ahead { learned.size } else { size };
+            let share = self.sweep(kind, now, population, &mut moved, &mut rng);
             turns.learn(kind, share);
             if matches!(kind, Kind::DifferentialEvolution | Kind::RandomWalk) {
                 // Robbins and Monro's steps towards the acceptance that suits random walks.
-                learned.size = (learned.size * (2.0 * (share - 0.25)).exp()).clamp(1e-6, 10.0);
+                let gain = if self.ahead { 1.0 / most as f64 } else { 2.0 };
+                size = (size * (gain * (share - 0.25)).exp()).clamp(1e-6, 10.0);
             }
             taken += share;
             sweeps += 1;
             if watch.forgotten(population, self.correlation) {
-                break;
+                forgotten = forgotten.or(Some(sweeps));
             }
         }
+        learned.size = size;
+        learned.planned = plan(most, forgotten);
         learned.acceptance = taken / sweeps as f64;
         learned.moves += sweeps;
         (learned.of_coordinates, learned.of_likelihood) = watch.left();
@@ -248,6 +269,15 @@ impl Movement<'_> {
             }
         }
         taken
+    }
+}
+
+/// How many moves the next population needs, after one that had so many and forgot its past after some of them, or
+/// did not.
+fn plan(moves: usize, forgotten: Option<usize>) -> usize {
+    match forgotten {
+        Some(needed) => moves - (moves - needed) / 10,
+        None => moves + moves / 5 + 1,
     }
 }
 

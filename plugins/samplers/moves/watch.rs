@@ -20,6 +20,8 @@ impl Watch {
     /// Whether each quantity has forgotten its past, or will not within reach.
     pub fn forgotten(&mut self, population: &Evaluated, threshold: f64) -> bool {
         let now = quantities(population);
+        // Less than the error of a correlation cannot be seen.
+        let threshold = threshold.max(1.0 / (population.points.rows() as f64).sqrt());
         let present: Vec<f64> =
             self.before.iter().zip(&now).map(|(x, y)| correlation(x, y)).collect();
         self.history.push(present);

@@ -259,6 +259,7 @@ impl Nested {
                 }
             },
             others: Others::Apart(&sides),
+            ahead: true,
         };
         movement.run(&mut born, &mut memory.moves, &stream.named("move"));
         let ranked: Vec<_> = surviving.iter().map(|&i| at(i)).collect();

@@ -144,6 +144,7 @@ impl Sampler for SequentialMonteCarlo {
                     + power * (new.log_likelihood(j) - old.log_likelihood(i))
             },
             others: Others::OtherHalf(&shape),
+            ahead: false,
         };
         state.accepted = movement.run(&mut population, &mut memory.moves, &stream);
         population::keep(state, population, &memory)
