@@ -59,7 +59,7 @@ impl Default for Nested {
             live: 500,
             remaining: 0.01,
             mutation: Mutation::DifferentialEvolution,
-            correlation: 0.05,
+            correlation: 0.1,
             moves: 100,
             halvings: 1000,
         }

@@ -23,7 +23,8 @@ use super::population::{self, Share};
 /// It needs no starting point, finds several modes where the prior reaches them, and gives the evidence (the
 /// probability of the data, from which Bayes factors follow) with its standard error. At each
 /// temperature the particles are weighted, drawn anew in proportion to their weights, and moved by
-/// Metropolis steps whose size is learned from the population. Choose it for comparing models and for
+/// Metropolis steps whose size and shape are learned from points of similar likelihood, and which change the scale of
+/// a point as well: an unknown variance and its misfit fall through a funnel together. Choose it for comparing models and for
 /// posteriors with several modes; for one well-shaped posterior a Markov chain gives more draws for
 /// the same work.
 ///
@@ -59,7 +60,7 @@ impl Default for SequentialMonteCarlo {
             particles: 1000,
             effective_share: 0.75,
             mutation: Mutation::Automatic,
-            correlation: 0.05,
+            correlation: 0.1,
             moves: 50,
             temperatures: 200,
         }
