@@ -1,7 +1,6 @@
 //! Points with their prior density and their likelihood, for methods that treat the two differently.
 
 use lacuna::linalg::{Cholesky, Matrix};
-use lacuna::math::random::Stream;
 use lacuna::plugin::Target;
 use lacuna::plugin::sampler::State;
 use lacuna::run::Stop;
@@ -73,67 +72,6 @@ impl Evaluated {
             evaluations: 0,
         }
     }
-}
-
-/// Checks one starting point a chain; methods that begin with draws of the prior use them for nothing else.
-pub(super) fn check_start(
-    target: &dyn Target,
-    points: &Matrix,
-    chains: usize,
-) -> Result<Vec<f64>, Stop> {
-    let dimension = target.dimension();
-    if (points.rows(), points.columns()) != (chains, dimension) {
-        return Err(Stop::new(format!(
-            "expected a starting point of {dimension} coordinates for each of {chains} chains, \
-             found {} points of {}",
-            points.rows(),
-            points.columns()
-        )));
-    }
-    let log_density = target.log_density(points);
-    match log_density.iter().position(|value| !value.is_finite()) {
-        None => Ok(log_density),
-        Some(chain) => Err(Stop::new(format!(
-            "chain {} starts where the posterior density is zero or has no value",
-            chain + 1
-        ))),
-    }
-}
-
-/// Draws of the prior, all of them inside the support of the density, and how many were tried.
-pub(super) fn from_prior(
-    target: &dyn Target,
-    count: usize,
-    stream: &Stream,
-) -> Result<(Evaluated, u64), Stop> {
-    const ROUNDS: u64 = 1000;
-    let mut kept = Evaluated {
-        points: Matrix::zeros(0, target.dimension()),
-        log_prior: Vec::new(),
-        log_density: Vec::new(),
-        evaluations: 0,
-    };
-    for round in 0..ROUNDS {
-        let drawn = Evaluated::new(target, target.prior_draws(count, &stream.at(round)));
-        kept.evaluations += drawn.evaluations;
-        for i in 0..count {
-            if !drawn.log_likelihood(i).is_finite() {
-                continue;
-            }
-            kept.points.push_row(drawn.points.row(i));
-            kept.log_prior.push(drawn.log_prior[i]);
-            kept.log_density.push(drawn.log_density[i]);
-            if kept.points.rows() == count {
-                return Ok((kept, round * count as u64 + i as u64 + 1));
-            }
-        }
-    }
-    Err(Stop::new(format!(
-        "of {} draws of the prior only {} have a posterior density above zero",
-        ROUNDS * count as u64,
-        kept.points.rows()
-    ))
-    .help("narrow the priors to where the model and its surrogate have values"))
 }
 
 /// Centre and factored covariance of weighted points.

@@ -139,6 +139,13 @@ impl Diagnosis {
         self
     }
 
+    /// The same with what a person should know besides, which comes first and leaves the verdict as it is.
+    #[must_use]
+    pub fn with_notes(mut self, notes: Vec<String>) -> Self {
+        self.advice.splice(0..0, notes);
+        self
+    }
+
     fn holds(&self) -> bool {
         let reached = self.stranded.to_the_end.is_empty() && self.stranded.late.is_empty();
         reached && self.more_steps == 0

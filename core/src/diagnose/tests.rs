@@ -223,6 +223,15 @@ fn the_error_of_an_ensemble_mean_is_that_of_its_independent_chains() {
 }
 
 #[test]
+fn a_note_leaves_the_verdict_and_a_doubt_turns_it() {
+    let good = || Diagnosis::of(&healthy(2, 40, 6000, 0.9, 1), true);
+    assert!(good().converged);
+    let noted = good().with_notes(vec!["a note".into()]);
+    assert!(noted.converged && noted.advice == ["a note"]);
+    assert!(!noted.with_doubts(vec!["a doubt".into()]).converged);
+}
+
+#[test]
 fn no_draws_are_no_reason_to_panic() {
     let empty = healthy(2, 3, 0, 0.5, 1);
     let diagnosis = Diagnosis::of(&empty, true);

@@ -65,6 +65,11 @@ pub trait Sampler: Component {
         Vec::new()
     }
 
+    /// What a person should know of a run that ended in this state although it is no reason to distrust the draws.
+    fn notes(&self, _state: &State) -> Vec<String> {
+        Vec::new()
+    }
+
     /// What is worth telling about the method.
     fn facts(&self) -> Vec<Fact> {
         Vec::new()

@@ -283,8 +283,9 @@ fn calibrate(
     let diagnosis = if let Some(harvest) = &sampled.harvest {
         Diagnosis::of_harvest(&kept, harvest.effective_size, &harvest.doubts)
     } else {
-        let doubts = section.built.plugin.doubts(&sampled.state);
-        Diagnosis::of(&kept, plan.ensemble).with_doubts(doubts)
+        let sampler = &section.built.plugin;
+        let (doubts, notes) = (sampler.doubts(&sampled.state), sampler.notes(&sampled.state));
+        Diagnosis::of(&kept, plan.ensemble).with_notes(notes).with_doubts(doubts)
     };
     let (harvested, mut evidence) =
         sampled.harvest.map_or_else(Default::default, |h| (h.facts, h.evidence));

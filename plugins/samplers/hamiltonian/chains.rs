@@ -279,28 +279,72 @@ where
     memory.keep(state)
 }
 
-/// Reasons not to trust draws: trajectories that went astray or were cut off.
+/// So many divergent trajectories, and this share of them, are a warning only: single ones happen in sound runs.
+const FEW_DIVERGENCES: u64 = 3;
+const SMALL_SHARE: f64 = 1e-3;
+
+/// Trajectories after the warm-up.
+struct Tally {
+    all: usize,
+    divergent: u64,
+    saturated: u64,
+}
+
+impl Tally {
+    fn of(settings: &Settings, state: &State) -> Option<Self> {
+        let memory = serde_json::from_value::<Memory>(state.memory.clone()).ok()?;
+        let sum = |count: fn(&Chain) -> u64| memory.chains.iter().map(count).sum::<u64>();
+        Some(Self {
+            all: memory.step.saturating_sub(settings.warm_up) * memory.chains.len(),
+            divergent: sum(|c| c.divergences),
+            saturated: sum(|c| c.saturated),
+        })
+    }
+
+    fn diverges(&self) -> bool {
+        self.divergent > FEW_DIVERGENCES && self.divergent as f64 > SMALL_SHARE * self.all as f64
+    }
+
+    fn divergences(&self) -> String {
+        let share = 100.0 * self.divergent as f64 / self.all.max(1) as f64;
+        format!(
+            "{} of {} trajectories after the warm-up ({share:.2} %) diverged",
+            self.divergent, self.all
+        )
+    }
+}
+
+/// Reasons not to trust draws: trajectories that often went astray or were cut off.
 pub(crate) fn doubts(settings: &Settings, state: &State) -> Vec<String> {
-    let Ok(memory) = serde_json::from_value::<Memory>(state.memory.clone()) else {
-        return Vec::new();
-    };
-    let draws = memory.step.saturating_sub(settings.warm_up) * memory.chains.len();
-    let sum = |count: fn(&Chain) -> u64| memory.chains.iter().map(count).sum::<u64>();
-    let (divergences, saturated) = (sum(|c| c.divergences), sum(|c| c.saturated));
+    let Some(tally) = Tally::of(settings, state) else { return Vec::new() };
     let mut doubts = Vec::new();
-    if divergences > 0 {
+    if tally.diverges() {
         doubts.push(format!(
-            "{divergences} of {draws} trajectories after the warm-up diverged: the density is too curved \
-             there for their steps, and draws are missing around; raise `target_acceptance` above {} or \
-             narrow the priors",
+            "{}: the density is too curved there for their steps, and draws are missing around; raise \
+             `target_acceptance` above {} or narrow the priors",
+            tally.divergences(),
             settings.target_acceptance
         ));
     }
-    if saturated > 0 {
+    if tally.saturated > 0 {
         doubts.push(format!(
-            "{saturated} of {draws} trajectories after the warm-up were cut off before they turned: draws \
-             follow each other closely; raise `depth`, or learn all correlations with `metric = \"dense\"`"
+            "{} of {} trajectories after the warm-up were cut off before they turned: draws \
+             follow each other closely; raise `depth`, or learn all correlations with `metric = \"dense\"`",
+            tally.saturated, tally.all
         ));
     }
     doubts
+}
+
+/// Divergences that are too few to distrust the draws.
+pub(crate) fn notes(settings: &Settings, state: &State) -> Vec<String> {
+    let few = |tally: &Tally| tally.divergent > 0 && !tally.diverges();
+    let note = |tally: Tally| {
+        format!(
+            "{}, too few to distrust the draws; a `target_acceptance` above {} shows whether they matter",
+            tally.divergences(),
+            settings.target_acceptance
+        )
+    };
+    Tally::of(settings, state).filter(few).map(note).into_iter().collect()
 }

@@ -31,6 +31,9 @@ pub use metric::Shape;
 /// length suits all of the posterior. Unknowns with bounds are moved in logarithms or logits, so that
 /// no trajectory hits a bound. The density must be smooth.
 ///
+/// Divergent trajectories after the warm-up, whose energy error exceeds 1000, are counted: more than three that
+/// are more than 0.1 % of all mean that the run has not converged; fewer are told as a note.
+///
 /// References: Neal, in Handbook of Markov Chain Monte Carlo (2011), chapter 5; Hoffman and Gelman,
 /// J. Mach. Learn. Res. 15 (2014) 1593 (the step size); Stan reference manual, chapter 15 (the windows of
 /// the warm-up).
@@ -164,6 +167,10 @@ impl Sampler for Hamiltonian {
 
     fn doubts(&self, state: &State) -> Vec<String> {
         chains::doubts(&self.settings(), state)
+    }
+
+    fn notes(&self, state: &State) -> Vec<String> {
+        chains::notes(&self.settings(), state)
     }
 
     fn facts(&self) -> Vec<Fact> {

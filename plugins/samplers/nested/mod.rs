@@ -13,8 +13,9 @@ use lacuna::study::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::evaluated::{Evaluated, Shape, check_start, from_prior};
-use super::moves::{Learned, Movement, Mutation};
+use super::evaluated::{Evaluated, Shape};
+use super::moves::{Learned, Movement, Mutation, Others, Side};
+use super::population::{self, Share};
 use volumes::Ladder;
 
 /// Nested sampling: live points, spread over the prior, that climb to ever higher likelihood while the prior
@@ -128,32 +129,16 @@ impl Sampler for Nested {
     }
 
     fn start(&self, target: &dyn Target, points: Matrix) -> Result<State, Stop> {
-        let log_density = check_start(target, &points, self.live)?;
-        Ok(State {
-            points,
-            log_density,
-            accepted: vec![false; self.live],
-            evaluations: self.live as u64,
-            memory: serde_json::Value::Null,
-        })
+        population::start(target, points, self.live)
     }
 
     fn step(&self, target: &dyn Target, state: &mut State, stream: &Stream) -> Result<(), Stop> {
-        let (mut live, mut memory) = if let Some(memory) = recall(state)? {
-            (Evaluated::take(target, state), memory)
-        } else {
-            let (drawn, tried) = from_prior(target, self.live, &stream.named("prior"))?;
-            (drawn, Memory::first(self.live, tried))
-        };
+        let (mut live, mut memory) = population::resume(target, state, Memory::first, stream)?;
         state.accepted = vec![false; self.live];
         if !memory.finished {
             state.accepted = self.halve(target, &mut live, &mut memory, stream)?;
         }
-        state.evaluations += live.evaluations;
-        state.points = live.points;
-        state.log_density = live.log_density;
-        state.memory = serde_json::to_value(memory).map_err(|e| Stop::new(e.to_string()))?;
-        Ok(())
+        population::keep(state, live, &memory)
     }
 
     fn finished(&self, state: &State) -> bool {
@@ -166,9 +151,7 @@ impl Sampler for Nested {
         state: &State,
         stream: &Stream,
     ) -> Result<Option<Harvest>, Stop> {
-        let memory = recall(&mut state.clone())?.ok_or_else(|| {
-            Stop::new("the live points have not left their starting points, which are no draws")
-        })?;
+        let memory = population::remembered(state)?;
         Ok(Some(self.bring_home(target, state, &memory, stream)))
     }
 
@@ -181,23 +164,12 @@ impl Sampler for Nested {
     }
 }
 
-/// The memory of a state, which loses it; none before the first step.
-fn recall(state: &mut State) -> Result<Option<Memory>, Stop> {
-    serde_json::from_value(std::mem::take(&mut state.memory))
-        .map_err(|error| Stop::new(format!("the saved state of the sampler is damaged: {error}")))
-}
-
 impl Memory {
-    /// Before the first death, when `tried` draws of the prior gave `live` inside the support.
-    fn first(live: usize, tried: u64) -> Self {
-        let mut memory = Self { ranks: vec![0; BINS], ..Self::default() };
-        if tried > live as u64 {
-            // The draws stop at the last point that is needed: a negative binomial number of them.
-            let share = (live as f64 - 1.0) / (tried as f64 - 1.0);
-            memory.log_share = share.ln();
-            memory.share_variance = (1.0 - share) / live as f64;
-        }
-        memory
+    /// Before the first death.
+    fn first(support: Share) -> Self {
+        let Share { log, variance } = support;
+        let ranks = vec![0; BINS];
+        Self { log_share: log, share_variance: variance, ranks, ..Self::default() }
     }
 
     /// One more dead point, the lowest of `live`.
@@ -236,6 +208,18 @@ fn order(a: (f64, &[f64]), b: (f64, &[f64])) -> std::cmp::Ordering {
     a.0.total_cmp(&b.0).then_with(|| label(a.1).total_cmp(&label(b.1)))
 }
 
+/// The survivors in two halves: the copies of each half learn from the other half.
+fn sides(survivors: &Evaluated, parents: &[usize]) -> Result<[Side; 2], Stop> {
+    let (first, second) = parents.split_at(parents.len() / 2);
+    let side = |copies: std::ops::Range<usize>, others: &[usize]| {
+        let others = survivors.select(others);
+        let equal = vec![1.0 / others.points.rows() as f64; others.points.rows()];
+        let shape = Shape::of(&others.points, &equal)?;
+        Ok::<Side, Stop>(Side { movers: copies.collect(), others, shape })
+    };
+    Ok([side(0..first.len(), second)?, side(first.len()..parents.len(), first)?])
+}
+
 impl Nested {
     /// The lower half of the live points dies and is replaced; which points are new.
     fn halve(
@@ -260,14 +244,12 @@ impl Nested {
         let mut rng = stream.named("birth").generator();
         let parents = &permutation(&mut rng, survivors.points.rows())[..dying.len()];
         let mut born = survivors.select(parents);
-        let equal = vec![1.0 / surviving.len() as f64; surviving.len()];
-        let shape = Shape::of(&survivors.points, &equal)?;
+        let sides = sides(&survivors, parents)?;
         let movement = Movement {
             target,
             mutation: self.mutation,
             correlation: self.correlation,
             most: self.moves,
-            shape: &shape,
             law: &|old, i, new, j| {
                 let place = (new.log_likelihood(j), new.points.row(j));
                 if order(place, (bound, &edge)).is_gt() {
@@ -276,7 +258,8 @@ impl Nested {
                     f64::NEG_INFINITY
                 }
             },
-            fixed: Some(&survivors.points),
+            others: Others::Apart(&sides),
+            ahead: true,
         };
         movement.run(&mut born, &mut memory.moves, &stream.named("move"));
         let ranked: Vec<_> = surviving.iter().map(|&i| at(i)).collect();

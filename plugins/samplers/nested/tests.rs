@@ -1,11 +1,10 @@
 //! Evidence and draws against closed forms and published values.
 
 use lacuna::contract;
-use lacuna::math::moments::{mean, variance};
 
 use super::super::known_evidence::{
-    assert_evidence, calibration, divergence, peak, regression, run, shells, two_data, two_peaks,
-    unit_cube,
+    assert_conjugate, assert_effective_size, assert_evidence, assert_shares, assert_support,
+    calibration, informative, peak, regression, run, shells, two_data, unit_cube,
 };
 use super::*;
 
@@ -45,48 +44,27 @@ fn both_shells_are_found_with_the_published_evidence() {
 
 #[test]
 fn a_conjugate_normal_posterior_is_found() {
-    let mut divergences: Vec<f64> =
-        (0..20).map(|seed| divergence(&run(&with(500), &two_data(), seed).0)).collect();
-    divergences.sort_by(f64::total_cmp);
-    assert!(divergences[10] < 0.01, "{divergences:?}");
+    assert_conjugate(&with(500));
 }
 
 #[test]
 fn separated_peaks_keep_their_shares() {
-    let shares: Vec<f64> = (0..20)
-        .map(|seed| {
-            let (harvest, _) = run(&with(400), &two_peaks(), seed);
-            let large = harvest.points.iter_rows().filter(|x| x[0] < 0.45).count();
-            large as f64 / harvest.points.rows() as f64
-        })
-        .collect();
-    let error = (variance(&shares) / 20.0).sqrt();
-    assert!((mean(&shares) - 0.75).abs() < 4.0 * error, "{} +- {error}", mean(&shares));
-    assert!(error < 0.03, "{error}");
+    assert_shares(&with(400), 0.03);
 }
 
 #[test]
 fn stated_errors_of_the_evidence_hold() {
-    for (name, target, runs) in [
-        ("two data", two_data(), 40),
-        ("regression", regression(), 40),
-        ("peak", peak(4, 30.0), 20),
-    ] {
-        calibration(&with(300), &target, runs).assert(name, runs);
+    for (name, target) in [("two data", two_data()), ("regression", regression())] {
+        calibration(&with(300), &target, 40).assert_close(name);
+    }
+    for (name, target) in [("peak", peak(4, 30.0)), ("founding shape", informative(3))] {
+        calibration(&with(300), &target, 60).assert(name);
     }
 }
 
 #[test]
 fn the_effective_size_is_that_of_the_posterior_mean() {
-    // Over many runs the mean of the draws scatters by the posterior's width over the root of the size.
-    let target = two_data();
-    let runs: Vec<_> = (0..60).map(|seed| run(&with(200), &target, seed).0).collect();
-    let means: Vec<f64> = runs.iter().map(|h| mean(&h.points.column(0))).collect();
-    let sizes: Vec<f64> = runs.iter().map(|h| h.effective_size).collect();
-    let real = 0.857_143 / variance(&means);
-    let stated = mean(&sizes);
-    // The variance of 60 means is known to sqrt(2 / 59) = 18 %.
-    assert!((stated / real - 1.0).abs() < 0.6, "stated {stated}, real {real}");
+    assert_effective_size(&with(200));
 }
 
 #[test]
@@ -119,11 +97,10 @@ fn equal_likelihoods_are_no_obstacle() {
     // The likelihood is one on half of the prior and e^-5 on the other: Z = (1 + e^-5) / 2.
     let function = |x: &[f64]| if x[0] < 0.5 { 0.0 } else { -5.0 };
     let expected = 0.5 * (1.0 + (-5.0_f64).exp());
-    calibration(&with(400), &unit_cube(1, expected.ln(), function), 20).assert("plateaus", 20);
+    calibration(&with(400), &unit_cube(1, expected.ln(), function), 20).assert("plateaus");
 }
 
 #[test]
 fn a_likelihood_that_is_zero_on_most_of_the_prior_is_no_obstacle() {
-    let function = |x: &[f64]| if x[0] < 0.02 { 0.0 } else { f64::NEG_INFINITY };
-    calibration(&with(200), &unit_cube(2, 0.02_f64.ln(), function), 20).assert("support", 20);
+    assert_support(&with(200));
 }

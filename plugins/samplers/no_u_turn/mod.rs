@@ -21,6 +21,9 @@ use super::hamiltonian::{Settings, Shape, chains};
 /// learnt in the warm-up, the shape from all chains together. Unknowns with bounds are moved in logarithms
 /// or logits. Separate maxima are not visited in turn: a chain stays at the one it finds.
 ///
+/// Divergent trajectories after the warm-up, whose energy error exceeds 1000, are counted: more than three that
+/// are more than 0.1 % of all mean that the run has not converged; fewer are told as a note.
+///
 /// References: Hoffman and Gelman, J. Mach. Learn. Res. 15 (2014) 1593; Betancourt, A conceptual
 /// introduction to Hamiltonian Monte Carlo, arXiv:1701.02434 (2017), appendix A (multinomial draws, the
 /// criterion of the turn); Stan reference manual, chapter 15 (the windows of the warm-up, the
@@ -99,6 +102,10 @@ impl Sampler for NoUTurn {
 
     fn doubts(&self, state: &State) -> Vec<String> {
         chains::doubts(&self.settings(), state)
+    }
+
+    fn notes(&self, state: &State) -> Vec<String> {
+        chains::notes(&self.settings(), state)
     }
 
     fn facts(&self) -> Vec<Fact> {

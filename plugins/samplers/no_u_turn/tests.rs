@@ -58,6 +58,23 @@ fn a_funnel_diverges_and_says_so() {
 }
 
 #[test]
+fn a_single_divergence_is_a_note_and_many_are_a_doubt() {
+    let sampler = NoUTurn { steps: 600, warm_up: 100, ..NoUTurn::default() };
+    let (_, mut state) = run(&sampler, &scaled(), 6);
+    assert!(sampler.doubts(&state).is_empty() && sampler.notes(&state).is_empty());
+    for (divergences, doubted) in [(1, false), (3, false), (4, true)] {
+        state.memory["chains"][0]["divergences"] = divergences.into();
+        let told = format!("{divergences} of 2000 trajectories after the warm-up (0.");
+        let (yes, no) = if doubted {
+            (sampler.doubts(&state), sampler.notes(&state))
+        } else {
+            (sampler.notes(&state), sampler.doubts(&state))
+        };
+        assert!(no.is_empty() && yes.len() == 1 && yes[0].contains(&told), "{yes:?} {no:?}");
+    }
+}
+
+#[test]
 fn trajectories_that_are_cut_off_are_told() {
     let sampler = NoUTurn { depth: 1, steps: 300, warm_up: 100, ..NoUTurn::default() };
     let (_, state) = run(&sampler, &scaled(), 7);

@@ -80,7 +80,8 @@ impl SequentialMonteCarlo {
             ));
         }
         // Coordinates may remember in which of several modes they are; the likelihood must not.
-        if memory.moves.of_likelihood > self.correlation {
+        let error = 1.0 / (self.particles as f64).sqrt();
+        if memory.moves.of_likelihood > self.correlation + 2.0 * error {
             doubts.push(format!(
                 "after the last {} moves of each particle its likelihood still has the correlation {:.2} \
                  with that before: raise `moves`",

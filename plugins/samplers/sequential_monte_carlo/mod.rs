@@ -13,8 +13,9 @@ use lacuna::study::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::evaluated::{Evaluated, Shape, check_start, from_prior};
-use super::moves::{Learned, Movement, Mutation};
+use super::evaluated::{Evaluated, Shape};
+use super::moves::{Learned, Movement, Mutation, Others};
+use super::population::{self, Share};
 
 /// Sequential Monte Carlo: a population of particles that is led from the prior to the posterior by
 /// raising the likelihood to a power that grows from 0 to 1.
@@ -22,7 +23,8 @@ use super::moves::{Learned, Movement, Mutation};
 /// It needs no starting point, finds several modes where the prior reaches them, and gives the evidence (the
 /// probability of the data, from which Bayes factors follow) with its standard error. At each
 /// temperature the particles are weighted, drawn anew in proportion to their weights, and moved by
-/// Metropolis steps whose size is learned from the population. Choose it for comparing models and for
+/// Metropolis steps whose size and shape are learned from points of similar likelihood, and which change the scale of
+/// a point as well: an unknown variance and its misfit fall through a funnel together. Choose it for comparing models and for
 /// posteriors with several modes; for one well-shaped posterior a Markov chain gives more draws for
 /// the same work.
 ///
@@ -56,7 +58,7 @@ impl Default for SequentialMonteCarlo {
     fn default() -> Self {
         Self {
             particles: 1000,
-            effective_share: 0.5,
+            effective_share: 0.75,
             mutation: Mutation::Automatic,
             correlation: 0.1,
             moves: 50,
@@ -114,23 +116,17 @@ impl Sampler for SequentialMonteCarlo {
     }
 
     fn start(&self, target: &dyn Target, points: Matrix) -> Result<State, Stop> {
-        let log_density = check_start(target, &points, self.particles)?;
-        Ok(State {
-            points,
-            log_density,
-            accepted: vec![false; self.particles],
-            evaluations: self.particles as u64,
-            memory: serde_json::Value::Null,
-        })
+        population::start(target, points, self.particles)
     }
 
     fn step(&self, target: &dyn Target, state: &mut State, stream: &Stream) -> Result<(), Stop> {
-        let (mut population, mut memory) = if let Some(memory) = recall(state)? {
-            (Evaluated::take(target, state), memory)
-        } else {
-            let (drawn, tried) = from_prior(target, self.particles, &stream.named("prior"))?;
-            (drawn, Memory::first(self.particles, tried))
+        let first = |support: Share| Memory {
+            log_evidence: support.log,
+            independent_variance: support.variance,
+            families: (0..self.particles).collect(),
+            ..Memory::default()
         };
+        let (mut population, mut memory) = population::resume(target, state, first, stream)?;
         let shape = if memory.temperature < 1.0 {
             self.cool(&mut population, &mut memory, &stream.named("cool"))?
         } else {
@@ -144,19 +140,15 @@ impl Sampler for SequentialMonteCarlo {
             mutation: self.mutation,
             correlation: self.correlation,
             most: self.moves,
-            shape: &shape,
             law: &|old, i, new, j| {
                 new.log_prior[j] - old.log_prior[i]
                     + power * (new.log_likelihood(j) - old.log_likelihood(i))
             },
-            fixed: None,
+            others: Others::OtherHalf(&shape),
+            ahead: false,
         };
         state.accepted = movement.run(&mut population, &mut memory.moves, &stream);
-        state.evaluations += population.evaluations;
-        state.points = population.points;
-        state.log_density = population.log_density;
-        state.memory = serde_json::to_value(memory).map_err(|e| Stop::new(e.to_string()))?;
-        Ok(())
+        population::keep(state, population, &memory)
     }
 
     fn finished(&self, state: &State) -> bool {
@@ -169,9 +161,7 @@ impl Sampler for SequentialMonteCarlo {
         state: &State,
         stream: &Stream,
     ) -> Result<Option<Harvest>, Stop> {
-        let memory = recall(&mut state.clone())?.ok_or_else(|| {
-            Stop::new("the particles have not left their starting points, which are no draws")
-        })?;
+        let memory = population::remembered(state)?;
         Ok(Some(self.bring_home(target, state, &memory, stream)))
     }
 
@@ -181,26 +171,6 @@ impl Sampler for SequentialMonteCarlo {
             Fact::new("effective share", self.effective_share),
             Fact::new("correlation after moves", self.correlation),
         ]
-    }
-}
-
-/// The memory of a state, which loses it; none before the first step.
-fn recall(state: &mut State) -> Result<Option<Memory>, Stop> {
-    serde_json::from_value(std::mem::take(&mut state.memory))
-        .map_err(|error| Stop::new(format!("the saved state of the sampler is damaged: {error}")))
-}
-
-impl Memory {
-    /// Before the first temperature, when `tried` draws of the prior gave `particles` inside the support.
-    fn first(particles: usize, tried: u64) -> Self {
-        let mut memory = Self { families: (0..particles).collect(), ..Self::default() };
-        if tried > particles as u64 {
-            // The draws stop at the last point that is needed: a negative binomial number of them.
-            let share = (particles as f64 - 1.0) / (tried as f64 - 1.0);
-            memory.log_evidence = share.ln();
-            memory.independent_variance = (1.0 - share) / particles as f64;
-        }
-        memory
     }
 }
 

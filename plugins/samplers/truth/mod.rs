@@ -1,6 +1,5 @@
 //! Samplers against densities whose moments are known.
 
-mod overhead;
 mod proof;
 
 use lacuna::data::Draws;
