@@ -1,10 +1,10 @@
 //! The inverse covariance of the mean curve, as far as derivatives need it.
 
-use lacuna::linalg::vector::dot;
-use lacuna::linalg::{self, Matrix};
+use lacuna::linalg::vector::{add_scaled, dot};
+use lacuna::linalg::{self, Cholesky, Matrix};
 
-use super::bias::{Bias, add};
-use super::filter::Traces;
+use super::bias::{Bias, Block};
+use super::filter::{Filter, Traces};
 use super::solve::Solved;
 
 /// `V^-1 = A^-1 + E E' - K K'` in the terms of [`Solved`].
@@ -24,8 +24,8 @@ pub(super) struct Precision<'a> {
 }
 
 /// `X L^-1'` for the factor `L L'`.
-fn half(x: &Matrix, factor: &linalg::Cholesky) -> Matrix {
-    factor.whiten_matrix(&x.transposed()).transposed()
+fn half(x: &Matrix, factor: &Cholesky) -> Matrix {
+    linalg::multiply_transposed(x, &factor.lower_inverse())
 }
 
 impl Solved<'_> {
@@ -33,21 +33,22 @@ impl Solved<'_> {
     pub fn precision(&self) -> Precision<'_> {
         let (n, r) = (self.residual.len(), self.factor.columns());
         let (mut inverse_image, mut added) = (Matrix::zeros(n, 0), Matrix::zeros(n, 0));
-        let mut inverse_factor = Matrix::zeros(n, r);
-        for i in 0..n {
-            inverse_factor.row_mut(i).copy_from_slice(self.white.row(i));
-        }
+        let mut inverse_factor = Matrix::from_vec(n, r, self.white.as_slice()[..n * r].to_vec());
         self.back(&mut inverse_factor);
         if let Some(inner) = &self.inner {
             inverse_image = inner.white.clone();
             self.back(&mut inverse_image);
             added = half(&inverse_image, &inner.reduced);
             let below: Vec<usize> = (n..self.white.rows()).collect();
-            let along = linalg::multiply(&added, &self.white.select_rows(&below));
-            add(&mut inverse_factor, 1.0, &along);
+            let below = self.white.select_rows(&below);
+            for i in 0..n {
+                for (&weight, row) in added.row(i).iter().zip(below.iter_rows()) {
+                    add_scaled(inverse_factor.row_mut(i), weight, row);
+                }
+            }
         }
         let taken = half(&inverse_factor, &self.capacitance);
-        let traces: Vec<Traces> = self.filters.iter().map(super::filter::Filter::traces).collect();
+        let traces: Vec<Traces> = self.filters.iter().map(Filter::traces).collect();
         let mut diagonal = vec![0.0; n];
         for (block, traces) in self.bias.blocks.iter().zip(&traces) {
             for (&row, own) in block.rows.iter().zip(&traces.diagonal) {
@@ -66,15 +67,14 @@ impl Precision<'_> {
     /// `P = I - H S^-1 G'`.
     pub fn by_process(&self) -> Vec<[f64; 2]> {
         let solved = self.solved;
-        let (left, right) = self.columns();
         let bias = solved.bias;
-        // Series with one covariance together.
+        let turned = self.turned();
         let mut found = vec![[0.0; 2]; bias.blocks.len()];
         for (s, block) in bias.blocks.iter().enumerate() {
             let Some([covariance, slope]) = bias.of(&solved.covariances, s) else { continue };
             let (sd, _) = Bias::of_block(block, solved.values);
-            let rows = |m: &Matrix| m.select_rows(&block.rows);
-            let by = linalg::multiply_transposed(&rows(&left), &rows(&right));
+            let (left, right) = self.columns(block, turned.as_ref());
+            let by = linalg::multiply_transposed(&left, &right);
             // tr(A^-1 C) = tr(I - A^-1 D).
             let noisy = block.rows.iter().zip(&self.traces[s].diagonal);
             let own: f64 = noisy.map(|(&row, d)| 1.0 - solved.noise[row] * d).sum();
@@ -86,44 +86,64 @@ impl Precision<'_> {
         found
     }
 
-    /// `X` and `Z` with `X Z' = P' (pull pull' - V^-1) P + A^-1` on the blocks of the diagonal.
-    fn columns(&self) -> (Matrix, Matrix) {
-        let n = self.pull.len();
-        let pull = Matrix::from_vec(n, 1, self.pull.clone());
-        let mut plain = beside(&[&pull, &self.added, &self.taken]);
-        let Some(inner) = &self.solved.inner else {
-            return (plain.clone(), plain);
-        };
-        // P' X = X - G S^-1 (H' X).
-        let basis = &self.solved.bias.basis;
-        let along = inner.outer.solve_matrix(&linalg::transposed_multiply(&inner.image, &plain));
-        add(&mut plain, -1.0, &linalg::multiply(basis, &along));
-        let mut signed = plain.clone();
-        let taken = 1..=self.added.columns();
-        for i in 0..n {
-            signed.row_mut(i)[taken.clone()].iter_mut().for_each(|x| *x = -*x);
+    /// What the projection makes of `pull`, `E`, `K` and `A^-1`; `None` where there is none.
+    fn turned(&self) -> Option<Turned> {
+        let inner = self.solved.inner.as_ref()?;
+        let (p, q, r) = (inner.image.columns(), self.added.columns(), self.taken.columns());
+        let mut along = Matrix::zeros(p, 1 + q + r);
+        for (i, row) in inner.image.iter_rows().enumerate() {
+            for (k, &weight) in row.iter().enumerate() {
+                let sum = along.row_mut(k);
+                sum[0] += weight * self.pull[i];
+                add_scaled(&mut sum[1..=q], weight, self.added.row(i));
+                add_scaled(&mut sum[1 + q..], weight, self.taken.row(i));
+            }
         }
-        // P' A^-1 P = A^-1 - G T' - T G' + G M G' with T = Y S^-1, M = S^-1 H'T.
-        let turned = inner.outer.solve_matrix(&self.inverse_image.transposed()).transposed();
-        let middle = linalg::transposed_multiply(&inner.image, &turned);
+        let inverse = inner.outer.solve_matrix(&self.inverse_image.transposed()).transposed();
+        let middle = linalg::transposed_multiply(&inner.image, &inverse);
         let middle = inner.outer.solve_matrix(&middle);
-        let mut other = turned.clone();
-        add(&mut other, -1.0, &linalg::multiply_transposed(basis, &middle));
-        (beside(&[&plain, basis, &turned]), beside(&[&signed, &other, basis]))
+        Some(Turned { along: inner.outer.solve_matrix(&along), inverse, middle })
+    }
+
+    /// `X` and `Z` with `X Z' = P' (pull pull' - V^-1) P + A^-1` at a series.
+    fn columns(&self, block: &Block, turned: Option<&Turned>) -> (Matrix, Matrix) {
+        let basis = &self.solved.bias.basis;
+        let (p, q, r) = (basis.columns(), self.added.columns(), self.taken.columns());
+        let own = 1 + q + r;
+        let width = if turned.is_some() { own + 2 * p } else { own };
+        let mut left = Matrix::zeros(block.rows.len(), width);
+        let mut right = Matrix::zeros(block.rows.len(), width);
+        for (k, &i) in block.rows.iter().enumerate() {
+            let (x, z) = (left.row_mut(k), right.row_mut(k));
+            x[0] = self.pull[i];
+            x[1..=q].copy_from_slice(self.added.row(i));
+            x[1 + q..own].copy_from_slice(self.taken.row(i));
+            if let Some(Turned { along, inverse, middle }) = turned {
+                // P' X = X - G S^-1 (H' X).
+                for (&weight, row) in basis.row(i).iter().zip(along.iter_rows()) {
+                    add_scaled(&mut x[..own], -weight, row);
+                }
+                // P' A^-1 P = A^-1 - G T' - T G' + G M G'.
+                x[own..own + p].copy_from_slice(basis.row(i));
+                x[own + p..].copy_from_slice(inverse.row(i));
+                z[own + p..].copy_from_slice(basis.row(i));
+                for (j, t) in inverse.row(i).iter().enumerate() {
+                    z[own + j] = t - dot(middle.row(j), basis.row(i));
+                }
+            }
+            z[..own].copy_from_slice(&x[..own]);
+            z[1..=q].iter_mut().for_each(|x| *x = -*x);
+        }
+        (left, right)
     }
 }
 
-/// Matrices of as many rows side by side.
-fn beside(parts: &[&Matrix]) -> Matrix {
-    let width = parts.iter().map(|m| m.columns()).sum();
-    let rows = parts.first().map_or(0, |m| m.rows());
-    let mut all = Matrix::zeros(rows, width);
-    for i in 0..rows {
-        let mut start = 0;
-        for part in parts {
-            all.row_mut(i)[start..start + part.columns()].copy_from_slice(part.row(i));
-            start += part.columns();
-        }
-    }
-    all
+/// See [`Precision::turned`].
+struct Turned {
+    /// `S^-1 H' X` for the columns `X` of `pull`, `E` and `K`.
+    along: Matrix,
+    /// `T = Y S^-1`.
+    inverse: Matrix,
+    /// `M = S^-1 H'T`, symmetric.
+    middle: Matrix,
 }

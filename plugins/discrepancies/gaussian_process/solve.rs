@@ -78,6 +78,30 @@ fn whiten(bias: &Bias, filters: &[Filter], columns: &mut Matrix) {
     }
 }
 
+/// Columns whitened with `B`: so many rows more, by `N^-1/2 Y'`, as the bias is orthogonal to.
+fn whitened(
+    bias: &Bias,
+    filters: &[Filter],
+    inner: Option<&Inner>,
+    columns: &Matrix,
+    below: usize,
+) -> Matrix {
+    let (n, r) = (columns.rows(), columns.columns());
+    let mut white = Matrix::zeros(n + below, r);
+    white.as_mut_slice()[..n * r].copy_from_slice(columns.as_slice());
+    whiten(bias, filters, &mut white);
+    let Some(inner) = inner else { return white };
+    let mut along = Matrix::zeros(below, r);
+    for (row, weights) in white.iter_rows().zip(inner.white.iter_rows()) {
+        for (k, &weight) in weights.iter().enumerate() {
+            add_scaled(along.row_mut(k), weight, row);
+        }
+    }
+    let along = inner.reduced.whiten_matrix(&along);
+    white.as_mut_slice()[n * r..].copy_from_slice(along.as_slice());
+    white
+}
+
 impl<'a> Solved<'a> {
     /// The factors at a residual of the means, for these variances of the means.
     pub fn new(
@@ -106,26 +130,11 @@ impl<'a> Solved<'a> {
             twice += inner.reduced.log_determinant() - inner.outer.log_determinant();
             Some(inner)
         };
-        // Columns: F, d.
-        let (n, r) = (factor.rows(), factor.columns());
-        let mut columns = Matrix::zeros(n, r + 1);
-        for (i, d) in residual.iter().enumerate() {
-            columns.row_mut(i)[..r].copy_from_slice(factor.row(i));
-            columns.row_mut(i)[r] = *d;
-        }
-        whiten(bias, &filters, &mut columns);
-        if let Some(inner) = &inner {
-            let along = linalg::transposed_multiply(&inner.white, &columns);
-            for row in inner.reduced.whiten_matrix(&along).iter_rows() {
-                columns.push_row(row);
-            }
-        }
-        let mut white = Matrix::zeros(columns.rows(), r);
-        let mut last = Vec::with_capacity(columns.rows());
-        for (i, row) in columns.iter_rows().enumerate() {
-            white.row_mut(i).copy_from_slice(&row[..r]);
-            last.push(row[r]);
-        }
+        let below = inner.as_ref().map_or(0, |inner| inner.white.columns());
+        let white = whitened(bias, &filters, inner.as_ref(), factor, below);
+        let column = Matrix::from_vec(residual.len(), 1, residual.clone());
+        let last = whitened(bias, &filters, inner.as_ref(), &column, below).into_vec();
+        let r = factor.columns();
         let mut capacitance = linalg::gram(&white);
         (0..r).for_each(|k| capacitance[(k, k)] += 1.0);
         let capacitance = Cholesky::new(&capacitance).ok()?;
