@@ -6,6 +6,3 @@ pub mod gaussian;
 pub mod gaussian_process;
 pub mod multiplicative_gaussian;
 pub mod student_t;
-
-#[cfg(test)]
-mod timing;

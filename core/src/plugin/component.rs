@@ -18,6 +18,9 @@ pub struct Context<'a> {
     pub layout: &'a Layout,
     /// The number of runs that the design makes, where the study has a design.
     pub runs: Option<usize>,
+    /// Whether the likelihood will have errors that all replicates share: of the emulator or of the
+    /// model's numerics. Those of the replicates' mean are known only with the data.
+    pub common_errors: bool,
 }
 
 /// What every plugin does besides its own work.

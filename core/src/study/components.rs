@@ -21,11 +21,13 @@ impl Study {
         let kept = self.surrogate.as_ref().map_or(0, |s| s.common.validation);
         let training = self.surrogate.as_ref().and_then(|s| s.common.training).map(usize::from);
         let runs = training.or_else(|| made.map(|made| made.saturating_sub(kept)));
+        let emulator = self.discrepancy.as_ref().is_some_and(|d| d.common.emulator_error);
         Context {
             directory: &self.directory,
             parameters: &self.parameters,
             layout: &self.layout,
             runs,
+            common_errors: self.numerical_error.is_some() || emulator,
         }
     }
 

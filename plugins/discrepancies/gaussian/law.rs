@@ -7,6 +7,7 @@ use lacuna::math::distribution::Distribution;
 use lacuna::plugin::discrepancy::CommonError;
 use lacuna::run::Stop;
 
+use super::grams::Grams;
 use super::integral::{Integral, conjugate, integrate};
 use super::statistics::{Residual, Spread, Statistics};
 use crate::discrepancies::common::PerGroup;
@@ -30,8 +31,7 @@ pub(super) struct Coupled {
     variance: PerGroup,
     /// `T_g`.
     factors: Vec<Matrix>,
-    /// `T_g' T_g`.
-    grams: Vec<Matrix>,
+    grams: Grams,
 }
 
 /// How the log-likelihood changes with the residual of each group.
@@ -180,17 +180,15 @@ impl Coupled {
             group.directions = qr.q.transposed();
             factors.push(qr.r);
         }
-        Ok(Self { variance, grams: factors.iter().map(linalg::gram).collect(), factors })
+        Ok(Self { variance, grams: Grams::of(&factors), factors })
     }
 
     fn solve<'a>(&'a self, hyper: &'a [f64], residuals: &[Residual<'_>]) -> Option<Solved<'a>> {
         let variance = self.variance.values(hyper)?;
         let rank = self.factors.first().map_or(0, Matrix::columns);
-        let mut capacitance = Matrix::zeros(rank, rank);
+        let mut capacitance = self.grams.sum(&self.factors, variance);
         let mut zeta = vec![0.0; rank];
         for (g, &v) in variance.iter().enumerate() {
-            let entries = capacitance.as_mut_slice().iter_mut().zip(self.grams[g].as_slice());
-            entries.for_each(|(c, m)| *c += m / v);
             let pull = linalg::transposed_multiply_vector(&self.factors[g], residuals[g].along);
             zeta.iter_mut().zip(pull).for_each(|(z, p)| *z += p / v);
         }
@@ -210,11 +208,10 @@ impl Coupled {
 
     /// By Fisher's identity: the derivative at fixed common errors, averaged over them given the data.
     fn by_variance(&self, solved: &Solved<'_>, spreads: &[&Spread]) -> Vec<f64> {
-        let inverse = solved.capacitance.inverse();
+        let traces = self.grams.traces(&self.factors, &solved.capacitance);
         let one = |(g, spread): (usize, &&Spread)| {
             let v = solved.variance[g];
-            let trace = dot(inverse.as_slice(), self.grams[g].as_slice());
-            let squares = spread.scatter + solved.squares[g] + trace;
+            let squares = spread.scatter + solved.squares[g] + traces[g];
             -0.5 * (spread.count / v - squares / (v * v))
         };
         spreads.iter().enumerate().map(one).collect()

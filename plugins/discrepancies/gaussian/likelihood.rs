@@ -122,11 +122,13 @@ fn residuals(split: &Split) -> Vec<Residual<'_>> {
         .collect()
 }
 
+/// What is wrong with `marginal` for several groups and common errors.
+pub(super) const SEVERAL: &str =
+    "several variances cannot be integrated out together with errors that all replicates share";
+
 fn not_integrable() -> Stop {
-    Stop::new(
-        "several variances cannot be integrated out together with errors that all replicates share",
-    )
-    .help("give `marginal = false`, or one variance for all outputs (`by = \"all\"`)")
+    Stop::new(SEVERAL)
+        .help("give `marginal = false`, or one variance for all outputs (`by = \"all\"`)")
 }
 
 impl Likelihood for GaussianLikelihood {

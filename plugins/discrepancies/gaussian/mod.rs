@@ -1,6 +1,7 @@
 //! `gaussian`: independent normal differences.
 
 mod compressed;
+mod grams;
 mod integral;
 mod law;
 mod likelihood;
@@ -69,6 +70,13 @@ impl Component for Gaussian {
                 .at("marginal")
                 .say("a known variance cannot be integrated out")
                 .help("leave `marginal` away, or give the variance a prior");
+        }
+        let several = Groups::of(context.layout, &self.by).is_ok_and(|g| g.count() > 1);
+        if self.marginal && several && context.common_errors {
+            complaints
+                .at("marginal")
+                .say(likelihood::SEVERAL)
+                .expected("`marginal = false`, or one variance for all outputs (`by = \"all\"`)");
         }
     }
 }

@@ -80,19 +80,39 @@ impl Bias {
         }
     }
 
-    /// The covariance of each series at its measured outputs.
-    pub fn covariances(&self, values: (&[f64], &[f64])) -> Vec<Matrix> {
-        let mut all: Vec<Matrix> = Vec::with_capacity(self.blocks.len());
-        for block in &self.blocks {
-            let covariance = if let Some(twin) = block.twin {
-                all[twin].clone()
-            } else {
-                let (sd, length) = Self::of_block(block, values);
-                self.covariance(&block.grid, &block.grid, sd, length)
-            };
-            all.push(covariance);
+    /// The covariance of each series at its measured outputs and its derivative by the length; none
+    /// for a series that has an earlier twin.
+    pub fn covariances(&self, values: (&[f64], &[f64])) -> Vec<Option<[Matrix; 2]>> {
+        let one = |block: &Block| {
+            let (sd, length) = Self::of_block(block, values);
+            block.twin.is_none().then(|| self.along(&block.grid, sd, length))
+        };
+        self.blocks.iter().map(one).collect()
+    }
+
+    /// The same along one grid: `exp(-x)` of a distance is the product of those of its steps.
+    fn along(&self, grid: &[f64], sd: f64, length: f64) -> [Matrix; 2] {
+        let (n, rate) = (grid.len(), self.kernel.rate(length));
+        let (mut covariance, mut slope) = (Matrix::zeros(n, n), Matrix::zeros(n, n));
+        let mut decays: Vec<f64> = Vec::with_capacity(n);
+        for i in 0..n {
+            let step = if i == 0 { 0.0 } else { (-rate * (grid[i] - grid[i - 1])).exp() };
+            decays.iter_mut().for_each(|e| *e *= step);
+            decays.push(sd * sd);
+            for (j, &e) in decays.iter().enumerate() {
+                let (value, by_length) = self.kernel.factors(rate * (grid[i] - grid[j]));
+                covariance[(i, j)] = value * e;
+                covariance[(j, i)] = value * e;
+                slope[(i, j)] = by_length * e / length;
+                slope[(j, i)] = by_length * e / length;
+            }
         }
-        all
+        [covariance, slope]
+    }
+
+    /// The one among covariances that belongs to a series.
+    pub fn of<'a>(&self, all: &'a [Option<[Matrix; 2]>], series: usize) -> Option<&'a [Matrix; 2]> {
+        all[self.blocks[series].twin.unwrap_or(series)].as_ref()
     }
 
     /// The covariance between two sets of values of the axis.
@@ -116,6 +136,19 @@ impl Bias {
             add(&mut inner, 1.0, &part);
         }
         Cholesky::new(&inner).ok()
+    }
+
+    /// `H` at the measured outputs, given the covariances.
+    pub fn image(&self, covariances: &[Option<[Matrix; 2]>]) -> Matrix {
+        let mut image = Matrix::zeros(self.basis.rows(), self.basis.columns());
+        for (s, block) in self.blocks.iter().enumerate() {
+            let Some([covariance, _]) = self.of(covariances, s) else { continue };
+            let own = linalg::multiply(covariance, &self.basis_of(block));
+            for (&row, values) in block.rows.iter().zip(own.iter_rows()) {
+                image.row_mut(row).copy_from_slice(values);
+            }
+        }
+        image
     }
 
     /// `H` at all outputs of each series, and the factor of `S`.

@@ -1,4 +1,13 @@
-//! Matérn correlations.
+//! Matérn correlations, also as processes in time.
+//!
+//! A process with a Matérn correlation of half-integer index is a component of a Markov process: of
+//! its value and first derivatives, each in units of the `rate` (Hartikainen and Särkkä, Kalman
+//! filtering and smoothing solutions to temporal Gaussian process regression models (2010)). Its
+//! drift `F` has the only eigenvalue -1, so that with `N = F + I`, whose cube is zero,
+//!
+//! ```text
+//! exp(F x) = exp(-x) (I + N x + N^2 x^2 / 2).
+//! ```
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -16,20 +25,63 @@ pub enum Kernel {
     FiveHalves,
 }
 
+/// A matrix of states: value and two derivatives, the last of which is zero where there is but one.
+pub(super) type Square = [[f64; 3]; 3];
+
 impl Kernel {
+    /// What a distance is multiplied by.
+    pub(super) fn rate(self, length: f64) -> f64 {
+        match self {
+            Self::ThreeHalves => 3.0_f64.sqrt() / length,
+            Self::FiveHalves => 5.0_f64.sqrt() / length,
+        }
+    }
+
+    /// The correlation and `length` times its derivative by the length, at a distance times the
+    /// rate, without the factor `exp(-x)` of both.
+    pub(super) fn factors(self, x: f64) -> (f64, f64) {
+        match self {
+            Self::ThreeHalves => (1.0 + x, x * x),
+            Self::FiveHalves => (1.0 + x + x * x / 3.0, x * x * (1.0 + x) / 3.0),
+        }
+    }
+
     /// The correlation at a distance, and its derivative by the length.
     pub(super) fn at(self, distance: f64, length: f64) -> (f64, f64) {
+        let x = self.rate(length) * distance;
+        let (value, slope) = self.factors(x);
+        let e = (-x).exp();
+        (value * e, slope * e / length)
+    }
+
+    /// The covariance of the state of a process of variance one.
+    pub(super) fn stationary(self) -> Square {
+        let third = 1.0 / 3.0;
         match self {
-            Self::ThreeHalves => {
-                let x = 3.0_f64.sqrt() * distance / length;
-                let e = (-x).exp();
-                ((1.0 + x) * e, x * x * e / length)
-            }
-            Self::FiveHalves => {
-                let x = 5.0_f64.sqrt() * distance / length;
-                let e = (-x).exp();
-                ((1.0 + x + x * x / 3.0) * e, x * x * (1.0 + x) * e / (3.0 * length))
+            Self::ThreeHalves => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0; 3]],
+            Self::FiveHalves => [[1.0, 0.0, -third], [0.0, third, 0.0], [-third, 0.0, 1.0]],
+        }
+    }
+
+    /// `exp(F x)` and its derivative by `x`.
+    pub(super) fn transition(self, x: f64) -> (Square, Square) {
+        let (first, second): (Square, Square) = match self {
+            Self::ThreeHalves => ([[1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [0.0; 3]], [[0.0; 3]; 3]),
+            Self::FiveHalves => (
+                [[1.0, 1.0, 0.0], [0.0, 1.0, 1.0], [-1.0, -3.0, -2.0]],
+                [[1.0, 2.0, 1.0], [-1.0, -2.0, -1.0], [1.0, 2.0, 1.0]],
+            ),
+        };
+        let e = (-x).exp();
+        let (mut value, mut slope) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
+        for i in 0..3 {
+            for j in 0..3 {
+                let unit = f64::from(u8::from(i == j));
+                let (n, nn) = (first[i][j], second[i][j]);
+                value[i][j] = e * (unit + x * (n + 0.5 * x * nn));
+                slope[i][j] = e * (n + x * nn) - value[i][j];
             }
         }
+        (value, slope)
     }
 }

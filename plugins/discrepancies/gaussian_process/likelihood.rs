@@ -64,11 +64,16 @@ impl BiasedLikelihood {
         Some(self.noise.by_measured(&self.replicates, self.noise.variance.values(hyper)?))
     }
 
-    fn solve(&self, response: &[f64], hyper: &[f64], variance: &[f64]) -> Option<Solved> {
+    fn solve<'a>(
+        &'a self,
+        response: &[f64],
+        hyper: &'a [f64],
+        variance: &[f64],
+    ) -> Option<Solved<'a>> {
         let means: Vec<f64> =
             variance.iter().zip(&self.replicates.count).map(|(v, n)| v / n).collect();
         let residual = self.replicates.residual(response);
-        Solved::new(&self.bias, self.bias.values(hyper)?, &means, &self.factor, &residual)
+        Solved::new(&self.bias, self.bias.values(hyper)?, means, &self.factor, residual)
     }
 
     /// The prior variance of the bias at each output.
@@ -144,32 +149,24 @@ impl Likelihood for BiasedLikelihood {
             return (vec![0.0; response.len()], by_hyper);
         };
         let r = &self.replicates;
-        let inverses = solved.inverses();
-        let diagonal = solved.diagonal(&self.bias, &inverses);
+        let precision = solved.precision();
         let by_variance: Vec<f64> = (0..variance.len())
             .map(|k| {
                 let (n, v) = (r.count[k], variance[k]);
                 let own = (n - 1.0) / v - r.scatter[k] / (v * v);
-                -0.5 * (own + (diagonal[k] - solved.pull[k].powi(2)) / n)
+                -0.5 * (own + (precision.diagonal[k] - precision.pull[k].powi(2)) / n)
             })
             .collect();
         self.noise.variance.add_gradient(&self.noise.by_group(r, &by_variance), &mut by_hyper);
         let (mut by_sd, mut by_length) = (vec![0.0; values.0.len()], vec![0.0; values.0.len()]);
-        let by_covariance = solved.by_covariance(&self.bias, &inverses);
-        for (s, (block, by)) in self.bias.blocks.iter().zip(&by_covariance).enumerate() {
+        for (block, [sd, length]) in self.bias.blocks.iter().zip(precision.by_process()) {
             let Some(g) = block.group else { continue };
-            let (sd, length) = (values.0[g], values.1[g]);
-            by_sd[g] += dot(by.as_slice(), solved.covariances[s].as_slice()) / sd;
-            for (i, row) in by.iter_rows().enumerate() {
-                for (j, m) in row.iter().enumerate() {
-                    let distance = (block.grid[i] - block.grid[j]).abs();
-                    by_length[g] += 0.5 * m * sd * sd * self.bias.kernel.at(distance, length).1;
-                }
-            }
+            by_sd[g] += sd;
+            by_length[g] += length;
         }
         self.bias.sd.add_gradient(&by_sd, &mut by_hyper);
         self.bias.length.add_gradient(&by_length, &mut by_hyper);
-        (r.over_all(&solved.pull, response.len()), by_hyper)
+        (r.over_all(&precision.pull, response.len()), by_hyper)
     }
 
     /// With `V` the covariance of the means, the precision of a value of output `i` is
@@ -177,13 +174,13 @@ impl Likelihood for BiasedLikelihood {
     fn left_out(&self, response: &[f64], hyper: &[f64]) -> Option<Vec<f64>> {
         let variance = self.variance(hyper)?;
         let solved = self.solve(response, hyper, &variance)?;
-        let diagonal = solved.diagonal(&self.bias, &solved.inverses());
+        let precision = solved.precision();
         let r = &self.replicates;
         let one = |(i, y): (usize, f64)| {
             let k = self.place[i];
             let (n, v) = (r.count[k], variance[k]);
-            let pull = (y - r.mean[k]) / v + solved.pull[k] / n;
-            conditional(pull, (1.0 - 1.0 / n) / v + diagonal[k] / (n * n))
+            let pull = (y - r.mean[k]) / v + precision.pull[k] / n;
+            conditional(pull, (1.0 - 1.0 / n) / v + precision.diagonal[k] / (n * n))
         };
         Some(values(&self.noise.setting.data).map(one).collect())
     }
@@ -228,7 +225,9 @@ impl BiasedLikelihood {
         let values = self.bias.values(hyper).unwrap();
         let n = self.replicates.measured.len();
         let mut plain = Matrix::zeros(n, n);
-        for (block, c) in self.bias.blocks.iter().zip(self.bias.covariances(values)) {
+        let covariances = self.bias.covariances(values);
+        for (s, block) in self.bias.blocks.iter().enumerate() {
+            let [c, _] = self.bias.of(&covariances, s).unwrap();
             for (i, &a) in block.rows.iter().enumerate() {
                 for (j, &b) in block.rows.iter().enumerate() {
                     plain[(a, b)] = c[(i, j)];

@@ -1,8 +1,10 @@
 //! `gaussian_process`: a smooth bias of the model, and independent noise.
 
 mod bias;
+mod filter;
 mod kernel;
 mod likelihood;
+mod precision;
 mod solve;
 #[cfg(test)]
 mod tests;
@@ -34,8 +36,8 @@ use likelihood::BiasedLikelihood;
 /// by them. The covariance `C` becomes `C - C G (G'CG)^-1 G'C` with `G` the derivatives.
 ///
 /// The variance of a new replicate is told as `measurement` (the noise), `model_form` (the bias
-/// before data), and the common errors. One evaluation takes the Cholesky factor of each series:
-/// the cube of its length in operations.
+/// before data), and the common errors. The process is Markov in its derivatives, so that a Kalman
+/// filter factors the covariance of a series in operations proportional to its length.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GaussianProcess {

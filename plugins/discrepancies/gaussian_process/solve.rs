@@ -8,185 +8,182 @@
 //! V = B + F F':        V^-1 = B^-1 - (B^-1 F) Q^-1 (B^-1 F)',  Q = I + F'B^-1 F,
 //! log det V = log det A + log det N - log det S + log det Q.
 //! ```
+//!
+//! Columns whitened by the [filter](super::filter) of `A` and, in rows below those, by
+//! `N^-1/2 Y'`, have the products of `B^-1`; the quadratic form is then a sum of squares.
 
 use lacuna::linalg::vector::{add_scaled, dot};
 use lacuna::linalg::{self, Cholesky, Matrix};
 
-use super::bias::{Bias, add};
+use super::bias::Bias;
+use super::filter::Filter;
 
 /// See the module. Matrices have the rows of the measured outputs.
-pub(super) struct Solved {
+pub(super) struct Solved<'a> {
+    pub bias: &'a Bias,
+    /// Standard deviations and lengths by group.
+    pub values: (&'a [f64], &'a [f64]),
+    /// The noise of the means.
+    pub noise: Vec<f64>,
+    pub factor: &'a Matrix,
+    /// The residual of the means.
+    pub residual: Vec<f64>,
     /// `A` by series.
-    pub blocks: Vec<Cholesky>,
-    /// `C` by series.
-    pub covariances: Vec<Matrix>,
-    /// `H`.
-    pub image: Matrix,
-    /// `Y`.
-    pub inverse_image: Matrix,
-    /// `S` and `N`; `None` where the bias need not be orthogonal.
-    pub inner: Option<(Cholesky, Cholesky)>,
-    /// `B^-1 F`.
-    pub inverse_factor: Matrix,
+    pub filters: Vec<Filter>,
+    /// `C` by series and its derivative by the length.
+    pub covariances: Vec<Option<[Matrix; 2]>>,
+    /// `H`, `S` and `N`; `None` where the bias need not be orthogonal.
+    pub inner: Option<Inner>,
+    /// `F` whitened with `B`.
+    pub white: Matrix,
     /// `Q`.
     pub capacitance: Cholesky,
-    /// `V^-1 d` for the residual `d` of the means.
-    pub pull: Vec<f64>,
-    /// `log det V + d' V^-1 d`.
+    /// The common errors that explain the residual best.
+    pub zeta: Vec<f64>,
+    /// `log det V + d' V^-1 d` for the residual `d`.
     pub twice: f64,
 }
 
-impl Solved {
+/// What makes the bias orthogonal.
+pub(super) struct Inner {
+    /// `H`, and as whitened with `A`.
+    pub image: Matrix,
+    pub white: Matrix,
+    /// `S` and `N`.
+    pub outer: Cholesky,
+    pub reduced: Cholesky,
+}
+
+impl Inner {
+    /// With `H` and the filters of `A`.
+    fn new(bias: &Bias, image: Matrix, filters: &[Filter], noise: &[f64]) -> Option<Self> {
+        let basis = &bias.basis;
+        let outer = Cholesky::new(&linalg::transposed_multiply(basis, &image)).ok()?;
+        let p = basis.columns();
+        let mut both = Matrix::from_fn(basis.rows(), 2 * p, |i, j| {
+            if j < p { image[(i, j)] } else { noise[i] * basis[(i, j - p)] }
+        });
+        whiten(bias, filters, &mut both);
+        let split = |from: usize| both.select_columns(&(from..from + p).collect::<Vec<_>>());
+        let (white, noisy) = (split(0), split(p));
+        let reduced = Cholesky::new(&linalg::transposed_multiply(&noisy, &white)).ok()?;
+        Some(Self { image, white, outer, reduced })
+    }
+}
+
+/// Whitens the rows of each series with its filter.
+fn whiten(bias: &Bias, filters: &[Filter], columns: &mut Matrix) {
+    for (block, filter) in bias.blocks.iter().zip(filters) {
+        filter.whiten(&block.rows, columns);
+    }
+}
+
+/// Columns whitened with `B`: so many rows more, by `N^-1/2 Y'`, as the bias is orthogonal to.
+fn whitened(
+    bias: &Bias,
+    filters: &[Filter],
+    inner: Option<&Inner>,
+    columns: &Matrix,
+    below: usize,
+) -> Matrix {
+    let (n, r) = (columns.rows(), columns.columns());
+    let mut white = Matrix::zeros(n + below, r);
+    white.as_mut_slice()[..n * r].copy_from_slice(columns.as_slice());
+    whiten(bias, filters, &mut white);
+    let Some(inner) = inner else { return white };
+    let mut along = Matrix::zeros(below, r);
+    for (row, weights) in white.iter_rows().zip(inner.white.iter_rows()) {
+        for (k, &weight) in weights.iter().enumerate() {
+            add_scaled(along.row_mut(k), weight, row);
+        }
+    }
+    let along = inner.reduced.whiten_matrix(&along);
+    white.as_mut_slice()[n * r..].copy_from_slice(along.as_slice());
+    white
+}
+
+impl<'a> Solved<'a> {
     /// The factors at a residual of the means, for these variances of the means.
     pub fn new(
-        bias: &Bias,
-        values: (&[f64], &[f64]),
-        noise: &[f64],
-        factor: &Matrix,
-        residual: &[f64],
+        bias: &'a Bias,
+        values: (&'a [f64], &'a [f64]),
+        noise: Vec<f64>,
+        factor: &'a Matrix,
+        residual: Vec<f64>,
     ) -> Option<Self> {
-        let (p, r, n) = (bias.basis.columns(), factor.columns(), residual.len());
-        let covariances = bias.covariances(values);
-        let mut blocks = Vec::with_capacity(covariances.len());
-        // Columns: H, D G, F, d; and A^-1 times them.
-        let width = 2 * p + r + 1;
-        let (mut right, mut solved) = (Matrix::zeros(n, width), Matrix::zeros(n, width));
-        let mut images = Vec::with_capacity(covariances.len());
-        let mut twice = 0.0;
-        for (block, covariance) in bias.blocks.iter().zip(&covariances) {
-            let mut a = covariance.clone();
-            for (k, &row) in block.rows.iter().enumerate() {
-                a[(k, k)] += noise[row];
-            }
-            let a = Cholesky::new(&a).ok()?;
-            let basis = bias.basis_of(block);
-            let image = linalg::multiply(covariance, &basis);
-            let columns = Matrix::from_fn(block.rows.len(), width, |k, j| {
-                let row = block.rows[k];
-                match j {
-                    j if j < p => image[(k, j)],
-                    j if j < 2 * p => noise[row] * basis[(k, j - p)],
-                    j if j < 2 * p + r => factor[(row, j - 2 * p)],
-                    _ => residual[row],
-                }
-            });
-            let inverse = a.solve_matrix(&columns);
-            for (k, &row) in block.rows.iter().enumerate() {
-                right.row_mut(row).copy_from_slice(columns.row(k));
-                solved.row_mut(row).copy_from_slice(inverse.row(k));
-            }
-            twice += a.log_determinant();
-            images.push(image);
-            blocks.push(a);
+        let mut filters = Vec::with_capacity(bias.blocks.len());
+        for block in &bias.blocks {
+            let own = block.rows.iter().map(|&row| noise[row]);
+            filters.push(Filter::new(
+                bias.kernel,
+                &block.grid,
+                Bias::of_block(block, values),
+                own,
+            )?);
         }
-        let pick =
-            |m: &Matrix, from: usize, to: usize| m.select_columns(&(from..to).collect::<Vec<_>>());
-        let (image, inverse_image) = (pick(&right, 0, p), pick(&solved, 0, p));
-        let mut rest = pick(&solved, 2 * p, width);
-        let inner = if p == 0 {
+        let mut twice: f64 = filters.iter().map(Filter::log_determinant).sum();
+        let covariances = bias.covariances(values);
+        let inner = if bias.basis.columns() == 0 {
             None
         } else {
-            let outer = bias.inner(&images)?;
-            let reduced = linalg::transposed_multiply(&pick(&solved, p, 2 * p), &image);
-            let reduced = Cholesky::new(&reduced).ok()?;
-            let along = linalg::transposed_multiply(&inverse_image, &pick(&right, 2 * p, width));
-            add(&mut rest, 1.0, &linalg::multiply(&inverse_image, &reduced.solve_matrix(&along)));
-            twice += reduced.log_determinant() - outer.log_determinant();
-            Some((outer, reduced))
+            let inner = Inner::new(bias, bias.image(&covariances), &filters, &noise)?;
+            twice += inner.reduced.log_determinant() - inner.outer.log_determinant();
+            Some(inner)
         };
-        let (inverse_factor, mut pull) = (pick(&rest, 0, r), rest.column(r));
-        let mut capacitance = linalg::transposed_multiply(factor, &inverse_factor);
-        for k in 0..r {
-            capacitance[(k, k)] += 1.0;
-        }
+        let below = inner.as_ref().map_or(0, |inner| inner.white.columns());
+        let white = whitened(bias, &filters, inner.as_ref(), factor, below);
+        let column = Matrix::from_vec(residual.len(), 1, residual.clone());
+        let last = whitened(bias, &filters, inner.as_ref(), &column, below).into_vec();
+        let r = factor.columns();
+        let mut capacitance = linalg::gram(&white);
+        (0..r).for_each(|k| capacitance[(k, k)] += 1.0);
         let capacitance = Cholesky::new(&capacitance).ok()?;
-        let mut zeta = linalg::transposed_multiply_vector(&inverse_factor, residual);
+        let mut zeta = linalg::transposed_multiply_vector(&white, &last);
         capacitance.solve(&mut zeta);
-        for (x, row) in pull.iter_mut().zip(inverse_factor.iter_rows()) {
-            *x -= dot(row, &zeta);
+        for (x, row) in last.iter().zip(white.iter_rows()) {
+            twice += (x - dot(row, &zeta)).powi(2);
         }
-        twice += capacitance.log_determinant() + dot(residual, &pull);
+        twice += dot(&zeta, &zeta) + capacitance.log_determinant();
         Some(Self {
-            blocks,
+            bias,
+            values,
+            noise,
+            factor,
+            residual,
+            filters,
             covariances,
-            image,
-            inverse_image,
             inner,
-            inverse_factor,
+            white,
             capacitance,
-            pull,
+            zeta,
             twice,
         })
     }
 
-    /// `E` and `K` with `V^-1 = A^-1 + E E' - K K'`.
-    pub fn corrections(&self) -> (Matrix, Matrix) {
-        let half =
-            |m: &Matrix, factor: &Cholesky| factor.whiten_matrix(&m.transposed()).transposed();
-        let added = match &self.inner {
-            Some((_, reduced)) => half(&self.inverse_image, reduced),
-            None => Matrix::zeros(self.pull.len(), 0),
-        };
-        (added, half(&self.inverse_factor, &self.capacitance))
-    }
-
-    /// The inverses of the blocks of `A`.
-    pub fn inverses(&self) -> Vec<Matrix> {
-        self.blocks.iter().map(Cholesky::inverse).collect()
-    }
-
-    /// The diagonal of `V^-1`.
-    pub fn diagonal(&self, bias: &Bias, inverses: &[Matrix]) -> Vec<f64> {
-        let (added, taken) = self.corrections();
-        let mut diagonal = vec![0.0; self.pull.len()];
-        for (block, inverse) in bias.blocks.iter().zip(inverses) {
-            for (k, &row) in block.rows.iter().enumerate() {
-                let (e, t) = (added.row(row), taken.row(row));
-                diagonal[row] = inverse[(k, k)] + dot(e, e) - dot(t, t);
-            }
+    /// `A^-1 X` for `X` whitened with `A`.
+    pub fn back(&self, columns: &mut Matrix) {
+        for (block, filter) in self.bias.blocks.iter().zip(&self.filters) {
+            filter.back(&block.rows, columns);
         }
-        diagonal
     }
 
-    /// Twice the derivative of the log density by the entries of `C`, by series:
-    /// `P' (pull pull' - V^-1) P` with the projection `P = I - H S^-1 G'`.
-    pub fn by_covariance(&self, bias: &Bias, inverses: &[Matrix]) -> Vec<Matrix> {
-        let (mut added, mut taken) = self.corrections();
-        let mut pull = Matrix::from_vec(self.pull.len(), 1, self.pull.clone());
-        let mut cross = None;
-        if let Some((outer, _)) = &self.inner {
-            // P' X = X - G S^-1 (H' X).
-            for x in [&mut added, &mut taken, &mut pull] {
-                let along = outer.solve_matrix(&linalg::transposed_multiply(&self.image, x));
-                add(x, -1.0, &linalg::multiply(&bias.basis, &along));
-            }
-            // P' A^-1 P = A^-1 - G (Y S^-1)' - (Y S^-1) G' + G (S^-1 H'Y S^-1) G'.
-            let turned = outer.solve_matrix(&self.inverse_image.transposed()).transposed();
-            let middle = linalg::transposed_multiply(&self.image, &turned);
-            cross = Some((turned, outer.solve_matrix(&middle)));
+    /// `V^-1 d = B^-1 (d - F zeta)`.
+    pub fn pull(&self, added: &Matrix) -> Vec<f64> {
+        let rest: Vec<f64> = (self.residual.iter().zip(self.factor.iter_rows()))
+            .map(|(d, row)| d - dot(row, &self.zeta))
+            .collect();
+        let mut column = Matrix::from_vec(rest.len(), 1, rest);
+        whiten(self.bias, &self.filters, &mut column);
+        let along = self.inner.as_ref().map(|inner| {
+            let mut along = linalg::transposed_multiply_vector(&inner.white, column.as_slice());
+            inner.reduced.whiten(&mut along);
+            along
+        });
+        self.back(&mut column);
+        let mut pull = column.into_vec();
+        if let Some(along) = along {
+            add_scaled(&mut pull, 1.0, &linalg::multiply_vector(added, &along));
         }
-        let one = |(block, inverse): (&super::bias::Block, &Matrix)| {
-            let rows = |m: &Matrix| m.select_rows(&block.rows);
-            let (added, taken, pull) = (rows(&added), rows(&taken), rows(&pull));
-            let mut by = inverse.clone();
-            by.as_mut_slice().iter_mut().for_each(|x| *x = -*x);
-            add(&mut by, 1.0, &linalg::multiply_transposed(&pull, &pull));
-            add(&mut by, -1.0, &linalg::multiply_transposed(&added, &added));
-            add(&mut by, 1.0, &linalg::multiply_transposed(&taken, &taken));
-            if let Some((turned, middle)) = &cross {
-                let (basis, turned) = (bias.basis_of(block), rows(turned));
-                let outer = linalg::multiply_transposed(&basis, &turned);
-                for i in 0..by.rows() {
-                    let column = outer.column(i);
-                    let row = by.row_mut(i);
-                    add_scaled(row, 1.0, outer.row(i));
-                    add_scaled(row, 1.0, &column);
-                }
-                let both = linalg::multiply_transposed(&linalg::multiply(&basis, middle), &basis);
-                add(&mut by, -1.0, &both);
-            }
-            by
-        };
-        bias.blocks.iter().zip(inverses).map(one).collect()
+        pull
     }
 }

@@ -255,7 +255,8 @@ pub(crate) fn complaints_about<C: Component + DeserializeOwned>(text: &str) -> S
     let component: C = lacuna::study::decode(&node, &mut problems).unwrap();
     let layout = Layout { name: String::new(), unit: Unit::parse("1").unwrap(), axes: Vec::new() };
     let directory = std::path::Path::new(".");
-    let context = Context { directory, parameters: &[], layout: &layout, runs: None };
+    let context =
+        Context { directory, parameters: &[], layout: &layout, runs: None, common_errors: false };
     component.check(&context, &mut Complaints::new(&node, &mut problems));
     problems.render(&sources)
 }

@@ -48,8 +48,13 @@ fn complaints(section: &str) -> String {
     let options: Option<Expression> = lacuna::study::decode(node, &mut problems);
     let layout = Layout { name: "none".into(), unit: Unit::dimensionless(), axes: Vec::new() };
     let parameters = parameters(&["a", "sigma"]);
-    let context =
-        Context { directory: Path::new("."), parameters: &parameters, layout: &layout, runs: None };
+    let context = Context {
+        directory: Path::new("."),
+        parameters: &parameters,
+        layout: &layout,
+        runs: None,
+        common_errors: false,
+    };
     if let Some(options) = options {
         options.check(&context, &mut Complaints::new(node, &mut problems));
     }

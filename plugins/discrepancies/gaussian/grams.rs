@@ -1,0 +1,101 @@
+//! Sums of the products `T_g' T_g` of groups, and their traces with an inverse.
+//!
+//! Products that are kept cost the reading of `rank^2 / 2` numbers a group, whatever its size; those
+//! of a group of few rows are made faster than read.
+
+use lacuna::linalg::vector::{add_scaled, dot};
+use lacuna::linalg::{self, Cholesky, Matrix};
+
+/// See the module.
+#[derive(Debug, Clone)]
+pub(super) enum Grams {
+    /// The lower triangle of each product, row by row.
+    Kept(Vec<Vec<f64>>),
+    /// All factors side by side, transposed: `rank x rows`.
+    Made(Matrix),
+}
+
+/// Up to this mean number of rows products are made and not kept.
+const FEW: usize = 30;
+
+impl Grams {
+    /// Of the factors `T_g`.
+    pub fn of(factors: &[Matrix]) -> Self {
+        let rows: usize = factors.iter().map(Matrix::rows).sum();
+        if rows > FEW * factors.len() {
+            return Self::Kept(factors.iter().map(|t| lower(&linalg::gram(t))).collect());
+        }
+        let rank = factors.first().map_or(0, Matrix::columns);
+        let stacked = Matrix::from_rows(rank, factors.iter().flat_map(Matrix::iter_rows));
+        Self::Made(stacked.transposed())
+    }
+
+    /// The lower triangle of `sum_g T_g' T_g / v_g`.
+    pub fn sum(&self, factors: &[Matrix], variance: &[f64]) -> Matrix {
+        let rank = factors.first().map_or(0, Matrix::columns);
+        match self {
+            Self::Kept(grams) => {
+                let mut sum = vec![0.0; rank * (rank + 1) / 2];
+                for (gram, v) in grams.iter().zip(variance) {
+                    add_scaled(&mut sum, 1.0 / v, gram);
+                }
+                let mut square = Matrix::zeros(rank, rank);
+                for i in 0..rank {
+                    square.row_mut(i)[..=i].copy_from_slice(&sum[start(i)..start(i + 1)]);
+                }
+                square
+            }
+            Self::Made(turned) => {
+                let mut weighted = Matrix::zeros(turned.columns(), rank);
+                let mut row = 0;
+                for (factor, v) in factors.iter().zip(variance) {
+                    for from in factor.iter_rows() {
+                        add_scaled(weighted.row_mut(row), 1.0 / v.sqrt(), from);
+                        row += 1;
+                    }
+                }
+                linalg::gram(&weighted)
+            }
+        }
+    }
+
+    /// `tr(C^-1 T_g' T_g)` for each group.
+    pub fn traces(&self, factors: &[Matrix], capacitance: &Cholesky) -> Vec<f64> {
+        match self {
+            Self::Kept(grams) => {
+                let inverse = capacitance.inverse();
+                let (packed, n) = (lower(&inverse), inverse.rows());
+                let trace = |gram: &Vec<f64>| {
+                    let diagonal: f64 = (0..n).map(|i| inverse[(i, i)] * gram[start(i) + i]).sum();
+                    2.0 * dot(&packed, gram) - diagonal
+                };
+                grams.iter().map(trace).collect()
+            }
+            Self::Made(turned) => {
+                let white = capacitance.whiten_matrix(turned);
+                let mut squares = vec![0.0; white.columns()];
+                for row in white.iter_rows() {
+                    squares.iter_mut().zip(row).for_each(|(sum, x)| *sum += x * x);
+                }
+                let mut rest = &squares[..];
+                let own = |factor: &Matrix| {
+                    let (own, after) = rest.split_at(factor.rows());
+                    rest = after;
+                    own.iter().sum()
+                };
+                factors.iter().map(own).collect()
+            }
+        }
+    }
+}
+
+/// Where a row begins in a lower triangle.
+fn start(row: usize) -> usize {
+    row * (row + 1) / 2
+}
+
+/// The lower triangle of a symmetric matrix.
+fn lower(matrix: &Matrix) -> Vec<f64> {
+    let rows = matrix.iter_rows().enumerate();
+    rows.flat_map(|(i, row)| row[..=i].iter().copied()).collect()
+}
