@@ -99,3 +99,38 @@ fn lower(matrix: &Matrix) -> Vec<f64> {
     let rows = matrix.iter_rows().enumerate();
     rows.flat_map(|(i, row)| row[..=i].iter().copied()).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::discrepancies::common::testing::{close, random_matrix};
+
+    /// Against the products written out, for groups of many rows (kept) and of few (made).
+    #[test]
+    fn sums_and_traces_are_those_of_the_products_written_out() {
+        let rank = 45;
+        for (rows, kept) in [([40, 45, 33], true), ([12, 0, 45], false)] {
+            let factors: Vec<Matrix> =
+                (0..3).map(|g| random_matrix(rows[g], rank, g as u64)).collect();
+            let grams = Grams::of(&factors);
+            assert_eq!(matches!(grams, Grams::Kept(_)), kept);
+            let variance = [0.3, 2.0, 0.7];
+            let products: Vec<Matrix> = factors.iter().map(linalg::gram).collect();
+            let mut written = Matrix::from_fn(rank, rank, |i, j| {
+                products.iter().zip(variance).map(|(m, v)| m[(i, j)] / v).sum()
+            });
+            let mut found = grams.sum(&factors, &variance);
+            for i in 0..rank {
+                (0..=i).for_each(|j| close(found[(i, j)], written[(i, j)], 1e-10));
+                written[(i, i)] += 1.0;
+                found[(i, i)] += 1.0;
+            }
+            let inverse = Cholesky::new(&written).unwrap().inverse();
+            let traces = grams.traces(&factors, &Cholesky::new(&found).unwrap());
+            for (trace, product) in traces.iter().zip(&products) {
+                close(*trace, dot(inverse.as_slice(), product.as_slice()), 1e-10);
+            }
+        }
+    }
+}

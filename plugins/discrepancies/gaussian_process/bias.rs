@@ -97,7 +97,9 @@ impl Bias {
         let mut decays: Vec<f64> = Vec::with_capacity(n);
         for i in 0..n {
             let step = if i == 0 { 0.0 } else { (-rate * (grid[i] - grid[i - 1])).exp() };
-            decays.iter_mut().for_each(|e| *e *= step);
+            for e in &mut decays {
+                *e *= step;
+            }
             decays.push(sd * sd);
             for (j, &e) in decays.iter().enumerate() {
                 let (value, by_length) = self.kernel.factors(rate * (grid[i] - grid[j]));

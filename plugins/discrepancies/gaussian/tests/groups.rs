@@ -1,15 +1,21 @@
 //! Several variances, multipliers of measured ones, and variances integrated out.
 
+use std::path::Path;
+
 use lacuna::data::Measurements;
 use lacuna::data::measurements::Summary;
 use lacuna::linalg::{self, Matrix};
 use lacuna::math::distribution::Distribution;
+use lacuna::plugin::component::{Component, Context};
 use lacuna::plugin::discrepancy::{CommonError, Known, Likelihood};
+use lacuna::study::problem::Complaints;
+use lacuna::study::read::read;
+use lacuna::study::{Problems, Sources};
 
 use super::{Emulated, build};
 use crate::discrepancies::common::testing::{
-    OUTPUTS, TIMES, Written, close, common, data, has_its_derivatives, options, random_matrix,
-    shared,
+    OUTPUTS, TIMES, Written, close, common, data, has_its_derivatives, layout, options,
+    random_matrix, shared,
 };
 use crate::discrepancies::gaussian::Gaussian;
 use crate::discrepancies::gaussian::likelihood::GaussianLikelihood;
@@ -289,6 +295,27 @@ fn several_variances_are_not_integrated_out_with_common_errors() {
     let (data, error) = (data(1, 3), [common(2)]);
     let stop = GaussianLikelihood::new(&chosen, &Known::without_slopes(&data, &error)).err();
     assert!(stop.unwrap().to_string().contains("cannot be integrated out together"));
+}
+
+/// The check knows it before anything is run.
+#[test]
+fn several_variances_with_marginal_are_refused_by_the_check() {
+    let text = "[discrepancy]\nvariance = { half_normal = 1.0 }\nmarginal = true\nby = ";
+    let complaints = |by: &str, common_errors: bool| {
+        let (mut sources, mut problems) = (Sources::default(), Problems::new());
+        let id = sources.add_file(Path::new("study.toml"), format!("{text}\"{by}\""));
+        let root = read(id, &sources, &mut problems).unwrap();
+        let node = root.get("discrepancy").unwrap();
+        let chosen: Gaussian = lacuna::study::decode(node, &mut problems).unwrap();
+        let (directory, layout) = (Path::new("."), layout());
+        let context =
+            Context { directory, parameters: &[], layout: &layout, runs: None, common_errors };
+        chosen.check(&context, &mut Complaints::new(node, &mut problems));
+        problems.render(&sources)
+    };
+    assert!(complaints("sensor", true).contains("expected `marginal = false`, or one variance"));
+    assert_eq!(complaints("sensor", false), "");
+    assert_eq!(complaints("all", true), "");
 }
 
 #[test]
