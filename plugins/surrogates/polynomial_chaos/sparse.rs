@@ -85,6 +85,8 @@ impl Sparse {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
     use lacuna::linalg::{multiply, transposed_multiply};
     use lacuna::math::random::{Stream, normal, uniform};
 
@@ -145,24 +147,5 @@ mod tests {
         assert!(Sparse::of(&full).is_none());
         let quarter = Matrix::from_fn(8, 8, |i, j| f64::from(u8::from((i + j) % 4 == 0)));
         assert!(Sparse::of(&quarter).is_some());
-    }
-
-    #[test]
-    fn tmp_dense() {
-        for (k, n) in [(220, 40), (1163, 1000), (286, 1000), (20, 1), (56, 7)] {
-            let a = Matrix::from_fn(300, k, |i, j| ((i * 31 + j * 7) as f64).sin());
-            let b = Matrix::from_fn(k, n, |i, j| ((i * 3 + j * 17) as f64).sin());
-            let whole = multiply(&a, &b);
-            for size in [1, 2, 7, 16, 17, 33, 64, 256] {
-                let mut differ = 0;
-                for first in (0..300).step_by(size) {
-                    let rows: Vec<usize> = (first..300.min(first + size)).collect();
-                    differ += usize::from(
-                        multiply(&a.select_rows(&rows), &b) != whole.select_rows(&rows),
-                    );
-                }
-                println!("{k} {n} size {size}: {differ} differ");
-            }
-        }
     }
 }
