@@ -17,7 +17,9 @@ pub(crate) fn view_mut(a: &mut Matrix) -> MatMut<'_, f64> {
 
 /// A copy, row by row.
 pub(crate) fn copied(a: MatRef<'_, f64>) -> Matrix {
-    Matrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)])
+    let mut copy = Matrix::zeros(a.nrows(), a.ncols());
+    view_mut(&mut copy).copy_from(a);
+    copy
 }
 
 /// Makes the factorisations of `faer` run on one thread: those of QR, singular values and

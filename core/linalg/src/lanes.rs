@@ -4,7 +4,7 @@
 
 #![allow(clippy::inline_always)]
 
-use faer::traits::pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd, WithSimd};
 
 /// How many points stand side by side.
 pub const LANES: usize = 16;

@@ -13,6 +13,7 @@ mod eigen;
 mod error;
 mod faer_view;
 pub mod lanes;
+pub mod level;
 mod matrix;
 mod packed;
 mod product;

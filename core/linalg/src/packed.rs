@@ -1,39 +1,46 @@
 //! Upper triangular matrices that grow by columns.
 #![allow(clippy::inline_always)]
 
-use faer::traits::pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd, WithSimd};
 
 const LANES: usize = 8;
 
-/// An upper triangular `n x n` matrix to which columns are appended, stored column after column
-/// without most of the zeros: the shape of factors that are updated one column at a time.
+/// An upper triangular `n x n` matrix to which columns are appended: the shape of factors that are updated one
+/// column at a time.
+///
+/// Stored in panels of eight columns, each column after the other, without the zeros below the panel.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PackedUpper {
-    /// Columns down to the diagonal, filled up with zeros to whole lanes: short columns are many, and
-    /// a remainder would cost more than the column.
+    /// The panels; columns that are not there yet are zero.
     lanes: Vec<[f64; LANES]>,
-    /// Where each column begins, and where the last one ends.
-    starts: Vec<usize>,
+    size: usize,
+}
+
+/// Where panel `p` begins: the panels before have `1, 2, ..., p` lanes a column.
+fn start(p: usize) -> usize {
+    LANES * p * (p + 1) / 2
 }
 
 impl PackedUpper {
     /// The matrix without columns.
     pub fn new() -> Self {
-        Self { lanes: Vec::new(), starts: vec![0] }
+        Self::default()
     }
 
     /// `n`.
     pub fn size(&self) -> usize {
-        self.starts.len() - 1
+        self.size
     }
 
     /// Column `j` down to the diagonal: `j + 1` entries.
+    ///
+    /// # Panics
+    /// When there is no such column.
     pub fn column(&self, j: usize) -> &[f64] {
-        &self.padded(j).as_flattened()[..=j]
-    }
-
-    fn padded(&self, j: usize) -> &[[f64; LANES]] {
-        &self.lanes[self.starts[j]..self.starts[j + 1]]
+        assert!(j < self.size, "a column of the matrix");
+        let panel = j / LANES;
+        let first = start(panel) + j % LANES * (panel + 1);
+        &self.lanes[first..=first + panel].as_flattened()[..=j]
     }
 
     /// Appends a column down to the diagonal.
@@ -41,92 +48,104 @@ impl PackedUpper {
     /// # Panics
     /// When it has not `n + 1` entries.
     pub fn push(&mut self, column: &[f64]) {
-        assert_eq!(column.len(), self.size() + 1, "a column reaches down to the diagonal");
-        self.lanes.extend(in_lanes(column));
-        self.starts.push(self.lanes.len());
+        assert_eq!(column.len(), self.size + 1, "a column reaches down to the diagonal");
+        let panel = self.size / LANES;
+        self.lanes.resize(start(panel + 1), [0.0; LANES]);
+        let first = start(panel) + self.size % LANES * (panel + 1);
+        self.lanes[first..=first + panel].as_flattened_mut()[..column.len()]
+            .copy_from_slice(column);
+        self.size += 1;
     }
 
-    /// `U x`.
+    /// Writes `U U' x` and returns `|U' x|^2`, reading the matrix once. `x` is handed over with its memory, which
+    /// is filled up with zeros meanwhile.
     ///
     /// # Panics
     /// When `x` has not `n` entries.
-    pub fn multiply(&self, x: &[f64]) -> Vec<f64> {
-        assert_eq!(x.len(), self.size(), "a vector of the matrix' size");
-        let mut product = vec![[0.0; LANES]; x.len().div_ceil(LANES)];
-        Arch::new().dispatch(Multiply { upper: self, x, product: &mut product });
-        let mut product = product.as_flattened().to_vec();
-        product.truncate(x.len());
-        product
-    }
-
-    /// `U' x`.
-    ///
-    /// # Panics
-    /// When `x` has not `n` entries.
-    pub fn transposed_multiply(&self, x: &[f64]) -> Vec<f64> {
-        assert_eq!(x.len(), self.size(), "a vector of the matrix' size");
-        let x = in_lanes(x);
-        let mut product = vec![0.0; self.size()];
-        Arch::new().dispatch(TransposedMultiply { upper: self, x: &x, product: &mut product });
-        product
+    pub fn square_multiply(&self, x: &mut Vec<f64>, product: &mut Vec<f64>) -> f64 {
+        assert_eq!(x.len(), self.size, "a vector of the matrix' size");
+        let padded = self.size.next_multiple_of(LANES);
+        x.resize(padded, 0.0);
+        product.clear();
+        product.resize(padded, 0.0);
+        let (x_lanes, product_lanes) = (x.as_chunks().0, product.as_chunks_mut().0);
+        let squares = Arch::new().dispatch(SquareMultiply {
+            upper: &self.lanes,
+            x: x_lanes,
+            product: product_lanes,
+        });
+        x.truncate(self.size);
+        product.truncate(self.size);
+        squares
     }
 }
 
-struct Multiply<'a> {
-    upper: &'a PackedUpper,
-    x: &'a [f64],
+struct SquareMultiply<'a> {
+    upper: &'a [[f64; LANES]],
+    x: &'a [[f64; LANES]],
     product: &'a mut [[f64; LANES]],
 }
 
-impl WithSimd for Multiply<'_> {
-    type Output = ();
+impl WithSimd for SquareMultiply<'_> {
+    type Output = f64;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        for (j, x) in self.x.iter().enumerate() {
-            for (y, u) in self.product.iter_mut().zip(self.upper.padded(j)) {
-                for l in 0..LANES {
-                    y[l] += x * u[l];
-                }
+    fn with_simd<S: Simd>(self, _: S) -> f64 {
+        let mut squares = 0.0;
+        for p in 0..self.x.len() {
+            let length = p + 1;
+            let panel = &self.upper[start(p)..start(p + 1)];
+            let (left, right) = panel.split_at(4 * length);
+            let x = &self.x[..length];
+            let product = &mut self.product[..length];
+            for columns in [left, right] {
+                let weights = inner_products(columns, x);
+                combine(columns, weights, product);
+                let [a, b, c, d] = weights;
+                squares += (a * a + b * b) + (c * c + d * d);
             }
         }
+        squares
     }
 }
 
-struct TransposedMultiply<'a> {
-    upper: &'a PackedUpper,
-    x: &'a [[f64; LANES]],
-    product: &'a mut [f64],
+/// The inner products of four columns, one after the other, with a vector.
+#[inline(always)]
+fn inner_products(columns: &[[f64; LANES]], x: &[[f64; LANES]]) -> [f64; 4] {
+    let ((a, b), (c, d)) = halves(columns);
+    [inner_product(a, x), inner_product(b, x), inner_product(c, x), inner_product(d, x)]
 }
 
-impl WithSimd for TransposedMultiply<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        for (j, product) in self.product.iter_mut().enumerate() {
-            let mut sums = [0.0; LANES];
-            for (u, x) in self.upper.padded(j).iter().zip(self.x) {
-                for l in 0..LANES {
-                    sums[l] += u[l] * x[l];
-                }
-            }
-            let [a, b, c, d, e, f, g, h] = sums;
-            *product = ((a + e) + (b + f)) + ((c + g) + (d + h));
+#[inline(always)]
+fn inner_product(column: &[[f64; LANES]], x: &[[f64; LANES]]) -> f64 {
+    let mut sums = [0.0; LANES];
+    for (u, x) in column.iter().zip(x) {
+        for l in 0..LANES {
+            sums[l] += u[l] * x[l];
         }
     }
+    let [a, b, c, d, e, f, g, h] = sums;
+    ((a + e) + (b + f)) + ((c + g) + (d + h))
 }
 
-/// The numbers in whole lanes, filled up with zeros.
-fn in_lanes(numbers: &[f64]) -> Vec<[f64; LANES]> {
-    let (whole, rest) = numbers.as_chunks::<LANES>();
-    let mut lanes = whole.to_vec();
-    if !rest.is_empty() {
-        let mut last = [0.0; LANES];
-        last[..rest.len()].copy_from_slice(rest);
-        lanes.push(last);
+/// Adds four columns with their weights.
+#[inline(always)]
+fn combine(columns: &[[f64; LANES]], weights: [f64; 4], product: &mut [[f64; LANES]]) {
+    let ((a, b), (c, d)) = halves(columns);
+    let left = a.as_flattened().iter().zip(b.as_flattened());
+    let right = c.as_flattened().iter().zip(d.as_flattened());
+    for ((y, (a, b)), (c, d)) in product.as_flattened_mut().iter_mut().zip(left).zip(right) {
+        *y += (weights[0] * a + weights[1] * b) + (weights[2] * c + weights[3] * d);
     }
-    lanes
+}
+
+type Column<'a> = &'a [[f64; LANES]];
+
+#[inline(always)]
+fn halves(columns: Column<'_>) -> ((Column<'_>, Column<'_>), (Column<'_>, Column<'_>)) {
+    let length = columns.len() / 4;
+    let (left, right) = columns.split_at(2 * length);
+    (left.split_at(length), right.split_at(length))
 }
 
 #[cfg(test)]
@@ -136,18 +155,24 @@ mod tests {
     #[test]
     fn products_agree_with_their_definition() {
         let entry = |i: usize, j: usize| ((3 * i + 7 * j) as f64).sin();
-        let n = 45;
         let mut upper = PackedUpper::new();
-        for j in 0..n {
-            upper.push(&(0..=j).map(|i| entry(i, j)).collect::<Vec<_>>());
+        for n in 0..46 {
+            let mut x: Vec<f64> = (0..n).map(|i| (i as f64).cos()).collect();
+            let transposed: Vec<f64> =
+                (0..n).map(|j| (0..=j).map(|i| entry(i, j) * x[i]).sum()).collect();
+            let mut product = vec![f64::NAN; 3];
+            let squares = upper.square_multiply(&mut x, &mut product);
+            assert_eq!((x.len(), product.len(), upper.size()), (n, n, n));
+            for (i, y) in product.iter().enumerate() {
+                let plain: f64 = (i..n).map(|j| entry(i, j) * transposed[j]).sum();
+                assert!((y - plain).abs() < 1e-11, "{n} {i}");
+            }
+            let plain: f64 = transposed.iter().map(|z| z * z).sum();
+            assert!((squares - plain).abs() < 1e-11);
+            upper.push(&(0..=n).map(|i| entry(i, n)).collect::<Vec<_>>());
+            assert!(
+                (0..=n).all(|j| upper.column(j).iter().enumerate().all(|(i, u)| *u == entry(i, j)))
+            );
         }
-        let x: Vec<f64> = (0..n).map(|i| (i as f64).cos()).collect();
-        let (plain, transposed) = (upper.multiply(&x), upper.transposed_multiply(&x));
-        for i in 0..n {
-            let row: f64 = (i..n).map(|j| entry(i, j) * x[j]).sum();
-            let column: f64 = (0..=i).map(|j| entry(j, i) * x[j]).sum();
-            assert!((plain[i] - row).abs() < 1e-12 && (transposed[i] - column).abs() < 1e-12);
-        }
-        assert_eq!(upper.size(), n);
     }
 }

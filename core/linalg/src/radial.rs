@@ -3,7 +3,7 @@
 
 #![allow(clippy::inline_always)]
 
-use faer::traits::pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::Matrix;
 use crate::lanes::LANES;

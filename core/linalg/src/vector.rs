@@ -6,7 +6,7 @@
 
 #![allow(clippy::inline_always)]
 
-use faer::traits::pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::Matrix;
 
@@ -91,39 +91,53 @@ impl WithSimd for AddScaled<'_> {
     }
 }
 
-/// `sum_i (numerators[i] / denominators[i])^2`.
+/// Takes one orthonormal column `q` out of a least-squares fit: `residual -= factor * q` and `freedom -= q * q`,
+/// entry by entry; returns `sum_i residual_i^2` and `sum_i (residual_i / freedom_i)^2`.
 ///
 /// # Panics
 /// When the lengths differ.
-pub fn sum_squared_ratios(numerators: &[f64], denominators: &[f64]) -> f64 {
-    assert_eq!(numerators.len(), denominators.len(), "vectors of one length");
-    Arch::new().dispatch(SumSquaredRatios { numerators, denominators })
+pub fn take_out(q: &[f64], factor: f64, residual: &mut [f64], freedom: &mut [f64]) -> [f64; 2] {
+    assert_eq!(q.len(), residual.len(), "vectors of one length");
+    assert_eq!(q.len(), freedom.len(), "vectors of one length");
+    Arch::new().dispatch(TakeOut { q, factor, residual, freedom })
 }
 
-struct SumSquaredRatios<'a> {
-    numerators: &'a [f64],
-    denominators: &'a [f64],
+struct TakeOut<'a> {
+    q: &'a [f64],
+    factor: f64,
+    residual: &'a mut [f64],
+    freedom: &'a mut [f64],
 }
 
-impl WithSimd for SumSquaredRatios<'_> {
-    type Output = f64;
+impl WithSimd for TakeOut<'_> {
+    type Output = [f64; 2];
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> f64 {
-        let mut lanes = [0.0; LANES];
-        let (above, rest_above) = self.numerators.as_chunks::<LANES>();
-        let (below, rest_below) = self.denominators.as_chunks::<LANES>();
-        for (a, b) in above.iter().zip(below) {
+    fn with_simd<S: Simd>(self, _: S) -> [f64; 2] {
+        let Self { q, factor, residual, freedom } = self;
+        for ((q, r), d) in q.iter().zip(&mut *residual).zip(&mut *freedom) {
+            *r -= factor * q;
+            *d -= q * q;
+        }
+        let mut lanes = [[0.0; LANES]; 2];
+        let (residual, rest_residual) = residual.as_chunks::<LANES>();
+        let (freedom, rest_freedom) = freedom.as_chunks::<LANES>();
+        // One statement a loop: so the compiler finds the vectors.
+        for (r, d) in residual.iter().zip(freedom) {
             for l in 0..LANES {
-                let ratio = a[l] / b[l];
-                lanes[l] += ratio * ratio;
+                lanes[0][l] += r[l] * r[l];
+            }
+            for l in 0..LANES {
+                let ratio = r[l] / d[l];
+                lanes[1][l] += ratio * ratio;
             }
         }
-        let mut rest = 0.0;
-        for (a, b) in rest_above.iter().zip(rest_below) {
-            rest += (a / b) * (a / b);
+        let mut rest = [0.0; 2];
+        for (r, d) in rest_residual.iter().zip(rest_freedom) {
+            rest[0] += r * r;
+            rest[1] += (r / d) * (r / d);
         }
-        total(&mut lanes) + rest
+        [total(&mut lanes[0]) + rest[0], total(&mut lanes[1]) + rest[1]]
     }
 }
 
@@ -210,8 +224,16 @@ mod tests {
             let b: Vec<f64> = (0..n).map(|i| (i as f64).cos()).collect();
             let plain: f64 = a.iter().zip(&b).map(|(x, y)| x * y).sum();
             assert!((dot(&a, &b) - plain).abs() < 1e-13);
-            let ratios: f64 = a.iter().zip(&b).map(|(x, y)| (x / y).powi(2)).sum();
-            assert!((sum_squared_ratios(&a, &b) - ratios).abs() <= 1e-12 * ratios);
+            let (mut residual, mut freedom) = (b.clone(), vec![2.0; n]);
+            let [squares, ratios] = take_out(&a, 0.5, &mut residual, &mut freedom);
+            let mut plain = [0.0; 2];
+            for i in 0..n {
+                let (r, d) = (b[i] - 0.5 * a[i], 2.0 - a[i] * a[i]);
+                assert_eq!((residual[i], freedom[i]), (r, d));
+                plain = [plain[0] + r * r, plain[1] + (r / d).powi(2)];
+            }
+            assert!((squares - plain[0]).abs() <= 1e-12 * plain[0]);
+            assert!((ratios - plain[1]).abs() <= 1e-12 * plain[1]);
             let mut y = b.clone();
             add_scaled(&mut y, 2.0, &a);
             assert!(y.iter().zip(a.iter().zip(&b)).all(|(y, (a, b))| *y == b + 2.0 * a));

@@ -38,23 +38,6 @@ pub(in crate::surrogates) fn layout(outputs: usize) -> Layout {
     }
 }
 
-/// Ten outputs of three inputs in the manner of Ishigami and Homma.
-fn ten(points: &Matrix) -> Matrix {
-    use std::f64::consts::PI;
-    let rows = points.iter_rows().map(|u| {
-        let x: Vec<f64> = u.iter().map(|u| (2.0 * u - 1.0) * PI).collect();
-        let output = |j: usize| {
-            let j = j as f64;
-            (x[0] + 0.15 * j).sin()
-                + (7.0 - 0.3 * j) * (x[1] + 0.05 * j).sin().powi(2)
-                + 0.1 * x[2].powi(4) * x[0].sin() / (1.0 + 0.1 * j)
-                + (x[1] * x[2] / (2.0 + j)).tanh()
-        };
-        (0..10).map(output).collect::<Vec<f64>>()
-    });
-    Matrix::from_rows(10, rows)
-}
-
 pub(in crate::surrogates) fn rmse(found: &Matrix, exact: &Matrix) -> Vec<f64> {
     let error = |j: usize| {
         let pairs = found.column(j).into_iter().zip(exact.column(j));
@@ -180,45 +163,5 @@ fn options_are_read_as_written() {
     }
     for wrong in ["nugget = \"guessed\"", "kernel = \"cubic\"", "components = { share = 1 }"] {
         assert!(read(wrong).is_err(), "{wrong}");
-    }
-}
-
-/// scikit-learn 1.9.1 on the same runs (`ConstantKernel * Matern(nu=2.5)`, one start, one core beside the same load) took
-/// 0.84 s of processor time an output with hyperparameters of its own (1.25 s with a `WhiteKernel`), 0.12 s (0.27 s)
-/// with one set for all ten, at a mean root mean square error of 0.1313.
-#[test]
-#[ignore = "a timing; run it alone with RAYON_NUM_THREADS=1"]
-fn ten_outputs_of_480_runs() {
-    let (points, fresh) = (recurrence(0, 480, 3), recurrence(480, 200, 3));
-    let (responses, exact) = (ten(&points), ten(&fresh));
-    let (parameters, layout) = (unit_parameters(3), layout(10));
-    let training = Training {
-        parameters: &parameters,
-        layout: &layout,
-        points: &points,
-        responses: &responses,
-    };
-    for kernel in [Kernel::Matern52, Kernel::SquaredExponential] {
-        for (length_scales, components) in [
-            (LengthScales::Each, Components::None),
-            (LengthScales::Each, Components::Variance(0.99999)),
-            (LengthScales::Shared, Components::None),
-        ] {
-            let options =
-                GaussianProcess { kernel, length_scales, components, ..GaussianProcess::default() };
-            let start = std::time::Instant::now();
-            let emulator =
-                options.krige(&training, &Stream::root(1), &Progress::new(&Silent)).unwrap();
-            let seconds = start.elapsed().as_secs_f64();
-            let start = std::time::Instant::now();
-            let errors = rmse(&emulator.mean(&fresh), &exact);
-            let predict = start.elapsed().as_secs_f64();
-            println!(
-                "{kernel:?} {length_scales:?} {components:?}: {:.1} ms an output, 200 means in {:.2} ms, \
-                 root mean square errors {errors:.4?}",
-                seconds * 100.0,
-                predict * 1e3
-            );
-        }
     }
 }

@@ -8,6 +8,7 @@
 //! step; the others are looked at again before the drift could have brought one of them there. This is
 //! a bound, not a guess: the path is the same.
 
+use lacuna::linalg::level::{Lines, first_meeting, least_gaps};
 use lacuna::linalg::{Matrix, vector};
 
 /// The near candidates are those that could arrive within about so many steps.
@@ -135,10 +136,9 @@ impl<'a> Candidates<'a> {
     /// Moves all candidates.
     fn advance_all(&mut self, direction: &Direction<'_>) -> Option<Arrival> {
         let level = direction.level;
-        let (correlations, rates) = (&self.correlations, &self.rates);
-        let (term, distance) =
-            first_arrival(level, correlations, rates, &self.closed, &mut self.scratch)
-                .filter(|(_, distance)| *distance < level)?;
+        let lines = Lines { values: &self.correlations, rates: &self.rates, closed: &self.closed };
+        let (term, distance) = first_meeting(level, lines, &mut self.scratch)
+            .filter(|(_, distance)| *distance < level)?;
         self.pace.took(distance);
         vector::add_scaled(&mut self.correlations, -distance, &self.rates);
         Some(Arrival { term, distance, correlation: self.correlations[term] })
@@ -183,18 +183,9 @@ impl<'a> Candidates<'a> {
         // The drift after so many steps of the usual length with turns of the usual length.
         let margin = self.pace.turn * self.pace.distance * (HORIZON.powi(3) / 3.0).sqrt();
         self.near.clear();
-        let mut clearance = f64::INFINITY;
-        let candidates = self.correlations.iter().zip(&self.rates).zip(&self.closed);
-        for (term, ((c, rate), closed)) in candidates.enumerate() {
-            // The distance from the level is concave along the line: least at one of the ends.
-            let least =
-                (level - c.abs()).min(level - horizon - (c - horizon * rate).abs()) + closed;
-            if least < margin {
-                self.near.terms.push(term);
-            } else if least < clearance {
-                clearance = least;
-            }
-        }
+        let lines = Lines { values: &self.correlations, rates: &self.rates, closed: &self.closed };
+        least_gaps(level, horizon, lines, &mut self.scratch);
+        let clearance = self.near.choose(&self.scratch, margin);
         if 2 * self.near.terms.len() > self.correlations.len() {
             self.near.clear();
             return;
@@ -254,6 +245,21 @@ impl Near {
         self.rows.clear();
     }
 
+    /// Chooses the terms whose gaps are below the margin; the least gap of the others.
+    fn choose(&mut self, gaps: &[f64], margin: f64) -> f64 {
+        let mut clearance = f64::INFINITY;
+        let mut count = 0;
+        // Without a branch, which nobody could foresee.
+        self.terms.resize(gaps.len(), 0);
+        for (term, &gap) in gaps.iter().enumerate() {
+            self.terms[count] = term;
+            count += usize::from(gap < margin);
+            clearance = if gap >= margin && gap < clearance { gap } else { clearance };
+        }
+        self.terms.truncate(count);
+        clearance
+    }
+
     /// Copies what belongs to the chosen terms.
     fn pack(&mut self, active: &[usize], gram: &Matrix, correlations: &[f64], rates: &[f64]) {
         self.correlations.extend(self.terms.iter().map(|&t| correlations[t]));
@@ -269,7 +275,8 @@ impl Near {
     /// The first to arrive and its distance; the level itself when none does.
     fn first(&mut self, level: f64) -> (Option<usize>, f64) {
         let Self { correlations, rates, closed, scratch, .. } = self;
-        let first = first_arrival(level, correlations, rates, closed, scratch);
+        let lines = Lines { values: correlations, rates, closed };
+        let first = first_meeting(level, lines, scratch);
         (first.map(|(i, _)| i), first.map_or(level, |(_, distance)| distance.min(level)))
     }
 
@@ -278,26 +285,4 @@ impl Near {
         self.rows.push(self.rows.len());
         self.gram.extend_row(self.terms.iter().map(|&t| gram[t]));
     }
-}
-
-/// The candidate that the falling level meets first, by its position, and how far that is.
-fn first_arrival(
-    level: f64,
-    correlations: &[f64],
-    rates: &[f64],
-    closed: &[f64],
-    arrivals: &mut [f64],
-) -> Option<(usize, f64)> {
-    // Where the level does not gain on a candidate they never meet. A candidate that stands at the
-    // level, but for round-off, meets it at once.
-    let meet = |gap: f64, gain: f64| if gain > 1e-12 { gap.max(0.0) / gain } else { f64::INFINITY };
-    let candidates = correlations.iter().zip(rates).zip(closed);
-    for (arrival, ((c, rate), closed)) in arrivals.iter_mut().zip(candidates) {
-        let up = meet(level - c, 1.0 - rate);
-        let down = meet(level + c, 1.0 + rate);
-        *arrival = closed + if up < down { up } else { down };
-    }
-    let least = arrivals.iter().fold(f64::INFINITY, |least, &a| if a < least { a } else { least });
-    let first = arrivals.iter().position(|&a| a == least)?;
-    least.is_finite().then_some((first, least))
 }

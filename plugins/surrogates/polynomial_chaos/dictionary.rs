@@ -81,6 +81,9 @@ pub(super) struct ActiveSet<'a> {
     inverse: PackedUpper,
     /// `tr (Psi' Psi)^-1` after each step, for the basis functions as they are and the constant.
     traces: Vec<f64>,
+    /// Memory for the products of the entering column with the active ones and for its column of `R^-1`.
+    products: Vec<f64>,
+    next: Vec<f64>,
 }
 
 impl<'a> ActiveSet<'a> {
@@ -91,6 +94,8 @@ impl<'a> ActiveSet<'a> {
             columns: Matrix::zeros(0, dictionary.columns.columns()),
             inverse: PackedUpper::new(),
             traces: Vec::new(),
+            products: Vec::new(),
+            next: Vec::new(),
         }
     }
 
@@ -99,27 +104,35 @@ impl<'a> ActiveSet<'a> {
         &self.terms
     }
 
-    /// Adds a term; the new column of `R^-1`, or none when the term depends linearly on those there.
-    pub fn enter(&mut self, term: usize) -> Option<Vec<f64>> {
+    /// Adds a term; false when it depends linearly on those there.
+    pub fn enter(&mut self, term: usize) -> bool {
         let gram = self.dictionary.gram.row(term);
-        let products: Vec<f64> = self.terms.iter().map(|&t| gram[t]).collect();
-        let projections = self.inverse.transposed_multiply(&products);
-        let outside = 1.0 - vector::dot(&projections, &projections);
+        let Self { products, next, inverse, .. } = self;
+        products.clear();
+        products.extend(self.terms.iter().map(|&t| gram[t]));
+        let outside = 1.0 - inverse.square_multiply(products, next);
         if outside < DEPENDENT {
-            return None;
+            return false;
         }
         let scale = outside.sqrt().recip();
-        let mut next = self.inverse.multiply(&projections);
-        for x in &mut next {
+        for x in &mut *next {
             *x *= -scale;
         }
         next.push(scale);
+        inverse.push(next);
 
         self.terms.push(term);
         self.columns.push_row(self.dictionary.columns.row(term));
-        self.traces.push(self.traces.last().copied().unwrap_or(0.0) + self.trace_of(&next));
-        self.inverse.push(&next);
-        Some(next)
+        self.traces.push(self.traces.last().copied().unwrap_or(0.0) + self.trace_of(&self.next));
+        true
+    }
+
+    /// The column of `R^-1` that the last term added.
+    ///
+    /// # Panics
+    /// When there is no term.
+    pub fn last_column(&self) -> &[f64] {
+        self.inverse.column(self.terms.len() - 1)
     }
 
     /// What one column of `R^-1` adds to `tr (Psi' Psi)^-1` of the basis functions as they are.
@@ -154,8 +167,9 @@ impl<'a> ActiveSet<'a> {
     /// The least-squares weights of the active columns for an output with these products with all
     /// columns, and the sum of squares that they explain.
     pub fn solve(&self, correlations: &[f64]) -> (Vec<f64>, f64) {
-        let own: Vec<f64> = self.terms.iter().map(|&t| correlations[t]).collect();
-        let projections = self.inverse.transposed_multiply(&own);
-        (self.inverse.multiply(&projections), vector::dot(&projections, &projections))
+        let mut own: Vec<f64> = self.terms.iter().map(|&t| correlations[t]).collect();
+        let mut weights = Vec::new();
+        let explained = self.inverse.square_multiply(&mut own, &mut weights);
+        (weights, explained)
     }
 }

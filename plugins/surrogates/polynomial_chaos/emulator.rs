@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::coordinate::Coordinate;
 use super::options::{Selection, Solver};
+use super::sparse::Sparse;
 use super::squares::Squares;
 use super::terms::{Basis, Terms};
 use super::{bytes, sensitivity};
@@ -18,6 +19,8 @@ pub struct Expansion {
     basis: Basis,
     /// `terms x outputs`.
     coefficients: Matrix,
+    /// The same without zeros, where these are most of them.
+    sparse: Option<Sparse>,
     fit_error: FitError,
     summary: Summary,
 }
@@ -75,7 +78,8 @@ impl Expansion {
         fit_error: FitError,
         summary: Summary,
     ) -> Self {
-        Self { basis, coefficients, fit_error, summary }
+        let sparse = Sparse::of(&coefficients);
+        Self { basis, coefficients, sparse, fit_error, summary }
     }
 
     /// The mean and the variance of each output under the design's distribution.
@@ -119,12 +123,12 @@ impl Expansion {
             return Err(bytes::damaged());
         }
         let terms_of = Terms::from_exponents(dimension, header.exponents);
-        Ok(Self {
-            basis: Basis::new(header.coordinates, terms_of),
-            coefficients: Matrix::from_vec(terms, outputs, numbers),
-            fit_error: FitError { relative, residuals: Matrix::from_vec(runs, outputs, residuals) },
-            summary: header.summary,
-        })
+        Ok(Self::new(
+            Basis::new(header.coordinates, terms_of),
+            Matrix::from_vec(terms, outputs, numbers),
+            FitError { relative, residuals: Matrix::from_vec(runs, outputs, residuals) },
+            header.summary,
+        ))
     }
 }
 
@@ -138,11 +142,18 @@ impl Emulator for Expansion {
     }
 
     fn mean(&self, points: &Matrix) -> Matrix {
-        multiply(&self.basis.values(points), &self.coefficients)
+        match &self.sparse {
+            Some(sparse) => sparse.mean(&self.basis, points),
+            None => multiply(&self.basis.values(points), &self.coefficients),
+        }
     }
 
     fn jacobian(&self, point: &[f64]) -> Matrix {
-        transposed_multiply(&self.coefficients, &self.basis.gradient(point))
+        let gradient = self.basis.gradient(point);
+        match &self.sparse {
+            Some(sparse) => sparse.transposed_multiply(&gradient),
+            None => transposed_multiply(&self.coefficients, &gradient),
+        }
     }
 
     fn linear(&self) -> Option<&dyn Linear> {

@@ -8,8 +8,8 @@ use super::options::Selection;
 
 /// Residuals below this share of the output are round-off: the fit is exact.
 const EXACT: f64 = 1e-14;
-/// Steps whose errors are computed together.
-const BLOCK: usize = 16;
+/// The most steps whose errors are computed together.
+const BLOCK: usize = 32;
 
 /// The error by which sets of terms are compared.
 pub(super) enum Criterion {
@@ -86,7 +86,10 @@ pub(super) fn best_along<'a>(
     let mut best: Option<(f64, usize)> = None;
     'path: while path.active().terms().len() < most {
         let first = path.active().terms().len();
-        while path.active().terms().len() < most.min(first + BLOCK) && path.step() {}
+        // No step is taken of which it is not known that the path reaches it.
+        let known = best.map_or(usize::MAX, |(_, at)| at.saturating_add(window));
+        let end = most.min(first + BLOCK).min(known);
+        while path.active().terms().len() < end && path.step() {}
         let active = path.active();
         if active.terms().len() == first {
             break;
@@ -124,6 +127,8 @@ struct Judge<'a> {
     folds: Vec<(&'a [usize], Matrix)>,
     /// The sum of squares of the centred output.
     total: f64,
+    /// Those of the residuals, and of these divided by `freedom`: the leave-one-out residuals.
+    squares: [f64; 2],
     terms: usize,
 }
 
@@ -139,11 +144,14 @@ impl<'a> Judge<'a> {
             Criterion::LeaveOneOut => Vec::new(),
             Criterion::Folds(folds) => folds.iter().map(block).collect(),
         };
+        let total = vector::dot(centred, centred);
+        let freedom = 1.0 - 1.0 / n as f64;
         Self {
             residual: centred.to_vec(),
-            freedom: vec![1.0 - 1.0 / n as f64; n],
+            freedom: vec![freedom; n],
             folds,
-            total: vector::dot(centred, centred),
+            total,
+            squares: [total, total / (freedom * freedom)],
             terms: 1,
         }
     }
@@ -154,10 +162,7 @@ impl<'a> Judge<'a> {
         // The projection of the residual, not of the output: what round-off left in the columns
         // already there is not projected twice.
         let projection = vector::dot(column, &self.residual);
-        vector::add_scaled(&mut self.residual, -projection, column);
-        for (d, q) in self.freedom.iter_mut().zip(column) {
-            *d -= q * q;
-        }
+        self.squares = vector::take_out(column, projection, &mut self.residual, &mut self.freedom);
         for (runs, block) in &mut self.folds {
             for (i, &a) in runs.iter().enumerate() {
                 let row = block.row_mut(i);
@@ -169,8 +174,7 @@ impl<'a> Judge<'a> {
     /// The error relative to the variance; `trace` is `tr (Psi' Psi)^-1`.
     fn error(&self, trace: f64) -> f64 {
         let error = if self.folds.is_empty() {
-            let squares = vector::sum_squared_ratios(&self.residual, &self.freedom);
-            squares / self.total * correction(self.residual.len(), self.terms, trace)
+            self.squares[1] / self.total * correction(self.residual.len(), self.terms, trace)
         } else {
             let squares = self.folds.iter().map(|(runs, b)| left_out(runs, b, &self.residual));
             squares.sum::<f64>() / self.total
@@ -180,7 +184,7 @@ impl<'a> Judge<'a> {
 
     /// Whether nothing is left but round-off.
     fn exact(&self) -> bool {
-        vector::dot(&self.residual, &self.residual) <= EXACT * EXACT * self.total
+        self.squares[0] <= EXACT * EXACT * self.total
     }
 }
 

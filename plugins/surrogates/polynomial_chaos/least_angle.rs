@@ -58,12 +58,15 @@ impl<'a> LeastAngle<'a> {
     /// Adds a term to the active set and says by what length the direction turns; none when the term
     /// depends linearly on those there.
     fn enter(&mut self, term: usize, sign: f64) -> Option<f64> {
-        let next = self.active.enter(term)?;
+        if !self.active.enter(term) {
+            return None;
+        }
+        let next = self.active.last_column();
         self.signs.push(sign);
         self.weights.push(0.0);
         // G^-1 s = R^-1 (R^-T s): the new column of R^-1 adds one entry of R^-T s and nothing else.
-        let entry = vector::dot(&next, &self.signs);
-        vector::add_scaled(&mut self.weights, entry, &next);
+        let entry = vector::dot(next, &self.signs);
+        vector::add_scaled(&mut self.weights, entry, next);
         Some(entry)
     }
 }

@@ -54,10 +54,12 @@ impl<'a> Path<'a> for MatchingPursuit<'a> {
     fn step(&mut self) -> bool {
         while let Some(term) = self.strongest() {
             self.open[term] = false;
-            let Some(next) = self.active.enter(term) else { continue };
-            let terms = self.active.terms();
+            if !self.active.enter(term) {
+                continue;
+            }
+            let (terms, next) = (self.active.terms(), self.active.last_column());
             let projection: f64 = next.iter().zip(terms).map(|(x, &t)| x * self.start[t]).sum();
-            vector::combine_rows(self.dictionary.gram(), terms, &next, &mut self.scratch);
+            vector::combine_rows(self.dictionary.gram(), terms, next, &mut self.scratch);
             vector::add_scaled(&mut self.correlations, -projection, &self.scratch);
             return true;
         }

@@ -18,6 +18,7 @@ mod quadrature;
 mod recurrence;
 mod search;
 mod sensitivity;
+mod sparse;
 mod squares;
 mod subspace_pursuit;
 mod terms;

@@ -1,9 +1,10 @@
 //! The multi-indices of an expansion, ordered so that each degree's set is a prefix of the next.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use lacuna::linalg::Matrix;
-use lacuna::linalg::lanes::LANES;
+use lacuna::linalg::lanes::{LANES, Lanes};
 
 use super::coordinate::Coordinate;
 
@@ -237,6 +238,24 @@ impl Basis {
     pub fn values(&self, points: &Matrix) -> Matrix {
         let count = self.terms.len();
         let mut values = Matrix::zeros(points.rows(), count);
+        self.in_lanes(points, |range, products| {
+            let rows = &mut values.as_mut_slice()[range.start * count..range.end * count];
+            for (l, row) in rows.chunks_exact_mut(count.max(1)).enumerate() {
+                for (value, &place) in row.iter_mut().zip(&self.places) {
+                    *value = products[place as usize][l];
+                }
+            }
+        });
+        values
+    }
+
+    /// Where each basis function stands in the table that [`Self::in_lanes`] makes.
+    pub(super) fn places(&self) -> &[u32] {
+        &self.places
+    }
+
+    /// Calls `take` with some points at a time, by their rows, and a table of their products side by side.
+    pub(super) fn in_lanes(&self, points: &Matrix, mut take: impl FnMut(Range<usize>, &[Lanes])) {
         let mut table = vec![[0.0; LANES]; self.coordinates.len() * self.stride];
         let mut products = vec![[1.0; LANES]; self.products.len() + 1];
         for first in (0..points.rows()).step_by(LANES) {
@@ -251,15 +270,8 @@ impl Basis {
                     *product = before[l] * factor[l];
                 }
             }
-            let rows =
-                values.as_mut_slice()[first * count..end * count].chunks_exact_mut(count.max(1));
-            for (l, row) in rows.enumerate() {
-                for (value, &place) in row.iter_mut().zip(&self.places) {
-                    *value = products[place as usize][l];
-                }
-            }
+            take(first..end, &products);
         }
-        values
     }
 
     /// The derivative of each basis function (rows) by each parameter (columns), in physical units.

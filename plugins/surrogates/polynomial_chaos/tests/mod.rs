@@ -9,5 +9,4 @@ mod families;
 mod laws;
 mod options;
 mod solvers;
-mod speed;
 mod textbook;
