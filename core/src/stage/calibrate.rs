@@ -22,7 +22,7 @@ use crate::study::file::Start;
 use super::read::Measured;
 use super::sampling::{self, Length, Sampled};
 use super::start::{inside, maxima, sobol};
-use super::{Known, best_fit, common_error, left_out, stream};
+use super::{Known, best_fit, common_error, stream};
 
 /// The posterior as draws, with its maximum.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,7 +128,7 @@ impl Parts {
         if section.common.emulator_error {
             let data = &measured.likelihood;
             let stated = stated_variance(study, data, known.emulator)?;
-            common.push(known.fitted.value.common_error(study, stated.as_deref())?);
+            common.push(known.fitted.value.covariance(study, stated.as_deref())?);
         }
         if section.common.replicate_error {
             common.extend(common_error::of_replicates(&measured.used));
@@ -136,13 +136,6 @@ impl Parts {
         if let (Some(kept), Some(section)) = (known.numerics, &study.numerical_error) {
             common.push(kept.value.common_error(section.written.whole()));
         }
-        let common = if common.is_empty() {
-            Vec::new()
-        } else {
-            let data = &measured.likelihood;
-            let fit = best_fit::fit_with_errors(study, data, known.emulator, &common)?;
-            left_out::completed(common, data, &fit)?
-        };
         let likelihood = section.built.plugin.likelihood(&discrepancy::Known {
             data: &measured.likelihood,
             common: &common,

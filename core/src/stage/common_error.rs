@@ -4,8 +4,6 @@ use crate::data::Measurements;
 use crate::linalg::Matrix;
 use crate::plugin::discrepancy::CommonError;
 
-use super::left_out::Sampled;
-
 /// The error of the replicates' mean curve, from the replicates themselves; `None` below three replicates.
 ///
 /// Points of one replicate share its gain and its timing, so that the mean over R replicates is not as exact
@@ -13,7 +11,7 @@ use super::left_out::Sampled;
 /// the deviations `d_r` of the replicates from their mean; where a value has fewer replicates, its own
 /// number stands for R. Its part that is white noise is counted again in at most R - 1 directions
 /// of all outputs, which costs next to no information.
-pub fn of_replicates(data: &Measurements) -> Option<Sampled> {
+pub fn of_replicates(data: &Measurements) -> Option<CommonError> {
     let summaries = data.summaries();
     let used: Vec<_> =
         data.replicates.iter().filter(|r| r.values.iter().any(Option::is_some)).collect();
@@ -27,10 +25,7 @@ pub fn of_replicates(data: &Measurements) -> Option<Sampled> {
             _ => 0.0,
         }
     });
-    let scale = (used.len() as f64).sqrt();
-    let samples = Matrix::from_fn(used.len(), data.layout.len(), |r, i| scale * factor[(i, r)]);
-    let error = CommonError { origin: "replicates".to_owned(), factor, predictive: false };
-    Some(Sampled { error, samples, noisy: true })
+    Some(CommonError { origin: "replicates".to_owned(), factor, predictive: false })
 }
 
 #[cfg(test)]
@@ -56,7 +51,7 @@ mod tests {
         let axes = vec![Axis::grid("time", grid.clone(), unit.clone())];
         let layout = Layout { name: "y".into(), unit, axes };
         let data = Measurements { layout, replicates: (0..count).map(replicate).collect() };
-        let factor = of_replicates(&data).unwrap().error.factor;
+        let factor = of_replicates(&data).unwrap().factor;
         let norm: f64 = curve.iter().map(|y| y * y).sum();
         let along: f64 = (0..count)
             .map(|r| {

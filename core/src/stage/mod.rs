@@ -6,7 +6,6 @@ pub mod common_error;
 pub mod design;
 pub mod evidence;
 pub mod inference_data;
-pub mod left_out;
 pub mod manifest;
 pub mod numerical_error;
 pub mod predict;

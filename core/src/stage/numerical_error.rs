@@ -16,7 +16,6 @@ use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, RunDirectory, Stop};
 use crate::study::Study;
 
-use super::left_out::Sampled;
 use super::read::{self, Data};
 use super::simulate;
 use super::simulator::Simulator;
@@ -46,15 +45,13 @@ impl Artifact for NumericalError {
 }
 
 impl NumericalError {
-    /// The numerical error: `whole` times the differences, its covariance their mean square about zero, since all of
-    /// them may lie on one side.
-    pub fn common_error(&self, whole: f64) -> Sampled {
+    /// The covariance of the numerical error: the mean square of `whole` times the differences about zero, since all
+    /// of them may lie on one side.
+    pub fn common_error(&self, whole: f64) -> CommonError {
+        let scale = (self.differences.rows() as f64).sqrt() / whole;
         let d = &self.differences;
-        let samples = Matrix::from_fn(d.rows(), d.columns(), |k, i| whole * d[(k, i)]);
-        let scale = (d.rows() as f64).sqrt();
-        let factor = Matrix::from_fn(d.columns(), d.rows(), |i, k| samples[(k, i)] / scale);
-        let error = CommonError { origin: "numerics".to_owned(), factor, predictive: true };
-        Sampled { error, samples, noisy: false }
+        let factor = Matrix::from_fn(d.columns(), d.rows(), |i, k| d[(k, i)] / scale);
+        CommonError { origin: "numerics".to_owned(), factor, predictive: true }
     }
 
     /// The root mean square difference over runs and outputs.

@@ -14,7 +14,6 @@ use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
 use crate::study::Study;
 
-use super::left_out::Sampled;
 use super::read::Data;
 use super::stream;
 
@@ -276,14 +275,13 @@ impl Fitted {
         if near.len() >= ENOUGH { self.samples.select_rows(&near) } else { self.samples.clone() }
     }
 
-    /// The emulator's error with the errors it is estimated from; its covariance is a low-rank factor that carries
-    /// 99.9 % of the variance.
+    /// The covariance of the emulator's error as a low-rank factor that carries 99.9 % of its variance.
     ///
     /// Each run's error curve is one sample of the error, which is common to all replicates and correlated
     /// between outputs; the covariance is their mean square about zero. An emulator that knows its own variance
     /// passes it as `stated`, at the point where the data are fitted best: then the runs tell how the
     /// errors of the outputs go together, and the variance how large they are there.
-    pub fn common_error(&self, study: &Study, stated: Option<&[f64]>) -> Result<Sampled, Stop> {
+    pub fn covariance(&self, study: &Study, stated: Option<&[f64]>) -> Result<CommonError, Stop> {
         let mut errors = self.errors_near_prior(study);
         if let Some(stated) = stated {
             rescale(&mut errors, stated, self.errors.inflation.map_or(1.0, |r| r.max(1.0)));
@@ -301,8 +299,7 @@ impl Fitted {
         let scale = (errors.rows() as f64).sqrt();
         let factor =
             Matrix::from_fn(errors.columns(), rank, |i, k| svd.v[(i, k)] * svd.values[k] / scale);
-        let error = CommonError { origin: "emulator".to_owned(), factor, predictive: true };
-        Ok(Sampled { error, samples: errors, noisy: false })
+        Ok(CommonError { origin: "emulator".to_owned(), factor, predictive: true })
     }
 }
 
