@@ -27,10 +27,12 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
     let calibration = findings.calibration.as_ref()?;
     let content = html! {
         p.verdict.good[calibration.converged] {
-            b { @if calibration.converged { "Converged. " } @else { "Not converged. " } }
+            b { @if calibration.converged { "Converged" } @else { "Not converged" } }
             @if calibration.verdict != "converged" {
-                (paragraph(calibration.verdict.trim_end_matches('.'))) "."
+                @if calibration.converged { "; note: " } @else { ": " }
+                (paragraph(calibration.verdict.trim_end_matches('.')))
             }
+            "."
         }
         (fact_list(&facts(calibration)))
         @if !calibration.acceptance.is_empty() { (acceptance(calibration, numbers)) }
