@@ -5,6 +5,7 @@ use lacuna::math::random::Stream;
 use lacuna::plugin::Target;
 use lacuna::plugin::sampler::State;
 use lacuna::run::Stop;
+use lacuna::study::problem::Complaints;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -28,6 +29,25 @@ impl Share {
         // The draws stop at the last point that is needed: a negative binomial number of them.
         let share = (count as f64 - 1.0) / (tried as f64 - 1.0);
         Self { log: share.ln(), variance: (1.0 - share) / count as f64 }
+    }
+}
+
+/// Complains about options that are no share between 0 and 1.
+pub(super) fn check_shares(options: &[(&str, f64)], complaints: &mut Complaints<'_>) {
+    for &(name, value) in options {
+        if !(value > 0.0 && value < 1.0) {
+            let spot = complaints.at(name);
+            spot.say("not a share").expected("a number between 0 and 1").found(value);
+        }
+    }
+}
+
+/// Complains about options that leave nothing to do.
+pub(super) fn check_counts(options: &[(&str, usize)], complaints: &mut Complaints<'_>) {
+    for &(name, value) in options {
+        if value == 0 {
+            complaints.at(name).say("nothing to do").expected("at least 1").found(0);
+        }
     }
 }
 

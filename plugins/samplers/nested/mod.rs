@@ -79,15 +79,9 @@ impl Component for Nested {
             let spot = complaints.at("remaining");
             spot.say("the run would never end").expected("a number above 0").found(self.remaining);
         }
-        if !(self.correlation > 0.0 && self.correlation < 1.0) {
-            let spot = complaints.at("correlation");
-            spot.say("not a share").expected("a number between 0 and 1").found(self.correlation);
-        }
-        for (name, value) in [("moves", self.moves), ("halvings", self.halvings)] {
-            if value == 0 {
-                complaints.at(name).say("nothing to do").expected("at least 1").found(0);
-            }
-        }
+        population::check_shares(&[("correlation", self.correlation)], complaints);
+        let counts = [("moves", self.moves), ("halvings", self.halvings)];
+        population::check_counts(&counts, complaints);
     }
 }
 

@@ -76,19 +76,10 @@ impl Component for SequentialMonteCarlo {
                 .expected(format!("at least {least}"))
                 .found(self.particles);
         }
-        for (name, value) in
-            [("effective_share", self.effective_share), ("correlation", self.correlation)]
-        {
-            if !(value > 0.0 && value < 1.0) {
-                let spot = complaints.at(name);
-                spot.say("not a share").expected("a number between 0 and 1").found(value);
-            }
-        }
-        for (name, value) in [("moves", self.moves), ("temperatures", self.temperatures)] {
-            if value == 0 {
-                complaints.at(name).say("nothing to do").expected("at least 1").found(0);
-            }
-        }
+        let shares = [("effective_share", self.effective_share), ("correlation", self.correlation)];
+        population::check_shares(&shares, complaints);
+        let counts = [("moves", self.moves), ("temperatures", self.temperatures)];
+        population::check_counts(&counts, complaints);
     }
 }
 
