@@ -13,12 +13,13 @@ mod gain;
 use std::path::{Path, PathBuf};
 
 use lacuna::contract::{self, Sample};
-use lacuna::data::{Axis, Layout, Parameter, Unit};
+use lacuna::data::{Axis, Layout, Parameter, Scenario, Unit};
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::model::Response;
 use lacuna::plugin::registry::{self, Kind};
 use lacuna::plugin::{
-    Density, Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate,
+    Context, Density, Design, Discrepancy, Effect, Executor, Given, Model, Reader, Sampler,
+    Surrogate,
 };
 use lacuna::run::write_response;
 // Without this line the linker leaves the plugins out.
@@ -89,7 +90,29 @@ fn designs() {
 #[test]
 fn models() {
     let table: &Table = &[("mercury_target", &["numerics = { mesh = [6, 24] }"])];
-    all::<dyn Model>(table, |case, model| contract::model(&case.label, model, case.scratch));
+    let parameter = |name: &str| Parameter {
+        name: name.to_owned(),
+        symbol: name.to_owned(),
+        unit: Unit::dimensionless(),
+        design: Distribution::Uniform([0.0, 2.0]),
+        prior: Distribution::Uniform([0.0, 2.0]),
+        reference: None,
+    };
+    let parameters = ["a", "b"].map(parameter);
+    let given =
+        parameters.clone().map(|p| Given { name: p.name.clone(), unit: Some(p.unit.clone()) });
+    let scenarios = [Scenario::default()];
+    let grid = (1..=5).map(f64::from).collect();
+    let axes = vec![Axis::grid("time", grid, Unit::parse("s").unwrap())];
+    let layout = Layout { name: "y".to_owned(), unit: Unit::dimensionless(), axes };
+    all::<dyn Model>(table, |case, model| {
+        let context = Context {
+            given: &given,
+            scenarios: &scenarios,
+            ..Context::new(case.scratch, &parameters, &layout)
+        };
+        contract::model(&case.label, model, &context, case.scratch)
+    });
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! `local`: all cores of this machine.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
 use std::time::Instant;
@@ -32,6 +33,7 @@ impl Executor for Local {
         finished: &mut dyn FnMut(Finished) -> Result<(), Stop>,
     ) -> Result<(), Stop> {
         let threads = self.threads.map_or_else(rayon::current_num_threads, std::num::NonZero::get);
+        let size = batch.model.batch().max(1);
         let next = AtomicUsize::new(0);
         let halt = AtomicBool::new(false);
         std::thread::scope(|scope| {
@@ -41,10 +43,16 @@ impl Executor for Local {
                 let (next, halt) = (&next, &halt);
                 scope.spawn(move || {
                     while !halt.load(Ordering::Relaxed) {
-                        let index = next.fetch_add(1, Ordering::Relaxed);
-                        let Some(job) = batch.jobs.get(index) else { break };
-                        if sender.send((index, run_one(batch, job))).is_err() {
+                        let first = next.fetch_add(size, Ordering::Relaxed);
+                        let jobs = batch.jobs.iter().skip(first).take(size);
+                        let ended = run(batch, &jobs.collect::<Vec<_>>());
+                        if ended.is_empty() {
                             break;
+                        }
+                        for (i, ended) in ended.into_iter().enumerate() {
+                            if sender.send((first + i, ended)).is_err() {
+                                return;
+                            }
                         }
                     }
                 });
@@ -74,22 +82,44 @@ fn collect(
     Ok(())
 }
 
-fn run_one(batch: &Batch<'_>, job: &Job) -> Ended {
+/// Runs some jobs in one go; the time is shared equally between them.
+fn run(batch: &Batch<'_>, jobs: &[&Job]) -> Vec<Ended> {
     let begun = Instant::now();
-    // A model that panics must cost its own run and no other.
-    let outcome = catch_unwind(AssertUnwindSafe(|| evaluate(batch, job)))
-        .unwrap_or_else(|_| Err(EvalError::Rejected("the model panicked".to_owned())));
-    (outcome, begun.elapsed().as_secs_f64())
+    let folders: Vec<PathBuf> = jobs.iter().map(|job| batch.folder(job)).collect();
+    let pairs = jobs.iter().zip(&folders);
+    let calls: Vec<Call<'_>> = pairs.map(|(job, folder)| batch.call(job, folder)).collect();
+    let responses = catch_unwind(AssertUnwindSafe(|| batch.model.predict_batch(&calls)));
+    let outcomes: Vec<_> = match responses {
+        Ok(responses) => responses
+            .into_iter()
+            .zip(jobs.iter().zip(&calls))
+            .map(|(response, (job, call))| {
+                let response = response?;
+                catch_unwind(AssertUnwindSafe(|| keep(batch, job, call, response)))
+                    .unwrap_or_else(|_| Err(panicked()))
+            })
+            .collect(),
+        // A model that panics must cost its own run and no other.
+        Err(_) if jobs.len() > 1 => {
+            return jobs.iter().flat_map(|job| run(batch, &[job])).collect();
+        }
+        Err(_) => vec![Err(panicked())],
+    };
+    let seconds = begun.elapsed().as_secs_f64() / jobs.len() as f64;
+    outcomes.into_iter().map(|outcome| (outcome, seconds)).collect()
 }
 
-fn evaluate(batch: &Batch<'_>, job: &Job) -> Result<(Response, String), EvalError> {
-    let call = Call {
-        inputs: &job.inputs,
-        layout: batch.layout,
-        scenario: batch.scenario,
-        directory: None,
-    };
-    let response = batch.model.predict(&call)?;
+fn panicked() -> EvalError {
+    EvalError::Rejected("the model panicked".to_owned())
+}
+
+/// Writes a response down.
+fn keep(
+    batch: &Batch<'_>,
+    job: &Job,
+    call: &Call<'_>,
+    response: Response,
+) -> Result<(Response, String), EvalError> {
     if let Some(i) = response.values.iter().position(|y| !y.is_finite()) {
         let place = batch.layout.describe(i);
         return Err(EvalError::Rejected(format!(
@@ -97,7 +127,7 @@ fn evaluate(batch: &Batch<'_>, job: &Job) -> Result<(Response, String), EvalErro
             response.values[i]
         )));
     }
-    let file = match batch.model.write(&job.name, &call, &response, batch.directory)? {
+    let file = match batch.model.write(&job.name, call, &response, batch.directory)? {
         Some(file) => file,
         None => write_response(batch.directory, &job.name, batch.layout, &response)
             .map_err(|stop| EvalError::Fatal(stop.to_string()))?,

@@ -12,7 +12,8 @@ use lacuna::plugin::reader::{Contents, ReadError};
 use lacuna::plugin::registry;
 use lacuna::plugin::surrogate::{FitError, Training};
 use lacuna::plugin::{
-    Component, Discrepancy, Emulator, Fact, Hyperparameter, Likelihood, Model, Reader, Surrogate,
+    Component, Context, Discrepancy, Emulator, Fact, Hyperparameter, Likelihood, Model, Reader,
+    Surrogate,
 };
 use lacuna::run::{Progress, Stop};
 
@@ -194,8 +195,8 @@ fn faults_of_surrogates_are_found() {
 }
 
 impl Model for Faulty<dyn Model> {
-    fn signature(&self) -> Signature {
-        let mut signature = self.sound.signature();
+    fn signature(&self, context: &Context<'_>) -> Signature {
+        let mut signature = self.sound.signature(context);
         if self.fault == Fault::Support {
             signature.inputs[0].default = Some(-1.0);
         }
@@ -233,7 +234,10 @@ fn faults_of_models_are_found() {
         let options = "numerics = { mesh = [4, 12] }";
         let sound = registry::from_text::<dyn Model>("mercury_target", options).unwrap().plugin;
         let scratch = tempfile::tempdir().unwrap();
-        found(contract::model("faulty", &Faulty { fault, sound }, scratch.path()), fault, expected);
+        let layout = Layout::number("none");
+        let context = Context::new(scratch.path(), &[], &layout);
+        let faulty = Faulty { fault, sound };
+        found(contract::model("faulty", &faulty, &context, scratch.path()), fault, expected);
     }
 }
 

@@ -5,9 +5,9 @@ use std::path::Path;
 
 use super::judge::{Check, judge, layout, same_on_threads};
 use crate::data::Scenario;
-use crate::plugin::Component;
 use crate::plugin::executor::{Batch, Executor, Finished, Job};
 use crate::plugin::model::{Call, EvalError, Input, Model, Response, Signature};
+use crate::plugin::{Component, Context};
 use crate::run::{Stop, arrays};
 
 /// Puts an executor through the contract; result files go to folders in `scratch`.
@@ -41,7 +41,7 @@ const HOPELESS: f64 = -4.0;
 impl Component for Line {}
 
 impl Model for Line {
-    fn signature(&self) -> Signature {
+    fn signature(&self, _context: &Context<'_>) -> Signature {
         let input = |name: &str| Input {
             name: name.to_owned(),
             unit: crate::data::Unit::dimensionless(),
@@ -67,6 +67,10 @@ impl Model for Line {
     }
 }
 
+fn names() -> Vec<String> {
+    ["a", "b"].map(str::to_owned).to_vec()
+}
+
 fn jobs(first: &[f64]) -> Vec<Job> {
     let job = |(i, &a): (usize, &f64)| Job {
         name: format!("run{:03}", i + 1),
@@ -86,8 +90,15 @@ fn run(
 ) -> Result<(Handed, Result<(), Stop>), String> {
     std::fs::create_dir_all(folder).map_err(|error| error.to_string())?;
     let (layout, scenario) = (layout(), Scenario::default());
-    let batch =
-        Batch { model: &Line, jobs, layout: &layout, scenario: &scenario, directory: folder };
+    let batch = Batch {
+        model: &Line,
+        names: &names(),
+        jobs,
+        layout: &layout,
+        scenario: &scenario,
+        study: folder,
+        directory: folder,
+    };
     let mut handed = Handed::new();
     let mut broken = None;
     let mut finished = |end: Finished| {
@@ -123,8 +134,14 @@ fn hands_over_every_job(executor: &dyn Executor, scratch: &Path) -> Result<(), S
     let handed = all()?;
     let (layout, scenario) = (layout(), Scenario::default());
     for (i, job) in jobs.iter().enumerate() {
-        let call =
-            Call { inputs: &job.inputs, layout: &layout, scenario: &scenario, directory: None };
+        let call = Call {
+            inputs: &job.inputs,
+            names: &names(),
+            layout: &layout,
+            scenario: &scenario,
+            study: scratch,
+            directory: None,
+        };
         let expected = Line.predict(&call).map_err(|error| error.to_string())?;
         match handed.get(&i) {
             Some(Ok((values, valid, stored))) => {

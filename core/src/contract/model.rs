@@ -4,10 +4,10 @@ use std::path::Path;
 
 use super::judge::{Check, agree, calm, judge, refused, same_on_threads, slope, twice};
 use crate::data::{Axis, Coordinates, Layout, Scenario};
-use crate::plugin::Model;
 use crate::plugin::model::{Call, Response, Signature};
+use crate::plugin::{Context, Model};
 
-/// Puts a model through the contract; files go to the folder `scratch`.
+/// Puts a model through the contract in a study of this context; files go to the folder `scratch`.
 ///
 /// - its inputs have different names, and defaults inside their ranges; its layout has values;
 /// - it answers with one finite value a place, the same each time and on any number of threads, and
@@ -16,10 +16,15 @@ use crate::plugin::model::{Call, Response, Signature};
 ///   refused without a panic;
 /// - a file of its own is there under the name it gives, the same bytes each time;
 /// - derivatives, where it has them, are those that differences give.
-pub fn model(name: &str, model: &dyn Model, scratch: &Path) -> Result<(), Vec<String>> {
-    let case = Case::of(model);
+pub fn model(
+    name: &str,
+    model: &dyn Model,
+    context: &Context<'_>,
+    scratch: &Path,
+) -> Result<(), Vec<String>> {
+    let case = Case::of(model, context);
     let checks: [Check<'_>; 5] = [
-        ("signs soundly", Box::new(|| signs_soundly(&model.signature()))),
+        ("signs soundly", Box::new(|| signs_soundly(&case.signature))),
         ("answers", Box::new(|| case.answers())),
         ("refuses nonsense", Box::new(|| case.refuses_nonsense())),
         ("writes its files", Box::new(|| case.writes_its_files(scratch))),
@@ -31,9 +36,12 @@ pub fn model(name: &str, model: &dyn Model, scratch: &Path) -> Result<(), Vec<St
 /// A model with a small call.
 struct Case<'a> {
     model: &'a dyn Model,
+    signature: Signature,
+    names: Vec<String>,
     inputs: Vec<f64>,
     layout: Layout,
     scenario: Scenario,
+    study: &'a Path,
 }
 
 fn signs_soundly(signature: &Signature) -> Result<(), String> {
@@ -66,19 +74,29 @@ fn part(layout: &Layout) -> Layout {
 }
 
 impl<'a> Case<'a> {
-    fn of(model: &'a dyn Model) -> Self {
-        let signature = model.signature();
+    fn of(model: &'a dyn Model, context: &Context<'a>) -> Self {
+        let signature = model.signature(context);
         let layout =
             if signature.resamples { part(&signature.layout) } else { signature.layout.clone() };
         let inputs = signature.inputs.iter().map(|input| {
             let (low, high) = (input.range.0.max(-1.0), input.range.1.min(1.0));
             input.default.unwrap_or(0.5 * (low + high))
         });
-        Self { model, inputs: inputs.collect(), layout, scenario: Scenario::default() }
+        let inputs = inputs.collect();
+        let names = signature.inputs.iter().map(|input| input.name.clone()).collect();
+        let scenario = context.scenarios.first().cloned().unwrap_or_default();
+        Self { model, signature, names, inputs, layout, scenario, study: context.directory }
     }
 
     fn call<'b>(&'b self, inputs: &'b [f64], layout: &'b Layout) -> Call<'b> {
-        Call { inputs, layout, scenario: &self.scenario, directory: None }
+        Call {
+            inputs,
+            names: &self.names,
+            layout,
+            scenario: &self.scenario,
+            study: self.study,
+            directory: None,
+        }
     }
 
     fn respond(&self, inputs: &[f64]) -> Result<Response, String> {
@@ -88,12 +106,11 @@ impl<'a> Case<'a> {
 
     /// The inputs, each one percent nearer to the middle of its range.
     fn other_inputs(&self) -> Vec<f64> {
-        let signature = self.model.signature();
         let moved = |(x, input): (&f64, &crate::plugin::model::Input)| {
             let up = x + 0.01 * x.abs().max(0.01);
             if up <= input.range.1 { up } else { x - 0.01 * x.abs().max(0.01) }
         };
-        self.inputs.iter().zip(&signature.inputs).map(moved).collect()
+        self.inputs.iter().zip(&self.signature.inputs).map(moved).collect()
     }
 
     fn answers(&self) -> Result<(), String> {

@@ -14,6 +14,6 @@ pub use ensemble::{Ensemble, FailedRun};
 pub use layout::{Axis, Coordinates, Layout};
 pub use measurements::{Measurements, Replicate};
 pub use parameter::Parameter;
-pub use scenario::Scenario;
+pub use scenario::{Condition, Function, Scenario};
 pub use table::Table;
 pub use unit::{Unit, UnitError};

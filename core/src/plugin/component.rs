@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::data::{Layout, Parameter};
+use crate::data::{Layout, Parameter, Scenario, Unit};
 use crate::study::problem::Complaints;
 
 /// The rest of the study, as a plugin sees it while it checks itself.
@@ -14,13 +14,42 @@ pub struct Context<'a> {
     pub directory: &'a Path,
     /// The unknowns of the model.
     pub parameters: &'a [Parameter],
-    /// The shape of the response.
+    /// What the study sets of its model's inputs, in the order in which it is written: parameters, values that
+    /// are fixed, and the values of scenarios.
+    pub given: &'a [Given],
+    /// The known conditions; one without a name where the study has no scenarios.
+    pub scenarios: &'a [Scenario],
+    /// The shape of the response; for a model that to one scenario.
     pub layout: &'a Layout,
     /// The number of runs that the design makes, where the study has a design.
     pub runs: Option<usize>,
     /// Whether the likelihood will have errors that all replicates share: of the emulator or of the
     /// model's numerics. Those of the replicates' mean are known only with the data.
     pub common_errors: bool,
+}
+
+impl<'a> Context<'a> {
+    /// A study of these parameters and this response, and nothing else.
+    pub fn new(directory: &'a Path, parameters: &'a [Parameter], layout: &'a Layout) -> Self {
+        Self {
+            directory,
+            parameters,
+            given: &[],
+            scenarios: &[],
+            layout,
+            runs: None,
+            common_errors: false,
+        }
+    }
+}
+
+/// What a study sets of an input of its model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Given {
+    /// The name of the input.
+    pub name: String,
+    /// The unit in which the study gives it; `None` for a plain number in the model's unit.
+    pub unit: Option<Unit>,
 }
 
 /// What every plugin does besides its own work.

@@ -1,9 +1,9 @@
 //! Executors: where many model evaluations run.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::Component;
-use super::model::{Model, Response};
+use super::model::{Call, Model, Response};
 use crate::data::{Layout, Scenario};
 use crate::run::Stop;
 
@@ -23,14 +23,37 @@ pub trait Executor: Component {
 pub struct Batch<'a> {
     /// The model that all jobs evaluate.
     pub model: &'a dyn Model,
+    /// The name of each of its inputs.
+    pub names: &'a [String],
     /// The jobs.
     pub jobs: &'a [Job],
     /// The shape of the response that is wanted.
     pub layout: &'a Layout,
     /// The conditions of all jobs.
     pub scenario: &'a Scenario,
+    /// The folder of the study file.
+    pub study: &'a Path,
     /// The folder into which result files are written.
     pub directory: &'a Path,
+}
+
+impl<'a> Batch<'a> {
+    /// The folder in which a model may keep files of a job.
+    pub fn folder(&self, job: &Job) -> PathBuf {
+        self.directory.join(&job.name)
+    }
+
+    /// What is asked of the model for a job whose own folder is `folder`.
+    pub fn call(&self, job: &'a Job, folder: &'a Path) -> Call<'a> {
+        Call {
+            inputs: &job.inputs,
+            names: self.names,
+            layout: self.layout,
+            scenario: self.scenario,
+            study: self.study,
+            directory: Some(folder),
+        }
+    }
 }
 
 /// One evaluation.

@@ -17,7 +17,7 @@ pub mod registry;
 pub mod sampler;
 pub mod surrogate;
 
-pub use component::{Component, Context, Fact};
+pub use component::{Component, Context, Fact, Given};
 pub use density::Density;
 pub use design::Design;
 pub use discrepancy::{Discrepancy, Hyperparameter, Likelihood};

@@ -4,17 +4,29 @@ use std::path::Path;
 
 use thiserror::Error;
 
-use super::{Component, Fact};
+use super::{Component, Context, Fact};
 use crate::data::{Layout, Scenario, Unit};
 use crate::linalg::Matrix;
 
 /// A simulator.
 pub trait Model: Component {
-    /// What goes in and what comes out.
-    fn signature(&self) -> Signature;
+    /// What goes in and what comes out. A model that takes whatever the study gives (a command, a server)
+    /// answers with the study's own inputs ([`Context::given`]) and layout.
+    fn signature(&self, context: &Context<'_>) -> Signature;
 
     /// Runs the simulator once.
     fn predict(&self, call: &Call<'_>) -> Result<Response, EvalError>;
+
+    /// How many evaluations are best asked for at once; 1 where each costs the same alone.
+    fn batch(&self) -> usize {
+        1
+    }
+
+    /// Runs the simulator for several calls, which differ in their inputs and folders only: one answer a
+    /// call, in their order, each the same as [`Model::predict`] gives.
+    fn predict_batch(&self, calls: &[Call<'_>]) -> Vec<Result<Response, EvalError>> {
+        calls.iter().map(|call| self.predict(call)).collect()
+    }
 
     /// Derivatives of the response, where the model knows them.
     fn gradient(&self) -> Option<&dyn Gradient> {
@@ -69,13 +81,18 @@ pub struct Input {
 /// One evaluation that is asked of a model.
 #[derive(Debug, Clone, Copy)]
 pub struct Call<'a> {
-    /// One value an input, in the units of the signature.
+    /// One value an input, in the order and the units of the signature.
     pub inputs: &'a [f64],
+    /// The name of each input.
+    pub names: &'a [String],
     /// The shape of the response that is wanted.
     pub layout: &'a Layout,
     /// The conditions of the run.
     pub scenario: &'a Scenario,
-    /// A folder of the run's own for files, where the model needs one.
+    /// The folder of the study file; relative paths start here.
+    pub study: &'a Path,
+    /// A folder of the run's own for files that are kept; the model makes it when it needs one. `None` for an
+    /// evaluation of which nothing is kept.
     pub directory: Option<&'a Path>,
 }
 

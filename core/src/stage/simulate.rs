@@ -220,9 +220,11 @@ fn simulate(
         .map_err(|error| files::cannot_write(&log_path, &error))?;
     let batch = Batch {
         model: simulator.model,
+        names: &simulator.names,
         jobs: &jobs,
         layout: &simulator.asked,
         scenario: &simulator.scenario,
+        study: &study.directory,
         directory: folder,
     };
     let mut note = |finished: Finished| {

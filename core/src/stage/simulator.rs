@@ -1,5 +1,7 @@
 //! The study's model as a function of the study's parameters, in the study's units.
 
+use std::path::Path;
+
 use crate::data::{Axis, Coordinates, Layout, Scenario};
 use crate::plugin::model::{Call, EvalError, Model, Response};
 use crate::plugin::registry::Section;
@@ -9,12 +11,16 @@ use crate::study::file::ModelKeys;
 
 /// A model with its fixed inputs, fed with the study's parameters.
 pub struct Simulator<'a> {
+    /// The folder of the study file.
+    study: &'a Path,
     /// The model.
     pub model: &'a dyn Model,
     /// The response that is asked of the model: the study's layout in the model's units.
     pub asked: Layout,
     /// The conditions of all runs.
     pub scenario: Scenario,
+    /// The name of each input of the model.
+    pub names: Vec<String>,
     /// One entry an input of the model.
     sources: Vec<Source>,
     /// Turns the model's response into the study's unit.
@@ -40,7 +46,7 @@ impl<'a> Simulator<'a> {
         section: &'a Section<dyn Model, ModelKeys>,
     ) -> Result<Self, Stop> {
         let model = &*section.built.plugin;
-        let signature = model.signature();
+        let signature = model.signature(&study.context());
         let mut sources = Vec::new();
         for input in &signature.inputs {
             let parameter = study.parameters.iter().position(|p| p.name == input.name);
@@ -60,7 +66,15 @@ impl<'a> Simulator<'a> {
             });
         }
         let (asked, factor) = asked(&study.layout, &signature.layout)?;
-        Ok(Self { model, asked, scenario: Scenario::default(), sources, factor })
+        Ok(Self {
+            study: &study.directory,
+            model,
+            asked,
+            scenario: Scenario::default(),
+            names: signature.inputs.into_iter().map(|input| input.name).collect(),
+            sources,
+            factor,
+        })
     }
 
     /// The model's inputs for one point of the study's parameters.
@@ -77,8 +91,10 @@ impl<'a> Simulator<'a> {
         let inputs = self.inputs(point);
         let call = Call {
             inputs: &inputs,
+            names: &self.names,
             layout: &self.asked,
             scenario: &self.scenario,
+            study: self.study,
             directory: None,
         };
         let mut response = self.model.predict(&call)?;

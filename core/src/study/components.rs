@@ -25,6 +25,8 @@ impl Study {
         Context {
             directory: &self.directory,
             parameters: &self.parameters,
+            given: &self.given,
+            scenarios: &self.scenarios,
             layout: &self.layout,
             runs,
             common_errors: self.numerical_error.is_some() || emulator,

@@ -20,7 +20,7 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     refinement(study, &mut complaints);
     validation(study, &mut complaints);
     if let Some(model) = &study.model {
-        let signature = model.built.plugin.signature();
+        let signature = model.built.plugin.signature(&study.context());
         inputs(study, &signature, &mut complaints);
         outputs(study, &signature, &mut complaints);
     }

@@ -14,14 +14,14 @@ use super::file::{
     ResponseSection, SamplerKeys, StudySection, SurrogateKeys, ValidateSection,
 };
 use super::sections::{
-    chosen, chosen_or, effects, layout, numerical_error, parameter, parameters, table,
+    chosen, chosen_or, effects, given, layout, numerical_error, parameter, parameters, table,
     unknown_sections,
 };
 use super::{Node, Problems, Sources, inherit, overrides, resolved};
-use crate::data::{Layout, Parameter};
+use crate::data::{Layout, Parameter, Scenario};
 use crate::plugin::registry::{NoKeys, Section};
 use crate::plugin::{
-    Density, Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate,
+    Density, Design, Discrepancy, Effect, Executor, Given, Model, Reader, Sampler, Surrogate,
 };
 
 /// A study that can be run.
@@ -36,6 +36,10 @@ pub struct Study {
     pub about: StudySection,
     /// The unknowns of the model.
     pub parameters: Vec<Parameter>,
+    /// The known conditions; one without a name where the study has no scenarios.
+    pub scenarios: Vec<Scenario>,
+    /// What the study sets of the model's inputs.
+    pub given: Vec<Given>,
     /// The shape of the response.
     pub layout: Layout,
     /// `[target]`.
@@ -204,12 +208,16 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     let directory = about.directory.take().map_or(folder.clone(), |given| folder.join(given));
+    let parameters: Vec<Parameter> = parameters?.iter().map(parameter).collect();
+    let given = given(&parameters, model.as_ref());
     let mut study = Study {
         name: about.name.take().unwrap_or(stem),
         directory,
         text,
         about,
-        parameters: parameters?.iter().map(parameter).collect(),
+        parameters,
+        scenarios: vec![Scenario::default()],
+        given,
         layout: layout?,
         target,
         model,

@@ -3,12 +3,12 @@
 use serde::de::DeserializeOwned;
 
 use super::decode::decode;
-use super::file::{NumericalErrorSection, ParameterSection, ResponseSection};
+use super::file::{ModelKeys, NumericalErrorSection, ParameterSection, ResponseSection};
 use super::resolve::{NumericalError, SECTIONS};
 use super::{Complaints, Node, Problems, nearest};
 use crate::data::{Layout, Parameter};
-use crate::plugin::Effect;
 use crate::plugin::registry::{Kind, NoKeys, Section, section};
+use crate::plugin::{Effect, Given, Model};
 
 pub(super) fn unknown_sections(root: &Node, problems: &mut Problems) {
     for (key, _) in root.entries() {
@@ -135,6 +135,17 @@ pub(super) fn parameter(section: &ParameterSection) -> Parameter {
         prior: section.prior.clone(),
         reference: section.reference,
     }
+}
+
+/// What a study sets of its model's inputs.
+pub(super) fn given(
+    parameters: &[Parameter],
+    model: Option<&Section<dyn Model, ModelKeys>>,
+) -> Vec<Given> {
+    let set = |p: &Parameter| Given { name: p.name.clone(), unit: Some(p.unit.clone()) };
+    let fixed = model.into_iter().flat_map(|model| model.common.fixed.keys());
+    let fixed = fixed.map(|name| Given { name: name.clone(), unit: None });
+    parameters.iter().map(set).chain(fixed).collect()
 }
 
 pub(super) fn layout(

@@ -58,6 +58,47 @@ impl MercuryTarget {
         }
     }
 
+    fn signed(&self) -> Signature {
+        let input = |name: &str, text: &str, range, default, description: &str| Input {
+            name: name.to_owned(),
+            unit: unit(text),
+            default: Some(default),
+            range,
+            description: description.to_owned(),
+        };
+        let smallest = f64::MIN_POSITIVE;
+        let Sampling { interval, count } = Sampling::default();
+        let grid = (1..=count).map(|i| i as f64 * interval).collect();
+        Signature {
+            inputs: vec![
+                input(
+                    "density",
+                    "kg/m3",
+                    (smallest, f64::INFINITY),
+                    13_500.0,
+                    "density of mercury",
+                ),
+                input("sound_speed", "m/s", (0.0, f64::INFINITY), 1456.0, "sound speed of mercury"),
+                input(
+                    "tensile_cutoff",
+                    "Pa",
+                    (0.0, f64::INFINITY),
+                    1.5e5,
+                    "tension at which mercury cavitates",
+                ),
+            ],
+            layout: Layout {
+                name: "strain".to_owned(),
+                unit: dimensionless(),
+                axes: vec![
+                    Axis::labels("sensor", self.gauges.0.iter().map(|gauge| gauge.name.clone())),
+                    Axis::grid("time", grid, unit("s")),
+                ],
+            },
+            resamples: true,
+        }
+    }
+
     fn run(&self, call: &Call<'_>) -> Result<(Outcome, Vec<f64>), EvalError> {
         let times = times(call.layout).map_err(EvalError::Fatal)?;
         let (sampling, steps) = sampling(times).map_err(EvalError::Fatal)?;
@@ -122,7 +163,7 @@ fn sampling(times: &[f64]) -> Result<(Sampling, Vec<usize>), String> {
 
 impl Component for MercuryTarget {
     fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        let ours = self.signature().layout;
+        let ours = self.signed().layout;
         let convertible = context.layout.axes.len() == 2;
         if convertible && let Ok(given) = times(context.layout) {
             // The engine converts the axis to seconds; multiples do not depend on the unit.
@@ -143,45 +184,8 @@ impl Component for MercuryTarget {
 }
 
 impl Model for MercuryTarget {
-    fn signature(&self) -> Signature {
-        let input = |name: &str, text: &str, range, default, description: &str| Input {
-            name: name.to_owned(),
-            unit: unit(text),
-            default: Some(default),
-            range,
-            description: description.to_owned(),
-        };
-        let smallest = f64::MIN_POSITIVE;
-        let Sampling { interval, count } = Sampling::default();
-        let grid = (1..=count).map(|i| i as f64 * interval).collect();
-        Signature {
-            inputs: vec![
-                input(
-                    "density",
-                    "kg/m3",
-                    (smallest, f64::INFINITY),
-                    13_500.0,
-                    "density of mercury",
-                ),
-                input("sound_speed", "m/s", (0.0, f64::INFINITY), 1456.0, "sound speed of mercury"),
-                input(
-                    "tensile_cutoff",
-                    "Pa",
-                    (0.0, f64::INFINITY),
-                    1.5e5,
-                    "tension at which mercury cavitates",
-                ),
-            ],
-            layout: Layout {
-                name: "strain".to_owned(),
-                unit: dimensionless(),
-                axes: vec![
-                    Axis::labels("sensor", self.gauges.0.iter().map(|gauge| gauge.name.clone())),
-                    Axis::grid("time", grid, unit("s")),
-                ],
-            },
-            resamples: true,
-        }
+    fn signature(&self, _context: &Context<'_>) -> Signature {
+        self.signed()
     }
 
     fn predict(&self, call: &Call<'_>) -> Result<Response, EvalError> {
@@ -211,7 +215,7 @@ impl Model for MercuryTarget {
         let names = gauges.iter().map(|&g| format!("strain_{}", self.gauges.0[g].name)).collect();
         let values = response.values.chunks(times.len()).map(<[f64]>::to_vec).collect();
         let history = History { times: times.to_vec(), names, values };
-        let inputs = self.signature().inputs;
+        let inputs = self.signed().inputs;
         let deck = inputs.iter().zip(call.inputs);
         let facts = response.facts.iter().map(|fact| format!("{} = {}", fact.name, fact.value));
         let origin = Origin {
@@ -249,7 +253,7 @@ mod tests {
     #[test]
     fn a_subset_of_gauges_gives_those_rows_of_the_whole() {
         let model = MercuryTarget::default();
-        let whole = model.signature().layout;
+        let whole = model.signed().layout;
         let times: Vec<f64> = (1..=10).map(|i| f64::from(i) * 1e-5).collect();
         let part = |labels: &[&str]| Layout {
             axes: vec![
@@ -262,8 +266,10 @@ mod tests {
         let respond = |layout: &Layout| {
             let call = Call {
                 inputs: &[13_500.0, 1456.0, 1.5e5],
+                names: &[],
                 layout,
                 scenario: &scenario,
+                study: Path::new(""),
                 directory: None,
             };
             model.predict(&call).unwrap().values

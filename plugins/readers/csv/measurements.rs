@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use lacuna::data::{Layout, Measurements, Replicate, Scenario};
+use lacuna::data::{Condition, Layout, Measurements, Replicate, Scenario};
 use lacuna::plugin::reader::ReadError;
 
 use crate::readers::cells::LongColumns;
@@ -97,9 +97,11 @@ impl Conditions {
                 let cell = &record.cells[column];
                 sheet.complain(record, column, format!("expected a number, found `{cell}`"))
             })?;
-            Ok((sheet.headings[column].name.clone(), value))
+            let name = sheet.headings[column].name.clone();
+            Ok(Condition { name, value, unit: None })
         });
-        Ok(Scenario { name, values: values.collect::<Result<_, ReadError>>()? })
+        let values = values.collect::<Result<_, ReadError>>()?;
+        Ok(Scenario { name, values, functions: Vec::new() })
     }
 }
 

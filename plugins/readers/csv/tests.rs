@@ -141,7 +141,7 @@ fn measurements_keep_gaps_and_conditions() {
     assert_eq!(read.replicates[0].values, [Some(1.0), None, None, Some(4.0)]);
     assert_eq!(read.replicates[1].values, [None, None, None, Some(5.0)]);
     assert_eq!(read.replicates[1].scenario.name, "high");
-    assert_eq!(read.replicates[1].scenario.values, [("power".to_owned(), 1.4)]);
+    assert_eq!(read.replicates[1].scenario.value("power").unwrap().value, 1.4);
 }
 
 #[test]

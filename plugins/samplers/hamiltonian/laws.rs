@@ -255,8 +255,7 @@ pub(crate) fn complaints_about<C: Component + DeserializeOwned>(text: &str) -> S
     let component: C = lacuna::study::decode(&node, &mut problems).unwrap();
     let layout = Layout { name: String::new(), unit: Unit::parse("1").unwrap(), axes: Vec::new() };
     let directory = std::path::Path::new(".");
-    let context =
-        Context { directory, parameters: &[], layout: &layout, runs: None, common_errors: false };
+    let context = Context::new(directory, &[], &layout);
     component.check(&context, &mut Complaints::new(&node, &mut problems));
     problems.render(&sources)
 }

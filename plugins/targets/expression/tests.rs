@@ -48,13 +48,7 @@ fn complaints(section: &str) -> String {
     let options: Option<Expression> = lacuna::study::decode(node, &mut problems);
     let layout = Layout { name: "none".into(), unit: Unit::dimensionless(), axes: Vec::new() };
     let parameters = parameters(&["a", "sigma"]);
-    let context = Context {
-        directory: Path::new("."),
-        parameters: &parameters,
-        layout: &layout,
-        runs: None,
-        common_errors: false,
-    };
+    let context = Context::new(Path::new("."), &parameters, &layout);
     if let Some(options) = options {
         options.check(&context, &mut Complaints::new(node, &mut problems));
     }

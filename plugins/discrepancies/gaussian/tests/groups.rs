@@ -308,8 +308,7 @@ fn several_variances_with_marginal_are_refused_by_the_check() {
         let node = root.get("discrepancy").unwrap();
         let chosen: Gaussian = lacuna::study::decode(node, &mut problems).unwrap();
         let (directory, layout) = (Path::new("."), layout());
-        let context =
-            Context { directory, parameters: &[], layout: &layout, runs: None, common_errors };
+        let context = Context { common_errors, ..Context::new(directory, &[], &layout) };
         chosen.check(&context, &mut Complaints::new(node, &mut problems));
         problems.render(&sources)
     };
