@@ -31,7 +31,7 @@ pub fn check(path: &Path, settings: &Settings) -> Result<(), Failure> {
     let study = load(path, settings)?;
     let response = match &study.target {
         Some(_) => String::new(),
-        None => format!(", {} values a response", study.layout.len()),
+        None => format!(", {} values a response", study.layouts.len()),
     };
     let parameters = study.parameters.len();
     print(&format!("{}: no problems; {parameters} parameters{response}", path.display()));

@@ -5,6 +5,7 @@ pub mod contents;
 pub mod csv;
 pub mod netcdf;
 pub mod runs;
+pub mod scenario;
 pub mod sheet;
 pub mod sierra;
 

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 
 use lacuna::data::{Ensemble, FailedRun, Parameter};
 use lacuna::linalg::Matrix;
-use lacuna::plugin::reader::{EnsembleSource, ReadError};
+use lacuna::plugin::reader::{EnsembleSource, ReadError, scenario_path};
 use lacuna::study::values::Unfit;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::de::{self, Deserializer};
 use serde::{Deserialize, Serialize};
 
-use super::sheet::{Record, Sheet};
+use super::sheet::{Conversion, Record, Sheet};
 
 /// The table of runs that the simulate stage writes.
 const SIMULATED: &str = "runs.csv";
@@ -68,7 +68,7 @@ pub fn table_path(
     key: &str,
 ) -> Result<PathBuf, ReadError> {
     match (named, source.simulated) {
-        (Some(path), _) => Ok(source.directory.join(path)),
+        (Some(path), _) => Ok(scenario_path(source.directory, path, source.scenario)),
         (None, Some(folder)) => Ok(folder.join(SIMULATED)),
         (None, None) => Err(ReadError::new(source.directory, "there are no simulation runs")
             .help(format!("name a table of runs with `{key}`, or let the study simulate"))),
@@ -84,7 +84,14 @@ pub fn read_runs(path: &Path, parameters: &[Parameter]) -> Result<Vec<Run>, Read
         .iter()
         .map(|p| {
             let column = sheet.column(&p.name)?;
-            Ok((column, sheet.conversion(column, &p.unit)?))
+            // `height[A]` is the parameter of scenario `A`, not one in amperes.
+            let of_scenario = p.name.ends_with(']') && sheet.headings[column].text == p.name;
+            let conversion = if of_scenario {
+                Conversion::none(&p.unit)
+            } else {
+                sheet.conversion(column, &p.unit)?
+            };
+            Ok((column, conversion))
         })
         .collect::<Result<Vec<_>, ReadError>>()?;
     let mut names = BTreeSet::new();
@@ -186,7 +193,7 @@ pub fn ensemble(
         units: source.parameters.iter().map(|p| p.unit.clone()).collect(),
         runs: kept.iter().map(|(run, _)| run.name.clone()).collect(),
         points: Matrix::from_rows(source.parameters.len(), kept.iter().map(|(run, _)| &run.point)),
-        layout: source.layout.clone(),
+        layouts: source.layout.clone().into(),
         responses: Matrix::from_rows(source.layout.len(), kept.iter().map(|(_, values)| values)),
         valid: kept.iter().map(|(run, _)| run.valid).collect(),
         failed,

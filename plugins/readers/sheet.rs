@@ -11,6 +11,8 @@ use super::listed;
 /// The heading of a column: `time [s]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Heading {
+    /// The whole heading.
+    pub text: String,
     /// The name, without the unit.
     pub name: String,
     /// The unit in brackets.
@@ -67,7 +69,7 @@ impl Sheet {
                 ReadError::new(path, message)
                     .at(format!("line {heading_line}, column {}", column + 1))
             })?;
-            if headings.iter().any(|h| h.name == heading.name) {
+            if headings.iter().any(|h| h.text == heading.text) {
                 let message = format!("two columns are called `{}`", heading.name);
                 return Err(ReadError::new(path, message).at(format!("line {heading_line}")));
             }
@@ -84,7 +86,8 @@ impl Sheet {
 
     /// The position of a column, if there is one of this name.
     pub fn find(&self, name: &str) -> Option<usize> {
-        self.headings.iter().position(|h| h.name == name)
+        let exact = self.headings.iter().position(|h| h.text == name);
+        exact.or_else(|| self.headings.iter().position(|h| h.name == name))
     }
 
     /// The position of a column that has to be there.
@@ -143,6 +146,11 @@ pub struct Conversion {
 }
 
 impl Conversion {
+    /// No change: the numbers are in this unit.
+    pub fn none(to: &Unit) -> Self {
+        Self { from: None, to: to.clone() }
+    }
+
     /// The number in the new unit; `None` if the units do not measure the same.
     pub fn apply(&self, x: f64) -> Option<f64> {
         self.from.as_ref().map_or(Some(x), |from| from.convert(x, &self.to))
@@ -161,11 +169,16 @@ fn delimiter(bytes: &[u8]) -> u8 {
 }
 
 fn heading(text: &str) -> Result<Heading, String> {
+    let whole = |name: &str, unit| Heading { text: text.to_owned(), name: name.to_owned(), unit };
     let Some((name, unit)) = text.strip_suffix(']').and_then(|text| text.rsplit_once('[')) else {
-        return Ok(Heading { name: text.to_owned(), unit: None });
+        return Ok(whole(text, None));
     };
-    let unit = Unit::parse(unit).map_err(|e| e.to_string())?;
-    Ok(Heading { name: name.trim().to_owned(), unit: Some(unit) })
+    match Unit::parse(unit) {
+        Ok(unit) => Ok(whole(name.trim(), Some(unit))),
+        // A parameter of one scenario: `height[ball 1]`.
+        Err(_) if !name.ends_with(' ') => Ok(whole(text, None)),
+        Err(error) => Err(error.to_string()),
+    }
 }
 
 fn unequal(path: &Path, error: &csv::Error) -> ReadError {

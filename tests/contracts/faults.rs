@@ -12,8 +12,8 @@ use lacuna::plugin::reader::{Contents, ReadError};
 use lacuna::plugin::registry;
 use lacuna::plugin::surrogate::{FitError, Training};
 use lacuna::plugin::{
-    Component, Context, Discrepancy, Emulator, Fact, Hyperparameter, Likelihood, Model, Reader,
-    Surrogate,
+    Component, Context, Discrepancy, Emulator, Fact, Forward, Hyperparameter, Likelihood, Model,
+    Reader, Surrogate,
 };
 use lacuna::run::{Progress, Stop};
 
@@ -75,10 +75,10 @@ impl Likelihood for Faulty<dyn Likelihood> {
         }
         parts
     }
-    fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Measurements {
+    fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements> {
         let mut data = self.sound.simulate(response, hyper, stream);
         if self.fault == Fault::Gaps {
-            data.replicates[1].values.fill(Some(1.0));
+            data[0].replicates[1].values.fill(Some(1.0));
         }
         data
     }
@@ -117,16 +117,19 @@ impl Surrogate for Faulty<dyn Surrogate> {
     }
 }
 
-impl Emulator for Faulty<dyn Emulator> {
+impl Forward for Faulty<dyn Emulator> {
     fn dimension(&self) -> usize {
         self.sound.dimension()
     }
+
     fn outputs(&self) -> usize {
         self.sound.outputs()
     }
+
     fn mean(&self, points: &Matrix) -> Matrix {
         self.sound.mean(points)
     }
+
     fn jacobian(&self, point: &[f64]) -> Matrix {
         let mut jacobian = self.sound.jacobian(point);
         if self.fault == Fault::Derivative {
@@ -134,12 +137,17 @@ impl Emulator for Faulty<dyn Emulator> {
         }
         jacobian
     }
+}
+
+impl Emulator for Faulty<dyn Emulator> {
     fn fit_error(&self) -> &FitError {
         self.sound.fit_error()
     }
+
     fn facts(&self) -> Vec<Fact> {
         self.sound.facts()
     }
+
     fn save(&self) -> Result<Vec<u8>, Stop> {
         let mut bytes = self.sound.save()?;
         if self.fault == Fault::Threads && rayon::current_num_threads() == 3 {
@@ -152,13 +160,15 @@ impl Emulator for Faulty<dyn Emulator> {
 /// An emulator after reading: not quite the one that was saved.
 struct Lossy(Faulty<dyn Emulator>);
 
-impl Emulator for Lossy {
+impl Forward for Lossy {
     fn dimension(&self) -> usize {
         self.0.dimension()
     }
+
     fn outputs(&self) -> usize {
         self.0.outputs()
     }
+
     fn mean(&self, points: &Matrix) -> Matrix {
         let mut mean = self.0.mean(points);
         if self.0.fault == Fault::Loss {
@@ -166,15 +176,21 @@ impl Emulator for Lossy {
         }
         mean
     }
+
     fn jacobian(&self, point: &[f64]) -> Matrix {
         self.0.jacobian(point)
     }
+}
+
+impl Emulator for Lossy {
     fn fit_error(&self) -> &FitError {
         self.0.fit_error()
     }
+
     fn facts(&self) -> Vec<Fact> {
         self.0.facts()
     }
+
     fn save(&self) -> Result<Vec<u8>, Stop> {
         self.0.save()
     }
@@ -262,8 +278,8 @@ impl Reader for Faulty<dyn Reader> {
             outcome => outcome,
         }
     }
-    fn files(&self, directory: &Path) -> Vec<PathBuf> {
-        self.sound.files(directory)
+    fn files(&self, directory: &Path, scenario: Option<&str>) -> Vec<PathBuf> {
+        self.sound.files(directory, scenario)
     }
 }
 

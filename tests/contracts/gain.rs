@@ -2,18 +2,14 @@
 
 use std::f64::consts::PI;
 
-use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Scenario, Unit};
+use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Unit};
 use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::discrepancy::Known;
 use lacuna::plugin::effect::Description;
 use lacuna::plugin::registry;
-use lacuna::plugin::surrogate::FitError;
-use lacuna::plugin::{
-    Component, Discrepancy, Effect, Emulator, Fact, Hyperparameter, Likelihood, Target,
-};
-use lacuna::posterior::{Emulated, Posterior};
-use lacuna::run::Stop;
+use lacuna::plugin::{Component, Discrepancy, Effect, Forward, Hyperparameter, Likelihood, Target};
+use lacuna::posterior::{OfData, Posterior};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -58,7 +54,7 @@ lacuna::register!(Effect, "gain", Gain);
 
 /// `y(t) = a t + b t^2` at the times 1, 2 and 3.
 #[derive(Default)]
-struct Quadratic(FitError);
+struct Quadratic;
 
 const TIMES: [f64; 3] = [1.0, 2.0, 3.0];
 
@@ -66,27 +62,21 @@ fn quadratic(a: f64, b: f64) -> [f64; 3] {
     TIMES.map(|t| a * t + b * t * t)
 }
 
-impl Emulator for Quadratic {
+impl Forward for Quadratic {
     fn dimension(&self) -> usize {
         2
     }
+
     fn outputs(&self) -> usize {
         3
     }
+
     fn mean(&self, points: &Matrix) -> Matrix {
         Matrix::from_rows(3, points.iter_rows().map(|p| quadratic(p[0], p[1])))
     }
+
     fn jacobian(&self, _: &[f64]) -> Matrix {
         Matrix::from_fn(3, 2, |i, j| TIMES[i].powi(j as i32 + 1))
-    }
-    fn fit_error(&self) -> &FitError {
-        &self.0
-    }
-    fn facts(&self) -> Vec<Fact> {
-        Vec::new()
-    }
-    fn save(&self) -> Result<Vec<u8>, Stop> {
-        Ok(Vec::new())
     }
 }
 
@@ -120,19 +110,16 @@ fn with_posterior(test: impl FnOnce(&Posterior<'_>)) {
     let effect = registry::from_text::<dyn Effect>("gain", "").unwrap().plugin;
     let options = "variance = { half_normal = 0.5 }";
     let discrepancy = registry::from_text::<dyn Discrepancy>("gaussian", options).unwrap().plugin;
-    let replicates = DATA.iter().enumerate().map(|(r, values)| Replicate {
-        name: format!("p{r}"),
-        scenario: Scenario::default(),
-        values: values.to_vec(),
-    });
+    let replicates = DATA
+        .iter()
+        .enumerate()
+        .map(|(r, values)| Replicate { name: format!("p{r}"), values: values.to_vec() });
     let data = Measurements { layout: layout(), replicates: replicates.collect() };
     let likelihood: Box<dyn Likelihood> =
         discrepancy.likelihood(&Known::without_slopes(&data, &[])).unwrap();
-    let (layout, parameters, emulator) = (layout(), parameters(), Quadratic::default());
-    test(&Posterior::new(
-        &parameters,
-        Emulated::new(&layout, &emulator, &[&*effect], &*likelihood),
-    ));
+    let (layout, parameters, emulator) = (layout(), parameters(), Quadratic);
+    let layouts = layout.into();
+    test(&Posterior::new(&parameters, OfData::new(&layouts, &emulator, &[&*effect], &*likelihood)));
 }
 
 fn log_normal_density(x: f64, mean: f64, sd: f64) -> f64 {

@@ -7,15 +7,14 @@
 //! pairs some fail by chance; a pair that does is tried once more on four times as many simulations with other random
 //! numbers, where it must pass: a sound pair fails both with probability 1e-4.
 
-use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Scenario, Unit};
+use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Unit};
 use lacuna::linalg::{Matrix, multiply};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
 use lacuna::plugin::discrepancy::{CommonError, Known};
-use lacuna::plugin::surrogate::{FitError, Linear};
-use lacuna::plugin::{Discrepancy, Emulator, Fact, Likelihood, Target, registry};
-use lacuna::posterior::{Emulated, Posterior};
-use lacuna::run::Stop;
+use lacuna::plugin::forward::Linear;
+use lacuna::plugin::{Discrepancy, Forward, Likelihood, Target, registry};
+use lacuna::posterior::{OfData, Posterior};
 use rayon::prelude::*;
 
 use super::runs;
@@ -28,7 +27,6 @@ const SIMULATIONS: u64 = 96;
 /// The straight line `y = a + b t` of each sensor, as an emulator with the basis `(1, a, b)`.
 struct Line {
     coefficients: Matrix,
-    fit_error: FitError,
 }
 
 const TIMES: usize = 5;
@@ -45,37 +43,29 @@ impl Default for Line {
             1 => 1.0,
             _ => time(i),
         };
-        Self {
-            coefficients: Matrix::from_fn(3, OUTPUTS, coefficient),
-            fit_error: FitError::default(),
-        }
+        Self { coefficients: Matrix::from_fn(3, OUTPUTS, coefficient) }
     }
 }
 
-impl Emulator for Line {
+impl Forward for Line {
     fn dimension(&self) -> usize {
         2
     }
+
     fn outputs(&self) -> usize {
         OUTPUTS
     }
+
     fn mean(&self, points: &Matrix) -> Matrix {
         multiply(&self.basis(points), &self.coefficients)
     }
+
     fn jacobian(&self, _: &[f64]) -> Matrix {
         Matrix::from_fn(OUTPUTS, 2, |i, j| if j == 0 { 1.0 } else { time(i) })
     }
+
     fn linear(&self) -> Option<&dyn Linear> {
         Some(self)
-    }
-    fn fit_error(&self) -> &FitError {
-        &self.fit_error
-    }
-    fn facts(&self) -> Vec<Fact> {
-        Vec::new()
-    }
-    fn save(&self) -> Result<Vec<u8>, Stop> {
-        Ok(Vec::new())
     }
 }
 
@@ -119,7 +109,6 @@ fn parameters() -> Vec<Parameter> {
 fn pattern() -> Measurements {
     let replicate = |r: usize| Replicate {
         name: format!("p{r}"),
-        scenario: Scenario::default(),
         values: (0..OUTPUTS)
             .map(|i| (!(i + 2 * r).is_multiple_of(7)).then_some(i as f64))
             .collect(),
@@ -142,18 +131,18 @@ fn likelihood(discrepancy: &dyn Discrepancy, data: &Measurements) -> Box<dyn Lik
 fn bins(sampler: (&str, &str), discrepancy: (&str, &str), stream: &Stream) -> Vec<usize> {
     let built = registry::from_text::<dyn Discrepancy>(discrepancy.0, discrepancy.1);
     let discrepancy = built.unwrap_or_else(|e| panic!("{e}")).plugin;
-    let (line, parameters, layout) = (Line::default(), parameters(), layout());
+    let (line, parameters, layouts) = (Line::default(), parameters(), layout().into());
     let prior = likelihood(&*discrepancy, &pattern());
-    let emulated = Emulated::new(&layout, &line, &[], &*prior);
+    let emulated = OfData::new(&layouts, &line, &[], &*prior);
     let truth = Posterior::new(&parameters, emulated).prior_draws(1, &stream.named("truth"));
     let natural = {
-        let emulated = Emulated::new(&layout, &line, &[], &*prior);
+        let emulated = OfData::new(&layouts, &line, &[], &*prior);
         Posterior::new(&parameters, emulated).natural(truth.row(0))
     };
     let response = line.mean(&Matrix::from_rows(2, [&natural[..2]]));
     let data = prior.simulate(response.row(0), &natural[2..], &stream.named("data"));
-    let likelihood = likelihood(&*discrepancy, &data);
-    let posterior = Posterior::new(&parameters, Emulated::new(&layout, &line, &[], &*likelihood));
+    let likelihood = likelihood(&*discrepancy, &data[0]);
+    let posterior = Posterior::new(&parameters, OfData::new(&layouts, &line, &[], &*likelihood));
     let method = runs::sampler(sampler.0, sampler.1);
     let found = runs::run(&*method, &posterior, &stream.named("run")).draws;
     let points = found.points();

@@ -8,11 +8,11 @@
 use std::error::Error;
 use std::hint::black_box;
 
-use lacuna::data::{Axis, Layout, Measurements, Replicate, Scenario, Unit};
+use lacuna::data::{Axis, Layout, Measurements, Replicate, Unit};
 use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::discrepancy::{CommonError, Known};
-use lacuna::plugin::surrogate::Linear;
+use lacuna::plugin::forward::Linear;
 use lacuna::plugin::{Discrepancy, registry};
 use lacuna_bench::clock::per_call;
 use lacuna_plugins as _;
@@ -121,7 +121,6 @@ fn data() -> Fallible<Measurements> {
     };
     let replicate = |r: u64| Replicate {
         name: r.to_string(),
-        scenario: Scenario::default(),
         values: random(1, OUTPUTS, 1.0, 100 + r).row(0).iter().map(|y| Some(*y)).collect(),
     };
     Ok(Measurements { layout, replicates: (0..REPLICATES).map(replicate).collect() })

@@ -8,7 +8,7 @@
 use std::error::Error;
 use std::hint::black_box;
 
-use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Scenario, Unit};
+use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Unit};
 use lacuna::linalg::{Matrix, multiply};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal, uniform};
@@ -144,7 +144,12 @@ fn emulator(
         degree: Degree::Fixed(degree),
         ..PolynomialChaos::default()
     };
-    let training = Training { parameters, layout, points: &runs, responses: &responses };
+    let training = Training {
+        parameters,
+        layouts: &layout.clone().into(),
+        points: &runs,
+        responses: &responses,
+    };
     Ok(options.fit(&training, &Stream::root(2), &Progress::new(&Silent))?)
 }
 
@@ -153,7 +158,7 @@ fn measured(emulator: &dyn Emulator, layout: &Layout) -> Measurements {
     let replicate = |r: usize| {
         let mut rng = Stream::root(3).at(r as u64).generator();
         let values = truth.row(0).iter().map(|m| Some(m + NOISE * normal(&mut rng))).collect();
-        Replicate { name: r.to_string(), scenario: Scenario::default(), values }
+        Replicate { name: r.to_string(), values }
     };
     let replicates = (0..REPLICATES).map(replicate).collect();
     Measurements { layout: layout.clone(), replicates }

@@ -1,12 +1,12 @@
 //! The contract of discrepancies.
 
 use super::judge::{Check, agree, calm, judge, layout, refused, slope, twice};
-use crate::data::{Measurements, Replicate, Scenario};
+use crate::data::{Measurements, Replicate};
 use crate::linalg::{self, Matrix};
 use crate::math::random::{Stream, normal};
 use crate::plugin::Discrepancy;
 use crate::plugin::discrepancy::{CommonError, Known, Likelihood};
-use crate::plugin::surrogate::Linear;
+use crate::plugin::forward::Linear;
 use crate::run::Stop;
 
 /// Puts a discrepancy through the contract, on five replicates of ten outputs with gaps, one output never
@@ -64,7 +64,7 @@ fn data() -> Measurements {
             (i != UNMEASURED && (r == 0 || !(i + r).is_multiple_of(3))).then_some(measured)
         };
         let values = truth().iter().enumerate().map(value).collect();
-        Replicate { name: format!("p{r}"), scenario: Scenario::default(), values }
+        Replicate { name: format!("p{r}"), values }
     };
     Measurements { layout: layout(), replicates: (0..5).map(replicate).collect() }
 }
@@ -245,11 +245,12 @@ fn simulates_what_it_predicts(likelihood: &dyn Likelihood) -> Result<(), String>
         if k == 0 && made != likelihood.simulate(&truth, &start, &stream.at(0)) {
             return Err("the same stream gives other data".into());
         }
+        let [made] = &made[..] else { return Err("simulated data are not one set".into()) };
         let gaps = |m: &Measurements| -> Vec<Vec<bool>> {
             let of = |r: &Replicate| r.values.iter().map(Option::is_some).collect();
             m.replicates.iter().map(of).collect()
         };
-        if gaps(&made) != gaps(&data) {
+        if gaps(made) != gaps(&data) {
             return Err("simulated data have other gaps than the measurements".into());
         }
         // Only one replicate of each data set: the others share the common errors with it.

@@ -173,13 +173,18 @@ fn needs_a_source(reader: &dyn Reader, scratch: &Path) -> Result<(), String> {
     let nowhere = scratch.join("nowhere");
     let folders = [None, Some(nowhere.as_path())];
     for simulated in folders {
-        let source =
-            EnsembleSource { directory: &nowhere, simulated, parameters: &[], layout: &layout };
+        let source = EnsembleSource {
+            directory: &nowhere,
+            simulated,
+            parameters: &[],
+            scenario: None,
+            layout: &layout,
+        };
         refused("a source without runs", || reader.ensemble(&source))?;
     }
-    let source = MeasurementSource { directory: &nowhere, layout: &layout };
+    let source = MeasurementSource { directory: &nowhere, scenario: None, layout: &layout };
     refused("a source without measurements", || reader.measurements(&source))?;
-    calm("asking for its files", || reader.files(&nowhere)).map(|_| ())
+    calm("asking for its files", || reader.files(&nowhere, None)).map(|_| ())
 }
 
 fn bears_damage(reader: &dyn Reader, sample: &Sample, scratch: &Path) -> Result<(), String> {

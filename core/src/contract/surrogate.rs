@@ -1,12 +1,13 @@
 //! The contract of surrogates.
 
 use super::judge::{Check, agree, calm, judge, layout, refused, same_on_threads, slope};
-use crate::data::{Layout, Parameter, Unit};
+use crate::data::{Layouts, Parameter, Unit};
 use crate::linalg::vector::dot;
 use crate::linalg::{self, Matrix};
 use crate::math::distribution::Distribution;
 use crate::math::random::{Stream, normal, uniform};
-use crate::plugin::surrogate::{Emulator, Indices, Linear, Surrogate, Training};
+use crate::plugin::forward::Linear;
+use crate::plugin::surrogate::{Emulator, Indices, Surrogate, Training};
 use crate::run::{Progress, Silent};
 
 /// Puts a surrogate through the contract, on 60 runs of a smooth function of two parameters with ten outputs, one of
@@ -36,7 +37,7 @@ pub fn surrogate(name: &str, surrogate: &dyn Surrogate) -> Result<(), Vec<String
 
 struct Problem {
     parameters: Vec<Parameter>,
-    layout: Layout,
+    layouts: Layouts,
     points: Matrix,
     responses: Matrix,
     /// Points that no run has.
@@ -73,7 +74,7 @@ impl Problem {
         };
         let (points, fresh) = (draw(RUNS, "runs"), draw(40, "fresh"));
         let responses = Matrix::from_rows(10, points.iter_rows().map(truth));
-        Self { parameters, layout: layout(), points, responses, fresh }
+        Self { parameters, layouts: layout().into(), points, responses, fresh }
     }
 
     fn fit(&self, surrogate: &dyn Surrogate) -> Result<Box<dyn Emulator>, String> {
@@ -88,7 +89,7 @@ impl Problem {
         responses: &Matrix,
     ) -> Result<Box<dyn Emulator>, crate::run::Stop> {
         let training =
-            Training { parameters: &self.parameters, layout: &self.layout, points, responses };
+            Training { parameters: &self.parameters, layouts: &self.layouts, points, responses };
         let stream = Stream::root(6).named("surrogate");
         surrogate.fit(&training, &stream, &Progress::new(&Silent))
     }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Layout, Unit};
+use super::{Layouts, Unit};
 use crate::linalg::Matrix;
 
 /// Simulation runs: the parameters each was made with and its response.
@@ -16,9 +16,9 @@ pub struct Ensemble {
     pub runs: Vec<String>,
     /// The parameters, `runs x parameters`.
     pub points: Matrix,
-    /// The shape of one response.
-    pub layout: Layout,
-    /// The responses, `runs x layout.len()`, all finite.
+    /// The shapes of the responses of one run.
+    pub layouts: Layouts,
+    /// The responses, `runs x layouts.len()`, all finite.
     pub responses: Matrix,
     /// Whether each run stayed inside the model's range of validity, as the model says.
     pub valid: Vec<bool>,

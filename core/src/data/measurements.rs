@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Layout, Scenario};
+use super::{Layout, Layouts};
 
 /// Repeated measurements of one response, with gaps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -18,8 +18,6 @@ pub struct Measurements {
 pub struct Replicate {
     /// Its name in the data, such as a pulse number.
     pub name: String,
-    /// The conditions under which it was taken.
-    pub scenario: Scenario,
     /// Its values on the layout; `None` where nothing was measured.
     pub values: Vec<Option<f64>>,
 }
@@ -67,5 +65,46 @@ impl Measurements {
     /// The measured values at place `i` of the layout, in the order of the replicates.
     pub fn values(&self, i: usize) -> Vec<f64> {
         self.replicates.iter().filter_map(|r| r.values[i]).collect()
+    }
+}
+
+/// The measurements of all blocks of a study's [`Layouts`], in their order.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Observations {
+    /// The measurements of each block.
+    pub blocks: Vec<Measurements>,
+}
+
+impl From<Measurements> for Observations {
+    fn from(measurements: Measurements) -> Self {
+        Self { blocks: vec![measurements] }
+    }
+}
+
+impl Observations {
+    /// The same with something done to each block.
+    pub fn map(&self, change: impl Fn(&Measurements) -> Measurements) -> Self {
+        Self { blocks: self.blocks.iter().map(change).collect() }
+    }
+
+    /// The number of values.
+    pub fn count(&self) -> usize {
+        self.blocks.iter().map(Measurements::count).sum()
+    }
+
+    /// The number of replicates of all blocks.
+    pub fn replicates(&self) -> usize {
+        self.blocks.iter().map(|block| block.replicates.len()).sum()
+    }
+
+    /// What the replicates say about each output of all blocks.
+    pub fn summaries(&self) -> Vec<Summary> {
+        self.blocks.iter().flat_map(Measurements::summaries).collect()
+    }
+
+    /// The shapes of the blocks.
+    pub fn layouts(&self) -> Layouts {
+        Layouts { blocks: self.blocks.iter().map(|block| block.layout.clone()).collect() }
     }
 }

@@ -3,6 +3,7 @@
 pub mod draws;
 pub mod ensemble;
 pub mod layout;
+pub mod layouts;
 pub mod measurements;
 pub mod parameter;
 pub mod scenario;
@@ -12,7 +13,8 @@ pub mod unit;
 pub use draws::Draws;
 pub use ensemble::{Ensemble, FailedRun};
 pub use layout::{Axis, Coordinates, Layout};
-pub use measurements::{Measurements, Replicate};
+pub use layouts::Layouts;
+pub use measurements::{Measurements, Observations, Replicate};
 pub use parameter::Parameter;
 pub use scenario::{Condition, Function, Scenario};
 pub use table::Table;

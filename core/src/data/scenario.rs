@@ -46,6 +46,11 @@ pub struct Function {
 }
 
 impl Scenario {
+    /// Its name, where it has one.
+    pub fn label(&self) -> Option<&str> {
+        (!self.name.is_empty()).then_some(&self.name)
+    }
+
     /// The value of this name.
     pub fn value(&self, name: &str) -> Option<&Condition> {
         self.values.iter().find(|condition| condition.name == name)

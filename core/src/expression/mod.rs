@@ -60,5 +60,10 @@ pub fn check(text: &str) -> Result<(), Fault> {
     tree::Tree::parse(text).map(|_| ())
 }
 
+/// The names that an expression uses.
+pub fn names(text: &str) -> Result<Vec<String>, Fault> {
+    Ok(tree::Tree::parse(text)?.names().map(str::to_owned).collect())
+}
+
 #[cfg(test)]
 mod tests;

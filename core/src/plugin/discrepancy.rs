@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::surrogate::Linear;
+use super::forward::Linear;
 use super::{Component, Fact};
 use crate::data::{Measurements, Unit};
 use crate::linalg::{Matrix, transposed_multiply_vector};
@@ -94,8 +94,9 @@ pub trait Likelihood: Send + Sync {
     /// split by origin.
     fn predictive(&self, response: &[f64], hyper: &[f64]) -> Vec<VariancePart>;
 
-    /// Data as this discrepancy would have made them: the gaps and replicates of the measurements, new values.
-    fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Measurements;
+    /// Data as this discrepancy would have made them: the gaps and replicates of the measurements, new values; one
+    /// set a block of scenarios.
+    fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements>;
 
     /// What is worth telling.
     fn facts(&self) -> Vec<Fact> {

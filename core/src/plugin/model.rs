@@ -1,6 +1,6 @@
 //! Models: from parameters to a response.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
@@ -26,6 +26,12 @@ pub trait Model: Component {
     /// call, in their order, each the same as [`Model::predict`] gives.
     fn predict_batch(&self, calls: &[Call<'_>]) -> Vec<Result<Response, EvalError>> {
         calls.iter().map(|call| self.predict(call)).collect()
+    }
+
+    /// The files on which the responses depend (for the hash of a stage's inputs), relative paths resolved against
+    /// `directory`, the folder of the study.
+    fn files(&self, _directory: &Path) -> Vec<PathBuf> {
+        Vec::new()
     }
 
     /// Derivatives of the response, where the model knows them.

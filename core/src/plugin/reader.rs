@@ -31,14 +31,21 @@ pub trait Reader: Component {
         Err(ReadError::new(source.directory, "this reader does not read measurements"))
     }
 
+    /// The numbers of an axis at which a scenario was measured, increasing: those of all its replicates.
+    fn grid(&self, source: &GridSource<'_>) -> Result<Vec<f64>, ReadError> {
+        let text = "this reader does not tell where the measurements were taken";
+        Err(ReadError::new(source.directory, text))
+    }
+
     /// One response from one file, such as the output of an external simulator.
     fn response(&self, path: &Path, _layout: &Layout) -> Result<Vec<f64>, ReadError> {
         Err(ReadError::new(path, "this reader does not read a single response"))
     }
 
     /// The files that the options name (for the hash of a stage's inputs), relative paths resolved
-    /// against `directory`. Folders stand for all files directly in them.
-    fn files(&self, directory: &Path) -> Vec<PathBuf>;
+    /// against `directory`, for one scenario (`None` in a study without). Folders stand for all files
+    /// directly in them.
+    fn files(&self, directory: &Path, scenario: Option<&str>) -> Vec<PathBuf>;
 }
 
 /// Where an ensemble comes from.
@@ -52,6 +59,9 @@ pub struct EnsembleSource<'a> {
     pub simulated: Option<&'a Path>,
     /// The study's parameters, in the order of the ensemble's columns.
     pub parameters: &'a [Parameter],
+    /// The scenario whose responses are wanted, in a study with scenarios. Where a table has a column
+    /// `scenario`, its other rows are of other scenarios; where a path holds `{scenario}`, this name stands there.
+    pub scenario: Option<&'a str>,
     /// The shape that each response must have.
     pub layout: &'a Layout,
 }
@@ -61,8 +71,31 @@ pub struct EnsembleSource<'a> {
 pub struct MeasurementSource<'a> {
     /// The folder of the study file; relative paths in the options start here.
     pub directory: &'a Path,
+    /// The scenario whose measurements are wanted; see [`EnsembleSource::scenario`].
+    pub scenario: Option<&'a str>,
     /// The shape that a complete measurement has.
     pub layout: &'a Layout,
+}
+
+/// Where the numbers of an axis come from.
+#[derive(Debug, Clone, Copy)]
+pub struct GridSource<'a> {
+    /// The folder of the study file; relative paths in the options start here.
+    pub directory: &'a Path,
+    /// The scenario; see [`EnsembleSource::scenario`].
+    pub scenario: Option<&'a str>,
+    /// The name of the axis.
+    pub axis: &'a str,
+    /// The unit in which the numbers are wanted.
+    pub unit: &'a Unit,
+}
+
+/// A path of the options for one scenario: its name in the place of `{scenario}`.
+pub fn scenario_path(directory: &Path, path: &Path, scenario: Option<&str>) -> PathBuf {
+    match (scenario, path.to_str()) {
+        (Some(name), Some(text)) => directory.join(text.replace("{scenario}", name)),
+        _ => directory.join(path),
+    }
 }
 
 /// What a reader sees in a file.

@@ -30,6 +30,11 @@ pub trait Target: Sync {
 
     /// Independent draws from the prior, one a row.
     fn prior_draws(&self, count: usize, stream: &Stream) -> Matrix;
+
+    /// Why the density can no longer be computed, once that has happened: its values mean nothing then.
+    fn failure(&self) -> Option<String> {
+        None
+    }
 }
 
 /// Draws from a log density step by step.

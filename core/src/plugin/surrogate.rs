@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Component, Fact};
-use crate::data::{Layout, Parameter};
+use super::{Component, Fact, Forward};
+use crate::data::{Layouts, Parameter};
 use crate::linalg::Matrix;
 use crate::math::random::Stream;
 use crate::run::{Progress, Stop};
@@ -27,8 +27,8 @@ pub trait Surrogate: Component {
 pub struct Training<'a> {
     /// The parameters with their design distributions.
     pub parameters: &'a [Parameter],
-    /// The shape of a response.
-    pub layout: &'a Layout,
+    /// The shapes of the responses of one run.
+    pub layouts: &'a Layouts,
     /// The parameters of each run in physical units, `runs x parameters`.
     pub points: &'a Matrix,
     /// The responses, `runs x outputs`.
@@ -36,29 +36,7 @@ pub struct Training<'a> {
 }
 
 /// A fitted surrogate. Points are in physical units, one a row.
-pub trait Emulator: Send + Sync {
-    /// The number of parameters.
-    fn dimension(&self) -> usize;
-
-    /// The number of outputs.
-    fn outputs(&self) -> usize;
-
-    /// The emulated responses, `points x outputs`.
-    fn mean(&self, points: &Matrix) -> Matrix;
-
-    /// The emulator's own variance at each point and output, where the method knows one.
-    fn variance(&self, _points: &Matrix) -> Option<Matrix> {
-        None
-    }
-
-    /// The derivative of each output (rows) by each parameter (columns) at a point.
-    fn jacobian(&self, point: &[f64]) -> Matrix;
-
-    /// The emulator as a linear combination of basis functions, where it is one.
-    fn linear(&self) -> Option<&dyn Linear> {
-        None
-    }
-
+pub trait Emulator: Forward {
     /// Which parameters matter under the design's distribution, where the method knows it exactly.
     fn sensitivity(&self) -> Option<Sensitivity> {
         None
@@ -72,42 +50,6 @@ pub trait Emulator: Send + Sync {
 
     /// The emulator as bytes, for [`Surrogate::load`].
     fn save(&self) -> Result<Vec<u8>, Stop>;
-}
-
-/// An emulator `y(x) = C' psi(x)` with coefficients `C` (`terms x outputs`).
-pub trait Linear: Send + Sync {
-    /// The coefficients, `terms x outputs`.
-    fn coefficients(&self) -> &Matrix;
-
-    /// The basis functions at each point, `points x terms`.
-    fn basis(&self, points: &Matrix) -> Matrix;
-
-    /// The derivative of each basis function (rows) by each parameter (columns) at a point.
-    fn basis_gradient(&self, point: &[f64]) -> Matrix;
-
-    /// The sum of squares `|R (psi(x), 1)|^2` as a function of the point, for a factor `R` (`any x (terms +
-    /// 1)`), where the basis has a form of it that takes fewer operations than the product.
-    fn sum_of_squares(&self, _factor: &Matrix) -> Option<Box<dyn SumOfSquares>> {
-        None
-    }
-}
-
-/// A sum of squares of linear combinations of basis functions.
-pub trait SumOfSquares: Send + Sync {
-    /// The sum at each point (one a row, in physical units) that it [covers](Self::covers).
-    fn values(&self, points: &Matrix) -> Vec<f64>;
-
-    /// The derivative by each parameter at a point that it covers.
-    fn gradient(&self, point: &[f64]) -> Vec<f64>;
-
-    /// Whether the form holds at a point to its [error](Self::error).
-    fn covers(&self, point: &[f64]) -> bool;
-
-    /// The largest difference from the product's own sum of squares that round-off makes.
-    ///
-    /// A sum of squares that is expanded carries the round-off of its largest parts into its
-    /// smallest values; whoever uses it compares this number with what matters.
-    fn error(&self) -> f64;
 }
 
 /// The error of a fit estimated from its own training runs.

@@ -13,11 +13,13 @@ use crate::math::distribution::Distribution;
 use crate::math::random::{Stream, uniform};
 use crate::plugin::{Fact, Hyperparameter, Target};
 
-mod emulated;
 mod given;
+mod joint;
+mod of_data;
 
-pub use emulated::Emulated;
 pub use given::Given;
+pub use joint::Joint;
+pub use of_data::{OfData, apply};
 
 /// Points that are evaluated together. Fixed, because the rounding of a matrix product depends on the
 /// number of its rows and results must not depend on the number of threads.
@@ -36,6 +38,11 @@ pub trait LogLikelihood: Sync {
 
     /// What is worth telling.
     fn facts(&self) -> Vec<Fact>;
+
+    /// Why there are no more answers, once that has happened.
+    fn failure(&self) -> Option<String> {
+        None
+    }
 }
 
 /// The posterior of a study.
@@ -218,6 +225,10 @@ impl<'a> Posterior<'a> {
 }
 
 impl Target for Posterior<'_> {
+    fn failure(&self) -> Option<String> {
+        self.likelihood.failure()
+    }
+
     fn dimension(&self) -> usize {
         self.parameters.len() + self.hyperparameters().len()
     }

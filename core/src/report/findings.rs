@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::data::{FailedRun, Layout, Measurements, Parameter, Unit};
+use crate::data::{FailedRun, Layouts, Observations, Parameter, Unit};
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::plugin::Fact;
@@ -23,8 +23,8 @@ pub struct Findings {
     pub components: Vec<(String, String)>,
     /// The parameters of the model.
     pub parameters: Vec<Parameter>,
-    /// The shape of the response.
-    pub layout: Layout,
+    /// The shapes of the responses to all scenarios.
+    pub layouts: Layouts,
     /// The simulation runs.
     pub ensemble: Option<EnsembleFindings>,
     /// The measured data.
@@ -60,7 +60,7 @@ pub struct EnsembleFindings {
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredFindings {
     /// The replicates that the calibration used, without added curves.
-    pub used: Measurements,
+    pub used: Observations,
     /// Curves that the screen flagged.
     pub flagged: Vec<FlaggedCurve>,
     /// The number of data in the likelihood, added curves included.

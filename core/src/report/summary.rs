@@ -123,7 +123,7 @@ fn runs(findings: &Findings) -> Option<Value> {
 fn data(findings: &Findings) -> Option<Value> {
     let measured = findings.measured.as_ref()?;
     Some(json!({
-        "replicates": measured.used.replicates.len(),
+        "replicates": measured.used.replicates(),
         "values": measured.used.count(),
         "count": measured.data_count,
         "sha256": measured.fingerprint,
@@ -138,7 +138,7 @@ fn surrogate(findings: &Findings, found: &SurrogateFindings) -> Value {
         "mae": found.mae,
         "rmse": found.rmse,
         "loo": found.loo,
-        "unit": findings.layout.unit.to_string(),
+        "unit": findings.layouts.unit().to_string(),
         "training": found.training,
         "validation": found.validation,
     });

@@ -23,7 +23,7 @@ pub fn summary_text(findings: &Findings) -> String {
         let title = "points inside the replicates' 95 % interval";
         parts.push(format!(
             "{title}\n{}",
-            accuracy_table(group_word(&findings.layout), &validation.cases).text()
+            accuracy_table(group_word(&findings.layouts), &validation.cases).text()
         ));
     }
     parts.join("\n")

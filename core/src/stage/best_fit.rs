@@ -1,12 +1,12 @@
 //! Where the model fits the data best, before any discrepancy is chosen, and how its response changes there.
 
-use crate::data::Measurements;
+use crate::data::{Measurements, Observations};
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::math::random::Stream;
-use crate::plugin::Emulator;
+use crate::plugin::Forward;
 use crate::plugin::discrepancy::{Hyperparameter, Likelihood, VariancePart};
-use crate::posterior::{Emulated, Posterior};
+use crate::posterior::{OfData, Posterior};
 use crate::run::Stop;
 use crate::study::Study;
 
@@ -15,21 +15,17 @@ use super::stream;
 
 /// The parameters at the largest of prior times `|y - m|^-N`: the normal likelihood of independent data
 /// with its unknown variance integrated out under the prior `1 / variance`.
-pub fn point(
-    study: &Study,
-    data: &Measurements,
-    emulator: &dyn Emulator,
-) -> Result<Vec<f64>, Stop> {
+pub fn point(study: &Study, data: &Observations, forward: &dyn Forward) -> Result<Vec<f64>, Stop> {
     let likelihood = LeastSquares::of(data)?;
     let posterior =
-        Posterior::new(&study.parameters, Emulated::new(&study.layout, emulator, &[], &likelihood));
+        Posterior::new(&study.parameters, OfData::new(&study.layouts, forward, &[], &likelihood));
     let maxima = maxima(&posterior, &stream(study, "best-fit"))?;
     Ok(maxima[0].point.clone())
 }
 
 /// The derivative of each output by each parameter at [`point`], per standard deviation of the prior.
-pub fn slopes(study: &Study, data: &Measurements, emulator: &dyn Emulator) -> Result<Matrix, Stop> {
-    let jacobian = emulator.jacobian(&point(study, data, emulator)?);
+pub fn slopes(study: &Study, data: &Observations, forward: &dyn Forward) -> Result<Matrix, Stop> {
+    let jacobian = forward.jacobian(&point(study, data, forward)?);
     let sd: Vec<f64> = study.parameters.iter().map(|p| scale(&p.prior)).collect();
     Ok(Matrix::from_fn(jacobian.rows(), jacobian.columns(), |i, j| jacobian[(i, j)] * sd[j]))
 }
@@ -42,7 +38,7 @@ fn scale(law: &Distribution) -> f64 {
 
 /// Independent normal data whose one variance is integrated out.
 struct LeastSquares<'a> {
-    data: &'a Measurements,
+    data: &'a Observations,
     /// Number of replicates and their mean, by output.
     outputs: Vec<(f64, f64)>,
     scatter: f64,
@@ -50,7 +46,7 @@ struct LeastSquares<'a> {
 }
 
 impl<'a> LeastSquares<'a> {
-    fn of(data: &'a Measurements) -> Result<Self, Stop> {
+    fn of(data: &'a Observations) -> Result<Self, Stop> {
         let summaries = data.summaries();
         if summaries.iter().all(|s| s.count == 0) {
             return Err(Stop::new("the measurements hold no value"));
@@ -92,13 +88,17 @@ impl Likelihood for LeastSquares<'_> {
     }
 
     /// Data without noise, of which this likelihood knows no size.
-    fn simulate(&self, response: &[f64], _hyper: &[f64], _stream: &Stream) -> Measurements {
-        let mut data = self.data.clone();
-        for replicate in &mut data.replicates {
-            for (value, y) in replicate.values.iter_mut().zip(response) {
-                *value = value.map(|_| *y);
+    fn simulate(&self, response: &[f64], _hyper: &[f64], _stream: &Stream) -> Vec<Measurements> {
+        let layouts = self.data.layouts();
+        let exact = |(block, range): (&Measurements, std::ops::Range<usize>)| {
+            let mut block = block.clone();
+            for replicate in &mut block.replicates {
+                for (value, y) in replicate.values.iter_mut().zip(&response[range.clone()]) {
+                    *value = value.map(|_| *y);
+                }
             }
-        }
-        data
+            block
+        };
+        self.data.blocks.iter().zip(layouts.ranges()).map(exact).collect()
     }
 }

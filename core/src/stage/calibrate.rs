@@ -1,19 +1,22 @@
 //! Stage 5: the posterior of the parameters.
 
+use std::ops::Range;
 use std::path::Path;
+use std::sync::OnceLock;
 
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::data::{Draws, Measurements, Unit};
+use crate::data::{Draws, Observations, Unit};
 use crate::diagnose::Diagnosis;
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::math::optimise;
 use crate::plugin::discrepancy;
+use crate::plugin::discrepancy::CommonError;
 use crate::plugin::sampler::Evidence;
-use crate::plugin::{Effect, Emulator, Fact, Likelihood, Target};
-use crate::posterior::{Emulated, Posterior};
+use crate::plugin::{Effect, Fact, Forward, Likelihood, Target};
+use crate::posterior::{Joint, OfData, Posterior};
 use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
 use crate::study::Study;
@@ -125,22 +128,42 @@ impl Parts {
         let section =
             study.discrepancy.as_ref().ok_or_else(|| Stop::new("the study has no discrepancy"))?;
         let mut common = Vec::new();
-        if section.common.emulator_error {
+        if let (Some(fitted), true) = (known.fitted, section.common.emulator_error) {
             let data = &measured.likelihood;
-            let stated = stated_variance(study, data, known.emulator)?;
-            common.push(known.fitted.value.covariance(study, stated.as_deref())?);
-        }
-        if section.common.replicate_error {
-            common.extend(common_error::of_replicates(&measured.used));
+            let stated = stated_variance(study, data, known.forward)?;
+            common.push(fitted.value.covariance(study, stated.as_deref())?);
         }
         if let (Some(kept), Some(section)) = (known.numerics, &study.numerical_error) {
             common.push(kept.value.common_error(section.written.whole()));
         }
-        let likelihood = section.built.plugin.likelihood(&discrepancy::Known {
-            data: &measured.likelihood,
-            common: &common,
-            slopes: &|| best_fit::slopes(study, &measured.likelihood, known.emulator),
-        })?;
+        let slopes = OnceLock::new();
+        let slopes = || {
+            let made = || best_fit::slopes(study, &measured.likelihood, known.forward);
+            slopes.get_or_init(made).clone()
+        };
+        let layouts = &study.layouts;
+        let mut likelihoods = Vec::new();
+        for (i, range) in layouts.ranges().enumerate() {
+            let part = |error: &CommonError| CommonError {
+                factor: rows(&error.factor, range.clone()),
+                ..error.clone()
+            };
+            let mut own: Vec<CommonError> = common.iter().map(part).collect();
+            if section.common.replicate_error {
+                let of_replicates = common_error::of_replicates(&measured.used.blocks[i]);
+                let after = usize::from(own.first().is_some_and(|e| e.origin == "emulator"));
+                own.splice(after..after, of_replicates);
+            }
+            likelihoods.push(section.built.plugin.likelihood(&discrepancy::Known {
+                data: &measured.likelihood.blocks[i],
+                common: &own,
+                slopes: &|| Ok(rows(&slopes()?, range.clone())),
+            })?);
+        }
+        let likelihood = match likelihoods.len() {
+            1 => likelihoods.remove(0),
+            _ => Box::new(Joint::new(layouts, likelihoods)),
+        };
         Ok(Self { likelihood })
     }
 
@@ -149,26 +172,31 @@ impl Parts {
         &*self.likelihood
     }
 
-    /// The posterior of a study with this emulator.
+    /// The posterior of a study with this forward map.
     pub fn posterior<'a>(&'a self, study: &'a Study, known: &Known<'a>) -> Posterior<'a> {
         let effects: Vec<&dyn Effect> = study.effects.iter().map(|e| &*e.built.plugin).collect();
-        let likelihood = Emulated::new(&study.layout, known.emulator, &effects, self.likelihood());
+        let likelihood = OfData::new(&study.layouts, known.forward, &effects, self.likelihood());
         Posterior::new(&study.parameters, likelihood).within(known.region.map(<[_]>::to_vec))
     }
 }
 
-/// The emulator's own variance of each output where it fits the data best; `None` when it knows none.
+/// Some rows of a matrix.
+fn rows(matrix: &Matrix, range: Range<usize>) -> Matrix {
+    matrix.select_rows(&range.collect::<Vec<_>>())
+}
+
+/// The forward map's own variance of each output where it fits the data best; `None` when it knows none.
 pub(super) fn stated_variance(
     study: &Study,
-    data: &Measurements,
-    emulator: &dyn Emulator,
+    data: &Observations,
+    forward: &dyn Forward,
 ) -> Result<Option<Vec<f64>>, Stop> {
     let centre: Vec<f64> = study.parameters.iter().map(|p| p.prior.quantile(0.5)).collect();
-    if emulator.variance(&Matrix::from_vec(1, centre.len(), centre)).is_none() {
+    if forward.variance(&Matrix::from_vec(1, centre.len(), centre)).is_none() {
         return Ok(None);
     }
-    let best = best_fit::point(study, data, emulator)?;
-    let variance = emulator.variance(&Matrix::from_vec(1, best.len(), best));
+    let best = best_fit::point(study, data, forward)?;
+    let variance = forward.variance(&Matrix::from_vec(1, best.len(), best));
     Ok(variance.map(Matrix::into_vec))
 }
 
@@ -189,7 +217,7 @@ pub fn stage(
     let effects: Vec<_> = study.effects.iter().map(|e| (e.built.name, &e.built.options)).collect();
     let inputs = json!([
         known.data.hash,
-        known.fitted.hash,
+        known.origin,
         known.numerics.map(|n| &n.hash),
         study.numerical_error.as_ref().map(|section| section.written.whole()),
         known.region,
@@ -236,7 +264,9 @@ fn calibrate(
 ) -> Result<Calibrated, Stop> {
     let section = study.sampler.as_ref().ok_or_else(|| Stop::new("the study has no sampler"))?;
     let random = stream(study, "calibrate");
-    let maxima = maxima(posterior, &random.named("optimise"))?;
+    let maxima = maxima(posterior, &random.named("optimise"));
+    sampling::broken(posterior)?;
+    let maxima = maxima?;
     let best = &maxima[0];
     let plan = section.built.plugin.plan(posterior.dimension());
     let start = || match section.common.start {

@@ -31,7 +31,7 @@ pub fn of_replicates(data: &Measurements) -> Option<CommonError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::{Axis, Layout, Replicate, Scenario, Unit};
+    use crate::data::{Axis, Layout, Replicate, Unit};
     use crate::math::random::{Stream, normal};
 
     /// Curves that differ by a gain of standard deviation 0.1 about a mean curve: the covariance of
@@ -45,7 +45,7 @@ mod tests {
         let replicate = |r: usize| {
             let gain = 1.0 + 0.1 * normal(&mut Stream::root(3).at(r as u64).generator());
             let values = curve.iter().map(|y| Some(gain * y)).collect();
-            Replicate { name: r.to_string(), scenario: Scenario::default(), values }
+            Replicate { name: r.to_string(), values }
         };
         let unit = Unit::dimensionless();
         let axes = vec![Axis::grid("time", grid.clone(), unit.clone())];

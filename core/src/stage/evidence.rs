@@ -13,7 +13,7 @@ use crate::diagnose::bridge;
 use crate::diagnose::leave_one_out::{LeaveOneOut, Left};
 use crate::linalg::Matrix;
 use crate::plugin::sampler::Evidence;
-use crate::plugin::{Emulator, Likelihood};
+use crate::plugin::{Forward, Likelihood};
 use crate::posterior::Posterior;
 use crate::report::number::significant;
 use crate::run::arrays::{self, Array};
@@ -94,8 +94,8 @@ pub fn left_out(folder: &Path) -> Result<LeaveOneOut, Stop> {
 /// What predicts the data, where there are any.
 #[derive(Clone, Copy)]
 pub struct Predicting<'a> {
-    /// The emulator.
-    pub emulator: &'a dyn Emulator,
+    /// From parameters to responses.
+    pub forward: &'a dyn Forward,
     /// The likelihood.
     pub likelihood: &'a dyn Likelihood,
 }
@@ -175,7 +175,7 @@ fn predictions(study: &Study, p: Predicting<'_>, draws: &Draws) -> Option<LeaveO
     let rows: Vec<usize> = (0..count).map(|k| (2 * k + 1) * draws.len() / (2 * count)).collect();
     let chosen = points.select_rows(&rows);
     let own = p.likelihood.hyperparameters().len();
-    let responses = predict::responses(study, p.emulator, &chosen);
+    let responses = predict::responses(study, p.forward, &chosen);
     let densities: Option<Vec<Vec<f64>>> = responses
         .par_iter()
         .enumerate()

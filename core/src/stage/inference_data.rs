@@ -7,7 +7,7 @@ use netcdf_writer::{
     DimensionId, Error, NcAttrValue, NcFileBuilder, NcWriteFormat, NcWriteOptions,
 };
 
-use crate::data::{Coordinates, Layout};
+use crate::data::{Coordinates, Layout, Layouts};
 use crate::run::Kept;
 use crate::study::Study;
 
@@ -32,10 +32,15 @@ pub fn encode(
         file.observed(measured)?;
     }
     if let Some(validated) = validated {
-        file.predictive(&study.layout, &validated.value)?;
+        file.predictive(&study.layouts, &validated.value)?;
     }
     let options = NcWriteOptions { format: NcWriteFormat::Nc4 };
     Ok(file.builder.to_vec(options)?.1)
+}
+
+/// What tells the blocks of scenarios apart in names: nothing where there is one.
+fn suffix(block: usize, blocks: usize) -> String {
+    if blocks == 1 { String::new() } else { format!("_{}", block + 1) }
 }
 
 struct File {
@@ -92,28 +97,36 @@ impl File {
     }
 
     fn observed(&mut self, measured: &Measured) -> Result<(), Error> {
-        let data = &measured.used;
         let group = "observed_data";
-        let names: Vec<String> = data.replicates.iter().map(|r| r.name.clone()).collect();
-        let mut dimensions = vec![self.labels(group, "replicate", &names)?];
-        dimensions.extend(self.axes(group, &data.layout)?);
-        let values: Vec<f64> = data
-            .replicates
-            .iter()
-            .flat_map(|r| r.values.iter().map(|y| y.unwrap_or(f64::NAN)))
-            .collect();
-        let unit = data.layout.unit.to_string();
-        self.numbers(&format!("{group}/{}", data.layout.name), &dimensions, &values, Some(&unit))
+        let blocks = &measured.used.blocks;
+        for (i, data) in blocks.iter().enumerate() {
+            let suffix = suffix(i, blocks.len());
+            let names: Vec<String> = data.replicates.iter().map(|r| r.name.clone()).collect();
+            let mut dimensions = vec![self.labels(group, &format!("replicate{suffix}"), &names)?];
+            dimensions.extend(self.axes(group, &data.layout, &suffix)?);
+            let values: Vec<f64> = data
+                .replicates
+                .iter()
+                .flat_map(|r| r.values.iter().map(|y| y.unwrap_or(f64::NAN)))
+                .collect();
+            let unit = data.layout.unit.to_string();
+            let path = format!("{group}/{}{suffix}", data.layout.name);
+            self.numbers(&path, &dimensions, &values, Some(&unit))?;
+        }
+        Ok(())
     }
 
-    fn predictive(&mut self, layout: &Layout, validated: &Validated) -> Result<(), Error> {
+    fn predictive(&mut self, layouts: &Layouts, validated: &Validated) -> Result<(), Error> {
         let group = "posterior_predictive";
         let Some((low, high)) = &validated.predictive else { return Ok(()) };
-        let dimensions = self.axes(group, layout)?;
-        let unit = layout.unit.to_string();
-        for (suffix, values) in [("q025", low), ("q975", high)] {
-            let path = format!("{group}/{}_{suffix}", layout.name);
-            self.numbers(&path, &dimensions, values, Some(&unit))?;
+        let unit = layouts.unit().to_string();
+        for (i, (layout, range)) in layouts.parts().enumerate() {
+            let block = suffix(i, layouts.blocks.len());
+            let dimensions = self.axes(group, layout, &block)?;
+            for (end, values) in [("q025", low), ("q975", high)] {
+                let path = format!("{group}/{}_{end}{block}", layout.name);
+                self.numbers(&path, &dimensions, &values[range.clone()], Some(&unit))?;
+            }
         }
         Ok(())
     }
@@ -126,13 +139,20 @@ impl File {
         Ok(dimension)
     }
 
-    fn axes(&mut self, group: &str, layout: &Layout) -> Result<Vec<DimensionId>, Error> {
+    fn axes(
+        &mut self,
+        group: &str,
+        layout: &Layout,
+        suffix: &str,
+    ) -> Result<Vec<DimensionId>, Error> {
         let mut dimensions = Vec::new();
         for axis in &layout.axes {
             dimensions.push(match &axis.coordinates {
-                Coordinates::Labels(labels) => self.labels(group, &axis.name, labels)?,
+                Coordinates::Labels(labels) => {
+                    self.labels(group, &format!("{}{suffix}", axis.name), labels)?
+                }
                 Coordinates::Grid { values, unit } => {
-                    let path = format!("{group}/{}", axis.name);
+                    let path = format!("{group}/{}{suffix}", axis.name);
                     let dimension = self.builder.add_dimension_path(&path, values.len() as u64)?;
                     self.numbers(&path, &[dimension], values, Some(&unit.to_string()))?;
                     dimension

@@ -4,6 +4,7 @@ pub mod best_fit;
 pub mod calibrate;
 pub mod common_error;
 pub mod design;
+pub mod direct;
 pub mod evidence;
 pub mod inference_data;
 pub mod manifest;
@@ -23,7 +24,7 @@ pub mod target;
 pub mod validate;
 
 use crate::math::random::Stream;
-use crate::plugin::Emulator;
+use crate::plugin::{Emulator, Forward};
 use crate::report::findings::Findings;
 use crate::run::{Kept, Observer, RunDirectory, Stop};
 use crate::study::Study;
@@ -42,30 +43,49 @@ pub fn run(
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {
     manifest::begin(study, run)?;
-    if let Some(given) = &study.target {
-        return target::run(study, given, run, observer);
-    }
+    let findings = match (&study.target, &study.surrogate) {
+        (Some(given), _) => target::run(study, given, run, observer)?,
+        (None, Some(_)) => with_surrogate(study, run, observer)?,
+        (None, None) => direct::run(study, run, observer)?,
+    };
+    manifest::end(study, run)?;
+    Ok(findings)
+}
+
+fn with_surrogate(
+    study: &Study,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Findings, Stop> {
     let design = design::stage(study, run, observer)?;
     let simulated = simulate::stage(study, design.as_ref(), run, observer)?;
     let data = read::stage(study, simulated.as_ref(), run, observer)?;
-    let fitting = surrogate::Fitting::of(study, &data.value.ensemble)?;
+    let fitting = surrogate::Fitting::of(study, data.value.runs()?)?;
     let (fitted, emulator) = surrogate::stage(study, &data, &fitting, run, observer)?;
     let folders = numerical_error::FOLDERS;
     let numerics = numerical_error::stage(study, &data, None, folders, run, observer)?;
     let first = Learned { data, fitted, numerics, emulator, region: None, refinement: None };
     let (learned, calibrated) = refine::stage(study, first, run, observer)?;
-    let known = learned.known();
-    let weighed = weigh(study, &known, calibrated.as_ref(), run, observer)?;
-    let validated = validate::stage(study, &known, calibrated.as_ref(), run, observer)?;
+    conclude(study, &learned.known(), calibrated.as_ref(), run, observer)
+}
+
+/// Evidence, validation and report of a calibration.
+fn conclude(
+    study: &Study,
+    known: &Known<'_>,
+    calibrated: Option<&Kept<Calibrated>>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Findings, Stop> {
+    let weighed = weigh(study, known, calibrated, run, observer)?;
+    let validated = validate::stage(study, known, calibrated, run, observer)?;
     let made = report::Artifacts {
-        known: Some(&known),
-        calibrated: calibrated.as_ref(),
+        known: Some(known),
+        calibrated,
         weighed: weighed.as_ref(),
         validated: validated.as_ref(),
     };
-    let findings = report::stage(study, &made, run)?;
-    manifest::end(study, run)?;
-    Ok(findings)
+    report::stage(study, &made, run)
 }
 
 /// The evidence of a calibration, where there is one.
@@ -81,7 +101,7 @@ fn weigh(
     };
     let parts = calibrate::Parts::of(study, measured, known)?;
     let posterior = parts.posterior(study, known);
-    let predicting = Predicting { emulator: known.emulator, likelihood: parts.likelihood() };
+    let predicting = Predicting { forward: known.forward, likelihood: parts.likelihood() };
     evidence::stage(study, &posterior, calibrated, Some(predicting), run, observer).map(Some)
 }
 
@@ -89,12 +109,16 @@ fn weigh(
 pub struct Known<'a> {
     /// The runs and the measurements.
     pub data: &'a Kept<Data>,
-    /// The fitted surrogate with its errors.
-    pub fitted: &'a Kept<Fitted>,
+    /// From parameters to responses: the emulator, or the model itself.
+    pub forward: &'a dyn Forward,
+    /// A hash of what the forward map was made of.
+    pub origin: &'a str,
+    /// The fitted surrogate with its errors, in a study with a surrogate.
+    pub fitted: Option<&'a Kept<Fitted>>,
+    /// The emulator, in a study with a surrogate.
+    pub emulator: Option<&'a dyn Emulator>,
     /// The model's numerical error, if the study asks for it.
     pub numerics: Option<&'a Kept<NumericalError>>,
-    /// The emulator.
-    pub emulator: &'a dyn Emulator,
     /// The interval of each parameter in which the emulator was fitted, where that is narrower than the design.
     pub region: Option<&'a [(f64, f64)]>,
     /// How far a refinement came.
@@ -122,9 +146,11 @@ impl Learned {
     pub fn known(&self) -> Known<'_> {
         Known {
             data: &self.data,
-            fitted: &self.fitted,
+            forward: &*self.emulator,
+            origin: &self.fitted.hash,
+            fitted: Some(&self.fitted),
+            emulator: Some(&*self.emulator),
             numerics: self.numerics.as_ref(),
-            emulator: &*self.emulator,
             region: self.region.as_deref(),
             refinement: self.refinement.as_ref(),
         }

@@ -11,12 +11,11 @@ use crate::data::{Ensemble, Parameter};
 use crate::linalg::Matrix;
 use crate::math::moments;
 use crate::plugin::discrepancy::CommonError;
-use crate::plugin::reader::EnsembleSource;
 use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, RunDirectory, Stop};
 use crate::study::Study;
 
-use super::read::{self, Data};
+use super::read::{self, Data, Runs};
 use super::simulate;
 use super::simulator::Simulator;
 
@@ -73,7 +72,7 @@ pub fn stage(
 ) -> Result<Option<Kept<NumericalError>>, Stop> {
     let Some(section) = &study.numerical_error else { return Ok(None) };
     let simulator = Simulator::with_model(study, &section.model)?;
-    let ensemble = &data.value.ensemble;
+    let ensemble = data.value.runs()?;
     let chosen = chosen(study, ensemble, region, section.runs);
     if chosen.is_empty() {
         if study.surrogate.as_ref().is_some_and(|s| s.common.refine.is_some()) {
@@ -92,15 +91,10 @@ pub fn stage(
     let reader = study.simulations.as_ref().map(|s| (s.built.name, &s.built.options));
     let inputs = json!([runs.hash, data.hash, reader]);
     let kept = run.keep(folder, &inputs, observer, |_| {
-        let source = EnsembleSource {
-            directory: &study.directory,
-            simulated: Some(&made),
-            parameters: &study.parameters,
-            layout: &study.layout,
-        };
-        let finer = read::from_files(study, &source)?;
+        let runs = Runs { folder: &made, made: &runs.value };
+        let finer = read::ensemble(study, Some(runs))?;
         let ordinary = ensemble;
-        let mut differences = Matrix::zeros(0, study.layout.len());
+        let mut differences = Matrix::zeros(0, study.layouts.len());
         for (name, response) in finer.runs.iter().zip(finer.responses.iter_rows()) {
             if let Some(row) = ordinary.runs.iter().position(|run| run == name) {
                 let base = ordinary.responses.row(row);
@@ -113,7 +107,7 @@ pub fn stage(
         }
         Ok(NumericalError { differences })
     })?;
-    let unit = &study.layout.unit;
+    let unit = study.layouts.unit();
     observer.end(
         "finer",
         &format!("{} runs, rms difference {:.3e} {unit}", names.len(), kept.value.rms()),

@@ -1,24 +1,25 @@
-//! Emulated responses with the study's effects.
+//! Responses of the forward map with the study's effects.
 
 use crate::linalg::Matrix;
-use crate::plugin::Emulator;
+use crate::plugin::Forward;
+use crate::posterior::apply;
 use crate::study::Study;
 
 /// The response at each point: parameters, effects' parameters and hyperparameters in natural units, one a row.
-pub fn responses(study: &Study, emulator: &dyn Emulator, points: &Matrix) -> Vec<Vec<f64>> {
+pub fn responses(study: &Study, forward: &dyn Forward, points: &Matrix) -> Vec<Vec<f64>> {
     let d = study.parameters.len();
     let theta = Matrix::from_rows(d, points.iter_rows().map(|p| &p[..d]));
-    let mean = emulator.mean(&theta);
-    let layout = &study.layout;
+    let mean = forward.mean(&theta);
+    let layouts = &study.layouts;
     mean.iter_rows()
         .zip(points.iter_rows())
         .map(|(mean, point)| {
             let mut response = mean.to_vec();
             let mut from = d;
             for effect in &study.effects {
-                let plugin = &effect.built.plugin;
-                let count = plugin.parameters(layout).len();
-                response = plugin.apply(layout, &response, &point[from..from + count]);
+                let plugin = &*effect.built.plugin;
+                let count = plugin.parameters(&layouts.blocks[0]).len();
+                response = apply(plugin, layouts, &response, &point[from..from + count]);
                 from += count;
             }
             response

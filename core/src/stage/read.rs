@@ -1,11 +1,16 @@
 //! Stage 3: files become data.
 
-use std::path::Path;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::data::{Ensemble, FailedRun, Layout, Measurements, Unit};
+use crate::data::{
+    Ensemble, FailedRun, Layouts, Measurements, Observations, Replicate, Scenario, Unit,
+};
+use crate::linalg::Matrix;
+use crate::plugin::Reader;
 use crate::plugin::reader::{EnsembleSource, MeasurementSource};
 use crate::report::findings::FlaggedCurve;
 use crate::run::arrays::{self, Array};
@@ -18,8 +23,8 @@ use super::simulate::Simulated;
 /// What was read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Data {
-    /// The simulation runs.
-    pub ensemble: Ensemble,
+    /// The simulation runs, in a study with a surrogate.
+    pub ensemble: Option<Ensemble>,
     /// The measurements, if the study has any.
     pub measured: Option<Measured>,
 }
@@ -28,11 +33,11 @@ pub struct Data {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
     /// All replicates as they were read.
-    pub read: Measurements,
+    pub read: Observations,
     /// The replicates without the curves that the screen left out.
-    pub used: Measurements,
+    pub used: Observations,
     /// `used` with the curves that the study adds: the data of the likelihood.
-    pub likelihood: Measurements,
+    pub likelihood: Observations,
     /// The curves that the screen flagged.
     pub flagged: Vec<FlaggedCurve>,
 }
@@ -43,14 +48,15 @@ struct Labels {
     parameters: Vec<String>,
     units: Vec<Unit>,
     runs: Vec<String>,
-    layout: Layout,
+    layouts: Layouts,
     valid: Vec<bool>,
     failed: Vec<FailedRun>,
 }
 
 impl Artifact for Data {
     fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
-        let e = &self.ensemble;
+        files::write_json(&folder.join(MEASUREMENTS), &self.measured)?;
+        let Some(e) = &self.ensemble else { return Ok(vec![MEASUREMENTS.to_owned()]) };
         let arrays = [
             Array::matrix("points", "run", "parameter", &e.points),
             Array::matrix("responses", "run", "output", &e.responses),
@@ -60,29 +66,41 @@ impl Artifact for Data {
             parameters: e.parameters.clone(),
             units: e.units.clone(),
             runs: e.runs.clone(),
-            layout: e.layout.clone(),
+            layouts: e.layouts.clone(),
             valid: e.valid.clone(),
             failed: e.failed.clone(),
         };
         files::write_json(&folder.join("ensemble.json"), &labels)?;
-        files::write_json(&folder.join("measurements.json"), &self.measured)?;
-        Ok(["ensemble.nc", "ensemble.json", "measurements.json"].map(str::to_owned).to_vec())
+        Ok(["ensemble.nc", "ensemble.json", MEASUREMENTS].map(str::to_owned).to_vec())
     }
 
     fn load(folder: &Path) -> Result<Self, Stop> {
+        let measured = files::read_json(&folder.join(MEASUREMENTS))?;
         let path = folder.join("ensemble.nc");
+        if !path.is_file() {
+            return Ok(Self { ensemble: None, measured });
+        }
         let labels: Labels = files::read_json(&folder.join("ensemble.json"))?;
         let ensemble = Ensemble {
             parameters: labels.parameters,
             units: labels.units,
             runs: labels.runs,
             points: arrays::read(&path, "points")?.into_matrix(),
-            layout: labels.layout,
+            layouts: labels.layouts,
             responses: arrays::read(&path, "responses")?.into_matrix(),
             valid: labels.valid,
             failed: labels.failed,
         };
-        Ok(Self { ensemble, measured: files::read_json(&folder.join("measurements.json"))? })
+        Ok(Self { ensemble: Some(ensemble), measured })
+    }
+}
+
+const MEASUREMENTS: &str = "measurements.json";
+
+impl Data {
+    /// The simulation runs of a study with a surrogate.
+    pub fn runs(&self) -> Result<&Ensemble, Stop> {
+        self.ensemble.as_ref().ok_or_else(|| Stop::new("the study has no simulation runs"))
     }
 }
 
@@ -95,21 +113,22 @@ pub fn stage(
 ) -> Result<Kept<Data>, Stop> {
     observer.begin("read", "file", 0);
     let folder = run.stage_folder("2-simulate");
-    let made = simulated.map(|_| folder.as_path());
+    let made = simulated.map(|kept| Runs { folder: &folder, made: &kept.value });
     let inputs = json!([
         simulated.map(|s| &s.hash),
+        study.surrogate.is_some(),
         study.simulations.as_ref().map(|s| (s.built.name, &s.built.options)),
         study.measurements.as_ref().map(|s| (s.built.name, &s.built.options, &s.common)),
         source_hash(study)?,
-        study.layout,
+        study.layouts,
         study.parameters.iter().map(|p| (&p.name, &p.unit)).collect::<Vec<_>>(),
     ]);
     let kept = run.keep("3-read", &inputs, observer, |_| {
-        let ensemble = ensemble(study, made)?;
+        let ensemble = if study.surrogate.is_some() { Some(ensemble(study, made)?) } else { None };
         let measured = measured(study)?;
         Ok(Data { ensemble, measured })
     })?;
-    for failed in &kept.value.ensemble.failed {
+    for failed in kept.value.ensemble.iter().flat_map(|ensemble| &ensemble.failed) {
         observer.warn(&format!("run {} is left out: {}", failed.run, failed.reason));
     }
     observer.end("read", &summary(&kept.value));
@@ -117,67 +136,175 @@ pub fn stage(
 }
 
 fn summary(data: &Data) -> String {
-    let mut text = format!("{} runs", data.ensemble.runs.len());
+    let mut text = match &data.ensemble {
+        Some(ensemble) => format!("{} runs, ", ensemble.runs.len()),
+        None => String::new(),
+    };
     if let Some(measured) = &data.measured {
-        text.push_str(&format!(", {} data", measured.likelihood.count()));
+        text.push_str(&format!("{} data", measured.likelihood.count()));
         let left_out = measured.flagged.iter().filter(|f| f.left_out).count();
         if left_out > 0 {
             text.push_str(&format!(", {left_out} faulty curves left out"));
         }
     }
-    text
+    text.trim_end_matches(", ").to_owned()
 }
 
 /// The hash of the user's own files.
 fn source_hash(study: &Study) -> Result<String, Stop> {
     let runs = study.simulations.iter().map(|s| &s.built.plugin);
     let data = study.measurements.iter().map(|s| &s.built.plugin);
-    let paths: Vec<_> =
-        runs.chain(data).flat_map(|reader| reader.files(&study.directory)).collect();
+    let names: Vec<Option<&str>> = study.scenarios.iter().map(Scenario::label).collect();
+    let of =
+        |reader| names.iter().flat_map(move |name| Reader::files(reader, &study.directory, *name));
+    let mut paths: Vec<PathBuf> = runs.chain(data).flat_map(|reader| of(&**reader)).collect();
+    paths.sort();
+    paths.dedup();
     files::hash_sources(&paths)
 }
 
-fn ensemble(study: &Study, simulated: Option<&Path>) -> Result<Ensemble, Stop> {
-    let source = EnsembleSource {
-        directory: &study.directory,
-        simulated,
-        parameters: &study.parameters,
-        layout: &study.layout,
-    };
-    from_files(study, &source)
+/// The folder of the runs that the study made, with what is there.
+#[derive(Clone, Copy)]
+pub struct Runs<'a> {
+    /// The folder of the stage that made them.
+    pub folder: &'a Path,
+    /// What it made.
+    pub made: &'a Simulated,
 }
 
-/// The runs of a source through the study's reader, every response finite.
-pub fn from_files(study: &Study, source: &EnsembleSource<'_>) -> Result<Ensemble, Stop> {
-    let ensemble = match &study.simulations {
-        Some(section) => section.built.plugin.ensemble(source)?,
-        None => super::results::ensemble(source)?,
-    };
+/// The runs of all scenarios through the study's reader, every response finite: those that have one in each.
+pub fn ensemble(study: &Study, runs: Option<Runs<'_>>) -> Result<Ensemble, Stop> {
+    let mut parts = Vec::new();
+    for (i, scenario) in study.scenarios.iter().enumerate() {
+        let (layout, outputs) = study
+            .layouts
+            .of_scenario(&scenario.name)
+            .ok_or_else(|| Stop::new(format!("no response to `{}`", scenario.name)))?;
+        let simulated = runs.map(|runs| runs.folder.join(&runs.made.scenarios[i].folder));
+        let source = EnsembleSource {
+            directory: &study.directory,
+            simulated: simulated.as_deref(),
+            parameters: &study.parameters,
+            scenario: scenario.label(),
+            layout: &layout,
+        };
+        let ensemble = match &study.simulations {
+            Some(section) => section.built.plugin.ensemble(&source)?,
+            None => super::results::ensemble(&source)?,
+        };
+        parts.push((ensemble, outputs));
+    }
+    let joined = joined(study, parts)?;
     if let Some((i, value)) =
-        ensemble.responses.as_slice().iter().enumerate().find(|(_, y)| !y.is_finite())
+        joined.responses.as_slice().iter().enumerate().find(|(_, y)| !y.is_finite())
     {
-        let (run, output) = (i / ensemble.layout.len(), i % ensemble.layout.len());
+        let (run, output) = (i / joined.layouts.len(), i % joined.layouts.len());
         return Err(Stop::new(format!(
             "run `{}` has the response {value} at {}",
-            ensemble.runs[run],
-            ensemble.layout.describe(output)
+            joined.runs[run],
+            joined.layouts.describe(output)
         )));
     }
-    Ok(ensemble)
+    Ok(joined)
+}
+
+/// The ensembles of the scenarios as one.
+fn joined(study: &Study, mut parts: Vec<(Ensemble, Range<usize>)>) -> Result<Ensemble, Stop> {
+    if parts.len() == 1 {
+        return Ok(Ensemble { layouts: study.layouts.clone(), ..parts.remove(0).0 });
+    }
+    let mut failed: Vec<FailedRun> = Vec::new();
+    for ((part, _), scenario) in parts.iter().zip(&study.scenarios) {
+        failed.extend(part.failed.iter().map(|f| FailedRun {
+            run: f.run.clone(),
+            reason: format!("scenario `{}`: {}", scenario.name, f.reason),
+        }));
+    }
+    let first = &parts[0].0;
+    let (mut runs, mut valid) = (Vec::new(), Vec::new());
+    let mut points = Matrix::zeros(0, first.parameters.len());
+    let mut responses = Matrix::zeros(0, study.layouts.len());
+    for (i, name) in first.runs.iter().enumerate() {
+        let rows: Option<Vec<usize>> =
+            parts.iter().map(|(part, _)| part.runs.iter().position(|run| run == name)).collect();
+        let Some(rows) = rows else { continue };
+        let mut response = vec![0.0; study.layouts.len()];
+        for ((part, outputs), &row) in parts.iter().zip(&rows) {
+            if part.points.row(row) != first.points.row(i) {
+                return Err(Stop::new(format!(
+                    "run `{name}` has other parameters in another scenario"
+                )));
+            }
+            response[outputs.clone()].copy_from_slice(part.responses.row(row));
+        }
+        valid.push(parts.iter().zip(&rows).all(|((part, _), &row)| part.valid[row]));
+        points.push_row(first.points.row(i));
+        responses.push_row(&response);
+        runs.push(name.clone());
+    }
+    if runs.is_empty() {
+        return Err(Stop::new("no run has a response in every scenario"));
+    }
+    Ok(Ensemble {
+        parameters: first.parameters.clone(),
+        units: first.units.clone(),
+        runs,
+        points,
+        layouts: study.layouts.clone(),
+        responses,
+        valid,
+        failed,
+    })
 }
 
 fn measured(study: &Study) -> Result<Option<Measured>, Stop> {
     let Some(section) = &study.measurements else { return Ok(None) };
-    let source = MeasurementSource { directory: &study.directory, layout: &study.layout };
-    let read = section.built.plugin.measurements(&source)?;
+    let read = observations(study, &*section.built.plugin)?;
     if read.count() == 0 {
         return Err(Stop::new("the measurements hold no value"));
     }
     let flagged = match &section.common.screen {
-        Some(options) => screen::flag(&read, options.threshold.get(), options.leave_out),
+        Some(options) => {
+            let (threshold, leave_out) = (options.threshold.get(), options.leave_out);
+            read.blocks.iter().flat_map(|data| screen::flag(data, threshold, leave_out)).collect()
+        }
         None => Vec::new(),
     };
-    let used = screen::without(&read, &flagged);
-    let likelihood = screen::with_added_curves(&used, &section.common.added_curves);
+    let used = read.map(|data| screen::without(data, &flagged));
+    let added = &section.common.added_curves;
+    let likelihood = used.map(|data| screen::with_added_curves(data, added));
     Ok(Some(Measured { read, used, likelihood, flagged }))
+}
+
+/// The measurements of all scenarios: a replicate belongs to one scenario and has gaps in the others of its block.
+fn observations(study: &Study, reader: &dyn Reader) -> Result<Observations, Stop> {
+    let mut blocks: Vec<Measurements> = study
+        .layouts
+        .blocks
+        .iter()
+        .map(|layout| Measurements { layout: layout.clone(), replicates: Vec::new() })
+        .collect();
+    let ranges: Vec<Range<usize>> = study.layouts.ranges().collect();
+    for scenario in &study.scenarios {
+        let (layout, outputs) = study
+            .layouts
+            .of_scenario(&scenario.name)
+            .ok_or_else(|| Stop::new(format!("no response to `{}`", scenario.name)))?;
+        let label = scenario.label();
+        let source =
+            MeasurementSource { directory: &study.directory, scenario: label, layout: &layout };
+        let read = reader.measurements(&source)?;
+        let block = ranges.iter().position(|range| range.contains(&outputs.start)).unwrap_or(0);
+        let begin = outputs.start - ranges[block].start;
+        for replicate in read.replicates {
+            let mut values = vec![None; ranges[block].len()];
+            values[begin..begin + replicate.values.len()].copy_from_slice(&replicate.values);
+            let name = match label {
+                Some(label) => format!("{label} {}", replicate.name),
+                None => replicate.name,
+            };
+            blocks[block].replicates.push(Replicate { name, values });
+        }
+    }
+    Ok(Observations { blocks })
 }

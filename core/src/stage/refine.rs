@@ -14,14 +14,13 @@ use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::math::moments;
 use crate::plugin::Emulator;
-use crate::plugin::reader::EnsembleSource;
 use crate::run::{Kept, Observer, RunDirectory, Stop};
 use crate::study::Study;
 use crate::study::file::{Refine, Region};
 
 use super::calibrate::{self, Calibrated, Parts};
 use super::numerical_error;
-use super::read::{self, Data};
+use super::read::{self, Data, Runs};
 use super::simulator::Simulator;
 use super::surrogate::{self, Fitting};
 use super::{Learned, simulate, stream};
@@ -186,10 +185,10 @@ fn next(
 ) -> Result<(Learned, f64), Stop> {
     let draws = kept(calibrated);
     let random = stream(study, "refine").at(round as u64);
-    let points = choose::points(&learned, &draws, &place, refine.runs.get(), &random);
-    let before = learned.data.value.ensemble.runs.len();
+    let points = choose::points(&learned, &draws, &place, refine.runs.get(), &random)?;
+    let before = learned.data.value.runs()?.runs.len();
     let data = extended(study, round, learned.data, &points, run, observer)?;
-    let ensemble = &data.value.ensemble;
+    let ensemble = data.value.runs()?;
     let error = error_at_new(ensemble, before, &*learned.emulator, learned.region.as_deref())?;
     let parameters: Vec<Parameter>;
     let all = 0..ensemble.runs.len();
@@ -283,15 +282,9 @@ fn extended(
     let made = simulate::kept(study, &simulator, &stage, &names, points, &model, run, observer)?;
     observer.end("refine", &format!("{} runs near the posterior", names.len()));
     let folder = run.stage_folder(&stage);
-    let source = EnsembleSource {
-        directory: &study.directory,
-        simulated: Some(&folder),
-        parameters: &study.parameters,
-        layout: &study.layout,
-    };
-    let more = read::from_files(study, &source)?;
+    let more = read::ensemble(study, Some(Runs { folder: &folder, made: &made.value }))?;
     let Data { ensemble, measured } = data.value;
-    let value = Data { ensemble: joined(ensemble, more), measured };
+    let value = Data { ensemble: ensemble.map(|first| joined(first, more)), measured };
     let hash = crate::run::files::hash(json!([data.hash, made.hash]).to_string().as_bytes());
     Ok(Kept { value, hash, ..data })
 }

@@ -1,6 +1,6 @@
 //! Stage 8: what was found, for people (`report.html`) and for scripts (`summary.json`, `posterior.nc`).
 
-use crate::data::{Draws, Measurements};
+use crate::data::{Draws, Ensemble, Observations};
 use crate::diagnose::Diagnosis;
 use crate::linalg::Matrix;
 use crate::math::fit;
@@ -15,7 +15,7 @@ use crate::study::Study;
 
 use super::calibrate::Calibrated;
 use super::evidence::Weighed;
-use super::read::{Data, Measured};
+use super::read::Measured;
 use super::validate::Validated;
 use super::{Known, inference_data};
 
@@ -73,10 +73,12 @@ fn findings(study: &Study, all: &Artifacts<'_>, run: &RunDirectory) -> Findings 
         version: env!("CARGO_PKG_VERSION").to_owned(),
         components: components(study),
         parameters: study.parameters.clone(),
-        layout: study.layout.clone(),
-        ensemble: all.known.map(|known| ensemble(study, &known.data.value)),
+        layouts: study.layouts.clone(),
+        ensemble: all
+            .known
+            .and_then(|known| Some(ensemble(study, known.data.value.ensemble.as_ref()?))),
         measured: measured.map(|m| measurements(study, m)),
-        surrogate: all.known.map(|known| surrogate(known, all.validated)),
+        surrogate: all.known.and_then(|known| surrogate(known, all.validated)),
         warnings: warnings(all, calibration.as_ref()),
         calibration,
         validation,
@@ -90,8 +92,7 @@ fn components(study: &Study) -> Vec<(String, String)> {
     chosen.map(|chosen| (chosen.section.to_owned(), chosen.name.to_owned())).collect()
 }
 
-fn ensemble(study: &Study, data: &Data) -> EnsembleFindings {
-    let e = &data.ensemble;
+fn ensemble(study: &Study, e: &Ensemble) -> EnsembleFindings {
     let inside = |point: &&[f64]| {
         study.parameters.iter().zip(*point).all(|(p, &x)| p.prior.log_density(x).is_finite())
     };
@@ -106,7 +107,7 @@ fn ensemble(study: &Study, data: &Data) -> EnsembleFindings {
 fn measurements(study: &Study, measured: &Measured) -> MeasuredFindings {
     let added =
         study.measurements.as_ref().map(|s| s.common.added_curves.len()).unwrap_or_default();
-    let curves = measured.likelihood.replicates.iter().rev().take(added).rev();
+    let curves = measured.likelihood.blocks[0].replicates.iter().rev().take(added).rev();
     MeasuredFindings {
         used: measured.used.clone(),
         flagged: measured.flagged.clone(),
@@ -117,19 +118,19 @@ fn measurements(study: &Study, measured: &Measured) -> MeasuredFindings {
 }
 
 /// What two runs must share for their evidences to be compared: a hash of the data in the likelihood.
-fn fingerprint(data: &Measurements) -> String {
-    let values = data.replicates.iter().flat_map(|r| &r.values);
+fn fingerprint(data: &Observations) -> String {
+    let values = data.blocks.iter().flat_map(|b| &b.replicates).flat_map(|r| &r.values);
     let bytes: Vec<u8> = values.flat_map(|y| y.unwrap_or(f64::NAN).to_le_bytes()).collect();
     files::hash(&bytes)
 }
 
-fn surrogate(known: &Known<'_>, validated: Option<&Kept<Validated>>) -> SurrogateFindings {
-    let errors = &known.fitted.value.errors;
-    let sobol = known.emulator.sensitivity().map(|s| {
+fn surrogate(known: &Known<'_>, validated: Option<&Kept<Validated>>) -> Option<SurrogateFindings> {
+    let errors = &known.fitted?.value.errors;
+    let sobol = known.emulator?.sensitivity().map(|s| {
         let total = s.aggregated.total.row(0).iter();
         s.aggregated.first.row(0).iter().zip(total).map(|(f, t)| (*f, *t)).collect()
     });
-    SurrogateFindings {
+    Some(SurrogateFindings {
         refinement: known.refinement.map(|r| (r.rounds, r.ratio, r.reached)),
         facts: errors.facts.clone(),
         training: errors.training,
@@ -141,7 +142,7 @@ fn surrogate(known: &Known<'_>, validated: Option<&Kept<Validated>>) -> Surrogat
         near_posterior: validated.and_then(|v| v.value.emulator_at_posterior),
         pairs: errors.pairs.clone(),
         sobol,
-    }
+    })
 }
 
 fn calibration(calibrated: &Calibrated, weighed: Option<&Weighed>) -> CalibrationFindings {
@@ -238,7 +239,10 @@ fn warnings(all: &Artifacts<'_>, calibration: Option<&CalibrationFindings>) -> V
             ));
         }
     }
-    let failed = all.known.map_or(0, |known| known.data.value.ensemble.failed.len());
+    let failed = all
+        .known
+        .and_then(|known| known.data.value.ensemble.as_ref())
+        .map_or(0, |ensemble| ensemble.failed.len());
     if failed > 0 {
         warnings.push(if failed == 1 {
             "1 simulation run has no usable response and is left out".to_owned()

@@ -3,20 +3,20 @@
 use crate::data::{Ensemble, FailedRun};
 use crate::linalg::Matrix;
 use crate::plugin::reader::EnsembleSource;
-use crate::run::{Artifact, Stop, arrays};
+use crate::run::{Stop, arrays};
 
-use super::simulate::Simulated;
+use super::simulate::{TABLE, from_table};
 
 /// The runs of the simulate stage from the NetCDF files that [`crate::run::write_response`] wrote.
 pub fn ensemble(source: &EnsembleSource<'_>) -> Result<Ensemble, Stop> {
     let folder = source.simulated.ok_or_else(|| {
         Stop::new("the study has no simulation runs").help("add `[simulations]` with their files")
     })?;
-    let simulated = Simulated::load(folder)?;
+    let (records, parameters, simulated) = from_table(&folder.join(TABLE))?;
     let (mut runs, mut valid, mut failed) = (Vec::new(), Vec::new(), Vec::new());
-    let mut points = Matrix::zeros(0, simulated.parameters.len());
+    let mut points = Matrix::zeros(0, parameters.len());
     let mut responses = Matrix::zeros(0, source.layout.len());
-    for (record, point) in simulated.runs.iter().zip(simulated.points.iter_rows()) {
+    for (record, point) in records.iter().zip(simulated.iter_rows()) {
         match &record.file {
             Some(file) => {
                 let response = arrays::read(&folder.join(file), &source.layout.name)?.values;
@@ -45,11 +45,11 @@ pub fn ensemble(source: &EnsembleSource<'_>) -> Result<Ensemble, Stop> {
             .help("run the study again to retry them, or name a reader in `[simulations]` and say there how many may be left out (`allow_failed`)"));
     }
     Ok(Ensemble {
-        parameters: simulated.parameters,
+        parameters,
         units: source.parameters.iter().map(|p| p.unit.clone()).collect(),
         runs,
         points,
-        layout: source.layout.clone(),
+        layouts: source.layout.clone().into(),
         responses,
         valid,
         failed,

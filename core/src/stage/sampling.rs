@@ -53,6 +53,11 @@ const PATIENCE: usize = 50;
 /// The number of chains into which independent draws are dealt.
 const HANDS: usize = 4;
 
+/// Stops when the target can no longer be computed; a step made of such values is not kept.
+pub(super) fn broken(target: &dyn Target) -> Result<(), Stop> {
+    target.failure().map_or(Ok(()), |reason| Err(Stop::new(reason)))
+}
+
 /// Runs a sampler, going on from a checkpoint in `folder` if there is one.
 pub fn sample(
     sampler: &dyn Sampler,
@@ -75,6 +80,7 @@ pub fn sample(
     loop {
         while step < limit && !sampler.finished(&state) {
             sampler.step(target, &mut state, &stream.at(step as u64))?;
+            broken(target)?;
             log.append(&state)?;
             step += 1;
             progress.add(1);

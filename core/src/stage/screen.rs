@@ -1,6 +1,5 @@
 //! Faulty curves among the replicates, and curves over the replicates that a study adds to its data.
 
-use crate::data::Scenario;
 use crate::data::layout::Group;
 use crate::data::measurements::{Measurements, Replicate};
 use crate::math::moments::{quantile, sorted};
@@ -105,7 +104,6 @@ pub fn with_added_curves(data: &Measurements, curves: &[AddedCurve]) -> Measurem
         };
         extended.replicates.push(Replicate {
             name: name.to_owned(),
-            scenario: Scenario::default(),
             values: summaries.iter().map(value).collect(),
         });
     }
@@ -137,13 +135,8 @@ mod tests {
             };
             (0..100).map(|i| value(i, &mut rng)).collect()
         };
-        let replicates = (0..12)
-            .map(|r| Replicate {
-                name: format!("p{r}"),
-                scenario: Scenario::default(),
-                values: curve(r),
-            })
-            .collect();
+        let replicates =
+            (0..12).map(|r| Replicate { name: format!("p{r}"), values: curve(r) }).collect();
         Measurements { layout, replicates }
     }
 

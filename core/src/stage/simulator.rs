@@ -1,28 +1,43 @@
 //! The study's model as a function of the study's parameters, in the study's units.
 
-use std::path::Path;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 
 use crate::data::{Axis, Coordinates, Layout, Scenario};
-use crate::plugin::model::{Call, EvalError, Model, Response};
+use crate::linalg::Matrix;
+use crate::plugin::model::{Call, EvalError, Input, Model, Response};
 use crate::plugin::registry::Section;
 use crate::run::Stop;
 use crate::study::Study;
 use crate::study::file::ModelKeys;
+use crate::study::inputs::Computed;
 
-/// A model with its fixed inputs, fed with the study's parameters.
+/// A model with all that is not unknown, fed with the study's parameters.
 pub struct Simulator<'a> {
-    /// The folder of the study file.
-    study: &'a Path,
     /// The model.
     pub model: &'a dyn Model,
-    /// The response that is asked of the model: the study's layout in the model's units.
-    pub asked: Layout,
-    /// The conditions of all runs.
-    pub scenario: Scenario,
+    /// The folder of the study file.
+    pub study: &'a Path,
     /// The name of each input of the model.
     pub names: Vec<String>,
+    /// One setting a scenario.
+    pub settings: Vec<Setting<'a>>,
+}
+
+/// The model under the conditions of one scenario.
+pub struct Setting<'a> {
+    /// The conditions.
+    pub scenario: &'a Scenario,
+    /// The response that is asked of the model: the study's layout in the model's units.
+    pub asked: Layout,
+    /// The outputs among those of all scenarios.
+    pub outputs: Range<usize>,
+    /// The folder of its runs in that of all runs.
+    pub folder: PathBuf,
     /// One entry an input of the model.
     sources: Vec<Source>,
+    /// The inputs that expressions set.
+    computed: Option<Computed>,
     /// Turns the model's response into the study's unit.
     factor: f64,
 }
@@ -32,6 +47,8 @@ enum Source {
     Fixed(f64),
     /// The index of a parameter of the study and the factor from its unit to the input's.
     Parameter(usize, f64),
+    /// The index of an expression and the factor from its unit to the input's.
+    Computed(usize, f64),
 }
 
 impl<'a> Simulator<'a> {
@@ -46,58 +63,111 @@ impl<'a> Simulator<'a> {
         section: &'a Section<dyn Model, ModelKeys>,
     ) -> Result<Self, Stop> {
         let model = &*section.built.plugin;
-        let signature = model.signature(&study.context());
-        let mut sources = Vec::new();
-        for input in &signature.inputs {
-            let parameter = study.parameters.iter().position(|p| p.name == input.name);
-            let fixed = section.common.fixed.get(&input.name).copied().or(input.default);
-            sources.push(match (parameter, fixed) {
-                (Some(i), _) => {
-                    let unit = &study.parameters[i].unit;
-                    let factor = unit.factor_to(&input.unit).ok_or_else(|| {
-                        Stop::new(format!("`{}` has no unit of the model's", input.name))
-                    })?;
-                    Source::Parameter(i, factor)
-                }
-                (None, Some(value)) => Source::Fixed(value),
-                (None, None) => {
-                    return Err(Stop::new(format!("nothing sets the input `{}`", input.name)));
-                }
-            });
+        let mut settings = Vec::new();
+        let mut names = Vec::new();
+        for (place, scenario) in study.scenarios.iter().enumerate() {
+            let (layout, outputs) = study
+                .layouts
+                .of_scenario(&scenario.name)
+                .ok_or_else(|| Stop::new(format!("no response to `{}`", scenario.name)))?;
+            let signature = model.signature(&study.context_of(&layout));
+            let computed = study.computed(place).map_err(|faults| {
+                let faults: Vec<String> = faults.iter().map(ToString::to_string).collect();
+                Stop::new(format!("`inputs` in `[model]`: {}", faults.join("; ")))
+            })?;
+            let source = |input: &Input| source(study, section, place, computed.as_ref(), input);
+            let sources = signature.inputs.iter().map(source).collect::<Result<_, Stop>>()?;
+            names = signature.inputs.iter().map(|input| input.name.clone()).collect();
+            let (asked, factor) = asked(&layout, &signature.layout)?;
+            let folder = folder(place, &scenario.name);
+            settings.push(Setting { scenario, asked, outputs, folder, sources, computed, factor });
         }
-        let (asked, factor) = asked(&study.layout, &signature.layout)?;
-        Ok(Self {
-            study: &study.directory,
-            model,
-            asked,
-            scenario: Scenario::default(),
-            names: signature.inputs.into_iter().map(|input| input.name).collect(),
-            sources,
-            factor,
-        })
+        Ok(Self { study: &study.directory, model, names, settings })
     }
 
+    /// The responses to all scenarios at one point, in the study's unit.
+    pub fn respond(&self, point: &[f64]) -> Result<Response, EvalError> {
+        let mut all = Response { values: Vec::new(), valid: true, facts: Vec::new() };
+        let outputs = self.settings.iter().map(|setting| setting.outputs.end).max();
+        all.values.resize(outputs.unwrap_or(0), 0.0);
+        for setting in &self.settings {
+            let inputs = setting.inputs(point);
+            let response = setting.checked(self.model.predict(&self.call(setting, &inputs)))?;
+            all.values[setting.outputs.clone()].copy_from_slice(&response.values);
+            all.valid &= response.valid;
+            all.facts.extend(response.facts);
+        }
+        Ok(all)
+    }
+
+    /// What is asked of the model for one scenario, nothing of it being kept.
+    pub fn call<'b>(&'b self, setting: &'b Setting<'_>, inputs: &'b [f64]) -> Call<'b> {
+        Call {
+            inputs,
+            names: &self.names,
+            layout: &setting.asked,
+            scenario: setting.scenario,
+            study: self.study,
+            directory: None,
+        }
+    }
+}
+
+/// The folder of a scenario's runs: that of all runs in a study without scenarios.
+fn folder(place: usize, name: &str) -> PathBuf {
+    if name.is_empty() {
+        return PathBuf::new();
+    }
+    let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
+    format!("{}-{}", place + 1, name.chars().map(plain).collect::<String>()).into()
+}
+
+impl Setting<'_> {
     /// The model's inputs for one point of the study's parameters.
     pub fn inputs(&self, point: &[f64]) -> Vec<f64> {
+        let computed = self.computed.as_ref().map(|computed| {
+            let unknowns: Vec<f64> = computed.parameters.iter().map(|&i| point[i]).collect();
+            computed.program.value(&unknowns)
+        });
         let value = |source: &Source| match source {
             Source::Fixed(value) => *value,
             Source::Parameter(i, factor) => point[*i] * factor,
+            Source::Computed(i, factor) => {
+                computed.as_ref().map_or(f64::NAN, |values| values[*i] * factor)
+            }
         };
         self.sources.iter().map(value).collect()
     }
 
-    /// The response at one point, in the study's unit.
-    pub fn respond(&self, point: &[f64]) -> Result<Response, EvalError> {
-        let inputs = self.inputs(point);
-        let call = Call {
-            inputs: &inputs,
-            names: &self.names,
-            layout: &self.asked,
-            scenario: &self.scenario,
-            study: self.study,
-            directory: None,
-        };
-        let mut response = self.model.predict(&call)?;
+    /// The derivative of each input (rows) by each parameter of the study (columns).
+    pub fn slopes(&self, point: &[f64]) -> Matrix {
+        let computed = self.computed.as_ref().map(|computed| {
+            let unknowns: Vec<f64> = computed.parameters.iter().map(|&i| point[i]).collect();
+            (computed, computed.program.jacobian(&unknowns).1)
+        });
+        let mut slopes = Matrix::zeros(self.sources.len(), point.len());
+        for (row, source) in self.sources.iter().enumerate() {
+            match (source, &computed) {
+                (Source::Parameter(i, factor), _) => slopes[(row, *i)] = *factor,
+                (Source::Computed(k, factor), Some((computed, jacobian))) => {
+                    for (column, &i) in computed.parameters.iter().enumerate() {
+                        slopes[(row, i)] = jacobian[(*k, column)] * factor;
+                    }
+                }
+                _ => {}
+            }
+        }
+        slopes
+    }
+
+    /// A response in the study's unit, every value finite and as many as were asked for.
+    pub fn checked(&self, response: Result<Response, EvalError>) -> Result<Response, EvalError> {
+        let mut response = response?;
+        let (found, asked) = (response.values.len(), self.asked.len());
+        if found != asked {
+            let text = format!("the response has {found} values where {asked} were asked for");
+            return Err(EvalError::Fatal(text));
+        }
         for (i, value) in response.values.iter_mut().enumerate() {
             if !value.is_finite() {
                 let place = self.asked.describe(i);
@@ -107,6 +177,42 @@ impl<'a> Simulator<'a> {
         }
         Ok(response)
     }
+
+    /// The factor from the model's unit of the response to the study's.
+    pub fn factor(&self) -> f64 {
+        self.factor
+    }
+}
+
+fn source(
+    study: &Study,
+    section: &Section<dyn Model, ModelKeys>,
+    scenario: usize,
+    computed: Option<&Computed>,
+    input: &Input,
+) -> Result<Source, Stop> {
+    let no_unit = || Stop::new(format!("`{}` has no unit of the model's", input.name));
+    if let Some(computed) = computed
+        && let Some(k) = computed.names.iter().position(|name| name == &input.name)
+    {
+        let factor = computed.units[k].factor_to(&input.unit).ok_or_else(no_unit)?;
+        return Ok(Source::Computed(k, factor));
+    }
+    let mut unknowns = study.unknowns.iter();
+    if let Some(i) = unknowns.position(|u| u.name == input.name && u.acts_in(scenario)) {
+        let factor = study.parameters[i].unit.factor_to(&input.unit).ok_or_else(no_unit)?;
+        return Ok(Source::Parameter(i, factor));
+    }
+    if let Some(condition) = study.scenarios[scenario].value(&input.name) {
+        let unit = condition.unit.as_ref().unwrap_or(&input.unit);
+        let value = unit.convert(condition.value, &input.unit).ok_or_else(no_unit)?;
+        return Ok(Source::Fixed(value));
+    }
+    if let Some(quantity) = section.common.fixed.get(&input.name) {
+        return quantity.in_unit(&input.unit).map(Source::Fixed).ok_or_else(no_unit);
+    }
+    let default = input.default.map(Source::Fixed);
+    default.ok_or_else(|| Stop::new(format!("nothing sets the input `{}`", input.name)))
 }
 
 /// The study's layout in the model's units, and the factor from the model's unit to the study's.

@@ -126,14 +126,14 @@ pub fn stage(
         laws,
         study.about.seed
     ]);
-    let ensemble = &data.value.ensemble;
-    observer.begin("surrogate", "output", ensemble.layout.len() as u64);
+    let ensemble = data.value.runs()?;
+    observer.begin("surrogate", "output", ensemble.layouts.len() as u64);
     let kept = run.keep(fitting.folder, &inputs, observer, |_| {
         fit(study, plugin, ensemble, fitting, observer)
     })?;
     let emulator = plugin.load(&kept.value.bytes)?;
     let errors = &kept.value.errors;
-    let unit = &study.layout.unit;
+    let unit = study.layouts.unit();
     observer.end("surrogate", &format!("rmse {:.3e} {unit}, loo {:.2e}", errors.rmse, errors.loo));
     Ok((kept, emulator))
 }
@@ -166,7 +166,7 @@ fn fit(
     let responses = ensemble.responses.select_rows(&fitting.training);
     let runs = Training {
         parameters: fitting.parameters,
-        layout: &study.layout,
+        layouts: &study.layouts,
         points: &points,
         responses: &responses,
     };
@@ -221,7 +221,7 @@ fn corrected(emulator: &dyn Emulator, responses: &Matrix) -> Matrix {
 }
 
 fn by_group(study: &Study, errors: &Matrix, loo: &[f64]) -> Vec<(String, f64, f64, f64)> {
-    let groups = study.layout.groups();
+    let groups = study.layouts.groups();
     let figures = |group: &crate::data::layout::Group| {
         let all = || errors.iter_rows().flat_map(|row| group.indices.iter().map(|&i| row[i]));
         let loo = mean(group.indices.iter().map(|&i| loo[i]));

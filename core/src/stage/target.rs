@@ -10,7 +10,7 @@ use crate::run::{Kept, Observer, RunDirectory, Stop};
 use crate::study::Study;
 
 use super::calibrate::{self, Calibrated};
-use super::{evidence, manifest, report};
+use super::{evidence, report};
 
 /// Samples the target and reports.
 pub fn run(
@@ -34,9 +34,7 @@ pub fn run(
         weighed: Some(&weighed),
         validated: None,
     };
-    let findings = report::stage(study, &made, run)?;
-    manifest::end(study, run)?;
-    Ok(findings)
+    report::stage(study, &made, run)
 }
 
 fn stage(

@@ -5,12 +5,12 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::data::{Draws, Measurements};
+use crate::data::{Draws, Observations};
 use crate::linalg::Matrix;
 use crate::math::moments;
 use crate::math::random::Stream;
 use crate::plugin::model::EvalError;
-use crate::plugin::{Emulator, Likelihood};
+use crate::plugin::{Forward, Likelihood};
 use crate::report::findings::{ValidationCase, ValidationFindings};
 use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
 use crate::study::Study;
@@ -60,7 +60,7 @@ pub fn stage(
     };
     let inputs = json!([
         known.data.hash,
-        known.fitted.hash,
+        known.origin,
         calibrated.hash,
         study.validate,
         study.model.as_ref().map(|m| (m.built.name, &m.built.options, &m.common)),
@@ -76,7 +76,7 @@ pub fn stage(
         let work = Work {
             study,
             measured,
-            emulator: known.emulator,
+            forward: known.forward,
             simulator,
             rerun,
             progress: Progress::new(observer),
@@ -107,7 +107,7 @@ struct Prediction {
 struct Work<'a> {
     study: &'a Study,
     measured: &'a Measured,
-    emulator: &'a dyn Emulator,
+    forward: &'a dyn Forward,
     simulator: Option<Simulator<'a>>,
     rerun: bool,
     progress: Progress<'a>,
@@ -156,7 +156,7 @@ impl Work<'_> {
         self.progress.add(1);
         let row = Matrix::from_vec(1, point.len(), point.to_vec());
         let is_simulated = simulated.is_some();
-        let response = simulated.unwrap_or_else(|| self.emulator.mean(&row).row(0).to_vec());
+        let response = simulated.unwrap_or_else(|| self.forward.mean(&row).row(0).to_vec());
         let accuracy = accuracy(&self.measured.used, &response);
         let average = accuracy.iter().map(|a| a.1).sum::<f64>() / accuracy.len().max(1) as f64;
         Ok(ValidationCase {
@@ -186,7 +186,7 @@ impl Work<'_> {
             match simulator.respond(point) {
                 Ok(response) => {
                     let row = Matrix::from_vec(1, d, point.to_vec());
-                    let emulated = self.emulator.mean(&row);
+                    let emulated = self.forward.mean(&row);
                     let pairs = response.values.iter().zip(emulated.row(0));
                     squares += pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>();
                     checked += 1;
@@ -198,7 +198,7 @@ impl Work<'_> {
             }
             self.progress.add(1);
         }
-        let outputs = self.study.layout.len() as f64;
+        let outputs = self.study.layouts.len() as f64;
         Ok((checked > 0)
             .then(|| ((squares / (f64::from(checked) * outputs)).sqrt(), checked as usize)))
     }
@@ -221,7 +221,7 @@ impl Work<'_> {
         let rows: Vec<usize> =
             (0..count).map(|k| (2 * k + 1) * draws.len() / (2 * count)).collect();
         let chosen = points.select_rows(&rows);
-        let mut responses = predict::responses(self.study, self.emulator, &chosen);
+        let mut responses = predict::responses(self.study, self.forward, &chosen);
         for (i, response) in responses.iter_mut().enumerate() {
             let hyper = &chosen.row(i)[chosen.columns() - own..];
             let variance = total(&likelihood.predictive(response, hyper));
@@ -230,7 +230,7 @@ impl Work<'_> {
                 *y += v.sqrt() * crate::math::random::normal(&mut rng);
             }
         }
-        let outputs = self.study.layout.len();
+        let outputs = self.study.layouts.len();
         let ends = |p: f64| -> Vec<f64> {
             let column = |j: usize| responses.iter().map(|r| r[j]).collect::<Vec<f64>>();
             (0..outputs).map(|j| moments::quantile(&moments::sorted(&column(j)), p)).collect()
@@ -238,7 +238,7 @@ impl Work<'_> {
         let map = &calibrated.outcome.map;
         let at_map = &predict::responses(
             self.study,
-            self.emulator,
+            self.forward,
             &Matrix::from_vec(1, map.len(), map.clone()),
         )[0];
         let parts = likelihood.predictive(at_map, &map[map.len() - own..]);
@@ -271,7 +271,7 @@ fn total(parts: &[crate::plugin::discrepancy::VariancePart]) -> Vec<f64> {
 
 /// The share of points inside the replicates' 95 % interval `mean +- 1.96 sd`, for each group (Radaideh et al.,
 /// arXiv 2202.03959). Points with fewer than two replicates are not counted.
-pub fn accuracy(data: &Measurements, response: &[f64]) -> Vec<(String, f64)> {
+pub fn accuracy(data: &Observations, response: &[f64]) -> Vec<(String, f64)> {
     let summaries = data.summaries();
     let share = |indices: &[usize]| {
         let (mut inside, mut judged) = (0.0, 0.0);
@@ -283,12 +283,12 @@ pub fn accuracy(data: &Measurements, response: &[f64]) -> Vec<(String, f64)> {
         }
         (judged > 0.0).then(|| inside / judged)
     };
-    let groups = data.layout.groups();
+    let groups = data.layouts().groups();
     groups.iter().filter_map(|g| Some((g.name.clone(), share(&g.indices)?))).collect()
 }
 
 /// The root mean square difference between a response and the replicates' mean.
-fn rmse(data: &Measurements, response: &[f64]) -> f64 {
+fn rmse(data: &Observations, response: &[f64]) -> f64 {
     let summaries = data.summaries();
     let measured = summaries.iter().zip(response).filter(|(s, _)| s.count > 0);
     let squares: Vec<f64> = measured.map(|(s, y)| (y - s.mean).powi(2)).collect();

@@ -2,6 +2,7 @@
 
 use super::resolve::Study;
 use super::{Complaints, Node, Problems};
+use crate::data::Layout;
 use crate::plugin::{Component, Context};
 
 /// A plugin that a study chose.
@@ -15,8 +16,9 @@ pub struct Chosen<'a> {
 }
 
 impl Study {
-    /// What a plugin sees of the study.
-    pub fn context(&self) -> Context<'_> {
+    /// What a plugin sees of the study with a response of this shape: that of a block of scenarios, or for
+    /// models and readers that to one scenario.
+    pub fn context_of<'a>(&'a self, layout: &'a Layout) -> Context<'a> {
         let made = self.design.as_ref().map(|design| design.common.runs.get());
         let kept = self.surrogate.as_ref().map_or(0, |s| s.common.validation);
         let training = self.surrogate.as_ref().and_then(|s| s.common.training).map(usize::from);
@@ -27,7 +29,7 @@ impl Study {
             parameters: &self.parameters,
             given: &self.given,
             scenarios: &self.scenarios,
-            layout: &self.layout,
+            layout,
             runs,
             common_errors: self.numerical_error.is_some() || emulator,
         }
@@ -60,7 +62,11 @@ impl Study {
         problems: &mut Problems,
         look: impl Fn(&dyn Component, &Context<'_>, &mut Complaints<'_>),
     ) {
-        let context = self.context();
+        let records: Vec<Layout> = self
+            .scenarios
+            .iter()
+            .filter_map(|scenario| Some(self.layouts.of_scenario(&scenario.name)?.0))
+            .collect();
         let unwritten = Node::table(root.place.clone());
         let mut effects = root.get("effect").map(Node::elements).unwrap_or_default().iter();
         let finer = self.numerical_error.as_ref().map(|error| Chosen {
@@ -70,10 +76,20 @@ impl Study {
         });
         for Chosen { section, plugin, .. } in self.components().into_iter().chain(finer) {
             let node = if section == "effect" { effects.next() } else { root.get(section) };
-            problems.within(section, |problems| {
-                let complaints = &mut Complaints::new(node.unwrap_or(&unwritten), problems);
-                look(plugin, &context, complaints);
-            });
+            let of_records =
+                ["model", "numerical_error", "simulations", "measurements"].contains(&section);
+            let layouts = if of_records { &records } else { &self.layouts.blocks };
+            for layout in layouts {
+                let before = problems.len();
+                problems.within(section, |problems| {
+                    let complaints = &mut Complaints::new(node.unwrap_or(&unwritten), problems);
+                    look(plugin, &self.context_of(layout), complaints);
+                });
+                // What is wrong for one shape is most often wrong for all.
+                if problems.len() > before {
+                    break;
+                }
+            }
         }
     }
 }

@@ -1,10 +1,12 @@
 //! Second layer of checking: the sections of a study against each other.
 
-use super::nearest::{nearest, one_of};
+mod inputs;
+mod outputs;
+
+use super::nearest::one_of;
 use super::resolve::Study;
 use super::{Complaints, Node, Problems};
-use crate::data::{Coordinates, Parameter};
-use crate::plugin::model::{Input, Signature};
+use crate::data::Parameter;
 use crate::plugin::{Surrogate, registry};
 
 /// Reports everything that is inconsistent.
@@ -20,10 +22,19 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     refinement(study, &mut complaints);
     validation(study, &mut complaints);
     if let Some(model) = &study.model {
-        let signature = model.built.plugin.signature(&study.context());
-        inputs(study, &signature, &mut complaints);
-        outputs(study, &signature, &mut complaints);
+        for (place, scenario) in study.scenarios.iter().enumerate() {
+            let Some((layout, _)) = study.layouts.of_scenario(&scenario.name) else { continue };
+            let signature = model.built.plugin.signature(&study.context_of(&layout));
+            let before = complaints.len();
+            inputs::check(study, place, &signature, &mut complaints);
+            outputs::check(&layout, &signature, &mut complaints);
+            // What is wrong in one scenario is most often wrong in all.
+            if complaints.len() > before {
+                break;
+            }
+        }
     }
+    super::inputs::check(study, root, problems);
     study.each_plugin(root, problems, |component, context, complaints| {
         component.check(context, complaints);
     });
@@ -48,6 +59,49 @@ fn beside_a_target(study: &Study, root: &Node, complaints: &mut Complaints<'_>) 
 
 /// What a section needs of the others.
 fn sections(study: &Study, complaints: &mut Complaints<'_>) {
+    if study.surrogate.is_none() {
+        without_surrogate(study, complaints);
+    } else {
+        runs_to_learn_from(study, complaints);
+    }
+    calibration(study, complaints);
+}
+
+/// Without a surrogate the calibration calls the model itself: nothing is made or read beforehand.
+fn without_surrogate(study: &Study, complaints: &mut Complaints<'_>) {
+    if study.model.is_none() {
+        let names = registry::entries::<dyn Surrogate>().into_iter().map(|entry| entry.name);
+        complaints
+            .at("")
+            .say("the study has neither a `[surrogate]` nor a `[model]`")
+            .help(format!("add `[surrogate]`, with `use` set to {}", one_of(names)))
+            .help("or add `[model]`: a study whose model is cheap needs no surrogate");
+    }
+    if study.measurements.is_none() {
+        complaints.at("").say("the study has neither a `[surrogate]` nor `[measurements]`").help(
+            "there is nothing to do: a surrogate learns from runs, a calibration from measurements",
+        );
+    }
+    let useless = [
+        ("design", study.design.is_some()),
+        ("simulations", study.simulations.is_some()),
+        ("numerical_error", study.numerical_error.is_some()),
+    ];
+    for (name, _) in useless.iter().filter(|(_, there)| *there) {
+        complaints
+            .at(name)
+            .say(format!("a study without `[surrogate]` has no use for `[{name}]`"))
+            .help("the calibration calls the model itself: take the section out, or add `[surrogate]`");
+    }
+    if study.validate.emulator_check > 0 {
+        complaints
+            .at("validate.emulator_check")
+            .say("the study has no surrogate to check")
+            .expected("a `[surrogate]` section, or `emulator_check = 0`");
+    }
+}
+
+fn runs_to_learn_from(study: &Study, complaints: &mut Complaints<'_>) {
     let imported = study.simulations.as_ref().is_some_and(|s| s.built.plugin.names_files());
     let simulated = study.model.is_some() && study.design.is_some();
     if !imported && !simulated {
@@ -61,13 +115,9 @@ fn sections(study: &Study, complaints: &mut Complaints<'_>) {
             .say("the study makes no runs that could be repeated")
             .expected("`[model]` and `[design]`, and no files of finished runs in `[simulations]`");
     }
-    if study.surrogate.is_none() {
-        let names = registry::entries::<dyn Surrogate>().into_iter().map(|entry| entry.name);
-        complaints
-            .at("")
-            .say("the study has no `[surrogate]`")
-            .help(format!("add the section, with `use` set to {}", one_of(names)));
-    }
+}
+
+fn calibration(study: &Study, complaints: &mut Complaints<'_>) {
     let calibration = [
         ("measurements", study.measurements.is_some()),
         ("discrepancy", study.discrepancy.is_some()),
@@ -91,7 +141,9 @@ fn parameters(study: &Study, complaints: &mut Complaints<'_>) {
                 .say(format!("there are two parameters `{}`", parameter.name))
                 .help("give each `[[parameter]]` its own name");
         }
-        inside_design(parameter, complaints);
+        if study.surrogate.is_some() {
+            inside_design(parameter, complaints);
+        }
         if let Some(value) = parameter.reference.filter(|value| !value.is_finite()) {
             complaints
                 .at(&format!("parameter.{}.reference", parameter.name))
@@ -169,167 +221,6 @@ fn validation(study: &Study, complaints: &mut Complaints<'_>) {
                 .at("validate.against")
                 .say(format!("the parameter `{}` has no `reference`", parameter.name))
                 .expected("a `reference` for every parameter");
-        }
-    }
-}
-
-fn inputs(study: &Study, signature: &Signature, complaints: &mut Complaints<'_>) {
-    let names = || signature.inputs.iter().map(|input| input.name.as_str());
-    let listed = names().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");
-    for parameter in &study.parameters {
-        let path = format!("parameter.{}", parameter.name);
-        if let Some(input) = signature.inputs.iter().find(|input| input.name == parameter.name) {
-            input_fits(parameter, input, &path, complaints);
-            continue;
-        }
-        let problem = complaints
-            .at(&format!("{path}.name"))
-            .say(format!("the model has no input `{}`", parameter.name))
-            .expected(format!("one of {listed}"));
-        if let Some(near) = nearest(&parameter.name, names()) {
-            problem.help(format!("did you mean `{near}`?"));
-        }
-    }
-    let fixed = study.model.as_ref().map(|model| &model.common.fixed);
-    for (name, &value) in fixed.into_iter().flatten() {
-        let path = format!("model.fixed.{name}");
-        let Some(input) = signature.inputs.iter().find(|input| &input.name == name) else {
-            let problem = complaints
-                .at(&path)
-                .say(format!("the model has no input `{name}`"))
-                .expected(format!("one of {listed}"));
-            if let Some(near) = nearest(name, names()) {
-                problem.help(format!("did you mean `{near}`?"));
-            }
-            continue;
-        };
-        if study.parameters.iter().any(|p| &p.name == name) {
-            complaints
-                .at(&path)
-                .say(format!("`{name}` is both fixed and a parameter"))
-                .help("take it out of one of the two");
-        }
-        if !(input.range.0..=input.range.1).contains(&value) {
-            out_of_range(input, value, &input.unit.to_string(), &path, complaints);
-        }
-    }
-    let set = |name: &str| {
-        study.parameters.iter().any(|p| p.name == name)
-            || fixed.is_some_and(|fixed| fixed.contains_key(name))
-    };
-    for input in signature.inputs.iter().filter(|i| i.default.is_none() && !set(&i.name)) {
-        complaints
-            .at("model")
-            .say(format!("nothing sets the model's input `{}`", input.name))
-            .help(format!(
-                "add a `[[parameter]]` of that name, or `fixed = {{ {} = … }}`",
-                input.name
-            ));
-    }
-}
-
-fn input_fits(parameter: &Parameter, input: &Input, path: &str, complaints: &mut Complaints<'_>) {
-    let Some(factor) = parameter.unit.factor_to(&input.unit) else {
-        complaints
-            .at(&format!("{path}.unit"))
-            .say(format!("`{}` has the wrong unit", parameter.name))
-            .expected(format!("a unit that converts to `{}`", input.unit))
-            .found(format!("`{}`", parameter.unit));
-        return;
-    };
-    let (low, high) = parameter.design.support();
-    for edge in [low, high] {
-        // Conversions round; a bound that agrees to 12 digits is the bound.
-        let slack = 1e-12 * (edge * factor).abs();
-        let value = edge * factor;
-        if value < input.range.0 - slack || value > input.range.1 + slack {
-            let key = format!("{path}.design");
-            out_of_range(input, value, &input.unit.to_string(), &key, complaints);
-        }
-    }
-}
-
-fn out_of_range(
-    input: &Input,
-    value: f64,
-    unit: &str,
-    path: &str,
-    complaints: &mut Complaints<'_>,
-) {
-    let (low, high) = input.range;
-    let range = match (low.is_finite(), high.is_finite()) {
-        (true, true) => format!("values from {low} to {high} {unit}"),
-        (true, false) => format!("values from {low} {unit} up"),
-        _ => format!("values up to {high} {unit}"),
-    };
-    complaints
-        .at(path)
-        .say(format!("`{}` leaves the range in which the model answers", input.name))
-        .expected(range)
-        .found(format!("{value} {unit}"));
-}
-
-fn outputs(study: &Study, signature: &Signature, complaints: &mut Complaints<'_>) {
-    let (ours, theirs) = (&study.layout, &signature.layout);
-    if ours.unit.factor_to(&theirs.unit).is_none() {
-        complaints
-            .at("response.unit")
-            .say(format!("the model's `{}` has another dimension", theirs.name))
-            .expected(format!("a unit that converts to `{}`", theirs.unit))
-            .found(format!("`{}`", ours.unit));
-    }
-    let names = |axes: &[crate::data::Axis]| {
-        axes.iter().map(|a| format!("`{}`", a.name)).collect::<Vec<_>>().join(", ")
-    };
-    let same_names = ours.axes.len() == theirs.axes.len()
-        && ours.axes.iter().zip(&theirs.axes).all(|(a, b)| a.name == b.name);
-    if !same_names {
-        complaints
-            .at("response.axes")
-            .say("the model's response has other axes")
-            .expected(if theirs.axes.is_empty() {
-                "no axes".to_owned()
-            } else {
-                names(&theirs.axes)
-            })
-            .found(if ours.axes.is_empty() { "none".to_owned() } else { names(&ours.axes) });
-        return;
-    }
-    for (a, b) in ours.axes.iter().zip(&theirs.axes) {
-        let path = format!("response.axes.{}", a.name);
-        match (&a.coordinates, &b.coordinates) {
-            (Coordinates::Labels(labels), Coordinates::Labels(known)) => {
-                for label in labels.iter().filter(|label| !known.contains(label)) {
-                    let listed = known.iter().map(|l| format!("`{l}`")).collect::<Vec<_>>();
-                    complaints
-                        .at(&path)
-                        .say(format!("the model has no {} `{label}`", a.name))
-                        .expected(format!("some of {}", listed.join(", ")));
-                }
-            }
-            (Coordinates::Grid { unit, .. }, Coordinates::Grid { unit: known, .. }) => {
-                if unit.factor_to(known).is_none() {
-                    complaints
-                        .at(&format!("{path}.unit"))
-                        .say(format!("the axis `{}` has the wrong unit", a.name))
-                        .expected(format!("a unit that converts to `{known}`"))
-                        .found(format!("`{unit}`"));
-                }
-            }
-            (Coordinates::Labels(_), Coordinates::Grid { .. }) => {
-                complaints
-                    .at(&path)
-                    .say(format!("the axis `{}` is a grid of numbers", a.name))
-                    .expected("a table such as `{ first = 1e-5, last = 1e-3, count = 100, unit = \"s\" }`")
-                    .found("labels");
-            }
-            (Coordinates::Grid { .. }, Coordinates::Labels(_)) => {
-                complaints
-                    .at(&path)
-                    .say(format!("the axis `{}` is a list of labels", a.name))
-                    .expected("a list such as `[\"B\", \"C\"]`")
-                    .found("a grid of numbers");
-            }
         }
     }
 }

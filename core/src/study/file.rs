@@ -8,7 +8,9 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use super::quantity::Quantity;
 pub use super::response::{Axes, AxisSection, GridSection, ResponseSection};
+pub use super::scenario::{FunctionSection, ScenarioSection};
 use super::values::{Count, Fraction, Name, Positive};
 use crate::data::Unit;
 use crate::math::distribution::Distribution;
@@ -37,8 +39,12 @@ pub struct StudySection {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ParameterSection {
-    /// The name of the model's input that it sets.
+    /// The name of the model's input that it sets, or a name that the expressions of `inputs` in `[model]` use.
     pub name: Name,
+    /// The scenario to which it belongs, such as the initial state of one record; `"each"` makes one parameter a
+    /// scenario, called `name[scenario]`. All scenarios share the parameter when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scenario: Option<String>,
     /// The symbol used in figures, such as `x1`; the name when left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub symbol: Option<String>,
@@ -59,8 +65,13 @@ pub struct ParameterSection {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct ModelKeys {
-    /// Values of inputs that are not calibrated, in the model's units; its defaults when left out.
-    pub fixed: BTreeMap<String, f64>,
+    /// Values of inputs that are not calibrated: numbers in the model's units, or with a unit as in
+    /// `{ value = 20, unit = "degC" }`; its defaults when left out.
+    pub fixed: BTreeMap<String, Quantity>,
+    /// Inputs of the model as expressions of parameters and of the values of scenarios, such as
+    /// `{ damping = "base + slope * gas_fraction" }`.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub inputs: BTreeMap<String, String>,
 }
 
 /// The engine's keys of `[design]`.

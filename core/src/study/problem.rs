@@ -229,6 +229,16 @@ impl<'a> Complaints<'a> {
         Self { section, problems }
     }
 
+    /// The number of problems so far, those of other sections counted.
+    pub fn len(&self) -> usize {
+        self.problems.len()
+    }
+
+    /// Whether nothing is wrong so far.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
     /// The value at a dotted path of the section, or the nearest parent that was written.
     pub fn at(&mut self, path: &str) -> Spot<'_> {
         let place = Some(self.section.nearest_place(path));

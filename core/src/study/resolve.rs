@@ -14,11 +14,12 @@ use super::file::{
     ResponseSection, SamplerKeys, StudySection, SurrogateKeys, ValidateSection,
 };
 use super::sections::{
-    chosen, chosen_or, effects, given, layout, numerical_error, parameter, parameters, table,
+    chosen, chosen_or, effects, layouts, numerical_error, parameters, scenarios, table,
     unknown_sections,
 };
+use super::unknowns::{Unknown, unknowns};
 use super::{Node, Problems, Sources, inherit, overrides, resolved};
-use crate::data::{Layout, Parameter, Scenario};
+use crate::data::{Layout, Layouts, Parameter, Scenario};
 use crate::plugin::registry::{NoKeys, Section};
 use crate::plugin::{
     Density, Design, Discrepancy, Effect, Executor, Given, Model, Reader, Sampler, Surrogate,
@@ -38,10 +39,12 @@ pub struct Study {
     pub parameters: Vec<Parameter>,
     /// The known conditions; one without a name where the study has no scenarios.
     pub scenarios: Vec<Scenario>,
+    /// What each parameter stands for.
+    pub unknowns: Vec<Unknown>,
     /// What the study sets of the model's inputs.
     pub given: Vec<Given>,
-    /// The shape of the response.
-    pub layout: Layout,
+    /// The shapes of the responses to all scenarios.
+    pub layouts: Layouts,
     /// `[target]`.
     pub target: Option<Section<dyn Density, NoKeys>>,
     /// `[model]`.
@@ -81,10 +84,11 @@ pub struct NumericalError {
 }
 
 /// The sections of the study language, in the order in which a study is written.
-pub const SECTIONS: [&str; 15] = [
+pub const SECTIONS: [&str; 16] = [
     "study",
     "parameter",
     "target",
+    "scenario",
     "response",
     "model",
     "design",
@@ -180,11 +184,11 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
         None if root.get("target").is_some() => Some(None),
         _ => table::<ResponseSection>(root, "response", problems).map(Some),
     };
-    let layout = match &response {
-        Some(Some(response)) => layout(response, root, problems),
-        Some(None) => Some(Layout::number("log_density")),
-        None => None,
-    };
+    let mut about = about?;
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+    let directory = about.directory.take().map_or(folder.clone(), |given| folder.join(given));
+    let scenarios = scenarios(root, &directory, problems);
     let before = problems.len();
     let target = chosen(root, "target", None, problems);
     let model = chosen(root, "model", None, problems);
@@ -201,24 +205,30 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
         Some(node) => problems.within("validate", |problems| decode(node, problems)),
         None => Some(ValidateSection::default()),
     };
+    let measured: Option<&Section<dyn Reader, MeasurementKeys>> = measurements.as_ref();
+    let reader = measured.map(|section| &*section.built.plugin);
+    let layouts = match (&response, &scenarios) {
+        (Some(Some(response)), Some((_, sections))) => {
+            layouts(response, sections, reader, &directory, root, problems)
+        }
+        (Some(None), _) => Some(Layout::number("log_density").into()),
+        _ => None,
+    };
+    let (scenarios, sections) = scenarios?;
+    let (parameters, unknowns) = unknowns(&parameters?, &scenarios, root, problems);
     if problems.len() > before {
         return None;
     }
-    let mut about = about?;
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-    let directory = about.directory.take().map_or(folder.clone(), |given| folder.join(given));
-    let parameters: Vec<Parameter> = parameters?.iter().map(parameter).collect();
-    let given = given(&parameters, model.as_ref());
     let mut study = Study {
         name: about.name.take().unwrap_or(stem),
         directory,
         text,
         about,
         parameters,
-        scenarios: vec![Scenario::default()],
-        given,
-        layout: layout?,
+        scenarios,
+        unknowns,
+        given: Vec::new(),
+        layouts: layouts?,
         target,
         model,
         design,
@@ -233,7 +243,8 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
         validate: validate?,
         resolved: Table::new(),
     };
-    match resolved::table(&study, response?.as_ref()) {
+    study.given = study.all_given();
+    match resolved::table(&study, response?.as_ref(), &sections) {
         Ok(resolved) => study.resolved = resolved,
         Err(error) => {
             problems.report(None, format!("the study with its defaults {error}"));

@@ -3,7 +3,7 @@
 use toml::Table;
 
 use super::emit::{Unwritable, to_table};
-use super::file::ResponseSection;
+use super::file::{ResponseSection, ScenarioSection};
 use super::resolve::Study;
 use crate::plugin::registry::Section;
 
@@ -11,15 +11,37 @@ use crate::plugin::registry::Section;
 pub(super) fn table(
     study: &Study,
     response: Option<&ResponseSection>,
+    scenarios: &[ScenarioSection],
 ) -> Result<Table, Unwritable> {
     let mut about = to_table(&study.about)?;
     about.insert("name".to_owned(), study.name.clone().into());
     let directory = std::path::absolute(&study.directory).unwrap_or(study.directory.clone());
     about.insert("directory".to_owned(), directory.display().to_string().into());
-    let parameters: Result<Vec<Table>, _> = study.parameters.iter().map(to_table).collect();
+    let parameters: Result<Vec<Table>, _> = study
+        .parameters
+        .iter()
+        .zip(&study.unknowns)
+        .map(|(parameter, unknown)| {
+            let mut table = to_table(parameter)?;
+            table.insert("name".to_owned(), unknown.name.clone().into());
+            if let Some(scenario) = unknown.scenario {
+                let name = study.scenarios[scenario].name.clone();
+                // The symbol of one scenario's parameter is made from the written one.
+                let suffix = format!("[{name}]");
+                let symbol = parameter.symbol.strip_suffix(&suffix).unwrap_or(&parameter.symbol);
+                table.insert("symbol".to_owned(), symbol.into());
+                table.insert("scenario".to_owned(), name.into());
+            }
+            Ok(table)
+        })
+        .collect();
     let mut whole = Table::new();
     whole.insert("study".to_owned(), about.into());
     whole.insert("parameter".to_owned(), parameters?.into());
+    if !scenarios.is_empty() {
+        let scenarios: Result<Vec<Table>, _> = scenarios.iter().map(to_table).collect();
+        whole.insert("scenario".to_owned(), scenarios?.into());
+    }
     if let Some(response) = response {
         whole.insert("response".to_owned(), to_table(response)?.into());
     }

@@ -37,7 +37,7 @@ pub enum AxisSection {
     Grid(GridSection),
 }
 
-/// An axis of increasing numbers: either `first`, `last` and `count`, or `values`.
+/// An axis of increasing numbers: `first`, `last` and `count`, or `values`, or those of the measurements.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GridSection {
@@ -53,18 +53,29 @@ pub struct GridSection {
     /// The numbers themselves, increasing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub values: Option<Vec<f64>>,
+    /// Whether the numbers are those at which the scenario was measured, as its file has them.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub measured: bool,
     /// Their unit.
     #[serde(default = "Unit::dimensionless")]
     pub unit: Unit,
 }
 
 impl GridSection {
-    /// The numbers, or what is wrong with them.
-    pub fn numbers(&self) -> Result<Vec<f64>, String> {
-        let numbers = match (self.first, self.last, self.count, &self.values) {
-            (None, None, None, Some(values)) => values.clone(),
-            (Some(first), Some(last), Some(count), None) => evenly(first, last, count.get()),
-            _ => return Err("expected `first`, `last` and `count`, or `values`".to_owned()),
+    /// The numbers, or what is wrong with them; `measured` gives those of the measurements.
+    pub fn numbers(
+        &self,
+        measured: impl FnOnce(&Unit) -> Result<Vec<f64>, String>,
+    ) -> Result<Vec<f64>, String> {
+        let numbers = match (self.first, self.last, self.count, &self.values, self.measured) {
+            (None, None, None, None, true) => measured(&self.unit)?,
+            (None, None, None, Some(values), false) => values.clone(),
+            (Some(first), Some(last), Some(count), None, false) => evenly(first, last, count.get()),
+            _ => {
+                let ways =
+                    "expected `first`, `last` and `count`, or `values`, or `measured = true`";
+                return Err(ways.to_owned());
+            }
         };
         match numbers
             .windows(2)
@@ -93,8 +104,12 @@ fn evenly(first: f64, last: f64, count: usize) -> Vec<f64> {
 }
 
 impl AxisSection {
-    /// The axis, or what is wrong with it.
-    pub fn axis(&self, name: &str) -> Result<Axis, String> {
+    /// The axis, or what is wrong with it; `measured` gives the numbers of the measurements in a unit.
+    pub fn axis(
+        &self,
+        name: &str,
+        measured: impl FnOnce(&Unit) -> Result<Vec<f64>, String>,
+    ) -> Result<Axis, String> {
         match self {
             Self::Labels(labels) => {
                 if labels.is_empty() {
@@ -107,7 +122,7 @@ impl AxisSection {
                     None => Ok(Axis::labels(name, labels.iter().cloned())),
                 }
             }
-            Self::Grid(grid) => Ok(Axis::grid(name, grid.numbers()?, grid.unit.clone())),
+            Self::Grid(grid) => Ok(Axis::grid(name, grid.numbers(measured)?, grid.unit.clone())),
         }
     }
 }

@@ -1,14 +1,19 @@
 //! The sections of a study file, decoded one by one.
 
+use std::path::Path;
+
 use serde::de::DeserializeOwned;
 
 use super::decode::decode;
-use super::file::{ModelKeys, NumericalErrorSection, ParameterSection, ResponseSection};
+use super::file::{
+    Axes, NumericalErrorSection, ParameterSection, ResponseSection, ScenarioSection,
+};
 use super::resolve::{NumericalError, SECTIONS};
 use super::{Complaints, Node, Problems, nearest};
-use crate::data::{Layout, Parameter};
+use crate::data::{Axis, Layout, Layouts, Scenario, Unit};
+use crate::plugin::reader::GridSource;
 use crate::plugin::registry::{Kind, NoKeys, Section, section};
-use crate::plugin::{Effect, Given, Model};
+use crate::plugin::{Effect, Reader};
 
 pub(super) fn unknown_sections(root: &Node, problems: &mut Problems) {
     for (key, _) in root.entries() {
@@ -125,49 +130,125 @@ pub(super) fn effects(
     decoded.into_iter().collect()
 }
 
-pub(super) fn parameter(section: &ParameterSection) -> Parameter {
-    let name = section.name.as_str().to_owned();
-    Parameter {
-        symbol: section.symbol.clone().unwrap_or_else(|| name.clone()),
-        name,
-        unit: section.unit.clone(),
-        design: section.design.clone().unwrap_or_else(|| section.prior.clone()),
-        prior: section.prior.clone(),
-        reference: section.reference,
+/// `[[scenario]]`: one without a name where there is none.
+pub(super) fn scenarios(
+    root: &Node,
+    directory: &Path,
+    problems: &mut Problems,
+) -> Option<(Vec<Scenario>, Vec<ScenarioSection>)> {
+    let list = root.get("scenario").map(Node::elements).unwrap_or_default();
+    if list.is_empty() {
+        return Some((vec![Scenario::default()], Vec::new()));
     }
+    let (mut scenarios, mut sections): (Vec<Scenario>, Vec<ScenarioSection>) = Default::default();
+    for node in list {
+        let path = format!("scenario.{}", node.name().unwrap_or("?"));
+        problems.within(&path, |problems| {
+            let section: ScenarioSection = decode(node, problems)?;
+            let twice = sections.iter().any(|other| other.name == section.name);
+            let wrong = if section.name.is_empty() || section.name == "each" {
+                Some("a scenario cannot be called this".to_owned())
+            } else {
+                twice.then(|| format!("there are two scenarios `{}`", section.name))
+            };
+            if let Some(wrong) = wrong {
+                Complaints::new(node, problems)
+                    .at("name")
+                    .say(wrong)
+                    .expected("a name of its own for each `[[scenario]]`");
+                return None;
+            }
+            let scenario = section.read(directory, &mut |key, reason| {
+                Complaints::new(node, problems).at(key).say(reason);
+            })?;
+            scenarios.push(scenario);
+            sections.push(section);
+            Some(())
+        });
+    }
+    (sections.len() == list.len()).then_some((scenarios, sections))
 }
 
-/// What a study sets of its model's inputs.
-pub(super) fn given(
-    parameters: &[Parameter],
-    model: Option<&Section<dyn Model, ModelKeys>>,
-) -> Vec<Given> {
-    let set = |p: &Parameter| Given { name: p.name.clone(), unit: Some(p.unit.clone()) };
-    let fixed = model.into_iter().flat_map(|model| model.common.fixed.keys());
-    let fixed = fixed.map(|name| Given { name: name.clone(), unit: None });
-    parameters.iter().map(set).chain(fixed).collect()
-}
-
-pub(super) fn layout(
-    section: &ResponseSection,
+/// The shapes of the responses to all scenarios; the measurements say where they were taken, if asked.
+pub(super) fn layouts(
+    response: &ResponseSection,
+    scenarios: &[ScenarioSection],
+    reader: Option<&dyn Reader>,
+    directory: &Path,
     root: &Node,
     problems: &mut Problems,
-) -> Option<Layout> {
-    let mut axes = Vec::new();
+) -> Option<Layouts> {
     let node = root.get("response")?;
-    problems.within("response", |problems| {
-        for (name, axis) in &section.axes.0 {
+    let own = &response.axes;
+    let shape = |axes| Layout {
+        name: response.name.as_str().to_owned(),
+        unit: response.unit.clone(),
+        axes,
+    };
+    if scenarios.is_empty() {
+        let grids = Grids { reader, directory, scenario: None };
+        let axes = problems.within("response", |problems| grids.axes(own, node, problems))?;
+        return Some(shape(axes).into());
+    }
+    let sections = root.get("scenario").map(Node::elements).unwrap_or_default();
+    let mut layouts = Vec::new();
+    for (scenario, section) in scenarios.iter().zip(sections) {
+        let mut axes = own.clone();
+        for (name, axis) in &scenario.axes.0 {
+            match axes.0.iter_mut().find(|(other, _)| other == name) {
+                Some((_, other)) => *other = axis.clone(),
+                None => axes.0.push((name.clone(), axis.clone())),
+            }
+        }
+        let grids = Grids { reader, directory, scenario: Some(&scenario.name) };
+        let overridden =
+            |path: &str| scenario.axes.0.iter().any(|(n, _)| path.ends_with(n.as_str()));
+        let found = problems.within(&format!("scenario.{}", scenario.name), |problems| {
+            let from = |path: &str| if overridden(path) { section } else { node };
+            grids.axes_from(&axes, from, problems)
+        });
+        layouts.push((scenario.name.as_str(), shape(found?)));
+    }
+    Some(Layouts::of_scenarios(layouts))
+}
+
+/// Where the numbers of axes come from that the measurements give.
+struct Grids<'a> {
+    reader: Option<&'a dyn Reader>,
+    directory: &'a Path,
+    scenario: Option<&'a str>,
+}
+
+impl Grids<'_> {
+    fn axes(&self, axes: &Axes, node: &Node, problems: &mut Problems) -> Option<Vec<Axis>> {
+        self.axes_from(axes, |_| node, problems)
+    }
+
+    fn axes_from<'n>(
+        &self,
+        axes: &Axes,
+        node: impl Fn(&str) -> &'n Node,
+        problems: &mut Problems,
+    ) -> Option<Vec<Axis>> {
+        let mut found = Vec::new();
+        for (name, axis) in &axes.0 {
             let path = format!("axes.{}", name.as_str());
-            match axis.axis(name.as_str()) {
-                Ok(axis) => axes.push(axis),
+            match axis.axis(name.as_str(), |unit| self.measured(name.as_str(), unit)) {
+                Ok(axis) => found.push(axis),
                 Err(reason) => {
                     let message = format!("the axis `{}`: {reason}", name.as_str());
-                    Complaints::new(node, problems).at(&path).say(message);
+                    Complaints::new(node(&path), problems).at(&path).say(message);
                 }
             }
         }
-    });
-    let whole = axes.len() == section.axes.0.len();
-    let name = section.name.as_str().to_owned();
-    whole.then(|| Layout { name, unit: section.unit.clone(), axes })
+        (found.len() == axes.0.len()).then_some(found)
+    }
+
+    fn measured(&self, name: &str, unit: &Unit) -> Result<Vec<f64>, String> {
+        let reader =
+            self.reader.ok_or("the study has no measurements that could give its numbers")?;
+        let source =
+            GridSource { directory: self.directory, scenario: self.scenario, axis: name, unit };
+        reader.grid(&source).map_err(|error| error.to_string())
+    }
 }

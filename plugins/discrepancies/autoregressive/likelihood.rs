@@ -294,15 +294,15 @@ impl Likelihood for AutoregressiveLikelihood {
         self.noise.setting.parts(&variance.unwrap_or_else(|| vec![f64::NAN; response.len()]))
     }
 
-    fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Measurements {
+    fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements> {
         let groups = self.noise.variance.values(hyper).unwrap_or_default();
         let sds: Vec<f64> = self.noise.by_output(groups).iter().map(|v| v.sqrt()).collect();
         let times = self.times.spread(self.time.values(hyper).unwrap_or_default());
         let mean = self.noise.setting.with_common_errors(response, stream);
-        self.noise.setting.replaced(stream, |own| {
+        vec![self.noise.setting.replaced(stream, |own| {
             let noise = self.noise_of(&sds, &times, own);
             mean.iter().zip(noise).map(|(m, e)| m + e).collect()
-        })
+        })]
     }
 
     fn facts(&self) -> Vec<Fact> {

@@ -77,7 +77,7 @@ fn simulated_noise_has_the_stationary_covariance() {
     let mut sums = [[0.0; TIMES]; TIMES];
     for k in 0..count {
         let made = likelihood.simulate(&[0.0; OUTPUTS], &[], &Stream::root(3).at(k));
-        let y = |j: usize| made.replicates[0].values[TIMES + j].unwrap();
+        let y = |j: usize| made[0].replicates[0].values[TIMES + j].unwrap();
         for (i, row) in sums.iter_mut().enumerate() {
             row.iter_mut().enumerate().for_each(|(j, s)| *s += y(i) * y(j));
         }

@@ -1,7 +1,7 @@
 //! Densities written out with the dense covariance of all data, for the tests.
 #![allow(clippy::unwrap_used)]
 
-use lacuna::data::{Axis, Layout, Measurements, Replicate, Scenario, Unit};
+use lacuna::data::{Axis, Layout, Measurements, Replicate, Unit};
 use lacuna::linalg::{Cholesky, Matrix};
 use lacuna::math::random::{Stream, normal, uniform};
 use lacuna::plugin::discrepancy::{CommonError, Likelihood};
@@ -29,7 +29,6 @@ pub fn data(seed: u64, replicates: usize) -> Measurements {
     let mut rng = Stream::root(seed).generator();
     let replicate = |r: usize, rng: &mut _| Replicate {
         name: r.to_string(),
-        scenario: Scenario::default(),
         values: (0..OUTPUTS)
             .map(|i| {
                 let y = normal(rng) * (1.0 + (i / TIMES) as f64) + (i as f64).sin();

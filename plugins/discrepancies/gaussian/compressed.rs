@@ -13,7 +13,7 @@
 use lacuna::linalg::vector::dot;
 use lacuna::linalg::{self, Matrix};
 use lacuna::plugin::discrepancy::Compressed;
-use lacuna::plugin::surrogate::{Linear, SumOfSquares};
+use lacuna::plugin::forward::{Linear, SumOfSquares};
 
 use super::law::Law;
 use super::likelihood::GaussianLikelihood;

@@ -6,7 +6,7 @@ use lacuna::linalg::{self, Matrix};
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::Fact;
 use lacuna::plugin::discrepancy::{Compressed, Hyperparameter, Known, Likelihood, VariancePart};
-use lacuna::plugin::surrogate::Linear;
+use lacuna::plugin::forward::Linear;
 use lacuna::run::Stop;
 
 use super::Gaussian;
@@ -198,7 +198,7 @@ impl Likelihood for GaussianLikelihood {
     }
 
     /// Variances that are integrated out are drawn from what the data say of them about this response.
-    fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Measurements {
+    fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements> {
         let mut rng = stream.named("variance").generator();
         let groups = self.variances(response, hyper).unwrap_or_default();
         let mut draw = |nodes: &Vec<(f64, f64)>| {
@@ -210,7 +210,7 @@ impl Likelihood for GaussianLikelihood {
             chosen.or(nodes.last()).map_or(0.0, |node| node.0)
         };
         let variance: Vec<f64> = groups.iter().map(&mut draw).collect();
-        self.noise.setting.simulate(response, &self.noise.by_output(&variance), stream)
+        vec![self.noise.setting.simulate(response, &self.noise.by_output(&variance), stream)]
     }
 
     fn facts(&self) -> Vec<Fact> {

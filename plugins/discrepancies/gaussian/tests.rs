@@ -1,11 +1,11 @@
 //! The likelihood against the multivariate normal density written out, and its parts against each other.
 #![allow(clippy::unwrap_used)]
 
-use lacuna::data::{Axis, Layout, Measurements, Replicate, Scenario, Unit};
+use lacuna::data::{Axis, Layout, Measurements, Replicate, Unit};
 use lacuna::linalg::{self, Cholesky, Matrix};
 use lacuna::math::random::{Stream, normal, uniform};
 use lacuna::plugin::discrepancy::{CommonError, Known, Likelihood};
-use lacuna::plugin::surrogate::Linear;
+use lacuna::plugin::forward::Linear;
 
 use super::Gaussian;
 use super::likelihood::GaussianLikelihood;
@@ -38,7 +38,6 @@ fn data(seed: u64) -> Measurements {
     let mut rng = Stream::root(seed).generator();
     let replicate = |r: usize, rng: &mut _| Replicate {
         name: r.to_string(),
-        scenario: Scenario::default(),
         values: (0..OUTPUTS)
             .map(|i| {
                 let y = normal(rng) + i as f64;
@@ -179,7 +178,7 @@ fn simulated_data_have_the_gaps_of_the_measurements_and_the_variance_asked_for()
     let mut count = 0.0;
     for k in 0..400 {
         let simulated = full.simulate(&response, &[0.25], &Stream::root(9).at(k));
-        for (made, real) in simulated.replicates.iter().zip(&data.replicates) {
+        for (made, real) in simulated[0].replicates.iter().zip(&data.replicates) {
             for (m, r) in made.values.iter().zip(&real.values) {
                 assert_eq!(m.is_some(), r.is_some());
                 if let Some(m) = m {

@@ -196,13 +196,13 @@ impl Likelihood for BiasedLikelihood {
         parts
     }
 
-    fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Measurements {
+    fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements> {
         let setting = &self.noise.setting;
         let mut mean = setting.with_common_errors(response, stream);
         let bias = self.draw(hyper, &stream.named("bias")).unwrap_or_default();
         mean.iter_mut().zip(bias).for_each(|(m, b)| *m += b);
         let noise = self.noise.by_output(self.noise.variance.values(hyper).unwrap_or_default());
-        setting.noisy(&mean, &noise, stream)
+        vec![setting.noisy(&mean, &noise, stream)]
     }
 
     fn facts(&self) -> Vec<Fact> {

@@ -116,7 +116,7 @@ fn the_bias_is_orthogonal_to_what_the_parameters_do() {
     let likelihood = build(silent, &data, &[]);
     let drawn = likelihood.simulate(&[0.0; OUTPUTS], &[], &Stream::root(5));
     let values: Vec<Option<f64>> =
-        kept.iter().map(|&i| drawn.replicates.iter().find_map(|r| r.values[i])).collect();
+        kept.iter().map(|&i| drawn[0].replicates.iter().find_map(|r| r.values[i])).collect();
     let values: Vec<f64> = values.into_iter().flatten().collect();
     let along = linalg::transposed_multiply_vector(&slopes, &values);
     assert!(along.iter().all(|x| x.abs() < 1e-9), "{along:?}");

@@ -160,9 +160,9 @@ impl Likelihood for Proportional {
         self.setting.parts(&self.variance(response, hyper).unwrap_or_default())
     }
 
-    fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Measurements {
+    fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements> {
         let variance = self.variance(response, hyper).unwrap_or_default();
-        self.setting.simulate(response, &variance, stream)
+        vec![self.setting.simulate(response, &variance, stream)]
     }
 }
 

@@ -192,19 +192,19 @@ impl Likelihood for StudentLikelihood {
     }
 
     /// Student's number is a normal one over the root of a chi-squared one over its degrees of freedom.
-    fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Measurements {
+    fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements> {
         let mean = self.mean(response, hyper);
         let freedom = self.freedom.values(hyper).map_or(f64::NAN, |f| f[0]);
         let scale = self.groups.spread(self.scale.values(hyper).unwrap_or_default());
         let law = Distribution::Gamma([0.5 * freedom, 2.0 / freedom]);
-        self.setting.replaced(stream, |own| {
+        vec![self.setting.replaced(stream, |own| {
             let mut rng = own.generator();
             let mut value = |(m, s): (&f64, &f64)| {
                 let z = normal(&mut rng);
                 m + s * z / law.sample(&mut rng).sqrt()
             };
             mean.iter().zip(&scale).map(&mut value).collect()
-        })
+        })]
     }
 
     fn facts(&self) -> Vec<Fact> {

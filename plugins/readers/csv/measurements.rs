@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use lacuna::data::{Condition, Layout, Measurements, Replicate, Scenario};
+use lacuna::data::layouts::SCENARIO;
+use lacuna::data::{Layout, Measurements, Replicate, Unit};
 use lacuna::plugin::reader::ReadError;
 
 use crate::readers::cells::LongColumns;
@@ -14,36 +15,27 @@ struct Rows {
     lines: Vec<usize>,
 }
 
-/// Reads the table: one replicate for each pair of `replicate` and conditions' name.
+/// Reads the table: one replicate for each name in the column `replicate`.
 pub(super) fn measurements(
     sheet: &Sheet,
     layout: &Layout,
-    scenario: &[String],
     ignore: &[String],
 ) -> Result<Measurements, ReadError> {
     let columns = LongColumns::find(sheet, layout)?;
     let name = sheet.column("replicate")?;
-    let conditions = Conditions::find(sheet, scenario)?;
-    reject_unknown(sheet, ignore, |c| columns.has(c) || c == name || conditions.has(c))?;
-    let mut order: BTreeMap<(&str, String), usize> = BTreeMap::new();
+    reject_unknown(sheet, ignore, |c| columns.has(c) || c == name)?;
+    let mut order: BTreeMap<&str, usize> = BTreeMap::new();
     let mut found: Vec<Rows> = Vec::new();
     for record in &sheet.records {
         let place = columns.place(sheet, record)?;
-        let scenario = conditions.read(sheet, record)?;
         let replicate = record.cells[name].as_str();
-        let key = (replicate, scenario.name.clone());
-        let number = *order.entry(key).or_insert_with(|| {
+        let number = *order.entry(replicate).or_insert_with(|| {
             let values = vec![None; layout.len()];
-            let name = replicate.to_owned();
-            let replicate = Replicate { name, scenario: scenario.clone(), values };
+            let replicate = Replicate { name: replicate.to_owned(), values };
             found.push(Rows { replicate, lines: vec![0; layout.len()] });
             found.len() - 1
         });
         let rows = &mut found[number];
-        if rows.replicate.scenario != scenario {
-            let text = format!("replicate `{replicate}` changes its conditions");
-            return Err(sheet.complain(record, name, text));
-        }
         if rows.lines[place] > 0 {
             let text = format!(
                 "a second value of replicate `{replicate}` for {}; the first is in line {}",
@@ -60,6 +52,24 @@ pub(super) fn measurements(
     Ok(Measurements { layout: layout.clone(), replicates })
 }
 
+/// The numbers of an axis that appear in the table, increasing.
+pub(super) fn grid(sheet: &Sheet, axis: &str, unit: &Unit) -> Result<Vec<f64>, ReadError> {
+    let column = sheet.column(axis)?;
+    let conversion = sheet.conversion(column, unit)?;
+    let mut numbers = Vec::with_capacity(sheet.records.len());
+    for record in &sheet.records {
+        let x = sheet.number(record, column)?.and_then(|x| conversion.apply(x));
+        let x = x.filter(|x| x.is_finite()).ok_or_else(|| {
+            let cell = &record.cells[column];
+            sheet.complain(record, column, format!("expected a finite number, found `{cell}`"))
+        })?;
+        numbers.push(x);
+    }
+    numbers.sort_by(f64::total_cmp);
+    numbers.dedup();
+    Ok(numbers)
+}
+
 fn measured(
     sheet: &Sheet,
     record: &Record,
@@ -74,37 +84,6 @@ fn measured(
     Ok(value)
 }
 
-/// The columns that say under which conditions a replicate was taken.
-struct Conditions {
-    name: Option<usize>,
-    values: Vec<usize>,
-}
-
-impl Conditions {
-    fn find(sheet: &Sheet, names: &[String]) -> Result<Self, ReadError> {
-        let values = names.iter().map(|name| sheet.column(name)).collect::<Result<_, _>>()?;
-        Ok(Self { name: sheet.find("scenario"), values })
-    }
-
-    fn has(&self, column: usize) -> bool {
-        self.name == Some(column) || self.values.contains(&column)
-    }
-
-    fn read(&self, sheet: &Sheet, record: &Record) -> Result<Scenario, ReadError> {
-        let name = self.name.map_or(String::new(), |column| record.cells[column].clone());
-        let values = self.values.iter().map(|&column| {
-            let value = sheet.number(record, column)?.ok_or_else(|| {
-                let cell = &record.cells[column];
-                sheet.complain(record, column, format!("expected a number, found `{cell}`"))
-            })?;
-            let name = sheet.headings[column].name.clone();
-            Ok(Condition { name, value, unit: None })
-        });
-        let values = values.collect::<Result<_, ReadError>>()?;
-        Ok(Scenario { name, values, functions: Vec::new() })
-    }
-}
-
 /// A column that nothing reads may hold a condition: replicates of different conditions must not
 /// silently become one.
 fn reject_unknown(
@@ -112,13 +91,14 @@ fn reject_unknown(
     ignore: &[String],
     known: impl Fn(usize) -> bool,
 ) -> Result<(), ReadError> {
-    let unknown =
-        (0..sheet.headings.len()).find(|&c| !known(c) && !ignore.contains(&sheet.headings[c].name));
+    let unknown = (0..sheet.headings.len()).find(|&c| {
+        !known(c) && sheet.headings[c].name != SCENARIO && !ignore.contains(&sheet.headings[c].name)
+    });
     let Some(column) = unknown else { return Ok(()) };
     let text = format!("column `{}` has no meaning here", sheet.headings[column].name);
     Err(ReadError::new(&sheet.path, text)
         .at(format!("line {}, column {}", sheet.heading_line, column + 1))
-        .help("list it under `scenario` if it is a condition, else under `ignore`"))
+        .help("list it under `ignore` if it means nothing, or make it a scenario if it is a condition"))
 }
 
 /// Every sensor and every time of the response has to appear in some row, be it without a value.

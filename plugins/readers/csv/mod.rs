@@ -7,7 +7,9 @@ mod measurements;
 use std::path::{Path, PathBuf};
 
 use lacuna::data::{Ensemble, Layout, Measurements};
-use lacuna::plugin::reader::{Contents, EnsembleSource, MeasurementSource, ReadError};
+use lacuna::plugin::reader::{
+    Contents, EnsembleSource, GridSource, MeasurementSource, ReadError, scenario_path,
+};
 use lacuna::plugin::{Component, Context, Reader};
 use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
@@ -15,6 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::cells::LongColumns;
 use super::runs::{self, AllowFailed};
+use super::scenario;
 use super::sheet::Sheet;
 use super::sierra::heartbeat;
 
@@ -32,7 +35,10 @@ use super::sierra::heartbeat;
 ///
 /// **Measurements** (section `measurements`): one long table `path` with the columns `replicate`,
 /// the axes and the response's name. A blank cell, `NaN`, or a row that is not there is a missing
-/// value. The column `scenario` and those listed under `scenario` give the conditions.
+/// value.
+///
+/// **Scenarios**: in a study with `[[scenario]]` sections the column `scenario` of these tables says to which a row
+/// belongs; or a path holds `{scenario}`, and each scenario has a file of its own.
 ///
 /// **A single response** of an external simulator: a long table with the axes and the response.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -52,8 +58,6 @@ pub struct Csv {
     /// How many runs without a complete response may be left out: below 1 a fraction, from 1 on a
     /// count.
     pub allow_failed: AllowFailed,
-    /// Columns of a table of measurements that hold conditions, as numbers.
-    pub scenario: Vec<String>,
     /// Columns of a table of measurements that mean nothing to the study. Any other column that
     /// the reader does not know is an error.
     pub ignore: Vec<String>,
@@ -69,16 +73,13 @@ impl Component for Csv {
     }
 
     fn environment(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        for (key, path) in
-            [("path", &self.path), ("parameters", &self.parameters), ("responses", &self.responses)]
-        {
-            if let Some(path) = path
-                && !context.directory.join(path).is_file()
-            {
-                let text = format!("there is no file `{}`", context.directory.join(path).display());
-                complaints.at(key).say(text);
-            }
-        }
+        let paths = [
+            ("path", &self.path),
+            ("parameters", &self.parameters),
+            ("responses", &self.responses),
+        ];
+        let paths = paths.map(|(key, path)| (key, path.as_deref()));
+        scenario::check_files(paths, context, complaints);
     }
 }
 
@@ -109,7 +110,7 @@ impl Reader for Csv {
                 self.response(file, source.layout)
             });
         };
-        let sheet = Sheet::read(&source.directory.join(responses))?;
+        let sheet = scenario::sheet(source.directory, responses, source.scenario, &self.ignore)?;
         let values = ensemble::responses(&sheet, &list, source.layout)?;
         runs::ensemble(source, &table, &list, self.allow_failed, |run| {
             let values = list.iter().position(|r| r.name == run.name).map(|i| &values[i]);
@@ -122,8 +123,17 @@ impl Reader for Csv {
             ReadError::new(source.directory, "there is no table of measurements")
                 .help("name it with `path`")
         })?;
-        let sheet = Sheet::read(&source.directory.join(path))?;
-        measurements::measurements(&sheet, source.layout, &self.scenario, &self.ignore)
+        let sheet = scenario::sheet(source.directory, path, source.scenario, &self.ignore)?;
+        measurements::measurements(&sheet, source.layout, &self.ignore)
+    }
+
+    fn grid(&self, source: &GridSource<'_>) -> Result<Vec<f64>, ReadError> {
+        let path = self.path.as_ref().ok_or_else(|| {
+            ReadError::new(source.directory, "there is no table of measurements")
+                .help("name it with `path`")
+        })?;
+        let sheet = scenario::sheet(source.directory, path, source.scenario, &self.ignore)?;
+        measurements::grid(&sheet, source.axis, source.unit)
     }
 
     fn response(&self, path: &Path, layout: &Layout) -> Result<Vec<f64>, ReadError> {
@@ -142,14 +152,14 @@ impl Reader for Csv {
         complete(path, layout, &values)
     }
 
-    fn files(&self, directory: &Path) -> Vec<PathBuf> {
+    fn files(&self, directory: &Path, scenario: Option<&str>) -> Vec<PathBuf> {
         let mut files: Vec<PathBuf> = [&self.path, &self.parameters, &self.responses]
             .into_iter()
             .flatten()
-            .map(|path| directory.join(path))
+            .map(|path| scenario_path(directory, path, scenario))
             .collect();
         if let (Some(table), None) = (&self.parameters, &self.responses) {
-            files.extend(runs::named_files(&directory.join(table)));
+            files.extend(runs::named_files(&scenario_path(directory, table, scenario)));
         }
         files
     }

@@ -6,7 +6,7 @@ use std::path::Path;
 use lacuna::data::{Axis, Layout, Parameter, Unit};
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::Reader;
-use lacuna::plugin::reader::{EnsembleSource, MeasurementSource};
+use lacuna::plugin::reader::{EnsembleSource, GridSource, MeasurementSource};
 
 use super::Csv;
 use crate::readers::runs::AllowFailed;
@@ -55,6 +55,7 @@ impl Folder {
             directory: self.path(),
             simulated: None,
             parameters: &parameters,
+            scenario: None,
             layout: &layout,
         };
         csv.ensemble(&source).map_err(|e| e.to_string())
@@ -64,7 +65,7 @@ impl Folder {
 fn measured(text: &str, csv: Csv) -> Result<lacuna::data::Measurements, String> {
     let folder = Folder::new(&[("strain.csv", text)]);
     let csv = Csv { path: Some("strain.csv".into()), ..csv };
-    let source = MeasurementSource { directory: folder.path(), layout: &layout() };
+    let source = MeasurementSource { directory: folder.path(), scenario: None, layout: &layout() };
     csv.measurements(&source).map_err(|e| e.to_string())
 }
 
@@ -127,21 +128,53 @@ fn each_run_may_have_a_file_of_its_own() {
     let ensemble = folder.ensemble(&csv).unwrap();
     assert_eq!((ensemble.runs.len(), &ensemble.valid[..]), (2, &[true, false][..]));
     assert_eq!(ensemble.failed[0].reason, "no steps");
-    assert_eq!(csv.files(folder.path()).len(), 3);
+    assert_eq!(csv.files(folder.path(), None).len(), 3);
 }
 
 #[test]
-fn measurements_keep_gaps_and_conditions() {
-    let text = "# pulses of April\nreplicate,scenario,power [MW],sensor,time [us],strain,note\n\
-                p1,low,0.5,B,10,1,x\np1,low,0.5,B,20,,x\np1,low,0.5,C,10,NaN,x\np1,low,0.5,C,20,4,x\n\
-                p1,high,1.4,C,20.0,5,x\n";
-    let csv = Csv { scenario: vec!["power".into()], ignore: vec!["note".into()], ..Csv::default() };
+fn measurements_keep_gaps() {
+    let text = "# pulses of April\nreplicate,sensor,time [us],strain,note\n\
+                p1,B,10,1,x\np1,B,20,,x\np1,C,10,NaN,x\np1,C,20,4,x\np2,C,20.0,5,x\n";
+    let csv = Csv { ignore: vec!["note".into()], ..Csv::default() };
     let read = measured(text, csv).unwrap();
     assert_eq!(read.replicates.len(), 2);
     assert_eq!(read.replicates[0].values, [Some(1.0), None, None, Some(4.0)]);
     assert_eq!(read.replicates[1].values, [None, None, None, Some(5.0)]);
-    assert_eq!(read.replicates[1].scenario.name, "high");
-    assert_eq!(read.replicates[1].scenario.value("power").unwrap().value, 1.4);
+}
+
+#[test]
+fn rows_belong_to_the_scenario_that_they_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "scenario,replicate,sensor,time,strain\nlow,1,B,1e-5,1\nlow,1,C,2e-5,2\n\
+                high,1,B,1e-5,3\nhigh,1,C,2e-5,4\n";
+    std::fs::write(folder.path().join("all.csv"), text).unwrap();
+    std::fs::write(folder.path().join("high.csv"), text.replace("scenario,", "s,")).unwrap();
+    let layout = layout();
+    let read = |path: &str, scenario: Option<&str>, ignore: &[&str]| {
+        let ignore = ignore.iter().map(|s| (*s).to_owned()).collect();
+        let csv = Csv { path: Some(path.into()), ignore, ..Csv::default() };
+        let source = MeasurementSource { directory: folder.path(), scenario, layout: &layout };
+        csv.measurements(&source).map_err(|error| error.to_string())
+    };
+    let high = read("all.csv", Some("high"), &[]).unwrap();
+    assert_eq!(high.replicates[0].values, [Some(3.0), None, None, Some(4.0)]);
+    let missing = read("all.csv", Some("none"), &[]).unwrap_err();
+    assert!(missing.contains("has no row of scenario `none`; it has `high`, `low`"), "{missing}");
+    let unasked = read("all.csv", None, &[]).unwrap_err();
+    assert!(unasked.contains("and the study has no scenarios"), "{unasked}");
+    let twice = read("{scenario}.csv", Some("high"), &["s"]).unwrap_err();
+    assert!(twice.contains("a second value of replicate `1`"), "{twice}");
+    let absent = read("high.csv", Some("high"), &["s"]).unwrap_err();
+    assert!(absent.contains("has no column `scenario`"), "{absent}");
+    let csv = Csv { path: Some("all.csv".into()), ..Csv::default() };
+    let unit = lacuna::data::Unit::parse("us").unwrap();
+    let grid = csv.grid(&GridSource {
+        directory: folder.path(),
+        scenario: Some("low"),
+        axis: "time",
+        unit: &unit,
+    });
+    assert_eq!(grid.unwrap(), [1e-5, 2e-5]);
 }
 
 #[test]

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use hdf5_reader::{FileStorage, Storage};
+use lacuna::data::layouts::SCENARIO;
 use lacuna::data::{Axis, Coordinates, Layout, Unit};
 use lacuna::plugin::reader::ReadError;
 use netcdf_reader::{NcFile, NcOpenOptions, NcType, NcVariable};
@@ -177,6 +178,43 @@ impl File {
             responses[target] = y;
         }
         Ok(responses.chunks(layout.len().max(1)).map(<[f64]>::to_vec).collect())
+    }
+
+    /// The responses to one scenario, one a place of `outer`: those of the variable, or where it has a dimension
+    /// `scenario` those at its label.
+    pub(super) fn of_scenario(
+        &self,
+        name: &str,
+        layout: &Layout,
+        outer: &str,
+        scenario: Option<&str>,
+    ) -> Result<Vec<Vec<f64>>, ReadError> {
+        let divided = self.variable(name)?.dimensions().iter().any(|d| d.name == SCENARIO);
+        let Some(scenario) = scenario.filter(|_| divided) else {
+            return self.responses(name, layout, Some(outer));
+        };
+        let labels = self.labels(&Axis::labels(SCENARIO, [""; 0]))?;
+        let place = labels.iter().position(|label| label == scenario).ok_or_else(|| {
+            let text = format!("has no scenario `{scenario}`; it has {}", listed(&labels));
+            self.complain(text).at(format!("variable `{name}`"))
+        })?;
+        let mut all = layout.clone();
+        all.axes.insert(0, Axis::labels(SCENARIO, labels));
+        let length = layout.len();
+        let own = place * length..(place + 1) * length;
+        let responses = self.responses(name, &all, Some(outer))?;
+        Ok(responses.into_iter().map(|response| response[own.clone()].to_vec()).collect())
+    }
+
+    /// The numbers of a coordinate variable, increasing.
+    pub(super) fn grid(&self, name: &str, unit: &Unit) -> Result<Vec<f64>, ReadError> {
+        let mut numbers = self.converted(name, Some(unit))?;
+        if let Some(x) = numbers.iter().find(|x| !x.is_finite()) {
+            return Err(self.complain(format!("holds {x}")).at(format!("variable `{name}`")));
+        }
+        numbers.sort_by(f64::total_cmp);
+        numbers.dedup();
+        Ok(numbers)
     }
 
     /// Where each place of the file's dimension lies on the response's axis; all have to be there.

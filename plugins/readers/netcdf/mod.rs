@@ -5,8 +5,10 @@ mod inspect;
 
 use std::path::{Path, PathBuf};
 
-use lacuna::data::{Ensemble, Layout, Measurements, Replicate, Scenario};
-use lacuna::plugin::reader::{Contents, EnsembleSource, MeasurementSource, ReadError};
+use lacuna::data::{Ensemble, Layout, Measurements, Replicate};
+use lacuna::plugin::reader::{
+    Contents, EnsembleSource, GridSource, MeasurementSource, ReadError, scenario_path,
+};
 use lacuna::plugin::{Component, Context, Reader};
 use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
@@ -14,6 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use self::array::File;
 use super::runs::{self, AllowFailed, Run};
+use super::scenario;
 use super::sierra;
 
 /// Reads netCDF files (classic, 64-bit offset, 64-bit data, netCDF-4) whose dimensions are named
@@ -55,14 +58,8 @@ impl Component for NetCdf {
     }
 
     fn environment(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        for (key, path) in [("path", &self.path), ("runs", &self.runs)] {
-            if let Some(path) = path
-                && !context.directory.join(path).is_file()
-            {
-                let text = format!("there is no file `{}`", context.directory.join(path).display());
-                complaints.at(key).say(text);
-            }
-        }
+        let paths = [("path", self.path.as_deref()), ("runs", self.runs.as_deref())];
+        scenario::check_files(paths, context, complaints);
     }
 }
 
@@ -77,7 +74,8 @@ impl NetCdf {
         path: &Path,
     ) -> Result<Ensemble, ReadError> {
         let file = File::open(path)?;
-        let values = file.responses(self.variable(source.layout), source.layout, Some("run"))?;
+        let variable = self.variable(source.layout);
+        let values = file.of_scenario(variable, source.layout, "run", source.scenario)?;
         let names = file.names("run", values.len())?;
         let columns = source
             .parameters
@@ -130,7 +128,8 @@ impl Reader for NetCdf {
 
     fn ensemble(&self, source: &EnsembleSource<'_>) -> Result<Ensemble, ReadError> {
         if let Some(path) = &self.path {
-            return self.whole_ensemble(source, &source.directory.join(path));
+            return self
+                .whole_ensemble(source, &scenario_path(source.directory, path, source.scenario));
         }
         let table = runs::table_path(source, self.runs.as_deref(), "runs")?;
         let list = runs::read_runs(&table, source.parameters)?;
@@ -148,10 +147,11 @@ impl Reader for NetCdf {
             ReadError::new(source.directory, "there is no file of measurements")
                 .help("name it with `path`")
         })?;
-        let path = source.directory.join(path);
+        let path = scenario_path(source.directory, path, source.scenario);
         let file = File::open(&path)?;
         let layout = source.layout;
-        let values = file.responses(self.variable(layout), layout, Some("replicate"))?;
+        let variable = self.variable(layout);
+        let values = file.of_scenario(variable, layout, "replicate", source.scenario)?;
         let names = file.names("replicate", values.len())?;
         let replicates = names.into_iter().zip(values).map(|(name, values)| {
             if let Some(i) = values.iter().position(|y| y.is_infinite()) {
@@ -159,10 +159,19 @@ impl Reader for NetCdf {
                 return Err(ReadError::new(&path, text));
             }
             let values = values.into_iter().map(|y| (!y.is_nan()).then_some(y)).collect();
-            Ok(Replicate { name, scenario: Scenario::default(), values })
+            Ok(Replicate { name, values })
         });
         let replicates = replicates.collect::<Result<_, _>>()?;
         Ok(Measurements { layout: layout.clone(), replicates })
+    }
+
+    fn grid(&self, source: &GridSource<'_>) -> Result<Vec<f64>, ReadError> {
+        let path = self.path.as_ref().ok_or_else(|| {
+            ReadError::new(source.directory, "there is no file of measurements")
+                .help("name it with `path`")
+        })?;
+        let file = File::open(&scenario_path(source.directory, path, source.scenario))?;
+        file.grid(source.axis, source.unit)
     }
 
     fn response(&self, path: &Path, layout: &Layout) -> Result<Vec<f64>, ReadError> {
@@ -173,11 +182,12 @@ impl Reader for NetCdf {
         Ok(values)
     }
 
-    fn files(&self, directory: &Path) -> Vec<PathBuf> {
+    fn files(&self, directory: &Path, scenario: Option<&str>) -> Vec<PathBuf> {
+        let file = |path: &PathBuf| scenario_path(directory, path, scenario);
         let mut files: Vec<PathBuf> =
-            [&self.path, &self.runs].into_iter().flatten().map(|p| directory.join(p)).collect();
+            [&self.path, &self.runs].into_iter().flatten().map(file).collect();
         if let Some(table) = &self.runs {
-            files.extend(runs::named_files(&directory.join(table)));
+            files.extend(runs::named_files(&file(table)));
         }
         files
     }

@@ -86,6 +86,7 @@ fn dimensions_are_found_by_name_in_any_order() {
             directory: folder.path(),
             simulated: None,
             parameters: &parameters,
+            scenario: None,
             layout: &layout,
         };
         let ensemble = reader.ensemble(&source).unwrap();
@@ -96,7 +97,8 @@ fn dimensions_are_found_by_name_in_any_order() {
             assert!((y - 1e-6 * f64::from(expected)).abs() < 1e-18);
         }
         write(&folder.path().join("a.nc"), "replicate", format, &[0.01, 0.02, 0.03]);
-        let source = MeasurementSource { directory: folder.path(), layout: &layout };
+        let source =
+            MeasurementSource { directory: folder.path(), scenario: None, layout: &layout };
         let measured = reader.measurements(&source).unwrap();
         assert_eq!((measured.replicates.len(), measured.count()), (2, 11));
         assert_eq!(measured.replicates[1].values[0], None);
@@ -128,7 +130,8 @@ fn mismatched_axes_are_named() {
     let layout = layout();
     let complaint = |outer: &str, times: &[f64]| {
         write(&path, outer, NcWriteFormat::Classic, times);
-        let source = MeasurementSource { directory: folder.path(), layout: &layout };
+        let source =
+            MeasurementSource { directory: folder.path(), scenario: None, layout: &layout };
         let reader = NetCdf { path: Some("a.nc".into()), ..NetCdf::default() };
         reader.measurements(&source).unwrap_err().to_string()
     };

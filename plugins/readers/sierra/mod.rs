@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use lacuna::data::{Axis, Coordinates, Ensemble, Layout, Unit};
-use lacuna::plugin::reader::{Contents, EnsembleSource, ReadError};
+use lacuna::plugin::reader::{Contents, EnsembleSource, ReadError, scenario_path};
 use lacuna::plugin::{Component, Context, Reader};
 use lacuna::study::problem::Complaints;
 use lacuna::study::values::Fraction;
@@ -27,6 +27,7 @@ use serde::{Deserialize, Serialize};
 use self::probe::Probe;
 use self::signal::Output;
 use super::runs::{self, AllowFailed, Run};
+use super::scenario;
 
 /// Reads what Sierra wrote for each run: Exodus II results or history files, in any netCDF
 /// container and in one file or one a processor, and heartbeat text in any of its formats.
@@ -123,12 +124,7 @@ impl Component for Sierra {
     }
 
     fn environment(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        if let Some(runs) = &self.runs
-            && !context.directory.join(runs).is_file()
-        {
-            let path = context.directory.join(runs);
-            complaints.at("runs").say(format!("there is no file `{}`", path.display()));
-        }
+        scenario::check_files([("runs", self.runs.as_deref())], context, complaints);
     }
 }
 
@@ -239,10 +235,9 @@ impl Reader for Sierra {
         Ok(response)
     }
 
-    fn files(&self, directory: &Path) -> Vec<PathBuf> {
-        let Some(table) = self.runs.as_ref().map(|runs| directory.join(runs)) else {
-            return Vec::new();
-        };
+    fn files(&self, directory: &Path, scenario: Option<&str>) -> Vec<PathBuf> {
+        let Some(runs) = &self.runs else { return Vec::new() };
+        let table = scenario_path(directory, runs, scenario);
         let list = runs::read_runs(&table, &[]).unwrap_or_default();
         let mut files: Vec<PathBuf> = list
             .iter()

@@ -1,9 +1,10 @@
 //! Beside a peer: the figures of scikit-learn were made with version 1.9.1 on the same runs.
 
 use super::*;
-use lacuna::data::{Axis, Layout, Parameter, Unit};
+use lacuna::data::{Axis, Layout, Layouts, Parameter, Unit};
 use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
+use lacuna::plugin::Forward;
 use lacuna::run::Silent;
 
 /// Points of the unit cube by the additive recurrence of Roberts (2018), which any language repeats.
@@ -63,7 +64,7 @@ pub(in crate::surrogates) fn ishigami(u: &[f64]) -> f64 {
 /// A function at 100 runs of the recurrence, and at 2000 further points.
 pub(in crate::surrogates) struct Case {
     pub parameters: Vec<Parameter>,
-    pub layout: Layout,
+    pub layouts: Layouts,
     pub points: Matrix,
     pub responses: Matrix,
     pub fresh: Matrix,
@@ -75,13 +76,13 @@ impl Case {
         let (points, fresh) = (recurrence(0, 100, dimension), recurrence(100, 2000, dimension));
         let at = |points: &Matrix| Matrix::from_rows(1, points.iter_rows().map(|u| [f(u)]));
         let (responses, exact) = (at(&points), at(&fresh));
-        let (parameters, layout) = (unit_parameters(dimension), layout(1));
-        Self { parameters, layout, points, responses, fresh, exact }
+        let (parameters, layouts) = (unit_parameters(dimension), layout(1).into());
+        Self { parameters, layouts, points, responses, fresh, exact }
     }
 
     pub fn training(&self) -> Training<'_> {
-        let Self { parameters, layout, points, responses, .. } = self;
-        Training { parameters, layout, points, responses }
+        let Self { parameters, layouts, points, responses, .. } = self;
+        Training { parameters, layouts, points, responses }
     }
 }
 

@@ -1,8 +1,9 @@
 //! Gaussian processes over the components of the outputs.
 
 use lacuna::linalg::{Matrix, multiply, transposed_multiply};
-use lacuna::plugin::surrogate::{FitError, Linear};
-use lacuna::plugin::{Emulator, Fact};
+use lacuna::plugin::forward::Linear;
+use lacuna::plugin::surrogate::FitError;
+use lacuna::plugin::{Emulator, Fact, Forward};
 use lacuna::run::Stop;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -132,7 +133,7 @@ impl Kriging {
     }
 }
 
-impl Emulator for Kriging {
+impl Forward for Kriging {
     fn dimension(&self) -> usize {
         self.standards.len()
     }
@@ -174,7 +175,9 @@ impl Emulator for Kriging {
     fn linear(&self) -> Option<&dyn Linear> {
         Some(self)
     }
+}
 
+impl Emulator for Kriging {
     fn fit_error(&self) -> &FitError {
         &self.fit_error
     }

@@ -1,8 +1,9 @@
 //! The fitted expansion.
 
 use lacuna::linalg::{Matrix, multiply, transposed_multiply};
-use lacuna::plugin::surrogate::{FitError, Linear, Sensitivity, SumOfSquares};
-use lacuna::plugin::{Emulator, Fact};
+use lacuna::plugin::forward::{Linear, SumOfSquares};
+use lacuna::plugin::surrogate::{FitError, Sensitivity};
+use lacuna::plugin::{Emulator, Fact, Forward};
 use lacuna::run::Stop;
 use serde::{Deserialize, Serialize};
 
@@ -132,7 +133,7 @@ impl Expansion {
     }
 }
 
-impl Emulator for Expansion {
+impl Forward for Expansion {
     fn dimension(&self) -> usize {
         self.basis.coordinates().len()
     }
@@ -159,7 +160,9 @@ impl Emulator for Expansion {
     fn linear(&self) -> Option<&dyn Linear> {
         Some(self)
     }
+}
 
+impl Emulator for Expansion {
     fn sensitivity(&self) -> Option<Sensitivity> {
         Some(self.moments())
     }

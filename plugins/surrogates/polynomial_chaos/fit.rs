@@ -74,7 +74,7 @@ pub(super) fn fit(
 
 /// Refuses numbers that no regression can take, naming where they are.
 pub(in crate::surrogates) fn check_numbers(training: &Training<'_>) -> Result<(), Stop> {
-    let Training { parameters, layout, points, responses } = training;
+    let Training { parameters, layouts, points, responses } = training;
     if points.rows() != responses.rows() || points.rows() < 3 {
         return Err(Stop::new(format!(
             "a surrogate needs at least 3 runs with a response each, but there are {} points and {} \
@@ -96,11 +96,11 @@ pub(in crate::surrogates) fn check_numbers(training: &Training<'_>) -> Result<()
         )));
     }
     if let Some((run, o)) = first(responses) {
-        let place = layout.describe(o);
+        let place = layouts.describe(o);
         let at = if place.is_empty() { String::new() } else { format!(" at {place}") };
         return Err(Stop::new(format!(
             "`{}` of run {}{at} is {}",
-            layout.name,
+            layouts.name(),
             run + 1,
             responses[(run, o)]
         ))

@@ -10,7 +10,7 @@ use lacuna::linalg::lanes::{LANES, Lanes, sparse_multiply};
 use lacuna::linalg::vector::dot;
 use lacuna::linalg::{Matrix, gram, multiply_vector};
 use lacuna::math::random::{Stream, uniform};
-use lacuna::plugin::surrogate::SumOfSquares;
+use lacuna::plugin::forward::SumOfSquares;
 
 use super::coordinate::Coordinate;
 use super::terms::{Basis, Terms};

@@ -5,7 +5,8 @@ mod tests;
 
 use lacuna::linalg::Matrix;
 use lacuna::math::random::Stream;
-use lacuna::plugin::surrogate::{Linear, Surrogate, Training};
+use lacuna::plugin::forward::Linear;
+use lacuna::plugin::surrogate::{Surrogate, Training};
 use lacuna::plugin::{Component, Context, Emulator};
 use lacuna::run::{Progress, Silent, Stop};
 use lacuna::study::problem::Complaints;

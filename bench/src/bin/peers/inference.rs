@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lacuna::data::{Draws, Layout, Measurements, Parameter};
+use lacuna::data::{Draws, Layouts, Measurements, Parameter};
 use lacuna::diagnose::Diagnosis;
 use lacuna::diagnose::bridge::bridge;
 use lacuna::linalg::Matrix;
@@ -13,7 +13,7 @@ use lacuna::math::random::Stream;
 use lacuna::plugin::discrepancy::{Discrepancy, Known};
 use lacuna::plugin::sampler::{Evidence, Sampler};
 use lacuna::plugin::{Emulator, Target};
-use lacuna::posterior::{Emulated, Posterior};
+use lacuna::posterior::{OfData, Posterior};
 use lacuna_bench::clock::{per_call, timed};
 use lacuna_plugins::discrepancies::common::By;
 use lacuna_plugins::discrepancies::gaussian::Gaussian;
@@ -31,7 +31,7 @@ const SEEDS: u64 = 8;
 /// What a posterior consists of.
 struct Parts {
     parameters: Vec<Parameter>,
-    layout: Layout,
+    layouts: Layouts,
     data: Measurements,
     emulator: Box<dyn Emulator>,
 }
@@ -41,7 +41,7 @@ impl Parts {
         let data = problem::measurements(folder)?;
         Ok(Self {
             parameters: problem::parameters()?,
-            layout: data.layout.clone(),
+            layouts: data.layout.clone().into(),
             data,
             emulator: emulator(folder, name)?,
         })
@@ -60,7 +60,7 @@ impl Parts {
         let known = Known::without_slopes(&self.data, &[]);
         let (likelihood, statistics) = timed(|| gaussian.likelihood(&known))?;
         let likelihood = likelihood?;
-        let join = || Emulated::new(&self.layout, &*self.emulator, &[], &*likelihood);
+        let join = || OfData::new(&self.layouts, &*self.emulator, &[], &*likelihood);
         let (emulated, reduction) = timed(join)?;
         job(&Posterior::new(&self.parameters, emulated), statistics + reduction)
     }

@@ -6,7 +6,7 @@
 use std::fs;
 use std::path::Path;
 
-use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Scenario, Unit};
+use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Unit};
 use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal, uniform};
@@ -138,7 +138,6 @@ pub fn measurements(folder: &Path) -> Fallible<Measurements> {
     let curves = load(folder, "curves", OUTPUTS)?;
     let replicate = |(r, values): (usize, &[f64])| Replicate {
         name: r.to_string(),
-        scenario: Scenario::default(),
         values: values.iter().map(|&y| Some(y)).collect(),
     };
     let replicates = curves.iter_rows().enumerate().map(replicate).collect();

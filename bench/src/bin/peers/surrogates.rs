@@ -114,7 +114,7 @@ fn fit(
     let (parameters, layout) = (problem::parameters()?, problem::layout(outputs.len())?);
     let training = Training {
         parameters: &parameters,
-        layout: &layout,
+        layouts: &layout.into(),
         points: &points,
         responses: &responses,
     };

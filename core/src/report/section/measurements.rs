@@ -2,6 +2,8 @@
 
 use maud::{Markup, html};
 
+use crate::data::Replicate;
+
 use super::{CurvePanel, Curves, group_word, response_label, response_unit};
 use crate::report::chart::{Axis, Band, Curve, Key, Panel, small_multiples};
 use crate::report::findings::{Findings, MeasuredFindings};
@@ -16,7 +18,7 @@ const MOST_DRAWN: usize = 60;
 /// The replicates, where there are any.
 pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
     let measured = findings.measured.as_ref()?;
-    let replicates = measured.used.replicates.len();
+    let replicates = measured.used.replicates();
     let content = html! {
         p {
             b { (count(replicates)) } " replicates with " (count(measured.used.count()))
@@ -51,7 +53,7 @@ fn figure(findings: &Findings, measured: &MeasuredFindings, numbers: &mut Number
     if measured.flagged.iter().any(|f| !f.left_out) {
         keys.insert(1, Key::line("s-flagged", "replicate flagged by the screen"));
     }
-    let replicates = measured.used.replicates.len();
+    let replicates = measured.used.replicates();
     let thinned = if replicates > MOST_DRAWN {
         let (all, most) = (count(replicates), MOST_DRAWN);
         format!(" Of {all} replicates at most {most} are drawn; mean and band are of all.")
@@ -75,15 +77,16 @@ fn panel(measured: &MeasuredFindings, outline: &CurvePanel, unit: &ShownUnit) ->
     let is_flagged = |replicate: &str| {
         measured.flagged.iter().any(|f| f.replicate == replicate && f.group == outline.title)
     };
-    let replicates = &measured.used.replicates;
-    let stride = replicates.len().div_ceil(MOST_DRAWN).max(1);
-    let chosen = replicates.iter().enumerate();
-    let chosen = chosen.filter(|(i, r)| i % stride == 0 || is_flagged(&r.name)).map(|(_, r)| r);
+    let measured_here = replicates(measured, outline);
+    let stride = measured_here.len().div_ceil(MOST_DRAWN).max(1);
+    let chosen = measured_here.iter().enumerate();
+    let chosen = chosen.filter(|(i, (r, _))| i % stride == 0 || is_flagged(&r.name));
     let mut curves: Vec<Curve> = chosen
-        .map(|replicate| Curve {
+        .map(|(_, (replicate, begin))| Curve {
             class: if is_flagged(&replicate.name) { "s-flagged" } else { "s-replicate" },
             name: String::new(),
-            points: outline.curve(|i| replicate.values[i].map_or(f64::NAN, |v| unit.show(v))),
+            points: outline
+                .curve(|i| replicate.values[i - begin].map_or(f64::NAN, |v| unit.show(v))),
         })
         .collect();
     curves.sort_by_key(|c| c.class == "s-flagged");
@@ -106,9 +109,27 @@ fn panel(measured: &MeasuredFindings, outline: &CurvePanel, unit: &ShownUnit) ->
     }
 }
 
+/// The replicates that have a value in a panel, each with the first output of its block.
+fn replicates<'a>(
+    measured: &'a MeasuredFindings,
+    outline: &CurvePanel,
+) -> Vec<(&'a Replicate, usize)> {
+    let layouts = measured.used.layouts();
+    let mut found = Vec::new();
+    for (block, range) in measured.used.blocks.iter().zip(layouts.ranges()) {
+        let inside: Vec<usize> = outline.places.iter().map(|&(_, i)| i).collect();
+        if !inside.first().is_some_and(|i| range.contains(i)) {
+            continue;
+        }
+        let there = |r: &&Replicate| inside.iter().any(|i| r.values[i - range.start].is_some());
+        found.extend(block.replicates.iter().filter(there).map(|r| (r, range.start)));
+    }
+    found
+}
+
 fn flagged(findings: &Findings, measured: &MeasuredFindings, numbers: &mut Numbers) -> Markup {
     let mut table = Table::new(
-        &["replicate", group_word(&findings.layout), "fate"],
+        &["replicate", group_word(&findings.layouts), "fate"],
         &["distance", "threshold"],
     );
     for curve in &measured.flagged {

@@ -17,7 +17,7 @@ pub use validation::accuracy_table;
 use super::findings::{CoordinateFindings, Findings};
 use super::page::{Numbers, Section};
 use super::scale::ShownUnit;
-use crate::data::{Coordinates, Layout};
+use crate::data::{Coordinates, Layouts};
 use crate::plugin::Fact;
 
 /// All sections that have something to show, in order.
@@ -51,15 +51,15 @@ pub fn response_unit(findings: &Findings) -> ShownUnit {
         .chain(simulated.flat_map(|case| case.response.iter().copied()))
         .collect();
     if values.is_empty() {
-        ShownUnit::for_values(&findings.layout.unit, pairs)
+        ShownUnit::for_values(findings.layouts.unit(), pairs)
     } else {
-        ShownUnit::for_values(&findings.layout.unit, values)
+        ShownUnit::for_values(findings.layouts.unit(), values)
     }
 }
 
 /// The label of an axis that carries the response.
 pub fn response_label(findings: &Findings) -> String {
-    response_unit(findings).label(&findings.layout.name)
+    response_unit(findings).label(findings.layouts.name())
 }
 
 /// The name with the symbol behind it, where the study gives one.
@@ -68,9 +68,11 @@ pub fn titled(name: &str, symbol: &str) -> String {
 }
 
 /// What the study calls the groups that figures and tables show one by one, such as `sensor`.
-pub fn group_word(layout: &Layout) -> &str {
-    let mut labels =
-        layout.axes.iter().filter(|axis| matches!(axis.coordinates, Coordinates::Labels(_)));
+pub fn group_word(layouts: &Layouts) -> &str {
+    let mut labels = layouts.blocks[0]
+        .axes
+        .iter()
+        .filter(|axis| matches!(axis.coordinates, Coordinates::Labels(_)));
     match (labels.next(), labels.next()) {
         (Some(axis), None) => &axis.name,
         _ => "group",
@@ -130,37 +132,51 @@ impl Curves {
 
     /// The curves of the study's response; responses without a numeric axis share one panel.
     pub fn of(findings: &Findings) -> Self {
-        let layout = &findings.layout;
-        let groups = layout.groups();
-        let Some((name, grid, unit)) = layout.abscissa() else {
-            let places = (0..layout.len()).map(|i| (i as f64 + 1.0, i)).collect();
-            let panel = CurvePanel { title: layout.name.clone(), places, connected: false };
+        let layouts = &findings.layouts;
+        let groups = layouts.groups();
+        let Some((name, _, unit)) = layouts.blocks[0].abscissa() else {
+            let places = (0..layouts.len()).map(|i| (i as f64 + 1.0, i)).collect();
+            let panel = CurvePanel { title: layouts.name().to_owned(), places, connected: false };
             return Self {
                 label: String::from("output [number in the study's order]"),
-                domain: (0.5, layout.len() as f64 + 0.5),
+                domain: (0.5, layouts.len() as f64 + 0.5),
                 panels: vec![panel],
                 left_out: 0,
             };
         };
-        let shown = ShownUnit::for_values(unit, grid.iter().copied());
-        let axis = layout.axis(name).map_or(0, |(position, _)| position);
+        let grids = || layouts.blocks.iter().filter_map(|block| Some(block.abscissa()?.1));
+        let shown = ShownUnit::for_values(unit, grids().flatten().copied());
+        let place = |flat: usize| {
+            let (block, own) = layouts.block(flat);
+            let at = block.axis(name).and_then(|(position, axis)| {
+                let Coordinates::Grid { values, .. } = &axis.coordinates else { return None };
+                Some(values[block.place(own)[position]])
+            });
+            (shown.show(at.unwrap_or(f64::NAN)), flat)
+        };
         let panels = groups.iter().take(MOST_PANELS).map(|group| CurvePanel {
             title: group.name.clone(),
-            places: group
-                .indices
-                .iter()
-                .map(|&flat| (shown.show(grid[layout.place(flat)[axis]]), flat))
-                .collect(),
+            places: thinned(&group.indices).map(place).collect(),
             connected: true,
         });
-        let ends = (grid.first().copied(), grid.last().copied());
+        let first = grids().filter_map(|grid| grid.first()).copied().fold(f64::INFINITY, f64::min);
+        let last =
+            grids().filter_map(|grid| grid.last()).copied().fold(f64::NEG_INFINITY, f64::max);
         Self {
             label: shown.label(name),
-            domain: (shown.show(ends.0.unwrap_or(0.0)), shown.show(ends.1.unwrap_or(1.0))),
+            domain: (shown.show(first), shown.show(last)),
             panels: panels.collect(),
             left_out: groups.len().saturating_sub(MOST_PANELS),
         }
     }
+}
+
+/// The most points of one curve: more are no more than a pen's width apart.
+const MOST_POINTS: usize = 2000;
+
+/// All outputs of a group, or evenly spaced ones of a long record.
+fn thinned(indices: &[usize]) -> impl Iterator<Item = usize> + '_ {
+    indices.iter().copied().step_by(indices.len().div_ceil(MOST_POINTS).max(1))
 }
 
 impl CurvePanel {

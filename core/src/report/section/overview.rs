@@ -3,6 +3,7 @@
 use maud::html;
 
 use super::{fact_list, titled};
+use crate::data::{Axis, Layout};
 use crate::plugin::Fact;
 use crate::report::findings::Findings;
 use crate::report::number::{count, exact, rounded};
@@ -40,13 +41,26 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Section {
 }
 
 fn response(findings: &Findings) -> String {
-    let layout = &findings.layout;
-    let axes: Vec<String> =
-        layout.axes.iter().map(|axis| format!("{} ({})", axis.name, count(axis.len()))).collect();
-    let shape = if axes.is_empty() { String::from("one number") } else { axes.join(" × ") };
-    let (name, unit, outputs) = (&layout.name, &layout.unit, count(layout.len()));
-    format!("The model's response is `{name}` in the unit `{unit}`: {shape}, {outputs} outputs.")
+    let layouts = &findings.layouts;
+    let shape = |layout: &Layout| {
+        let size = |axis: &Axis| format!("{} ({})", axis.name, count(axis.len()));
+        let axes: Vec<String> = layout.axes.iter().map(size).collect();
+        if axes.is_empty() { String::from("one number") } else { axes.join(" × ") }
+    };
+    let shapes: Vec<String> = layouts.blocks.iter().take(MOST_SHAPES).map(shape).collect();
+    let more = match layouts.blocks.len().saturating_sub(MOST_SHAPES) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    let (name, unit, outputs) = (layouts.name(), layouts.unit(), count(layouts.len()));
+    let shapes = shapes.join("; ");
+    format!(
+        "The model's response is `{name}` in the unit `{unit}`: {shapes}{more}, {outputs} outputs."
+    )
 }
+
+/// Of how many blocks of scenarios the shapes are told.
+const MOST_SHAPES: usize = 3;
 
 /// What the study is made of, and what it takes to make it again.
 fn facts(findings: &Findings) -> Vec<Fact> {

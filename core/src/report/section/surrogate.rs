@@ -42,7 +42,7 @@ fn errors(findings: &Findings, surrogate: &SurrogateFindings, numbers: &mut Numb
     let unit = response_unit(findings);
     let (mae, rmse) = (unit.label("MAE"), unit.label("RMSE"));
     let mut table =
-        Table::new(&[group_word(&findings.layout)], &[&mae, &rmse, "LOO [share of variance]"]);
+        Table::new(&[group_word(&findings.layouts)], &[&mae, &rmse, "LOO [share of variance]"]);
     let cells = |name: &str, mae: f64, rmse: f64, loo: f64| {
         [
             name.to_owned(),

@@ -197,7 +197,7 @@ fn accuracy(findings: &Findings, validation: &ValidationFindings, numbers: &mut 
     let chart = BarChart {
         series: series.collect(),
         levels: Vec::new(),
-        x_label: group_word(&findings.layout).to_owned(),
+        x_label: group_word(&findings.layouts).to_owned(),
         y: Axis::new("points inside the interval [%]", (0.0, 108.0)).ticks(6),
         outstanding: Vec::new(),
         numbers: names.len() * cases.len() <= 30,
@@ -218,7 +218,7 @@ fn accuracy(findings: &Findings, validation: &ValidationFindings, numbers: &mut 
         Caption::new("The same accuracies as numbers, with their mean over the groups.", "", "");
     html! {
         (numbers.figure(&[chart.draw("accuracy of every group")], &keys, &caption))
-        (numbers.table(&accuracy_table(group_word(&findings.layout), cases), &table_caption))
+        (numbers.table(&accuracy_table(group_word(&findings.layouts), cases), &table_caption))
     }
 }
 

@@ -1,7 +1,7 @@
 //! Made-up results with the shape, the units and the magnitudes of the mercury target study
 //! (Radaideh et al., arXiv 2202.03959); no number in it is a result.
 
-use crate::data::{Axis, FailedRun, Layout, Measurements, Parameter, Replicate, Scenario, Unit};
+use crate::data::{Axis, FailedRun, Layout, Measurements, Parameter, Replicate, Unit};
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::math::random::{Stream, normal, uniform};
@@ -44,7 +44,7 @@ pub fn findings() -> Findings {
         surrogate: Some(surrogate(&layout)),
         calibration: Some(calibration()),
         validation: Some(validation(&layout)),
-        layout,
+        layouts: layout.into(),
         seconds: [
             ("design", 0.004),
             ("simulate", 1834.0),
@@ -162,11 +162,7 @@ fn measured(layout: &Layout) -> MeasuredFindings {
             // Sensor M fails late in one pulse.
             (!(r == 3 && i / TIMES == 3 && i % TIMES > 60)).then_some(clean + noise + odd)
         });
-        Replicate {
-            name: format!("pulse {}", r + 1),
-            scenario: Scenario::default(),
-            values: values.collect(),
-        }
+        Replicate { name: format!("pulse {}", r + 1), values: values.collect() }
     });
     let used = Measurements { layout: layout.clone(), replicates: replicates.collect() };
     let flagged = |replicate: &str, group: &str, distance, left_out| FlaggedCurve {
@@ -179,7 +175,7 @@ fn measured(layout: &Layout) -> MeasuredFindings {
     MeasuredFindings {
         fingerprint: String::from("0123456789abcdef"),
         data_count: used.count(),
-        used,
+        used: used.into(),
         flagged: vec![flagged("pulse 6", "R", 9.4, false), flagged("pulse 17", "B", 31.0, true)],
         added_curves: vec!["mean".into(), "q025".into(), "q975".into()],
     }

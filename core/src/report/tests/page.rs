@@ -1,6 +1,6 @@
 use super::fixture::{bare, findings, unit};
 use super::xml::{self, Element};
-use crate::data::{Axis, Layout, Measurements};
+use crate::data::{Axis, Layout};
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::report::findings::{CoordinateFindings, Findings};
@@ -71,7 +71,7 @@ fn axes_carry_their_units() {
 #[test]
 fn strain_as_a_unit_is_shown_as_microstrain() {
     let mut findings = findings();
-    findings.layout.unit = unit("strain");
+    findings.layouts.blocks[0].unit = unit("strain");
     assert!(has_text(&elements(&findings), "strain [microstrain]"));
 }
 
@@ -121,7 +121,7 @@ fn names_that_people_wrote_are_escaped() {
     findings.parameters[0].name = "<x> & \"y\"".into();
     findings.calibration.as_mut().unwrap().coordinates[0].name = "<x> & \"y\"".into();
     findings.warnings.push("`<b>` & `\"q\"`".into());
-    findings.layout.name = "s<t>r & \"ain\"".into();
+    findings.layouts.blocks[0].name = "s<t>r & \"ain\"".into();
     let page = render(&findings);
     assert_eq!(page.matches("<script>").count(), 1);
     elements(&findings);
@@ -130,7 +130,7 @@ fn names_that_people_wrote_are_escaped() {
 #[test]
 fn a_sensor_without_measurements_says_so() {
     let mut findings = findings();
-    for replicate in &mut findings.measured.as_mut().unwrap().used.replicates {
+    for replicate in &mut findings.measured.as_mut().unwrap().used.blocks[0].replicates {
         replicate.values[..100].fill(None);
     }
     let validation = findings.validation.as_mut().unwrap();
@@ -192,7 +192,7 @@ fn huge_and_small_numbers_stay_inside_their_figures() {
                 *value *= factor;
             }
         }
-        for replicate in &mut findings.measured.as_mut().unwrap().used.replicates {
+        for replicate in &mut findings.measured.as_mut().unwrap().used.blocks[0].replicates {
             for value in replicate.values.iter_mut().flatten() {
                 *value *= factor;
             }
@@ -205,12 +205,12 @@ fn huge_and_small_numbers_stay_inside_their_figures() {
 fn a_response_without_a_numeric_axis_is_drawn_as_points() {
     let mut findings = findings();
     let axes = vec![Axis::labels("gauge", ["left", "right", "top"])];
-    findings.layout = Layout { axes, ..findings.layout };
+    findings.layouts = Layout { axes, ..findings.layouts.blocks.remove(0) }.into();
     let measured = findings.measured.as_mut().unwrap();
-    for replicate in &mut measured.used.replicates {
+    for replicate in &mut measured.used.blocks[0].replicates {
         replicate.values.truncate(3);
     }
-    measured.used = Measurements { layout: findings.layout.clone(), ..measured.used.clone() };
+    measured.used.blocks[0].layout = findings.layouts.blocks[0].clone();
     findings.validation = None;
     let elements = elements(&findings);
     assert!(elements.iter().filter(|e| e.name == "circle").count() >= 3);

@@ -4,6 +4,7 @@ use crate::data::Draws;
 use crate::linalg::Matrix;
 use crate::math::random::{Stream, uniform};
 use crate::math::{moments, sobol};
+use crate::run::Stop;
 use crate::stage::Learned;
 
 /// Candidates for each point that is chosen: half of them draws of the posterior, half an even cover.
@@ -18,13 +19,13 @@ pub(super) fn points(
     place: &[(f64, f64)],
     count: usize,
     stream: &Stream,
-) -> Matrix {
+) -> Result<Matrix, Stop> {
     let candidates = candidates(draws, place, CANDIDATES * count, stream);
     let unit = |point: &[f64]| -> Vec<f64> {
         place.iter().zip(point).map(|(&(low, high), x)| (x - low) / (high - low)).collect()
     };
     let scaled: Vec<Vec<f64>> = candidates.iter_rows().map(unit).collect();
-    let runs: Vec<Vec<f64>> = learned.data.value.ensemble.points.iter_rows().map(unit).collect();
+    let runs: Vec<Vec<f64>> = learned.data.value.runs()?.points.iter_rows().map(unit).collect();
     let errors = errors(learned, &candidates, &scaled, &unit);
     let nearest = |x: &Vec<f64>| runs.iter().map(|r| distance(x, r)).fold(f64::INFINITY, f64::min);
     let mut clearance: Vec<f64> = scaled.iter().map(nearest).collect();
@@ -38,7 +39,7 @@ pub(super) fn points(
             *c = c.min(distance(x, &scaled[best]));
         }
     }
-    chosen
+    Ok(chosen)
 }
 
 fn candidates(draws: &Draws, place: &[(f64, f64)], count: usize, stream: &Stream) -> Matrix {

@@ -1,6 +1,6 @@
 //! The fast forms on a smooth problem of the founding study's size, against the sum over all data.
 
-use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Scenario, Unit};
+use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Unit};
 use lacuna::linalg::{self, Matrix};
 use lacuna::math::distribution::Distribution;
 
@@ -63,7 +63,7 @@ fn emulator() -> Box<dyn Emulator> {
     };
     let training = Training {
         parameters: &parameters,
-        layout: &layout(),
+        layouts: &layout().into(),
         points: &runs,
         responses: &responses,
     };
@@ -81,7 +81,6 @@ fn measured(emulator: &dyn Emulator, replicates: usize, sd: f64) -> Measurements
         };
         Replicate {
             name: r.to_string(),
-            scenario: Scenario::default(),
             values: truth.row(0).iter().enumerate().map(value).collect(),
         }
     };

@@ -52,8 +52,13 @@ fn parameters() -> [Parameter; 1] {
 
 fn ensemble(folder: &Path, reader: &Sierra, layout: &Layout) -> Result<Ensemble, String> {
     let parameters = parameters();
-    let source =
-        EnsembleSource { directory: folder, simulated: None, parameters: &parameters, layout };
+    let source = EnsembleSource {
+        directory: folder,
+        simulated: None,
+        parameters: &parameters,
+        scenario: None,
+        layout,
+    };
     reader.ensemble(&source).map_err(|e| e.to_string())
 }
 
@@ -125,7 +130,7 @@ fn unfinished_and_damaged_runs_are_named() {
     let allowed = Sierra { allow_failed: AllowFailed::new(0.8).unwrap(), ..reader.clone() };
     let ensemble = ensemble(folder.path(), &allowed, &layout).unwrap();
     assert_eq!((&ensemble.runs[..], ensemble.failed.len()), (&["good".to_owned()][..], 4));
-    assert_eq!(reader.files(folder.path()).len(), 6);
+    assert_eq!(reader.files(folder.path(), None).len(), 6);
 }
 
 #[test]
@@ -145,6 +150,7 @@ fn what_the_simulate_stage_wrote_is_found() {
         directory: Path::new("elsewhere"),
         simulated: Some(folder.path()),
         parameters: &parameters(),
+        scenario: None,
         layout: &layout,
     };
     let ensemble = reader.ensemble(&source).unwrap();

@@ -3,7 +3,9 @@
 use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::Emulator;
-use lacuna::plugin::surrogate::{Linear, Surrogate};
+use lacuna::plugin::Forward;
+use lacuna::plugin::forward::Linear;
+use lacuna::plugin::surrogate::Surrogate;
 
 use super::bench::{
     ISHIGAMI, fitted, latin_hypercube, monte_carlo, of_degree, scaled, sobol, up_to,

@@ -5,6 +5,7 @@ use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, permutation, uniform};
 use lacuna::plugin::Emulator;
+use lacuna::plugin::Forward;
 use lacuna::plugin::surrogate::Training;
 use lacuna::run::{Progress, Silent, Stop};
 
@@ -180,8 +181,8 @@ pub fn fitted_to(
     points: &Matrix,
     responses: &Matrix,
 ) -> Result<Expansion, Stop> {
-    let layout = layout(responses.columns());
-    let training = Training { parameters, layout: &layout, points, responses };
+    let layouts = layout(responses.columns()).into();
+    let training = Training { parameters, layouts: &layouts, points, responses };
     fit::fit(options, &training, &Stream::root(1), &Progress::new(&Silent))
 }
 

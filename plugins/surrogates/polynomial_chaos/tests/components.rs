@@ -2,7 +2,8 @@
 
 use lacuna::linalg::{Matrix, multiply};
 use lacuna::plugin::Emulator;
-use lacuna::plugin::surrogate::Linear;
+use lacuna::plugin::Forward;
+use lacuna::plugin::forward::Linear;
 
 use super::bench::{fitted, latin_hypercube, of_degree, scaled, up_to};
 use crate::surrogates::polynomial_chaos::{Expansion, PolynomialChaos, Solver};

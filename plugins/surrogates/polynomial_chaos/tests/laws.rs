@@ -3,7 +3,8 @@
 use lacuna::linalg::{Matrix, multiply_vector, vector};
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::Emulator;
-use lacuna::plugin::surrogate::Linear;
+use lacuna::plugin::Forward;
+use lacuna::plugin::forward::Linear;
 
 use super::bench::{fitted_to, latin_hypercube, of_degree, parameters_of, sobol};
 use crate::surrogates::polynomial_chaos::{Expansion, Family, PolynomialChaos, Solver};

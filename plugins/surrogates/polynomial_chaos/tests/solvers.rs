@@ -4,7 +4,8 @@ use lacuna::data::Parameter;
 use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
-use lacuna::plugin::surrogate::Linear;
+use lacuna::plugin::Forward;
+use lacuna::plugin::forward::Linear;
 use lacuna::plugin::{Design, Emulator};
 
 use super::bench::{

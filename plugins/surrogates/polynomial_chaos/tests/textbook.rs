@@ -4,7 +4,8 @@
 use lacuna::linalg::{Cholesky, Matrix, multiply_vector};
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::Emulator;
-use lacuna::plugin::surrogate::Linear;
+use lacuna::plugin::Forward;
+use lacuna::plugin::forward::Linear;
 
 use super::bench::{fitted, latin_hypercube, of_degree, scaled};
 use crate::surrogates::polynomial_chaos::bayesian::Ascent;

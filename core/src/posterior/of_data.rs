@@ -1,28 +1,30 @@
-//! The likelihood of measurements through an emulator, effects and a discrepancy.
+//! The likelihood of measurements through a forward map, effects and a discrepancy.
 
-use crate::data::Layout;
+use std::ops::Range;
+
+use crate::data::{Layout, Layouts};
 use crate::linalg::{Matrix, transposed_multiply_vector};
 use crate::plugin::discrepancy::Compressed;
-use crate::plugin::surrogate::Linear;
-use crate::plugin::{Effect, Emulator, Fact, Hyperparameter, Likelihood};
+use crate::plugin::forward::Linear;
+use crate::plugin::{Effect, Fact, Forward, Hyperparameter, Likelihood};
 
 use super::LogLikelihood;
 
 /// See the module. The hyperparameters are those of the effects, then those of the discrepancy.
-pub struct Emulated<'a> {
-    layout: &'a Layout,
-    emulator: &'a dyn Emulator,
-    effects: Vec<(&'a dyn Effect, std::ops::Range<usize>)>,
+pub struct OfData<'a> {
+    layouts: &'a Layouts,
+    forward: &'a dyn Forward,
+    effects: Vec<(&'a dyn Effect, Range<usize>)>,
     likelihood: &'a dyn Likelihood,
     reduced: Option<(&'a dyn Linear, Box<dyn Compressed>)>,
     hyper: Vec<Hyperparameter>,
 }
 
-impl<'a> Emulated<'a> {
-    /// Joins the parts. Without effects and with a linear emulator the likelihood is compressed.
+impl<'a> OfData<'a> {
+    /// Joins the parts. Without effects and with a linear forward map the likelihood is compressed.
     pub fn new(
-        layout: &'a Layout,
-        emulator: &'a dyn Emulator,
+        layouts: &'a Layouts,
+        forward: &'a dyn Forward,
         effects: &[&'a dyn Effect],
         likelihood: &'a dyn Likelihood,
     ) -> Self {
@@ -30,22 +32,22 @@ impl<'a> Emulated<'a> {
         let mut placed = Vec::new();
         for &effect in effects {
             let begin = hyper.len();
-            hyper.extend(effect.parameters(layout));
+            hyper.extend(effect.parameters(&layouts.blocks[0]));
             placed.push((effect, begin..hyper.len()));
         }
         hyper.extend_from_slice(likelihood.hyperparameters());
         let reduced = if effects.is_empty() {
-            emulator.linear().and_then(|linear| Some((linear, likelihood.compress(linear)?)))
+            forward.linear().and_then(|linear| Some((linear, likelihood.compress(linear)?)))
         } else {
             None
         };
-        Self { layout, emulator, effects: placed, likelihood, reduced, hyper }
+        Self { layouts, forward, effects: placed, likelihood, reduced, hyper }
     }
 
-    /// The response at natural values: the emulator's mean with the effects applied, and the discrepancy's own
-    /// hyperparameters.
+    /// The response at natural values: that of the forward map with the effects applied, and the discrepancy's
+    /// own hyperparameters.
     pub fn response(&self, theta: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let mean = self.emulator.mean(&Matrix::from_vec(1, theta.len(), theta.to_vec()));
+        let mean = self.forward.mean(&Matrix::from_vec(1, theta.len(), theta.to_vec()));
         (self.with_effects(mean.row(0).to_vec(), hyper), hyper[self.own()..].to_vec())
     }
 
@@ -56,13 +58,20 @@ impl<'a> Emulated<'a> {
 
     fn with_effects(&self, mut response: Vec<f64>, hyper: &[f64]) -> Vec<f64> {
         for (effect, range) in &self.effects {
-            response = effect.apply(self.layout, &response, &hyper[range.clone()]);
+            response = apply(*effect, self.layouts, &response, &hyper[range.clone()]);
         }
         response
     }
 }
 
-impl LogLikelihood for Emulated<'_> {
+/// An effect applied to the responses of all blocks.
+pub fn apply(effect: &dyn Effect, layouts: &Layouts, response: &[f64], values: &[f64]) -> Vec<f64> {
+    let one =
+        |(layout, range): (&Layout, Range<usize>)| effect.apply(layout, &response[range], values);
+    layouts.parts().flat_map(one).collect()
+}
+
+impl LogLikelihood for OfData<'_> {
     fn hyperparameters(&self) -> &[Hyperparameter] {
         &self.hyper
     }
@@ -71,11 +80,14 @@ impl LogLikelihood for Emulated<'_> {
         if let Some((linear, compressed)) = &self.reduced {
             return compressed.log_likelihood_at(*linear, theta, hyper);
         }
-        let mean = self.emulator.mean(theta);
+        let mean = self.forward.mean(theta);
         let own = self.own();
         mean.iter_rows()
             .zip(hyper.iter_rows())
             .map(|(mean, hyper)| {
+                if mean.iter().any(|y| !y.is_finite()) {
+                    return f64::NEG_INFINITY;
+                }
                 let response = self.with_effects(mean.to_vec(), hyper);
                 self.likelihood.log_likelihood(&response, &hyper[own..])
             })
@@ -88,26 +100,38 @@ impl LogLikelihood for Emulated<'_> {
             return [by_theta, by_hyper].concat();
         }
         let row = Matrix::from_vec(1, theta.len(), theta.to_vec());
-        let mut responses = vec![self.emulator.mean(&row).row(0).to_vec()];
+        let mut responses = vec![self.forward.mean(&row).row(0).to_vec()];
         for (effect, range) in &self.effects {
             let before = &responses[responses.len() - 1];
-            responses.push(effect.apply(self.layout, before, &hyper[range.clone()]));
+            responses.push(apply(*effect, self.layouts, before, &hyper[range.clone()]));
         }
         let last = &responses[responses.len() - 1];
+        if last.iter().any(|y| !y.is_finite()) {
+            return vec![0.0; theta.len() + hyper.len()];
+        }
         let (mut weight, by_own) = self.likelihood.gradient(last, &hyper[self.own()..]);
         let mut by_effects = vec![0.0; self.own()];
         for ((effect, range), before) in self.effects.iter().zip(&responses).rev() {
             let values = &hyper[range.clone()];
-            let jacobian = effect.by_parameters(self.layout, before, values);
-            by_effects[range.clone()]
-                .copy_from_slice(&transposed_multiply_vector(&jacobian, &weight));
-            weight = effect.pull_back(self.layout, before, values, &weight);
+            let mut pulled = Vec::with_capacity(weight.len());
+            for (layout, part) in self.layouts.parts() {
+                let jacobian = effect.by_parameters(layout, &before[part.clone()], values);
+                let slopes = transposed_multiply_vector(&jacobian, &weight[part.clone()]);
+                by_effects[range.clone()].iter_mut().zip(slopes).for_each(|(b, s)| *b += s);
+                let (before, weight) = (&before[part.clone()], &weight[part]);
+                pulled.extend(effect.pull_back(layout, before, values, weight));
+            }
+            weight = pulled;
         }
-        let by_theta = transposed_multiply_vector(&self.emulator.jacobian(theta), &weight);
+        let by_theta = transposed_multiply_vector(&self.forward.jacobian(theta), &weight);
         [by_theta, by_effects, by_own].concat()
     }
 
     fn facts(&self) -> Vec<Fact> {
         self.likelihood.facts()
+    }
+
+    fn failure(&self) -> Option<String> {
+        self.forward.failure()
     }
 }

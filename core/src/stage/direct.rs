@@ -1,0 +1,246 @@
+//! A study without a surrogate: the model itself is the forward map.
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use rayon::prelude::*;
+use serde_json::json;
+
+use crate::linalg::{Matrix, multiply};
+use crate::math::distribution::Distribution;
+use crate::plugin::Forward;
+use crate::plugin::model::{Call, EvalError, Gradient};
+use crate::report::findings::Findings;
+use crate::run::{Observer, RunDirectory, Stop, files};
+use crate::study::Study;
+
+use super::simulator::{Setting, Simulator};
+use super::{Known, calibrate, read};
+
+/// Runs a study without a surrogate: calibration and validation call the model.
+pub fn run(
+    study: &Study,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Findings, Stop> {
+    let data = read::stage(study, None, run, observer)?;
+    let direct = Direct::of(study)?;
+    let model = study.model.as_ref().map(|m| (m.built.name, &m.built.options, &m.common));
+    let files = files::hash_sources(&direct.simulator.model.files(&study.directory))?;
+    let origin = json!([model, study.scenarios, study.layouts, study.unknowns, files]);
+    let known = Known {
+        data: &data,
+        forward: &direct,
+        origin: &files::hash(origin.to_string().as_bytes()),
+        fitted: None,
+        emulator: None,
+        numerics: None,
+        region: None,
+        refinement: None,
+    };
+    let calibrated = calibrate::stage(study, &known, "5-calibrate", run, observer)?;
+    if let Some(tally) = direct.tally() {
+        observer.warn(&tally);
+    }
+    super::conclude(study, &known, calibrated.as_ref(), run, observer)
+}
+
+/// The model of a study as its forward map.
+///
+/// An evaluation without an answer is a row of NaN, and counted with its reason. Derivatives are the model's own
+/// where it has some, else differences.
+pub struct Direct<'a> {
+    simulator: Simulator<'a>,
+    priors: Vec<&'a Distribution>,
+    outputs: usize,
+    evaluations: AtomicU64,
+    failures: Mutex<Failures>,
+}
+
+#[derive(Default)]
+struct Failures {
+    reasons: BTreeMap<String, u64>,
+    fatal: Option<String>,
+}
+
+/// How many different reasons are told.
+const TOLD: usize = 5;
+
+impl<'a> Direct<'a> {
+    /// The model of a study.
+    pub fn of(study: &'a Study) -> Result<Self, Stop> {
+        let simulator = Simulator::of(study)?.ok_or_else(|| {
+            Stop::new("the study has neither a surrogate nor a model")
+                .help("add `[model]`, or `[surrogate]` with simulation runs")
+        })?;
+        Ok(Self {
+            simulator,
+            priors: study.parameters.iter().map(|p| &p.prior).collect(),
+            outputs: study.layouts.len(),
+            evaluations: AtomicU64::new(0),
+            failures: Mutex::default(),
+        })
+    }
+
+    /// How often the model was asked and how often it had no answer, with the most frequent reasons.
+    pub fn tally(&self) -> Option<String> {
+        let failures = self.failures.lock().ok()?;
+        let failed: u64 = failures.reasons.values().sum();
+        if failed == 0 {
+            return None;
+        }
+        let asked = self.evaluations.load(Ordering::Relaxed);
+        let mut reasons: Vec<(&String, &u64)> = failures.reasons.iter().collect();
+        reasons.sort_by(|a, b| b.1.cmp(a.1).then(a.0.cmp(b.0)));
+        let told: Vec<String> = reasons
+            .iter()
+            .take(TOLD)
+            .map(|(reason, count)| format!("{count} times: {reason}"))
+            .collect();
+        Some(format!(
+            "the model gave no answer at {failed} of {asked} evaluations ({})",
+            told.join("; ")
+        ))
+    }
+
+    fn note<T>(&self, outcome: Result<T, EvalError>) -> Option<T> {
+        self.evaluations.fetch_add(1, Ordering::Relaxed);
+        let error = match outcome {
+            Ok(answer) => return Some(answer),
+            Err(error) => error,
+        };
+        if let Ok(mut failures) = self.failures.lock() {
+            match error {
+                EvalError::Rejected(reason) => *failures.reasons.entry(reason).or_default() += 1,
+                EvalError::Fatal(reason) => {
+                    failures.fatal.get_or_insert(reason);
+                }
+            }
+        }
+        None
+    }
+
+    /// The answers to one scenario at some rows of `points`.
+    fn some(
+        &self,
+        setting: &Setting<'_>,
+        points: &Matrix,
+        rows: &[usize],
+    ) -> Vec<Option<Vec<f64>>> {
+        if self.failure().is_some() {
+            return vec![None; rows.len()];
+        }
+        let inputs: Vec<Vec<f64>> = rows.iter().map(|&i| setting.inputs(points.row(i))).collect();
+        let calls: Vec<Call<'_>> =
+            inputs.iter().map(|inputs| self.simulator.call(setting, inputs)).collect();
+        let mut responses = self.simulator.model.predict_batch(&calls).into_iter();
+        let missing = || Err(EvalError::Fatal("the model left calls unanswered".to_owned()));
+        let mut next = || responses.next().unwrap_or_else(missing);
+        rows.iter().map(|_| self.note(setting.checked(next())).map(|r| r.values)).collect()
+    }
+
+    /// The derivatives of one scenario's outputs by the study's parameters, from the model's own.
+    fn exact(
+        &self,
+        setting: &Setting<'_>,
+        gradient: &dyn Gradient,
+        point: &[f64],
+    ) -> Option<Matrix> {
+        let inputs = setting.inputs(point);
+        let jacobian = self.note(gradient.jacobian(&self.simulator.call(setting, &inputs)))?;
+        let by_parameters = multiply(&jacobian, &setting.slopes(point));
+        let scaled = |i, j| by_parameters[(i, j)] * setting.factor();
+        Some(Matrix::from_fn(by_parameters.rows(), by_parameters.columns(), scaled))
+    }
+
+    /// Derivatives by central differences; one-sided where the model answers on one side only.
+    fn differences(&self, point: &[f64]) -> Matrix {
+        let steps: Vec<f64> =
+            self.priors.iter().zip(point).map(|(prior, &x)| step(prior, x)).collect();
+        let mut around = vec![point.to_vec()];
+        for (j, step) in steps.iter().enumerate() {
+            for sign in [1.0, -1.0] {
+                let mut moved = point.to_vec();
+                moved[j] += sign * step;
+                around.push(moved);
+            }
+        }
+        let responses = self.mean(&Matrix::from_rows(point.len(), around));
+        let slope = |i: usize, j: usize| {
+            let [here, above, below] = [0, 2 * j + 1, 2 * j + 2].map(|row| responses[(row, i)]);
+            match (above.is_finite(), below.is_finite()) {
+                (true, true) => (above - below) / (2.0 * steps[j]),
+                (true, false) => (above - here) / steps[j],
+                _ => (here - below) / steps[j],
+            }
+        };
+        Matrix::from_fn(self.outputs, point.len(), slope)
+    }
+}
+
+/// A step that is small against the prior and large against rounding.
+fn step(prior: &Distribution, x: f64) -> f64 {
+    let width = prior.quantile(0.975) - prior.quantile(0.025);
+    (1e-5 * width).max(1e-9 * x.abs()).max(f64::MIN_POSITIVE)
+}
+
+impl Forward for Direct<'_> {
+    fn dimension(&self) -> usize {
+        self.priors.len()
+    }
+
+    fn outputs(&self) -> usize {
+        self.outputs
+    }
+
+    fn mean(&self, points: &Matrix) -> Matrix {
+        let size = self.simulator.model.batch().max(1);
+        let rows: Vec<usize> = (0..points.rows()).collect();
+        let tasks: Vec<(&Setting<'_>, &[usize])> = self
+            .simulator
+            .settings
+            .iter()
+            .flat_map(|setting| rows.chunks(size).map(move |some| (setting, some)))
+            .collect();
+        let answers: Vec<Vec<Option<Vec<f64>>>> =
+            tasks.par_iter().map(|(setting, some)| self.some(setting, points, some)).collect();
+        let mut all = Matrix::zeros(points.rows(), self.outputs);
+        for ((setting, some), answers) in tasks.iter().zip(answers) {
+            for (&row, answer) in some.iter().zip(answers) {
+                let place = &mut all.row_mut(row)[setting.outputs.clone()];
+                match answer {
+                    Some(values) => place.copy_from_slice(&values),
+                    None => place.fill(f64::NAN),
+                }
+            }
+        }
+        all
+    }
+
+    fn jacobian(&self, point: &[f64]) -> Matrix {
+        let Some(gradient) = self.simulator.model.gradient() else {
+            return self.differences(point);
+        };
+        let mut all = Matrix::zeros(self.outputs, point.len());
+        let parts: Vec<Option<Matrix>> = self
+            .simulator
+            .settings
+            .par_iter()
+            .map(|setting| self.exact(setting, gradient, point))
+            .collect();
+        for (setting, part) in self.simulator.settings.iter().zip(parts) {
+            for (k, row) in setting.outputs.clone().enumerate() {
+                match &part {
+                    Some(part) => all.row_mut(row).copy_from_slice(part.row(k)),
+                    None => all.row_mut(row).fill(f64::NAN),
+                }
+            }
+        }
+        all
+    }
+
+    fn failure(&self) -> Option<String> {
+        self.failures.lock().ok().and_then(|failures| failures.fatal.clone())
+    }
+}

@@ -1,0 +1,120 @@
+//! What a study sets of its model's inputs, scenario by scenario.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::resolve::Study;
+use super::{Complaints, Node, Problems};
+use crate::data::Unit;
+use crate::expression::{Data, Fault, Program, Scope};
+use crate::plugin::Given;
+
+/// The inputs that expressions set in one scenario.
+#[derive(Debug, Clone)]
+pub struct Computed {
+    /// The inputs, in the order of the program's outputs.
+    pub names: Vec<String>,
+    /// The unit of each.
+    pub units: Vec<Unit>,
+    /// The parameter of the study behind each unknown of the program.
+    pub parameters: Vec<usize>,
+    /// The expressions.
+    pub program: Program,
+}
+
+impl Study {
+    /// The expressions of `[model] inputs` in a scenario; `None` without any.
+    pub fn computed(&self, scenario: usize) -> Result<Option<Computed>, Vec<Fault>> {
+        let texts = self.expressions();
+        if texts.is_empty() {
+            return Ok(None);
+        }
+        let mut scope = Scope::new();
+        let mut units = BTreeMap::new();
+        let mut parameters = Vec::new();
+        let one = |fault: Fault| vec![fault];
+        for (i, unknown) in self.unknowns.iter().enumerate() {
+            if unknown.acts_in(scenario) && !texts.contains_key(&unknown.name) {
+                scope.unknown(&unknown.name).map_err(one)?;
+                units.insert(unknown.name.clone(), self.parameters[i].unit.clone());
+                parameters.push(i);
+            }
+        }
+        for condition in &self.scenarios[scenario].values {
+            scope.data(&condition.name, Data::Number(condition.value)).map_err(one)?;
+            units.extend(condition.unit.clone().map(|unit| (condition.name.clone(), unit)));
+        }
+        for (name, text) in texts {
+            scope.define(name, text).map_err(one)?;
+        }
+        let names: Vec<String> = texts.keys().cloned().collect();
+        let outputs: Vec<&str> = names.iter().map(String::as_str).collect();
+        let program = scope.compile(&outputs)?;
+        let found = scope.check_units(&units)?;
+        let unit = |name: &String| found.get(name).cloned().unwrap_or_default();
+        Ok(Some(Computed { units: names.iter().map(unit).collect(), names, parameters, program }))
+    }
+
+    fn expressions(&self) -> &BTreeMap<String, String> {
+        static NONE: BTreeMap<String, String> = BTreeMap::new();
+        self.model.as_ref().map_or(&NONE, |model| &model.common.inputs)
+    }
+
+    /// The names that expressions of `[model] inputs` use.
+    pub(super) fn used_in_expressions(&self) -> BTreeSet<String> {
+        let texts = self.expressions().values();
+        texts.flat_map(|text| crate::expression::names(text).unwrap_or_default()).collect()
+    }
+
+    /// See [`crate::plugin::Context::given`]: a name that only expressions use is not the model's.
+    pub(super) fn all_given(&self) -> Vec<Given> {
+        let hidden = self.used_in_expressions();
+        let mut given: Vec<Given> = Vec::new();
+        let mut add = |name: &str, unit: Option<&Unit>| {
+            let known = given.iter().any(|other| other.name == name);
+            if !known && (!hidden.contains(name) || self.expressions().contains_key(name)) {
+                given.push(Given { name: name.to_owned(), unit: unit.cloned() });
+            }
+        };
+        let computed = self.computed(0).ok().flatten();
+        for (parameter, unknown) in self.parameters.iter().zip(&self.unknowns) {
+            add(&unknown.name, Some(&parameter.unit));
+        }
+        for name in self.expressions().keys() {
+            let unit = computed
+                .as_ref()
+                .and_then(|c| c.names.iter().position(|other| other == name).map(|i| &c.units[i]));
+            add(name, unit);
+        }
+        for condition in self.scenarios.iter().flat_map(|scenario| &scenario.values) {
+            add(&condition.name, condition.unit.as_ref());
+        }
+        for (name, quantity) in self.model.iter().flat_map(|model| &model.common.fixed) {
+            add(name, quantity.unit.as_ref());
+        }
+        given
+    }
+}
+
+/// Reports what is wrong with the expressions.
+pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
+    let mut said: Vec<Fault> = Vec::new();
+    for scenario in 0..study.scenarios.len() {
+        let Err(faults) = study.computed(scenario) else { continue };
+        for fault in faults {
+            if said.contains(&fault) {
+                continue;
+            }
+            let texts = study.expressions();
+            let path = match texts.get(&fault.definition) {
+                Some(_) => format!("model.inputs.{}", fault.definition),
+                None => "model.inputs".to_owned(),
+            };
+            said.push(fault.clone());
+            let mut complaints = Complaints::new(root, problems);
+            let problem = complaints.at(&path).inside(fault.span).say(fault.message);
+            problem.expected = fault.expected.map(String::from);
+            problem.found = fault.found.map(String::from);
+            problem.help.extend(fault.help.map(String::from));
+        }
+    }
+}

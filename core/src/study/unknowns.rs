@@ -1,0 +1,79 @@
+//! The unknowns of a study: shared by all scenarios, or each of one.
+
+use super::Problems;
+use super::file::ParameterSection;
+use super::node::Node;
+use super::{Complaints, nearest};
+use crate::data::{Parameter, Scenario};
+
+/// What a parameter of a study stands for.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Unknown {
+    /// The name by which inputs and expressions know it: that of the parameter without its scenario.
+    pub name: String,
+    /// The scenario to which it belongs; all where there is none.
+    pub scenario: Option<usize>,
+}
+
+impl Unknown {
+    /// Whether it acts in a scenario.
+    pub fn acts_in(&self, scenario: usize) -> bool {
+        self.scenario.is_none_or(|own| own == scenario)
+    }
+}
+
+/// The parameters of a study and what they stand for: `"each"` makes one a scenario.
+pub(super) fn unknowns(
+    sections: &[ParameterSection],
+    scenarios: &[Scenario],
+    root: &Node,
+    problems: &mut Problems,
+) -> (Vec<Parameter>, Vec<Unknown>) {
+    let (mut parameters, mut unknowns) = (Vec::new(), Vec::new());
+    let mut add = |section: &ParameterSection, scenario: Option<usize>| {
+        let name = section.name.as_str().to_owned();
+        let full = |base: &str| match scenario {
+            Some(i) => format!("{base}[{}]", scenarios[i].name),
+            None => base.to_owned(),
+        };
+        parameters.push(Parameter {
+            symbol: full(section.symbol.as_deref().unwrap_or(&name)),
+            name: full(&name),
+            unit: section.unit.clone(),
+            design: section.design.clone().unwrap_or_else(|| section.prior.clone()),
+            prior: section.prior.clone(),
+            reference: section.reference,
+        });
+        unknowns.push(Unknown { name, scenario });
+    };
+    let named: Vec<&str> =
+        scenarios.iter().map(|s| s.name.as_str()).filter(|name| !name.is_empty()).collect();
+    for section in sections {
+        let Some(scenario) = &section.scenario else {
+            add(section, None);
+            continue;
+        };
+        let place = scenarios.iter().position(|s| &s.name == scenario && !s.name.is_empty());
+        match place {
+            Some(place) => add(section, Some(place)),
+            None if scenario == "each" && !named.is_empty() => {
+                (0..scenarios.len()).for_each(|i| add(section, Some(i)));
+            }
+            None => {
+                let mut complaints = Complaints::new(root, problems);
+                let path = format!("parameter.{}.scenario", section.name);
+                let complaint = complaints.at(&path);
+                if named.is_empty() {
+                    complaint.say("the study has no scenarios").help("add `[[scenario]]` sections");
+                    continue;
+                }
+                let problem = complaint.say(format!("there is no scenario `{scenario}`"));
+                problem.expected(nearest::one_of(named.iter().copied().chain(["each"])));
+                if let Some(near) = nearest::nearest(scenario, named.iter().copied()) {
+                    problem.help(format!("did you mean `{near}`?"));
+                }
+            }
+        }
+    }
+    (parameters, unknowns)
+}

@@ -1,0 +1,78 @@
+//! The part of a file that belongs to one scenario of a study.
+
+use std::path::Path;
+
+use lacuna::data::layouts::SCENARIO;
+use lacuna::plugin::Context;
+use lacuna::plugin::reader::{ReadError, scenario_path};
+use lacuna::study::problem::Complaints;
+
+use super::listed;
+use super::sheet::Sheet;
+
+/// What stands in a path for the name of a scenario.
+pub const PLACE: &str = "{scenario}";
+
+/// Whether a path has another file for each scenario.
+pub fn each_has_its_file(path: &Path) -> bool {
+    path.to_str().is_some_and(|text| text.contains(PLACE))
+}
+
+/// Complains about files of the options that are not there, for each scenario.
+pub fn check_files<'p>(
+    paths: impl IntoIterator<Item = (&'p str, Option<&'p Path>)>,
+    context: &Context<'_>,
+    complaints: &mut Complaints<'_>,
+) {
+    for (key, path) in paths {
+        let Some(path) = path else { continue };
+        for scenario in context.scenarios {
+            let file = scenario_path(context.directory, path, scenario.label());
+            if !file.is_file() {
+                complaints.at(key).say(format!("there is no file `{}`", file.display()));
+            }
+            if !each_has_its_file(path) {
+                break;
+            }
+        }
+    }
+}
+
+/// Reads the rows of a table that belong to a scenario: all of a file of its own, else those with its name in the
+/// column `scenario`. A study without scenarios takes all rows, and no such column unless it is ignored.
+pub fn sheet(
+    directory: &Path,
+    path: &Path,
+    scenario: Option<&str>,
+    ignore: &[String],
+) -> Result<Sheet, ReadError> {
+    let sheet = Sheet::read(&scenario_path(directory, path, scenario))?;
+    let column = sheet.find(SCENARIO).filter(|_| !ignore.iter().any(|name| name == SCENARIO));
+    match (column, scenario) {
+        (None, Some(_)) if !each_has_its_file(path) => Err(ReadError::new(
+            &sheet.path,
+            "has no column `scenario`, and the study has scenarios",
+        )
+        .help(format!("add the column, or name a file for each scenario: a path with `{PLACE}`"))),
+        (None, _) => Ok(sheet),
+        (Some(column), None) => {
+            let text = "has a column `scenario`, and the study has no scenarios";
+            Err(ReadError::new(&sheet.path, text)
+                .at(format!("line {}, column {}", sheet.heading_line, column + 1))
+                .help("add `[[scenario]]` sections, or list the column under `ignore`"))
+        }
+        (Some(column), Some(name)) => some(sheet, column, name),
+    }
+}
+
+fn some(mut sheet: Sheet, column: usize, name: &str) -> Result<Sheet, ReadError> {
+    let mut known: Vec<String> = sheet.records.iter().map(|r| r.cells[column].clone()).collect();
+    sheet.records.retain(|record| record.cells[column] == name);
+    if sheet.records.is_empty() {
+        known.sort();
+        known.dedup();
+        let text = format!("has no row of scenario `{name}`; it has {}", listed(&known));
+        return Err(ReadError::new(&sheet.path, text));
+    }
+    Ok(sheet)
+}
