@@ -8,7 +8,7 @@
 use std::error::Error;
 use std::hint::black_box;
 
-use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Unit};
+use lacuna::data::{Axis, Layout, Layouts, Measurements, Parameter, Replicate, Unit};
 use lacuna::linalg::{Matrix, multiply};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal, uniform};
@@ -16,7 +16,7 @@ use lacuna::plugin::discrepancy::Known;
 use lacuna::plugin::discrepancy::{CommonError, Discrepancy};
 use lacuna::plugin::surrogate::{Surrogate, Training};
 use lacuna::plugin::{Emulator, Target};
-use lacuna::posterior::{Emulated, Posterior};
+use lacuna::posterior::{OfData, Posterior};
 use lacuna::run::{Progress, Silent};
 use lacuna_bench::clock::{per_call, processor_seconds};
 use lacuna_plugins::discrepancies::gaussian::Gaussian;
@@ -37,8 +37,9 @@ fn main() -> Fallible<()> {
     let degree: usize = arguments.next().map_or(Ok(17), |text| text.parse())?;
     let rank: usize = arguments.next().map_or(Ok(420), |text| text.parse())?;
     let (parameters, layout) = (parameters()?, layout()?);
-    let emulator = emulator(&parameters, &layout, degree)?;
-    let data = measured(&*emulator, &layout);
+    let layouts = Layouts::from(layout);
+    let emulator = emulator(&parameters, &layouts, degree)?;
+    let data = measured(&*emulator, &layouts.blocks[0]);
     let gaussian = Gaussian {
         variance: Distribution::HalfNormal(1e-6).into(),
         by: lacuna_plugins::discrepancies::common::By::default(),
@@ -47,7 +48,7 @@ fn main() -> Fallible<()> {
     let likelihood = gaussian.likelihood(&Known::without_slopes(&data, &error(rank)))?;
     let begun = processor_seconds()?;
     let posterior =
-        Posterior::new(&parameters, Emulated::new(&layout, &*emulator, &[], &*likelihood));
+        Posterior::new(&parameters, OfData::new(&layouts, &*emulator, &[], &*likelihood));
     let preparation = processor_seconds()? - begun;
     let walkers = posterior.coordinates_of(&points(WALKERS, 4));
 
@@ -133,7 +134,7 @@ fn layout() -> Fallible<Layout> {
 /// All terms of a degree, fitted to half as many runs again.
 fn emulator(
     parameters: &[Parameter],
-    layout: &Layout,
+    layouts: &Layouts,
     degree: usize,
 ) -> Fallible<Box<dyn Emulator>> {
     let terms = (degree + 1) * (degree + 2) * (degree + 3) / 6;
@@ -144,12 +145,7 @@ fn emulator(
         degree: Degree::Fixed(degree),
         ..PolynomialChaos::default()
     };
-    let training = Training {
-        parameters,
-        layouts: &layout.clone().into(),
-        points: &runs,
-        responses: &responses,
-    };
+    let training = Training { parameters, layouts, points: &runs, responses: &responses };
     Ok(options.fit(&training, &Stream::root(2), &Progress::new(&Silent))?)
 }
 

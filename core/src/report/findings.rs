@@ -117,7 +117,7 @@ pub struct SurrogateFindings {
 /// The posterior.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationFindings {
-    /// The coordinates: parameters first, then hyperparameters.
+    /// The coordinates: parameters first, then hyperparameters, then derived quantities.
     pub coordinates: Vec<CoordinateFindings>,
     /// All draws, burn-in included: `[chain][step][coordinate]` flattened in that order, natural units.
     pub draws: Vec<f64>,
@@ -164,6 +164,18 @@ pub struct LeftOutFindings {
     pub count: usize,
 }
 
+/// What a coordinate is of the posterior.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// A parameter of the model.
+    Parameter,
+    /// An unknown of a discrepancy or effect.
+    Hyperparameter,
+    /// A quantity that follows from the parameters.
+    Derived,
+}
+
 /// One coordinate of the posterior.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CoordinateFindings {
@@ -173,8 +185,10 @@ pub struct CoordinateFindings {
     pub symbol: String,
     /// Its unit.
     pub unit: Unit,
-    /// Its prior.
-    pub prior: Distribution,
+    /// What it is of the posterior.
+    pub role: Role,
+    /// Its prior, where it has one of its own.
+    pub prior: Option<Distribution>,
     /// The reference value, where the study gives one.
     pub reference: Option<f64>,
     /// Posterior mean.

@@ -32,13 +32,13 @@ pub const SCHEMA: u64 = 1;
 /// | `surrogate.near_posterior` | root mean square difference between the emulator and the model, run anew at posterior draws (`validate.emulator_check`), in `surrogate.unit` |
 /// | `surrogate.refine.rounds`, `.ratio`, `.reached` | rounds of refinement; the emulator's error near the posterior over the discrepancy; whether that is small enough |
 /// | `surrogate.sobol` | for each parameter its `first` and `total` index, where known |
-/// | `parameters.NAME` | parameters and hyperparameters, in that order |
+/// | `parameters.NAME` | parameters, hyperparameters and derived quantities, in that order |
 /// | `….mean`, `.sd`, `.q025`, `.median`, `.q975` | of the posterior draws after the burn-in |
 /// | `….map` | where the posterior density has its maximum |
 /// | `….r_hat`, `.ess_bulk`, `.ess_tail`, `.mcse_mean` | rank-normalised split R-hat, effective sample sizes, Monte Carlo standard error of the mean |
 /// | `….autocorrelation_time` | integrated autocorrelation time in steps |
 /// | `….unit` | the unit of all these but R-hat and the sample sizes |
-/// | `….role` | `parameter` or `hyperparameter` |
+/// | `….role` | `parameter`, `hyperparameter` or `derived` |
 /// | `….reference` | the study's reference value, where it gives one |
 /// | `correlation.names`, `.matrix` | posterior correlation, rows and columns in the order of `names` |
 /// | `acceptance.mean`, `.min`, `.max` | share of accepted moves over the chains |
@@ -72,7 +72,7 @@ pub fn summary(findings: &Findings) -> Value {
         put("surrogate", surrogate(findings, found));
     }
     if let Some(calibration) = &findings.calibration {
-        put("parameters", parameters(findings, calibration));
+        put("parameters", parameters(calibration));
         put("correlation", correlation(calibration));
         if !calibration.acceptance.is_empty() {
             put("acceptance", acceptance(calibration));
@@ -158,17 +158,12 @@ fn surrogate(findings: &Findings, found: &SurrogateFindings) -> Value {
     value
 }
 
-fn parameters(findings: &Findings, calibration: &CalibrationFindings) -> Value {
-    let split = findings.parameters.len();
-    let coordinates = calibration.coordinates.iter().enumerate();
-    let named = coordinates.map(|(i, c)| {
-        let role = if i < split { "parameter" } else { "hyperparameter" };
-        (c.name.clone(), coordinate(c, role))
-    });
+fn parameters(calibration: &CalibrationFindings) -> Value {
+    let named = calibration.coordinates.iter().map(|c| (c.name.clone(), coordinate(c)));
     named.collect::<Map<_, _>>().into()
 }
 
-fn coordinate(c: &CoordinateFindings, role: &str) -> Value {
+fn coordinate(c: &CoordinateFindings) -> Value {
     let mut value = json!({
         "mean": c.mean,
         "sd": c.sd,
@@ -182,7 +177,7 @@ fn coordinate(c: &CoordinateFindings, role: &str) -> Value {
         "mcse_mean": c.mcse_mean,
         "autocorrelation_time": c.autocorrelation_time,
         "unit": c.unit.to_string(),
-        "role": role,
+        "role": c.role,
     });
     if let Some(reference) = c.reference {
         value["reference"] = json!(reference);

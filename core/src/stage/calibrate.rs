@@ -72,8 +72,8 @@ pub struct Coordinate {
     pub symbol: String,
     /// Its unit.
     pub unit: Unit,
-    /// Its prior.
-    pub prior: Distribution,
+    /// Its prior; that of a derived quantity is nowhere written.
+    pub prior: Option<Distribution>,
     /// Its reference value.
     pub reference: Option<f64>,
 }
@@ -336,14 +336,14 @@ fn coordinates(study: &Study, posterior: &Posterior<'_>) -> Vec<Coordinate> {
         name: p.name.clone(),
         symbol: p.symbol.clone(),
         unit: p.unit.clone(),
-        prior: p.prior.clone(),
+        prior: Some(p.prior.clone()),
         reference: p.reference,
     });
     let hyper = posterior.hyperparameters().iter().map(|h| Coordinate {
         name: h.name.clone(),
         symbol: h.symbol.clone(),
         unit: h.unit.clone(),
-        prior: h.prior.clone(),
+        prior: Some(h.prior.clone()),
         reference: None,
     });
     parameters.chain(hyper).collect()

@@ -3,6 +3,7 @@
 pub mod best_fit;
 pub mod calibrate;
 pub mod common_error;
+pub mod derived;
 pub mod design;
 pub mod direct;
 pub mod evidence;

@@ -18,7 +18,7 @@ use crate::run::{Artifact, Kept, Observer, RunDirectory, Stop, files};
 use crate::study::Study;
 
 use super::screen;
-use super::simulate::Simulated;
+use super::simulate::{Simulated, inside};
 
 /// What was read.
 #[derive(Debug, Clone, PartialEq)]
@@ -180,7 +180,7 @@ pub fn ensemble(study: &Study, runs: Option<Runs<'_>>) -> Result<Ensemble, Stop>
             .layouts
             .of_scenario(&scenario.name)
             .ok_or_else(|| Stop::new(format!("no response to `{}`", scenario.name)))?;
-        let simulated = runs.map(|runs| runs.folder.join(&runs.made.scenarios[i].folder));
+        let simulated = runs.map(|runs| inside(runs.folder, &runs.made.scenarios[i].folder));
         let source = EnsembleSource {
             directory: &study.directory,
             simulated: simulated.as_deref(),

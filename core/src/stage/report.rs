@@ -7,7 +7,7 @@ use crate::math::fit;
 use crate::math::moments::{self, Moments};
 use crate::report::findings::{
     CalibrationFindings, CoordinateFindings, EnsembleFindings, Findings, FittedDistribution,
-    LeftOutFindings, MeasuredFindings, SurrogateFindings,
+    LeftOutFindings, MeasuredFindings, Role, SurrogateFindings,
 };
 use crate::report::{render, summary_json};
 use crate::run::{Kept, RunDirectory, Stop, files};
@@ -17,19 +17,21 @@ use super::calibrate::Calibrated;
 use super::evidence::Weighed;
 use super::read::Measured;
 use super::validate::Validated;
-use super::{Known, inference_data};
+use super::{Known, derived, inference_data};
 
 /// Writes report, summary and posterior file; returns the findings.
 pub fn stage(study: &Study, all: &Artifacts<'_>, run: &RunDirectory) -> Result<Findings, Stop> {
-    let findings = findings(study, all, run);
+    let calibrated = all.calibrated.map(|kept| derived::extended(study, &kept.value));
+    let calibrated = calibrated.as_ref();
+    let findings = findings(study, all, calibrated, run);
     let root = run.root();
     files::write_atomic(&root.join("summary.json"), summary_json(&findings).as_bytes())?;
     let page = render(&findings);
     files::write_atomic(&run.stage_folder("8-report").join("report.html"), page.as_bytes())?;
     files::write_atomic(&root.join("report.html"), page.as_bytes())?;
-    if let Some(calibrated) = all.calibrated {
+    if let Some(calibrated) = calibrated {
         let measured = all.measured();
-        let bytes = inference_data::encode(study, &calibrated.value, measured, all.validated)
+        let bytes = inference_data::encode(study, calibrated, measured, all.validated)
             .map_err(|error| Stop::new(format!("cannot write posterior.nc: {error}")))?;
         files::write_atomic(&root.join("posterior.nc"), &bytes)?;
     }
@@ -55,10 +57,15 @@ impl<'a> Artifacts<'a> {
     }
 }
 
-fn findings(study: &Study, all: &Artifacts<'_>, run: &RunDirectory) -> Findings {
+fn findings(
+    study: &Study,
+    all: &Artifacts<'_>,
+    calibrated: Option<&Calibrated>,
+    run: &RunDirectory,
+) -> Findings {
     let measured = all.measured();
     let weighed = all.weighed.map(|w| &w.value);
-    let calibration = all.calibrated.map(|c| calibration(&c.value, weighed));
+    let calibration = calibrated.map(|c| calibration(study, c, weighed));
     let validation =
         all.validated.zip(measured).map(|(kept, measured)| kept.value.findings(measured));
     let seconds = run
@@ -145,10 +152,20 @@ fn surrogate(known: &Known<'_>, validated: Option<&Kept<Validated>>) -> Option<S
     })
 }
 
-fn calibration(calibrated: &Calibrated, weighed: Option<&Weighed>) -> CalibrationFindings {
+fn calibration(
+    study: &Study,
+    calibrated: &Calibrated,
+    weighed: Option<&Weighed>,
+) -> CalibrationFindings {
     let outcome = &calibrated.outcome;
     let kept = calibrated.draws.from_step(outcome.burn_in);
-    let coordinates = (0..kept.dimension()).map(|j| coordinate(calibrated, &kept, j)).collect();
+    let role = |j: usize| match calibrated.outcome.coordinates[j].prior {
+        None => Role::Derived,
+        Some(_) if j < study.parameters.len() => Role::Parameter,
+        Some(_) => Role::Hyperparameter,
+    };
+    let one = |j: usize| coordinate(calibrated, &kept, j, role(j));
+    let coordinates = (0..kept.dimension()).map(one).collect();
     CalibrationFindings {
         coordinates,
         draws: calibrated.draws.values.clone(),
@@ -182,7 +199,7 @@ fn verdict(diagnosis: &Diagnosis) -> String {
     }
 }
 
-fn coordinate(calibrated: &Calibrated, kept: &Draws, j: usize) -> CoordinateFindings {
+fn coordinate(calibrated: &Calibrated, kept: &Draws, j: usize, role: Role) -> CoordinateFindings {
     let outcome = &calibrated.outcome;
     let about = &outcome.coordinates[j];
     let judged = &outcome.diagnosis.coordinates[j];
@@ -194,6 +211,7 @@ fn coordinate(calibrated: &Calibrated, kept: &Draws, j: usize) -> CoordinateFind
         name: about.name.clone(),
         symbol: about.symbol.clone(),
         unit: about.unit.clone(),
+        role,
         prior: about.prior.clone(),
         reference: about.reference,
         mean: moments::mean(&pooled),

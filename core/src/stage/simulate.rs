@@ -65,7 +65,7 @@ impl Artifact for Simulated {
     fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
         let mut names = Vec::new();
         for made in &self.scenarios {
-            let folder = folder.join(&made.folder);
+            let folder = inside(folder, &made.folder);
             files::write_atomic(&folder.join(TABLE), self.table(&made.runs).as_bytes())?;
             let seconds: String = std::iter::once("run,seconds\n".to_owned())
                 .chain(made.runs.iter().map(|r| format!("{},{:.3}\n", r.run, r.seconds)))
@@ -91,7 +91,7 @@ impl Artifact for Simulated {
         let mut all =
             Self { scenarios: Vec::new(), parameters: Vec::new(), points: Matrix::default() };
         for inner in folders {
-            let (runs, parameters, points) = from_table(&folder.join(&inner).join(TABLE))?;
+            let (runs, parameters, points) = from_table(&inside(folder, &inner).join(TABLE))?;
             all.scenarios.push(Made { folder: inner, runs });
             (all.parameters, all.points) = (parameters, points);
         }
@@ -132,7 +132,7 @@ impl Simulated {
     /// How many result files are missing or have changed.
     fn damaged(&self, folder: &Path) -> usize {
         let of = |made: &Made| {
-            let folder = folder.join(&made.folder);
+            let folder = inside(folder, &made.folder);
             made.runs.iter().filter(|r| r.file.is_some() && !is_whole(r, &folder)).count()
         };
         self.scenarios.iter().map(of).sum()
@@ -163,6 +163,11 @@ pub(super) fn from_table(path: &Path) -> Result<(Vec<RunRecord>, Vec<String>, Ma
         points.push_row(&values.map_err(|e| bad(format!("a parameter: {e}")))?);
     }
     Ok((runs, parameters, points))
+}
+
+/// The folder of a scenario's runs in that of all.
+pub(super) fn inside(folder: &Path, own: &Path) -> PathBuf {
+    if own.as_os_str().is_empty() { folder.to_owned() } else { folder.join(own) }
 }
 
 fn is_whole(record: &RunRecord, folder: &Path) -> bool {
@@ -250,7 +255,7 @@ fn simulate(
     let progress = Progress::new(observer);
     let mut scenarios = Vec::new();
     for setting in &simulator.settings {
-        let folder = folder.join(&setting.folder);
+        let folder = inside(folder, &setting.folder);
         fs::create_dir_all(&folder).map_err(|error| files::cannot_write(&folder, &error))?;
         let work = Work { study, simulator, setting, names, points, folder: &folder };
         scenarios.push(Made { folder: setting.folder.clone(), runs: work.run(&progress)? });

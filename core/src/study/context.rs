@@ -35,6 +35,7 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
         }
     }
     super::inputs::check(study, root, problems);
+    super::derived::check(study, root, problems);
     study.each_plugin(root, problems, |component, context, complaints| {
         component.check(context, complaints);
     });
@@ -42,7 +43,7 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
 
 /// A target takes the place of all that makes a likelihood.
 fn beside_a_target(study: &Study, root: &Node, complaints: &mut Complaints<'_>) {
-    const ALONE: [&str; 5] = ["study", "parameter", "target", "executor", "sampler"];
+    const ALONE: [&str; 6] = ["study", "parameter", "derived", "target", "executor", "sampler"];
     for (key, _) in root.entries().iter().filter(|(key, _)| !ALONE.contains(&key.name.as_str())) {
         complaints
             .at(&key.name)

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use super::derived::DerivedSection;
 pub use super::quantity::Quantity;
 pub use super::response::{Axes, AxisSection, GridSection, ResponseSection};
 pub use super::scenario::{FunctionSection, ScenarioSection};

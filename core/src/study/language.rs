@@ -5,8 +5,9 @@ use schemars::JsonSchema;
 use serde_json::Value;
 
 use super::file::{
-    DesignKeys, DiscrepancyKeys, MeasurementKeys, ModelKeys, NumericalErrorSection,
-    ParameterSection, ResponseSection, SamplerKeys, StudySection, SurrogateKeys, ValidateSection,
+    DerivedSection, DesignKeys, DiscrepancyKeys, MeasurementKeys, ModelKeys, NumericalErrorSection,
+    ParameterSection, ResponseSection, SamplerKeys, ScenarioSection, StudySection, SurrogateKeys,
+    ValidateSection,
 };
 use super::schema::Language;
 use crate::plugin::manual::{Manual, generator, resolve};
@@ -23,7 +24,9 @@ pub fn schema() -> Value {
         .required("study")
         .tables::<ParameterSection>("parameter")
         .required("parameter")
+        .tables::<DerivedSection>("derived")
         .section::<dyn Density, NoKeys>("target")
+        .tables::<ScenarioSection>("scenario")
         .table::<ResponseSection>("response")
         .section::<dyn Model, ModelKeys>("model")
         .section::<dyn Design, DesignKeys>("design")
@@ -44,6 +47,8 @@ pub fn manual() -> Vec<Manual> {
     vec![
         page::<StudySection>("[study]"),
         page::<ParameterSection>("[[parameter]]"),
+        page::<DerivedSection>("[[derived]]"),
+        page::<ScenarioSection>("[[scenario]]"),
         page::<ResponseSection>("[response]"),
         page::<ModelKeys>("[model]"),
         page::<DesignKeys>("[design]"),

@@ -3,6 +3,7 @@
 pub mod components;
 mod context;
 pub mod decode;
+pub mod derived;
 pub mod emit;
 pub mod file;
 pub mod inherit;

@@ -10,11 +10,11 @@ use toml::Table;
 use super::context;
 use super::decode::{decode, fields};
 use super::file::{
-    DesignKeys, DiscrepancyKeys, MeasurementKeys, ModelKeys, NumericalErrorSection,
+    DerivedSection, DesignKeys, DiscrepancyKeys, MeasurementKeys, ModelKeys, NumericalErrorSection,
     ResponseSection, SamplerKeys, StudySection, SurrogateKeys, ValidateSection,
 };
 use super::sections::{
-    chosen, chosen_or, effects, layouts, numerical_error, parameters, scenarios, table,
+    chosen, chosen_or, derived, effects, layouts, numerical_error, parameters, scenarios, table,
     unknown_sections,
 };
 use super::unknowns::{Unknown, unknowns};
@@ -65,6 +65,8 @@ pub struct Study {
     pub sampler: Option<Section<dyn Sampler, SamplerKeys>>,
     /// `[numerical_error]`.
     pub numerical_error: Option<NumericalError>,
+    /// `[[derived]]`.
+    pub derived_sections: Vec<DerivedSection>,
     /// `[[effect]]`.
     pub effects: Vec<Section<dyn Effect, NoKeys>>,
     /// `[validate]`.
@@ -84,10 +86,11 @@ pub struct NumericalError {
 }
 
 /// The sections of the study language, in the order in which a study is written.
-pub const SECTIONS: [&str; 16] = [
+pub const SECTIONS: [&str; 17] = [
     "study",
     "parameter",
     "target",
+    "derived",
     "scenario",
     "response",
     "model",
@@ -200,6 +203,7 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
     let discrepancy = chosen(root, "discrepancy", None, problems);
     let sampler = chosen(root, "sampler", None, problems);
     let numerical_error = numerical_error(root, problems);
+    let derived_sections = derived(root, problems);
     let effects = effects(root, problems);
     let validate = match root.get("validate") {
         Some(node) => problems.within("validate", |problems| decode(node, problems)),
@@ -239,6 +243,7 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
         discrepancy,
         sampler,
         numerical_error,
+        derived_sections: derived_sections?,
         effects: effects?,
         validate: validate?,
         resolved: Table::new(),

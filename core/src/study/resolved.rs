@@ -38,6 +38,10 @@ pub(super) fn table(
     let mut whole = Table::new();
     whole.insert("study".to_owned(), about.into());
     whole.insert("parameter".to_owned(), parameters?.into());
+    if !study.derived_sections.is_empty() {
+        let derived: Result<Vec<Table>, _> = study.derived_sections.iter().map(to_table).collect();
+        whole.insert("derived".to_owned(), derived?.into());
+    }
     if !scenarios.is_empty() {
         let scenarios: Result<Vec<Table>, _> = scenarios.iter().map(to_table).collect();
         whole.insert("scenario".to_owned(), scenarios?.into());

@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 
 use super::decode::decode;
 use super::file::{
-    Axes, NumericalErrorSection, ParameterSection, ResponseSection, ScenarioSection,
+    Axes, DerivedSection, NumericalErrorSection, ParameterSection, ResponseSection, ScenarioSection,
 };
 use super::resolve::{NumericalError, SECTIONS};
 use super::{Complaints, Node, Problems, nearest};
@@ -126,6 +126,19 @@ pub(super) fn effects(
     let decoded: Vec<Option<_>> = list
         .iter()
         .map(|node| problems.within("effect", |problems| section(node, None, problems)))
+        .collect();
+    decoded.into_iter().collect()
+}
+
+/// `[[derived]]`.
+pub(super) fn derived(root: &Node, problems: &mut Problems) -> Option<Vec<DerivedSection>> {
+    let list = root.get("derived").map(Node::elements).unwrap_or_default();
+    let decoded: Vec<Option<DerivedSection>> = list
+        .iter()
+        .map(|node| {
+            let path = format!("derived.{}", node.name().unwrap_or("?"));
+            problems.within(&path, |problems| decode(node, problems))
+        })
         .collect();
     decoded.into_iter().collect()
 }

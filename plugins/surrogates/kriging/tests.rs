@@ -1,7 +1,6 @@
 //! Beside the textbook's formulas with dense inverses, and figures of a peer.
 
 use lacuna::linalg::{Matrix, multiply, multiply_transposed, multiply_vector, vector::dot};
-use lacuna::plugin::Forward;
 use lacuna::plugin::Target;
 
 use super::factor::Factor;

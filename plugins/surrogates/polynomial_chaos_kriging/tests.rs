@@ -3,7 +3,6 @@
 use super::*;
 use crate::surrogates::gaussian_process::GaussianProcess;
 use crate::surrogates::gaussian_process::tests::{Case, ishigami, rmse};
-use lacuna::plugin::Forward;
 
 /// Errors of the Gaussian process, the expansion and both together.
 fn errors(case: &Case) -> [f64; 3] {

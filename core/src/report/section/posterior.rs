@@ -9,7 +9,7 @@ use crate::report::chart::{
     pair_matrix,
 };
 use crate::report::curve::named_density;
-use crate::report::findings::{CalibrationFindings, CoordinateFindings, Findings};
+use crate::report::findings::{CalibrationFindings, CoordinateFindings, Findings, Role};
 use crate::report::number::{decimals, fixed, rounded, significant};
 use crate::report::page::{Caption, Numbers, Section};
 use crate::report::scale::extent;
@@ -25,6 +25,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
         @if !calibration.draws.is_empty() {
             (parameter_marginals(findings, calibration, numbers))
             (hyperparameter_marginals(findings, calibration, numbers))
+            (derived_marginals(findings, calibration, numbers))
             @if several { (pairs(calibration, numbers)) }
         }
         (fits(calibration, numbers))
@@ -53,7 +54,7 @@ pub fn posterior_table(calibration: &CalibrationFindings) -> Table {
 
 fn summary(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
     let caption = Caption::new(
-        "Posterior of the parameters and of the hyperparameters. Mean, sd and quantiles are those of \
+        "Posterior of the parameters, of the hyperparameters and of derived quantities. Mean, sd and quantiles are those of \
          the draws after the burn-in; the MAP is the optimised maximum of the density. Numbers end \
          at the first digit of the Monte Carlo standard error (MCSE) of the mean.",
         "posterior, given this model and this discrepancy: doubt about the form of either is not in it.",
@@ -107,7 +108,7 @@ fn hyperparameter_marginals(
     numbers: &mut Numbers,
 ) -> Markup {
     let first = findings.parameters.len().min(calibration.coordinates.len());
-    let all = calibration.coordinates.len() - first;
+    let all = count_of(calibration, Role::Hyperparameter);
     if all == 0 {
         return html! {};
     }
@@ -135,6 +136,41 @@ fn hyperparameter_marginals(
     )
 }
 
+/// How many coordinates have this role.
+fn count_of(calibration: &CalibrationFindings, role: Role) -> usize {
+    calibration.coordinates.iter().filter(|c| c.role == role).count()
+}
+
+fn derived_marginals(
+    findings: &Findings,
+    calibration: &CalibrationFindings,
+    numbers: &mut Numbers,
+) -> Markup {
+    let all = count_of(calibration, Role::Derived);
+    if all == 0 {
+        return html! {};
+    }
+    let first = calibration.coordinates.len() - all;
+    let shown = first..first + all.min(MOST_SHOWN);
+    let panels: Vec<Marginal> = shown.map(|i| marginal(findings, calibration, i)).collect();
+    let caption = Caption::new(
+        format!(
+            "Marginals of the derived quantities, scaled to area one: each draw of the parameters gives one \
+             value.{}",
+            first_of(all, MOST_SHOWN)
+        ),
+        "histogram and fitted curve the posterior. The MAP is the value at the MAP of the parameters, not the \
+         peak of this histogram.",
+        "quantities that are far better known than the parameters of which they are made.",
+    );
+    let [draws, fit, _, map] = marginal_keys();
+    numbers.figure(
+        &marginals(&panels, "marginals of the derived quantities"),
+        &[draws, fit, map],
+        &caption,
+    )
+}
+
 fn marginal_keys() -> [Key; 4] {
     [
         Key::area("s-histogram", "draws"),
@@ -158,7 +194,8 @@ fn marginal(findings: &Findings, calibration: &CalibrationFindings, i: usize) ->
     };
     let mut curves = Vec::new();
     if let Some(span) = span.filter(|(low, high)| high > low) {
-        let prior = shown(named_density(&c.prior, span, 160));
+        let prior =
+            c.prior.as_ref().map_or_else(Vec::new, |prior| shown(named_density(prior, span, 160)));
         curves.push(Curve { class: "s-prior", name: String::from("prior"), points: prior });
         if let Some(fit) = c.fits.first() {
             let name = fit.distribution.name().replace('_', "-");
@@ -180,13 +217,13 @@ fn marginal(findings: &Findings, calibration: &CalibrationFindings, i: usize) ->
         draws,
         curves,
         marks: marks(c, &unit),
-        second: is_variance(findings, i, c).then(|| sd_axis(findings, unit.factor)),
+        second: is_variance(c).then(|| sd_axis(findings, unit.factor)),
     }
 }
 
 /// Whether a hyperparameter is the variance of the response.
-fn is_variance(findings: &Findings, i: usize, c: &CoordinateFindings) -> bool {
-    i >= findings.parameters.len() && c.name.contains("variance") && c.q025 > 0.0
+fn is_variance(c: &CoordinateFindings) -> bool {
+    c.role == Role::Hyperparameter && c.name.contains("variance") && c.q025 > 0.0
 }
 
 /// The standard deviation in the response's unit above a variance in a unit of this size.

@@ -8,7 +8,7 @@ use crate::math::random::{Stream, normal, uniform};
 use crate::plugin::Fact;
 use crate::report::findings::{
     CalibrationFindings, CoordinateFindings, EnsembleFindings, Findings, FittedDistribution,
-    FlaggedCurve, MeasuredFindings, SurrogateFindings, ValidationCase, ValidationFindings,
+    FlaggedCurve, MeasuredFindings, Role, SurrogateFindings, ValidationCase, ValidationFindings,
 };
 
 const SENSORS: [&str; 10] = ["B", "C", "G", "M", "R", "T", "U", "V", "Y", "Z"];
@@ -301,7 +301,8 @@ fn coordinates() -> Vec<CoordinateFindings> {
                 name: NAMES[i].into(),
                 symbol: ["x1", "x2", "x3", "σ²"][i].into(),
                 unit: unit(units[i]),
-                prior,
+                role: if i < 3 { Role::Parameter } else { Role::Hyperparameter },
+                prior: Some(prior),
                 reference: references[i],
                 mean,
                 sd,

@@ -10,7 +10,6 @@ use super::bench::{
 };
 use crate::surrogates::polynomial_chaos::{PolynomialChaos, QNorm, QNormRange};
 use lacuna::plugin::Emulator;
-use lacuna::plugin::Forward;
 
 /// Validation error with the Sobol' design, and the median with five Latin hypercubes.
 fn errors(function: &Function, options: &PolynomialChaos, n: usize) -> (f64, f64) {

@@ -4,7 +4,6 @@ use lacuna::data::{Axis, Layout, Parameter, Unit};
 use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, permutation, uniform};
-use lacuna::plugin::Emulator;
 use lacuna::plugin::Forward;
 use lacuna::plugin::surrogate::Training;
 use lacuna::run::{Progress, Silent, Stop};

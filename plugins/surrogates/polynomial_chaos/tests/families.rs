@@ -4,7 +4,6 @@ use lacuna::linalg::Matrix;
 use lacuna::linalg::lanes::LANES;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::special::ln_gamma;
-use lacuna::plugin::Forward;
 
 use super::bench::parameter;
 use crate::surrogates::polynomial_chaos::{Coordinate, Family, Recurrence, measure};

@@ -1,7 +1,6 @@
 //! The options as a study writes them.
 
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::Forward;
 
 use super::bench::{of_degree, parameters, up_to};
 use crate::surrogates::polynomial_chaos::{

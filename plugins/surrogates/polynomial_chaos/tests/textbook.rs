@@ -4,7 +4,6 @@
 use lacuna::linalg::{Cholesky, Matrix, multiply_vector};
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::Emulator;
-use lacuna::plugin::Forward;
 use lacuna::plugin::forward::Linear;
 
 use super::bench::{fitted, latin_hypercube, of_degree, scaled};
