@@ -25,15 +25,12 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
         for (place, scenario) in study.scenarios.iter().enumerate() {
             let Some((layout, _)) = study.layouts.of_scenario(&scenario.name) else { continue };
             let signature = model.built.plugin.signature(&study.context_of(&layout));
-            let before = complaints.len();
             inputs::check(study, place, &signature, &mut complaints);
             outputs::check(&layout, &signature, &mut complaints);
-            // What is wrong in one scenario is most often wrong in all.
-            if complaints.len() > before {
-                break;
-            }
         }
     }
+    // What is wrong in one scenario is most often wrong in all.
+    problems.dedup();
     super::inputs::check(study, root, problems);
     super::derived::check(study, root, problems);
     study.each_plugin(root, problems, |component, context, complaints| {

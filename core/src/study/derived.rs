@@ -99,8 +99,9 @@ impl Study {
         scenario: Option<usize>,
     ) -> Result<Derived, Vec<Wrong>> {
         let faults = |faults: Vec<Fault>| faults.into_iter().map(Wrong::Fault).collect::<Vec<_>>();
-        let (scope, units, parameters) = self.scope(scenario).map_err(|f| faults(vec![f]))?;
         let name = section.name.as_str();
+        let (scope, units, parameters) =
+            self.scope(name, scenario).map_err(|fault| faults(vec![fault]))?;
         let program = scope.compile(&[name]).map_err(faults)?;
         let found = scope.check_units(&units).map_err(faults)?;
         let own = found.get(name).cloned().unwrap_or_default();
@@ -115,9 +116,25 @@ impl Study {
         Ok(Derived { name: full(name), symbol, unit, reference, parameters, program, factor })
     }
 
-    /// The names that derived quantities may use, their units, and the parameters behind the unknowns.
+    /// The derived quantities on which one of them depends, itself included.
+    fn needed(&self, name: &str) -> Vec<&DerivedSection> {
+        let find = |name: &str| self.derived_sections.iter().find(|s| s.name.as_str() == name);
+        let mut needed: Vec<&DerivedSection> = find(name).into_iter().collect();
+        let mut next = 0;
+        while let Some(section) = needed.get(next) {
+            for used in crate::expression::names(&section.expression).unwrap_or_default() {
+                let more = find(&used).filter(|s| !needed.iter().any(|n| n.name == s.name));
+                needed.extend(more);
+            }
+            next += 1;
+        }
+        needed
+    }
+
+    /// The names that a derived quantity may use, their units, and the parameters behind the unknowns.
     fn scope(
         &self,
+        name: &str,
         scenario: Option<usize>,
     ) -> Result<(Scope, BTreeMap<String, Unit>, Vec<usize>), Fault> {
         let mut scope = Scope::new();
@@ -139,7 +156,7 @@ impl Study {
             scope.data(&name, Data::Number(quantity.value))?;
             units.extend(quantity.unit.map(|unit| (name, unit)));
         }
-        for other in &self.derived_sections {
+        for other in self.needed(name) {
             let usable = other.scenario.is_none() || scenario.is_some();
             if usable {
                 scope.define(other.name.as_str(), &other.expression)?;
@@ -152,7 +169,13 @@ impl Study {
 /// Reports what is wrong with the derived quantities.
 pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     let mut said: Vec<Fault> = Vec::new();
-    for section in &study.derived_sections {
+    for (i, section) in study.derived_sections.iter().enumerate() {
+        if study.derived_sections[..i].iter().any(|other| other.name == section.name) {
+            Complaints::new(root, problems)
+                .at(&format!("derived.{}.name", section.name))
+                .say(format!("there are two derived quantities `{}`", section.name))
+                .help("give each `[[derived]]` its own name");
+        }
         let Err(wrongs) = study.derive(section) else { continue };
         for wrong in wrongs {
             let mut complaints = Complaints::new(root, problems);

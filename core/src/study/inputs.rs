@@ -39,10 +39,14 @@ impl Study {
                 parameters.push(i);
             }
         }
-        for condition in &self.scenarios[scenario].values {
+        // A value that is also a parameter is reported with the inputs.
+        let known = self.scenarios[scenario].values.iter();
+        let mut of_conditions = BTreeMap::new();
+        for condition in known.filter(|c| !units.contains_key(&c.name)) {
             scope.data(&condition.name, Data::Number(condition.value)).map_err(one)?;
-            units.extend(condition.unit.clone().map(|unit| (condition.name.clone(), unit)));
+            of_conditions.extend(condition.unit.clone().map(|unit| (condition.name.clone(), unit)));
         }
+        units.extend(of_conditions);
         for (name, text) in texts {
             scope.define(name, text).map_err(one)?;
         }

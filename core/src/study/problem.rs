@@ -172,6 +172,17 @@ impl Problems {
         steps.join(".")
     }
 
+    /// Takes out what was said before.
+    pub fn dedup(&mut self) {
+        let mut kept: Vec<Problem> = Vec::with_capacity(self.list.len());
+        for problem in self.list.drain(..) {
+            if !kept.contains(&problem) {
+                kept.push(problem);
+            }
+        }
+        self.list = kept;
+    }
+
     /// True when nothing is wrong so far.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
@@ -227,16 +238,6 @@ impl<'a> Complaints<'a> {
     /// Complaints about `section`, collected in `problems`.
     pub fn new(section: &'a Node, problems: &'a mut Problems) -> Self {
         Self { section, problems }
-    }
-
-    /// The number of problems so far, those of other sections counted.
-    pub fn len(&self) -> usize {
-        self.problems.len()
-    }
-
-    /// Whether nothing is wrong so far.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// The value at a dotted path of the section, or the nearest parent that was written.

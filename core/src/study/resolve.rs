@@ -187,10 +187,9 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
         None if root.get("target").is_some() => Some(None),
         _ => table::<ResponseSection>(root, "response", problems).map(Some),
     };
-    let mut about = about?;
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-    let directory = about.directory.take().map_or(folder.clone(), |given| folder.join(given));
+    let given = about.as_ref().and_then(|about| about.directory.as_ref());
+    let directory = given.map_or(folder.clone(), |given| folder.join(given));
     let scenarios = scenarios(root, &directory, problems);
     let before = problems.len();
     let target = chosen(root, "target", None, problems);
@@ -223,6 +222,9 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
     if problems.len() > before {
         return None;
     }
+    let mut about = about?;
+    about.directory = None;
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut study = Study {
         name: about.name.take().unwrap_or(stem),
         directory,
