@@ -193,7 +193,8 @@ impl Bubbly {
     /// `(1 + grown)^(-1/κ)` to fourth order.
     fn volume_ratio(&self, grown: f64) -> f64 {
         let b = self.inverse_index;
-        1.0 - b * grown * (1.0 - (b + 1.0) / 2.0 * grown * (1.0 - (b + 2.0) / 3.0 * grown))
+        let (second, third) = (0.5 + 0.5 * b, (b + 2.0) / 3.0);
+        1.0 - b * grown * (1.0 - second * grown * (1.0 - third * grown))
     }
 
     /// Energy of the gas of a cell, J/m³: `P a₀ ((w^(1-κ) - 1)/(κ - 1) + w - 1)`, the work on

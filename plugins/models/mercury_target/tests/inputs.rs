@@ -7,9 +7,6 @@ use lacuna::plugin::model::{Call, EvalError, Response};
 use lacuna::plugin::registry;
 use lacuna::plugin::{Context, Given, Model};
 
-use crate::models::mercury_target_bubbles as _;
-use crate::models::mercury_target_equilibrium_gas as _;
-
 const NAMES: [&str; 3] =
     ["mercury_target", "mercury_target_equilibrium_gas", "mercury_target_bubbles"];
 
