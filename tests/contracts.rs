@@ -89,7 +89,11 @@ fn designs() {
 
 #[test]
 fn models() {
-    let table: &Table = &[("mercury_target", &["numerics = { mesh = [6, 24] }"])];
+    let table: &Table = &[
+        ("mercury_target", &["numerics = { mesh = [6, 24] }"]),
+        ("mercury_target_bubbles", &["numerics = { mesh = [6, 24] }"]),
+        ("mercury_target_equilibrium_gas", &["numerics = { mesh = [6, 24] }"]),
+    ];
     let parameter = |name: &str| Parameter {
         name: name.to_owned(),
         symbol: name.to_owned(),

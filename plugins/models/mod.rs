@@ -1,3 +1,5 @@
 //! Simulators a study can name.
 
 pub mod mercury_target;
+pub mod mercury_target_bubbles;
+pub mod mercury_target_equilibrium_gas;

@@ -5,16 +5,17 @@
 /// others' results as they are, bit for bit.
 pub trait EquationOfState {
     /// Advances the cells `first..first + strain.len()` by `dt` to the given volumetric strains
-    /// (total since the pulse); writes their pressures (Pa, relative to the static state) and 1
-    /// where the fluid is whole, 0 where it is cavitated. The solver calls it once with no strain
-    /// and `dt = 0` for the state just after the pulse.
+    /// (total since the pulse); writes their pressures (Pa, relative to the static state) and the
+    /// present speed of small waves as a share of [`Self::sound_speed`]: 1 where the liquid is
+    /// whole, 0 where it is cavitated. The solver first asks for the state just after the pulse, no
+    /// strain and `dt = 0`, and for that half a step later: the pressure that starts the motion.
     fn update(
         &mut self,
         first: usize,
         strain: &[f64],
         dt: f64,
         pressure: &mut [f64],
-        whole: &mut [f64],
+        speed: &mut [f64],
     );
 
     /// Speed of the fastest small wave, m/s.
@@ -22,6 +23,11 @@ pub trait EquationOfState {
 
     /// Energy stored in a cell at a volumetric strain, J/m³.
     fn stored_energy(&self, cell: usize, strain: f64) -> f64;
+
+    /// Energy that the law itself has turned into heat in a cell so far, J/m³.
+    fn lost_energy(&self, _cell: usize) -> f64 {
+        0.0
+    }
 }
 
 /// `p = max(p₀ - K ε, -p_c)` with `K = ρc²`: linear, reversible, with a tensile cutoff (the
@@ -40,6 +46,21 @@ impl TensileCutoff {
         let bulk_modulus = density * sound_speed * sound_speed;
         Self { initial, bulk_modulus, sound_speed, cutoff }
     }
+
+    /// Pressure of a cell at a volumetric strain as if the liquid bore any tension, Pa.
+    pub(super) fn trial(&self, cell: usize, strain: f64) -> f64 {
+        self.initial[cell] - self.bulk_modulus * strain
+    }
+
+    /// `K = ρc²`, Pa.
+    pub(super) fn bulk_modulus(&self) -> f64 {
+        self.bulk_modulus
+    }
+
+    /// The lowest pressure, `-p_c`, Pa.
+    pub(super) fn floor(&self) -> f64 {
+        -self.cutoff
+    }
 }
 
 impl EquationOfState for TensileCutoff {
@@ -49,16 +70,16 @@ impl EquationOfState for TensileCutoff {
         strain: &[f64],
         _dt: f64,
         pressure: &mut [f64],
-        whole: &mut [f64],
+        speed: &mut [f64],
     ) {
         let n = strain.len();
         let (initial, k, floor) =
             (&self.initial[first..first + n], self.bulk_modulus, -self.cutoff);
-        let (pressure, whole) = (&mut pressure[..n], &mut whole[..n]);
+        let (pressure, speed) = (&mut pressure[..n], &mut speed[..n]);
         for i in 0..n {
             let trial = initial[i] - k * strain[i];
             pressure[i] = if trial < floor { floor } else { trial };
-            whole[i] = if trial < floor { 0.0 } else { 1.0 };
+            speed[i] = if trial < floor { 0.0 } else { 1.0 };
         }
     }
 

@@ -1,8 +1,8 @@
 //! The fluid: strains, pressures, artificial viscosity, hourglass control and nodal forces.
 //!
 //! Small displacements on a frozen mesh, inviscid: `ρ v' = -grad p`, `ε' = div v`. Shocks are
-//! spread by `q = -b₁ρcl d + ρ(b₂l d)²` (the second term in compression only), `d = div v`, where
-//! the fluid is whole. The loops run along mesh rows over slices of equal length.
+//! spread by `q = -b₁ρcl d + ρ(b₂l d)²` (the second term in compression only), `d = div v`, in
+//! proportion to the present speed of small waves: none where the fluid is cavitated. The loops run along mesh rows over slices of equal length.
 
 use super::coupling::Field;
 use super::eos::EquationOfState;
@@ -30,8 +30,8 @@ pub struct Fluid<E> {
     pub strain: Vec<f64>,
     /// Pressure, Pa.
     pub pressure: Vec<f64>,
-    /// 1 where the fluid is whole, 0 where it is cavitated.
-    pub whole: Vec<f64>,
+    /// Present speed of small waves as a share of the sound speed; 0 where the fluid is cavitated.
+    pub speed: Vec<f64>,
     /// Longest uninterrupted time at the cutoff so far, s.
     pub longest_saturation: Vec<f64>,
     /// Largest size of the volumetric strain so far.
@@ -97,7 +97,7 @@ impl<E: EquationOfState> Fluid<E> {
                 .collect(),
             strain: zeros(),
             pressure: zeros(),
-            whole: zeros(),
+            speed: zeros(),
             longest_saturation: zeros(),
             largest_strain: zeros(),
             viscous_loss: zeros(),
@@ -112,7 +112,9 @@ impl<E: EquationOfState> Fluid<E> {
         for coefficient in fluid.linear.iter_mut().chain(&mut fluid.quadratic) {
             *coefficient *= density;
         }
-        fluid.eos.update(0, &fluid.strain, 0.0, &mut fluid.pressure, &mut fluid.whole);
+        for dt in [0.0, 0.5 * dt] {
+            fluid.eos.update(0, &fluid.strain, dt, &mut fluid.pressure, &mut fluid.speed);
+        }
         fluid
     }
 
@@ -126,7 +128,7 @@ impl<E: EquationOfState> Fluid<E> {
                 &self.strain[row.clone()],
                 dt,
                 &mut self.pressure[row.clone()],
-                &mut self.whole[row],
+                &mut self.speed[row],
             );
             self.viscosity_row(mesh, j, dt);
             self.hourglass_row(mesh, velocity, j, dt);
@@ -157,7 +159,7 @@ impl<E: EquationOfState> Fluid<E> {
 
     fn viscosity_row(&mut self, mesh: &Mesh, j: usize, dt: f64) {
         let (n, at) = (mesh.nz, j * mesh.nz);
-        let (rate, whole) = (&self.rate[at..][..n], &self.whole[at..][..n]);
+        let (rate, speed) = (&self.rate[at..][..n], &self.speed[at..][..n]);
         let (linear, quadratic) = (&self.linear[at..][..n], &self.quadratic[at..][..n]);
         let (ceiling, volume) = (&self.ceiling[at..][..n], &mesh.volume[at..][..n]);
         let q = &mut self.viscous_pressure[at..][..n];
@@ -167,14 +169,14 @@ impl<E: EquationOfState> Fluid<E> {
             let squeeze = if d < 0.0 { -d } else { 0.0 };
             let wanted = linear[i] + quadratic[i] * squeeze;
             let viscosity = if wanted < ceiling[i] { wanted } else { ceiling[i] };
-            let new = -whole[i] * viscosity * d;
+            let new = -speed[i] * viscosity * d;
             loss[i] -= 0.5 * (q[i] + new) * d * dt * volume[i];
             q[i] = new;
         }
         let longest = &mut self.longest_saturation[at..][..n];
         let saturation = &mut self.saturation[at..][..n];
         for i in 0..n {
-            saturation[i] = (saturation[i] + dt) * (1.0 - whole[i]);
+            saturation[i] = (saturation[i] + dt) * cavitated(speed[i]);
             longest[i] = if saturation[i] > longest[i] { saturation[i] } else { longest[i] };
         }
     }
@@ -210,12 +212,22 @@ impl<E: EquationOfState> Fluid<E> {
         cells.map(|(cell, (&v, &strain))| v * self.eos.stored_energy(cell, strain)).sum()
     }
 
+    /// Energy that the equation of state has turned into heat so far, J.
+    pub fn lost_energy(&self, mesh: &Mesh) -> f64 {
+        mesh.volume.iter().enumerate().map(|(cell, v)| v * self.eos.lost_energy(cell)).sum()
+    }
+
     /// Share of the volume at the cutoff.
     pub fn cavitated_fraction(&self, mesh: &Mesh) -> f64 {
         let volume: f64 = mesh.volume.iter().sum();
-        mesh.volume.iter().zip(&self.whole).map(|(v, whole)| v * (1.0 - whole)).sum::<f64>()
+        mesh.volume.iter().zip(&self.speed).map(|(v, &speed)| v * cavitated(speed)).sum::<f64>()
             / volume
     }
+}
+
+/// 1 where no small wave runs, else 0.
+fn cavitated(speed: f64) -> f64 {
+    if speed == 0.0 { 1.0 } else { 0.0 }
 }
 
 /// One component of the nodal forces.

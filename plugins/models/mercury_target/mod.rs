@@ -27,6 +27,8 @@
 //!   displacements; pressures count from the static state. The law is single-valued, hence
 //!   reversible (Bleich & Sandler, Int. J. Solids Structures 6, 1970).
 //! - Wall: Mindlin shell of revolution; its equations stand in the module `shell`.
+//! - Gas, in the models `mercury_target_equilibrium_gas` and `mercury_target_bubbles`: the strain is
+//!   that of the liquid and of bubbles, in equilibrium or over-damped; see the module `gas`.
 //! - Contact: fluid and wall share the motion along the normal and slip along the meridian.
 //! - Rear: mercury without end (absorbing) or rigid.
 //!
@@ -55,12 +57,15 @@
 //! cavitation and closure under a floating plate (against an independent computation by
 //! characteristics), water hammer into a cavitated column, plate and cylinder theory for the
 //! wall, rigid acoustics of second order, balances of energy and momentum, reversal, scaling
-//! invariances, mesh convergence and survival over the whole design box.
+//! invariances, mesh convergence and survival over the whole design box. Bubbly mercury: Wood's
+//! speed, the linear waves of the relaxation and of Commander and Prosperetti, its limits.
 
 mod coupling;
 mod eos;
 mod fluid;
+mod gas;
 mod gauges;
+mod inputs;
 mod load;
 mod mesh;
 mod model;
@@ -74,7 +79,9 @@ use std::fmt;
 pub use coupling::{Contact, Field, Held, Joints};
 pub use eos::{EquationOfState, TensileCutoff};
 pub use fluid::{Fluid, FluidConstants};
+pub use gas::{Bubbles, Bubbly, Gas};
 pub use gauges::Sensor;
+pub(crate) use inputs::Filling;
 pub use mesh::Mesh;
 pub use model::MercuryTarget;
 pub use settings::{

@@ -3,14 +3,15 @@
 use std::path::Path;
 
 use lacuna::data::{Axis, Coordinates, Layout, Unit};
-use lacuna::plugin::model::{Call, EvalError, Input, Response, Signature};
+use lacuna::plugin::model::{Call, EvalError, Response, Signature};
 use lacuna::plugin::{Component, Context, Fact, Model};
 use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::inputs::{Filling, deck, inputs, values};
 use super::settings::{Gauges, Geometry, Numerics, Pulse, Sampling, Settings, Wall};
-use super::{Mercury, Outcome, SimulationError, simulate};
+use super::{Outcome, SimulationError};
 use crate::readers::sierra::write::{History, Origin, write_history};
 
 /// Strain of a mercury-filled steel vessel after a proton pulse: an open stand-in for the Sierra
@@ -19,6 +20,11 @@ use crate::readers::sierra::write::{History, Origin, write_history};
 /// Axisymmetric explicit dynamics. The mercury is inviscid with pressure = bulk modulus x volumetric strain,
 /// held at minus the tensile cutoff while tension grows; the wall is a Mindlin shell. Inputs: `density`,
 /// `sound_speed`, `tensile_cutoff`. Response: `strain` over `sensor` (the gauges) and `time`.
+///
+/// Further inputs count as soon as a study sets them: `damping` (1/s: vibrations fall off as
+/// exp(-damping t / 2)), `pulse_energy` and `wall_thickness` (relative to the options), `beam_width` (m).
+/// A study may also set inputs of `mercury_target_equilibrium_gas` and `mercury_target_bubbles`, so that the model
+/// can be changed by its name alone; there is no gas here, and they have no effect.
 ///
 /// The output times must be whole multiples of the smallest step between them. Each run is written as an
 /// Exodus II history file with the signals `strain_NAME`, as Sierra writes them.
@@ -42,7 +48,7 @@ fn dimensionless() -> Unit {
     Unit::dimensionless()
 }
 
-fn unit(text: &str) -> Unit {
+pub(super) fn unit(text: &str) -> Unit {
     Unit::parse(text).unwrap_or_else(|_| dimensionless())
 }
 
@@ -55,60 +61,36 @@ impl MercuryTarget {
             numerics: self.numerics.clone(),
             gauges: self.gauges.clone(),
             sampling,
+            damping: 0.0,
         }
     }
 
-    fn signed(&self) -> Signature {
-        let input = |name: &str, text: &str, range, default, description: &str| Input {
-            name: name.to_owned(),
-            unit: unit(text),
-            default: Some(default),
-            range,
-            description: description.to_owned(),
-        };
-        let smallest = f64::MIN_POSITIVE;
+    fn layout(&self) -> Layout {
         let Sampling { interval, count } = Sampling::default();
         let grid = (1..=count).map(|i| i as f64 * interval).collect();
-        Signature {
-            inputs: vec![
-                input(
-                    "density",
-                    "kg/m3",
-                    (smallest, f64::INFINITY),
-                    13_500.0,
-                    "density of mercury",
-                ),
-                input("sound_speed", "m/s", (0.0, f64::INFINITY), 1456.0, "sound speed of mercury"),
-                input(
-                    "tensile_cutoff",
-                    "Pa",
-                    (0.0, f64::INFINITY),
-                    1.5e5,
-                    "tension at which mercury cavitates",
-                ),
+        Layout {
+            name: "strain".to_owned(),
+            unit: dimensionless(),
+            axes: vec![
+                Axis::labels("sensor", self.gauges.0.iter().map(|gauge| gauge.name.clone())),
+                Axis::grid("time", grid, unit("s")),
             ],
-            layout: Layout {
-                name: "strain".to_owned(),
-                unit: dimensionless(),
-                axes: vec![
-                    Axis::labels("sensor", self.gauges.0.iter().map(|gauge| gauge.name.clone())),
-                    Axis::grid("time", grid, unit("s")),
-                ],
-            },
-            resamples: true,
         }
     }
 
-    fn run(&self, call: &Call<'_>) -> Result<(Outcome, Vec<f64>), EvalError> {
+    /// The signature with the inputs of a model on this vessel.
+    pub(crate) fn signed(&self, filling: Filling, context: &Context<'_>) -> Signature {
+        let inputs = inputs(self, filling, context);
+        Signature { inputs, layout: self.layout(), resamples: true }
+    }
+
+    /// A run of a model on this vessel.
+    pub(crate) fn respond(&self, filling: Filling, call: &Call<'_>) -> Result<Response, EvalError> {
         let times = times(call.layout).map_err(EvalError::Fatal)?;
         let (sampling, steps) = sampling(times).map_err(EvalError::Fatal)?;
-        let &[density, sound_speed, tensile_cutoff] = call.inputs else {
-            let count = call.inputs.len();
-            return Err(EvalError::Fatal(format!("expected 3 inputs, found {count}")));
-        };
-        let mercury = Mercury { density, sound_speed, tensile_cutoff };
+        let (given, idle) = values(self, filling, call)?;
         let outcome =
-            simulate(&self.settings(sampling), &mercury).map_err(|error| match error {
+            given.simulate(filling, self.settings(sampling)).map_err(|error| match error {
                 SimulationError::Settings(_) => EvalError::Fatal(error.to_string()),
                 other => EvalError::Rejected(other.to_string()),
             })?;
@@ -116,7 +98,38 @@ impl MercuryTarget {
         for gauge in self.asked(call.layout)? {
             values.extend(steps.iter().map(|&step| outcome.strain[gauge][step - 1]));
         }
-        Ok((outcome, values))
+        let mut facts = facts(&outcome);
+        if !idle.is_empty() {
+            facts.push(Fact::new("inputs without effect", idle.join(", ")));
+        }
+        Ok(Response { values, valid: outcome.valid, facts })
+    }
+
+    /// Writes a run of a model of this name as a history file.
+    pub(crate) fn write_run(
+        &self,
+        model: &str,
+        run: &str,
+        call: &Call<'_>,
+        response: &Response,
+        directory: &Path,
+    ) -> Result<Option<String>, EvalError> {
+        let times = times(call.layout).map_err(EvalError::Fatal)?;
+        let gauges = self.asked(call.layout)?;
+        let names = gauges.iter().map(|&g| format!("strain_{}", self.gauges.0[g].name)).collect();
+        let values = response.values.chunks(times.len()).map(<[f64]>::to_vec).collect();
+        let history = History { times: times.to_vec(), names, values };
+        let facts = response.facts.iter().map(|fact| format!("{} = {}", fact.name, fact.value));
+        let origin = Origin {
+            title: format!("{run}: {model}, a stand-in for the SNS target"),
+            // A fixed date keeps equal runs equal to the byte.
+            qa: ["lacuna", env!("CARGO_PKG_VERSION"), "1970/01/01", "00:00:00"].map(str::to_owned),
+            info: deck(call).chain(facts).chain([format!("valid = {}", response.valid)]).collect(),
+        };
+        let file = format!("{run}.h");
+        write_history(&directory.join(&file), &origin, &history)
+            .map_err(|error| EvalError::Fatal(error.to_string()))?;
+        Ok(Some(file))
     }
 
     /// The indices of the gauges that a layout asks for.
@@ -131,6 +144,17 @@ impl MercuryTarget {
         };
         labels.iter().map(find).collect()
     }
+}
+
+fn facts(outcome: &Outcome) -> Vec<Fact> {
+    let cavitated = outcome.cavitated_fraction.iter().copied().fold(0.0, f64::max);
+    let strain = outcome.largest_volumetric_strain;
+    vec![
+        Fact::new("saturation time", format!("{:.4e} s", outcome.saturation_time)),
+        Fact::new("largest cavitated share", format!("{cavitated:.3}")),
+        Fact::new("largest volumetric strain", format!("{strain:.3e}")),
+        Fact::new("time steps", outcome.steps),
+    ]
 }
 
 fn times(layout: &Layout) -> Result<&[f64], String> {
@@ -163,7 +187,7 @@ fn sampling(times: &[f64]) -> Result<(Sampling, Vec<usize>), String> {
 
 impl Component for MercuryTarget {
     fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        let ours = self.signed().layout;
+        let ours = self.layout();
         let convertible = context.layout.axes.len() == 2;
         if convertible && let Ok(given) = times(context.layout) {
             // The engine converts the axis to seconds; multiples do not depend on the unit.
@@ -184,23 +208,12 @@ impl Component for MercuryTarget {
 }
 
 impl Model for MercuryTarget {
-    fn signature(&self, _context: &Context<'_>) -> Signature {
-        self.signed()
+    fn signature(&self, context: &Context<'_>) -> Signature {
+        self.signed(Filling::Mercury, context)
     }
 
     fn predict(&self, call: &Call<'_>) -> Result<Response, EvalError> {
-        let (outcome, values) = self.run(call)?;
-        let cavitated = outcome.cavitated_fraction.iter().copied().fold(0.0, f64::max);
-        let facts = vec![
-            Fact::new("saturation time", format!("{:.4e} s", outcome.saturation_time)),
-            Fact::new("largest cavitated share", format!("{cavitated:.3}")),
-            Fact::new(
-                "largest volumetric strain",
-                format!("{:.3e}", outcome.largest_volumetric_strain),
-            ),
-            Fact::new("time steps", outcome.steps),
-        ];
-        Ok(Response { values, valid: outcome.valid, facts })
+        self.respond(Filling::Mercury, call)
     }
 
     fn write(
@@ -210,28 +223,7 @@ impl Model for MercuryTarget {
         response: &Response,
         directory: &Path,
     ) -> Result<Option<String>, EvalError> {
-        let times = times(call.layout).map_err(EvalError::Fatal)?;
-        let gauges = self.asked(call.layout)?;
-        let names = gauges.iter().map(|&g| format!("strain_{}", self.gauges.0[g].name)).collect();
-        let values = response.values.chunks(times.len()).map(<[f64]>::to_vec).collect();
-        let history = History { times: times.to_vec(), names, values };
-        let inputs = self.signed().inputs;
-        let deck = inputs.iter().zip(call.inputs);
-        let facts = response.facts.iter().map(|fact| format!("{} = {}", fact.name, fact.value));
-        let origin = Origin {
-            title: format!("{run}: mercury_target, a stand-in for the SNS target"),
-            // A fixed date keeps equal runs equal to the byte.
-            qa: ["lacuna", env!("CARGO_PKG_VERSION"), "1970/01/01", "00:00:00"].map(str::to_owned),
-            info: deck
-                .map(|(input, value)| format!("{} = {value} {}", input.name, input.unit))
-                .chain(facts)
-                .chain([format!("valid = {}", response.valid)])
-                .collect(),
-        };
-        let file = format!("{run}.h");
-        write_history(&directory.join(&file), &origin, &history)
-            .map_err(|error| EvalError::Fatal(error.to_string()))?;
-        Ok(Some(file))
+        self.write_run("mercury_target", run, call, response, directory)
     }
 }
 
@@ -253,7 +245,7 @@ mod tests {
     #[test]
     fn a_subset_of_gauges_gives_those_rows_of_the_whole() {
         let model = MercuryTarget::default();
-        let whole = model.signed().layout;
+        let whole = model.layout();
         let times: Vec<f64> = (1..=10).map(|i| f64::from(i) * 1e-5).collect();
         let part = |labels: &[&str]| Layout {
             axes: vec![
@@ -263,10 +255,11 @@ mod tests {
             ..whole.clone()
         };
         let scenario = lacuna::data::Scenario::default();
+        let names = ["density", "sound_speed", "tensile_cutoff"].map(str::to_owned);
         let respond = |layout: &Layout| {
             let call = Call {
                 inputs: &[13_500.0, 1456.0, 1.5e5],
-                names: &[],
+                names: &names,
                 layout,
                 scenario: &scenario,
                 study: Path::new(""),

@@ -21,6 +21,9 @@ pub struct Settings {
     pub gauges: Gauges,
     /// Output times.
     pub sampling: Sampling,
+    /// Decay of all motion in proportion to its mass, 1/s: free vibrations of any frequency lose
+    /// amplitude as `exp(-damping t / 2)`.
+    pub damping: f64,
 }
 
 /// A cylinder with a spherical cap as beam window; `z` runs from the cap's apex to the rear.
@@ -270,7 +273,7 @@ impl Default for Sampling {
 }
 
 /// A value that `keep` refuses is reported under its name.
-fn check(
+pub(super) fn check(
     name: &str,
     value: f64,
     keep: impl Fn(f64) -> bool,
@@ -342,6 +345,7 @@ impl Settings {
         check("numerics.linear_viscosity", n.linear_viscosity, mild, "in [0, 2]")?;
         check("numerics.quadratic_viscosity", n.quadratic_viscosity, mild, "in [0, 2]")?;
         check("numerics.hourglass", n.hourglass, |x| (0.0..=0.2).contains(&x), "in [0, 0.2]")?;
+        check("damping", self.damping, |x| x >= 0.0, "zero or more")?;
         check("sampling.interval", self.sampling.interval, |x| x > 0.0, "a positive number")?;
         if self.sampling.count == 0 {
             return Err(SimulationError::Settings(

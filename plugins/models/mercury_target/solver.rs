@@ -45,15 +45,20 @@ pub struct EnergyBalance {
     pub hourglass: f64,
     /// Gone through the open rear end.
     pub radiated: f64,
+    /// Lost to the damping.
+    pub damped: f64,
+    /// Turned into heat by the equation of state.
+    pub relaxed: f64,
 }
 
 impl EnergyBalance {
     /// Energy that appeared from nowhere, relative to the sum of the sizes of all entries.
     pub fn imbalance(&self) -> f64 {
-        let now =
-            [self.kinetic, self.fluid, self.wall, self.viscous, self.hourglass, self.radiated];
-        let size = self.start.abs() + now.iter().map(|e| e.abs()).sum::<f64>();
-        if size == 0.0 { 0.0 } else { (now.iter().sum::<f64>() - self.start) / size }
+        let stored = [self.kinetic, self.fluid, self.wall];
+        let lost = [self.viscous, self.hourglass, self.radiated, self.damped, self.relaxed];
+        let now = || stored.iter().chain(&lost);
+        let size = self.start.abs() + now().map(|e| e.abs()).sum::<f64>();
+        if size == 0.0 { 0.0 } else { (now().sum::<f64>() - self.start) / size }
     }
 }
 
@@ -68,12 +73,15 @@ pub struct Solver<'a, E> {
     pub velocity: Field,
     /// Completed steps.
     pub steps: usize,
+    /// Decay of all motion in proportion to its mass, 1/s.
+    pub damping: f64,
     vessel: &'a Vessel,
     motion: Motion,
     force: Field,
     dt: f64,
     start: f64,
     radiated: f64,
+    damped: f64,
 }
 
 impl<'a, E: EquationOfState + Clone> Solver<'a, E> {
@@ -93,16 +101,18 @@ impl<'a, E: EquationOfState + Clone> Solver<'a, E> {
         let motion = Motion::new(mass, &mesh.area(), held, joints, impedance);
         let zeros = Field::zeros(mesh.r.len(), shell.nodes());
         let mut solver = Self {
-            start: fluid.stored_energy(mesh) + shell.stored_energy(),
+            start: fluid.stored_energy(mesh) + fluid.lost_energy(mesh) + shell.stored_energy(),
             fluid,
             shell: shell.clone(),
             velocity: zeros.clone(),
             steps: 0,
+            damping: 0.0,
             vessel,
             motion,
             force: zeros,
             dt,
             radiated: 0.0,
+            damped: 0.0,
         };
         solver.update_forces();
         solver
@@ -113,7 +123,7 @@ impl<'a, E: EquationOfState + Clone> Solver<'a, E> {
         if self.steps == 0 {
             self.first_kick();
         } else {
-            self.radiated += self.motion.kick(&mut self.velocity, &self.force, self.dt);
+            self.full_kick();
         }
         self.drift();
         self.steps += 1;
@@ -126,11 +136,40 @@ impl<'a, E: EquationOfState + Clone> Solver<'a, E> {
         self.update_forces();
     }
 
+    fn full_kick(&mut self) {
+        let mut velocity = std::mem::take(&mut self.velocity);
+        let before = (self.damping != 0.0).then(|| velocity.clone());
+        self.radiated += self.kick(&mut velocity);
+        if let Some(mut mean) = before {
+            average(&mut mean, &velocity);
+            self.damped += self.dt * self.damped_power(&mean, &mean);
+        }
+        self.velocity = velocity;
+    }
+
+    /// The velocities a step on; the damping acts on the mean of old and new ones: stable for
+    /// any step. Returns the energy radiated, J.
+    fn kick(&self, velocity: &mut Field) -> f64 {
+        if self.damping == 0.0 {
+            return self.motion.kick(velocity, &self.force, self.dt);
+        }
+        let half = 0.5 * self.damping * self.dt;
+        scale(velocity, (1.0 - half) / (1.0 + half));
+        self.motion.kick(velocity, &self.force, self.dt / (1.0 + half))
+    }
+
+    /// Power that the damping takes from a velocity, tested with another one, W.
+    fn damped_power(&self, velocity: &Field, test: &Field) -> f64 {
+        2.0 * self.damping * self.motion.kinetic(velocity, test)
+    }
+
     /// From the start to half a step later. The energy that the leapfrog conserves counts the
     /// product of the velocities half a step before and after the start.
     fn first_kick(&mut self) {
         let mut before = self.velocity.clone();
+        scale(&mut self.velocity, 1.0 - 0.5 * self.damping * self.dt);
         self.motion.kick(&mut self.velocity, &self.force, 0.5 * self.dt);
+        self.damped += 0.5 * self.dt * self.damped_power(&before, &self.velocity);
         let power = self.motion.radiated_power(&self.velocity, &before);
         self.radiated += 0.5 * self.dt * power;
         for (v, after) in before.parts_mut().into_iter().zip(self.velocity.parts()) {
@@ -168,8 +207,11 @@ impl<'a, E: EquationOfState + Clone> Solver<'a, E> {
     pub fn energy(&self) -> EnergyBalance {
         let mut after = self.velocity.clone();
         if self.steps > 0 {
-            self.motion.kick(&mut after, &self.force, self.dt);
+            self.kick(&mut after);
         }
+        let mut mean = after.clone();
+        average(&mut mean, &self.velocity);
+        let damped = self.damped + 0.5 * self.dt * self.damped_power(&mean, &self.velocity);
         let kinetic = self.motion.kinetic(&self.velocity, &after);
         let mesh = &self.vessel.mesh;
         let now = 0.5 * self.dt * self.motion.radiated_power(&self.velocity, &after);
@@ -181,6 +223,23 @@ impl<'a, E: EquationOfState + Clone> Solver<'a, E> {
             viscous: self.fluid.viscous_loss.iter().sum(),
             hourglass: self.fluid.hourglass_loss.iter().sum(),
             radiated: self.radiated + now,
+            damped,
+            relaxed: self.fluid.lost_energy(mesh),
+        }
+    }
+}
+
+fn scale(field: &mut Field, factor: f64) {
+    for x in field.parts_mut().into_iter().flatten() {
+        *x *= factor;
+    }
+}
+
+/// The mean of two fields, in the place of the first.
+fn average(field: &mut Field, other: &Field) {
+    for (x, y) in field.parts_mut().into_iter().zip(other.parts()) {
+        for (x, y) in x.iter_mut().zip(y) {
+            *x = 0.5 * (*x + y);
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::coupling::{Contact, Held, Joints};
 use super::eos::{EquationOfState, TensileCutoff};
 use super::fluid::FluidConstants;
+use super::gas::{Bubbly, Gas};
 use super::gauges::{Meridian, Sensor};
 use super::load;
 use super::mesh::Mesh;
@@ -68,6 +69,22 @@ impl Target {
         self.run(density, TensileCutoff::new(density, sound_speed, tensile_cutoff, initial))
     }
 
+    /// The strain traces of one pulse in mercury with gas bubbles.
+    pub fn simulate_with_gas(
+        &self,
+        mercury: &Mercury,
+        gas: &Gas,
+    ) -> Result<Outcome, SimulationError> {
+        mercury.validate()?;
+        gas.validate()?;
+        let Mercury { density, sound_speed, tensile_cutoff } = *mercury;
+        let initial = self.initial_pressure(mercury);
+        let liquid = TensileCutoff::new(density, sound_speed, tensile_cutoff, initial);
+        let centres = self.vessel.mesh.centres();
+        let share = centres.map(|[r, z]| gas.share(&self.settings.geometry, r, z)).collect();
+        self.run(density, Bubbly::new(liquid, gas.bubbles(density), share))
+    }
+
     /// Pressure that the pulse leaves in each cell of the given mercury, Pa.
     pub fn initial_pressure(&self, mercury: &Mercury) -> Vec<f64> {
         let peak = self.settings.pulse.pressure(mercury);
@@ -94,6 +111,7 @@ impl Target {
             hourglass: numerics.hourglass,
         };
         let mut solver = Solver::new(&self.vessel, constants, eos, sampling.interval / substeps);
+        solver.damping = self.settings.damping;
         let mut outcome = Outcome::empty(self.sensors.len(), sampling.count);
         for output in 1..=sampling.count {
             for _ in 0..substeps as usize {

@@ -226,8 +226,8 @@ fn tiny_changes_of_the_mercury_change_the_traces_little() {
 struct Wrapped(TensileCutoff);
 
 impl EquationOfState for Wrapped {
-    fn update(&mut self, first: usize, strain: &[f64], dt: f64, p: &mut [f64], whole: &mut [f64]) {
-        self.0.update(first, strain, dt, p, whole);
+    fn update(&mut self, first: usize, strain: &[f64], dt: f64, p: &mut [f64], speed: &mut [f64]) {
+        self.0.update(first, strain, dt, p, speed);
     }
 
     fn sound_speed(&self) -> f64 {

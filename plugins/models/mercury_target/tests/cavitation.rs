@@ -96,7 +96,7 @@ fn a_plate_takes_up_an_exponential_wave_and_leaves_the_fluid() {
         if t < leaves {
             worst = worst.max((v - velocity(t)).abs());
         }
-        if solver.fluid.whole.contains(&0.0) {
+        if solver.fluid.speed.contains(&0.0) {
             first = first.min(t);
         }
     });
@@ -279,8 +279,8 @@ fn cavitation_under_a_floating_plate_opens_and_closes_as_computed_by_characteris
             velocity = velocity.max((v - exact.velocity(t)).abs());
             let cavitated = |whole: &f64| *whole == 0.0;
             if t > 5e-4 {
-                let top = solver.fluid.whole.iter().position(cavitated).unwrap() as f64;
-                let bottom = solver.fluid.whole.iter().rposition(cavitated).unwrap() as f64;
+                let top = solver.fluid.speed.iter().position(cavitated).unwrap() as f64;
+                let bottom = solver.fluid.speed.iter().rposition(cavitated).unwrap() as f64;
                 closure = closure.max((top - exact.closure(t) / cell).abs());
                 opening = opening.max((bottom - exact.opening(t) / cell).abs());
             }
@@ -314,7 +314,7 @@ fn a_cavitated_column_closes_against_a_wall() {
         while solver.steps as f64 * dt * front < 0.5 {
             solver.step();
         }
-        let closed = solver.fluid.whole.iter().filter(|whole| **whole == 1.0).count();
+        let closed = solver.fluid.speed.iter().filter(|whole| **whole == 1.0).count();
         assert!((closed as f64 / 400.0 - 0.5).abs() < 0.02, "{closed}");
         let behind = solver.fluid.pressure[..150].iter().sum::<f64>() / 150.0;
         assert!((behind / pressure - 1.0).abs() < 0.02, "{behind} {pressure}");

@@ -3,7 +3,11 @@
 
 mod acoustics;
 mod balances;
+mod bubbly_column;
 mod cavitation;
+mod gas;
+mod inputs;
+mod recorded;
 mod survival;
 mod tube;
 mod wall;

@@ -1,0 +1,262 @@
+//! Mercury with gas bubbles: an equation of state with the volume of the gas in each cell.
+//!
+//! The strain of a cell is that of the liquid plus the change of the gas volume fraction,
+//! `ε = ε_l + a - a₀`, `p = max(p₀ - K ε_l, -p_c)`. With `w = a/a₀` and the gas at
+//! `p_g = P w^-κ` (`P` the ambient pressure, `κ` the polytropic index) the gas follows by
+//! `κ P τ w' = p_g - (p + P)`: at once (`τ = 0`, the equilibrium law), or as over-damped bubbles
+//! of the relaxation time `τ`. Small changes obey `τ δ' + δ = -a₀ (p - p_s)/(κ P)`, so that long
+//! waves run at Wood's speed, `1/ρc_m² = 1/ρc² + a₀/κP`. The gas adds no mass.
+//!
+//! The step is implicit: with `w` the unknown, both sides are monotone, the root is unique, and
+//! the relaxation only takes energy.
+
+use super::SimulationError;
+use super::eos::{EquationOfState, TensileCutoff};
+use super::settings::{Geometry, check};
+
+/// The iteration ends with a relative change below this; the error left is about its cube.
+const CLOSE: f64 = 1e-3;
+
+/// Up to this relative change steps are of third order.
+const NEAR: f64 = 0.1;
+
+/// No iteration takes nearly so many rounds.
+const MOST_ROUNDS: usize = 200;
+
+/// The gas in the vessel, at rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gas {
+    /// Volume fraction, mean over a cross section far behind the window.
+    pub void_fraction: f64,
+    /// Stratification over the radius `a` of the vessel, in [-1, 1]: the fraction goes as
+    /// `1 + gradient (2r²/a² - 1)`, the mean over the cross section kept.
+    pub gradient: f64,
+    /// Share of the gas that is missing at the window, in [0, 1].
+    pub depletion: f64,
+    /// Length behind the window over which the missing share falls to 1/e, m.
+    pub depletion_length: f64,
+    /// Radius of the bubbles, m; zero when the gas is in equilibrium at any time.
+    pub bubble_radius: f64,
+    /// Static pressure, Pa.
+    pub ambient_pressure: f64,
+    /// Polytropic index of the gas: 1 isothermal, 5/3 adiabatic for helium.
+    pub polytropic_index: f64,
+}
+
+impl Default for Gas {
+    fn default() -> Self {
+        Self {
+            void_fraction: 2e-4,
+            gradient: 0.0,
+            depletion: 0.0,
+            depletion_length: 0.05,
+            bubble_radius: 5e-5,
+            ambient_pressure: 3e5,
+            polytropic_index: 1.4,
+        }
+    }
+}
+
+impl Gas {
+    pub(super) fn validate(&self) -> Result<(), SimulationError> {
+        let zero_or_more = |x: f64| x >= 0.0;
+        let positive = |x: f64| x > 0.0;
+        check("void_fraction", self.void_fraction, |x| (0.0..1.0).contains(&x), "in [0, 1)")?;
+        check("void_gradient", self.gradient, |x| x.abs() <= 1.0, "in [-1, 1]")?;
+        check("void_depletion", self.depletion, |x| (0.0..=1.0).contains(&x), "in [0, 1]")?;
+        check("depletion_length", self.depletion_length, positive, "a positive number")?;
+        check("bubble_radius", self.bubble_radius, zero_or_more, "zero or more")?;
+        check("ambient_pressure", self.ambient_pressure, positive, "a positive number")?;
+        check("polytropic_index", self.polytropic_index, |x| x >= 1.0, "at least 1")
+    }
+
+    /// Gas volume fraction at rest at (r, z).
+    pub fn share(&self, geometry: &Geometry, r: f64, z: f64) -> f64 {
+        let depth = (z - geometry.nose(r)).max(0.0);
+        let across = 1.0 + self.gradient * (2.0 * (r / geometry.radius).powi(2) - 1.0);
+        let along = 1.0 - self.depletion * (-depth / self.depletion_length).exp();
+        self.void_fraction * across * along
+    }
+
+    /// The bubbles in a liquid of the given density. Their relaxation time is `1/2πf₀` of
+    /// Minnaert (1933), `R √(ρ/3κP)`: no bubble follows faster than its liquid's inertia allows.
+    pub fn bubbles(&self, density: f64) -> Bubbles {
+        let Self { ambient_pressure, polytropic_index, bubble_radius, .. } = *self;
+        let stiffness = 3.0 * polytropic_index * ambient_pressure;
+        Bubbles {
+            ambient_pressure,
+            polytropic_index,
+            relaxation: bubble_radius * (density / stiffness).sqrt(),
+        }
+    }
+}
+
+/// How bubbles respond to pressure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bubbles {
+    /// Pressure of the gas at rest, `P`, Pa.
+    pub ambient_pressure: f64,
+    /// Polytropic index `κ`.
+    pub polytropic_index: f64,
+    /// Relaxation time of small changes, `τ`, s; zero for equilibrium.
+    pub relaxation: f64,
+}
+
+/// A liquid with bubbles.
+#[derive(Debug, Clone)]
+pub struct Bubbly {
+    liquid: TensileCutoff,
+    bubbles: Bubbles,
+    /// `1/κ`.
+    inverse_index: f64,
+    /// Gas volume fraction at rest, of each cell.
+    share: Vec<f64>,
+    /// Size and compression of each cell's gas.
+    gas: Vec<State>,
+    /// Work done on each cell's gas so far, J/m³.
+    work: Vec<f64>,
+}
+
+/// The gas of a cell relative to its state at rest.
+#[derive(Debug, Clone, Copy)]
+struct State {
+    /// Volume, `w`.
+    volume: f64,
+    /// Pressure, `w^-κ`.
+    pressure: f64,
+}
+
+/// What the gas of a cell meets in a step.
+#[derive(Debug, Clone, Copy)]
+struct Surroundings {
+    /// Pressure that the liquid would have with the gas at rest, Pa.
+    trial: f64,
+    /// `K a₀`: how the liquid stiffens against the gas, Pa.
+    stiffness: f64,
+    /// `κ P τ / dt`, Pa.
+    resistance: f64,
+    /// Lowest pressure of the liquid, Pa.
+    floor: f64,
+}
+
+impl Bubbly {
+    /// The law for cells with the given gas volume fractions at rest.
+    pub fn new(liquid: TensileCutoff, bubbles: Bubbles, share: Vec<f64>) -> Self {
+        let rest = State { volume: 1.0, pressure: 1.0 };
+        let (gas, work) = (vec![rest; share.len()], vec![0.0; share.len()]);
+        Self { liquid, bubbles, inverse_index: 1.0 / bubbles.polytropic_index, share, gas, work }
+    }
+
+    /// The gas after a step, and the share of the liquid's stiffness `K` that the mixture has
+    /// (where the liquid is whole).
+    ///
+    /// Newton's method on `κPτ/dt (w - w_old) + p(w) + P (1 - w^-κ) = 0`. Written in the gas
+    /// pressure `w^-κ` the function is convex, written in `w` concave on each side of the cutoff:
+    /// far steps of compression are taken in the first, of expansion in the second, so that none
+    /// leaves the positive numbers or runs past the root twice. Near steps are Halley's.
+    fn follow(&self, old: State, around: &Surroundings) -> (State, f64) {
+        let Bubbles { ambient_pressure: ambient, polytropic_index: index, .. } = self.bubbles;
+        let Surroundings { trial, stiffness, resistance, floor } = *around;
+        let mut now = old;
+        for _ in 0..MOST_ROUNDS {
+            let State { volume, pressure } = now;
+            let liquid = trial + stiffness * (volume - 1.0);
+            let (held, slope) = if liquid < floor { (floor, 0.0) } else { (liquid, stiffness) };
+            let excess = resistance * (volume - old.volume) + held + ambient * (1.0 - pressure);
+            // All slopes here are times the volume.
+            let own = resistance * volume + index * ambient * pressure;
+            let inverse = 1.0 / (own + slope * volume);
+            let change = excess * inverse;
+            if change.abs() < NEAR {
+                let linear = 1.0 - index * ambient * pressure * inverse;
+                let bend = 0.5 * (1.0 + index) * linear * change;
+                let grown = index * change * (1.0 + bend + bend * bend);
+                now.pressure *= 1.0 + grown;
+                if change.abs() < CLOSE {
+                    now.volume *= self.volume_ratio(grown);
+                    return (now, own * inverse);
+                }
+                now.volume = now.pressure.powf(-self.inverse_index);
+            } else if change > 0.0 {
+                now.pressure *= 1.0 + index * change;
+                now.volume = now.pressure.powf(-self.inverse_index);
+            } else {
+                // Past the kink the liquid helps; a little more, lest rounding stay below.
+                let kink = if liquid < floor { (floor - trial) / stiffness } else { f64::INFINITY };
+                now.volume = (volume * (1.0 - change)).min((1.0 + kink) * (1.0 + 1e-9));
+                now.pressure = now.volume.powf(-index);
+            }
+        }
+        (now, 0.0)
+    }
+
+    /// `(1 + grown)^(-1/κ)` to fourth order.
+    fn volume_ratio(&self, grown: f64) -> f64 {
+        let b = self.inverse_index;
+        let (second, third) = (0.5 + 0.5 * b, (b + 2.0) / 3.0);
+        1.0 - b * grown * (1.0 - second * grown * (1.0 - third * grown))
+    }
+
+    /// Energy of the gas of a cell, J/m³: `P a₀ ((w^(1-κ) - 1)/(κ - 1) + w - 1)`, the work on
+    /// it less that of the ambient pressure.
+    fn gas_energy(&self, cell: usize) -> f64 {
+        let Bubbles { ambient_pressure, polytropic_index, .. } = self.bubbles;
+        let volume = self.gas[cell].volume;
+        let (expansion, above) = (volume.ln(), polytropic_index - 1.0);
+        let compressed =
+            if above == 0.0 { -expansion } else { (-above * expansion).exp_m1() / above };
+        ambient_pressure * self.share[cell] * (compressed + volume - 1.0)
+    }
+}
+
+impl EquationOfState for Bubbly {
+    fn update(
+        &mut self,
+        first: usize,
+        strain: &[f64],
+        dt: f64,
+        pressure: &mut [f64],
+        speed: &mut [f64],
+    ) {
+        let Bubbles { ambient_pressure, polytropic_index, relaxation } = self.bubbles;
+        let (modulus, floor) = (self.liquid.bulk_modulus(), self.liquid.floor());
+        let resistance = polytropic_index * ambient_pressure * relaxation / dt;
+        for (i, &strain) in strain.iter().enumerate() {
+            let cell = first + i;
+            let trial = self.liquid.trial(cell, strain);
+            let share = self.share[cell];
+            let (mut liquid, mut stiffness) = (trial, 1.0);
+            // At the moment of the pulse the gas is at rest.
+            if share > 0.0 && dt > 0.0 {
+                let around = Surroundings { trial, stiffness: modulus * share, resistance, floor };
+                let old = self.gas[cell];
+                let (new, left) = self.follow(old, &around);
+                liquid = trial + around.stiffness * (new.volume - 1.0);
+                // While the strain stands still the liquid's pressure is linear in the volume.
+                let mean = 0.5 * (pressure[i] + liquid.max(floor));
+                self.work[cell] -= mean * share * (new.volume - old.volume);
+                self.gas[cell] = new;
+                stiffness = left;
+            }
+            let cavitated = liquid < floor;
+            pressure[i] = if cavitated { floor } else { liquid };
+            speed[i] = if cavitated { 0.0 } else { stiffness.sqrt() };
+        }
+    }
+
+    fn sound_speed(&self) -> f64 {
+        self.liquid.sound_speed()
+    }
+
+    /// That of the liquid and of the gas.
+    fn stored_energy(&self, cell: usize, strain: f64) -> f64 {
+        let change = self.share[cell] * (self.gas[cell].volume - 1.0);
+        self.liquid.stored_energy(cell, strain - change) + self.gas_energy(cell)
+    }
+
+    /// What of the work on the gas it does not hold: in equilibrium the sudden collapse at the
+    /// pulse, else the resistance too.
+    fn lost_energy(&self, cell: usize) -> f64 {
+        self.work[cell] - self.gas_energy(cell)
+    }
+}

@@ -1,0 +1,290 @@
+//! The inputs of the models on this vessel.
+//!
+//! Each model lists its own. Of the others it takes those that a study sets, so that a study
+//! changes from one model to another by its name: what belongs to the vessel and the pulse acts in
+//! all of them, what belongs to a gas that the model does not have is read and changes nothing.
+
+use lacuna::plugin::Context;
+use lacuna::plugin::model::{Call, EvalError, Input};
+
+use super::model::unit;
+use super::{Gas, Mercury, MercuryTarget, Outcome, Settings, SimulationError, Target};
+
+/// What fills the vessel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Filling {
+    /// Pure mercury.
+    Mercury,
+    /// Mercury with gas in pressure equilibrium.
+    EquilibriumGas,
+    /// Mercury with bubbles that take time to follow.
+    Bubbles,
+}
+
+/// The values of a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Values {
+    mercury: Mercury,
+    gas: Gas,
+    damping: f64,
+    pulse_energy: f64,
+    beam_width: f64,
+    wall_thickness: f64,
+}
+
+impl Values {
+    fn default_of(target: &MercuryTarget) -> Self {
+        Self {
+            mercury: Mercury { density: 13_500.0, sound_speed: 1456.0, tensile_cutoff: 1.5e5 },
+            gas: Gas::default(),
+            damping: 0.0,
+            pulse_energy: 1.0,
+            beam_width: target.pulse.width,
+            wall_thickness: 1.0,
+        }
+    }
+
+    /// A run with these settings.
+    pub fn simulate(
+        &self,
+        filling: Filling,
+        settings: Settings,
+    ) -> Result<Outcome, SimulationError> {
+        let target = Target::new(&self.applied(settings))?;
+        match filling {
+            Filling::Mercury => target.simulate(&self.mercury),
+            Filling::EquilibriumGas => {
+                target.simulate_with_gas(&self.mercury, &Gas { bubble_radius: 0.0, ..self.gas })
+            }
+            Filling::Bubbles => target.simulate_with_gas(&self.mercury, &self.gas),
+        }
+    }
+
+    /// Settings with these values of vessel and pulse.
+    fn applied(&self, mut settings: Settings) -> Settings {
+        settings.damping = self.damping;
+        settings.pulse.peak_pressure *= self.pulse_energy;
+        settings.pulse.wall_strain *= self.pulse_energy;
+        settings.pulse.width = self.beam_width;
+        settings.wall.cap_thickness *= self.wall_thickness;
+        settings.wall.cylinder_thickness *= self.wall_thickness;
+        settings
+    }
+}
+
+/// Which models have an input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Part {
+    Mercury,
+    /// Vessel and pulse: all models have it, the one without gas lists it when it is set.
+    Vessel,
+    Gas,
+    Bubbles,
+}
+
+impl Part {
+    fn is_listed(self, filling: Filling) -> bool {
+        match self {
+            Self::Mercury => true,
+            Self::Vessel | Self::Gas => filling >= Filling::EquilibriumGas,
+            Self::Bubbles => filling == Filling::Bubbles,
+        }
+    }
+
+    fn acts(self, filling: Filling) -> bool {
+        self == Self::Vessel || self.is_listed(filling)
+    }
+}
+
+struct Entry {
+    name: &'static str,
+    part: Part,
+    unit: &'static str,
+    range: (f64, f64),
+    description: &'static str,
+    place: fn(&mut Values) -> &mut f64,
+}
+
+const ENTRIES: [Entry; 14] = [
+    Entry {
+        name: "density",
+        part: Part::Mercury,
+        unit: "kg/m3",
+        range: (f64::MIN_POSITIVE, f64::INFINITY),
+        description: "density of mercury",
+        place: |v| &mut v.mercury.density,
+    },
+    Entry {
+        name: "sound_speed",
+        part: Part::Mercury,
+        unit: "m/s",
+        range: (0.0, f64::INFINITY),
+        description: "sound speed of mercury",
+        place: |v| &mut v.mercury.sound_speed,
+    },
+    Entry {
+        name: "tensile_cutoff",
+        part: Part::Mercury,
+        unit: "Pa",
+        range: (0.0, f64::INFINITY),
+        description: "tension at which mercury cavitates",
+        place: |v| &mut v.mercury.tensile_cutoff,
+    },
+    Entry {
+        name: "void_fraction",
+        part: Part::Gas,
+        unit: "1",
+        range: (0.0, 0.05),
+        description: "volume of the gas at rest as a share of the mixture's, away from the window",
+        place: |v| &mut v.gas.void_fraction,
+    },
+    Entry {
+        name: "void_gradient",
+        part: Part::Gas,
+        unit: "1",
+        range: (-1.0, 1.0),
+        description: "stratification g over the radius: the gas goes as 1 + g (2r²/a² - 1), towards the wall for g > 0",
+        place: |v| &mut v.gas.gradient,
+    },
+    Entry {
+        name: "void_depletion",
+        part: Part::Gas,
+        unit: "1",
+        range: (0.0, 1.0),
+        description: "stratification d along the axis: the gas goes as 1 - d exp(-z'/l) behind the window",
+        place: |v| &mut v.gas.depletion,
+    },
+    Entry {
+        name: "depletion_length",
+        part: Part::Gas,
+        unit: "m",
+        range: (1e-4, 10.0),
+        description: "length l over which the gas missing at the window returns",
+        place: |v| &mut v.gas.depletion_length,
+    },
+    Entry {
+        name: "bubble_radius",
+        part: Part::Bubbles,
+        unit: "m",
+        range: (0.0, 0.01),
+        description: "radius of the bubbles; 0 follows at once",
+        place: |v| &mut v.gas.bubble_radius,
+    },
+    Entry {
+        name: "ambient_pressure",
+        part: Part::Gas,
+        unit: "Pa",
+        range: (1e3, 1e8),
+        description: "static pressure of mercury and gas",
+        place: |v| &mut v.gas.ambient_pressure,
+    },
+    Entry {
+        name: "polytropic_index",
+        part: Part::Gas,
+        unit: "1",
+        range: (1.0, 2.0),
+        description: "polytropic index of the gas: 1 isothermal, 5/3 adiabatic helium",
+        place: |v| &mut v.gas.polytropic_index,
+    },
+    Entry {
+        name: "damping",
+        part: Part::Vessel,
+        unit: "1/s",
+        range: (0.0, 1e6),
+        description: "damping in proportion to mass: vibrations fall off as exp(-damping t / 2)",
+        place: |v| &mut v.damping,
+    },
+    Entry {
+        name: "pulse_energy",
+        part: Part::Vessel,
+        unit: "1",
+        range: (0.0, 100.0),
+        description: "energy of the pulse relative to that of the options",
+        place: |v| &mut v.pulse_energy,
+    },
+    Entry {
+        name: "beam_width",
+        part: Part::Vessel,
+        unit: "m",
+        range: (1e-3, 10.0),
+        description: "standard deviation of the beam, in place of the option `pulse.width`",
+        place: |v| &mut v.beam_width,
+    },
+    Entry {
+        name: "wall_thickness",
+        part: Part::Vessel,
+        unit: "1",
+        range: (0.05, 20.0),
+        description: "thickness of the walls relative to that of the options",
+        place: |v| &mut v.wall_thickness,
+    },
+];
+
+/// The inputs that a model lists in a study.
+pub(super) fn inputs(
+    target: &MercuryTarget,
+    filling: Filling,
+    context: &Context<'_>,
+) -> Vec<Input> {
+    let defaults = Values::default_of(target);
+    let is_given = |name: &str| context.given.iter().any(|given| given.name == name);
+    let input = |entry: &Entry| Input {
+        name: entry.name.to_owned(),
+        unit: unit(entry.unit),
+        default: Some(*(entry.place)(&mut defaults.clone())),
+        range: entry.range,
+        description: if entry.part.acts(filling) {
+            entry.description.to_owned()
+        } else {
+            format!("{}; without effect in this model", entry.description)
+        },
+    };
+    let listed = ENTRIES.iter().filter(|entry| entry.part.is_listed(filling));
+    let others = ENTRIES.iter().filter(|e| !e.part.is_listed(filling) && is_given(e.name));
+    listed.chain(others).map(input).collect()
+}
+
+/// The values of a call, and the names of those without effect.
+pub(super) fn values(
+    target: &MercuryTarget,
+    filling: Filling,
+    call: &Call<'_>,
+) -> Result<(Values, Vec<&'static str>), EvalError> {
+    let (expected, found) = (call.names.len(), call.inputs.len());
+    if expected != found {
+        return Err(EvalError::Fatal(format!("expected {expected} inputs, found {found}")));
+    }
+    let mut values = Values::default_of(target);
+    let mut idle = Vec::new();
+    for (name, &value) in call.names.iter().zip(call.inputs) {
+        let Some(entry) = ENTRIES.iter().find(|entry| entry.name == name) else {
+            return Err(EvalError::Fatal(format!("the model has no input `{name}`")));
+        };
+        let (low, high) = entry.range;
+        // Mercury has messages of its own.
+        if entry.part != Part::Mercury && !(low..=high).contains(&value) {
+            let unit = if entry.unit == "1" { String::new() } else { format!(" {}", entry.unit) };
+            return Err(EvalError::Fatal(format!(
+                "`{name}` is {value}; it must be from {low} to {high}{unit}"
+            )));
+        }
+        if entry.part.acts(filling) {
+            *(entry.place)(&mut values) = value;
+        } else {
+            idle.push(entry.name);
+        }
+    }
+    Ok((values, idle))
+}
+
+/// The inputs of a call with their units, one a line.
+pub(super) fn deck<'a>(call: &'a Call<'_>) -> impl Iterator<Item = String> + 'a {
+    let unit = |name: &str| {
+        let entry = ENTRIES.iter().find(|entry| entry.name == name);
+        entry.map_or_else(String::new, |entry| format!(" {}", entry.unit))
+    };
+    call.names
+        .iter()
+        .zip(call.inputs)
+        .map(move |(name, value)| format!("{name} = {value}{}", unit(name)))
+}

@@ -1,0 +1,52 @@
+//! The stand-in's vessel with gas in pressure equilibrium.
+
+use std::path::Path;
+
+use lacuna::plugin::model::{Call, EvalError, Response, Signature};
+use lacuna::plugin::{Component, Context, Model};
+use lacuna::study::problem::Complaints;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::mercury_target::{Filling, MercuryTarget};
+
+/// `mercury_target` with helium in pressure equilibrium with the mercury.
+///
+/// Vessel, pulse, numerics and response are those of `mercury_target`. The strain of a cell is that of the mercury
+/// plus the change of the gas, which has the mercury's pressure at any time:
+/// `ε = -(p - p₀)/K + a₀ ((P/(p + P))^(1/κ) - 1)` with the gas volume fraction `a₀` at rest, held at minus the tensile
+/// cutoff as there. Small waves run at Wood's speed.
+///
+/// Inputs: those of `mercury_target_bubbles` without `bubble_radius`. A study may set `bubble_radius` all the same, so
+/// that the model can be changed by its name alone; it has no effect here. Without gas (`void_fraction` = 0) the response is that of
+/// `mercury_target` to the last bit.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MercuryTargetEquilibriumGas(MercuryTarget);
+
+impl Component for MercuryTargetEquilibriumGas {
+    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        self.0.check(context, complaints);
+    }
+}
+
+impl Model for MercuryTargetEquilibriumGas {
+    fn signature(&self, context: &Context<'_>) -> Signature {
+        self.0.signed(Filling::EquilibriumGas, context)
+    }
+
+    fn predict(&self, call: &Call<'_>) -> Result<Response, EvalError> {
+        self.0.respond(Filling::EquilibriumGas, call)
+    }
+
+    fn write(
+        &self,
+        run: &str,
+        call: &Call<'_>,
+        response: &Response,
+        directory: &Path,
+    ) -> Result<Option<String>, EvalError> {
+        self.0.write_run("mercury_target_equilibrium_gas", run, call, response, directory)
+    }
+}
+
+lacuna::register!(Model, "mercury_target_equilibrium_gas", MercuryTargetEquilibriumGas);
