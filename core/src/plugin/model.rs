@@ -1,6 +1,6 @@
 //! Models: from parameters to a response.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
@@ -16,6 +16,13 @@ pub trait Model: Component {
 
     /// Runs the simulator once.
     fn predict(&self, call: &Call<'_>) -> Result<Response, EvalError>;
+
+    /// The user's files that the answers depend on, such as a program or an input deck (for the hash of a
+    /// stage's inputs), relative paths resolved against `directory`. Folders stand for all files directly in
+    /// them.
+    fn files(&self, _directory: &Path) -> Vec<PathBuf> {
+        Vec::new()
+    }
 
     /// How many evaluations are best asked for at once; 1 where each costs the same alone.
     fn batch(&self) -> usize {

@@ -160,7 +160,8 @@ pub fn kept(
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Kept<Simulated>, Stop> {
-    let inputs = json!([names, points, model, simulator.asked]);
+    let sources = files::hash_sources(&simulator.model.files(&study.directory))?;
+    let inputs = json!([names, points, model, simulator.asked, sources]);
     let folder = run.stage_folder(stage);
     let make = |folder: &Path| simulate(study, simulator, names, points, folder, observer);
     let kept = run.keep(stage, &inputs, observer, make)?;
