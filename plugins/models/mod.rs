@@ -1,3 +1,6 @@
 //! Simulators a study can name.
 
+pub mod external;
 pub mod mercury_target;
+pub mod process;
+pub mod python;
