@@ -36,6 +36,11 @@ impl Process {
         &mut self.child
     }
 
+    /// Whether the process has not ended.
+    pub fn is_running(&mut self) -> bool {
+        self.status.is_none() && group::leader_has_ended(&mut self.child).is_ok_and(|ended| !ended)
+    }
+
     /// Waits until the process has ended, then ends whatever it left running; `None` when the time is up and
     /// all of it was ended.
     pub fn wait(&mut self, limit: Option<Duration>) -> io::Result<Option<ExitStatus>> {

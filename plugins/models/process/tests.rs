@@ -63,7 +63,8 @@ fn the_guard_forgets_a_group_that_has_ended() {
 #[test]
 fn the_guard_ends_what_runs_when_its_pipe_closes() {
     let folder = tempfile::tempdir().unwrap();
-    let mut sleeper = Process::start(&mut shell("echo $$ > child; sleep 100", folder.path())).unwrap();
+    let mut sleeper =
+        Process::start(&mut shell("echo $$ > child; sleep 100", folder.path())).unwrap();
     let group = sleeper.child().id();
     let script = format!("echo '+ {group}' | sh -c \"$SCRIPT\"");
     shell(&script, folder.path()).env("SCRIPT", super::guard::SCRIPT).status().unwrap();
