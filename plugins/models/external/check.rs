@@ -226,11 +226,13 @@ fn program(model: &External, context: &Context<'_>, complaints: &mut Complaints<
     let spot = complaints.at("command.0");
     if Path::new(&name).components().count() > 1 {
         let path = context.directory.join(&name);
-        let what = if path.is_file() { "is no program that can be run" } else { "is not there" };
-        spot.say(format!("the command `{name}` {what}"))
-            .help(format!("it was looked for at `{}`", path.display()));
+        if path.is_file() {
+            spot.say(format!("`{}` is no program: it may not be executed", path.display()));
+        } else {
+            spot.say(format!("there is no file `{}`: the command is not there", path.display()));
+        }
     } else {
-        spot.say(format!("the command `{name}` is not there"))
-            .help("it was looked for in the folders of `PATH`; install it, or write its path");
+        spot.say(format!("there is no file `{name}` in the folders of `PATH`: the command is not there"))
+            .help("install it, or write its path");
     }
 }

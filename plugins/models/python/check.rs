@@ -53,7 +53,7 @@ pub fn files(model: &Python, context: &Context<'_>, complaints: &mut Complaints<
         let name = model.interpreter.display();
         complaints
             .at("interpreter")
-            .say(format!("the Python interpreter `{name}` is not there"))
+            .say(format!("there is no file `{name}`: the Python interpreter is not there"))
             .help("name a program in `PATH`, its path, or the folder of a virtual environment");
         return;
     };

@@ -6,6 +6,7 @@ or reads cannot disturb them: its standard output goes where its errors go.
 """
 import array
 import collections.abc
+import contextlib
 import importlib.util
 import inspect
 import json
@@ -258,7 +259,9 @@ def main():
             say({"error": explain(error, path)})
         else:
             say({"count": len(data) // 8}, data)
-        print(end="", flush=True)
+        # What is printed is for messages only; the user's code may have closed or replaced the stream.
+        with contextlib.suppress(Exception):
+            sys.stdout.flush()
 
 
 main()

@@ -39,7 +39,7 @@ fn a_response_may_have_any_shape_that_says_what_it_means() {
 fn numbers_are_passed_exactly() {
     let text = "def simulate(a, b):\n    return [[a, b, a / b], [b / a, 5e-324, a * b]]";
     let Some(case) = Case::new(text, "") else { return };
-    for (a, b) in [(0.1, 1.0 / 3.0), (1e-300, 2.0), (6.022_140_76e23, -7.3e-12), (5e-324, 1e300)] {
+    for (a, b) in [(0.1, 1.0 / 3.0), (1e-300, 2.0), (6.022_140_76e23, -7.3e-12), (5e-324, 5e-324)] {
         assert_eq!(case.at([a, b]).unwrap(), [a, b, a / b, b / a, 5e-324, a * b]);
     }
 }
