@@ -173,6 +173,10 @@ fn shipped_studies_are_accepted() {
             let path = file.unwrap().path();
             if path.extension().is_some_and(|extension| extension == "toml") {
                 let complaints = load(&path, &[]).complaints();
+                // Not every machine has ABAQUS; `commands` tests what is said about that.
+                if path.ends_with("abaqus/study.toml") && complaints.contains("`abaqus`") {
+                    continue;
+                }
                 assert!(complaints.is_empty(), "{complaints}");
                 checked += 1;
             }

@@ -194,7 +194,10 @@ fn studies(folder: &Path) -> Vec<PathBuf> {
 fn shipped_studies_are_sound_and_have_run_directories_of_their_own() {
     let mut names = BTreeMap::new();
     for path in studies(&quick::root().join("configs")) {
-        let study = quick::load(&path, &[]);
+        // Not every machine has ABAQUS.
+        let abaqus = ["model.command=[\"sh\"]"];
+        let settings = if path.ends_with("abaqus/study.toml") { &abaqus[..] } else { &[] };
+        let study = quick::load(&path, settings);
         assert!(study.about.title.len() > 10, "{} has no title", path.display());
         if let Some(other) = names.insert(study.name.clone(), path.clone()) {
             panic!("{} and {} are both called {}", other.display(), path.display(), study.name);

@@ -1,5 +1,9 @@
 //! Simulators a study can name.
 
+pub mod external;
+pub mod given;
 pub mod mercury_target;
 pub mod mercury_target_bubbles;
 pub mod mercury_target_equilibrium_gas;
+pub mod process;
+pub mod python;

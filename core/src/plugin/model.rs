@@ -17,6 +17,13 @@ pub trait Model: Component {
     /// Runs the simulator once.
     fn predict(&self, call: &Call<'_>) -> Result<Response, EvalError>;
 
+    /// The user's files that the answers depend on, such as a program or an input deck (for the hash of a
+    /// stage's inputs), relative paths resolved against `directory`. Folders stand for all files directly in
+    /// them.
+    fn files(&self, _directory: &Path) -> Vec<PathBuf> {
+        Vec::new()
+    }
+
     /// How many evaluations are best asked for at once; 1 where each costs the same alone.
     fn batch(&self) -> usize {
         1
@@ -26,12 +33,6 @@ pub trait Model: Component {
     /// call, in their order, each the same as [`Model::predict`] gives.
     fn predict_batch(&self, calls: &[Call<'_>]) -> Vec<Result<Response, EvalError>> {
         calls.iter().map(|call| self.predict(call)).collect()
-    }
-
-    /// The files on which the responses depend (for the hash of a stage's inputs), relative paths resolved against
-    /// `directory`, the folder of the study.
-    fn files(&self, _directory: &Path) -> Vec<PathBuf> {
-        Vec::new()
     }
 
     /// Derivatives of the response, where the model knows them.

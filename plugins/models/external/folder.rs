@@ -1,0 +1,83 @@
+//! The folder in which a command runs.
+
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+
+use lacuna::plugin::model::{Call, EvalError};
+use lacuna::run::files::in_words;
+use tempfile::TempDir;
+
+/// A run's folder.
+pub enum Folder {
+    /// One that the study keeps.
+    Kept(PathBuf),
+    /// One for an evaluation of which nothing is kept.
+    Passing(TempDir),
+}
+
+impl Folder {
+    /// An empty folder for a call; files of an earlier, interrupted run in it are removed.
+    pub fn of(call: &Call<'_>) -> Result<Self, EvalError> {
+        let Some(directory) = call.directory else {
+            let folder = tempfile::Builder::new().prefix("lacuna-run-").tempdir();
+            return folder.map(Self::Passing).map_err(|error| {
+                EvalError::Fatal(format!("cannot make a folder for a run: {}", in_words(&error)))
+            });
+        };
+        let failed = |error| cannot("make the folder", directory, &error);
+        let folder = std::path::absolute(directory).map_err(failed)?;
+        if folder.exists() {
+            fs::remove_dir_all(&folder).map_err(failed)?;
+        }
+        fs::create_dir_all(&folder).map_err(failed)?;
+        Ok(Self::Kept(folder))
+    }
+
+    /// Where it is, from the root.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Kept(path) => path,
+            Self::Passing(folder) => folder.path(),
+        }
+    }
+
+    /// Leaves it after the run.
+    pub fn leave(self, keep: bool) {
+        if let (Self::Kept(path), false) = (&self, keep) {
+            // A file that somebody holds open costs some space and no result.
+            let _ = fs::remove_dir_all(path);
+        }
+    }
+}
+
+/// What cannot be done with a file: no run can be made.
+pub fn cannot(what: &str, path: &Path, error: &std::io::Error) -> EvalError {
+    EvalError::Fatal(format!("cannot {what} {}: {}", path.display(), in_words(error)))
+}
+
+/// Whether a relative path stays in the folder from which it starts.
+pub fn stays_inside(path: &Path) -> bool {
+    let normal = |component| matches!(component, Component::Normal(_) | Component::CurDir);
+    path.components().all(normal) && path.file_name().is_some()
+}
+
+/// Copies a file, or a folder with all that is in it.
+pub fn copy(from: &Path, to: &Path) -> std::io::Result<()> {
+    if !from.is_dir() {
+        return fs::copy(from, to).map(|_| ());
+    }
+    fs::create_dir_all(to)?;
+    for entry in fs::read_dir(from)? {
+        let entry = entry?;
+        copy(&entry.path(), &to.join(entry.file_name()))?;
+    }
+    Ok(())
+}
+
+/// Makes a link, or a copy where there are no links.
+pub fn link(from: &Path, to: &Path) -> std::io::Result<()> {
+    #[cfg(unix)]
+    return std::os::unix::fs::symlink(from, to);
+    #[cfg(not(unix))]
+    copy(from, to)
+}

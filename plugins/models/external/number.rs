@@ -1,0 +1,117 @@
+//! Numbers as an input deck wants them: the shortest text that reads back the same, or C's `printf` formats.
+
+use std::iter::Peekable;
+use std::str::Chars;
+
+/// How a number is written: a conversion of C's `printf` for one floating-point number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Format {
+    left: bool,
+    plus: bool,
+    blank: bool,
+    zeros: bool,
+    width: usize,
+    precision: usize,
+    conversion: Conversion,
+    capital: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Conversion {
+    Fixed,
+    Exponent,
+    General,
+}
+
+/// Widths and precisions above this are slips.
+const MOST: usize = 100;
+
+impl Format {
+    /// Reads a format: `%`, flags among `-+ 0`, a width, a point with a precision, and one of `e E f F g G`.
+    pub fn parse(text: &str) -> Option<Self> {
+        let mut rest = text.strip_prefix('%')?.chars().peekable();
+        let mut flags = [false; 4];
+        while let Some(flag) = rest.peek().and_then(|c| "-+ 0".find(*c)) {
+            flags[flag] = true;
+            rest.next();
+        }
+        let width = digits(&mut rest).unwrap_or(0);
+        let precision =
+            if rest.next_if_eq(&'.').is_some() { digits(&mut rest).unwrap_or(0) } else { 6 };
+        let letter = rest.next()?;
+        let conversion = match letter.to_ascii_lowercase() {
+            'e' => Conversion::Exponent,
+            'f' => Conversion::Fixed,
+            'g' => Conversion::General,
+            _ => return None,
+        };
+        let [left, plus, blank, zeros] = flags;
+        let capital = letter.is_ascii_uppercase();
+        let sound = rest.next().is_none() && width <= MOST && precision <= MOST;
+        sound.then_some(Self { left, plus, blank, zeros, width, precision, conversion, capital })
+    }
+
+    /// A finite number in this format.
+    pub fn write(self, x: f64) -> String {
+        let size = x.abs();
+        let mut digits = match self.conversion {
+            Conversion::Fixed => format!("{size:.*}", self.precision),
+            Conversion::Exponent => exponential(size, self.precision),
+            Conversion::General => general(size, self.precision.max(1)),
+        };
+        if self.capital {
+            digits.make_ascii_uppercase();
+        }
+        let sign = match (x.is_sign_negative(), self.plus, self.blank) {
+            (true, _, _) => "-",
+            (false, true, _) => "+",
+            (false, false, true) => " ",
+            (false, false, false) => "",
+        };
+        let fill = self.width.saturating_sub(sign.len() + digits.len());
+        match (self.left, self.zeros) {
+            (true, _) => format!("{sign}{digits}{}", " ".repeat(fill)),
+            (false, true) => format!("{sign}{}{digits}", "0".repeat(fill)),
+            (false, false) => format!("{}{sign}{digits}", " ".repeat(fill)),
+        }
+    }
+}
+
+fn digits(rest: &mut Peekable<Chars<'_>>) -> Option<usize> {
+    let mut number = None;
+    while let Some(digit) = rest.peek().and_then(|c| c.to_digit(10)) {
+        number = Some(number.unwrap_or(0_usize).saturating_mul(10).saturating_add(digit as usize));
+        rest.next();
+    }
+    number
+}
+
+/// One digit, a point and `precision` digits, and an exponent of two digits or more.
+fn exponential(size: f64, precision: usize) -> String {
+    let text = format!("{size:.precision$e}");
+    let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+    let (sign, exponent) = exponent.strip_prefix('-').map_or(('+', exponent), |rest| ('-', rest));
+    format!("{mantissa}e{sign}{exponent:0>2}")
+}
+
+/// C11, 7.21.6.1: the style of `%e` where the exponent is below -4 or not below the precision, else that of
+/// `%f`; zeros at the end left out.
+fn general(size: f64, precision: usize) -> String {
+    let rounded = format!("{size:.*e}", precision - 1);
+    let exponent: i32 = rounded.rsplit('e').next().and_then(|e| e.parse().ok()).unwrap_or(0);
+    let bare = |text: &str| {
+        let text = if text.contains('.') { text.trim_end_matches('0') } else { text };
+        text.trim_end_matches('.').to_owned()
+    };
+    if exponent < -4 || exponent >= precision as i32 {
+        let text = exponential(size, precision - 1);
+        let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "+00"));
+        return format!("{}e{exponent}", bare(mantissa));
+    }
+    bare(&format!("{size:.*}", (precision as i32 - 1 - exponent) as usize))
+}
+
+/// The shortest decimal that reads back as the same number.
+pub fn shortest(x: f64) -> String {
+    format!("{x:?}")
+}

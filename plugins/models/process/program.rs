@@ -1,0 +1,29 @@
+//! Where a program is.
+
+use std::env;
+use std::ffi::{OsStr, OsString};
+use std::path::{Path, PathBuf};
+
+/// The file that a command's first word means: a path from `directory`, or a name that is looked up in the
+/// folders of `path` (the environment's when `None`).
+pub fn find(program: &str, directory: &Path, path: Option<&OsStr>) -> Option<PathBuf> {
+    let absolute = std::path::absolute(directory).unwrap_or_else(|_| directory.to_owned());
+    if Path::new(program).components().count() > 1 {
+        return Some(absolute.join(program)).filter(|file| can_run(file));
+    }
+    let folders = path.map(OsString::from).or_else(|| env::var_os("PATH"))?;
+    env::split_paths(&folders)
+        .map(|folder| absolute.join(folder).join(format!("{program}{}", env::consts::EXE_SUFFIX)))
+        .find(|file| can_run(file))
+}
+
+#[cfg(unix)]
+fn can_run(file: &Path) -> bool {
+    use std::os::unix::fs::PermissionsExt as _;
+    file.metadata().is_ok_and(|data| data.is_file() && data.permissions().mode() & 0o111 != 0)
+}
+
+#[cfg(not(unix))]
+fn can_run(file: &Path) -> bool {
+    file.is_file()
+}

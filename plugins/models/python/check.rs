@@ -1,0 +1,140 @@
+//! What can be wrong with a Python file, found without running it.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use lacuna::plugin::Context;
+use lacuna::study::nearest::nearest;
+use lacuna::study::problem::Complaints;
+use serde::Deserialize;
+
+use super::Python;
+use super::pool::interpreter;
+use crate::models::given;
+
+const SCRIPT: &str = include_str!("names.py");
+/// Arguments that a function may have beside the inputs.
+const EXTRA: [&str; 2] = ["layout", "scenario"];
+
+/// What a file defines.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Names {
+    Wrong {
+        error: String,
+        line: Option<usize>,
+    },
+    Sound {
+        /// The functions that were asked for, where their arguments can be seen.
+        functions: BTreeMap<String, Option<Arguments>>,
+        /// The functions that were asked for and are not there.
+        unknown: Vec<String>,
+        /// All functions.
+        defined: Vec<String>,
+    },
+}
+
+/// What a function takes by name.
+#[derive(Deserialize)]
+struct Arguments {
+    arguments: Vec<String>,
+    optional: Vec<String>,
+    any: bool,
+}
+
+/// The options against the machine.
+pub fn files(model: &Python, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+    let file = context.directory.join(&model.file);
+    if !file.is_file() {
+        complaints.at("file").say(format!("there is no file `{}`", file.display()));
+    }
+    let Some(python) = interpreter(&model.interpreter, context.directory) else {
+        let name = model.interpreter.display();
+        complaints
+            .at("interpreter")
+            .say(format!("there is no file `{name}`: the Python interpreter is not there"))
+            .help("name a program in `PATH`, its path, or the folder of a virtual environment");
+        return;
+    };
+    if file.is_file() {
+        names(model, &python, &file, context, complaints);
+    }
+}
+
+fn names(
+    model: &Python,
+    python: &Path,
+    file: &Path,
+    context: &Context<'_>,
+    complaints: &mut Complaints<'_>,
+) {
+    let wanted = [("function", Some(&model.function)), ("gradient", model.gradient.as_ref())];
+    let wanted: Vec<_> = wanted.into_iter().filter_map(|(key, name)| Some(key).zip(name)).collect();
+    let output = Command::new(python)
+        .args(["-c", SCRIPT])
+        .arg(file)
+        .args(wanted.iter().map(|(_, name)| name))
+        .stdin(Stdio::null())
+        .output();
+    let found = output.ok().filter(|output| output.status.success());
+    let found = found.and_then(|output| serde_json::from_slice::<Names>(&output.stdout).ok());
+    let Some(found) = found else {
+        let name = model.interpreter.display();
+        complaints
+            .at("interpreter")
+            .say(format!("`{name}` is no working Python interpreter of version 3.8 or later"));
+        return;
+    };
+    match found {
+        Names::Wrong { error, line } => {
+            let line = line.map_or(String::new(), |line| format!(":{line}"));
+            complaints.at("file").say(format!("{}{line}: {error}", file.display()));
+        }
+        Names::Sound { functions, unknown, defined } => {
+            for (key, name) in wanted {
+                if unknown.contains(name) {
+                    let names = || defined.iter().map(String::as_str);
+                    let text = format!("{} has no function `{name}`", model.file.display());
+                    let problem = complaints.at(key).say(text);
+                    if !defined.is_empty() {
+                        problem.expected(given::listed(names()));
+                    }
+                    if let Some(near) = nearest(name, names()) {
+                        problem.help(format!("did you mean `{near}`?"));
+                    }
+                } else if let Some(Some(arguments)) = functions.get(name) {
+                    arguments.check(key, name, context, complaints);
+                }
+            }
+        }
+    }
+}
+
+impl Arguments {
+    /// Complains of inputs that the function does not take, and of arguments that nothing gives.
+    fn check(&self, key: &str, name: &str, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        let inputs = || context.given.iter().map(|given| given.name.as_str());
+        for input in inputs().filter(|input| !self.any && !self.takes(input)) {
+            let free = || self.arguments.iter().map(String::as_str);
+            let problem =
+                complaints.at(key).say(format!("`{name}` has no argument for the input `{input}`"));
+            if let Some(near) = nearest(input, free()) {
+                problem.help(format!("did you mean `{near}`?"));
+            }
+        }
+        let given =
+            |argument: &str| EXTRA.contains(&argument) || inputs().any(|input| input == argument);
+        let wanted = self.arguments.iter().filter(|a| !given(a) && !self.optional.contains(a));
+        for argument in wanted {
+            complaints
+                .at(key)
+                .say(format!("`{name}` wants `{argument}`, which the study does not give"))
+                .expected(given::listed(inputs()));
+        }
+    }
+
+    fn takes(&self, input: &str) -> bool {
+        self.arguments.iter().any(|argument| argument == input)
+    }
+}

@@ -1,0 +1,209 @@
+//! A Python process that has loaded the user's file and answers calls.
+
+use std::io::{self, BufReader, Read, Write as _};
+use std::path::Path;
+use std::process::{ChildStdin, Command, Stdio};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use lacuna::data::{Layout, Scenario};
+use lacuna::plugin::model::Call;
+use serde_json::{Value, json};
+
+use super::frame::{self, Answer};
+use crate::models::given::{layout_document, scenario_document};
+use crate::models::process::{Process, tail};
+
+const SCRIPT: &str = include_str!("worker.py");
+/// How much of what a worker prints is remembered.
+const REMEMBERED: usize = 4096;
+
+/// What stays the same from call to call.
+#[derive(Debug)]
+struct Settings {
+    names: Vec<String>,
+    layout: Layout,
+    scenario: Scenario,
+}
+
+impl Settings {
+    fn of(call: &Call<'_>) -> Self {
+        Self {
+            names: call.names.to_vec(),
+            layout: call.layout.clone(),
+            scenario: call.scenario.clone(),
+        }
+    }
+
+    fn fit(&self, call: &Call<'_>) -> bool {
+        self.names == call.names && self.layout == *call.layout && self.scenario == *call.scenario
+    }
+}
+
+/// Why there is no answer.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Silent {
+    /// The worker says why, and can be asked again.
+    Failed(String),
+    /// The time is up.
+    Late,
+    /// The worker has ended, in words.
+    Ended(String),
+}
+
+/// A worker.
+#[derive(Debug)]
+pub struct Worker {
+    process: Process,
+    requests: ChildStdin,
+    answers: Receiver<io::Result<Answer>>,
+    printed: Printed,
+    settings: Option<Settings>,
+}
+
+impl Worker {
+    /// Starts a worker that loads a file.
+    pub fn start(
+        interpreter: &Path,
+        arguments: &[String],
+        study: &Path,
+        limit: Option<Duration>,
+    ) -> Result<Self, Silent> {
+        let ended = |error: io::Error| Silent::Ended(format!("cannot be run: {error}"));
+        let mut command = Command::new(interpreter);
+        command.args(["-c", SCRIPT]).args(arguments).current_dir(study);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut process = Process::start(&mut command).map_err(ended)?;
+        let child = process.child();
+        let (Some(requests), Some(output), Some(errors)) =
+            (child.stdin.take(), child.stdout.take(), child.stderr.take())
+        else {
+            return Err(Silent::Ended("has no pipes".to_owned()));
+        };
+        let answers = listen(output);
+        let printed = Printed::of(errors);
+        let mut worker = Self { process, requests, answers, printed, settings: None };
+        worker.hear(limit)?;
+        Ok(worker)
+    }
+
+    /// Tells the worker what stays the same from call to call, if that is new to it.
+    pub fn prepare(&mut self, call: &Call<'_>, limit: Option<Duration>) -> Result<(), Silent> {
+        if self.settings.as_ref().is_some_and(|settings| settings.fit(call)) {
+            return Ok(());
+        }
+        let document = json!({
+            "names": call.names,
+            "layout": layout_document(call.layout),
+            "scenario": scenario_document(call.scenario),
+        });
+        match self.ask(&document, limit)? {
+            Answer::Failed(text) => Err(Silent::Failed(text)),
+            Answer::Values(_) => {
+                self.settings = Some(Settings::of(call));
+                Ok(())
+            }
+        }
+    }
+
+    /// Whether the worker can be asked.
+    pub fn is_running(&mut self) -> bool {
+        self.process.is_running()
+    }
+
+    /// The answer to a request.
+    pub fn ask(&mut self, request: &Value, limit: Option<Duration>) -> Result<Answer, Silent> {
+        // A worker that does not read any more has ended; the silence tells how.
+        let _ = self.requests.write_all(format!("{request}\n").as_bytes());
+        self.hear_any(limit)
+    }
+
+    fn hear(&mut self, limit: Option<Duration>) -> Result<(), Silent> {
+        match self.hear_any(limit)? {
+            Answer::Values(_) => Ok(()),
+            Answer::Failed(text) => Err(Silent::Failed(text)),
+        }
+    }
+
+    fn hear_any(&mut self, limit: Option<Duration>) -> Result<Answer, Silent> {
+        let heard = match limit {
+            Some(limit) => self.answers.recv_timeout(limit),
+            None => self.answers.recv().map_err(RecvTimeoutError::from),
+        };
+        match heard {
+            Ok(Ok(answer)) => Ok(answer),
+            Err(RecvTimeoutError::Timeout) => {
+                // An error leaves nothing to end.
+                let _ = self.process.end();
+                Err(Silent::Late)
+            }
+            Ok(Err(_)) | Err(RecvTimeoutError::Disconnected) => Err(Silent::Ended(self.death())),
+        }
+    }
+
+    /// How the worker ended.
+    fn death(&mut self) -> String {
+        let status = self.process.wait(Some(Duration::from_secs(1)));
+        let how = match status {
+            Ok(Some(status)) => match status.code() {
+                Some(code) => format!("ended with exit code {code}"),
+                None => "was ended by a signal".to_owned(),
+            },
+            _ => "stopped answering".to_owned(),
+        };
+        match self.printed.tail() {
+            said if said.is_empty() => how,
+            said => format!("{how}; it said:\n{said}"),
+        }
+    }
+}
+
+/// Reads answers as they come, so that they can be waited for with a limit.
+fn listen(output: impl Read + Send + 'static) -> Receiver<io::Result<Answer>> {
+    let (sender, receiver) = mpsc::channel();
+    thread::spawn(move || {
+        let mut output = BufReader::new(output);
+        while let Some(answer) = frame::read(&mut output).transpose() {
+            let last = answer.is_err();
+            if sender.send(answer).is_err() || last {
+                break;
+            }
+        }
+    });
+    receiver
+}
+
+/// The end of what a worker prints.
+#[derive(Debug)]
+struct Printed {
+    end: Arc<Mutex<Vec<u8>>>,
+    closed: Receiver<()>,
+}
+
+impl Printed {
+    fn of(mut errors: impl Read + Send + 'static) -> Self {
+        let end = Arc::new(Mutex::new(Vec::new()));
+        let (sender, closed) = mpsc::channel::<()>();
+        let kept = Arc::clone(&end);
+        thread::spawn(move || {
+            // The pipe is closed when this goes.
+            let _open = sender;
+            let mut bytes = [0; REMEMBERED];
+            while let Ok(count @ 1..) = errors.read(&mut bytes) {
+                let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
+                kept.extend_from_slice(&bytes[..count]);
+                let surplus = kept.len().saturating_sub(REMEMBERED);
+                kept.drain(..surplus);
+            }
+        });
+        Self { end, closed }
+    }
+
+    /// The last lines, once all is read or some time has passed.
+    fn tail(&self) -> String {
+        let _ = self.closed.recv_timeout(Duration::from_secs(1));
+        tail(&self.end.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
