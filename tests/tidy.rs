@@ -19,7 +19,7 @@ const MACHINE: [&str; 6] = ["/home/", "/Users/", "/root/", "/work/", "/tmp/", "C
 /// A study chooses plugins and plugins complain about their part of a study; both stop with what a run
 /// says, and expressions guess at names as a study does: these four are one layer.
 const LAYERS: [&[&str]; 10] = [
-    &["compare"],
+    &["compare", "serve"],
     &["stage"],
     &["contract"],
     &["report"],
@@ -79,7 +79,7 @@ fn sources(folders: &[&str], extension: &str) -> Vec<Source> {
     found
 }
 
-const FOLDERS: [&str; 6] = ["core", "plugins", "cli", "tests", "examples", "bench"];
+const FOLDERS: [&str; 7] = ["core", "um_bridge", "plugins", "cli", "tests", "examples", "bench"];
 
 fn rust() -> Vec<Source> {
     let sources = sources(&FOLDERS, "rs");

@@ -4,6 +4,7 @@ mod inspect;
 mod new;
 mod plugins;
 mod progress;
+mod serve;
 mod study;
 #[cfg(test)]
 mod tests;
@@ -92,6 +93,18 @@ enum Verb {
         #[arg(long, value_name = "NAME")]
         reader: Option<String>,
     },
+    /// Serve a study's model, emulator and posterior over UM-Bridge, until Ctrl-C.
+    Serve {
+        /// The study file.
+        study: PathBuf,
+        #[command(flatten)]
+        settings: study::Settings,
+        /// The run directory; `runs/<study name>` when left out. Emulator and posterior are those of its finished run.
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        #[command(flatten)]
+        place: serve::Place,
+    },
     /// Write the skeleton of something new.
     New {
         #[command(subcommand)]
@@ -115,6 +128,9 @@ fn main() -> ExitCode {
         Verb::Schema => plugins::schema(),
         Verb::Inspect { file, variable, csv, reader } => {
             inspect::inspect(&file, reader.as_deref(), variable.as_deref(), csv.as_deref())
+        }
+        Verb::Serve { study, settings, out, place } => {
+            serve::serve(&study, &settings, out.as_deref(), &place)
         }
         Verb::New { what } => new::write(&what),
     };

@@ -22,8 +22,12 @@ pub struct Settings {
 /// `lacuna run STUDY`
 pub fn run(path: &Path, settings: &Settings, out: Option<&Path>) -> Result<(), Failure> {
     let study = load(path, settings)?;
-    let folder = out.map_or_else(|| Path::new("runs").join(&study.name), Path::to_owned);
-    execute(&study, &folder)
+    execute(&study, &folder(&study, out))
+}
+
+/// The run directory of a study.
+pub fn folder(study: &Study, out: Option<&Path>) -> PathBuf {
+    out.map_or_else(|| Path::new("runs").join(&study.name), Path::to_owned)
 }
 
 /// `lacuna check STUDY`
@@ -69,7 +73,8 @@ pub fn compare(folders: &[PathBuf], json: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-fn load(path: &Path, settings: &Settings) -> Result<Study, Failure> {
+/// The study in a file, if nothing is wrong with it.
+pub fn load(path: &Path, settings: &Settings) -> Result<Study, Failure> {
     let checked = resolve::load(path, &settings.set);
     let complaints = checked.complaints();
     checked.study.ok_or_else(|| {

@@ -14,6 +14,7 @@ pub mod plugin;
 pub mod posterior;
 pub mod report;
 pub mod run;
+pub mod serve;
 pub mod stage;
 pub mod study;
 

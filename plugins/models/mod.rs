@@ -7,3 +7,4 @@ pub mod mercury_target_bubbles;
 pub mod mercury_target_equilibrium_gas;
 pub mod process;
 pub mod python;
+pub mod um_bridge;

@@ -7,14 +7,15 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use rayon::prelude::*;
 use serde_json::json;
 
-use crate::linalg::{Matrix, multiply};
+use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::plugin::Forward;
-use crate::plugin::model::{Call, EvalError, Gradient};
+use crate::plugin::model::{Call, EvalError};
 use crate::report::findings::Findings;
-use crate::run::{Observer, RunDirectory, Stop, files};
+use crate::run::{Kept, Observer, RunDirectory, Stop, files};
 use crate::study::Study;
 
+use super::read::Data;
 use super::simulator::{Setting, Simulator};
 use super::{Known, calibrate, read};
 
@@ -24,26 +25,50 @@ pub fn run(
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {
-    let data = read::stage(study, None, run, observer)?;
-    let direct = Direct::of(study)?;
-    let model = study.model.as_ref().map(|m| (m.built.name, &m.built.options, &m.common));
-    let files = files::hash_sources(&direct.simulator.model.files(&study.directory))?;
-    let origin = json!([model, study.scenarios, study.layouts, study.unknowns, files]);
-    let known = Known {
-        data: &data,
-        forward: &direct,
-        origin: &files::hash(origin.to_string().as_bytes()),
-        fitted: None,
-        emulator: None,
-        numerics: None,
-        region: None,
-        refinement: None,
-    };
+    let prepared = Prepared::of(study, run, observer)?;
+    let known = prepared.known();
     let calibrated = calibrate::stage(study, &known, "5-calibrate", run, observer)?;
-    if let Some(tally) = direct.tally() {
+    if let Some(tally) = prepared.direct.tally() {
         observer.warn(&tally);
     }
     super::conclude(study, &known, calibrated.as_ref(), run, observer)
+}
+
+/// The measurements and the model, all that there is before the posterior.
+pub struct Prepared<'a> {
+    data: Kept<Data>,
+    direct: Direct<'a>,
+    origin: String,
+}
+
+impl<'a> Prepared<'a> {
+    /// Reads the measurements.
+    pub fn of(
+        study: &'a Study,
+        run: &mut RunDirectory,
+        observer: &dyn Observer,
+    ) -> Result<Self, Stop> {
+        let data = read::stage(study, None, run, observer)?;
+        let direct = Direct::of(study)?;
+        let model = study.model.as_ref().map(|m| (m.built.name, &m.built.options, &m.common));
+        let sources = files::hash_sources(&direct.simulator.model.files(&study.directory))?;
+        let origin = json!([model, study.scenarios, study.layouts, study.unknowns, sources]);
+        Ok(Self { data, direct, origin: files::hash(origin.to_string().as_bytes()) })
+    }
+
+    /// The same as it is handed on.
+    pub fn known(&self) -> Known<'_> {
+        Known {
+            data: &self.data,
+            forward: &self.direct,
+            origin: &self.origin,
+            fitted: None,
+            emulator: None,
+            numerics: None,
+            region: None,
+            refinement: None,
+        }
+    }
 }
 
 /// The model of a study as its forward map.
@@ -140,20 +165,6 @@ impl<'a> Direct<'a> {
         rows.iter().map(|_| self.note(setting.checked(next())).map(|r| r.values)).collect()
     }
 
-    /// The derivatives of one scenario's outputs by the study's parameters, from the model's own.
-    fn exact(
-        &self,
-        setting: &Setting<'_>,
-        gradient: &dyn Gradient,
-        point: &[f64],
-    ) -> Option<Matrix> {
-        let inputs = setting.inputs(point);
-        let jacobian = self.note(gradient.jacobian(&self.simulator.call(setting, &inputs)))?;
-        let by_parameters = multiply(&jacobian, &setting.slopes(point));
-        let scaled = |i, j| by_parameters[(i, j)] * setting.factor();
-        Some(Matrix::from_fn(by_parameters.rows(), by_parameters.columns(), scaled))
-    }
-
     /// Derivatives by central differences; one-sided where the model answers on one side only.
     fn differences(&self, point: &[f64]) -> Matrix {
         let steps: Vec<f64> =
@@ -227,7 +238,7 @@ impl Forward for Direct<'_> {
             .simulator
             .settings
             .par_iter()
-            .map(|setting| self.exact(setting, gradient, point))
+            .map(|setting| self.note(self.simulator.jacobian(setting, gradient, point)))
             .collect();
         for (setting, part) in self.simulator.settings.iter().zip(parts) {
             for (k, row) in setting.outputs.clone().enumerate() {

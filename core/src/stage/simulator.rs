@@ -4,8 +4,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::data::{Axis, Coordinates, Layout, Scenario};
-use crate::linalg::Matrix;
-use crate::plugin::model::{Call, EvalError, Input, Model, Response};
+use crate::linalg::{Matrix, multiply};
+use crate::plugin::model::{Call, EvalError, Gradient, Input, Model, Response};
 use crate::plugin::registry::Section;
 use crate::run::Stop;
 use crate::study::Study;
@@ -34,6 +34,8 @@ pub struct Setting<'a> {
     pub outputs: Range<usize>,
     /// The folder of its runs in that of all runs.
     pub folder: PathBuf,
+    /// The range of each input in which the model answers.
+    ranges: Vec<(f64, f64)>,
     /// One entry an input of the model.
     sources: Vec<Source>,
     /// The inputs that expressions set.
@@ -80,7 +82,17 @@ impl<'a> Simulator<'a> {
             names = signature.inputs.iter().map(|input| input.name.clone()).collect();
             let (asked, factor) = asked(&layout, &signature.layout)?;
             let folder = folder(place, &scenario.name);
-            settings.push(Setting { scenario, asked, outputs, folder, sources, computed, factor });
+            let ranges = signature.inputs.iter().map(|input| input.range).collect();
+            settings.push(Setting {
+                scenario,
+                asked,
+                outputs,
+                folder,
+                ranges,
+                sources,
+                computed,
+                factor,
+            });
         }
         Ok(Self { study: &study.directory, model, names, settings })
     }
@@ -98,6 +110,35 @@ impl<'a> Simulator<'a> {
             all.facts.extend(response.facts);
         }
         Ok(all)
+    }
+
+    /// Refuses a point at which an input leaves the range in which the model answers.
+    pub fn in_range(&self, point: &[f64]) -> Result<(), EvalError> {
+        for setting in &self.settings {
+            let inputs = setting.inputs(point);
+            for ((x, (low, high)), name) in inputs.iter().zip(&setting.ranges).zip(&self.names) {
+                if !(low..=high).contains(&x) {
+                    return Err(EvalError::Rejected(format!(
+                        "`{name}` is {x} in the model's unit, outside {low} to {high} where it answers"
+                    )));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The derivatives of the response to one scenario by the study's parameters, in the study's unit.
+    pub fn jacobian(
+        &self,
+        setting: &Setting<'_>,
+        gradient: &dyn Gradient,
+        point: &[f64],
+    ) -> Result<Matrix, EvalError> {
+        let inputs = setting.inputs(point);
+        let jacobian = gradient.jacobian(&self.call(setting, &inputs))?;
+        let mut product = multiply(&jacobian, &setting.slopes(point));
+        product.as_mut_slice().iter_mut().for_each(|value| *value *= setting.factor);
+        Ok(product)
     }
 
     /// What is asked of the model for one scenario, nothing of it being kept.
@@ -176,11 +217,6 @@ impl Setting<'_> {
             *value *= self.factor;
         }
         Ok(response)
-    }
-
-    /// The factor from the model's unit of the response to the study's.
-    pub fn factor(&self) -> f64 {
-        self.factor
     }
 }
 

@@ -1,0 +1,77 @@
+//! `emulator`: the fitted surrogate.
+
+use super::{Derivatives, Function, Variable, parameters};
+use crate::linalg::Matrix;
+use crate::plugin::Emulator;
+use crate::plugin::model::EvalError;
+use crate::stage::Known;
+use crate::study::Study;
+
+/// The emulator's mean as a function of the study's parameters.
+pub(super) struct Emulated<'a> {
+    study: &'a Study,
+    emulator: &'a dyn Emulator,
+    /// The interval of each parameter in which it was fitted.
+    region: Vec<(f64, f64)>,
+}
+
+impl<'a> Emulated<'a> {
+    /// The emulator of a finished run, if it has one.
+    pub(super) fn of(study: &'a Study, known: &Known<'a>) -> Option<Self> {
+        let whole = || study.parameters.iter().map(|p| p.design.support()).collect();
+        let region = known.region.map_or_else(whole, <[_]>::to_vec);
+        Some(Self { study, emulator: known.emulator?, region })
+    }
+
+    /// Outside the runs it was fitted to an emulator knows nothing.
+    fn inside(&self, point: &[f64]) -> Result<(), EvalError> {
+        for ((x, (low, high)), p) in point.iter().zip(&self.region).zip(&self.study.parameters) {
+            if !(low..=high).contains(&x) {
+                return Err(EvalError::Rejected(format!(
+                    "`{}` is {x}, outside {low} to {high} where the emulator was fitted",
+                    p.name
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Function for Emulated<'_> {
+    fn name(&self) -> &'static str {
+        "emulator"
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        parameters(self.study)
+    }
+
+    fn outputs(&self) -> usize {
+        self.emulator.outputs()
+    }
+
+    fn values(&self, point: &[f64]) -> Result<Vec<f64>, EvalError> {
+        self.inside(point)?;
+        let row = Matrix::from_vec(1, point.len(), point.to_vec());
+        Ok(self.emulator.mean(&row).into_vec())
+    }
+
+    fn derivatives(&self) -> Option<&dyn Derivatives> {
+        Some(self)
+    }
+}
+
+impl Derivatives for Emulated<'_> {
+    fn jacobian(&self, point: &[f64]) -> Result<Matrix, EvalError> {
+        self.inside(point)?;
+        Ok(self.emulator.jacobian(point))
+    }
+
+    fn scales(&self) -> Option<Vec<f64>> {
+        let widths = self.study.parameters.iter().map(|p| {
+            let [low, high] = [0.05, 0.95].map(|share| p.design.quantile(share));
+            high - low
+        });
+        Some(widths.collect())
+    }
+}

@@ -1,0 +1,44 @@
+//! What a finished run has learned, taken from its folder.
+
+use std::path::Path;
+
+use crate::run::{Observer, RunDirectory, Stop, files};
+use crate::stage::{Learned, design, numerical_error, read, refine, simulate, surrogate};
+use crate::study::{Study, emit};
+
+/// The run directory of a study, if a run of this very study is finished there; `None` where there is no run.
+pub fn finished(study: &Study, folder: &Path) -> Result<Option<RunDirectory>, Stop> {
+    if !folder.join("manifest.json").exists() {
+        return Ok(None);
+    }
+    let kept = files::read(&folder.join("resolved.toml"))?;
+    let kept = String::from_utf8_lossy(&kept);
+    let ours = emit::to_toml(&study.resolved)
+        .map_err(|error| Stop::new(format!("the study cannot be written down: {error}")))?;
+    // The head names the version of the program.
+    if kept.split_once("\n\n").is_none_or(|(_, kept)| kept != ours) {
+        let folder = folder.display();
+        let message = format!("the run in {folder} was made from another version of the study");
+        return Err(Stop::new(message).help(format!(
+            "run the study again, or serve the run's own: `{folder}/resolved.toml` with `--out {folder}`"
+        )));
+    }
+    RunDirectory::open(folder).map(Some)
+}
+
+/// The stages up to the posterior, all of them kept.
+pub(super) fn learned(
+    study: &Study,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Learned, Stop> {
+    let design = design::stage(study, run, observer)?;
+    let simulated = simulate::stage(study, design.as_ref(), run, observer)?;
+    let data = read::stage(study, simulated.as_ref(), run, observer)?;
+    let fitting = surrogate::Fitting::of(study, data.value.runs()?)?;
+    let (fitted, emulator) = surrogate::stage(study, &data, &fitting, run, observer)?;
+    let folders = numerical_error::FOLDERS;
+    let numerics = numerical_error::stage(study, &data, None, folders, run, observer)?;
+    let first = Learned { data, fitted, numerics, emulator, region: None, refinement: None };
+    refine::stage(study, first, run, observer).map(|(learned, _)| learned)
+}

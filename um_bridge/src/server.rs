@@ -1,0 +1,134 @@
+//! Answers clients: HTTP/1.1 with connections that stay open, one thread a connection.
+//!
+//! So many evaluations run at a time as the server is told; further ones wait their turn.
+
+mod answer;
+mod connection;
+mod http;
+mod model;
+mod turns;
+
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::time::Duration;
+
+use crate::protocol::Fault;
+
+pub use model::Model;
+
+use turns::Turns;
+
+/// The most connections that are open at a time.
+const CONNECTIONS: usize = 512;
+
+/// A server whose port is taken and who does not answer yet.
+pub struct Server {
+    listener: TcpListener,
+    address: SocketAddr,
+    stopper: Stopper,
+}
+
+/// Stops a server, from any thread.
+#[derive(Clone)]
+pub struct Stopper {
+    stopped: Arc<AtomicBool>,
+    address: SocketAddr,
+}
+
+impl Stopper {
+    /// The server answers what it was asked, and ends.
+    pub fn stop(&self) {
+        self.stopped.store(true, Ordering::SeqCst);
+        // The server waits for a connection: this is the last one.
+        let _ = TcpStream::connect_timeout(&self.address, Duration::from_secs(1));
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.stopped.load(Ordering::SeqCst)
+    }
+}
+
+/// What all connections share.
+struct Shared<'a> {
+    models: &'a [&'a dyn Model],
+    turns: Turns,
+    stopper: &'a Stopper,
+    open: AtomicUsize,
+    answered: AtomicU64,
+}
+
+impl Server {
+    /// Takes a port of an address; port 0 takes any that is free.
+    pub fn bind(host: IpAddr, port: u16) -> io::Result<Self> {
+        let listener = TcpListener::bind((host, port))?;
+        let address = listener.local_addr()?;
+        let mut reached = address;
+        if host.is_unspecified() {
+            reached.set_ip(match host {
+                IpAddr::V4(_) => Ipv4Addr::LOCALHOST.into(),
+                IpAddr::V6(_) => Ipv6Addr::LOCALHOST.into(),
+            });
+        }
+        let stopper = Stopper { stopped: Arc::default(), address: reached };
+        Ok(Self { listener, address, stopper })
+    }
+
+    /// Where it listens.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// What stops it.
+    pub fn stopper(&self) -> Stopper {
+        self.stopper.clone()
+    }
+
+    /// Answers questions about these models, so many evaluations at a time, until it is stopped; returns how many
+    /// questions it answered.
+    pub fn serve(&self, models: &[&dyn Model], at_a_time: usize) -> u64 {
+        let shared = Shared {
+            models,
+            turns: Turns::of(at_a_time.max(1)),
+            stopper: &self.stopper,
+            open: AtomicUsize::new(0),
+            answered: AtomicU64::new(0),
+        };
+        std::thread::scope(|scope| {
+            for stream in self.listener.incoming() {
+                if self.stopper.is_stopped() {
+                    break;
+                }
+                let Ok(stream) = stream else {
+                    // Too many open files, or a client that is gone already: neither ends the server.
+                    std::thread::sleep(Duration::from_millis(10));
+                    continue;
+                };
+                if shared.open.fetch_add(1, Ordering::SeqCst) >= CONNECTIONS {
+                    connection::refuse(stream);
+                    shared.open.fetch_sub(1, Ordering::SeqCst);
+                    continue;
+                }
+                let shared = &shared;
+                let spawned = std::thread::Builder::new().spawn_scoped(scope, move || {
+                    connection::attend(stream, shared);
+                    shared.open.fetch_sub(1, Ordering::SeqCst);
+                });
+                if spawned.is_err() {
+                    shared.open.fetch_sub(1, Ordering::SeqCst);
+                }
+            }
+        });
+        shared.answered.into_inner()
+    }
+}
+
+/// The HTTP status of a fault, as the reference implementation has it.
+fn status(fault: &Fault) -> u16 {
+    use crate::protocol::{INTERNAL_ERROR, INVALID_OUTPUT};
+    if [INVALID_OUTPUT, INTERNAL_ERROR].contains(&fault.kind.as_str()) { 500 } else { 400 }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,173 @@
+//! As much of HTTP/1.1 (RFC 9112) as the protocol needs: a method, a path, a body of known length.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::time::{Duration, Instant};
+
+/// The most bytes before the body.
+const LONGEST_HEAD: usize = 16 * 1024;
+/// The most bytes of a body.
+const LONGEST_BODY: usize = 256 * 1024 * 1024;
+/// The longest pause of a client in the middle of a request.
+const PATIENCE: Duration = Duration::from_secs(30);
+/// How long a connection stays open without a request.
+const IDLE: Duration = Duration::from_secs(120);
+
+/// A question.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Request {
+    /// `GET`, `POST`.
+    pub(super) method: String,
+    /// The path without what follows a question mark.
+    pub(super) path: String,
+    /// The body.
+    pub(super) body: Vec<u8>,
+    /// Whether the client wants to ask more.
+    pub(super) stays: bool,
+}
+
+/// What came instead of a question.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Nothing {
+    /// The client is gone, or the server stops.
+    End,
+    /// No such request is answered: the HTTP status, and why.
+    Refused(u16, String),
+}
+
+/// The part of a head that matters.
+struct Head {
+    method: String,
+    path: String,
+    length: usize,
+    stays: bool,
+    /// Whether the client waits for a word before it sends the body.
+    waits: bool,
+    /// The length of the head itself.
+    end: usize,
+}
+
+/// Reads requests from a connection whose reads return now and then without data.
+pub(super) struct Reader<S> {
+    stream: S,
+    /// What was read beyond the last request.
+    buffer: Vec<u8>,
+}
+
+impl<S: Read + Write> Reader<S> {
+    pub(super) fn new(stream: S) -> Self {
+        Self { stream, buffer: Vec::new() }
+    }
+
+    /// The next request; `stop` says whether to wait no longer for one.
+    pub(super) fn next(&mut self, stop: impl Fn() -> bool) -> Result<Request, Nothing> {
+        let head = loop {
+            if let Some(head) = head(&self.buffer)? {
+                break head;
+            }
+            if self.buffer.len() > LONGEST_HEAD {
+                return Err(Nothing::Refused(431, "the head of the request is too long".into()));
+            }
+            let idle = self.buffer.is_empty();
+            let patience = if idle { IDLE } else { PATIENCE };
+            self.more(patience, || idle && stop())?;
+        };
+        if head.waits && self.buffer.len() == head.end {
+            let word = self.stream.write_all(b"HTTP/1.1 100 Continue\r\n\r\n");
+            word.map_err(|_| Nothing::End)?;
+        }
+        let whole = head.end + head.length;
+        while self.buffer.len() < whole {
+            self.more(PATIENCE, || false)?;
+        }
+        let rest = self.buffer.split_off(whole);
+        let body = std::mem::replace(&mut self.buffer, rest).split_off(head.end);
+        Ok(Request { method: head.method, path: head.path, body, stays: head.stays })
+    }
+
+    /// Reads some more, for at most so long.
+    fn more(&mut self, patience: Duration, stop: impl Fn() -> bool) -> Result<(), Nothing> {
+        let begun = Instant::now();
+        let mut chunk = [0; 16 * 1024];
+        while !stop() && begun.elapsed() < patience {
+            match self.stream.read(&mut chunk) {
+                Ok(0) => return Err(Nothing::End),
+                Ok(count) => {
+                    self.buffer.extend_from_slice(&chunk[..count]);
+                    return Ok(());
+                }
+                Err(error) if is_pause(&error) => {}
+                Err(_) => return Err(Nothing::End),
+            }
+        }
+        Err(Nothing::End)
+    }
+
+    /// Writes an answer.
+    pub(super) fn answer(&mut self, status: u16, body: &str, stays: bool) -> io::Result<()> {
+        let reason = reason(status);
+        let length = body.len();
+        let connection = if stays { "keep-alive" } else { "close" };
+        let text = format!(
+            "HTTP/1.1 {status} {reason}\r\nContent-Type: application/json\r\n\
+             Content-Length: {length}\r\nConnection: {connection}\r\n\r\n{body}"
+        );
+        self.stream.write_all(text.as_bytes())?;
+        self.stream.flush()
+    }
+}
+
+fn is_pause(error: &io::Error) -> bool {
+    [ErrorKind::WouldBlock, ErrorKind::TimedOut, ErrorKind::Interrupted].contains(&error.kind())
+}
+
+/// The head at the beginning of these bytes, once it is whole.
+fn head(bytes: &[u8]) -> Result<Option<Head>, Nothing> {
+    let mut headers = [httparse::EMPTY_HEADER; 100];
+    let mut request = httparse::Request::new(&mut headers);
+    let end = match request.parse(bytes) {
+        Ok(httparse::Status::Complete(end)) => end,
+        Ok(httparse::Status::Partial) => return Ok(None),
+        Err(error) => return Err(Nothing::Refused(400, format!("this is no HTTP: {error}"))),
+    };
+    let method = request.method.unwrap_or_default().to_owned();
+    let path = request.path.unwrap_or_default().split('?').next().unwrap_or_default().to_owned();
+    let header = |name: &str| {
+        let found = request.headers.iter().find(|h| h.name.eq_ignore_ascii_case(name));
+        found.map(|h| String::from_utf8_lossy(h.value).trim().to_ascii_lowercase())
+    };
+    if header("transfer-encoding").is_some() {
+        let text = "a body of unknown length is not read: send `Content-Length`";
+        return Err(Nothing::Refused(411, text.to_owned()));
+    }
+    let length = match header("content-length") {
+        None => 0,
+        Some(text) => text.parse().map_err(|_| {
+            Nothing::Refused(400, format!("`Content-Length` is `{text}`, not a number of bytes"))
+        })?,
+    };
+    if length > LONGEST_BODY {
+        let text = format!("a body of {length} bytes is too long; the most is {LONGEST_BODY}");
+        return Err(Nothing::Refused(413, text));
+    }
+    let connection = header("connection").unwrap_or_default();
+    let stays = match request.version {
+        Some(1) => !connection.contains("close"),
+        _ => connection.contains("keep-alive"),
+    };
+    let waits = header("expect").is_some_and(|text| text == "100-continue");
+    Ok(Some(Head { method, path, length, stays, waits, end }))
+}
+
+fn reason(status: u16) -> &'static str {
+    match status {
+        200 => "OK",
+        400 => "Bad Request",
+        404 => "Not Found",
+        405 => "Method Not Allowed",
+        411 => "Length Required",
+        413 => "Content Too Large",
+        431 => "Request Header Fields Too Large",
+        503 => "Service Unavailable",
+        _ => "Internal Server Error",
+    }
+}
