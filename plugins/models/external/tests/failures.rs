@@ -62,7 +62,10 @@ fn output_that_is_missing_garbage_or_cut_off_is_refused() {
             "y.csv: 1 of 3 values are missing, first at time 3 s",
         ),
         ("printf 'time,y\\n1,1\\n2,2\\n3' > y.csv", "y.csv, "),
-        ("printf 'time,y\\n1,1\\n2,x\\n3,3\\n' > y.csv", "y.csv, line 3, column 2 (`y`): expected a number, found `x`"),
+        (
+            "printf 'time,y\\n1,1\\n2,x\\n3,3\\n' > y.csv",
+            "y.csv, line 3, column 2 (`y`): expected a number, found `x`",
+        ),
         (
             "printf 'time,y\\n1,1\\n2,NaN\\n3,3\\n' > y.csv",
             "y.csv: 1 of 3 values are missing, first at time 2 s",
