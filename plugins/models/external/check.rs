@@ -33,9 +33,11 @@ pub fn options(model: &External, context: &Context<'_>, complaints: &mut Complai
                 ));
         }
     }
+    let mut all_known = true;
     for (path, template) in texts(model) {
         for place in template.places() {
             if let Some(unknown) = Unknown::of(place, context) {
+                all_known = false;
                 let spot = complaints.at(&path).inside(place.at.clone());
                 unknown.explain(spot.say(unknown.message()));
             }
@@ -46,7 +48,7 @@ pub fn options(model: &External, context: &Context<'_>, complaints: &mut Complai
     if let Output::File(file) = &model.output {
         file.check(context, complaints);
     }
-    if model.templates.is_empty() {
+    if all_known && model.templates.is_empty() {
         unused(model, BTreeSet::new(), context, complaints);
     }
 }
@@ -115,7 +117,7 @@ impl<'a> Unknown<'a> {
     }
 }
 
-/// The inputs that a template uses; `None` when it cannot be read.
+/// The inputs that a template uses; `None` when it is wrong.
 fn template_file(
     path: &Path,
     spot: &str,
@@ -146,12 +148,13 @@ fn template_file(
             return None;
         }
     };
-    for place in template.places() {
-        if let Some(unknown) = Unknown::of(place, context) {
-            unknown.explain(complaints.at(spot).say(located(place.at.start, &unknown.message())));
-        }
+    let mut all_known = true;
+    for unknown in template.places().filter_map(|place| Unknown::of(place, context)) {
+        all_known = false;
+        let said = located(unknown.place.at.start, &unknown.message());
+        unknown.explain(complaints.at(spot).say(said));
     }
-    Some(template.places().map(|place| place.name.clone()).collect())
+    all_known.then(|| template.places().map(|place| place.name.clone()).collect())
 }
 
 /// Complains of inputs that reach the command in no way: the response could not depend on them.
@@ -182,14 +185,17 @@ fn places(model: &External, complaints: &mut Complaints<'_>) {
     let mut taken: Vec<&Path> = [STDOUT, STDERR, STDIN].map(Path::new).to_vec();
     let copied =
         [("copy", &model.copy), ("link", &model.link)].into_iter().flat_map(|(key, list)| {
-            list.iter().enumerate().map(move |(i, path)| (format!("{key}.{i}"), path.file_name()))
+            list.iter()
+                .enumerate()
+                .map(move |(i, path)| (format!("{key}.{i}"), path, path.file_name()))
         });
     let made = model.templates.iter().enumerate();
-    let made = made.map(|(i, file)| (format!("templates.{i}.to"), Some(file.to.as_os_str())));
-    for (spot, name) in copied.chain(made) {
+    let made =
+        made.map(|(i, file)| (format!("templates.{i}.to"), &file.to, Some(file.to.as_os_str())));
+    for (spot, written, name) in copied.chain(made) {
         let path = Path::new(name.unwrap_or_default());
         if !stays_inside(path) {
-            outside(&spot, path, complaints);
+            outside(&spot, written, complaints);
         } else if taken.contains(&path) {
             let text = format!("a run's folder has another file `{}`", path.display());
             complaints.at(&spot).say(text);

@@ -6,14 +6,21 @@ use std::str::Chars;
 /// How a number is written: a conversion of C's `printf` for one floating-point number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Format {
-    left: bool,
-    plus: bool,
-    blank: bool,
-    zeros: bool,
+    /// What stands before a number that is not negative.
+    positive: &'static str,
+    fill: Fill,
     width: usize,
     precision: usize,
     conversion: Conversion,
     capital: bool,
+}
+
+/// What makes a text as wide as it is to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Fill {
+    BlanksBefore,
+    BlanksAfter,
+    Zeros,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,9 +53,23 @@ impl Format {
             _ => return None,
         };
         let [left, plus, blank, zeros] = flags;
-        let capital = letter.is_ascii_uppercase();
         let sound = rest.next().is_none() && width <= MOST && precision <= MOST;
-        sound.then_some(Self { left, plus, blank, zeros, width, precision, conversion, capital })
+        sound.then_some(Self {
+            positive: match (plus, blank) {
+                (true, _) => "+",
+                (false, true) => " ",
+                (false, false) => "",
+            },
+            fill: match (left, zeros) {
+                (true, _) => Fill::BlanksAfter,
+                (false, true) => Fill::Zeros,
+                (false, false) => Fill::BlanksBefore,
+            },
+            width,
+            precision,
+            conversion,
+            capital: letter.is_ascii_uppercase(),
+        })
     }
 
     /// A finite number in this format.
@@ -62,17 +83,12 @@ impl Format {
         if self.capital {
             digits.make_ascii_uppercase();
         }
-        let sign = match (x.is_sign_negative(), self.plus, self.blank) {
-            (true, _, _) => "-",
-            (false, true, _) => "+",
-            (false, false, true) => " ",
-            (false, false, false) => "",
-        };
-        let fill = self.width.saturating_sub(sign.len() + digits.len());
-        match (self.left, self.zeros) {
-            (true, _) => format!("{sign}{digits}{}", " ".repeat(fill)),
-            (false, true) => format!("{sign}{}{digits}", "0".repeat(fill)),
-            (false, false) => format!("{}{sign}{digits}", " ".repeat(fill)),
+        let sign = if x.is_sign_negative() { "-" } else { self.positive };
+        let count = self.width.saturating_sub(sign.len() + digits.len());
+        match self.fill {
+            Fill::BlanksAfter => format!("{sign}{digits}{}", " ".repeat(count)),
+            Fill::Zeros => format!("{sign}{}{digits}", "0".repeat(count)),
+            Fill::BlanksBefore => format!("{}{sign}{digits}", " ".repeat(count)),
         }
     }
 }

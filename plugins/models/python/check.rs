@@ -38,7 +38,7 @@ enum Names {
 /// What a function takes by name.
 #[derive(Deserialize)]
 struct Arguments {
-    arguments: Vec<String>,
+    names: Vec<String>,
     optional: Vec<String>,
     any: bool,
 }
@@ -116,7 +116,7 @@ impl Arguments {
     fn check(&self, key: &str, name: &str, context: &Context<'_>, complaints: &mut Complaints<'_>) {
         let inputs = || context.given.iter().map(|given| given.name.as_str());
         for input in inputs().filter(|input| !self.any && !self.takes(input)) {
-            let free = || self.arguments.iter().map(String::as_str);
+            let free = || self.names.iter().map(String::as_str);
             let problem =
                 complaints.at(key).say(format!("`{name}` has no argument for the input `{input}`"));
             if let Some(near) = nearest(input, free()) {
@@ -125,7 +125,7 @@ impl Arguments {
         }
         let given =
             |argument: &str| EXTRA.contains(&argument) || inputs().any(|input| input == argument);
-        let wanted = self.arguments.iter().filter(|a| !given(a) && !self.optional.contains(a));
+        let wanted = self.names.iter().filter(|a| !given(a) && !self.optional.contains(a));
         for argument in wanted {
             complaints
                 .at(key)
@@ -135,6 +135,6 @@ impl Arguments {
     }
 
     fn takes(&self, input: &str) -> bool {
-        self.arguments.iter().any(|argument| argument == input)
+        self.names.iter().any(|argument| argument == input)
     }
 }

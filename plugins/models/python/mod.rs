@@ -40,10 +40,10 @@ use super::given;
 /// The function gets each input that the study gives (parameters, fixed values, values of a scenario) under
 /// its name, in the study's unit or in that of `units`. If it has an argument `layout` it gets the response's `name`,
 /// `unit` and `axes` (each with `name`, and `labels` or `values` and `unit`); if it has an argument `scenario`,
-/// that scenario's `name`, `values` and `functions`. It returns the response: a NumPy array or nested lists of the
+/// that scenario's `name`, `values` and `functions`. It returns the response: an array or nested lists of the
 /// layout's shape, one flat list in row-major order, or dicts by label. Numbers are passed exactly.
 ///
-/// With `vectorised` every input is a sequence with one value a run (an array, if the file imports NumPy), and the
+/// With `vectorised` every input is a sequence with one value a run (an array, if the file imports `numpy`), and the
 /// function returns one response a run; what it does for one run must not depend on the others.
 ///
 /// The file is loaded once by a worker process; as many workers run as runs are made at a time. What the

@@ -10,7 +10,7 @@ def described(function):
     named = [a.arg for a in arguments.args + arguments.kwonlyargs]
     optional = [a.arg for a in arguments.args[len(arguments.args) - len(arguments.defaults):]]
     optional += [a.arg for a, default in zip(arguments.kwonlyargs, arguments.kw_defaults) if default]
-    return {"arguments": named, "optional": optional, "any": arguments.kwarg is not None}
+    return {"names": named, "optional": optional, "any": arguments.kwarg is not None}
 
 
 def main():

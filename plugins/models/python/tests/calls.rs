@@ -95,7 +95,9 @@ def simulate(**inputs):
     assert_eq!(loads(), 1);
     std::thread::scope(|scope| {
         let calls: Vec<_> = (0..4).map(|_| scope.spawn(|| case.run().unwrap())).collect();
-        calls.into_iter().for_each(|call| assert_eq!(call.join().unwrap(), [4.0; 6]));
+        for call in calls {
+            assert_eq!(call.join().unwrap(), [4.0; 6]);
+        }
     });
     assert!((1..=4).contains(&loads()));
 }
@@ -147,7 +149,7 @@ def slopes(a, b):
     assert!(case.model.gradient().is_none());
 }
 
-/// Arrays are answered as lists are. Runs where the interpreter has NumPy.
+/// Arrays are answered as lists are. Runs where the interpreter has `numpy`.
 #[test]
 fn arrays_are_answered_exactly() {
     let text = "

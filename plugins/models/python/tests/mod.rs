@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod calls;
+mod checks;
 mod failures;
 
 use std::path::{Path, PathBuf};
