@@ -55,19 +55,27 @@ impl Scope {
         &self,
         units: &BTreeMap<String, Unit>,
     ) -> Result<BTreeMap<String, Unit>, Vec<Fault>> {
-        let found = self.find_units(units)?;
+        let (found, faults) = self.find_units(units);
+        if !faults.is_empty() {
+            return Err(faults);
+        }
         Ok(found.into_iter().map(|(name, unit)| (name, unit.unwrap_or_default())).collect())
     }
 
-    /// The same, with `None` for a definition that is zero and has every unit.
+    /// The same with all that could be found beside the faults; `None` stands for the unit of a definition that is
+    /// zero and has every unit.
     pub fn find_units(
         &self,
         units: &BTreeMap<String, Unit>,
-    ) -> Result<BTreeMap<String, Option<Unit>>, Vec<Fault>> {
+    ) -> (BTreeMap<String, Option<Unit>>, Vec<Fault>) {
         let mut known = units.clone();
         let mut found = BTreeMap::new();
+        let order = match self.order() {
+            Ok(order) => order,
+            Err(faults) => return (found, faults),
+        };
         let mut faults = Vec::new();
-        for name in self.order()? {
+        for name in order {
             let tree = &self.definitions[name];
             // What uses a definition of no known unit waits until that one is right.
             let settled =
@@ -83,7 +91,7 @@ impl Scope {
                 Err(fault) => faults.push(fault.within(name)),
             }
         }
-        if faults.is_empty() { Ok(found) } else { Err(faults) }
+        (found, faults)
     }
 
     fn unit_of(&self, tree: &Tree, units: &BTreeMap<String, Unit>) -> Result<Option<Unit>, Fault> {

@@ -76,8 +76,8 @@ fn tables_have_units() {
     let of = |text: &str| {
         let mut scope = loaded();
         scope.result("a.b", text).unwrap();
-        let found = scope.find_units(&units).map_err(|faults| faults[0].to_string())?;
-        Ok::<_, String>(found["a.b"].clone())
+        let (found, faults) = scope.find_units(&units);
+        faults.first().map_or_else(|| Ok(found["a.b"].clone()), |fault| Err(fault.to_string()))
     };
     assert_eq!(of("force(t) / m"), Ok(Some(unit("m/s2"))));
     assert_eq!(of("0 * force(t)"), Ok(None));
