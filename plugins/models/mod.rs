@@ -1,5 +1,6 @@
 //! Simulators a study can name.
 
+pub mod equations;
 pub mod external;
 pub mod given;
 pub mod mercury_target;

@@ -6,14 +6,16 @@ mod value;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::Fault;
 use super::forward;
-use super::function::functions;
+use super::function::{functions, table_usage};
 use super::operator::{Binary, Lanes, Unary};
 use super::program::{Action, Instruction, Place, Program, Tables, WIDE};
 use super::scope::{Data, Scope, element};
 use super::tree::{Id, Node, NodeKind, Tree};
+use crate::data;
 use crate::study::nearest::nearest;
 use value::{Argument, Kind, Value, fit};
 
@@ -28,6 +30,10 @@ pub(super) struct Compiler {
     /// What has been computed already.
     results: BTreeMap<Action, Place>,
     tables: Tables,
+    /// Functions that are given by tables.
+    functions: BTreeMap<String, Arc<data::Function>>,
+    /// Those that are in `tables` already.
+    curves: BTreeMap<String, usize>,
 }
 
 impl Compiler {
@@ -43,6 +49,8 @@ impl Compiler {
             instructions: Vec::new(),
             results: BTreeMap::new(),
             tables: Tables::default(),
+            functions: scope.functions.clone(),
+            curves: BTreeMap::new(),
         };
         for (name, x) in [("pi", std::f64::consts::PI), ("e", std::f64::consts::E)] {
             let value = compiler.number(x);
@@ -118,33 +126,16 @@ impl Compiler {
             let value = whole.number().map_err(|fault| fault.within(name))?;
             places.push(value.place);
         }
-        let mut needed = vec![false; self.registers];
-        let mark = |needed: &mut Vec<bool>, place: &Place| {
-            if !place.constant {
-                needed[place.range()].fill(true);
-            }
-        };
-        for place in &places {
-            mark(&mut needed, place);
-        }
-        let mut instructions = Vec::new();
-        for instruction in self.instructions.into_iter().rev() {
-            let results = instruction.start..instruction.start + instruction.length;
-            if needed[results].contains(&true) {
-                instruction.action.places().iter().for_each(|place| mark(&mut needed, place));
-                instructions.push(instruction);
-            }
-        }
-        instructions.reverse();
-        Ok(Program {
-            instructions,
+        let program = Program {
+            instructions: self.instructions,
             tables: self.tables,
             unknowns: self.unknowns,
             wide_constants: self.constants.iter().map(|lane| [lane[0]; WIDE]).collect(),
             constants: self.constants,
             registers: self.registers,
             outputs: places,
-        })
+        };
+        Ok(program.pruned())
     }
 
     fn number(&mut self, x: f64) -> Value {
@@ -250,6 +241,7 @@ impl Compiler {
                 let arguments: Vec<Argument> = ids.iter().map(argument).collect();
                 self.call(function, &arguments, &node.span)
             }
+            NodeKind::Table(name, id) => self.table(name, &argument(id)),
             NodeKind::Index(base, index) => self.index(&argument(base), &argument(index)),
             NodeKind::Slice(base, first, last) => {
                 let ends = [first, last].map(|end| end.as_ref().map(argument));
@@ -273,6 +265,9 @@ impl Compiler {
         let fault = Fault::new(span.clone(), format!("unknown name `{name}`"));
         if let Some(function) = functions().find(|function| function.name == name) {
             return Err(fault.help(format!("a function is called as `{}`", function.usage())));
+        }
+        if self.functions.contains_key(name) {
+            return Err(fault.help(format!("a function is called as `{}`", table_usage(name))));
         }
         // Constants of mathematics are too short to be what was meant.
         let names =

@@ -224,18 +224,28 @@ pub fn functions() -> impl Iterator<Item = &'static Function> {
     FUNCTIONS.iter()
 }
 
-/// The function of a name that stands at these bytes.
-pub(super) fn find(name: &str, span: &Range<usize>) -> Result<&'static Function, Fault> {
+/// The function of a name that stands at these bytes; tables are named for help.
+pub(super) fn find(
+    name: &str,
+    span: &Range<usize>,
+    tables: &[&str],
+) -> Result<&'static Function, Fault> {
     if let Some(function) = functions().find(|function| function.name == name) {
         return Ok(function);
     }
     let fault = Fault::new(span.clone(), format!("unknown function `{name}`"));
     let alias = ALIASES.into_iter().find(|(other, _)| *other == name).map(|(_, ours)| ours);
-    let near = alias.or_else(|| nearest(name, functions().map(|function| function.name)));
+    let names = functions().map(|function| function.name).chain(tables.iter().copied());
+    let near = alias.or_else(|| nearest(name, names));
     Err(match near {
         Some(near) => fault.help(format!("did you mean `{near}`?")),
         None => fault.help("a product with a parenthesis is written with `*`"),
     })
+}
+
+/// How a function that is given by a table is called.
+pub(super) fn table_usage(name: &str) -> String {
+    format!("{name}(x)")
 }
 
 impl Function {

@@ -20,7 +20,7 @@
 //! every element; vectors must have one length. Elements count from 1: `x[3]`, `x[2:10]` (both ends included), and
 //! `theta[school]` for a vector of whole numbers `school`. `sum`, `mean`, `min`, `max` and others give one number of a
 //! vector. So the log density of a regression reads `sum(normal_log_density(y, a + b * x, sigma))`. All functions are
-//! listed by [`functions`].
+//! listed by [`functions`]; a study's tables, such as a force over time, are called like them: `force(time)`.
 //!
 //! # What is undefined
 //!
@@ -32,10 +32,12 @@
 //!
 //! are exact, in forward or reverse mode. Where there is none, this one is taken: `abs` and `sign` have slope 0
 //! at 0; `floor` and `ceil` have slope 0; `min` and `max` have the slope of the first of equal arguments; `if` has
-//! the slope of the branch taken; `interpolate` that of the segment to the right, and none beyond its nodes;
+//! the slope of the branch taken; `interpolate` and tables that of the segment to the right, and none beyond the nodes;
 //! `hypot` and `atan2` have slope 0 at the origin. What does not contribute to a result has no slope in it.
 
+mod breaks;
 mod compile;
+mod evaluator;
 mod fault;
 mod forward;
 mod function;
@@ -49,6 +51,8 @@ mod token;
 mod tree;
 mod units;
 
+pub use breaks::Break;
+pub use evaluator::Evaluator;
 pub use fault::Fault;
 pub use function::{Function, functions};
 pub use program::Program;
@@ -57,12 +61,12 @@ pub use token::is_name;
 
 /// Reads an expression without looking up its names: a fault is one of form.
 pub fn check(text: &str) -> Result<(), Fault> {
-    tree::Tree::parse(text).map(|_| ())
+    tree::Tree::parse(text, &[]).map(|_| ())
 }
 
-/// The names that an expression uses.
-pub fn names(text: &str) -> Result<Vec<String>, Fault> {
-    Ok(tree::Tree::parse(text)?.names().map(str::to_owned).collect())
+/// The names that an expression uses, which may call these tables.
+pub fn names(text: &str, tables: &[&str]) -> Result<Vec<String>, Fault> {
+    Ok(tree::Tree::parse(text, tables)?.names().map(str::to_owned).collect())
 }
 
 #[cfg(test)]

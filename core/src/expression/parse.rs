@@ -23,8 +23,9 @@ const SIGN: u8 = 7;
 const POWER: u8 = 8;
 
 /// The nodes of a whole text.
-pub(super) fn nodes(text: &str) -> Result<Vec<Node>, Fault> {
-    let mut parser = Parser { text, tokens: tokens(text)?, at: 0, nodes: Vec::new(), depth: 0 };
+pub(super) fn nodes(text: &str, tables: &[&str]) -> Result<Vec<Node>, Fault> {
+    let tokens = tokens(text)?;
+    let mut parser = Parser { text, tables, tokens, at: 0, nodes: Vec::new(), depth: 0 };
     if parser.peek().kind == Kind::End {
         return Err(Fault::new(0..0, "the expression is empty"));
     }
@@ -37,6 +38,8 @@ pub(super) fn nodes(text: &str) -> Result<Vec<Node>, Fault> {
 
 struct Parser<'t> {
     text: &'t str,
+    /// Functions that are given by tables.
+    tables: &'t [&'t str],
     tokens: Vec<Token>,
     at: usize,
     nodes: Vec<Node>,
@@ -205,14 +208,26 @@ impl Parser<'_> {
     }
 
     fn call(&mut self, name: Range<usize>) -> Result<Id, Fault> {
-        let function = function::find(&self.text[name.clone()], &name)?;
+        let word = &self.text[name.clone()];
+        let function = if self.tables.contains(&word) {
+            None
+        } else {
+            Some(function::find(word, &name, self.tables)?)
+        };
         let open = self.next().span;
         let arguments = self.list(")", "(", &open)?;
         let span = name.start..self.tokens[self.at - 1].span.end;
-        if !function.takes(arguments.len()) {
-            return Err(wrong_count(function, arguments.len(), span));
-        }
-        Ok(self.push(NodeKind::Call(function, arguments), span))
+        let kind = match (function, &arguments[..]) {
+            (Some(function), _) if function.takes(arguments.len()) => {
+                NodeKind::Call(function, arguments)
+            }
+            (None, [argument]) => NodeKind::Table(word.to_owned(), *argument),
+            (function, _) => {
+                let usage = function.map_or_else(|| function::table_usage(word), Function::usage);
+                return Err(wrong_count(word, &usage, arguments.len(), span));
+            }
+        };
+        Ok(self.push(kind, span))
     }
 
     /// Values between commas, up to the closing bracket.
@@ -278,13 +293,13 @@ impl Parser<'_> {
     }
 }
 
-fn wrong_count(function: &Function, count: usize, span: Range<usize>) -> Fault {
+fn wrong_count(name: &str, usage: &str, count: usize, span: Range<usize>) -> Fault {
     let found = match count {
         0 => "no argument".to_owned(),
         1 => "1 argument".to_owned(),
         n => format!("{n} arguments"),
     };
-    Fault::new(span, format!("wrong number of arguments for `{}`", function.name))
-        .expected(format!("`{}`", function.usage()))
+    Fault::new(span, format!("wrong number of arguments for `{name}`"))
+        .expected(format!("`{usage}`"))
         .found(found)
 }

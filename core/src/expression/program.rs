@@ -1,5 +1,7 @@
 //! Compiled expressions: a short list of instructions on numbered places.
 
+use std::sync::Arc;
+
 use super::function::Reduction;
 use super::operator::{Binary, Lanes, Unary};
 use super::{forward, reverse, tangent};
@@ -67,7 +69,8 @@ pub(super) struct Place {
 pub(super) struct Tables {
     pub indices: Vec<Vec<usize>>,
     pub matrices: Vec<Matrix>,
-    pub curves: Vec<Curve>,
+    /// Shared, as tables may be long and programs of one scope use the same.
+    pub curves: Vec<Arc<Curve>>,
 }
 
 /// Straight lines between nodes.
@@ -108,6 +111,11 @@ impl Program {
     /// The number of values at a point: the outputs, all elements of a vector counted.
     pub fn outputs(&self) -> usize {
         self.outputs.iter().map(|place| place.length).sum()
+    }
+
+    /// The number of values of each output: 1, or the length of a vector.
+    pub fn lengths(&self) -> Vec<usize> {
+        self.outputs.iter().map(|place| place.length).collect()
     }
 
     /// The number of instructions that are left after simplification.

@@ -1,12 +1,15 @@
 //! The names of expressions: unknowns, data, definitions.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use super::Fault;
 use super::compile::Compiler;
+use super::function::functions;
 use super::program::Program;
 use super::token::is_name;
 use super::tree::{NodeKind, Tree};
+use crate::data;
 use crate::linalg::Matrix;
 
 /// Names that expressions may use: unknowns, data, and definitions in terms of both.
@@ -33,6 +36,7 @@ pub struct Scope {
     /// In the order of the coordinates of a point.
     pub(super) unknowns: Vec<String>,
     pub(super) data: BTreeMap<String, Data>,
+    pub(super) functions: BTreeMap<String, Arc<data::Function>>,
     pub(super) definitions: BTreeMap<String, Tree>,
 }
 
@@ -78,11 +82,71 @@ impl Scope {
         Ok(())
     }
 
+    /// Declares a function that is given by a table: straight between its points, constant beyond the first and the
+    /// last. It is called as `name(x)` by expressions that are defined after it.
+    ///
+    /// ```
+    /// use lacuna::data::{Function, Unit};
+    /// use lacuna::expression::Scope;
+    ///
+    /// let unit = |text: &str| Unit::parse(text).expect("a unit");
+    /// let force = Function {
+    ///     name: "force".to_owned(),
+    ///     at: vec![0.0, 1.0, 3.0],
+    ///     at_unit: unit("s"),
+    ///     values: vec![0.0, 4.0, 2.0],
+    ///     unit: unit("N"),
+    /// };
+    /// let mut scope = Scope::new();
+    /// scope.unknown("t")?;
+    /// scope.function(force.into())?;
+    /// scope.define("work_rate", "force(t) * 2 {m/s}")?;
+    /// let program = scope.compile(&["work_rate"]).expect("no fault");
+    /// assert_eq!(program.gradient(&[2.0]), (6.0, vec![-2.0]));
+    /// assert_eq!(program.gradient(&[5.0]), (4.0, vec![0.0]));
+    /// # Ok::<(), lacuna::expression::Fault>(())
+    /// ```
+    pub fn function(&mut self, function: Arc<data::Function>) -> Result<(), Fault> {
+        let name = &function.name;
+        self.declare(name, name)?;
+        let fault =
+            |message: String| Err(Fault::new(0..0, format!("the function `{name}` {message}")));
+        if functions().any(|built_in| built_in.name == name) {
+            return fault("has the name of one that expressions know".to_owned());
+        }
+        let (places, values) = (function.at.len(), function.values.len());
+        if places == 0 || places != values {
+            return fault(format!("has {places} places and {values} values"));
+        }
+        if let Some(pair) = function
+            .at
+            .windows(2)
+            .find(|pair| pair[0].partial_cmp(&pair[1]) != Some(std::cmp::Ordering::Less))
+        {
+            return fault(format!("has places that do not ascend: {} after {}", pair[1], pair[0]));
+        }
+        self.functions.insert(name.clone(), function);
+        Ok(())
+    }
+
+    /// An expression that no other can use: its key may be any text.
+    pub fn result(&mut self, key: &str, text: &str) -> Result<(), Fault> {
+        if self.definitions.contains_key(key) {
+            return Err(Fault::new(0..0, format!("there are two of the name `{key}`")).within(key));
+        }
+        self.read(key, text)
+    }
+
     /// Gives a name to an expression; the order of definitions does not matter. A fault is one of form: names
     /// are looked up when all of them are known, by [`Scope::compile`].
     pub fn define(&mut self, name: &str, text: &str) -> Result<(), Fault> {
         self.declare(name, name).map_err(|fault| fault.within(name))?;
-        let tree = Tree::parse(text).map_err(|fault| fault.within(name))?;
+        self.read(name, text)
+    }
+
+    fn read(&mut self, name: &str, text: &str) -> Result<(), Fault> {
+        let tables: Vec<&str> = self.functions.keys().map(String::as_str).collect();
+        let tree = Tree::parse(text, &tables).map_err(|fault| fault.within(name))?;
         self.definitions.insert(name.to_owned(), tree);
         Ok(())
     }
@@ -98,8 +162,10 @@ impl Scope {
             Some((other_base, _)) => other == name || (other_base == base && base == name),
             None => other == base,
         });
-        let taken =
-            taken_by_unknown || self.data.contains_key(base) || self.definitions.contains_key(base);
+        let taken = taken_by_unknown
+            || self.data.contains_key(base)
+            || self.functions.contains_key(base)
+            || self.definitions.contains_key(base);
         if taken {
             return Err(Fault::new(0..0, format!("there are two of the name `{name}`"))
                 .help("give one of them another name"));

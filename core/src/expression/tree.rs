@@ -35,6 +35,8 @@ pub(super) enum NodeKind {
     Unary(Unary, Id),
     Binary(Binary, Id, Id),
     Call(&'static Function, Vec<Id>),
+    /// `name(x)`, a function that is given by a table.
+    Table(String, Id),
     /// `base[index]`
     Index(Id, Id),
     /// `base[first:last]`
@@ -44,8 +46,9 @@ pub(super) enum NodeKind {
 }
 
 impl Tree {
-    pub fn parse(text: &str) -> Result<Self, Fault> {
-        Ok(Self { text: text.to_owned(), nodes: parse::nodes(text)? })
+    /// Reads an expression that may call these functions besides the language's own.
+    pub fn parse(text: &str, tables: &[&str]) -> Result<Self, Fault> {
+        Ok(Self { text: text.to_owned(), nodes: parse::nodes(text, tables)? })
     }
 
     /// The names that occur, in the order of the text, repetitions included.

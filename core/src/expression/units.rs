@@ -55,10 +55,27 @@ impl Scope {
         &self,
         units: &BTreeMap<String, Unit>,
     ) -> Result<BTreeMap<String, Unit>, Vec<Fault>> {
+        let (found, faults) = self.find_units(units);
+        if !faults.is_empty() {
+            return Err(faults);
+        }
+        Ok(found.into_iter().map(|(name, unit)| (name, unit.unwrap_or_default())).collect())
+    }
+
+    /// The same with all that could be found beside the faults; `None` stands for the unit of a definition that is
+    /// zero and has every unit.
+    pub fn find_units(
+        &self,
+        units: &BTreeMap<String, Unit>,
+    ) -> (BTreeMap<String, Option<Unit>>, Vec<Fault>) {
         let mut known = units.clone();
         let mut found = BTreeMap::new();
+        let order = match self.order() {
+            Ok(order) => order,
+            Err(faults) => return (found, faults),
+        };
         let mut faults = Vec::new();
-        for name in self.order()? {
+        for name in order {
             let tree = &self.definitions[name];
             // What uses a definition of no known unit waits until that one is right.
             let settled =
@@ -66,29 +83,36 @@ impl Scope {
             if !tree.names().all(settled) {
                 continue;
             }
-            match unit_of(tree, &known) {
+            match self.unit_of(tree, &known) {
                 Ok(unit) => {
-                    known.insert(name.to_owned(), unit.clone());
+                    known.insert(name.to_owned(), unit.clone().unwrap_or_default());
                     found.insert(name.to_owned(), unit);
                 }
                 Err(fault) => faults.push(fault.within(name)),
             }
         }
-        if faults.is_empty() { Ok(found) } else { Err(faults) }
+        (found, faults)
     }
-}
 
-fn unit_of(tree: &Tree, units: &BTreeMap<String, Unit>) -> Result<Unit, Fault> {
-    let mut parts: Vec<Part> = Vec::with_capacity(tree.nodes.len());
-    for node in &tree.nodes {
-        let measure = measure(&node.kind, &node.span, &parts, tree, units)?;
-        let value = value(&node.kind, &parts);
-        parts.push(Part { measure, value, span: node.span.clone() });
+    fn unit_of(&self, tree: &Tree, units: &BTreeMap<String, Unit>) -> Result<Option<Unit>, Fault> {
+        let mut parts: Vec<Part> = Vec::with_capacity(tree.nodes.len());
+        for node in &tree.nodes {
+            let measure = match &node.kind {
+                NodeKind::Table(name, id) => {
+                    let function = &self.functions[name];
+                    parts[*id].demand(&function.at_unit)?;
+                    Measure::Of(function.unit.clone())
+                }
+                kind => measure(kind, &node.span, &parts, tree, units)?,
+            };
+            let value = value(&node.kind, &parts);
+            parts.push(Part { measure, value, span: node.span.clone() });
+        }
+        Ok(match parts.pop().map(|whole| whole.measure) {
+            Some(Measure::Of(unit)) => Some(unit),
+            _ => None,
+        })
     }
-    Ok(match parts.pop().map(|whole| whole.measure) {
-        Some(Measure::Of(unit)) => unit,
-        _ => Unit::dimensionless(),
-    })
 }
 
 fn measure(
@@ -114,7 +138,9 @@ fn measure(
             Ok(Measure::Of(unit))
         }
         NodeKind::Name(name) => Ok(units.get(name).map_or_else(plain, |u| Measure::Of(u.clone()))),
-        NodeKind::Unary(_, a) | NodeKind::Slice(a, ..) => Ok(part(a).measure.clone()),
+        NodeKind::Unary(_, a) | NodeKind::Slice(a, ..) | NodeKind::Table(_, a) => {
+            Ok(part(a).measure.clone())
+        }
         NodeKind::Index(base, index) => {
             part(index).demand_plain("an index")?;
             Ok(part(base).measure.clone())
@@ -205,19 +231,7 @@ fn same<'a>(parts: impl Iterator<Item = &'a Part>) -> Result<Measure, Fault> {
         let Measure::Of(unit) = &part.measure else { continue };
         match common {
             None => common = Some(unit),
-            Some(first) if first == unit => {}
-            Some(first) => {
-                let fault = Fault::new(part.span.clone(), "the units do not agree")
-                    .expected(format!("`{first}`"))
-                    .found(format!("`{unit}`"));
-                return Err(if first.same_dimension(unit) {
-                    fault.help("numbers are not converted: use one unit for both")
-                } else if part.value.is_some() {
-                    fault.help(format!("a number with its unit is written `2.5 {{{first}}}`"))
-                } else {
-                    fault
-                });
-            }
+            Some(first) => part.demand(first)?,
         }
     }
     Ok(common.map_or(Measure::Any, |unit| Measure::Of(unit.clone())))
@@ -260,6 +274,24 @@ fn with_own_zero(span: &Range<usize>) -> Fault {
 }
 
 impl Part {
+    /// Demands a unit, or the zero that has every one.
+    fn demand(&self, wanted: &Unit) -> Result<(), Fault> {
+        let Measure::Of(unit) = &self.measure else { return Ok(()) };
+        if unit == wanted {
+            return Ok(());
+        }
+        let fault = Fault::new(self.span.clone(), "the units do not agree")
+            .expected(format!("`{wanted}`"))
+            .found(format!("`{unit}`"));
+        Err(if wanted.same_dimension(unit) {
+            fault.help("numbers are not converted: use one unit for both")
+        } else if self.value.is_some() {
+            fault.help(format!("a number with its unit is written `2.5 {{{wanted}}}`"))
+        } else {
+            fault
+        })
+    }
+
     fn demand_plain(&self, what: &str) -> Result<(), Fault> {
         match &self.measure {
             Measure::Of(unit) if *unit != Unit::dimensionless() => {

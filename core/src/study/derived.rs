@@ -122,7 +122,7 @@ impl Study {
         let mut needed: Vec<&DerivedSection> = find(name).into_iter().collect();
         let mut next = 0;
         while let Some(section) = needed.get(next) {
-            for used in crate::expression::names(&section.expression).unwrap_or_default() {
+            for used in crate::expression::names(&section.expression, &[]).unwrap_or_default() {
                 let more = find(&used).filter(|s| !needed.iter().any(|n| n.name == s.name));
                 needed.extend(more);
             }

@@ -32,6 +32,9 @@ impl Study {
         let mut units = BTreeMap::new();
         let mut parameters = Vec::new();
         let one = |fault: Fault| vec![fault];
+        for function in &self.scenarios[scenario].functions {
+            scope.function(function.clone()).map_err(one)?;
+        }
         for (i, unknown) in self.unknowns.iter().enumerate() {
             if unknown.acts_in(scenario) && !texts.contains_key(&unknown.name) {
                 scope.unknown(&unknown.name).map_err(one)?;
@@ -65,8 +68,10 @@ impl Study {
 
     /// The names that expressions of `[model] inputs` use.
     pub(super) fn used_in_expressions(&self) -> BTreeSet<String> {
+        let functions = self.scenarios.iter().flat_map(|scenario| &scenario.functions);
+        let tables: Vec<&str> = functions.map(|function| function.name.as_str()).collect();
         let texts = self.expressions().values();
-        texts.flat_map(|text| crate::expression::names(text).unwrap_or_default()).collect()
+        texts.flat_map(|text| crate::expression::names(text, &tables).unwrap_or_default()).collect()
     }
 
     /// See [`crate::plugin::Context::given`]: a name that only expressions use is not the model's.

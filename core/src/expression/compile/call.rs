@@ -1,6 +1,7 @@
 //! Calls of functions.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::value::{Argument, Kind, Value, fit};
 use super::{Compiler, Fault};
@@ -139,9 +140,25 @@ impl Compiler {
                 .expected("each node above the one before")
                 .found(format!("{after} after {before}")));
         }
-        self.tables.curves.push(curve);
+        self.tables.curves.push(Arc::new(curve));
         let action = Action::Interpolate(self.tables.curves.len() - 1, at.place);
         Ok(Value { place: self.emit(action, at.place.length), ..at })
+    }
+
+    /// A function that is given by a table.
+    pub(super) fn table(&mut self, name: &str, argument: &Argument) -> Result<Value, Fault> {
+        let at = argument.number()?;
+        let curve = if let Some(curve) = self.curves.get(name) {
+            *curve
+        } else {
+            let function = &self.functions[name];
+            let curve = Curve { nodes: function.at.clone(), values: function.values.clone() };
+            self.tables.curves.push(Arc::new(curve));
+            self.curves.insert(name.to_owned(), self.tables.curves.len() - 1);
+            self.tables.curves.len() - 1
+        };
+        let place = self.emit(Action::Interpolate(curve, at.place), at.place.length);
+        Ok(Value { place, ..at })
     }
 }
 

@@ -5,6 +5,7 @@ mod densities;
 mod derivatives;
 mod faults;
 mod language;
+mod tables;
 mod units;
 
 use super::{Data, Fault, Program, Scope};

@@ -1,0 +1,245 @@
+//! The rates of a system at a state and time, and their derivatives.
+
+use std::cell::RefCell;
+
+use lacuna::expression::{Evaluator, Program};
+
+use super::system::System;
+
+/// Stands in for a rate that is no number: so large that every method refuses the step and tries a shorter one.
+const UNDEFINED: f64 = 1e150;
+
+/// The rates for given inputs.
+pub struct Flow<'s> {
+    pub system: &'s System,
+    inputs: &'s [f64],
+    /// The inputs by which derivatives are taken.
+    channels: &'s [usize],
+    work: RefCell<Work<'s>>,
+}
+
+struct Work<'s> {
+    rates: Evaluator<'s>,
+    point: Vec<f64>,
+    direction: Vec<f64>,
+    /// The last rate that was no number: its state, its value and where.
+    undefined: Option<Undefined>,
+}
+
+/// A rate that is no number.
+#[derive(Debug, Clone)]
+pub struct Undefined {
+    /// The index of the state.
+    pub state: usize,
+    /// What the rate is instead.
+    pub value: f64,
+    /// When.
+    pub time: f64,
+    /// At which states.
+    pub states: Vec<f64>,
+}
+
+impl<'s> Flow<'s> {
+    pub fn new(system: &'s System, inputs: &'s [f64], channels: &'s [usize]) -> Self {
+        let coordinates = system.coordinates();
+        let mut point = vec![0.0; coordinates];
+        let variables = system.variables.len();
+        point[variables..variables + inputs.len()].copy_from_slice(inputs);
+        let rates = Evaluator::new(&system.rates);
+        let work = Work { rates, point, direction: vec![0.0; coordinates], undefined: None };
+        Self { system, inputs, channels, work: RefCell::new(work) }
+    }
+
+    /// The number of inputs by which derivatives are taken.
+    pub fn channels(&self) -> usize {
+        self.channels.len()
+    }
+
+    /// A point of the system's programs.
+    pub fn point(&self, time: f64, states: &[f64]) -> Vec<f64> {
+        [&[time], self.inputs, states].concat()
+    }
+
+    /// The coordinate of a channel's input.
+    pub fn coordinate(&self, channel: usize) -> usize {
+        self.system.variables.len() + self.channels[channel]
+    }
+
+    /// The magnitude of a channel's input, by which the size of its sensitivities is judged.
+    pub fn size(&self, channel: usize) -> f64 {
+        let size = self.inputs[self.channels[channel]].abs();
+        if size == 0.0 { 1.0 } else { size }
+    }
+
+    /// The rates; what is no number becomes [`UNDEFINED`] and is remembered.
+    pub fn rates(&self, time: f64, states: &[f64], out: &mut [f64]) {
+        let mut work = self.work.borrow_mut();
+        work.go(time, states);
+        work.rates.values(out);
+        for (state, rate) in out.iter_mut().enumerate() {
+            if !rate.is_finite() {
+                let (value, states) = (*rate, states.to_vec());
+                // Of a trial step that went astray nothing is to be told.
+                if states.iter().all(|x| x.is_finite()) {
+                    work.undefined = Some(Undefined { state, value, time, states });
+                }
+                *rate = UNDEFINED;
+            }
+        }
+    }
+
+    /// The derivatives of the rates along a direction of the states.
+    pub fn along(&self, time: f64, states: &[f64], direction: &[f64], out: &mut [f64]) {
+        let mut work = self.work.borrow_mut();
+        let first = work.direction.len() - states.len();
+        work.direction[..first].fill(0.0);
+        work.direction[first..].copy_from_slice(direction);
+        work.slopes(time, states, out);
+    }
+
+    /// The derivatives of the rates along a direction of the channels.
+    pub fn by_channels(&self, time: f64, states: &[f64], direction: &[f64], out: &mut [f64]) {
+        let mut work = self.work.borrow_mut();
+        work.direction.fill(0.0);
+        for (channel, share) in direction.iter().enumerate() {
+            work.direction[self.coordinate(channel)] = *share;
+        }
+        work.slopes(time, states, out);
+    }
+
+    /// The rate of a channel's sensitivity: `∂f/∂y s + ∂f/∂p`.
+    pub fn sensitivity_rate(
+        &self,
+        time: f64,
+        states: &[f64],
+        channel: usize,
+        sensitivity: &[f64],
+        out: &mut [f64],
+    ) {
+        let mut work = self.work.borrow_mut();
+        let first = work.direction.len() - states.len();
+        work.direction.fill(0.0);
+        work.direction[self.coordinate(channel)] = 1.0;
+        work.direction[first..].copy_from_slice(sensitivity);
+        work.slopes(time, states, out);
+    }
+
+    /// The last rate that was no number.
+    pub fn undefined(&self) -> Option<Undefined> {
+        self.work.borrow().undefined.clone()
+    }
+}
+
+impl Work<'_> {
+    fn go(&mut self, time: f64, states: &[f64]) {
+        let first = self.point.len() - states.len();
+        self.point[0] = time;
+        self.point[first..].copy_from_slice(states);
+        self.rates.at(&self.point);
+    }
+
+    /// A slope that is no number counts as none: the rate there is none either, or the slope is infinite at the edge
+    /// of where the rate is defined.
+    fn slopes(&mut self, time: f64, states: &[f64], out: &mut [f64]) {
+        self.go(time, states);
+        self.rates.slopes(&self.direction, out);
+        out.iter_mut().filter(|slope| !slope.is_finite()).for_each(|slope| *slope = 0.0);
+    }
+}
+
+/// The start of a run.
+pub struct Start {
+    pub time: f64,
+    pub states: Vec<f64>,
+    /// The derivative of the states by each channel, channel by channel.
+    pub sensitivities: Vec<f64>,
+}
+
+impl Start {
+    /// The start values and their derivatives at the fixed start time: a start that comes later by `dt` leaves the
+    /// states behind by their rates times `dt`.
+    pub fn of(flow: &Flow<'_>) -> Result<Self, String> {
+        let system = flow.system;
+        let states = system.states.len();
+        let point = flow.point(0.0, &vec![0.0; states]);
+        let mut start = Evaluator::new(&system.start);
+        let mut values = vec![0.0; 1 + states];
+        start.at(&point);
+        start.values(&mut values);
+        let time = values.remove(0);
+        let variable = &system.variables[0];
+        if !time.is_finite() {
+            return Err(format!("the start {variable} is {time}"));
+        }
+        if let Some(i) = values.iter().position(|value| !value.is_finite()) {
+            return Err(format!("the start value of `{}` is {}", system.states[i], values[i]));
+        }
+        let mut rates = vec![0.0; states];
+        flow.rates(time, &values, &mut rates);
+        if let Some(undefined) = flow.undefined() {
+            return Err(undefined.describe(system));
+        }
+        let mut sensitivities = vec![0.0; flow.channels() * states];
+        let mut slopes = vec![0.0; 1 + states];
+        for (channel, sensitivity) in sensitivities.chunks_mut(states).enumerate() {
+            let mut direction = vec![0.0; point.len()];
+            direction[flow.coordinate(channel)] = 1.0;
+            start.slopes(&direction, &mut slopes);
+            for (i, s) in sensitivity.iter_mut().enumerate() {
+                *s = slopes[1 + i] - rates[i] * slopes[0];
+            }
+        }
+        Ok(Self { time, states: values, sensitivities })
+    }
+
+    /// The derivative of the states along a direction of the channels.
+    pub fn along(&self, direction: &[f64], out: &mut [f64]) {
+        out.fill(0.0);
+        for (share, sensitivity) in direction.iter().zip(self.sensitivities.chunks(out.len())) {
+            out.iter_mut().zip(sensitivity).for_each(|(out, s)| *out += share * s);
+        }
+    }
+}
+
+impl Undefined {
+    /// In words.
+    pub fn describe(&self, system: &System) -> String {
+        let name = &system.states[self.state];
+        let at = describe(system, self.time, &self.states);
+        format!("the rate of `{name}` is {} at {at}", self.value)
+    }
+}
+
+/// A time and states in words, such as `t = 0.5, x = 1, y = 2`; of many states the first ones.
+pub fn describe(system: &System, time: f64, states: &[f64]) -> String {
+    const SHOWN: usize = 6;
+    let each = system.states.iter().zip(states).take(SHOWN);
+    let each: Vec<String> = each.map(|(name, value)| format!("{name} = {value}")).collect();
+    let rest = if states.len() > SHOWN { ", …" } else { "" };
+    format!("{} = {time}, {}{rest}", system.variables[0], each.join(", "))
+}
+
+/// Evaluates the one output of a program and its derivatives.
+pub struct Quantity<'p>(pub Evaluator<'p>);
+
+impl<'p> Quantity<'p> {
+    pub fn new(program: &'p Program) -> Self {
+        Self(Evaluator::new(program))
+    }
+
+    /// The value at a point.
+    pub fn value(&mut self, point: &[f64]) -> f64 {
+        let mut out = [0.0];
+        self.0.at(point);
+        self.0.values(&mut out);
+        out[0]
+    }
+
+    /// The derivative at a point along a direction.
+    pub fn slope(&mut self, point: &[f64], direction: &[f64]) -> f64 {
+        let mut out = [0.0];
+        self.0.at(point);
+        self.0.slopes(direction, &mut out);
+        out[0]
+    }
+}

@@ -1,0 +1,106 @@
+//! Sensitivities where rates jump.
+//!
+//! At a moment `t*(p)` at which the rates change from `f⁻` to `f⁺` the states are continuous and their
+//! derivatives by an input `p` are not: `s⁺ = s⁻ + (f⁻ - f⁺) dt*/dp`. With `q(t, y, p)` the quantity that reaches its
+//! value there, `dt*/dp = -(q_y s⁻ + q_p) / (q_t + q_y f⁻)`. E. Rozenwasser and R. Yusupov, Sensitivity of Automatic
+//! Control Systems, CRC 2000, chapter 2.
+
+use super::stepper::Stepper;
+use crate::models::equations::flow::{Flow, Quantity, Start};
+use crate::models::equations::stops::depends_on_states;
+
+/// The jumps of a system.
+pub struct Jumps<'r, 'f> {
+    flow: &'r Flow<'f>,
+    /// Those that happen at certain states, with the side on which the run is.
+    by_states: Vec<Watched<'f>>,
+    /// The moment and the states before the last step.
+    before: (f64, Vec<f64>),
+}
+
+struct Watched<'f> {
+    index: usize,
+    quantity: Quantity<'f>,
+    value: f64,
+    above: bool,
+}
+
+impl<'r, 'f> Jumps<'r, 'f> {
+    pub fn new(flow: &'r Flow<'f>, start: &Start) -> Self {
+        let mut by_states = Vec::new();
+        // Values alone need no correction: the steps get short at the jump.
+        let breaks = flow.system.breaks.iter().enumerate().filter(|_| flow.channels() > 0);
+        for (index, broken) in breaks.filter(|(_, b)| b.jumps && depends_on_states(b, flow)) {
+            let (mut quantity, value) = (Quantity::new(&broken.quantity), broken.at[0]);
+            let above = quantity.value(&flow.point(start.time, &start.states)) > value;
+            by_states.push(Watched { index, quantity, value, above });
+        }
+        Self { flow, by_states, before: (start.time, start.states.clone()) }
+    }
+
+    /// Corrects the sensitivities where the last step has crossed a jump.
+    pub fn look(&mut self, stepper: &mut dyn Stepper) {
+        if self.by_states.is_empty() {
+            return;
+        }
+        let point = self.flow.point(stepper.time(), stepper.states());
+        let mut crossed = None;
+        for watched in &mut self.by_states {
+            let above = watched.quantity.value(&point) > watched.value;
+            if above != watched.above {
+                watched.above = above;
+                crossed = Some(watched.index);
+            }
+        }
+        let before = self.before.clone();
+        self.before = (stepper.time(), stepper.states().to_vec());
+        if let Some(index) = crossed {
+            let mut rates = vec![0.0; before.1.len()];
+            self.flow.rates(before.0, &before.1, &mut rates);
+            let now = stepper.time();
+            self.correct(stepper, now, index, &rates);
+        }
+    }
+
+    /// Goes on behind a jump that the run has reached.
+    pub fn cross(&mut self, stepper: &mut dyn Stepper, after: f64, index: usize) {
+        let mut rates = vec![0.0; stepper.states().len()];
+        self.flow.rates(stepper.time(), stepper.states(), &mut rates);
+        self.correct(stepper, after, index, &rates);
+    }
+
+    /// Corrects the sensitivities for a jump from these rates, and goes on at `after`.
+    fn correct(&self, stepper: &mut dyn Stepper, after: f64, index: usize, old_rates: &[f64]) {
+        let (flow, now) = (self.flow, stepper.time());
+        let states = stepper.states().to_vec();
+        let n = states.len();
+        let mut rates = vec![0.0; n];
+        flow.rates(after, &states, &mut rates);
+        let mut sensitivities = vec![0.0; n * flow.channels()];
+        stepper.sensitivities(&mut sensitivities);
+        let mut quantity = Quantity::new(&flow.system.breaks[index].quantity);
+        let point = flow.point(now, &states);
+        let first = point.len() - n;
+        let mut direction = vec![0.0; point.len()];
+        direction[0] = 1.0;
+        direction[first..].copy_from_slice(old_rates);
+        let speed = quantity.slope(&point, &direction);
+        for (channel, sensitivity) in sensitivities.chunks_mut(n).enumerate() {
+            direction.fill(0.0);
+            direction[flow.coordinate(channel)] = 1.0;
+            direction[first..].copy_from_slice(sensitivity);
+            let later = -quantity.slope(&point, &direction) / speed;
+            if later.is_finite() {
+                for ((s, old), new) in sensitivity.iter_mut().zip(old_rates).zip(&rates) {
+                    *s += (old - new) * later;
+                }
+            }
+        }
+        let mut their_rates = vec![0.0; sensitivities.len()];
+        let both = sensitivities.chunks(n).zip(their_rates.chunks_mut(n));
+        for (channel, (sensitivity, rate)) in both.enumerate() {
+            flow.sensitivity_rate(after, &states, channel, sensitivity, rate);
+        }
+        stepper.go_on(after, &rates, &sensitivities, &their_rates);
+    }
+}

@@ -1,0 +1,100 @@
+//! Integration of the states, with steps by diffsol.
+//!
+//! C. Tsitouras, Comput. Math. Appl. 62 (2011) 770; G. Byrne and A. Hindmarsh, ACM Trans. Math. Softw. 1 (1975) 71;
+//! L. Shampine and M. Reichelt, SIAM J. Sci. Comput. 18 (1997) 1; J. Jørgensen, M. Kristensen and P. Thomsen,
+//! arXiv 1803.01613 (2018). Of stiffness: E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, 2nd
+//! edition, Springer 1996, section IV.2.
+
+mod jumps;
+mod march;
+mod stepper;
+
+use super::flow::{Flow, Start};
+use super::options::{Method, Solver};
+use super::stops::{Stop, stops};
+use march::March;
+use stepper::with_stepper;
+
+/// How many breaks of the rates make a method dear that starts anew at each.
+const MANY_BREAKS: usize = 50;
+
+/// An absolute tolerance may be this many times too large for its state before the run is repeated.
+const TOO_LARGE: f64 = 3.0;
+
+/// Takes the states and sensitivities (channel by channel) at each of the times asked for, by the time's index; after
+/// a run that is repeated once more.
+pub type Sink<'k> = dyn FnMut(usize, &[f64], &[f64]) + 'k;
+
+/// What a run cost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Effort {
+    /// The method that came to the end.
+    pub method: Method,
+    /// Its steps.
+    pub steps: usize,
+}
+
+/// Integrates over the times, which ascend.
+pub fn integrate(
+    flow: &Flow<'_>,
+    solver: &Solver,
+    times: &[f64],
+    sink: &mut Sink<'_>,
+) -> Result<Effort, String> {
+    let start = Start::of(flow)?;
+    let (first, last) = (times[0], times[times.len() - 1]);
+    if first < start.time {
+        let (name, begun) = (&flow.system.variables[0], start.time);
+        return Err(format!("the first {name}, {first}, is before the start {name}, {begun}"));
+    }
+    let stops = stops(flow, (start.time, last), times);
+    let stiff_method = if stops.len() > MANY_BREAKS { Method::Esdirk } else { Method::Bdf };
+    let mut run = Run { flow, solver, times, start, stops, sink };
+    match solver.method {
+        Method::Auto => {
+            run.with_tolerances(Method::RungeKutta).or_else(|_| run.with_tolerances(stiff_method))
+        }
+        method => run.with_tolerances(method),
+    }
+}
+
+/// A run by one or more attempts.
+struct Run<'r, 'f, 'k> {
+    flow: &'r Flow<'f>,
+    solver: &'r Solver,
+    times: &'r [f64],
+    start: Start,
+    stops: Vec<Stop>,
+    sink: &'r mut Sink<'k>,
+}
+
+impl Run<'_, '_, '_> {
+    /// Runs, and again where an absolute tolerance has proved too large for its state.
+    fn with_tolerances(&mut self, method: Method) -> Result<Effort, String> {
+        let relative = self.solver.relative_tolerance.get();
+        if let Some(absolute) = self.solver.absolute_tolerance {
+            let tolerances = vec![absolute.get(); self.start.states.len()];
+            return self.once(method, &tolerances).map(|(effort, _)| effort);
+        }
+        let size = |x: &f64| relative * if *x == 0.0 { 1.0 } else { x.abs() };
+        let mut tolerances: Vec<f64> = self.start.states.iter().map(size).collect();
+        let (effort, peaks) = self.once(method, &tolerances)?;
+        let mut repeat = false;
+        for (tolerance, peak) in tolerances.iter_mut().zip(peaks).filter(|(_, peak)| *peak > 0.0) {
+            repeat |= *tolerance > TOO_LARGE * relative * peak;
+            *tolerance = relative * peak;
+        }
+        if repeat { Ok(self.once(method, &tolerances)?.0) } else { Ok(effort) }
+    }
+
+    /// One run; also the largest magnitude of each state.
+    fn once(&mut self, method: Method, absolute: &[f64]) -> Result<(Effort, Vec<f64>), String> {
+        let (flow, start, sink) = (self.flow, &self.start, &mut *self.sink);
+        let watched = self.solver.method == Method::Auto && method == Method::RungeKutta;
+        with_stepper(flow, start, self.solver, method, absolute, |stepper| {
+            let mut march = March::new(flow, start, self.solver, self.times, watched);
+            let steps = march.run(stepper, &self.stops, sink)?;
+            Ok((Effort { method, steps }, march.peaks))
+        })
+    }
+}

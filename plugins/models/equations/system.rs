@@ -1,0 +1,215 @@
+//! Equations with their names looked up: programs for the start, the rates and what is observed.
+
+use std::sync::Arc;
+
+use lacuna::data::{Axis, Coordinates, Function, Layout};
+use lacuna::expression::{Break, Fault, Program, Scope, is_name};
+use lacuna::plugin::Context;
+
+use super::Equations;
+
+/// The names that equations may use besides their own.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Names {
+    /// The axes of numbers of the response.
+    pub variables: Vec<String>,
+    /// What the study sets.
+    pub inputs: Vec<String>,
+    /// Tables that are called as functions.
+    pub functions: Vec<Arc<Function>>,
+}
+
+/// The option that says when the start is.
+pub const START_TIME: &str = "start_time";
+
+/// A fault and the option it is in.
+pub type Located = (String, Fault);
+
+/// Compiled equations. A point holds the variables, the inputs and the states, in this order.
+#[derive(Debug)]
+pub struct System {
+    /// The variables; the one of a system with states is its time.
+    pub variables: Vec<String>,
+    /// The states.
+    pub states: Vec<String>,
+    /// How many inputs there are.
+    pub inputs: usize,
+    /// The start time and the start value of each state; of the inputs only.
+    pub start: Program,
+    /// The rate of each state.
+    pub rates: Program,
+    /// What is observed, a value a label.
+    pub observed: Program,
+    /// The labels; one that is empty for a response without labels.
+    pub labels: Vec<String>,
+    /// Where the rates break.
+    pub breaks: Vec<Break>,
+}
+
+impl Names {
+    /// The names of a layout's axes of numbers.
+    pub fn variables(layout: &Layout) -> Vec<String> {
+        let grid = |axis: &&Axis| matches!(axis.coordinates, Coordinates::Grid { .. });
+        layout.axes.iter().filter(grid).map(|axis| axis.name.clone()).collect()
+    }
+
+    /// The names of a study. One that no expression can write is none that an expression uses.
+    pub fn of(context: &Context<'_>) -> Self {
+        let inputs = context.given.iter().map(|given| given.name.clone());
+        let scenario = context.scenarios.first();
+        Self {
+            variables: Self::variables(context.layout),
+            inputs: inputs.filter(|name| is_name(name)).collect(),
+            functions: scenario.map(|scenario| scenario.functions.clone()).unwrap_or_default(),
+        }
+    }
+}
+
+/// The scope of equations, or all that is wrong with their form.
+pub fn scope(equations: &Equations, names: &Names) -> Result<Scope, Vec<Located>> {
+    let mut scope = Scope::new();
+    let mut faults = Vec::new();
+    let mut note = |option: String, outcome: Result<(), Fault>| {
+        faults.extend(outcome.err().map(|fault| (option, fault)));
+    };
+    for name in names.variables.iter().chain(&names.inputs) {
+        note(String::new(), scope.unknown(name));
+    }
+    for function in &names.functions {
+        note(String::new(), scope.function(function.clone()));
+    }
+    for name in equations.state.keys() {
+        note(format!("state.{name}"), scope.unknown(name));
+    }
+    for (name, text) in &equations.definitions {
+        note(format!("where.{name}"), scope.define(name, text));
+    }
+    note(START_TIME.into(), scope.result(START_TIME, &equations.start_time.text()));
+    for (name, state) in &equations.state {
+        let (start, key) = state.start();
+        let option = format!("state.{name}{key}");
+        note(option.clone(), scope.result(&option, &start.text()));
+    }
+    for (name, text) in &equations.rate {
+        let option = format!("rate.{name}");
+        note(option.clone(), scope.result(&option, text));
+    }
+    for (_, option, text) in equations.observe.each() {
+        note(option.clone(), scope.result(&option, text));
+    }
+    faults.extend(states_without_rates(equations));
+    if faults.is_empty() { Ok(scope) } else { Err(faults) }
+}
+
+fn states_without_rates(equations: &Equations) -> Vec<Located> {
+    let (states, rates) = (&equations.state, &equations.rate);
+    let listed = states.keys().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+    let missing = states.keys().filter(|name| !rates.contains_key(*name)).map(|name| {
+        let fault = Fault::new(0..0, format!("the state `{name}` has no rate"));
+        (format!("state.{name}"), fault.help(format!("add `{name} = \"…\"` to `rate`")))
+    });
+    let surplus = rates.keys().filter(|name| !states.contains_key(*name)).map(|name| {
+        let fault = Fault::new(0..0, format!("there is no state `{name}`"));
+        let fault = if states.is_empty() {
+            fault.help("states are declared in `state`, with their start values")
+        } else {
+            fault.expected(format!("one of {listed}"))
+        };
+        (format!("rate.{name}"), fault)
+    });
+    missing.chain(surplus).collect()
+}
+
+impl System {
+    /// Looks up all names.
+    pub fn compile(equations: &Equations, names: &Names) -> Result<Self, Vec<Located>> {
+        let scope = scope(equations, names)?;
+        let states: Vec<String> = equations.state.keys().cloned().collect();
+        let rates: Vec<String> = states.iter().map(|name| format!("rate.{name}")).collect();
+        let observed = equations.observe.each();
+        let options: Vec<String> = observed.iter().map(|(_, option, _)| option.clone()).collect();
+        let rates = program(&scope, &rates)?;
+        let system = Self {
+            start: program(&scope, &equations.starts())?,
+            observed: program(&scope, &options)?,
+            breaks: rates.breaks(),
+            rates,
+            labels: observed.into_iter().map(|(label, ..)| label.to_owned()).collect(),
+            variables: names.variables.clone(),
+            inputs: names.inputs.len(),
+            states,
+        };
+        system.start_is_of_inputs(equations, names, &scope)?;
+        Ok(system)
+    }
+
+    /// Whether any expression uses the input of this index.
+    pub fn uses(&self, input: usize) -> bool {
+        let coordinate = self.variables.len() + input;
+        [&self.start, &self.rates, &self.observed].iter().any(|p| p.depends_on(coordinate))
+    }
+
+    /// Whether the states depend on the input of this index.
+    pub fn moves_states(&self, input: usize) -> bool {
+        let coordinate = self.variables.len() + input;
+        self.start.depends_on(coordinate) || self.rates.depends_on(coordinate)
+    }
+
+    /// The number of coordinates of a point.
+    pub fn coordinates(&self) -> usize {
+        self.variables.len() + self.inputs + self.states.len()
+    }
+
+    /// Refuses start values that depend on what is known only after the start.
+    fn start_is_of_inputs(
+        &self,
+        equations: &Equations,
+        names: &Names,
+        scope: &Scope,
+    ) -> Result<(), Vec<Located>> {
+        let inputs = self.variables.len()..self.variables.len() + self.inputs;
+        let later = (0..self.coordinates()).filter(|i| !inputs.contains(i));
+        let mut faults = Vec::new();
+        for coordinate in later.filter(|i| self.start.depends_on(*i)) {
+            let name = match coordinate.checked_sub(inputs.end) {
+                Some(state) => &self.states[state],
+                None => &names.variables[coordinate],
+            };
+            for option in equations.starts() {
+                if program(scope, std::slice::from_ref(&option))?.depends_on(coordinate) {
+                    let fault = Fault::new(0..0, format!("the start depends on `{name}`"))
+                        .expected("an expression of parameters and other inputs");
+                    faults.push((option, fault));
+                }
+            }
+        }
+        if faults.is_empty() { Ok(()) } else { Err(faults) }
+    }
+}
+
+/// The program of these results, one number each.
+fn program(scope: &Scope, results: &[String]) -> Result<Program, Vec<Located>> {
+    let keys: Vec<&str> = results.iter().map(String::as_str).collect();
+    let program = scope.compile(&keys).map_err(|faults| {
+        let located = |fault: Fault| (option_of(&fault.definition), fault);
+        faults.into_iter().map(located).collect::<Vec<_>>()
+    })?;
+    let lengths = program.lengths();
+    let vectors = results.iter().zip(lengths).filter(|(_, length)| *length != 1);
+    let faults: Vec<Located> = vectors
+        .map(|(option, length)| {
+            let fault = Fault::new(0..0, "this is a vector").expected("one number");
+            (option.clone(), fault.found(format!("{length} numbers")))
+        })
+        .collect();
+    if faults.is_empty() { Ok(program) } else { Err(faults) }
+}
+
+/// The option in which a definition stands: results have its path as their key.
+pub fn option_of(definition: &str) -> String {
+    if definition.contains('.') || definition == START_TIME || definition == "observe" {
+        definition.to_owned()
+    } else {
+        format!("where.{definition}")
+    }
+}

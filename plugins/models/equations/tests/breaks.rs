@@ -1,0 +1,126 @@
+//! Rates that break: tables, conditions of time, conditions of states.
+
+use super::*;
+
+/// `x'' + ω² x = F(t)` with straight pieces: on each, `x = p + q τ + A cos ωτ + B sin ωτ`.
+fn forced(omega: f64, at: &[f64], force: &[f64], times: &[f64]) -> Vec<f64> {
+    let (mut x, mut v) = (0.0, 0.0);
+    let w2 = omega * omega;
+    let mut values = Vec::new();
+    for i in 0..at.len() - 1 {
+        let (t0, t1) = (at[i], at[i + 1]);
+        let slope = (force[i + 1] - force[i]) / (t1 - t0);
+        let (p, q) = (force[i] / w2, slope / w2);
+        let (a, b) = (x - p, (v - q) / omega);
+        let piece = |t: f64| {
+            let (sin, cos) = (omega * (t - t0)).sin_cos();
+            (p + q * (t - t0) + a * cos + b * sin, q + omega * (b * cos - a * sin))
+        };
+        values.extend(times.iter().filter(|t| t0 < **t && **t <= t1).map(|t| piece(*t).0));
+        (x, v) = piece(t1);
+    }
+    values
+}
+
+const FORCED: &str = r#"
+state = { x = 0.0, v = 0.0 }
+rate = { x = "v", v = "force(t) - omega^2 * x" }
+observe = "x"
+"#;
+
+#[test]
+fn a_table_of_few_points() {
+    // A blow of 2 ms in ten seconds of rest is not to be missed.
+    let (at, force) = ([0.0, 6.0, 6.001, 6.002, 10.0], [0.0, 0.0, 500.0, 0.0, 0.0]);
+    let times = times(10.0, 25);
+    for method in ["auto", "bdf", "esdirk"] {
+        let options = format!("{FORCED}solver = {{ method = \"{method}\" }}");
+        let case = case(&options, &["omega"], &[], &times);
+        let case = case.with_table("force", at.to_vec(), force.to_vec());
+        case.is(&[3.0], |p| forced(p[0], &at, &force, &times), 1e-5, 1e-4);
+    }
+}
+
+#[test]
+fn a_table_and_a_record_of_a_hundred_thousand_points() {
+    let at: Vec<f64> = (0..=100_000).map(|i| 1e-3 * f64::from(i)).collect();
+    // A chirp with noise of a fixed pattern.
+    let noise = |i: usize| ((i * 7919) % 1000) as f64 / 1000.0 - 0.5;
+    let chirp = |(i, t): (usize, &f64)| (0.05 * t * t).sin() + 0.3 * noise(i);
+    let force: Vec<f64> = at.iter().enumerate().map(chirp).collect();
+    let case = case(FORCED, &["omega"], &[], &at[1..]);
+    let case = case.with_table("force", at.clone(), force.clone());
+    close(&case.values(&[2.0]), &forced(2.0, &at, &force, &at[1..]), 1e-7, "the values");
+    let exact = derivative(&|p: &[f64]| forced(p[0], &at, &force, &at[1..]), &[2.0], 0);
+    close(&case.jacobian(&[2.0]).column(0), &exact, 1e-5, "the derivative");
+}
+
+/// A push of unknown size, begin and length on a body with friction `v' = a - v`.
+#[test]
+fn a_push_of_unknown_length() {
+    let options = r#"
+        state = { v = 0.0 }
+        rate = { v = "if(t >= begin and t < begin + length, a, 0) - v" }
+        observe = "v"
+    "#;
+    let times = times(10.0, 20);
+    let case = case(options, &["a", "begin", "length"], &[], &times);
+    let form = |p: &[f64]| {
+        let at = |t: &f64| {
+            let rise = |from: f64| if *t > from { 1.0 - (from - t).exp() } else { 0.0 };
+            p[0] * (rise(p[1]) - rise(p[1] + p[2]))
+        };
+        times.iter().map(at).collect()
+    };
+    // The second push is much shorter than the distance of the points, the third begins at one of them.
+    for inputs in [[3.0, 1.3, 4.0], [3.0, 7.123, 0.005], [3.0, 1.52, 2.0]] {
+        case.is(&inputs, form, 1e-7, 1e-6);
+    }
+    let at_a_point = form(&[3.0, 1.5, 2.0]);
+    close(&case.values(&[3.0, 1.5, 2.0]), &at_a_point, 1e-7, "the values");
+}
+
+/// `y' = 1` up to `y = c`, `y' = 3` beyond: the derivative by `c` comes from the moment of the change alone.
+#[test]
+fn rates_that_jump_at_a_state() {
+    for method in ["auto", "bdf", "esdirk"] {
+        let options = format!(
+            "state = {{ y = \"y0\" }}\nrate = {{ y = \"if(y < c, 1, 3)\" }}\nobserve = \"y\"\n\
+             solver = {{ method = \"{method}\" }}"
+        );
+        let times = times(4.0, 9);
+        let case = case(&options, &["c", "y0"], &[], &times);
+        let form = |p: &[f64]| {
+            let reach = p[0] - p[1];
+            times.iter().map(|t| p[1] + t + 2.0 * (t - reach).max(0.0)).collect()
+        };
+        case.is(&[1.7, 0.2], form, 1e-6, 1e-5);
+    }
+}
+
+/// A square wave: `y` rises and falls with slope one between multiples of half a period.
+#[test]
+fn a_square_wave() {
+    let options = r#"
+        state = { y = 0.0 }
+        rate = { y = "sign(sin(2 * pi * t / period))" }
+        observe = "y"
+    "#;
+    let times = times(10.0, 100);
+    let case = case(options, &["period"], &[], &times);
+    let form = |p: &[f64]| {
+        let at = |t: &f64| {
+            let phase = t.rem_euclid(p[0]);
+            phase.min(p[0] - phase)
+        };
+        times.iter().map(at).collect::<Vec<f64>>()
+    };
+    let period = 1.37;
+    close(&case.values(&[period]), &form(&[period]), 1e-7, "the values");
+    close(
+        &case.jacobian(&[period]).column(0),
+        &derivative(&form, &[period], 0),
+        1e-6,
+        "the slopes",
+    );
+}
