@@ -1,5 +1,6 @@
 //! Simulators a study can name.
 
+pub mod composed;
 pub mod equations;
 pub mod external;
 pub mod given;

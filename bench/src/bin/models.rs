@@ -62,6 +62,7 @@ fn ask(
     let calls_of = |inputs| Call {
         inputs,
         names: &names,
+        units: &[],
         layout: &layout,
         scenario: &scenario,
         study,

@@ -93,6 +93,7 @@ fn run(
     let batch = Batch {
         model: &Line,
         names: &names(),
+        units: &[],
         jobs,
         layout: &layout,
         scenario: &scenario,
@@ -137,6 +138,7 @@ fn hands_over_every_job(executor: &dyn Executor, scratch: &Path) -> Result<(), S
         let call = Call {
             inputs: &job.inputs,
             names: &names(),
+            units: &[],
             layout: &layout,
             scenario: &scenario,
             study: scratch,

@@ -38,6 +38,7 @@ struct Case<'a> {
     model: &'a dyn Model,
     signature: Signature,
     names: Vec<String>,
+    units: Vec<crate::data::Unit>,
     inputs: Vec<f64>,
     layout: Layout,
     scenario: Scenario,
@@ -84,14 +85,16 @@ impl<'a> Case<'a> {
         });
         let inputs = inputs.collect();
         let names = signature.inputs.iter().map(|input| input.name.clone()).collect();
+        let units = signature.inputs.iter().map(|input| input.unit.clone()).collect();
         let scenario = context.scenarios.first().cloned().unwrap_or_default();
-        Self { model, signature, names, inputs, layout, scenario, study: context.directory }
+        Self { model, signature, names, units, inputs, layout, scenario, study: context.directory }
     }
 
     fn call<'b>(&'b self, inputs: &'b [f64], layout: &'b Layout) -> Call<'b> {
         Call {
             inputs,
             names: &self.names,
+            units: &self.units,
             layout,
             scenario: &self.scenario,
             study: self.study,

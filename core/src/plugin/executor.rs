@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::Component;
 use super::model::{Call, Model, Response};
-use crate::data::{Layout, Scenario};
+use crate::data::{Layout, Scenario, Unit};
 use crate::run::Stop;
 
 /// Runs many model evaluations somewhere.
@@ -25,6 +25,8 @@ pub struct Batch<'a> {
     pub model: &'a dyn Model,
     /// The name of each of its inputs.
     pub names: &'a [String],
+    /// The unit of each.
+    pub units: &'a [Unit],
     /// The jobs.
     pub jobs: &'a [Job],
     /// The shape of the response that is wanted.
@@ -48,6 +50,7 @@ impl<'a> Batch<'a> {
         Call {
             inputs: &job.inputs,
             names: self.names,
+            units: self.units,
             layout: self.layout,
             scenario: self.scenario,
             study: self.study,

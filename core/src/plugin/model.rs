@@ -92,6 +92,8 @@ pub struct Call<'a> {
     pub inputs: &'a [f64],
     /// The name of each input.
     pub names: &'a [String],
+    /// The unit of each input.
+    pub units: &'a [Unit],
     /// The shape of the response that is wanted.
     pub layout: &'a Layout,
     /// The conditions of the run.

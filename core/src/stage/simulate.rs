@@ -297,6 +297,7 @@ impl Work<'_> {
         let batch = Batch {
             model: self.simulator.model,
             names: &self.simulator.names,
+            units: &self.simulator.units,
             jobs: &jobs,
             layout: &self.setting.asked,
             scenario: self.setting.scenario,

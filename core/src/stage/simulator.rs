@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use crate::data::{Axis, Coordinates, Layout, Scenario};
+use crate::data::{Axis, Coordinates, Layout, Scenario, Unit};
 use crate::linalg::{Matrix, multiply};
 use crate::plugin::model::{Call, EvalError, Gradient, Input, Model, Response};
 use crate::plugin::registry::Section;
@@ -20,6 +20,8 @@ pub struct Simulator<'a> {
     pub study: &'a Path,
     /// The name of each input of the model.
     pub names: Vec<String>,
+    /// The unit of each.
+    pub units: Vec<Unit>,
     /// One setting a scenario.
     pub settings: Vec<Setting<'a>>,
 }
@@ -66,7 +68,7 @@ impl<'a> Simulator<'a> {
     ) -> Result<Self, Stop> {
         let model = &*section.built.plugin;
         let mut settings = Vec::new();
-        let mut names = Vec::new();
+        let (mut names, mut units) = (Vec::new(), Vec::new());
         for (place, scenario) in study.scenarios.iter().enumerate() {
             let (layout, outputs) = study
                 .layouts
@@ -80,6 +82,7 @@ impl<'a> Simulator<'a> {
             let source = |input: &Input| source(study, section, place, computed.as_ref(), input);
             let sources = signature.inputs.iter().map(source).collect::<Result<_, Stop>>()?;
             names = signature.inputs.iter().map(|input| input.name.clone()).collect();
+            units = signature.inputs.iter().map(|input| input.unit.clone()).collect();
             let (asked, factor) = asked(&layout, &signature.layout)?;
             let folder = folder(place, &scenario.name);
             let ranges = signature.inputs.iter().map(|input| input.range).collect();
@@ -94,7 +97,7 @@ impl<'a> Simulator<'a> {
                 factor,
             });
         }
-        Ok(Self { study: &study.directory, model, names, settings })
+        Ok(Self { study: &study.directory, model, names, units, settings })
     }
 
     /// The responses to all scenarios at one point, in the study's unit.
@@ -146,6 +149,7 @@ impl<'a> Simulator<'a> {
         Call {
             inputs,
             names: &self.names,
+            units: &self.units,
             layout: &setting.asked,
             scenario: setting.scenario,
             study: self.study,

@@ -260,6 +260,7 @@ mod tests {
             let call = Call {
                 inputs: &[13_500.0, 1456.0, 1.5e5],
                 names: &names,
+                units: &[],
                 layout,
                 scenario: &scenario,
                 study: Path::new(""),

@@ -55,6 +55,7 @@ impl Case {
         Call {
             inputs,
             names: &self.names,
+            units: &[],
             layout: &self.layout,
             scenario: &self.scenario,
             study: Path::new("."),

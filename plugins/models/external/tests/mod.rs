@@ -49,6 +49,7 @@ impl Case {
         let call = Call {
             inputs,
             names: &names,
+            units: &[],
             layout: &self.layout,
             scenario: &scenario,
             study: self.study.path(),

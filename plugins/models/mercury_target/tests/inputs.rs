@@ -40,6 +40,7 @@ fn respond(name: &str, inputs: &[(&str, f64)]) -> Result<Response, EvalError> {
     let call = Call {
         inputs: &values,
         names: &names,
+        units: &[],
         layout: &layout,
         scenario: &scenario,
         study: Path::new(""),

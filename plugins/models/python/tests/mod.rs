@@ -71,6 +71,7 @@ impl Case {
         Call {
             inputs,
             names: &self.names,
+            units: &[],
             layout: &self.layout,
             scenario: &self.scenario,
             study: self.study.path(),

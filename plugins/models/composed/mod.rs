@@ -1,0 +1,369 @@
+//! `composed`: models in a chain, the output of one being an input of those after it.
+
+mod part;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use lacuna::data::{Condition, Coordinates, Function, Layout, Scenario, Unit};
+use lacuna::plugin::model::{Call, EvalError, Input, Response, Signature};
+use lacuna::plugin::{Component, Context, Fact, Given, Model};
+use lacuna::study::problem::{Complaints, Problems};
+use lacuna::study::{Node, Place, Sources};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use part::{Part, pass_on};
+
+/// Models in a chain: what one gives is an input of those after it, as from load to response to sensor. A part is
+/// swapped by changing its `use`.
+///
+/// Each entry of `parts` is a model of any kind with its options, a `name`, and, for all but the last, the `output` that
+/// is asked of it: `name`, `unit` and `axes` as in `[response]`. The parts after it see that output
+///
+/// - as an input of the output's name, where it has no axes; of each label's name, where it has an axis of labels;
+/// - as a function of the output's name, where it has one axis of numbers (in `equations` it is called as `force(t)`; a
+///   command finds it in its JSON); of each label's name, where it has an axis of labels before that.
+///
+/// An input of a part that no part before it gives is an input of the chain. The last part gives the response.
+/// Derivatives are taken by differences.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Composed {
+    /// The parts, in the order in which they are computed.
+    pub parts: Vec<Part>,
+}
+
+/// One thing that a part hands on.
+struct Handed {
+    name: String,
+    unit: Unit,
+    /// The axis of numbers, where it is a function.
+    grid: Option<(Vec<f64>, Unit)>,
+    /// Where its values begin in the response of the part, and how many there are.
+    begin: usize,
+}
+
+/// What an output of this shape is to the parts after it.
+fn handed(layout: &Layout) -> Result<Vec<Handed>, String> {
+    let labels = |i: usize| match layout.axes.get(i).map(|axis| &axis.coordinates) {
+        Some(Coordinates::Labels(labels)) => Some(labels.clone()),
+        _ => None,
+    };
+    let grid = |i: usize| match layout.axes.get(i).map(|axis| &axis.coordinates) {
+        Some(Coordinates::Grid { values, unit }) => Some((values.clone(), unit.clone())),
+        _ => None,
+    };
+    let one = |name: String, grid: Option<(Vec<f64>, Unit)>, i: usize| {
+        let length = grid.as_ref().map_or(1, |(values, _)| values.len());
+        Handed { name, unit: layout.unit.clone(), grid, begin: i * length }
+    };
+    let name = layout.name.clone();
+    match (layout.axes.len(), labels(0), grid(0), grid(1)) {
+        (0, ..) => Ok(vec![one(name, None, 0)]),
+        (1, _, Some(grid), _) => Ok(vec![one(name, Some(grid), 0)]),
+        (1, Some(labels), ..) => {
+            Ok(labels.into_iter().enumerate().map(|(i, label)| one(label, None, i)).collect())
+        }
+        (2, Some(labels), _, Some(grid)) => Ok(labels
+            .into_iter()
+            .enumerate()
+            .map(|(i, label)| one(label, Some(grid.clone()), i))
+            .collect()),
+        _ => {
+            Err("expected no axes, labels, one axis of numbers, or labels and then numbers".into())
+        }
+    }
+}
+
+/// A part with all that it is asked with.
+struct Link<'a> {
+    model: &'a dyn Model,
+    name: String,
+    /// What it is asked for; the study's own layout for the last.
+    asked: Layout,
+    signature: Signature,
+    /// What it hands on; nothing for the last.
+    handed: Vec<Handed>,
+}
+
+impl Composed {
+    /// The parts in a study of this context, or what does not fit.
+    fn links<'a>(&'a self, context: &Context<'_>) -> Result<Vec<Link<'a>>, String> {
+        let mut given = context.given.to_vec();
+        let mut scenarios = context.scenarios.to_vec();
+        let mut links = Vec::new();
+        for (i, part) in self.parts.iter().enumerate() {
+            let section = part.section().ok_or("the options of a part are wrong")?;
+            let name = section.common.name.as_str().to_owned();
+            let last = i + 1 == self.parts.len();
+            let asked = match (part.output()?, last) {
+                (Some(layout), false) => layout,
+                (None, true) => context.layout.clone(),
+                (None, false) => return Err(format!("part `{name}` has no `output`")),
+                (Some(_), true) => {
+                    return Err(format!(
+                        "part `{name}` is the last and gives the study's response: it has no `output`"
+                    ));
+                }
+            };
+            let own = Context {
+                given: &given,
+                scenarios: &scenarios,
+                layout: &asked,
+                ..Context::new(context.directory, context.parameters, &asked)
+            };
+            let model = &*section.built.plugin;
+            let signature = model.signature(&own);
+            let handed = if last { Vec::new() } else { handed(&asked)? };
+            for output in &handed {
+                match &output.grid {
+                    None => {
+                        given.retain(|other| other.name != output.name);
+                        given.push(Given {
+                            name: output.name.clone(),
+                            unit: Some(output.unit.clone()),
+                        });
+                    }
+                    Some((at, at_unit)) => {
+                        let values = vec![0.0; at.len()];
+                        for scenario in &mut scenarios {
+                            scenario.functions.push(Arc::new(Function {
+                                name: output.name.clone(),
+                                at: at.clone(),
+                                at_unit: at_unit.clone(),
+                                values: values.clone(),
+                                unit: output.unit.clone(),
+                            }));
+                        }
+                    }
+                }
+            }
+            links.push(Link { model, name, asked, signature, handed });
+        }
+        Ok(links)
+    }
+
+    /// The inputs of the chain: those of the parts that no part before gives.
+    fn inputs(links: &[Link<'_>]) -> Vec<Input> {
+        let mut known: Vec<&str> = Vec::new();
+        let mut inputs: Vec<Input> = Vec::new();
+        for link in links {
+            for input in &link.signature.inputs {
+                let there = inputs.iter().any(|other| other.name == input.name);
+                if !there && !known.contains(&input.name.as_str()) {
+                    inputs.push(input.clone());
+                }
+            }
+            known.extend(link.handed.iter().map(|output| output.name.as_str()));
+        }
+        inputs
+    }
+}
+
+/// What is there to the part that is asked next.
+struct State {
+    /// Names, values and units of what sets inputs.
+    values: Vec<(String, f64, Unit)>,
+    scenario: Scenario,
+}
+
+impl Link<'_> {
+    /// The answer of the part.
+    fn answer(
+        &self,
+        state: &State,
+        study: &Path,
+        directory: Option<&Path>,
+    ) -> Result<Response, EvalError> {
+        let fatal = |what: String| EvalError::Fatal(format!("part `{}`: {what}", self.name));
+        let mut inputs = Vec::new();
+        let mut names = Vec::new();
+        for input in &self.signature.inputs {
+            let set = state.values.iter().find(|(name, ..)| name == &input.name);
+            let value = match set {
+                Some((_, value, unit)) => unit
+                    .convert(*value, &input.unit)
+                    .ok_or_else(|| fatal(format!("`{}` has another unit", input.name)))?,
+                None => {
+                    input.default.ok_or_else(|| fatal(format!("nothing sets `{}`", input.name)))?
+                }
+            };
+            inputs.push(value);
+            names.push(input.name.clone());
+        }
+        let folder = directory.map(|folder| folder.join(&self.name));
+        let call = Call {
+            inputs: &inputs,
+            names: &names,
+            units: &[],
+            layout: &self.asked,
+            scenario: &state.scenario,
+            study,
+            directory: folder.as_deref(),
+        };
+        let named = |text: String| format!("part `{}`: {text}", self.name);
+        let response = self.model.predict(&call).map_err(|error| match error {
+            EvalError::Rejected(reason) => EvalError::Rejected(named(reason)),
+            EvalError::Fatal(reason) => EvalError::Fatal(named(reason)),
+        })?;
+        if let Some(i) = response.values.iter().position(|y| !y.is_finite()) {
+            let (value, place) = (response.values[i], self.asked.describe(i));
+            return Err(EvalError::Rejected(named(format!("the response is {value} at {place}"))));
+        }
+        Ok(response)
+    }
+
+    /// Makes the answer known to the parts after it.
+    fn hand_on(&self, response: &Response, state: &mut State) {
+        for output in &self.handed {
+            let value = response.values[output.begin];
+            match &output.grid {
+                None => {
+                    state.values.retain(|(name, ..)| name != &output.name);
+                    state.values.push((output.name.clone(), value, output.unit.clone()));
+                    state.scenario.values.retain(|known| known.name != output.name);
+                    let (name, unit) = (output.name.clone(), Some(output.unit.clone()));
+                    state.scenario.values.push(Condition { name, value, unit });
+                }
+                Some((at, at_unit)) => {
+                    state.scenario.functions.retain(|known| known.name != output.name);
+                    state.scenario.functions.push(Arc::new(Function {
+                        name: output.name.clone(),
+                        at: at.clone(),
+                        at_unit: at_unit.clone(),
+                        values: response.values[output.begin..output.begin + at.len()].to_vec(),
+                        unit: output.unit.clone(),
+                    }));
+                }
+            }
+        }
+    }
+}
+
+impl Component for Composed {
+    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        if self.parts.is_empty() {
+            complaints.at("parts").say("a chain has at least one part");
+        }
+        self.parts.iter().enumerate().for_each(|(i, part)| part.check(i, complaints));
+        if self.parts.iter().any(|part| part.section().is_none()) {
+            return;
+        }
+        let links = match self.links(context) {
+            Ok(links) => links,
+            Err(reason) => {
+                complaints.at("parts").say(reason);
+                return;
+            }
+        };
+        each(&links, context, |i, link, own| {
+            let (mut problems, mut sources) = (Problems::new(), Sources::default());
+            let source = sources.add_argument("part", String::new());
+            let node = Node::table(Place::whole(source));
+            link.model.check(own, &mut Complaints::new(&node, &mut problems));
+            pass_on(i, problems.sorted().into_iter(), complaints);
+        });
+    }
+
+    fn environment(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        let Ok(links) = self.links(context) else { return };
+        each(&links, context, |i, link, own| {
+            let (mut problems, mut sources) = (Problems::new(), Sources::default());
+            let source = sources.add_argument("part", String::new());
+            let node = Node::table(Place::whole(source));
+            link.model.environment(own, &mut Complaints::new(&node, &mut problems));
+            pass_on(i, problems.sorted().into_iter(), complaints);
+        });
+    }
+}
+
+/// Looks at each part in the context that it sees: what the parts before it hand on is given.
+fn each(
+    links: &[Link<'_>],
+    context: &Context<'_>,
+    mut look: impl FnMut(usize, &Link<'_>, &Context<'_>),
+) {
+    let mut scenarios = context.scenarios.to_vec();
+    let mut outputs: Vec<Given> = Vec::new();
+    for (i, link) in links.iter().enumerate() {
+        // A part sees those of the chain's inputs that it takes.
+        let takes = |given: &&Given| link.signature.inputs.iter().any(|x| x.name == given.name);
+        let all = context.given.iter().chain(&outputs);
+        let given: Vec<Given> = all.filter(takes).cloned().collect();
+        let own = Context {
+            given: &given,
+            scenarios: &scenarios,
+            ..Context::new(context.directory, context.parameters, &link.asked)
+        };
+        look(i, link, &own);
+        for output in &link.handed {
+            match &output.grid {
+                None => outputs
+                    .push(Given { name: output.name.clone(), unit: Some(output.unit.clone()) }),
+                Some((at, at_unit)) => {
+                    for scenario in &mut scenarios {
+                        scenario.functions.push(Arc::new(Function {
+                            name: output.name.clone(),
+                            at: at.clone(),
+                            at_unit: at_unit.clone(),
+                            values: vec![0.0; at.len()],
+                            unit: output.unit.clone(),
+                        }));
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Model for Composed {
+    fn signature(&self, context: &Context<'_>) -> Signature {
+        let links = self.links(context).unwrap_or_default();
+        let (layout, resamples) = links.last().map_or_else(
+            || (context.layout.clone(), true),
+            |link| (link.signature.layout.clone(), link.signature.resamples),
+        );
+        Signature { inputs: Self::inputs(&links), layout, resamples }
+    }
+
+    fn predict(&self, call: &Call<'_>) -> Result<Response, EvalError> {
+        if call.names.len() != call.inputs.len() {
+            let (expected, found) = (call.names.len(), call.inputs.len());
+            return Err(EvalError::Fatal(format!("expected {expected} inputs, found {found}")));
+        }
+        let given =
+            |(name, unit): (&String, &Unit)| Given { name: name.clone(), unit: Some(unit.clone()) };
+        let given: Vec<Given> = call.names.iter().zip(call.units).map(given).collect();
+        let scenarios = [call.scenario.clone()];
+        let context = Context {
+            given: &given,
+            scenarios: &scenarios,
+            ..Context::new(call.study, &[], call.layout)
+        };
+        let links = self.links(&context).map_err(EvalError::Fatal)?;
+        let values = call.names.iter().zip(call.inputs).zip(call.units);
+        let values = values.map(|((name, x), unit)| (name.clone(), *x, unit.clone()));
+        let mut state = State { values: values.collect(), scenario: call.scenario.clone() };
+        let mut facts: Vec<Fact> = Vec::new();
+        let mut valid = true;
+        let mut values = Vec::new();
+        for link in &links {
+            let response = link.answer(&state, call.study, call.directory)?;
+            link.hand_on(&response, &mut state);
+            let named =
+                |fact: &Fact| Fact::new(format!("{}: {}", link.name, fact.name), &fact.value);
+            facts.extend(response.facts.iter().map(named));
+            valid &= response.valid;
+            values = response.values;
+        }
+        Ok(Response { values, valid, facts })
+    }
+
+    fn files(&self, directory: &Path) -> Vec<PathBuf> {
+        let models = self.parts.iter().filter_map(|part| part.section());
+        models.flat_map(|section| section.built.plugin.files(directory)).collect()
+    }
+}
+
+lacuna::register!(Model, "composed", Composed);
