@@ -9,6 +9,8 @@
 mod faults;
 #[path = "contracts/gain.rs"]
 mod gain;
+#[path = "contracts/served.rs"]
+mod served;
 
 use std::path::{Path, PathBuf};
 
@@ -89,7 +91,8 @@ fn designs() {
 
 #[test]
 fn models() {
-    let table: &Table = &[("mercury_target", &["numerics = { mesh = [6, 24] }"])];
+    let table: &Table =
+        &[("mercury_target", &["numerics = { mesh = [6, 24] }"]), ("um_bridge", served::options())];
     let parameter = |name: &str| Parameter {
         name: name.to_owned(),
         symbol: name.to_owned(),

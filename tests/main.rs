@@ -9,3 +9,4 @@ mod python;
 mod quick;
 mod studies;
 mod tidy;
+mod um_bridge;
