@@ -43,5 +43,6 @@ pub fn options() -> &'static [&'static str] {
     let server = Server::bind(Ipv4Addr::LOCALHOST.into(), 0).unwrap();
     let options = format!("url = \"http://{}\"\nmodel = \"curve\"", server.address());
     std::thread::spawn(move || server.serve(&[&Curve], 2));
-    Vec::leak(vec![options.leak()])
+    let options: &'static str = options.leak();
+    Vec::leak(vec![options])
 }
