@@ -25,21 +25,22 @@ impl Served {
     pub fn start(study: &Path, arguments: &[&str]) -> Self {
         let mut command = quick::command();
         command.arg("serve").arg(study).args(["--port", "0"]).args(arguments);
-        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-        let mut said = String::new();
-        let mut lines = BufReader::new(child.stdout.as_mut().unwrap());
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        let (url, said) = (String::new(), String::new());
+        let mut served = Self { child: command.spawn().unwrap(), url, said };
+        let mut lines = BufReader::new(served.child.stdout.as_mut().unwrap());
         loop {
             let mut line = String::new();
             if lines.read_line(&mut line).unwrap() == 0 {
                 let mut errors = String::new();
-                child.stderr.take().unwrap().read_to_string(&mut errors).unwrap();
-                panic!("{said}{errors}");
+                served.child.stderr.take().unwrap().read_to_string(&mut errors).unwrap();
+                panic!("{}{errors}", served.said);
             }
             if let Some(rest) = line.strip_prefix("listening at ") {
-                let url = rest.split(';').next().unwrap().to_owned();
-                return Self { child, url, said };
+                rest.split(';').next().unwrap().clone_into(&mut served.url);
+                return served;
             }
-            said += &line;
+            served.said += &line;
         }
     }
 
@@ -95,14 +96,14 @@ fn the_posterior_that_is_served_is_the_one_that_was_sampled() {
         ["draws", "log_density"].map(|name| arrays::read(&path, name).unwrap());
     for i in [0, 1234, 3999] {
         let point = draws.values[3 * i..3 * (i + 1)].to_vec();
-        let value = client.evaluate(&posterior, &[point.clone()]).unwrap()[0][0];
+        let value = client.evaluate(&posterior, std::slice::from_ref(&point)).unwrap()[0][0];
         // The sampler's coordinate is the logarithm of the variance: its density carries the Jacobian.
         let expected = densities.values[i] - point[2].ln();
         assert!((value - expected).abs() < 1e-9 * expected.abs(), "{value} {expected}");
     }
     derivatives_agree(&client, &posterior, &draws.values[..3]);
     let outside = vec![2.0, 1.0, -1.0];
-    let value = client.evaluate(&posterior, &[outside.clone()]).unwrap()[0][0];
+    let value = client.evaluate(&posterior, std::slice::from_ref(&outside)).unwrap()[0][0];
     assert_eq!(value, f64::MIN);
     let error = client.gradient(&posterior, WHOLE, &[outside], &[1.0]).unwrap_err().to_string();
     assert!(error.contains("InvalidInput: the density is zero here"), "{error}");
