@@ -59,7 +59,7 @@ fn complaints(settings: &[&str], address: &str) -> Vec<String> {
     let said = checked.problems.sorted().into_iter().map(|problem| {
         let parts = [&problem.expected, &problem.found].into_iter().flatten().chain(&problem.help);
         let parts: Vec<&str> =
-            [&problem.message].into_iter().chain(parts).map(|s| s.as_str()).collect();
+            [&problem.message].into_iter().chain(parts).map(String::as_str).collect();
         parts.join(" | ").replace(address, "ADDRESS")
     });
     said.collect()
