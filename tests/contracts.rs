@@ -9,6 +9,8 @@
 mod faults;
 #[path = "contracts/gain.rs"]
 mod gain;
+#[path = "contracts/served.rs"]
+mod served;
 
 use std::path::{Path, PathBuf};
 
@@ -130,6 +132,7 @@ fn models() {
         ("mercury_target_bubbles", &["numerics = { mesh = [6, 24] }"]),
         ("mercury_target_equilibrium_gas", &["numerics = { mesh = [6, 24] }"]),
         ("python", if there_is_python() { python } else { &[] }),
+        ("um_bridge", served::options()),
     ];
     let parameter = |name: &str| Parameter {
         name: name.to_owned(),

@@ -10,3 +10,4 @@ mod python;
 mod quick;
 mod studies;
 mod tidy;
+mod um_bridge;

@@ -3,19 +3,26 @@
 //! `LACUNA_PYTHON` names an interpreter that has both; without it the tests say that they are skipped, unless
 //! `LACUNA_REQUIRE_PYTHON=1` makes that a failure.
 
+use std::ffi::OsString;
 use std::path::Path;
 use std::process::Command;
 
 use crate::quick;
 
+/// The interpreter that has these packages; `None` when there is none and none is required.
+pub fn interpreter(packages: &str) -> Option<OsString> {
+    let required = std::env::var_os("LACUNA_REQUIRE_PYTHON").is_some_and(|value| value == "1");
+    let python = std::env::var_os("LACUNA_PYTHON");
+    if python.is_none() {
+        assert!(!required, "LACUNA_REQUIRE_PYTHON is set, but LACUNA_PYTHON names no interpreter");
+        println!("skipped: LACUNA_PYTHON names no interpreter with {packages}");
+    }
+    python
+}
+
 /// What a script prints, as JSON; `None` when there is no interpreter and none is required.
 fn python(script: &str, arguments: &[&Path]) -> Option<serde_json::Value> {
-    let required = std::env::var_os("LACUNA_REQUIRE_PYTHON").is_some_and(|value| value == "1");
-    let Some(python) = std::env::var_os("LACUNA_PYTHON") else {
-        assert!(!required, "LACUNA_REQUIRE_PYTHON is set, but LACUNA_PYTHON names no interpreter");
-        println!("skipped: LACUNA_PYTHON names no interpreter with arviz and netCDF4");
-        return None;
-    };
+    let python = interpreter("arviz and netCDF4")?;
     let output = Command::new(python).arg("-c").arg(script).args(arguments).output().unwrap();
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{errors}");

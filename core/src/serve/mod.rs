@@ -12,6 +12,8 @@ mod emulated;
 mod finished;
 mod posterior;
 mod simulated;
+#[cfg(test)]
+mod tests;
 
 use crate::data::Unit;
 use crate::linalg::Matrix;

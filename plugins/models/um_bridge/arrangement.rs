@@ -32,7 +32,9 @@ impl UmBridge {
             None => given().filter(|name| !self.config_inputs.contains(name)).collect(),
         };
         let mut names: Vec<String> = Vec::new();
-        for name in vectors.into_iter().chain(&self.config_inputs) {
+        // What nothing sets is complained about in `check`.
+        let config_inputs = self.config_inputs.iter().filter(|name| given().any(|g| g == *name));
+        for name in vectors.into_iter().chain(config_inputs) {
             if !names.contains(name) {
                 names.push(name.clone());
             }

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::http::{Nothing, Reader};
 use super::{Shared, answer};
-use crate::protocol::{Failed, Fault, INVALID_INPUT};
+use crate::protocol::{Failed, Fault, INTERNAL_ERROR, INVALID_INPUT};
 
 /// How often a connection without questions looks whether the server stops.
 const GLANCE: Duration = Duration::from_millis(200);
@@ -47,7 +47,8 @@ pub(super) fn attend(stream: TcpStream, shared: &Shared<'_>) {
 pub(super) fn refuse(stream: TcpStream) {
     let _ = stream.set_write_timeout(Some(GLANCE));
     let mut reader = Reader::new(stream);
-    let _ = reader.answer(503, "too many connections", false);
+    let text = "too many connections are open".to_owned();
+    let _ = reader.answer(503, &fault(INTERNAL_ERROR, text), false);
 }
 
 /// The body of an error.
