@@ -59,7 +59,7 @@ fn a_file_is_looked_at_without_being_run() {
             "gradient = 'slopes'",
             "gradient: model.py has no function `slopes` | expected `simulate`\n",
         ),
-        ("a = 1\ndef simulate(a, b:\n    pass", "", "file: model.py:2: invalid syntax\n"),
+        ("a = 1\ndef simulate(:", "", "file: model.py:2: invalid syntax\n"),
         (
             LINES,
             "units = { aa = 'm' }",
