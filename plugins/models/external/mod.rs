@@ -56,11 +56,12 @@ pub struct External {
     /// The program and its arguments, one word each. A program with a `/` is relative to the study file,
     /// any other is looked up in `PATH`. No shell is involved unless it is named: `["sh", "-c", "…"]`.
     pub command: Vec<Template>,
-    /// Where the response is: `"json"`, or a file in the run's folder and its reader. JSON is printed to standard
-    /// output as the only or the last line: nested lists in the order of the axes, one flat list,
-    /// or objects by label.
+    /// Where the response is: `"json"`, or a table with a reader and the file: `use`, `path` relative to the run's
+    /// folder, and the reader's options. JSON is printed to standard output as the only or the last line: nested lists
+    /// in the order of the axes, one flat list, or objects by label.
     pub output: Output,
-    /// Files made from templates.
+    /// Files made from templates: a list of `{ from = "deck.template", to = "deck.i" }`, the first relative to the
+    /// study file, the second to the run's folder.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub templates: Vec<TemplateFile>,
     /// What the command finds on its standard input.

@@ -77,6 +77,7 @@ pub struct Python {
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub units: BTreeMap<String, Unit>,
     /// Seconds after which a call (of all runs in it, if vectorised) is stopped; no limit when left out.
+    /// Loading the file may take a minute, or as long if that is longer.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub timeout: Option<Positive>,
     #[serde(skip)]

@@ -12,6 +12,9 @@ use super::frame::Answer;
 use super::worker::{Silent, Worker};
 use crate::models::process;
 
+/// A file may take this long to load, however short the limit of a call: its packages are loaded with it.
+const LOADING: Duration = Duration::from_secs(60);
+
 /// Workers that wait for a call.
 #[derive(Debug, Default)]
 pub struct Pool(Mutex<Vec<Worker>>);
@@ -28,7 +31,7 @@ impl Pool {
         let limit = model.timeout.map(|limit| Duration::from_secs_f64(limit.get()));
         let mut worker = match self.waiting() {
             Some(worker) => worker,
-            None => start(model, call.study, limit)?,
+            None => start(model, call.study, limit.map(|limit| limit.max(LOADING)))?,
         };
         worker.prepare(call, limit).map_err(|why| match why {
             Silent::Failed(text) => EvalError::Fatal(format!("{}: {text}", shown(&model.file))),

@@ -128,8 +128,19 @@ def place(value, axes, into):
         items = listed(value, f"values along `{name}`")
     if len(items) != axis["length"]:
         raise Wrong(f"{len(items)} values along `{name}`, expected {axis['length']}")
+    if not inner and extended(into, items):
+        return
     for item in items:
         place(item, inner, into)
+
+
+def extended(into, items):
+    """Appends numbers all at once; false when one of them is none."""
+    try:
+        into.extend(array.array("d", items))
+    except TypeError:
+        return False
+    return True
 
 
 def flatten(value, axes):
@@ -148,7 +159,8 @@ def flatten(value, axes):
         if len(axes) != 1 and all(is_one(item) for item in value):
             if len(value) != count:
                 raise Wrong(f"the response has {len(value)} values, expected {count}")
-            into.extend(number(item) for item in value)
+            if not extended(into, value):
+                into.extend(number(item) for item in value)
             return little_endian(into)
     place(value, axes, into)
     return little_endian(into)

@@ -59,11 +59,11 @@ fn a_file_is_looked_at_without_being_run() {
             "gradient = 'slopes'",
             "gradient: model.py has no function `slopes` | expected `simulate`\n",
         ),
-        ("a = 1\ndef simulate(a, b:\n    pass", "", "file: model.py:2: invalid syntax\n"),
+        ("a = 1\ndef simulate(:", "", "file: model.py:2: invalid syntax\n"),
         (
             LINES,
-            "units = { aa = 'm' }",
-            "units.aa: the study gives no input `aa` | expected one of `a`, `b`\n",
+            "units = { speed = 'm' }",
+            "units.speed: the study gives no input `speed` | expected one of `a`, `b`\n",
         ),
     ] {
         let text = format!("{text}\n{}", if said.contains("syntax") { "" } else { fatal });
