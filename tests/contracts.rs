@@ -89,7 +89,16 @@ fn designs() {
 
 #[test]
 fn models() {
-    let table: &Table = &[("mercury_target", &["numerics = { mesh = [6, 24] }"])];
+    let table: &Table = &[
+        (
+            "equations",
+            &[
+                "observe = \"a + sin(b * time / 1 {s}) + b\"",
+                "state = { y = \"a + 1\" }\nrate = { y = \"(b - y^2) / 1 {s}\" }\nobserve = \"y\"",
+            ],
+        ),
+        ("mercury_target", &["numerics = { mesh = [6, 24] }"]),
+    ];
     let parameter = |name: &str| Parameter {
         name: name.to_owned(),
         symbol: name.to_owned(),
