@@ -3,7 +3,6 @@
 
 mod breaks;
 mod closed_forms;
-mod cost;
 mod limits;
 mod stiff;
 
