@@ -175,7 +175,7 @@ struct FormulaVisitor;
 struct StateVisitor;
 struct ObserveVisitor;
 
-impl<'de> de::Visitor<'de> for FormulaVisitor {
+impl de::Visitor<'_> for FormulaVisitor {
     type Value = Formula;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
