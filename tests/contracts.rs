@@ -117,6 +117,9 @@ fn there_is_python() -> bool {
 
 #[test]
 fn models() {
+    let composed = &["[[parts]]\nname = 'load'\nuse = 'equations'\nobserve = 'a + 2 * b'\n\
+          output = { name = 'force' }\n[[parts]]\nname = 'sensor'\nuse = 'equations'\n\
+          observe = 'force * time / 1 {s} + a^2'"];
     let external = &[
         "command = ['sh', '-c', 'echo [{{ a }}, {{ b }}, 3, 4, 5]']\noutput = 'json'",
         "command = ['cp', 'table', 'y.csv']\ntemplates = [{ from = 'table', to = 'table' }]\n\
@@ -127,6 +130,14 @@ fn models() {
         "file = 'model.py'\nfunction = 'rows'\nvectorised = true",
     ];
     let table: &Table = &[
+        ("composed", composed),
+        (
+            "equations",
+            &[
+                "observe = \"a + sin(b * time / 1 {s}) + b\"",
+                "state = { y = \"a + 1\" }\nrate = { y = \"(b - y^2) / 1 {s}\" }\nobserve = \"y\"",
+            ],
+        ),
         ("external", external),
         ("mercury_target", &["numerics = { mesh = [6, 24] }"]),
         ("mercury_target_bubbles", &["numerics = { mesh = [6, 24] }"]),

@@ -183,7 +183,7 @@ fn shipped_studies_are_accepted() {
                 let complaints = loaded.complaints();
                 let sound = loaded.problems.sorted().iter().all(|p| absent(&p.message));
                 assert!(sound, "{complaints}");
-                checked += 1;
+                count += 1;
             }
         }
     }

@@ -1,5 +1,6 @@
 //! The names of expressions: unknowns, data, definitions.
 
+use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -118,12 +119,9 @@ impl Scope {
         if places == 0 || places != values {
             return fault(format!("has {places} places and {values} values"));
         }
-        if let Some(pair) = function
-            .at
-            .windows(2)
-            .find(|pair| pair[0].partial_cmp(&pair[1]) != Some(std::cmp::Ordering::Less))
-        {
-            return fault(format!("has places that do not ascend: {} after {}", pair[1], pair[0]));
+        let ascends = |pair: &[f64]| pair[0].partial_cmp(&pair[1]) == Some(Ordering::Less);
+        if let Some(&[before, after]) = function.at.windows(2).find(|pair| !ascends(pair)) {
+            return fault(format!("has places that do not ascend: {after} after {before}"));
         }
         self.functions.insert(name.clone(), function);
         Ok(())

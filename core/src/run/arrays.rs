@@ -90,7 +90,8 @@ pub fn read(path: &Path, name: &str) -> Result<Array, Stop> {
         variable.dimensions().iter().map(|d| (d.name.clone(), d.size as usize)).collect();
     let values = file.read_variable_as_f64(name).map_err(|error| fail(error.to_string()))?;
     let values = values.iter().copied().collect();
-    Ok(Array { name: name.to_owned(), dimensions, values, unit: None })
+    let unit = variable.attribute("units").and_then(|attribute| attribute.value.as_string());
+    Ok(Array { name: name.to_owned(), dimensions, values, unit })
 }
 
 /// Writes one run's response as `NAME.nc`: a variable with the response's name on the axes of the layout, their

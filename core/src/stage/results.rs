@@ -1,9 +1,10 @@
 //! The engine's own result files: what a model without a file format of its own leaves behind.
 
-use crate::data::{Ensemble, FailedRun};
+use crate::data::{Ensemble, FailedRun, Unit};
 use crate::linalg::Matrix;
 use crate::plugin::reader::EnsembleSource;
-use crate::run::{Stop, arrays};
+use crate::run::Stop;
+use crate::run::arrays::{self, Array};
 
 use super::simulate::{TABLE, from_table};
 
@@ -19,7 +20,8 @@ pub fn ensemble(source: &EnsembleSource<'_>) -> Result<Ensemble, Stop> {
     for (record, point) in records.iter().zip(simulated.iter_rows()) {
         match &record.file {
             Some(file) => {
-                let response = arrays::read(&folder.join(file), &source.layout.name)?.values;
+                let stored = arrays::read(&folder.join(file), &source.layout.name)?;
+                let response = in_unit(stored, &source.layout.unit, file)?;
                 if response.len() != source.layout.len() {
                     let (n, m) = (response.len(), source.layout.len());
                     let message = format!("{file} holds {n} values where {m} were asked for");
@@ -54,4 +56,14 @@ pub fn ensemble(source: &EnsembleSource<'_>) -> Result<Ensemble, Stop> {
         valid,
         failed,
     })
+}
+
+/// The values of a file, which are in the model's unit, in the study's.
+fn in_unit(stored: Array, wanted: &Unit, file: &str) -> Result<Vec<f64>, Stop> {
+    let Some(text) = &stored.unit else { return Ok(stored.values) };
+    let unit = Unit::parse(text).map_err(|error| Stop::new(format!("{file}: {error}")))?;
+    let factor = unit.factor_to(wanted).ok_or_else(|| {
+        Stop::new(format!("{file} holds values in `{unit}`, which do not convert to `{wanted}`"))
+    })?;
+    Ok(stored.values.into_iter().map(|value| value * factor).collect())
 }

@@ -56,13 +56,13 @@ pub fn layout(equations: &Equations, layout: &Layout) -> Layout {
     Layout { axes: layout.axes.iter().map(axis).collect(), ..layout.clone() }
 }
 
-fn is_grid(axis: &&Axis) -> bool {
+fn is_grid(axis: &Axis) -> bool {
     matches!(axis.coordinates, Coordinates::Grid { .. })
 }
 
 /// The axes of the response against what is observed and what time is needed.
 fn axes(equations: &Equations, layout: &Layout, complaints: &mut Complaints<'_>) {
-    let grids = layout.axes.iter().filter(is_grid).count();
+    let grids = layout.axes.iter().filter(|axis| is_grid(axis)).count();
     let labels: Vec<&Axis> = layout.axes.iter().filter(|axis| !is_grid(axis)).collect();
     match (&equations.observe, &labels[..]) {
         (Observe::One(_), []) | (Observe::Each(_), [_]) => {}

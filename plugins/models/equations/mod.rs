@@ -17,6 +17,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use lacuna::data::Layout;
+use lacuna::expression::Fault;
 use lacuna::linalg::Matrix;
 use lacuna::plugin::model::{Call, EvalError, Gradient, Input, Response, Signature};
 use lacuna::plugin::{Component, Context, Model};
@@ -125,7 +126,11 @@ impl Equations {
             functions: call.scenario.functions.clone(),
         };
         self.kept.get(&names, || System::compile(self, &names)).map_err(|faults| {
-            let lines = faults.iter().map(|(option, fault)| format!("`model.{option}`: {fault}"));
+            let lines = faults.into_iter().map(|(option, fault)| {
+                // The fault of a definition names it already.
+                let fault = Fault { definition: String::new(), ..fault };
+                format!("`model.{option}`: {fault}")
+            });
             EvalError::Fatal(lines.collect::<Vec<_>>().join("\n"))
         })
     }

@@ -77,8 +77,8 @@ pub struct Solver {
     pub method: Method,
     /// The error of a step as a share of each state.
     pub relative_tolerance: Positive,
-    /// The error of a step that is no matter, one number for all states, each in its unit. Without it: each state's
-    /// largest magnitude in the run times `relative_tolerance`.
+    /// The error of a step that is no matter, one number for all states, each in its unit. Without it: a hundredth of
+    /// each state's largest magnitude in the run times `relative_tolerance`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub absolute_tolerance: Option<Positive>,
     /// The most steps of a run; one that needs more fails.
@@ -175,7 +175,7 @@ struct FormulaVisitor;
 struct StateVisitor;
 struct ObserveVisitor;
 
-impl<'de> de::Visitor<'de> for FormulaVisitor {
+impl de::Visitor<'_> for FormulaVisitor {
     type Value = Formula;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

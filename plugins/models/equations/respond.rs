@@ -30,7 +30,7 @@ pub struct Responder<'a> {
     pub length: usize,
 }
 
-impl<'a> Responder<'a> {
+impl Responder<'_> {
     /// The response; with derivatives where they are wanted.
     pub fn answer(&self, derivatives: bool) -> Result<Answer, String> {
         let system = self.system;

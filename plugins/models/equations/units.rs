@@ -75,13 +75,25 @@ fn states(
         let (start, key) = state.start();
         let unit = &known[name];
         demand(format!("state.{name}{key}"), start, unit, format!("the start value of `{name}`"));
-        let per_time = time.and_then(|time| unit.times(&time.power(-1.0)?));
+        let per_time = time.and_then(|time| ratio(unit, time));
         if let (Some(wanted), Some(text)) = (per_time, equations.rate.get(name)) {
             let rate = Formula::Text(text.clone());
             demand(format!("rate.{name}"), &rate, &wanted, format!("the rate of `{name}`"));
         }
     }
     faults
+}
+
+/// A unit by another, written as people do where that is a unit.
+fn ratio(unit: &Unit, time: &Unit) -> Option<Unit> {
+    let simple = |text: &str| text.chars().all(char::is_alphanumeric);
+    let wrapped = |unit: &Unit| match unit.as_str() {
+        "" => "1".to_owned(),
+        text if simple(text) => text.to_owned(),
+        text => format!("({text})"),
+    };
+    let written = Unit::parse(&format!("{}/{}", wrapped(unit), wrapped(time)));
+    written.ok().or_else(|| unit.times(&time.power(-1.0)?))
 }
 
 fn mismatch(fault: Fault, wanted: &Unit, found: &Unit) -> Fault {

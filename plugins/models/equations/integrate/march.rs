@@ -70,7 +70,10 @@ impl<'r, 'f> March<'r, 'f> {
         stops: &[Stop],
         sink: &mut Sink<'_>,
     ) -> Result<usize, String> {
-        self.emit(stepper.time(), stepper, sink)?;
+        while self.times.get(self.next).is_some_and(|time| *time <= stepper.time()) {
+            sink(self.next, &self.states, &self.sensitivities);
+            self.next += 1;
+        }
         let end = Stop { before: self.times[self.times.len() - 1], jump: None };
         for stop in stops.iter().chain([&end]) {
             let reached = stop.jump.map_or(stop.before, |(after, _)| after);

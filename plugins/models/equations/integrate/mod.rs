@@ -18,6 +18,9 @@ use stepper::with_stepper;
 /// How many breaks of the rates make a method dear that starts anew at each.
 const MANY_BREAKS: usize = 50;
 
+/// The absolute tolerance as a share of the relative one times the largest magnitude of the state.
+const SHARE: f64 = 0.01;
+
 /// An absolute tolerance may be this many times too large for its state before the run is repeated.
 const TOO_LARGE: f64 = 3.0;
 
@@ -76,13 +79,14 @@ impl Run<'_, '_, '_> {
             let tolerances = vec![absolute.get(); self.start.states.len()];
             return self.once(method, &tolerances).map(|(effort, _)| effort);
         }
-        let size = |x: &f64| relative * if *x == 0.0 { 1.0 } else { x.abs() };
+        let share = SHARE * relative;
+        let size = |x: &f64| share * if *x == 0.0 { 1.0 } else { x.abs() };
         let mut tolerances: Vec<f64> = self.start.states.iter().map(size).collect();
         let (effort, peaks) = self.once(method, &tolerances)?;
         let mut repeat = false;
         for (tolerance, peak) in tolerances.iter_mut().zip(peaks).filter(|(_, peak)| *peak > 0.0) {
-            repeat |= *tolerance > TOO_LARGE * relative * peak;
-            *tolerance = relative * peak;
+            repeat |= *tolerance > TOO_LARGE * share * peak;
+            *tolerance = share * peak;
         }
         if repeat { Ok(self.once(method, &tolerances)?.0) } else { Ok(effort) }
     }

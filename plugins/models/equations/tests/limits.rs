@@ -8,7 +8,7 @@ fn a_solution_that_ends() {
     let options = "state = { y = \"y0\" }\nrate = { y = \"y^2\" }\nobserve = \"y\"";
     let case = case(options, &["y0"], &[], &times(2.0, 10));
     let reason = case.rejected(&[1.0]);
-    assert!(reason.starts_with("the integration stopped at t = 1"), "{reason}");
+    assert!(reason.starts_with("the integration stopped at t = 0.99999"), "{reason}");
     assert_eq!(case.rejected(&[1.0]), reason);
     assert_eq!(case.values(&[0.1]).len(), 10);
 }

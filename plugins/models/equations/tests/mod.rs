@@ -103,7 +103,7 @@ fn close(found: &[f64], expected: &[f64], tolerance: f64, what: &str) {
 
 /// Central differences of order 6.
 fn derivative(form: &impl Fn(&[f64]) -> Vec<f64>, inputs: &[f64], j: usize) -> Vec<f64> {
-    let step = 3e-3 * inputs[j].abs().max(0.1);
+    let step = 1e-3 * inputs[j].abs().max(0.1);
     let at = |k: f64| {
         let mut moved = inputs.to_vec();
         moved[j] += k * step;
