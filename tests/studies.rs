@@ -292,3 +292,30 @@ fn the_borehole_study_finds_its_truth() {
         assert!((mean - truth).abs() < 3.0 * sd, "{}: {mean} ± {sd}", parameter.name);
     }
 }
+
+/// Each of the three studies differs from the others in the model's name and its own, and runs as it is.
+#[test]
+fn the_helium_study_runs_with_each_of_its_models() {
+    let short = [
+        "design.runs=40",
+        "model.numerics={ mesh = [6, 24] }",
+        "numerical_error.runs=4",
+        "numerical_error.model={ numerics = { mesh = [8, 32] } }",
+        "surrogate.training=32",
+        "surrogate.validation=8",
+        "surrogate.degree=1",
+        "sampler.use=metropolis",
+        "sampler.start=prior",
+        "sampler.steps=100",
+        "validate.emulator_check=1",
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let paths = studies(&quick::root().join("configs/sns-helium"));
+    assert_eq!(paths.len(), 3);
+    for path in paths {
+        let study = quick::load(&path, &short);
+        assert_eq!(study.parameters.len(), 10);
+        let out = folder.path().join(&study.name);
+        quick::run(&path, &short, &out).unwrap_or_else(|stop| panic!("{}: {stop}", path.display()));
+    }
+}

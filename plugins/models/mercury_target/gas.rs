@@ -15,7 +15,7 @@ use super::eos::{EquationOfState, TensileCutoff};
 use super::settings::{Geometry, check};
 
 /// The iteration ends with a relative change below this; the error left is about its cube.
-const CLOSE: f64 = 1e-3;
+const CLOSE: f64 = 5e-3;
 
 /// Up to this relative change steps are of third order.
 const NEAR: f64 = 0.1;
@@ -109,6 +109,8 @@ pub struct Bubbly {
     bubbles: Bubbles,
     /// `1/κ`.
     inverse_index: f64,
+    /// Each term of the binomial series of the power `-1/κ` over the one before.
+    ratios: [f64; 5],
     /// Gas volume fraction at rest, of each cell.
     share: Vec<f64>,
     /// Size and compression of each cell's gas.
@@ -144,7 +146,9 @@ impl Bubbly {
     pub fn new(liquid: TensileCutoff, bubbles: Bubbles, share: Vec<f64>) -> Self {
         let rest = State { volume: 1.0, pressure: 1.0 };
         let (gas, work) = (vec![rest; share.len()], vec![0.0; share.len()]);
-        Self { liquid, bubbles, inverse_index: 1.0 / bubbles.polytropic_index, share, gas, work }
+        let inverse_index = 1.0 / bubbles.polytropic_index;
+        let ratios = [0.0, 1.0, 2.0, 3.0, 4.0].map(|k| -(inverse_index + k) / (k + 1.0));
+        Self { liquid, bubbles, inverse_index, ratios, share, gas, work }
     }
 
     /// The gas after a step, and the share of the liquid's stiffness `K` that the mixture has
@@ -190,11 +194,9 @@ impl Bubbly {
         (now, 0.0)
     }
 
-    /// `(1 + grown)^(-1/κ)` to fourth order.
+    /// `(1 + grown)^(-1/κ)` up to the fifth power.
     fn volume_ratio(&self, grown: f64) -> f64 {
-        let b = self.inverse_index;
-        let (second, third) = (0.5 + 0.5 * b, (b + 2.0) / 3.0);
-        1.0 - b * grown * (1.0 - second * grown * (1.0 - third * grown))
+        self.ratios.iter().rev().fold(1.0, |sum, ratio| 1.0 + ratio * grown * sum)
     }
 
     /// Energy of the gas of a cell, J/m³: `P a₀ ((w^(1-κ) - 1)/(κ - 1) + w - 1)`, the work on
