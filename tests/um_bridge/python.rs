@@ -4,7 +4,7 @@ use std::net::{Ipv4Addr, TcpListener};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use lacuna::plugin::model::{Call, Gradient};
+use lacuna::plugin::model::Gradient;
 use lacuna::stage::simulator::Simulator;
 use lacuna_um_bridge::Client;
 
@@ -49,17 +49,8 @@ impl Drop for Python {
 }
 
 fn gradient(simulator: &Simulator<'_>) -> lacuna::linalg::Matrix {
-    let inputs = simulator.inputs(&[-18.41, 0.00191]);
-    let call = Call {
-        inputs: &inputs,
-        names: &simulator.names,
-        layout: &simulator.asked,
-        scenario: &simulator.scenario,
-        study: std::path::Path::new("."),
-        directory: None,
-    };
     let gradient: &dyn Gradient = simulator.model.gradient().unwrap();
-    gradient.jacobian(&call).unwrap()
+    simulator.jacobian(&simulator.settings[0], gradient, &[-18.41, 0.00191]).unwrap()
 }
 
 #[test]
