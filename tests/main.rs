@@ -11,3 +11,4 @@ mod quick;
 mod studies;
 mod tidy;
 mod um_bridge;
+mod worked;

@@ -14,6 +14,7 @@ use super::function::{functions, table_usage};
 use super::operator::{Binary, Lanes, Unary};
 use super::program::{Action, Instruction, Place, Program, Tables, WIDE};
 use super::scope::{Data, Scope, element};
+use super::token::is_name;
 use super::tree::{Id, Node, NodeKind, Tree};
 use crate::data;
 use crate::study::nearest::nearest;
@@ -269,9 +270,9 @@ impl Compiler {
         if self.functions.contains_key(name) {
             return Err(fault.help(format!("a function is called as `{}`", table_usage(name))));
         }
-        // Constants of mathematics are too short to be what was meant.
-        let names =
-            self.names.keys().map(String::as_str).filter(|name| !matches!(*name, "e" | "pi"));
+        // Constants of mathematics are too short to be what was meant; keys of results are no names.
+        let meant = |name: &&str| !matches!(*name, "e" | "pi") && is_name(name);
+        let names = self.names.keys().map(String::as_str).filter(meant);
         if let Some(near) = nearest(name, names.clone()) {
             return Err(fault.help(format!("did you mean `{near}`?")));
         }

@@ -127,10 +127,11 @@ impl Scope {
         Ok(())
     }
 
-    /// An expression that no other can use: its key may be any text.
+    /// An expression that no other can use, as its key is a text that is no name.
     pub fn result(&mut self, key: &str, text: &str) -> Result<(), Fault> {
-        if self.definitions.contains_key(key) {
-            return Err(Fault::new(0..0, format!("there are two of the name `{key}`")).within(key));
+        if is_name(key) || self.definitions.contains_key(key) {
+            let message = format!("`{key}` cannot be the key of a result, or is one already");
+            return Err(Fault::new(0..0, message).within(key));
         }
         self.read(key, text)
     }

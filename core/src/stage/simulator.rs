@@ -77,7 +77,7 @@ impl<'a> Simulator<'a> {
             let signature = model.signature(&study.context_of(&layout));
             let computed = study.computed(place).map_err(|faults| {
                 let faults: Vec<String> = faults.iter().map(ToString::to_string).collect();
-                Stop::new(format!("`inputs` in `[model]`: {}", faults.join("; ")))
+                Stop::new(format!("`computed` in `[model]`: {}", faults.join("; ")))
             })?;
             let source = |input: &Input| source(study, section, place, computed.as_ref(), input);
             let sources = signature.inputs.iter().map(source).collect::<Result<_, Stop>>()?;

@@ -40,7 +40,7 @@ pub struct StudySection {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ParameterSection {
-    /// The name of the model's input that it sets, or a name that the expressions of `inputs` in `[model]` use.
+    /// The name of the model's input that it sets, or a name that the expressions of `computed` in `[model]` use.
     pub name: Name,
     /// The scenario to which it belongs, such as the initial state of one record; `"each"` makes one parameter a
     /// scenario, called `name[scenario]`. All scenarios share the parameter when left out.
@@ -72,7 +72,7 @@ pub struct ModelKeys {
     /// Inputs of the model as expressions of parameters and of the values of scenarios, such as
     /// `{ damping = "base + slope * gas_fraction" }`.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub inputs: BTreeMap<String, String>,
+    pub computed: BTreeMap<String, String>,
 }
 
 /// The engine's keys of `[design]`.

@@ -22,7 +22,7 @@ pub struct Computed {
 }
 
 impl Study {
-    /// The expressions of `[model] inputs` in a scenario; `None` without any.
+    /// The expressions of `[model] computed` in a scenario; `None` without any.
     pub fn computed(&self, scenario: usize) -> Result<Option<Computed>, Vec<Fault>> {
         let texts = self.expressions();
         if texts.is_empty() {
@@ -63,10 +63,10 @@ impl Study {
 
     fn expressions(&self) -> &BTreeMap<String, String> {
         static NONE: BTreeMap<String, String> = BTreeMap::new();
-        self.model.as_ref().map_or(&NONE, |model| &model.common.inputs)
+        self.model.as_ref().map_or(&NONE, |model| &model.common.computed)
     }
 
-    /// The names that expressions of `[model] inputs` use.
+    /// The names that expressions of `[model] computed` use.
     pub(super) fn used_in_expressions(&self) -> BTreeSet<String> {
         let functions = self.scenarios.iter().flat_map(|scenario| &scenario.functions);
         let tables: Vec<&str> = functions.map(|function| function.name.as_str()).collect();
@@ -115,8 +115,8 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
             }
             let texts = study.expressions();
             let path = match texts.get(&fault.definition) {
-                Some(_) => format!("model.inputs.{}", fault.definition),
-                None => "model.inputs".to_owned(),
+                Some(_) => format!("model.computed.{}", fault.definition),
+                None => "model.computed".to_owned(),
             };
             said.push(fault.clone());
             let mut complaints = Complaints::new(root, problems);

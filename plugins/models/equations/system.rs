@@ -55,11 +55,16 @@ impl Names {
 
     /// The names of a study. One that no expression can write is none that an expression uses.
     pub fn of(context: &Context<'_>) -> Self {
-        let inputs = context.given.iter().map(|given| given.name.clone());
+        let mut inputs: Vec<String> = Vec::new();
+        for given in context.given.iter().filter(|given| is_name(&given.name)) {
+            if !inputs.contains(&given.name) {
+                inputs.push(given.name.clone());
+            }
+        }
         let scenario = context.scenarios.first();
         Self {
             variables: Self::variables(context.layout),
-            inputs: inputs.filter(|name| is_name(name)).collect(),
+            inputs,
             functions: scenario.map(|scenario| scenario.functions.clone()).unwrap_or_default(),
         }
     }
@@ -84,18 +89,18 @@ pub fn scope(equations: &Equations, names: &Names) -> Result<Scope, Vec<Located>
     for (name, text) in &equations.definitions {
         note(format!("where.{name}"), scope.define(name, text));
     }
-    note(START_TIME.into(), scope.result(START_TIME, &equations.start_time.text()));
+    note(START_TIME.into(), scope.result(&key(START_TIME), &equations.start_time.text()));
     for (name, state) in &equations.state {
-        let (start, key) = state.start();
-        let option = format!("state.{name}{key}");
-        note(option.clone(), scope.result(&option, &start.text()));
+        let (start, part) = state.start();
+        let option = format!("state.{name}{part}");
+        note(option.clone(), scope.result(&key(&option), &start.text()));
     }
     for (name, text) in &equations.rate {
         let option = format!("rate.{name}");
-        note(option.clone(), scope.result(&option, text));
+        note(option.clone(), scope.result(&key(&option), text));
     }
     for (_, option, text) in equations.observe.each() {
-        note(option.clone(), scope.result(&option, text));
+        note(option.clone(), scope.result(&key(&option), text));
     }
     faults.extend(states_without_rates(equations));
     if faults.is_empty() { Ok(scope) } else { Err(faults) }
@@ -189,7 +194,8 @@ impl System {
 
 /// The program of these results, one number each.
 fn program(scope: &Scope, results: &[String]) -> Result<Program, Vec<Located>> {
-    let keys: Vec<&str> = results.iter().map(String::as_str).collect();
+    let keys: Vec<String> = results.iter().map(|option| key(option)).collect();
+    let keys: Vec<&str> = keys.iter().map(String::as_str).collect();
     let program = scope.compile(&keys).map_err(|faults| {
         let located = |fault: Fault| (option_of(&fault.definition), fault);
         faults.into_iter().map(located).collect::<Vec<_>>()
@@ -205,11 +211,15 @@ fn program(scope: &Scope, results: &[String]) -> Result<Program, Vec<Located>> {
     if faults.is_empty() { Ok(program) } else { Err(faults) }
 }
 
-/// The option in which a definition stands: results have its path as their key.
+/// The key of the result that is written under an option: no name, so that no expression can use it.
+pub fn key(option: &str) -> String {
+    format!("={option}")
+}
+
+/// The option in which a definition stands.
 pub fn option_of(definition: &str) -> String {
-    if definition.contains('.') || definition == START_TIME || definition == "observe" {
-        definition.to_owned()
-    } else {
-        format!("where.{definition}")
+    match definition.strip_prefix('=') {
+        Some(option) => option.to_owned(),
+        None => format!("where.{definition}"),
     }
 }

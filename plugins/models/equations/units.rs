@@ -8,7 +8,7 @@ use lacuna::plugin::Context;
 
 use super::Equations;
 use super::options::Formula;
-use super::system::{Located, START_TIME, option_of};
+use super::system::{Located, START_TIME, key, option_of};
 
 /// The unit of every result; `None` for what is zero and has every unit.
 type Found = BTreeMap<String, Option<Unit>>;
@@ -22,10 +22,10 @@ pub fn check(
     let mut known = given(context);
     let (found, _) = scope.find_units(&known);
     for (name, state) in &equations.state {
-        let (start, key) = state.start();
+        let (start, part) = state.start();
         let of_start = match start {
             Formula::Number(_) => None,
-            Formula::Text(_) => found.get(&format!("state.{name}{key}")).cloned().flatten(),
+            Formula::Text(_) => found.get(&key(&format!("state.{name}{part}"))).cloned().flatten(),
         };
         let unit = state.unit().cloned().or(of_start).unwrap_or_default();
         known.insert(name.clone(), unit);
@@ -59,7 +59,7 @@ fn states(
 ) -> Vec<Located> {
     let mut faults = Vec::new();
     let mut demand = |option: String, formula: &Formula, wanted: &Unit, what: String| {
-        let found = found.get(&option).cloned().flatten();
+        let found = found.get(&key(&option)).cloned().flatten();
         if let (Some(unit), Formula::Text(text)) = (found, formula)
             && unit != *wanted
         {
@@ -72,9 +72,9 @@ fn states(
         demand(START_TIME.into(), &equations.start_time, time, "the start time".into());
     }
     for (name, state) in &equations.state {
-        let (start, key) = state.start();
+        let (start, part) = state.start();
         let unit = &known[name];
-        demand(format!("state.{name}{key}"), start, unit, format!("the start value of `{name}`"));
+        demand(format!("state.{name}{part}"), start, unit, format!("the start value of `{name}`"));
         let per_time = time.and_then(|time| ratio(unit, time));
         if let (Some(wanted), Some(text)) = (per_time, equations.rate.get(name)) {
             let rate = Formula::Text(text.clone());
@@ -110,7 +110,7 @@ fn observed(equations: &Equations, found: &Found, response: &Unit) -> (Unit, Vec
     let mut common: Option<Unit> = None;
     let mut faults = Vec::new();
     for (_, option, text) in equations.observe.each() {
-        let Some(unit) = found.get(&option).cloned().flatten() else { continue };
+        let Some(unit) = found.get(&key(&option)).cloned().flatten() else { continue };
         let whole = 0..text.len();
         match &common {
             _ if unit.factor_to(response).is_none() => {

@@ -16,7 +16,7 @@ pub(super) fn check(
     let find = |name: &str| signature.inputs.iter().find(|input| input.name == name);
     let used = study.used_in_expressions();
     let section = study.model.as_ref().map(|model| &model.common);
-    let computed = |name: &str| section.is_some_and(|keys| keys.inputs.contains_key(name));
+    let computed = |name: &str| section.is_some_and(|keys| keys.computed.contains_key(name));
     let mut set: Vec<&str> = Vec::new();
     for (parameter, unknown) in study.parameters.iter().zip(&study.unknowns) {
         if !unknown.acts_in(scenario) {
@@ -32,8 +32,8 @@ pub(super) fn check(
             _ => no_input(&unknown.name, &format!("{path}.name"), signature, complaints),
         }
     }
-    for name in section.into_iter().flat_map(|keys| keys.inputs.keys()) {
-        let path = format!("model.inputs.{name}");
+    for name in section.into_iter().flat_map(|keys| keys.computed.keys()) {
+        let path = format!("model.computed.{name}");
         match find(name) {
             Some(input) => {
                 set.push(name);

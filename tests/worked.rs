@@ -1,0 +1,96 @@
+//! Worked studies of cheap models, run as they are shipped, against closed forms.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::quick;
+
+/// Runs a study of `configs`; its summary.
+fn summary(study: &str, out: &Path) -> Value {
+    let path = quick::root().join("configs").join(study);
+    quick::run(&path, &[], out).unwrap_or_else(|stop| panic!("{stop}"));
+    quick::summary(out)
+}
+
+/// Means and standard deviations of a normal posterior within four Monte Carlo errors, which are `sd / √n` and
+/// `sd / √2n` for `n` independent draws.
+fn is_normal(summary: &Value, exact: &[(&str, f64, f64)]) {
+    assert_eq!(summary["converged"], true, "{}", summary["verdict"]);
+    for &(name, mean, sd) in exact {
+        let found = &summary["parameters"][name];
+        let number = |key: &str| found[key].as_f64().unwrap_or_else(|| panic!("{name}: {found}"));
+        let size = number("ess_bulk").min(number("ess_tail"));
+        let error = (number("mean") - mean).abs() / (sd / size.sqrt());
+        assert!(error < 4.0, "the mean of {name} is {} and not {mean}: {error}", number("mean"));
+        let error = (number("sd") / sd - 1.0).abs() * (2.0 * size).sqrt();
+        assert!(error < 4.0, "the sd of {name} is {} and not {sd}: {error}", number("sd"));
+    }
+}
+
+fn has_evidence(summary: &Value, exact: f64) {
+    let [log, error] = ["log", "error"].map(|key| summary["evidence"][key].as_f64().unwrap());
+    assert!((log - exact).abs() < 4.0 * error.max(1e-3), "{log} ± {error}, not {exact}");
+}
+
+/// The posterior of `y = X θ + e` with `e ~ N(0, s²)` and `θ ~ N(m, S)`: `V = (S⁻¹ + X'X/s²)⁻¹` and `V (S⁻¹ m + X'y/s²)`;
+/// the evidence is `N(y; X m, X S X' + s²)`. Computed with NumPy from the tables of the studies.
+#[test]
+fn records_of_different_lengths_have_the_posterior_of_the_closed_form() {
+    let folder = tempfile::tempdir().unwrap();
+    let found = summary("records/study.toml", folder.path());
+    let exact = [
+        ("gravity", 9.759_317, 0.039_032),
+        ("resistance", 0.342_941, 0.003_707),
+        ("start[gentle]", 0.104_541, 0.003_238),
+        ("start[middle]", -0.053_766, 0.002_255),
+        ("start[steep]", 0.297_271, 0.002_655),
+        ("speed[gentle]", 0.192_723, 0.003_729),
+        ("speed[middle]", 0.003_006, 0.003_712),
+        ("speed[steep]", -0.493_177, 0.006_771),
+    ];
+    is_normal(&found, &exact);
+    has_evidence(&found, 736.335_411);
+    assert_eq!(found["data"]["count"], 243);
+    assert!(found["surrogate"].is_null() && found["runs"].is_null());
+    // asin(resistance / gravity) in degrees, to first order about the means: the relative deviations are 0.4 % and
+    // 1.1 %, with the correlation 0.887.
+    let angle = &found["parameters"]["resting_angle"];
+    assert_eq!((angle["role"].as_str(), angle["unit"].as_str()), (Some("derived"), Some("deg")));
+    let ratio: f64 = 0.342_941 / 9.759_317;
+    let [a, b] = [0.003_707 / 0.342_941, 0.039_032 / 9.759_317_f64];
+    let sd = (a * a + b * b - 2.0 * 0.887_011 * a * b).sqrt() * ratio.to_degrees();
+    let [mean, found] = ["mean", "sd"].map(|key| angle[key].as_f64().unwrap());
+    assert!((mean - ratio.asin().to_degrees()).abs() < 0.2 * sd, "{mean}");
+    assert!((found / sd - 1.0).abs() < 0.15, "{found} {sd}");
+}
+
+/// The closed form stands in the README of the study.
+#[test]
+fn a_line_of_equations_has_the_posterior_of_the_closed_form() {
+    let folder = tempfile::tempdir().unwrap();
+    let found = summary("equations/line.toml", folder.path());
+    is_normal(&found, &[("level0", 1.1965, 0.0708), ("rise", -0.3520, 0.0193)]);
+    has_evidence(&found, 2.465);
+}
+
+/// `Σ x y / Σ x²` with the standard deviation `0.01 / √Σ x²` (README of the study): the paper's bias.
+#[test]
+fn the_simple_machine_is_precise_and_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    let found = summary("simple_machine/study.toml", folder.path());
+    let efficiency = &found["parameters"]["efficiency"];
+    let [mean, sd] = ["mean", "sd"].map(|key| efficiency[key].as_f64().unwrap());
+    assert!((mean - 0.5663).abs() < 2e-4 && (sd / 5.4e-4 - 1.0).abs() < 0.15, "{mean} {sd}");
+    assert!((0.65 - mean) / sd > 100.0);
+}
+
+#[test]
+fn an_oscillator_of_equations_finds_its_truth() {
+    let folder = tempfile::tempdir().unwrap();
+    let found = summary("equations/oscillator.toml", folder.path());
+    for (name, truth) in [("stiffness", 90.0), ("damping", 1.1)] {
+        let [mean, sd] = ["mean", "sd"].map(|key| found["parameters"][name][key].as_f64().unwrap());
+        assert!((mean - truth).abs() < 3.0 * sd, "{name}: {mean} ± {sd}");
+    }
+}
