@@ -34,7 +34,7 @@ fn has_evidence(summary: &Value, exact: f64) {
 }
 
 /// The posterior of `y = X θ + e` with `e ~ N(0, s²)` and `θ ~ N(m, S)`: `V = (S⁻¹ + X'X/s²)⁻¹` and `V (S⁻¹ m + X'y/s²)`;
-/// the evidence is `N(y; X m, X S X' + s²)`. Computed with NumPy from the tables of the studies.
+/// the evidence is `N(y; X m, X S X' + s²)`. Computed with `numpy` from the tables of the studies.
 #[test]
 fn records_of_different_lengths_have_the_posterior_of_the_closed_form() {
     let folder = tempfile::tempdir().unwrap();

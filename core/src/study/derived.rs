@@ -61,6 +61,9 @@ impl Derived {
     }
 }
 
+/// The names that an expression may use, their units, and the parameters behind the unknowns.
+type Known = (Scope, BTreeMap<String, Unit>, Vec<usize>);
+
 /// What is wrong with a derived quantity.
 pub(super) enum Wrong {
     /// Its scenario is none.
@@ -131,12 +134,8 @@ impl Study {
         needed
     }
 
-    /// The names that a derived quantity may use, their units, and the parameters behind the unknowns.
-    fn scope(
-        &self,
-        name: &str,
-        scenario: Option<usize>,
-    ) -> Result<(Scope, BTreeMap<String, Unit>, Vec<usize>), Fault> {
+    /// What a derived quantity may use.
+    fn scope(&self, name: &str, scenario: Option<usize>) -> Result<Known, Fault> {
         let mut scope = Scope::new();
         let (mut units, mut parameters) = (BTreeMap::new(), Vec::new());
         for (i, unknown) in self.unknowns.iter().enumerate() {
