@@ -7,9 +7,9 @@ use serde_json::Value;
 use crate::quick;
 
 /// Runs a study of `configs`; its summary.
-fn summary(study: &str, out: &Path) -> Value {
+fn summary(study: &str, settings: &[&str], out: &Path) -> Value {
     let path = quick::root().join("configs").join(study);
-    quick::run(&path, &[], out).unwrap_or_else(|stop| panic!("{stop}"));
+    quick::run(&path, settings, out).unwrap_or_else(|stop| panic!("{stop}"));
     quick::summary(out)
 }
 
@@ -33,24 +33,26 @@ fn has_evidence(summary: &Value, exact: f64) {
     assert!((log - exact).abs() < 4.0 * error.max(1e-3), "{log} ± {error}, not {exact}");
 }
 
+const RECORDS: [(&str, f64, f64); 8] = [
+    ("gravity", 9.759_317, 0.039_032),
+    ("resistance", 0.342_941, 0.003_707),
+    ("start[gentle]", 0.104_541, 0.003_238),
+    ("start[middle]", -0.053_766, 0.002_255),
+    ("start[steep]", 0.297_271, 0.002_655),
+    ("speed[gentle]", 0.192_723, 0.003_729),
+    ("speed[middle]", 0.003_006, 0.003_712),
+    ("speed[steep]", -0.493_177, 0.006_771),
+];
+const RECORDS_EVIDENCE: f64 = 736.335_411;
+
 /// The posterior of `y = X θ + e` with `e ~ N(0, s²)` and `θ ~ N(m, S)`: `V = (S⁻¹ + X'X/s²)⁻¹` and `V (S⁻¹ m + X'y/s²)`;
 /// the evidence is `N(y; X m, X S X' + s²)`. Computed with `numpy` from the tables of the studies.
 #[test]
 fn records_of_different_lengths_have_the_posterior_of_the_closed_form() {
     let folder = tempfile::tempdir().unwrap();
-    let found = summary("records/study.toml", folder.path());
-    let exact = [
-        ("gravity", 9.759_317, 0.039_032),
-        ("resistance", 0.342_941, 0.003_707),
-        ("start[gentle]", 0.104_541, 0.003_238),
-        ("start[middle]", -0.053_766, 0.002_255),
-        ("start[steep]", 0.297_271, 0.002_655),
-        ("speed[gentle]", 0.192_723, 0.003_729),
-        ("speed[middle]", 0.003_006, 0.003_712),
-        ("speed[steep]", -0.493_177, 0.006_771),
-    ];
-    is_normal(&found, &exact);
-    has_evidence(&found, 736.335_411);
+    let found = summary("records/study.toml", &[], folder.path());
+    is_normal(&found, &RECORDS);
+    has_evidence(&found, RECORDS_EVIDENCE);
     assert_eq!(found["data"]["count"], 243);
     assert!(found["surrogate"].is_null() && found["runs"].is_null());
     // asin(resistance / gravity) in degrees, to first order about the means: the relative deviations are 0.4 % and
@@ -65,11 +67,32 @@ fn records_of_different_lengths_have_the_posterior_of_the_closed_form() {
     assert!((found / sd - 1.0).abs() < 0.15, "{found} {sd}");
 }
 
+/// A surrogate of degree one is exact for this model: the same closed form, by way of runs of every scenario, an
+/// emulator of all blocks and compressed likelihoods.
+#[test]
+fn records_with_a_surrogate_have_the_same_posterior() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = [
+        "design.use=\"sobol\"",
+        "design.runs=64",
+        "surrogate.use=\"polynomial_chaos\"",
+        "surrogate.degree=1",
+        "discrepancy.emulator_error=false",
+    ];
+    let found = summary("records/study.toml", &settings, folder.path());
+    is_normal(&found, &RECORDS);
+    has_evidence(&found, RECORDS_EVIDENCE);
+    for scenario in ["1-gentle", "2-middle", "3-steep"] {
+        assert!(folder.path().join("2-simulate").join(scenario).join("runs.csv").is_file());
+    }
+    assert_eq!(found["runs"]["used"], 64);
+}
+
 /// The closed form stands in the README of the study.
 #[test]
 fn a_line_of_equations_has_the_posterior_of_the_closed_form() {
     let folder = tempfile::tempdir().unwrap();
-    let found = summary("equations/line.toml", folder.path());
+    let found = summary("equations/line.toml", &[], folder.path());
     is_normal(&found, &[("level0", 1.1965, 0.0708), ("rise", -0.3520, 0.0193)]);
     has_evidence(&found, 2.465);
 }
@@ -78,7 +101,7 @@ fn a_line_of_equations_has_the_posterior_of_the_closed_form() {
 #[test]
 fn the_simple_machine_is_precise_and_wrong() {
     let folder = tempfile::tempdir().unwrap();
-    let found = summary("simple_machine/study.toml", folder.path());
+    let found = summary("simple_machine/study.toml", &[], folder.path());
     let efficiency = &found["parameters"]["efficiency"];
     let [mean, sd] = ["mean", "sd"].map(|key| efficiency[key].as_f64().unwrap());
     assert!((mean - 0.5663).abs() < 2e-4 && (sd / 5.4e-4 - 1.0).abs() < 0.15, "{mean} {sd}");
@@ -88,7 +111,7 @@ fn the_simple_machine_is_precise_and_wrong() {
 #[test]
 fn an_oscillator_of_equations_finds_its_truth() {
     let folder = tempfile::tempdir().unwrap();
-    let found = summary("equations/oscillator.toml", folder.path());
+    let found = summary("equations/oscillator.toml", &[], folder.path());
     for (name, truth) in [("stiffness", 90.0), ("damping", 1.1)] {
         let [mean, sd] = ["mean", "sd"].map(|key| found["parameters"][name][key].as_f64().unwrap());
         assert!((mean - truth).abs() < 3.0 * sd, "{name}: {mean} ± {sd}");

@@ -220,7 +220,8 @@ fn chains(calibration: &CalibrationFindings) -> Value {
 
 fn accuracy(case: &ValidationCase) -> Value {
     let mut value = pairs(&case.accuracy);
-    value["average"] = json!(case.average);
+    // With one replicate there is no interval, and nothing to average.
+    value["average"] = if case.accuracy.is_empty() { Value::Null } else { json!(case.average) };
     value
 }
 

@@ -19,7 +19,9 @@ pub fn summary_text(findings: &Findings) -> String {
             parts.push(evidence.join("\n") + "\n");
         }
     }
-    if let Some(validation) = findings.validation.as_ref().filter(|v| !v.cases.is_empty()) {
+    if let Some(validation) =
+        findings.validation.as_ref().filter(|v| v.cases.iter().any(|c| !c.accuracy.is_empty()))
+    {
         let title = "points inside the replicates' 95 % interval";
         parts.push(format!(
             "{title}\n{}",

@@ -91,6 +91,11 @@ pub fn stage(
 }
 
 fn summary(validated: &Validated) -> String {
+    // One replicate has no interval in which to lie.
+    if validated.cases.iter().all(|case| case.accuracy.is_empty()) {
+        let rmse = validated.cases.iter().map(|c| format!("{} {:.3e}", c.name, c.rmse));
+        return format!("rms difference: {}", rmse.collect::<Vec<_>>().join(", "));
+    }
     let accuracy = validated.cases.iter().map(|c| format!("{} {:.1} %", c.name, 100.0 * c.average));
     format!("accuracy: {}", accuracy.collect::<Vec<_>>().join(", "))
 }
@@ -158,7 +163,8 @@ impl Work<'_> {
         let is_simulated = simulated.is_some();
         let response = simulated.unwrap_or_else(|| self.forward.mean(&row).row(0).to_vec());
         let accuracy = accuracy(&self.measured.used, &response);
-        let average = accuracy.iter().map(|a| a.1).sum::<f64>() / accuracy.len().max(1) as f64;
+        let shares: Vec<f64> = accuracy.iter().map(|a| a.1).collect();
+        let average = if shares.is_empty() { 0.0 } else { moments::mean(&shares) };
         Ok(ValidationCase {
             name: name.to_owned(),
             point: point.to_vec(),

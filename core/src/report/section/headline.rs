@@ -65,6 +65,12 @@ fn agreement(findings: &Findings, validation: &ValidationFindings) -> Option<Str
     let unit = response_unit(findings);
     let (first, others) = validation.cases.split_first()?;
     let how = if first.simulated { "simulated" } else { "emulated" };
+    if first.accuracy.is_empty() {
+        let (name, rmse) = (case_title(&first.name), unit.text(first.rmse, 3));
+        return Some(format!(
+            "The {how} response at the {name} differs from what was measured by {rmse} root mean square."
+        ));
+    }
     let map = format!(
         "{} of the {how} points at the {} lie inside the replicates' 95 % interval (mean over \
          groups) and differ from the replicates' mean by {} root mean square",

@@ -20,7 +20,9 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
         @if !validation.cases.is_empty() {
             (points(findings, validation, numbers))
             (curves(findings, validation, numbers))
-            (accuracy(findings, validation, numbers))
+            @if validation.cases.iter().any(|case| !case.accuracy.is_empty()) {
+                (accuracy(findings, validation, numbers))
+            }
         }
         @if !validation.spread.is_empty() { (spread(findings, validation, numbers)) }
     };
