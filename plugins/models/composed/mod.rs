@@ -2,6 +2,7 @@
 
 mod part;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -13,6 +14,7 @@ use lacuna::study::{Node, Place, Sources};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::given;
 use part::{Part, pass_on};
 
 /// Models in a chain: what one gives is an input of those after it, as from load to response to sensor. A part is
@@ -88,13 +90,13 @@ struct Link<'a> {
 }
 
 impl Composed {
-    /// The parts in a study of this context, or what does not fit.
+    /// The first parts in a study of this context, as far as their options are right, or what does not fit.
     fn links<'a>(&'a self, context: &Context<'_>) -> Result<Vec<Link<'a>>, String> {
         let mut given = context.given.to_vec();
         let mut scenarios = context.scenarios.to_vec();
         let mut links = Vec::new();
         for (i, part) in self.parts.iter().enumerate() {
-            let section = part.section().ok_or("the options of a part are wrong")?;
+            let Some(section) = part.section() else { break };
             let name = section.common.name.as_str().to_owned();
             let last = i + 1 == self.parts.len();
             let asked = match (part.output()?, last) {
@@ -247,9 +249,6 @@ impl Component for Composed {
             complaints.at("parts").say("a chain has at least one part");
         }
         self.parts.iter().enumerate().for_each(|(i, part)| part.check(i, complaints));
-        if self.parts.iter().any(|part| part.section().is_none()) {
-            return;
-        }
         let links = match self.links(context) {
             Ok(links) => links,
             Err(reason) => {
@@ -320,11 +319,15 @@ fn each(
 impl Model for Composed {
     fn signature(&self, context: &Context<'_>) -> Signature {
         let links = self.links(context).unwrap_or_default();
-        let (layout, resamples) = links.last().map_or_else(
-            || (context.layout.clone(), true),
-            |link| (link.signature.layout.clone(), link.signature.resamples),
-        );
-        Signature { inputs: Self::inputs(&links), layout, resamples }
+        match links.last() {
+            Some(last) if links.len() == self.parts.len() => Signature {
+                inputs: Self::inputs(&links),
+                layout: last.signature.layout.clone(),
+                resamples: last.signature.resamples,
+            },
+            // Of a chain with a wrong part the check says enough.
+            _ => given::signature(context, &BTreeMap::new()),
+        }
     }
 
     fn predict(&self, call: &Call<'_>) -> Result<Response, EvalError> {
@@ -342,6 +345,9 @@ impl Model for Composed {
             ..Context::new(call.study, &[], call.layout)
         };
         let links = self.links(&context).map_err(EvalError::Fatal)?;
+        if links.len() < self.parts.len() {
+            return Err(EvalError::Fatal("the options of a part are wrong".to_owned()));
+        }
         let values = call.names.iter().zip(call.inputs).zip(call.units);
         let values = values.map(|((name, x), unit)| (name.clone(), *x, unit.clone()));
         let mut state = State { values: values.collect(), scenario: call.scenario.clone() };
