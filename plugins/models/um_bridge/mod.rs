@@ -29,7 +29,7 @@ use connection::Connection;
 /// Where the server offers `ApplyJacobian` or `Gradient`, the study has derivatives of the model, by whichever
 /// takes fewer questions. `ApplyHessian` is not used: nothing in a study asks a model for second derivatives.
 ///
-/// `lacuna check` asks the server whether it is there and whether it has the model, with the right sizes. While a study
+/// `lacuna check STUDY` asks the server whether it is there and whether it has the model, with the right sizes. While a study
 /// runs, an evaluation that fails (an error body, a crash, a value that is not finite, an answer of another size or
 /// none in time) is a failed run with its reason. A server that is gone for good, or that does not know the model,
 /// stops the study; what is done is kept.
