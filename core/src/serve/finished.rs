@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use crate::run::{Observer, RunDirectory, Stop, files};
-use crate::stage::{Learned, design, numerical_error, read, refine, simulate, surrogate};
+use crate::run::{RunDirectory, Stop, files};
 use crate::study::{Study, emit};
 
 /// The run directory of a study, if a run of this very study is finished there; `None` where there is no run.
@@ -24,21 +23,4 @@ pub fn finished(study: &Study, folder: &Path) -> Result<Option<RunDirectory>, St
         )));
     }
     RunDirectory::open(folder).map(Some)
-}
-
-/// The stages up to the posterior, all of them kept.
-pub(super) fn learned(
-    study: &Study,
-    run: &mut RunDirectory,
-    observer: &dyn Observer,
-) -> Result<Learned, Stop> {
-    let design = design::stage(study, run, observer)?;
-    let simulated = simulate::stage(study, design.as_ref(), run, observer)?;
-    let data = read::stage(study, simulated.as_ref(), run, observer)?;
-    let fitting = surrogate::Fitting::of(study, data.value.runs()?)?;
-    let (fitted, emulator) = surrogate::stage(study, &data, &fitting, run, observer)?;
-    let folders = numerical_error::FOLDERS;
-    let numerics = numerical_error::stage(study, &data, None, folders, run, observer)?;
-    let first = Learned { data, fitted, numerics, emulator, region: None, refinement: None };
-    refine::stage(study, first, run, observer).map(|(learned, _)| learned)
 }

@@ -22,9 +22,9 @@ use crate::plugin::model::EvalError;
 use crate::plugin::registry::{NoKeys, Section};
 use crate::posterior::{Given, Posterior};
 use crate::run::{Observer, RunDirectory, Stop};
-use crate::stage::Known;
 use crate::stage::calibrate::Parts;
 use crate::stage::direct::Prepared;
+use crate::stage::{self, Known};
 use crate::study::Study;
 
 pub use curvature::curvature;
@@ -93,7 +93,8 @@ pub fn functions<R>(
         drop(run);
         return of_run(study, simulated.as_ref(), &prepared.known(), act);
     }
-    let learned = finished::learned(study, &mut run, observer)?;
+    // All of it is kept.
+    let (learned, _) = stage::learn(study, &mut run, observer)?;
     // Others may use the folder while the functions are served from memory.
     drop(run);
     of_run(study, simulated.as_ref(), &learned.known(), act)

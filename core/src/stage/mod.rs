@@ -58,6 +58,16 @@ fn with_surrogate(
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {
+    let (learned, calibrated) = learn(study, run, observer)?;
+    conclude(study, &learned.known(), calibrated.as_ref(), run, observer)
+}
+
+/// All stages of a study with a surrogate up to the posterior, which is there when the study has measurements.
+pub fn learn(
+    study: &Study,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<(Learned, Option<Kept<Calibrated>>), Stop> {
     let design = design::stage(study, run, observer)?;
     let simulated = simulate::stage(study, design.as_ref(), run, observer)?;
     let data = read::stage(study, simulated.as_ref(), run, observer)?;
@@ -66,8 +76,7 @@ fn with_surrogate(
     let folders = numerical_error::FOLDERS;
     let numerics = numerical_error::stage(study, &data, None, folders, run, observer)?;
     let first = Learned { data, fitted, numerics, emulator, region: None, refinement: None };
-    let (learned, calibrated) = refine::stage(study, first, run, observer)?;
-    conclude(study, &learned.known(), calibrated.as_ref(), run, observer)
+    refine::stage(study, first, run, observer)
 }
 
 /// Evidence, validation and report of a calibration.
