@@ -9,12 +9,11 @@ use std::sync::Arc;
 use lacuna::data::{Condition, Coordinates, Function, Layout, Scenario, Unit};
 use lacuna::plugin::model::{Call, EvalError, Input, Response, Signature};
 use lacuna::plugin::{Component, Context, Fact, Given, Model};
-use lacuna::study::problem::{Complaints, Problems};
-use lacuna::study::{Node, Place, Sources};
+use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::given;
+use super::{given, nested};
 use part::{Part, pass_on};
 
 /// Models in a chain: what one gives is an input of those after it, as from load to response to sensor. A part is
@@ -96,7 +95,7 @@ impl Composed {
         let mut scenarios = context.scenarios.to_vec();
         let mut links = Vec::new();
         for (i, part) in self.parts.iter().enumerate() {
-            let Some(section) = part.section() else { break };
+            let Ok(section) = part.section() else { break };
             let name = section.common.name.as_str().to_owned();
             let last = i + 1 == self.parts.len();
             let asked = match (part.output()?, last) {
@@ -257,22 +256,14 @@ impl Component for Composed {
             }
         };
         each(&links, context, |i, link, own| {
-            let (mut problems, mut sources) = (Problems::new(), Sources::default());
-            let source = sources.add_argument("part", String::new());
-            let node = Node::table(Place::whole(source));
-            link.model.check(own, &mut Complaints::new(&node, &mut problems));
-            pass_on(i, problems.sorted().into_iter(), complaints);
+            pass_on(i, &nested::complaints(|said| link.model.check(own, said)), complaints);
         });
     }
 
     fn environment(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
         let Ok(links) = self.links(context) else { return };
         each(&links, context, |i, link, own| {
-            let (mut problems, mut sources) = (Problems::new(), Sources::default());
-            let source = sources.add_argument("part", String::new());
-            let node = Node::table(Place::whole(source));
-            link.model.environment(own, &mut Complaints::new(&node, &mut problems));
-            pass_on(i, problems.sorted().into_iter(), complaints);
+            pass_on(i, &nested::complaints(|said| link.model.environment(own, said)), complaints);
         });
     }
 }
@@ -367,7 +358,7 @@ impl Model for Composed {
     }
 
     fn files(&self, directory: &Path) -> Vec<PathBuf> {
-        let models = self.parts.iter().filter_map(|part| part.section());
+        let models = self.parts.iter().filter_map(|part| part.section().ok());
         models.flat_map(|section| section.built.plugin.files(directory)).collect()
     }
 }
