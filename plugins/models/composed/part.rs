@@ -3,14 +3,15 @@
 use std::borrow::Cow;
 
 use lacuna::data::Layout;
-use lacuna::plugin::Model;
 use lacuna::plugin::registry::entries;
+use lacuna::plugin::{Given, Model};
 use lacuna::study::problem::{Complaints, Problem};
 use lacuna::study::response::ResponseSection;
 use lacuna::study::values::Name;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
+use crate::models::given::listed;
 use crate::models::nested::{self, Nested};
 
 /// A part as a study writes it.
@@ -22,23 +23,42 @@ pub type Part = Nested<dyn Model, PartKeys>;
 pub struct PartKeys {
     /// What the part is called.
     pub name: Name,
+    /// The inputs of the study and of the parts before it that it takes; all when left out, which suits models that choose
+    /// for themselves, such as `equations`. Functions are seen by all parts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub takes: Option<Vec<Name>>,
     /// What it hands on to the parts after it: name, unit and axes, as in `[response]`. The last part has none: it
     /// gives the response of the study.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub output: Option<ResponseSection>,
+    pub gives: Option<ResponseSection>,
 }
 
 impl Part {
     /// The shape of what it hands on, or what is wrong with it.
-    pub fn output(&self) -> Result<Option<Layout>, String> {
-        let Some(output) = self.section().ok().and_then(|s| s.common.output.as_ref()) else {
+    pub fn gives(&self) -> Result<Option<Layout>, String> {
+        let Some(given) = self.section().ok().and_then(|s| s.common.gives.as_ref()) else {
             return Ok(None);
         };
         let unknown = |_: &_| Err("the measurements are of the study's response".to_owned());
         let axes: Result<Vec<_>, String> =
-            output.axes.0.iter().map(|(name, axis)| axis.axis(name.as_str(), unknown)).collect();
-        let name = output.name.as_str().to_owned();
-        Ok(Some(Layout { name, unit: output.unit.clone(), axes: axes? }))
+            given.axes.0.iter().map(|(name, axis)| axis.axis(name.as_str(), unknown)).collect();
+        let name = given.name.as_str().to_owned();
+        Ok(Some(Layout { name, unit: given.unit.clone(), axes: axes? }))
+    }
+
+    /// What it sees of what is given.
+    pub fn seen(&self, given: &[Given]) -> Result<Vec<Given>, String> {
+        let Some(takes) = self.section().ok().and_then(|s| s.common.takes.as_ref()) else {
+            return Ok(given.to_vec());
+        };
+        let find = |name: &Name| {
+            let found = given.iter().find(|given| given.name == name.as_str());
+            found.cloned().ok_or_else(|| {
+                let known = listed(given.iter().map(|given| given.name.as_str()));
+                format!("nothing gives `{}`, expected {known}", name.as_str())
+            })
+        };
+        takes.iter().map(find).collect()
     }
 
     /// Complains of the options of the part at position `place`.
@@ -46,8 +66,8 @@ impl Part {
         if let Err(problems) = self.section() {
             pass_on(place, problems, complaints);
         }
-        if let Err(reason) = self.output() {
-            complaints.at(&format!("parts.{place}.output.axes")).say(reason);
+        if let Err(reason) = self.gives() {
+            complaints.at(&format!("parts.{place}.gives.axes")).say(reason);
         }
     }
 }
@@ -65,7 +85,7 @@ impl JsonSchema for Part {
 
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         let names: Vec<&str> = entries::<dyn Model>().into_iter().map(|entry| entry.name).collect();
-        let output = generator.subschema_for::<ResponseSection>();
+        let gives = generator.subschema_for::<ResponseSection>();
         // The options are those of the model; a part may be a chain itself, whose schema has no end.
         json_schema!({
             "type": "object",
@@ -73,7 +93,12 @@ impl JsonSchema for Part {
             "properties": {
                 "use": { "enum": names, "description": "The model." },
                 "name": { "type": "string", "description": "What the part is called." },
-                "output": output,
+                "takes": {
+                    "type": "array",
+                    "items": { "type": "string" },
+                    "description": "The inputs that it takes; all when left out.",
+                },
+                "gives": gives,
             }
         })
     }
