@@ -113,13 +113,15 @@ fn scenario(function: &dyn Function, config: &Config) -> Result<Option<usize>, F
         return wrong(format!("there is no setting `{key}`"));
     }
     let Some(value) = config.get(SCENARIO) else { return Ok(None) };
-    match known.iter().position(|part| value.as_str() == Some(&part.scenario)) {
-        Some(place) => Ok(Some(place)),
-        None => {
-            let names: Vec<String> = known.iter().map(|p| format!("`{}`", p.scenario)).collect();
-            wrong(format!("there is no scenario {value}, expected one of {}", names.join(", ")))
-        }
+    let place = known.iter().position(|part| value.as_str() == Some(&part.scenario));
+    if place.is_none() {
+        let names: Vec<String> = known.iter().map(|p| format!("`{}`", p.scenario)).collect();
+        return wrong(format!(
+            "there is no scenario {value}, expected one of {}",
+            names.join(", ")
+        ));
     }
+    Ok(place)
 }
 
 impl Model for Bridged<'_> {

@@ -175,7 +175,9 @@ impl SumOfSquares for WidenedSum {
     fn gradient(&self, point: &[f64]) -> Vec<f64> {
         let mut whole = vec![0.0; self.used.of];
         let gradient = self.sum.gradient(&self.used.point(point));
-        self.used.indices.iter().zip(gradient).for_each(|(&i, slope)| whole[i] = slope);
+        for (&i, slope) in self.used.indices.iter().zip(gradient) {
+            whole[i] = slope;
+        }
         whole
     }
 

@@ -108,7 +108,9 @@ pub fn scatter(
             if !idle.is_empty() {
                 let tries = stream.named("idle").at(index as u64).at(u64::from(attempt));
                 let draw = target.prior_draws(1, &tries);
-                idle.iter().for_each(|&j| point[j] = draw[(0, j)]);
+                for &j in &idle {
+                    point[j] = draw[(0, j)];
+                }
             }
             let inside = point.iter().zip(&bounds).all(|(x, (lo, hi))| x >= lo && x <= hi);
             (inside && density(&point) >= lowest).then_some(point)
