@@ -6,25 +6,20 @@
 //! scatter from pulse to pulse: gain and timing jitter, and white noise. Everything that was chosen is written to
 //! `measurements.json` beside the data; no study reads it.
 
+mod pulses;
+
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::Path;
 
 use lacuna::math::random::{Stream, normal};
 use lacuna_plugins::models::mercury_target::{Cells, Gas, Mercury, Sampling, Settings, Target};
+use pulses::{Jitter, STEP, at, times};
 use serde_json::json;
 
 const SEED: u64 = 20_230_511;
-/// Sampling of the simulated truth, s: fine enough to shift curves by a fraction of a microsecond.
-const STEP: f64 = 1e-6;
-/// Times of the measurements: 10 us to 1 ms.
-const TIMES: usize = 100;
-const INTERVAL: f64 = 1e-5;
 const PULSES: u64 = 10;
-/// Relative standard deviation of the gain, common to all gauges of a pulse and of each gauge.
-const GAIN: [f64; 2] = [0.01, 0.02];
-/// Standard deviation of the shift in time, s, common and of each gauge.
-const JITTER: [f64; 2] = [5e-7, 5e-7];
+const JITTER: Jitter = Jitter { gain: [0.01, 0.02], shift: [5e-7, 5e-7] };
 /// Standard deviation of the noise, microstrain.
 const NOISE: f64 = 8.0;
 /// Damping of all motion, 1/s.
@@ -55,13 +50,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let root = Stream::root(SEED);
     for pulse in 1..=PULSES {
         let mut common = root.named("pulse").at(pulse).generator();
-        let (gain, shift) = (GAIN[0] * normal(&mut common), JITTER[0] * normal(&mut common));
+        let common = JITTER.common(&mut common);
         for (g, (gauge, trace)) in settings.gauges.0.iter().zip(&truth).enumerate() {
             let mut own = root.named("gauge").at(pulse).at(g as u64).generator();
-            let gain = 1.0 + gain + GAIN[1] * normal(&mut own);
-            let shift = shift + JITTER[1] * normal(&mut own);
-            for t in 1..=TIMES {
-                let time = t as f64 * INTERVAL;
+            let [gain, shift] = JITTER.own(common, &mut own);
+            for time in times() {
                 let strain = 1e6 * gain * at(trace, time - shift) + NOISE * normal(&mut own);
                 writeln!(text, "{pulse},{},{time:.5},{strain:.1}", gauge.name)?;
             }
@@ -84,21 +77,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         "damping [1/s]": DAMPING,
         "pulse_energy": PULSE_ENERGY,
         "beam_width [m]": BEAM_WIDTH,
-        "gain sd: common, own": GAIN,
-        "time shift sd [s]: common, own": JITTER,
+        "gain sd: common, own": JITTER.gain,
+        "time shift sd [s]: common, own": JITTER.shift,
         "noise sd [microstrain]": NOISE,
     });
     std::fs::write(folder.join("measurements.json"), format!("{record:#}\n"))?;
     Ok(())
-}
-
-/// The simulated strain at a time, by linear interpolation; zero before the pulse.
-fn at(trace: &[f64], time: f64) -> f64 {
-    let place = time / STEP - 1.0;
-    if place < 0.0 {
-        return trace[0] * (place + 1.0).max(0.0);
-    }
-    let i = (place as usize).min(trace.len() - 2);
-    let share = place - i as f64;
-    trace[i] * (1.0 - share) + trace[i + 1] * share
 }

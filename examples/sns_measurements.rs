@@ -6,24 +6,19 @@
 //! noise, larger for U and C and small for G and M, and a few curves of white noise. Everything that
 //! was chosen is written to `measurements.json` beside the data; no study reads it.
 
+mod pulses;
+
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::Path;
 
 use lacuna::math::random::{Stream, normal};
 use lacuna_plugins::models::mercury_target::{Cells, Mercury, Sampling, Settings, simulate};
+use pulses::{Jitter, STEP, at, times};
 use serde_json::json;
 
 const SEED: u64 = 1_004_056;
-/// Sampling of the simulated truth, s: fine enough to shift curves by a fraction of a microsecond.
-const STEP: f64 = 1e-6;
-/// Times of the measurements: 10 us to 1 ms.
-const TIMES: usize = 100;
-const INTERVAL: f64 = 1e-5;
-/// Relative standard deviation of the gain, common to all gauges of a pulse and of each gauge.
-const GAIN: [f64; 2] = [0.02, 0.03];
-/// Standard deviation of the shift in time, s, common and of each gauge.
-const JITTER: [f64; 2] = [1.0e-6, 1.0e-6];
+const JITTER: Jitter = Jitter { gain: [0.02, 0.03], shift: [1.0e-6, 1.0e-6] };
 /// Gauge, number of sound curves, standard deviation of the noise in microstrain.
 const GAUGES: [(&str, usize, f64); 10] = [
     ("B", 20, 16.0),
@@ -54,7 +49,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let root = Stream::root(SEED);
     for pulse in 1..=22 {
         let mut common = root.named("pulse").at(pulse).generator();
-        let (gain, shift) = (GAIN[0] * normal(&mut common), JITTER[0] * normal(&mut common));
+        let common = JITTER.common(&mut common);
         for (g, (gauge, curves, noise)) in GAUGES.iter().enumerate() {
             let faulty = FAULTY.iter().find(|(p, name, _)| *p as u64 == pulse && name == gauge);
             let before = FAULTY.iter().filter(|(p, name, _)| (*p as u64) < pulse && name == gauge);
@@ -64,10 +59,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
             let row = names.iter().position(|name| name == gauge).ok_or("an unknown gauge")?;
             let mut own = root.named("gauge").at(pulse).at(g as u64).generator();
-            let gain = 1.0 + gain + GAIN[1] * normal(&mut own);
-            let shift = shift + JITTER[1] * normal(&mut own);
-            for t in 1..=TIMES {
-                let time = t as f64 * INTERVAL;
+            let [gain, shift] = JITTER.own(common, &mut own);
+            for time in times() {
                 let strain = match faulty {
                     Some((_, _, sd)) => sd * normal(&mut own),
                     None => 1e6 * gain * at(&truth[row], time - shift) + noise * normal(&mut own),
@@ -85,22 +78,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         "density [kg/m3]": mercury.density,
         "sound_speed [m/s]": mercury.sound_speed,
         "tensile_cutoff [Pa]": mercury.tensile_cutoff,
-        "gain sd: common, own": GAIN,
-        "time shift sd [s]: common, own": JITTER,
+        "gain sd: common, own": JITTER.gain,
+        "time shift sd [s]: common, own": JITTER.shift,
         "gauges: name, sound curves, noise sd [microstrain]": GAUGES,
         "faulty: pulse, gauge, sd [microstrain]": FAULTY,
     });
     std::fs::write(folder.join("measurements.json"), format!("{record:#}\n"))?;
     Ok(())
-}
-
-/// The simulated strain at a time, by linear interpolation; zero before the pulse.
-fn at(trace: &[f64], time: f64) -> f64 {
-    let place = time / STEP - 1.0;
-    if place < 0.0 {
-        return trace[0] * (place + 1.0).max(0.0);
-    }
-    let i = (place as usize).min(trace.len() - 2);
-    let share = place - i as f64;
-    trace[i] * (1.0 - share) + trace[i + 1] * share
 }

@@ -223,18 +223,10 @@ fn effects() {
 
 #[test]
 fn targets() {
-    let parameter = |name: &str, prior: Distribution| Parameter {
-        name: name.to_owned(),
-        symbol: name.to_owned(),
-        unit: Unit::dimensionless(),
-        design: prior.clone(),
-        prior,
-        reference: None,
-    };
     let parameters = [
-        parameter("intercept", Distribution::Normal([0.0, 10.0])),
-        parameter("slope", Distribution::Uniform([-10.0, 10.0])),
-        parameter("sigma", Distribution::HalfNormal(2.0)),
+        Parameter::plain("intercept", Distribution::Normal([0.0, 10.0])),
+        Parameter::plain("slope", Distribution::Uniform([-10.0, 10.0])),
+        Parameter::plain("sigma", Distribution::HalfNormal(2.0)),
     ];
     let table: &Table = &[(
         "expression",

@@ -293,6 +293,29 @@ fn the_borehole_study_finds_its_truth() {
     }
 }
 
+/// What the data say nothing of keeps its prior, uniform from -0.5 to 0.5, whatever chance the design holds.
+#[test]
+fn a_parameter_that_the_model_does_not_use_keeps_its_prior() {
+    let folder = quick::simulated();
+    let path = folder.path().join("study.toml");
+    let idle = "[[parameter]]\nname = \"void_gradient\"\nprior = { uniform = [-0.5, 0.5] }\nreference = 0.0\n\n[response]";
+    quick::replace(&path, "[response]", idle);
+    let settings = ["sampler.use=no_u_turn", "sampler.warm_up=200", "sampler.steps=500"];
+    let out = folder.path().join("run");
+    let ran = quick::run(&path, &settings, &out).unwrap_or_else(|stop| panic!("{stop}"));
+    let note = "`void_gradient` is not used by the model: its posterior is its prior";
+    assert!(ran.findings.warnings.iter().any(|said| said == note), "{:?}", ran.findings.warnings);
+    let summary = quick::summary(&out);
+    let number = |name: &str, key: &str| summary["parameters"][name][key].as_f64().unwrap();
+    let (size, sd) = (number("void_gradient", "ess_bulk"), 1.0 / 12_f64.sqrt());
+    assert!(size > 200.0 && number("void_gradient", "mean").abs() < 4.0 * sd / size.sqrt());
+    assert!((number("void_gradient", "sd") / sd - 1.0).abs() < 4.0 / (2.0 * size).sqrt());
+    // A kept emulator is taken up again with the parameter that it does not have.
+    let again = quick::run(&path, &settings, &out).unwrap_or_else(|stop| panic!("{stop}"));
+    assert_eq!(again.made, [""; 0]);
+    assert!(summary["sobol"].is_null() || summary["sobol"].to_string().contains("void_gradient"));
+}
+
 /// Each of the three studies differs from the others in the model's name and its own, and runs as it is.
 #[test]
 fn the_helium_study_runs_with_each_of_its_models() {

@@ -6,11 +6,12 @@ use std::path::Path;
 use lacuna::plugin::model::EvalError;
 use lacuna::run::Stop;
 use lacuna::serve::{Derivatives, Function, curvature, finished, functions};
+use lacuna::study::resolve::Use;
 use lacuna_um_bridge::protocol::{Config, Fault, INTERNAL_ERROR, INVALID_INPUT, Support};
 use lacuna_um_bridge::{Model, Server};
 
 use crate::progress::Terminal;
-use crate::study::{Settings, folder, load};
+use crate::study::{Settings, folder, load, load_for};
 use crate::{Failure, print};
 
 /// Where the server listens.
@@ -31,7 +32,7 @@ pub fn serve(
     out: Option<&Path>,
     place: &Place,
 ) -> Result<(), Failure> {
-    let study = load(path, settings)?;
+    let study = load_for(path, settings, Use::Look)?;
     // First of all, because a port that is taken should not be found out after everything else.
     let server = Server::bind(place.host, place.port).map_err(|error| {
         let Place { host, port } = place;
@@ -40,6 +41,10 @@ pub fn serve(
     })?;
     let directory = folder(&study, out);
     let run = finished(&study, &directory)?;
+    if run.is_none() || (study.surrogate.is_none() && study.target.is_none()) {
+        // Then the model will be asked, so that it has to be there.
+        load(path, settings)?;
+    }
     if run.is_none() && out.is_some() {
         let message = format!("there is no finished run in {}", directory.display());
         return Err(Stop::new(message).help("run the study first, or leave `--out` out").into());
@@ -72,7 +77,11 @@ fn described(function: &dyn Function) -> String {
         1 => "1 value".to_owned(),
         n => format!("{n} values"),
     };
-    format!("`{}`: {} -> {outputs}", function.name(), variables.join(", "))
+    let parts = function.scenarios().iter();
+    let parts: Vec<String> =
+        parts.map(|p| format!("`{}` {}", p.scenario, p.outputs.len())).collect();
+    let parts = if parts.is_empty() { String::new() } else { format!(": {}", parts.join(", ")) };
+    format!("`{}`: {} -> {outputs}{parts}", function.name(), variables.join(", "))
 }
 
 /// A function as a model of one input and one output vector.
@@ -93,11 +102,26 @@ fn fault(error: EvalError) -> Fault {
     }
 }
 
-fn without_settings(config: &Config) -> Result<(), Fault> {
-    match config.keys().next() {
-        Some(key) => Err(Fault::new(INVALID_INPUT, format!("there is no setting `{key}`"))),
-        None => Ok(()),
+/// The setting by which one scenario is asked for.
+const SCENARIO: &str = "scenario";
+
+/// The number of the scenario that the settings ask for, the only thing that can be set.
+fn scenario(function: &dyn Function, config: &Config) -> Result<Option<usize>, Fault> {
+    let wrong = |text: String| Err(Fault::new(INVALID_INPUT, text));
+    let known = function.scenarios();
+    if let Some(key) = config.keys().find(|key| known.is_empty() || *key != SCENARIO) {
+        return wrong(format!("there is no setting `{key}`"));
     }
+    let Some(value) = config.get(SCENARIO) else { return Ok(None) };
+    let place = known.iter().position(|part| value.as_str() == Some(&part.scenario));
+    if place.is_none() {
+        let names: Vec<String> = known.iter().map(|p| format!("`{}`", p.scenario)).collect();
+        return wrong(format!(
+            "there is no scenario {value}, expected one of {}",
+            names.join(", ")
+        ));
+    }
+    Ok(place)
 }
 
 impl Model for Bridged<'_> {
@@ -116,17 +140,19 @@ impl Model for Bridged<'_> {
     }
 
     fn input_sizes(&self, config: &Config) -> Result<Vec<usize>, Fault> {
-        without_settings(config)?;
+        scenario(self.0, config)?;
         Ok(vec![self.0.variables().len()])
     }
 
     fn output_sizes(&self, config: &Config) -> Result<Vec<usize>, Fault> {
-        without_settings(config)?;
-        Ok(vec![self.0.outputs()])
+        let all = || self.0.outputs();
+        let of = |i: usize| self.0.scenarios()[i].outputs.len();
+        Ok(vec![scenario(self.0, config)?.map_or_else(all, of)])
     }
 
-    fn evaluate(&self, input: &[Vec<f64>], _: &Config) -> Result<Vec<Vec<f64>>, Fault> {
-        self.0.values(&input[0]).map(|values| vec![values]).map_err(fault)
+    fn evaluate(&self, input: &[Vec<f64>], config: &Config) -> Result<Vec<Vec<f64>>, Fault> {
+        let scenario = scenario(self.0, config)?;
+        self.0.values(&input[0], scenario).map(|values| vec![values]).map_err(fault)
     }
 
     fn gradient(
@@ -135,9 +161,10 @@ impl Model for Bridged<'_> {
         _: usize,
         input: &[Vec<f64>],
         sens: &[f64],
-        _: &Config,
+        config: &Config,
     ) -> Result<Vec<f64>, Fault> {
-        let jacobian = self.derivatives()?.jacobian(&input[0]).map_err(fault)?;
+        let scenario = scenario(self.0, config)?;
+        let jacobian = self.derivatives()?.jacobian(&input[0], scenario).map_err(fault)?;
         Ok(lacuna::linalg::transposed_multiply_vector(&jacobian, sens))
     }
 
@@ -147,9 +174,10 @@ impl Model for Bridged<'_> {
         _: usize,
         input: &[Vec<f64>],
         vec: &[f64],
-        _: &Config,
+        config: &Config,
     ) -> Result<Vec<f64>, Fault> {
-        let jacobian = self.derivatives()?.jacobian(&input[0]).map_err(fault)?;
+        let scenario = scenario(self.0, config)?;
+        let jacobian = self.derivatives()?.jacobian(&input[0], scenario).map_err(fault)?;
         Ok(lacuna::linalg::multiply_vector(&jacobian, vec))
     }
 
@@ -160,10 +188,11 @@ impl Model for Bridged<'_> {
         input: &[Vec<f64>],
         sens: &[f64],
         vec: &[f64],
-        _: &Config,
+        config: &Config,
     ) -> Result<Vec<f64>, Fault> {
+        let scenario = scenario(self.0, config)?;
         let rough = || Fault::new(INTERNAL_ERROR, "this function has no second derivatives");
-        let second = curvature(self.derivatives()?, &input[0], sens, vec);
+        let second = curvature(self.derivatives()?, &input[0], scenario, sens, vec);
         second.ok_or_else(rough)?.map_err(fault)
     }
 }

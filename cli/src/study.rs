@@ -6,7 +6,8 @@ use lacuna::compare::{self, Finished};
 use lacuna::report::summary_text;
 use lacuna::run::{RunDirectory, Stop, files};
 use lacuna::stage;
-use lacuna::study::{Study, resolve};
+use lacuna::study::Study;
+use lacuna::study::resolve::{self, Use};
 
 use crate::progress::Terminal;
 use crate::{Failure, print};
@@ -50,7 +51,7 @@ pub fn resume(folder: &Path) -> Result<(), Failure> {
 /// `lacuna report RUN`
 pub fn report(folder: &Path) -> Result<(), Failure> {
     let study = kept_study(folder)?;
-    if !folder.join("manifest.json").exists() {
+    if !is_finished(folder) {
         let stop = Stop::new(format!("the run in {} is not finished", folder.display()));
         return Err(stop
             .help(format!("`lacuna resume {}` goes on with it", folder.display()))
@@ -75,7 +76,12 @@ pub fn compare(folders: &[PathBuf], json: bool) -> Result<(), Failure> {
 
 /// The study in a file, if nothing is wrong with it.
 pub fn load(path: &Path, settings: &Settings) -> Result<Study, Failure> {
-    let checked = resolve::load(path, &settings.set);
+    load_for(path, settings, Use::Run)
+}
+
+/// The same for some use.
+pub fn load_for(path: &Path, settings: &Settings, purpose: Use) -> Result<Study, Failure> {
+    let checked = resolve::load_for(path, &settings.set, purpose);
     let complaints = checked.complaints();
     checked.study.ok_or_else(|| {
         let count = checked.problems.sorted().len();
@@ -92,10 +98,15 @@ fn kept_study(folder: &Path) -> Result<Study, Failure> {
             format!("error: {} is no run directory: it has no resolved.toml", folder.display());
         return Err(Failure::wrong(text));
     }
-    let mut study = load(&resolved, &Settings { set: Vec::new() })?;
+    let purpose = if is_finished(folder) { Use::Look } else { Use::Run };
+    let mut study = load_for(&resolved, &Settings { set: Vec::new() }, purpose)?;
     let written: PathBuf = folder.join("study.toml");
     study.text = String::from_utf8_lossy(&files::read(&written)?).into_owned();
     Ok(study)
+}
+
+fn is_finished(folder: &Path) -> bool {
+    folder.join("manifest.json").exists()
 }
 
 fn execute(study: &Study, folder: &Path) -> Result<(), Failure> {

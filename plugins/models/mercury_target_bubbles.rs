@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use lacuna::plugin::model::{Call, EvalError, Response, Signature};
-use lacuna::plugin::{Component, Context, Model};
+use lacuna::plugin::{Component, Context};
 use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::mercury_target::{Filling, MercuryTarget};
+use super::mercury_target::{Filling, MercuryTarget, filled};
 
 /// `mercury_target` with helium bubbles that take time to follow the pressure.
 ///
@@ -37,24 +37,4 @@ impl Component for MercuryTargetBubbles {
     }
 }
 
-impl Model for MercuryTargetBubbles {
-    fn signature(&self, context: &Context<'_>) -> Signature {
-        self.0.signed(Filling::Bubbles, context)
-    }
-
-    fn predict(&self, call: &Call<'_>) -> Result<Response, EvalError> {
-        self.0.respond(Filling::Bubbles, call)
-    }
-
-    fn write(
-        &self,
-        run: &str,
-        call: &Call<'_>,
-        response: &Response,
-        directory: &Path,
-    ) -> Result<Option<String>, EvalError> {
-        self.0.write_run("mercury_target_bubbles", run, call, response, directory)
-    }
-}
-
-lacuna::register!(Model, "mercury_target_bubbles", MercuryTargetBubbles);
+filled!(MercuryTargetBubbles, "mercury_target_bubbles", Bubbles, 0);

@@ -7,6 +7,7 @@ pub mod given;
 pub mod mercury_target;
 pub mod mercury_target_bubbles;
 pub mod mercury_target_equilibrium_gas;
+mod nested;
 pub mod process;
 pub mod python;
 pub mod um_bridge;

@@ -36,7 +36,7 @@ fn there_is_python() -> bool {
 #[test]
 fn models() {
     let composed = &["[[parts]]\nname = 'load'\nuse = 'equations'\nobserve = 'a + 2 * b'\n\
-          output = { name = 'force' }\n[[parts]]\nname = 'sensor'\nuse = 'equations'\n\
+          gives = { name = 'force' }\n[[parts]]\nname = 'sensor'\nuse = 'equations'\n\
           observe = 'force * time / 1 {s} + a^2'"];
     let external = &[
         "command = ['sh', '-c', 'echo [{{ a }}, {{ b }}, 3, 4, 5]']\noutput = 'json'",
@@ -63,15 +63,8 @@ fn models() {
         ("python", if there_is_python() { python } else { &[] }),
         ("um_bridge", served::options()),
     ];
-    let parameter = |name: &str| Parameter {
-        name: name.to_owned(),
-        symbol: name.to_owned(),
-        unit: Unit::dimensionless(),
-        design: Distribution::Uniform([0.0, 2.0]),
-        prior: Distribution::Uniform([0.0, 2.0]),
-        reference: None,
-    };
-    let parameters = ["a", "b"].map(parameter);
+    let parameters =
+        ["a", "b"].map(|name| Parameter::plain(name, Distribution::Uniform([0.0, 2.0])));
     let given =
         parameters.clone().map(|p| Given { name: p.name.clone(), unit: Some(p.unit.clone()) });
     let scenarios = [Scenario::default()];

@@ -11,6 +11,7 @@ use lacuna_um_bridge::Client;
 use lacuna_um_bridge::client::Place;
 use lacuna_um_bridge::protocol::About;
 
+use super::rod::{Rod, serving, setting};
 use crate::quick;
 
 /// `lacuna serve` at a free port.
@@ -192,4 +193,56 @@ fn a_run_of_another_study_is_not_served() {
     let message = "error: there is no finished run in DIR/none\n\
                    help: run the study first, or leave `--out` out\n";
     assert_eq!(serve(&folder.path().join("none")), (Some(1), message.to_owned()));
+}
+
+/// `configs/records` has three scenarios, of 81, 101 and 61 values.
+#[test]
+fn scenarios_are_asked_for_one_at_a_time() {
+    let served = Served::start(&quick::root().join("configs/records/study.toml"), &[]);
+    assert!(served.said.contains("-> 243 values: `gentle` 81, `middle` 101, `steep` 61\n"));
+    let client = served.client();
+    let of = |name: &str| About {
+        config: serde_json::json!({ "scenario": name }).as_object().unwrap().clone(),
+        ..about("model")
+    };
+    let point = vec![vec![9.8, 0.35, 0.1, -0.05, 0.3, 0.2, 0.0, -0.5]];
+    let all = client.evaluate(&about("model"), &point).unwrap().concat();
+    assert_eq!(client.output_sizes(&of("middle")).unwrap(), [101]);
+    let parts = ["gentle", "middle", "steep"]
+        .map(|name| client.evaluate(&of(name), &point).unwrap().concat());
+    assert_eq!(parts.concat(), all);
+    // The derivative by gravity of the second record alone, and among those of all.
+    let along = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let whole = client.apply_jacobian(&about("model"), WHOLE, &point, &along).unwrap();
+    let middle = client.apply_jacobian(&of("middle"), WHOLE, &point, &along).unwrap();
+    assert_eq!(whole[81..182], middle);
+    let error = client.evaluate(&of("flat"), &point).unwrap_err().to_string();
+    let expected =
+        "InvalidInput: there is no scenario \"flat\", expected one of `gentle`, `middle`, `steep`";
+    assert!(error.ends_with(expected), "{error}");
+}
+
+/// The study of `configs/um_bridge`, whose server ends when the run is finished.
+#[test]
+fn what_a_finished_run_keeps_needs_no_server() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let short = ["sampler.steps=300", "sampler.warm_up=150"];
+    serving(&Rod::default(), |address| {
+        let ran = quick::run(&super::study(), &[&setting(address), short[0], short[1]], &out);
+        ran.unwrap_or_else(|stop| panic!("{stop}"));
+    });
+    for verb in ["report", "resume"] {
+        let (code, text) = quick::said(quick::command().arg(verb).arg(&out));
+        assert_eq!(code, Some(0), "{verb}: {text}");
+    }
+    let served = Served::start(&out.join("resolved.toml"), &["--out", &out.display().to_string()]);
+    let client = served.client();
+    let point = [vec![-18.4, 1.9e-3]];
+    assert_eq!(client.evaluate(&about("emulator"), &point).unwrap()[0].len(), 15);
+    assert!(client.evaluate(&about("model"), &point).is_err());
+    // A run that is not finished asks the model, and says that it is not there.
+    std::fs::remove_file(out.join("manifest.json")).unwrap();
+    let (code, text) = quick::said(quick::command().arg("resume").arg(&out));
+    assert!(code == Some(2) && text.contains("the connection is refused"), "{text}");
 }

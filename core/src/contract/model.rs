@@ -11,7 +11,7 @@ use crate::plugin::{Context, Model};
 ///
 /// - its inputs have different names, and defaults inside their ranges; its layout has values;
 /// - it answers with one finite value a place, the same each time and on any number of threads, and
-///   another one for other inputs;
+///   another one for other inputs, but not for those that it says it does not use;
 /// - an input that is not a number, too few or too many inputs, and a layout of other axes or labels are
 ///   refused without a panic;
 /// - a file of its own is there under the name it gives, the same bytes each time;
@@ -23,8 +23,9 @@ pub fn model(
     scratch: &Path,
 ) -> Result<(), Vec<String>> {
     let case = Case::of(model, context);
-    let checks: [Check<'_>; 5] = [
+    let checks: [Check<'_>; 6] = [
         ("signs soundly", Box::new(|| signs_soundly(&case.signature))),
+        ("uses what it says", Box::new(|| case.uses_what_it_says(&model.unused(context)))),
         ("answers", Box::new(|| case.answers())),
         ("refuses nonsense", Box::new(|| case.refuses_nonsense())),
         ("writes its files", Box::new(|| case.writes_its_files(scratch))),
@@ -132,6 +133,21 @@ impl<'a> Case<'a> {
             return Err("other inputs give the same response".into());
         }
         same_on_threads(|| self.respond(&self.inputs))
+    }
+
+    fn uses_what_it_says(&self, unused: &[String]) -> Result<(), String> {
+        let (response, others) = (self.respond(&self.inputs)?, self.other_inputs());
+        for name in unused {
+            let Some(i) = self.names.iter().position(|other| other == name) else {
+                return Err(format!("`{name}`, which it does not use, is no input"));
+            };
+            let mut inputs = self.inputs.clone();
+            inputs[i] = others[i];
+            if self.respond(&inputs)?.values != response.values {
+                return Err(format!("the response depends on `{name}`, which it does not use"));
+            }
+        }
+        Ok(())
     }
 
     fn refuses_nonsense(&self) -> Result<(), String> {

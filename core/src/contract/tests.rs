@@ -134,17 +134,9 @@ impl BoundDensity for Law {
 
 #[test]
 fn faults_of_targets_are_found() {
-    let parameter = |name: &str, prior: Distribution| Parameter {
-        name: name.to_owned(),
-        symbol: name.to_owned(),
-        unit: Unit::dimensionless(),
-        design: prior.clone(),
-        prior,
-        reference: None,
-    };
     let parameters = [
-        parameter("a", Distribution::Normal([0.0, 1.0])),
-        parameter("b", Distribution::Uniform([-1.0, 1.0])),
+        Parameter::plain("a", Distribution::Normal([0.0, 1.0])),
+        Parameter::plain("b", Distribution::Uniform([-1.0, 1.0])),
     ];
     for (fault, expected) in [
         (Fault::Edge, "it is NaN for `a` = NaN"),

@@ -22,3 +22,17 @@ pub struct Parameter {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference: Option<f64>,
 }
+
+impl Parameter {
+    /// A plain number of that name, whose runs are made where its prior is.
+    pub fn plain(name: &str, prior: Distribution) -> Self {
+        Self {
+            name: name.to_owned(),
+            symbol: name.to_owned(),
+            unit: Unit::dimensionless(),
+            design: prior.clone(),
+            prior,
+            reference: None,
+        }
+    }
+}

@@ -14,6 +14,12 @@ pub trait Model: Component {
     /// answers with the study's own inputs ([`Context::given`]) and layout.
     fn signature(&self, context: &Context<'_>) -> Signature;
 
+    /// The inputs of the signature on which no response depends, whatever their values: a model may take them so that a
+    /// study can change to it by its name alone. Parameters that set nothing else keep their priors.
+    fn unused(&self, _context: &Context<'_>) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Runs the simulator once.
     fn predict(&self, call: &Call<'_>) -> Result<Response, EvalError>;
 
@@ -103,6 +109,19 @@ pub struct Call<'a> {
     /// A folder of the run's own for files that are kept; the model makes it when it needs one. `None` for an
     /// evaluation of which nothing is kept.
     pub directory: Option<&'a Path>,
+}
+
+impl<'a> Call<'a> {
+    /// A call in the folder of the process, by a caller that knows no units.
+    pub fn new(
+        inputs: &'a [f64],
+        names: &'a [String],
+        layout: &'a Layout,
+        scenario: &'a Scenario,
+    ) -> Self {
+        let (units, study, directory) = (&[][..], Path::new("."), None);
+        Self { inputs, names, units, layout, scenario, study, directory }
+    }
 }
 
 /// What a model answers.

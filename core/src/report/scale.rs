@@ -259,6 +259,12 @@ fn prefix(power: i32) -> Option<&'static str> {
     })
 }
 
+/// A unit as it is printed, `kg/m³`; `1` for plain numbers.
+pub fn printed(unit: &Unit) -> String {
+    let text = pretty(&unit.to_string());
+    if text.is_empty() { "1".to_owned() } else { text }
+}
+
 /// A unit with exponents as superscripts; the unit of plain numbers is not written.
 fn pretty(unit: &str) -> String {
     if unit == "1" {
@@ -357,6 +363,10 @@ mod tests {
         assert_eq!(shown("(m3/d)^2", 25.0), "x [(m³/d)²]");
         assert_eq!(shown("1/s", 25.0), "x [1/s]");
         assert_eq!(shown("kPa", 3.0), "x [kPa]");
+        assert_eq!(
+            ["kg/m3", "J/(kg K)", "1"].map(|u| printed(&unit(u))),
+            ["kg/m³", "J/(kg K)", "1"]
+        );
         assert_eq!(shown("Pa", 0.0), "x [Pa]");
         assert_eq!(ShownUnit::of(&unit("Pa"), 6.5e4).text(64_873.0, 3), "64.9 kPa");
         assert_eq!(ShownUnit::of(&unit("1"), 6e-5).text(5.8e-5, 2), "58 × 10⁻⁶");

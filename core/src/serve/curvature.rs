@@ -13,6 +13,7 @@ use crate::plugin::model::EvalError;
 pub fn curvature(
     function: &dyn Derivatives,
     point: &[f64],
+    scenario: Option<usize>,
     weights: &[f64],
     direction: &[f64],
 ) -> Option<Result<Vec<f64>, EvalError>> {
@@ -29,7 +30,7 @@ pub fn curvature(
     let gradient = |steps: f64| {
         let moved: Vec<f64> =
             point.iter().zip(direction).map(|(x, v)| x + steps * step * v).collect();
-        let jacobian = function.jacobian(&moved)?;
+        let jacobian = function.jacobian(&moved, scenario)?;
         Ok(transposed_multiply_vector(&jacobian, weights))
     };
     Some(differences(gradient, step))

@@ -1,6 +1,6 @@
 //! `emulator`: the fitted surrogate.
 
-use super::{Derivatives, Function, Variable, parameters};
+use super::{Derivatives, Function, Part, Variable, parameters, parts};
 use crate::linalg::Matrix;
 use crate::plugin::Emulator;
 use crate::plugin::model::EvalError;
@@ -13,6 +13,7 @@ pub(super) struct Emulated<'a> {
     emulator: &'a dyn Emulator,
     /// The interval of each parameter in which it was fitted.
     region: Vec<(f64, f64)>,
+    parts: Vec<Part>,
 }
 
 impl<'a> Emulated<'a> {
@@ -20,7 +21,7 @@ impl<'a> Emulated<'a> {
     pub(super) fn of(study: &'a Study, known: &Known<'a>) -> Option<Self> {
         let whole = || study.parameters.iter().map(|p| p.design.support()).collect();
         let region = known.region.map_or_else(whole, <[_]>::to_vec);
-        Some(Self { study, emulator: known.emulator?, region })
+        Some(Self { study, emulator: known.emulator?, region, parts: parts(study) })
     }
 
     /// Outside the runs it was fitted to an emulator knows nothing.
@@ -50,10 +51,18 @@ impl Function for Emulated<'_> {
         self.emulator.outputs()
     }
 
-    fn values(&self, point: &[f64]) -> Result<Vec<f64>, EvalError> {
+    fn scenarios(&self) -> &[Part] {
+        &self.parts
+    }
+
+    fn values(&self, point: &[f64], scenario: Option<usize>) -> Result<Vec<f64>, EvalError> {
         self.inside(point)?;
         let row = Matrix::from_vec(1, point.len(), point.to_vec());
-        Ok(self.emulator.mean(&row).into_vec())
+        let all = self.emulator.mean(&row).into_vec();
+        Ok(match scenario {
+            Some(i) => all[self.parts[i].outputs.clone()].to_vec(),
+            None => all,
+        })
     }
 
     fn derivatives(&self) -> Option<&dyn Derivatives> {
@@ -62,9 +71,13 @@ impl Function for Emulated<'_> {
 }
 
 impl Derivatives for Emulated<'_> {
-    fn jacobian(&self, point: &[f64]) -> Result<Matrix, EvalError> {
+    fn jacobian(&self, point: &[f64], scenario: Option<usize>) -> Result<Matrix, EvalError> {
         self.inside(point)?;
-        Ok(self.emulator.jacobian(point))
+        let all = self.emulator.jacobian(point);
+        Ok(match scenario {
+            Some(i) => all.select_rows(&self.parts[i].outputs.clone().collect::<Vec<_>>()),
+            None => all,
+        })
     }
 
     fn scales(&self) -> Option<Vec<f64>> {

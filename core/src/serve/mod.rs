@@ -15,6 +15,8 @@ mod simulated;
 #[cfg(test)]
 mod tests;
 
+use std::ops::Range;
+
 use crate::data::Unit;
 use crate::linalg::Matrix;
 use crate::plugin::Density;
@@ -45,8 +47,13 @@ pub trait Function: Sync {
     /// How many values come out.
     fn outputs(&self) -> usize;
 
-    /// The values at a point.
-    fn values(&self, point: &[f64]) -> Result<Vec<f64>, EvalError>;
+    /// The scenarios that it can be asked for one at a time, with their outputs; none where it answers as a whole.
+    fn scenarios(&self) -> &[Part] {
+        &[]
+    }
+
+    /// The values at a point: all of them, or those of the scenario of this number.
+    fn values(&self, point: &[f64], scenario: Option<usize>) -> Result<Vec<f64>, EvalError>;
 
     /// Its derivatives, where they are known exactly.
     fn derivatives(&self) -> Option<&dyn Derivatives> {
@@ -56,12 +63,21 @@ pub trait Function: Sync {
 
 /// Exact derivatives of a function.
 pub trait Derivatives: Sync {
-    /// The derivative of each value (rows) by each variable (columns).
-    fn jacobian(&self, point: &[f64]) -> Result<Matrix, EvalError>;
+    /// The derivative of each value (rows) by each variable (columns), of all values or of one scenario's.
+    fn jacobian(&self, point: &[f64], scenario: Option<usize>) -> Result<Matrix, EvalError>;
 
     /// For each variable the size of a change that matters, where the function is smooth enough for differences of
     /// its derivatives; `None` where it is not.
     fn scales(&self) -> Option<Vec<f64>>;
+}
+
+/// A scenario's share of the values.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Part {
+    /// The scenario.
+    pub scenario: String,
+    /// Its values among those of all.
+    pub outputs: Range<usize>,
 }
 
 /// What a function depends on.
@@ -149,4 +165,14 @@ fn parameters(study: &Study) -> Vec<Variable> {
     let variable =
         |p: &crate::data::Parameter| Variable { name: p.name.clone(), unit: p.unit.clone() };
     study.parameters.iter().map(variable).collect()
+}
+
+/// The scenarios of a study; none where it has but the one that has no name.
+fn parts(study: &Study) -> Vec<Part> {
+    let named = study.scenarios.iter().filter(|scenario| !scenario.name.is_empty());
+    let part = |name: &String| {
+        let (_, outputs) = study.layouts.of_scenario(name)?;
+        Some(Part { scenario: name.clone(), outputs })
+    };
+    named.filter_map(|scenario| part(&scenario.name)).collect()
 }

@@ -52,7 +52,7 @@ impl Function for LogPosterior<'_> {
         1
     }
 
-    fn values(&self, point: &[f64]) -> Result<Vec<f64>, EvalError> {
+    fn values(&self, point: &[f64], _: Option<usize>) -> Result<Vec<f64>, EvalError> {
         Ok(vec![self.value(point)])
     }
 
@@ -62,7 +62,7 @@ impl Function for LogPosterior<'_> {
 }
 
 impl Derivatives for LogPosterior<'_> {
-    fn jacobian(&self, point: &[f64]) -> Result<Matrix, EvalError> {
+    fn jacobian(&self, point: &[f64], _: Option<usize>) -> Result<Matrix, EvalError> {
         if self.value(point) == NOTHING {
             let reason = "the density is zero here, so that its logarithm has no derivatives";
             return Err(EvalError::Rejected(reason.to_owned()));

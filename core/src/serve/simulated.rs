@@ -1,10 +1,10 @@
 //! `model`: the study's simulator.
 
-use super::{Derivatives, Function, Variable, parameters};
+use super::{Derivatives, Function, Part, Variable, parameters, parts};
 use crate::linalg::Matrix;
 use crate::plugin::model::{EvalError, Gradient};
 use crate::run::Stop;
-use crate::stage::simulator::Simulator;
+use crate::stage::simulator::{Setting, Simulator};
 use crate::study::Study;
 
 /// The simulator as a function of the study's parameters.
@@ -12,6 +12,7 @@ pub(super) struct Simulated<'a> {
     study: &'a Study,
     simulator: Simulator<'a>,
     gradient: Option<&'a dyn Gradient>,
+    parts: Vec<Part>,
 }
 
 impl<'a> Simulated<'a> {
@@ -21,7 +22,13 @@ impl<'a> Simulated<'a> {
             return Ok(None);
         };
         let gradient = section.built.plugin.gradient();
-        Ok(Some(Self { study, simulator, gradient }))
+        Ok(Some(Self { study, simulator, gradient, parts: parts(study) }))
+    }
+
+    /// The settings of all scenarios, or of one.
+    fn settings(&self, scenario: Option<usize>) -> &[Setting<'a>] {
+        let all = &self.simulator.settings[..];
+        scenario.map_or(all, |i| &all[i..=i])
     }
 }
 
@@ -38,8 +45,16 @@ impl Function for Simulated<'_> {
         self.study.layouts.len()
     }
 
-    fn values(&self, point: &[f64]) -> Result<Vec<f64>, EvalError> {
-        self.simulator.in_range(point)?;
+    fn scenarios(&self) -> &[Part] {
+        &self.parts
+    }
+
+    fn values(&self, point: &[f64], scenario: Option<usize>) -> Result<Vec<f64>, EvalError> {
+        let settings = self.settings(scenario);
+        self.simulator.in_range(settings, point)?;
+        if scenario.is_some() {
+            return self.simulator.respond_to(&settings[0], point).map(|response| response.values);
+        }
         self.simulator.respond(point).map(|response| response.values)
     }
 
@@ -49,13 +64,17 @@ impl Function for Simulated<'_> {
 }
 
 impl Derivatives for Simulated<'_> {
-    fn jacobian(&self, point: &[f64]) -> Result<Matrix, EvalError> {
-        self.simulator.in_range(point)?;
+    fn jacobian(&self, point: &[f64], scenario: Option<usize>) -> Result<Matrix, EvalError> {
+        let settings = self.settings(scenario);
+        self.simulator.in_range(settings, point)?;
         let gradient = self
             .gradient
             .ok_or_else(|| EvalError::Fatal("the model knows no derivatives".to_owned()))?;
+        if scenario.is_some() {
+            return self.simulator.jacobian(&settings[0], gradient, point);
+        }
         let mut all = Matrix::zeros(self.outputs(), point.len());
-        for setting in &self.simulator.settings {
+        for setting in settings {
             let part = self.simulator.jacobian(setting, gradient, point)?;
             for (k, row) in setting.outputs.clone().enumerate() {
                 all.row_mut(row).copy_from_slice(part.row(k));

@@ -17,7 +17,7 @@ use super::calibrate::Calibrated;
 use super::evidence::Weighed;
 use super::read::Measured;
 use super::validate::Validated;
-use super::{Known, derived, inference_data};
+use super::{Known, derived, idle, inference_data};
 
 /// Writes report, summary and posterior file; returns the findings.
 pub fn stage(study: &Study, all: &Artifacts<'_>, run: &RunDirectory) -> Result<Findings, Stop> {
@@ -86,7 +86,7 @@ fn findings(
             .and_then(|known| Some(ensemble(study, known.data.value.ensemble.as_ref()?))),
         measured: measured.map(|m| measurements(study, m)),
         surrogate: all.known.and_then(|known| surrogate(known, all.validated)),
-        warnings: warnings(all, calibration.as_ref()),
+        warnings: warnings(study, all, calibration.as_ref()),
         calibration,
         validation,
         seconds,
@@ -241,7 +241,11 @@ fn correlation(kept: &Draws) -> Matrix {
     Moments::of_rows(&kept.points()).correlation()
 }
 
-fn warnings(all: &Artifacts<'_>, calibration: Option<&CalibrationFindings>) -> Vec<String> {
+fn warnings(
+    study: &Study,
+    all: &Artifacts<'_>,
+    calibration: Option<&CalibrationFindings>,
+) -> Vec<String> {
     let mut warnings = Vec::new();
     if let Some(c) = calibration {
         if !c.converged {
@@ -274,6 +278,14 @@ fn warnings(all: &Artifacts<'_>, calibration: Option<&CalibrationFindings>) -> V
         warnings.push(format!(
             "the posterior has {others} further local maxima within ten of the best log density"
         ));
+    }
+    // An effect may use what the model does not.
+    if calibration.is_some() && study.effects.is_empty() {
+        let idle = idle::parameters(study).unwrap_or_default().into_iter();
+        warnings.extend(idle.map(|i| {
+            let name = &study.parameters[i].name;
+            format!("`{name}` is not used by the model: its posterior is its prior")
+        }));
     }
     warnings.extend(all.validated.iter().flat_map(|v| v.value.failed.clone()));
     warnings

@@ -42,6 +42,8 @@ pub struct Setting<'a> {
     sources: Vec<Source>,
     /// The inputs that expressions set.
     computed: Option<Computed>,
+    /// The parameters of the study on which the response depends, as far as the model knows.
+    used: Vec<usize>,
     /// Turns the model's response into the study's unit.
     factor: f64,
 }
@@ -53,6 +55,17 @@ enum Source {
     Parameter(usize, f64),
     /// The index of an expression and the factor from its unit to the input's.
     Computed(usize, f64),
+}
+
+impl Source {
+    /// The parameters behind it; behind one expression all those of any.
+    fn parameters(&self, computed: Option<&Computed>) -> Vec<usize> {
+        match self {
+            Self::Fixed(_) => Vec::new(),
+            Self::Parameter(i, _) => vec![*i],
+            Self::Computed(..) => computed.map_or_else(Vec::new, |all| all.parameters.clone()),
+        }
+    }
 }
 
 impl<'a> Simulator<'a> {
@@ -74,13 +87,19 @@ impl<'a> Simulator<'a> {
                 .layouts
                 .of_scenario(&scenario.name)
                 .ok_or_else(|| Stop::new(format!("no response to `{}`", scenario.name)))?;
-            let signature = model.signature(&study.context_of(&layout));
+            let context = study.context_of(&layout);
+            let signature = model.signature(&context);
+            let unused = model.unused(&context);
             let computed = study.computed(place).map_err(|faults| {
                 let faults: Vec<String> = faults.iter().map(ToString::to_string).collect();
                 Stop::new(format!("`computed` in `[model]`: {}", faults.join("; ")))
             })?;
             let source = |input: &Input| source(study, section, place, computed.as_ref(), input);
-            let sources = signature.inputs.iter().map(source).collect::<Result<_, Stop>>()?;
+            let sources = signature.inputs.iter().map(source).collect::<Result<Vec<_>, Stop>>()?;
+            let heeded = signature.inputs.iter().zip(&sources);
+            let heeded = heeded.filter(|(input, _)| !unused.contains(&input.name));
+            let behind = |(_, source): (&Input, &Source)| source.parameters(computed.as_ref());
+            let used = heeded.flat_map(behind).collect();
             names = signature.inputs.iter().map(|input| input.name.clone()).collect();
             units = signature.inputs.iter().map(|input| input.unit.clone()).collect();
             let (asked, factor) = asked(&layout, &signature.layout)?;
@@ -94,6 +113,7 @@ impl<'a> Simulator<'a> {
                 ranges,
                 sources,
                 computed,
+                used,
                 factor,
             });
         }
@@ -106,8 +126,7 @@ impl<'a> Simulator<'a> {
         let outputs = self.settings.iter().map(|setting| setting.outputs.end).max();
         all.values.resize(outputs.unwrap_or(0), 0.0);
         for setting in &self.settings {
-            let inputs = setting.inputs(point);
-            let response = setting.checked(self.model.predict(&self.call(setting, &inputs)))?;
+            let response = self.respond_to(setting, point)?;
             all.values[setting.outputs.clone()].copy_from_slice(&response.values);
             all.valid &= response.valid;
             all.facts.extend(response.facts);
@@ -115,9 +134,15 @@ impl<'a> Simulator<'a> {
         Ok(all)
     }
 
-    /// Refuses a point at which an input leaves the range in which the model answers.
-    pub fn in_range(&self, point: &[f64]) -> Result<(), EvalError> {
-        for setting in &self.settings {
+    /// The response to one scenario at a point, in the study's unit.
+    pub fn respond_to(&self, setting: &Setting<'_>, point: &[f64]) -> Result<Response, EvalError> {
+        let inputs = setting.inputs(point);
+        setting.checked(self.model.predict(&self.call(setting, &inputs)))
+    }
+
+    /// Refuses a point at which an input leaves the range in which the model answers in one of these settings.
+    pub fn in_range(&self, settings: &[Setting<'_>], point: &[f64]) -> Result<(), EvalError> {
+        for setting in settings {
             let inputs = setting.inputs(point);
             for ((x, (low, high)), name) in inputs.iter().zip(&setting.ranges).zip(&self.names) {
                 if !(low..=high).contains(&x) {
@@ -128,6 +153,12 @@ impl<'a> Simulator<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Which of the study's parameters set nothing that a response depends on.
+    pub fn idle(&self, parameters: usize) -> Vec<usize> {
+        let used = |i: &usize| self.settings.iter().any(|setting| setting.used.contains(i));
+        (0..parameters).filter(|i| !used(i)).collect()
     }
 
     /// The derivatives of the response to one scenario by the study's parameters, in the study's unit.

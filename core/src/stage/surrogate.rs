@@ -14,6 +14,7 @@ use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
 use crate::study::Study;
 
+use super::idle::Used;
 use super::read::Data;
 use super::stream;
 
@@ -117,7 +118,9 @@ pub fn stage(
     let section =
         study.surrogate.as_ref().ok_or_else(|| Stop::new("the study has no surrogate"))?;
     let plugin = &*section.built.plugin;
-    let laws: Vec<_> = fitting.parameters.iter().map(|p| (&p.name, &p.design)).collect();
+    let used = Used::of(study)?;
+    let parameters = used.parameters(fitting.parameters);
+    let laws: Vec<_> = parameters.iter().map(|p| (&p.name, &p.design)).collect();
     let inputs = json!([
         data.hash,
         section.built.name,
@@ -129,9 +132,9 @@ pub fn stage(
     let ensemble = data.value.runs()?;
     observer.begin("surrogate", "output", ensemble.layouts.len() as u64);
     let kept = run.keep(fitting.folder, &inputs, observer, |_| {
-        fit(study, plugin, ensemble, fitting, observer)
+        fit(study, plugin, ensemble, fitting, &used, observer)
     })?;
-    let emulator = plugin.load(&kept.value.bytes)?;
+    let emulator = used.widen(plugin.load(&kept.value.bytes)?);
     let errors = &kept.value.errors;
     let unit = study.layouts.unit();
     observer.end("surrogate", &format!("rmse {:.3e} {unit}, loo {:.2e}", errors.rmse, errors.loo));
@@ -160,18 +163,20 @@ fn fit(
     plugin: &dyn Surrogate,
     ensemble: &Ensemble,
     fitting: &Fitting<'_>,
+    used: &Used,
     observer: &dyn Observer,
 ) -> Result<Fitted, Stop> {
     let points = ensemble.points.select_rows(&fitting.training);
     let responses = ensemble.responses.select_rows(&fitting.training);
     let runs = Training {
-        parameters: fitting.parameters,
+        parameters: &used.parameters(fitting.parameters),
         layouts: &study.layouts,
-        points: &points,
+        points: &used.points(&points),
         responses: &responses,
     };
     let progress = Progress::new(observer);
     let emulator = plugin.fit(&runs, &stream(study, "surrogate"), &progress)?;
+    let emulator = used.clone().widen(emulator);
     let test_points = ensemble.points.select_rows(&fitting.validation);
     let simulated = ensemble.responses.select_rows(&fitting.validation);
     let emulated = emulator.mean(&test_points);

@@ -60,7 +60,7 @@ impl Study {
         &self,
         root: &Node,
         problems: &mut Problems,
-        look: impl Fn(&dyn Component, &Context<'_>, &mut Complaints<'_>),
+        look: impl Fn(&str, &dyn Component, &Context<'_>, &mut Complaints<'_>),
     ) {
         let records: Vec<Layout> = self
             .scenarios
@@ -83,7 +83,7 @@ impl Study {
                 let before = problems.len();
                 problems.within(section, |problems| {
                     let complaints = &mut Complaints::new(node.unwrap_or(&unwritten), problems);
-                    look(plugin, &self.context_of(layout), complaints);
+                    look(section, plugin, &self.context_of(layout), complaints);
                 });
                 // What is wrong for one shape is most often wrong for all.
                 if problems.len() > before {

@@ -33,7 +33,7 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     problems.dedup();
     super::inputs::check(study, root, problems);
     super::derived::check(study, root, problems);
-    study.each_plugin(root, problems, |component, context, complaints| {
+    study.each_plugin(root, problems, |_, component, context, complaints| {
         component.check(context, complaints);
     });
 }

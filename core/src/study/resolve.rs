@@ -126,11 +126,25 @@ impl Checked {
 
 /// Reads a study file with `--set` arguments and checks all three layers.
 pub fn load(path: &Path, arguments: &[String]) -> Checked {
+    load_for(path, arguments, Use::Run)
+}
+
+/// What a study is read for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Use {
+    /// To run it: its model must be there.
+    Run,
+    /// To look at what a finished run has kept: the model, which is not asked, may be gone.
+    Look,
+}
+
+/// [`load`] for some use.
+pub fn load_for(path: &Path, arguments: &[String], purpose: Use) -> Checked {
     let mut sources = Sources::default();
     let mut problems = Problems::new();
     let root = inherit::load(path, &common_keys, &mut sources, &mut problems);
     let text = std::fs::read_to_string(path).unwrap_or_default();
-    finish(path, text, root, arguments, sources, problems)
+    finish(path, text, root, arguments, purpose, sources, problems)
 }
 
 /// Checks a study given as text, as if it stood in a file at `path`.
@@ -138,7 +152,7 @@ pub fn load_text(path: &Path, text: &str, arguments: &[String]) -> Checked {
     let mut sources = Sources::default();
     let mut problems = Problems::new();
     let root = inherit::load_text(path, text.to_owned(), &common_keys, &mut sources, &mut problems);
-    finish(path, text.to_owned(), root, arguments, sources, problems)
+    finish(path, text.to_owned(), root, arguments, Use::Run, sources, problems)
 }
 
 fn finish(
@@ -146,6 +160,7 @@ fn finish(
     text: String,
     root: Option<Node>,
     arguments: &[String],
+    purpose: Use,
     mut sources: Sources,
     mut problems: Problems,
 ) -> Checked {
@@ -156,7 +171,7 @@ fn finish(
             context::check(&study, &root, &mut problems);
         }
         if problems.is_empty() {
-            environment(&study, &root, &mut problems);
+            environment(&study, purpose, &root, &mut problems);
         }
         Some(study)
     });
@@ -173,6 +188,8 @@ fn common_keys(section: &str) -> &'static [&'static str] {
         "surrogate" => fields::<SurrogateKeys>(),
         "discrepancy" => fields::<DiscrepancyKeys>(),
         "sampler" => fields::<SamplerKeys>(),
+        // Elements of named lists, such as the parts of a chain.
+        "" => &["name", "takes", "gives"],
         _ => &[],
     }
 }
@@ -262,8 +279,10 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
 }
 
 /// Third layer: what the plugins need of the machine.
-fn environment(study: &Study, root: &Node, problems: &mut Problems) {
-    study.each_plugin(root, problems, |component, context, complaints| {
-        component.environment(context, complaints);
+fn environment(study: &Study, purpose: Use, root: &Node, problems: &mut Problems) {
+    study.each_plugin(root, problems, |section, component, context, complaints| {
+        if purpose == Use::Run || !["model", "numerical_error"].contains(&section) {
+            component.environment(context, complaints);
+        }
     });
 }

@@ -9,25 +9,25 @@ use std::sync::Arc;
 use lacuna::data::{Condition, Coordinates, Function, Layout, Scenario, Unit};
 use lacuna::plugin::model::{Call, EvalError, Input, Response, Signature};
 use lacuna::plugin::{Component, Context, Fact, Given, Model};
-use lacuna::study::problem::{Complaints, Problems};
-use lacuna::study::{Node, Place, Sources};
+use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::given;
+use super::{given, nested};
 use part::{Part, pass_on};
 
 /// Models in a chain: what one gives is an input of those after it, as from load to response to sensor. A part is
 /// swapped by changing its `use`.
 ///
-/// Each entry of `parts` is a model of any kind with its options, a `name`, and, for all but the last, the `output` that
-/// is asked of it: `name`, `unit` and `axes` as in `[response]`. The parts after it see that output
+/// Each entry of `parts` is a model of any kind with its options, a `name`, and, for all but the last, what it `gives`:
+/// `name`, `unit` and `axes` as in `[response]`. The parts after it see that output
 ///
 /// - as an input of the output's name, where it has no axes; of each label's name, where it has an axis of labels;
 /// - as a function of the output's name, where it has one axis of numbers (in `equations` it is called as `force(t)`; a
 ///   command finds it in its JSON); of each label's name, where it has an axis of labels before that.
 ///
-/// An input of a part that no part before it gives is an input of the chain. The last part gives the response.
+/// An input of a part that no part before it gives is an input of the chain. A model that takes whatever there is (a
+/// command, a Python function, a server) says by `takes` what it is to see. The last part gives the response.
 /// Derivatives are taken by differences.
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -78,6 +78,36 @@ fn handed(layout: &Layout) -> Result<Vec<Handed>, String> {
     }
 }
 
+impl Handed {
+    /// The function that it is with these values, where it is one.
+    fn function(&self, values: &[f64]) -> Option<Function> {
+        let (at, at_unit) = self.grid.as_ref()?;
+        Some(Function {
+            name: self.name.clone(),
+            at: at.clone(),
+            at_unit: at_unit.clone(),
+            values: values.to_vec(),
+            unit: self.unit.clone(),
+        })
+    }
+}
+
+/// Makes known what the parts after will see: numbers by their names, functions by their points.
+fn announce(handed: &[Handed], given: &mut Vec<Given>, scenarios: &mut [Scenario]) {
+    for output in handed {
+        let zeros = output.grid.as_ref().map_or_else(Vec::new, |(at, _)| vec![0.0; at.len()]);
+        if let Some(function) = output.function(&zeros).map(Arc::new) {
+            for scenario in &mut *scenarios {
+                scenario.functions.retain(|known| known.name != output.name);
+                scenario.functions.push(Arc::clone(&function));
+            }
+        } else {
+            given.retain(|other| other.name != output.name);
+            given.push(Given { name: output.name.clone(), unit: Some(output.unit.clone()) });
+        }
+    }
+}
+
 /// A part with all that it is asked with.
 struct Link<'a> {
     model: &'a dyn Model,
@@ -96,21 +126,22 @@ impl Composed {
         let mut scenarios = context.scenarios.to_vec();
         let mut links = Vec::new();
         for (i, part) in self.parts.iter().enumerate() {
-            let Some(section) = part.section() else { break };
+            let Ok(section) = part.section() else { break };
             let name = section.common.name.as_str().to_owned();
             let last = i + 1 == self.parts.len();
-            let asked = match (part.output()?, last) {
+            let asked = match (part.gives()?, last) {
                 (Some(layout), false) => layout,
                 (None, true) => context.layout.clone(),
-                (None, false) => return Err(format!("part `{name}` has no `output`")),
+                (None, false) => return Err(format!("part `{name}` does not say what it `gives`")),
                 (Some(_), true) => {
                     return Err(format!(
-                        "part `{name}` is the last and gives the study's response: it has no `output`"
+                        "part `{name}` is the last and gives the study's response: leave `gives` out"
                     ));
                 }
             };
+            let seen = part.seen(&given).map_err(|what| format!("part `{name}`: {what}"))?;
             let own = Context {
-                given: &given,
+                given: &seen,
                 scenarios: &scenarios,
                 layout: &asked,
                 ..Context::new(context.directory, context.parameters, &asked)
@@ -118,29 +149,7 @@ impl Composed {
             let model = &*section.built.plugin;
             let signature = model.signature(&own);
             let handed = if last { Vec::new() } else { handed(&asked)? };
-            for output in &handed {
-                match &output.grid {
-                    None => {
-                        given.retain(|other| other.name != output.name);
-                        given.push(Given {
-                            name: output.name.clone(),
-                            unit: Some(output.unit.clone()),
-                        });
-                    }
-                    Some((at, at_unit)) => {
-                        let values = vec![0.0; at.len()];
-                        for scenario in &mut scenarios {
-                            scenario.functions.push(Arc::new(Function {
-                                name: output.name.clone(),
-                                at: at.clone(),
-                                at_unit: at_unit.clone(),
-                                values: values.clone(),
-                                unit: output.unit.clone(),
-                            }));
-                        }
-                    }
-                }
-            }
+            announce(&handed, &mut given, &mut scenarios);
             links.push(Link { model, name, asked, signature, handed });
         }
         Ok(links)
@@ -194,11 +203,12 @@ impl Link<'_> {
             inputs.push(value);
             names.push(input.name.clone());
         }
+        let units: Vec<Unit> = self.signature.inputs.iter().map(|i| i.unit.clone()).collect();
         let folder = directory.map(|folder| folder.join(&self.name));
         let call = Call {
             inputs: &inputs,
             names: &names,
-            units: &[],
+            units: &units,
             layout: &self.asked,
             scenario: &state.scenario,
             study,
@@ -219,25 +229,17 @@ impl Link<'_> {
     /// Makes the answer known to the parts after it.
     fn hand_on(&self, response: &Response, state: &mut State) {
         for output in &self.handed {
-            let value = response.values[output.begin];
-            match &output.grid {
-                None => {
-                    state.values.retain(|(name, ..)| name != &output.name);
-                    state.values.push((output.name.clone(), value, output.unit.clone()));
-                    state.scenario.values.retain(|known| known.name != output.name);
-                    let (name, unit) = (output.name.clone(), Some(output.unit.clone()));
-                    state.scenario.values.push(Condition { name, value, unit });
-                }
-                Some((at, at_unit)) => {
-                    state.scenario.functions.retain(|known| known.name != output.name);
-                    state.scenario.functions.push(Arc::new(Function {
-                        name: output.name.clone(),
-                        at: at.clone(),
-                        at_unit: at_unit.clone(),
-                        values: response.values[output.begin..output.begin + at.len()].to_vec(),
-                        unit: output.unit.clone(),
-                    }));
-                }
+            let length = output.grid.as_ref().map_or(1, |(at, _)| at.len());
+            let values = &response.values[output.begin..output.begin + length];
+            if let Some(function) = output.function(values) {
+                state.scenario.functions.retain(|known| known.name != output.name);
+                state.scenario.functions.push(Arc::new(function));
+            } else {
+                let (name, value, unit) = (output.name.clone(), values[0], output.unit.clone());
+                state.values.retain(|(known, ..)| known != &name);
+                state.values.push((name.clone(), value, unit.clone()));
+                state.scenario.values.retain(|known| known.name != name);
+                state.scenario.values.push(Condition { name, value, unit: Some(unit) });
             }
         }
     }
@@ -257,22 +259,14 @@ impl Component for Composed {
             }
         };
         each(&links, context, |i, link, own| {
-            let (mut problems, mut sources) = (Problems::new(), Sources::default());
-            let source = sources.add_argument("part", String::new());
-            let node = Node::table(Place::whole(source));
-            link.model.check(own, &mut Complaints::new(&node, &mut problems));
-            pass_on(i, problems.sorted().into_iter(), complaints);
+            pass_on(i, &nested::complaints(|said| link.model.check(own, said)), complaints);
         });
     }
 
     fn environment(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
         let Ok(links) = self.links(context) else { return };
         each(&links, context, |i, link, own| {
-            let (mut problems, mut sources) = (Problems::new(), Sources::default());
-            let source = sources.add_argument("part", String::new());
-            let node = Node::table(Place::whole(source));
-            link.model.environment(own, &mut Complaints::new(&node, &mut problems));
-            pass_on(i, problems.sorted().into_iter(), complaints);
+            pass_on(i, &nested::complaints(|said| link.model.environment(own, said)), complaints);
         });
     }
 }
@@ -296,23 +290,7 @@ fn each(
             ..Context::new(context.directory, context.parameters, &link.asked)
         };
         look(i, link, &own);
-        for output in &link.handed {
-            match &output.grid {
-                None => outputs
-                    .push(Given { name: output.name.clone(), unit: Some(output.unit.clone()) }),
-                Some((at, at_unit)) => {
-                    for scenario in &mut scenarios {
-                        scenario.functions.push(Arc::new(Function {
-                            name: output.name.clone(),
-                            at: at.clone(),
-                            at_unit: at_unit.clone(),
-                            values: vec![0.0; at.len()],
-                            unit: output.unit.clone(),
-                        }));
-                    }
-                }
-            }
-        }
+        announce(&link.handed, &mut outputs, &mut scenarios);
     }
 }
 
@@ -328,6 +306,18 @@ impl Model for Composed {
             // Of a chain with a wrong part the check says enough.
             _ => given::signature(context, &BTreeMap::new()),
         }
+    }
+
+    fn unused(&self, context: &Context<'_>) -> Vec<String> {
+        let Ok(links) = self.links(context) else { return Vec::new() };
+        let mut used = Vec::new();
+        each(&links, context, |_, link, own| {
+            let idle = link.model.unused(own);
+            let names = link.signature.inputs.iter().map(|input| input.name.clone());
+            used.extend(names.filter(|name| !idle.contains(name)));
+        });
+        let names = Self::inputs(&links).into_iter().map(|input| input.name);
+        names.filter(|name| !used.contains(name)).collect()
     }
 
     fn predict(&self, call: &Call<'_>) -> Result<Response, EvalError> {
@@ -367,7 +357,7 @@ impl Model for Composed {
     }
 
     fn files(&self, directory: &Path) -> Vec<PathBuf> {
-        let models = self.parts.iter().filter_map(|part| part.section());
+        let models = self.parts.iter().filter_map(|part| part.section().ok());
         models.flat_map(|section| section.built.plugin.files(directory)).collect()
     }
 }

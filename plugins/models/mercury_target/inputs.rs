@@ -105,119 +105,130 @@ struct Entry {
     place: fn(&mut Values) -> &mut f64,
 }
 
+const fn entry(
+    part: Part,
+    name: &'static str,
+    unit: &'static str,
+    range: (f64, f64),
+    description: &'static str,
+    place: fn(&mut Values) -> &mut f64,
+) -> Entry {
+    Entry { name, part, unit, range, description, place }
+}
+
 const ENTRIES: [Entry; 14] = [
-    Entry {
-        name: "density",
-        part: Part::Mercury,
-        unit: "kg/m3",
-        range: (f64::MIN_POSITIVE, f64::INFINITY),
-        description: "density of mercury",
-        place: |v| &mut v.mercury.density,
-    },
-    Entry {
-        name: "sound_speed",
-        part: Part::Mercury,
-        unit: "m/s",
-        range: (0.0, f64::INFINITY),
-        description: "sound speed of mercury",
-        place: |v| &mut v.mercury.sound_speed,
-    },
-    Entry {
-        name: "tensile_cutoff",
-        part: Part::Mercury,
-        unit: "Pa",
-        range: (0.0, f64::INFINITY),
-        description: "tension at which mercury cavitates",
-        place: |v| &mut v.mercury.tensile_cutoff,
-    },
-    Entry {
-        name: "void_fraction",
-        part: Part::Gas,
-        unit: "1",
-        range: (0.0, 0.05),
-        description: "volume of the gas at rest as a share of the mixture's, away from the window",
-        place: |v| &mut v.gas.void_fraction,
-    },
-    Entry {
-        name: "void_gradient",
-        part: Part::Gas,
-        unit: "1",
-        range: (-1.0, 1.0),
-        description: "stratification g over the radius: the gas goes as 1 + g (2r²/a² - 1), towards the wall for g > 0",
-        place: |v| &mut v.gas.gradient,
-    },
-    Entry {
-        name: "void_depletion",
-        part: Part::Gas,
-        unit: "1",
-        range: (0.0, 1.0),
-        description: "stratification d along the axis: the gas goes as 1 - d exp(-z'/l) behind the window",
-        place: |v| &mut v.gas.depletion,
-    },
-    Entry {
-        name: "depletion_length",
-        part: Part::Gas,
-        unit: "m",
-        range: (1e-4, 10.0),
-        description: "length l over which the gas missing at the window returns",
-        place: |v| &mut v.gas.depletion_length,
-    },
-    Entry {
-        name: "bubble_radius",
-        part: Part::Bubbles,
-        unit: "m",
-        range: (0.0, 0.01),
-        description: "radius of the bubbles; 0 follows at once",
-        place: |v| &mut v.gas.bubble_radius,
-    },
-    Entry {
-        name: "ambient_pressure",
-        part: Part::Gas,
-        unit: "Pa",
-        range: (1e3, 1e8),
-        description: "static pressure of mercury and gas",
-        place: |v| &mut v.gas.ambient_pressure,
-    },
-    Entry {
-        name: "polytropic_index",
-        part: Part::Gas,
-        unit: "1",
-        range: (1.0, 2.0),
-        description: "polytropic index of the gas: 1 isothermal, 5/3 adiabatic helium",
-        place: |v| &mut v.gas.polytropic_index,
-    },
-    Entry {
-        name: "damping",
-        part: Part::Vessel,
-        unit: "1/s",
-        range: (0.0, 1e6),
-        description: "damping in proportion to mass: vibrations fall off as exp(-damping t / 2)",
-        place: |v| &mut v.damping,
-    },
-    Entry {
-        name: "pulse_energy",
-        part: Part::Vessel,
-        unit: "1",
-        range: (0.0, 100.0),
-        description: "energy of the pulse relative to that of the options",
-        place: |v| &mut v.pulse_energy,
-    },
-    Entry {
-        name: "beam_width",
-        part: Part::Vessel,
-        unit: "m",
-        range: (1e-3, 10.0),
-        description: "standard deviation of the beam, in place of the option `pulse.width`",
-        place: |v| &mut v.beam_width,
-    },
-    Entry {
-        name: "wall_thickness",
-        part: Part::Vessel,
-        unit: "1",
-        range: (0.05, 20.0),
-        description: "thickness of the walls relative to that of the options",
-        place: |v| &mut v.wall_thickness,
-    },
+    entry(
+        Part::Mercury,
+        "density",
+        "kg/m3",
+        (f64::MIN_POSITIVE, f64::INFINITY),
+        "density of mercury",
+        |v| &mut v.mercury.density,
+    ),
+    entry(
+        Part::Mercury,
+        "sound_speed",
+        "m/s",
+        (0.0, f64::INFINITY),
+        "sound speed of mercury",
+        |v| &mut v.mercury.sound_speed,
+    ),
+    entry(
+        Part::Mercury,
+        "tensile_cutoff",
+        "Pa",
+        (0.0, f64::INFINITY),
+        "tension at which mercury cavitates",
+        |v| &mut v.mercury.tensile_cutoff,
+    ),
+    entry(
+        Part::Gas,
+        "void_fraction",
+        "1",
+        (0.0, 0.05),
+        "volume of the gas at rest as a share of the mixture's, away from the window",
+        |v| &mut v.gas.void_fraction,
+    ),
+    entry(
+        Part::Gas,
+        "void_gradient",
+        "1",
+        (-1.0, 1.0),
+        "stratification g over the radius: the gas goes as 1 + g (2r²/a² - 1), towards the wall for g > 0",
+        |v| &mut v.gas.gradient,
+    ),
+    entry(
+        Part::Gas,
+        "void_depletion",
+        "1",
+        (0.0, 1.0),
+        "stratification d along the axis: the gas goes as 1 - d exp(-z'/l) behind the window",
+        |v| &mut v.gas.depletion,
+    ),
+    entry(
+        Part::Gas,
+        "depletion_length",
+        "m",
+        (1e-4, 10.0),
+        "length l over which the gas missing at the window returns",
+        |v| &mut v.gas.depletion_length,
+    ),
+    entry(
+        Part::Bubbles,
+        "bubble_radius",
+        "m",
+        (0.0, 0.01),
+        "radius of the bubbles; 0 follows at once",
+        |v| &mut v.gas.bubble_radius,
+    ),
+    entry(
+        Part::Gas,
+        "ambient_pressure",
+        "Pa",
+        (1e3, 1e8),
+        "static pressure of mercury and gas",
+        |v| &mut v.gas.ambient_pressure,
+    ),
+    entry(
+        Part::Gas,
+        "polytropic_index",
+        "1",
+        (1.0, 2.0),
+        "polytropic index of the gas: 1 isothermal, 5/3 adiabatic helium",
+        |v| &mut v.gas.polytropic_index,
+    ),
+    entry(
+        Part::Vessel,
+        "damping",
+        "1/s",
+        (0.0, 1e6),
+        "damping in proportion to mass: vibrations fall off as exp(-damping t / 2)",
+        |v| &mut v.damping,
+    ),
+    entry(
+        Part::Vessel,
+        "pulse_energy",
+        "1",
+        (0.0, 100.0),
+        "energy of the pulse relative to that of the options",
+        |v| &mut v.pulse_energy,
+    ),
+    entry(
+        Part::Vessel,
+        "beam_width",
+        "m",
+        (1e-3, 10.0),
+        "standard deviation of the beam, in place of the option `pulse.width`",
+        |v| &mut v.beam_width,
+    ),
+    entry(
+        Part::Vessel,
+        "wall_thickness",
+        "1",
+        (0.05, 20.0),
+        "thickness of the walls relative to that of the options",
+        |v| &mut v.wall_thickness,
+    ),
 ];
 
 /// The inputs that a model lists in a study.
@@ -242,6 +253,13 @@ pub(super) fn inputs(
     let listed = ENTRIES.iter().filter(|entry| entry.part.is_listed(filling));
     let others = ENTRIES.iter().filter(|e| !e.part.is_listed(filling) && is_given(e.name));
     listed.chain(others).map(input).collect()
+}
+
+/// The inputs that a study sets and that have no effect.
+pub(crate) fn unused(filling: Filling, context: &Context<'_>) -> Vec<String> {
+    let idle = |name: &str| ENTRIES.iter().any(|e| e.name == name && !e.part.acts(filling));
+    let names = context.given.iter().map(|given| given.name.clone());
+    names.filter(|name| idle(name)).collect()
 }
 
 /// The values of a call, and the names of those without effect.

@@ -81,9 +81,10 @@ pub use eos::{EquationOfState, TensileCutoff};
 pub use fluid::{Fluid, FluidConstants};
 pub use gas::{Bubbles, Bubbly, Gas};
 pub use gauges::Sensor;
-pub(crate) use inputs::Filling;
+pub(crate) use inputs::{Filling, unused};
 pub use mesh::Mesh;
 pub use model::MercuryTarget;
+pub(crate) use model::filled;
 pub use settings::{
     Cells, Gauge, Gauges, Geometry, Load, NamedMesh, Numerics, Place, Pulse, Rear, Sampling,
     Settings, Wall,

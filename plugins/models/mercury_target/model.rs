@@ -4,7 +4,7 @@ use std::path::Path;
 
 use lacuna::data::{Axis, Coordinates, Layout, Unit};
 use lacuna::plugin::model::{Call, EvalError, Response, Signature};
-use lacuna::plugin::{Component, Context, Fact, Model};
+use lacuna::plugin::{Component, Context, Fact};
 use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -207,30 +207,45 @@ impl Component for MercuryTarget {
     }
 }
 
-impl Model for MercuryTarget {
-    fn signature(&self, context: &Context<'_>) -> Signature {
-        self.signed(Filling::Mercury, context)
-    }
+/// Makes a model of a type that holds the vessel: what fills it and what it is called is all that differs.
+macro_rules! filled {
+    ($model:ident, $name:literal, $filling:ident $(, $field:tt)?) => {
+        impl lacuna::plugin::Model for $model {
+            fn signature(&self, context: &Context<'_>) -> Signature {
+                self$(.$field)?.signed(Filling::$filling, context)
+            }
 
-    fn predict(&self, call: &Call<'_>) -> Result<Response, EvalError> {
-        self.respond(Filling::Mercury, call)
-    }
+            fn unused(&self, context: &Context<'_>) -> Vec<String> {
+                $crate::models::mercury_target::unused(Filling::$filling, context)
+            }
 
-    fn write(
-        &self,
-        run: &str,
-        call: &Call<'_>,
-        response: &Response,
-        directory: &Path,
-    ) -> Result<Option<String>, EvalError> {
-        self.write_run("mercury_target", run, call, response, directory)
-    }
+            fn predict(&self, call: &Call<'_>) -> Result<Response, EvalError> {
+                self$(.$field)?.respond(Filling::$filling, call)
+            }
+
+            fn write(
+                &self,
+                run: &str,
+                call: &Call<'_>,
+                response: &Response,
+                directory: &Path,
+            ) -> Result<Option<String>, EvalError> {
+                self$(.$field)?.write_run($name, run, call, response, directory)
+            }
+        }
+
+        lacuna::register!(lacuna::plugin::Model, $name, $model);
+    };
 }
 
-lacuna::register!(Model, "mercury_target", MercuryTarget);
+pub(crate) use filled;
+
+filled!(MercuryTarget, "mercury_target", Mercury);
 
 #[cfg(test)]
 mod tests {
+    use lacuna::plugin::Model;
+
     use super::*;
 
     #[test]
@@ -257,15 +272,7 @@ mod tests {
         let scenario = lacuna::data::Scenario::default();
         let names = ["density", "sound_speed", "tensile_cutoff"].map(str::to_owned);
         let respond = |layout: &Layout| {
-            let call = Call {
-                inputs: &[13_500.0, 1456.0, 1.5e5],
-                names: &names,
-                units: &[],
-                layout,
-                scenario: &scenario,
-                study: Path::new(""),
-                directory: None,
-            };
+            let call = Call::new(&[13_500.0, 1456.0, 1.5e5], &names, layout, &scenario);
             model.predict(&call).unwrap().values
         };
         let (both, one) = (respond(&part(&["T", "B"])), respond(&part(&["B"])));

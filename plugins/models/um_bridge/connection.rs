@@ -53,6 +53,13 @@ impl UmBridge {
         once(&self.connection.support, ask).copied()
     }
 
+    /// The same from a server that answers at once.
+    pub(super) fn support_now(&self) -> Option<Support> {
+        let client = || Client::new(&self.url, Duration::from_secs(60), 0);
+        let ask = || client().support(&self.about(self.config.clone()));
+        once(&self.connection.support, ask).ok().copied()
+    }
+
     /// The length of each input vector, under the settings that the study writes.
     pub(super) fn input_sizes(&self) -> Result<&[usize], Error> {
         let ask = || self.client().input_sizes(&self.about(self.config.clone()));

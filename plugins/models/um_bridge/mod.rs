@@ -154,8 +154,8 @@ impl Model for UmBridge {
     }
 
     fn gradient(&self) -> Option<&dyn Gradient> {
-        match self.support() {
-            Ok(support) if !(support.gradient || support.apply_jacobian) => None,
+        match self.support_now() {
+            Some(support) if !(support.gradient || support.apply_jacobian) => None,
             // Who is not there now says so when derivatives are asked for.
             _ => Some(self),
         }

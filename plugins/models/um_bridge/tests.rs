@@ -107,15 +107,7 @@ impl Case {
     }
 
     fn call<'a>(&'a self, inputs: &'a [f64]) -> Call<'a> {
-        Call {
-            inputs,
-            names: &self.names,
-            units: &[],
-            layout: &self.layout,
-            scenario: &self.scenario,
-            study: Path::new("."),
-            directory: None,
-        }
+        Call::new(inputs, &self.names, &self.layout, &self.scenario)
     }
 }
 

@@ -15,7 +15,7 @@ mod series;
 
 use std::sync::Arc;
 
-use lacuna::data::{Parameter, Unit};
+use lacuna::data::Parameter;
 use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::Component;
@@ -127,14 +127,7 @@ impl File {
 
     /// A posterior whose published quantities are the sampled ones.
     fn posterior<M: Model>(self, model: M, parameters: Vec<(&str, Distribution)>) -> Posterior {
-        let parameter = |(name, prior): (&str, Distribution)| Parameter {
-            name: name.to_owned(),
-            symbol: name.to_owned(),
-            unit: Unit::dimensionless(),
-            design: prior.clone(),
-            prior,
-            reference: None,
-        };
+        let parameter = |(name, prior): (&str, Distribution)| Parameter::plain(name, prior);
         let reference = self.content["reference"].as_object().unwrap().iter().map(|(name, f)| {
             let figure = |key: &str| f[key].as_f64().unwrap();
             Reference {

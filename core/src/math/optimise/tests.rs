@@ -235,6 +235,74 @@ fn walkers_are_scattered_inside_the_support() {
     assert!(Moments::of_rows(&points).sd()[0] > 0.02);
 }
 
+/// A datum of `x[0]` with a uniform prior, and coordinates that it says nothing of: uniform ones and half-normal ones.
+struct OneOfMany(usize);
+
+impl OneOfMany {
+    fn law(&self, j: usize) -> Distribution {
+        if j < self.0 / 2 {
+            Distribution::Uniform([0.0, 1.0])
+        } else {
+            Distribution::HalfNormal(2.0)
+        }
+    }
+}
+
+impl Target for OneOfMany {
+    fn dimension(&self) -> usize {
+        self.0
+    }
+
+    fn log_density(&self, points: &Matrix) -> Vec<f64> {
+        let prior = self.log_prior(points).into_iter();
+        prior
+            .zip(points.iter_rows())
+            .map(|(p, x)| p - 0.5 * ((x[0] - 0.5) / 0.01).powi(2))
+            .collect()
+    }
+
+    fn log_prior(&self, points: &Matrix) -> Vec<f64> {
+        let density = |x: &[f64]| (0..x.len()).map(|j| self.law(j).log_density(x[j])).sum();
+        points.iter_rows().map(density).collect()
+    }
+
+    fn gradient(&self, x: &[f64]) -> (f64, Vec<f64>) {
+        let value = self.log_density(&Matrix::from_rows(x.len(), [x]))[0];
+        let mut slope: Vec<f64> =
+            (0..x.len()).map(|j| if j < self.0 / 2 { 0.0 } else { -0.25 * x[j] }).collect();
+        slope[0] -= (x[0] - 0.5) / 1e-4;
+        (value, slope)
+    }
+
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        (0..self.0).map(|j| self.law(j).support()).collect()
+    }
+
+    fn prior_draws(&self, count: usize, stream: &Stream) -> Matrix {
+        let mut rng = stream.generator();
+        let draw = |_, j| self.law(j).quantile(crate::math::random::uniform(&mut rng));
+        Matrix::from_fn(count, self.0, draw)
+    }
+}
+
+#[test]
+fn coordinates_that_the_data_say_nothing_of_start_at_draws_of_their_priors() {
+    let target = OneOfMany(60);
+    // At the bound of every idle coordinate: one normal draw in 2^59 lies inside.
+    let top: Vec<f64> = (0..60).map(|j| if j == 0 { 0.5 } else { 0.0 }).collect();
+    let shape = laplace(&target, &top).unwrap();
+    let points = scatter(&target, &top, &shape, 400, &Stream::root(4)).unwrap();
+    let (moments, sd) = (Moments::of_rows(&points), Moments::of_rows(&points).sd());
+    // Standard deviations of 400 draws have errors of 3.5 % and less; that of a half-normal law is sqrt(1 - 2/pi).
+    close(&sd[..1], &[0.01], 0.12);
+    for (j, sd) in sd.iter().enumerate().skip(1) {
+        let law = target.law(j);
+        let (exact, error) = (law.variance().sqrt(), law.variance().sqrt() / 20.0);
+        assert!((sd / exact - 1.0).abs() < 0.2, "{j}: {sd} {exact}");
+        assert!((moments.mean()[j] - law.mean()).abs() < 5.0 * error, "{j}");
+    }
+}
+
 #[test]
 fn no_walker_starts_far_below_the_ridge() {
     // A thin curved ridge: draws of the normal law at its top fall hundreds of nats beside it.

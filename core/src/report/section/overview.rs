@@ -8,6 +8,7 @@ use crate::plugin::Fact;
 use crate::report::findings::Findings;
 use crate::report::number::{count, exact, rounded};
 use crate::report::page::{Caption, Numbers, Section, paragraph};
+use crate::report::scale::printed;
 use crate::report::table::Table;
 
 /// The study.
@@ -17,7 +18,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Section {
     for p in &findings.parameters {
         parameters.row([
             titled(&p.name, &p.symbol),
-            p.unit.to_string(),
+            printed(&p.unit),
             rounded(&p.design.to_string(), 6),
             rounded(&p.prior.to_string(), 6),
             p.reference.map_or_else(|| String::from("–"), exact),
@@ -52,7 +53,7 @@ fn response(findings: &Findings) -> String {
         0 => String::new(),
         more => format!(" and {more} more"),
     };
-    let (name, unit, outputs) = (layouts.name(), layouts.unit(), count(layouts.len()));
+    let (name, unit, outputs) = (layouts.name(), printed(layouts.unit()), count(layouts.len()));
     let shapes = shapes.join("; ");
     format!(
         "The model's response is `{name}` in the unit `{unit}`: {shapes}{more}, {outputs} outputs."

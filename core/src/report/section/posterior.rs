@@ -12,7 +12,7 @@ use crate::report::curve::named_density;
 use crate::report::findings::{CalibrationFindings, CoordinateFindings, Findings, Role};
 use crate::report::number::{decimals, fixed, rounded, significant};
 use crate::report::page::{Caption, Numbers, Section};
-use crate::report::scale::extent;
+use crate::report::scale::{extent, printed};
 use crate::report::table::Table;
 
 /// The posterior, where there is a calibration.
@@ -290,7 +290,7 @@ fn fits(calibration: &CalibrationFindings, numbers: &mut Numbers) -> Markup {
         for fit in &c.fits {
             table.row([
                 c.name.clone(),
-                c.unit.to_string(),
+                printed(&c.unit),
                 rounded(&fit.distribution.to_string(), 5),
                 fixed(fit.ks, 4),
                 significant(fit.p_value, 2),

@@ -66,6 +66,7 @@ fn axes_carry_their_units() {
     ] {
         assert!(has_text(&elements, label), "no `{label}` in {:?}", texts(&elements));
     }
+    assert!(has_text(&elements, "kg/m³") && !texts(&elements).iter().any(|t| t.contains("kg/m3")));
 }
 
 #[test]

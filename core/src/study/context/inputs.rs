@@ -77,8 +77,8 @@ fn no_input(name: &str, path: &str, signature: &Signature, complaints: &mut Comp
     let listed = names().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");
     let problem: &mut Problem = complaints
         .at(path)
-        .say(format!("the model has no input `{name}`"))
-        .expected(format!("one of {listed}"));
+        .say(format!("the model does not use `{name}`"))
+        .expected(format!("one of its inputs {listed}"));
     if let Some(near) = nearest(name, names()) {
         problem.help(format!("did you mean `{near}`?"));
     }

@@ -6,7 +6,6 @@ mod closed_forms;
 mod limits;
 mod stiff;
 
-use std::path::Path;
 use std::sync::Arc;
 
 use lacuna::data::{Axis, Function, Layout, Scenario, Unit};
@@ -52,15 +51,7 @@ impl Case {
     }
 
     fn call<'a>(&'a self, inputs: &'a [f64]) -> Call<'a> {
-        Call {
-            inputs,
-            names: &self.names,
-            units: &[],
-            layout: &self.layout,
-            scenario: &self.scenario,
-            study: Path::new("."),
-            directory: None,
-        }
+        Call::new(inputs, &self.names, &self.layout, &self.scenario)
     }
 
     fn values(&self, inputs: &[f64]) -> Vec<f64> {

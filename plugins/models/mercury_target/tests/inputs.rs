@@ -37,15 +37,7 @@ fn respond(name: &str, inputs: &[(&str, f64)]) -> Result<Response, EvalError> {
     let (names, values): (Vec<String>, Vec<f64>) =
         all().map(|&(name, value)| (name.to_owned(), value)).unzip();
     let (layout, scenario) = (layout(), Scenario::default());
-    let call = Call {
-        inputs: &values,
-        names: &names,
-        units: &[],
-        layout: &layout,
-        scenario: &scenario,
-        study: Path::new(""),
-        directory: None,
-    };
+    let call = Call::new(&values, &names, &layout, &scenario);
     model(name).predict(&call)
 }
 

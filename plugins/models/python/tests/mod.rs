@@ -68,15 +68,8 @@ impl Case {
     }
 
     fn call<'a>(&'a self, inputs: &'a [f64]) -> Call<'a> {
-        Call {
-            inputs,
-            names: &self.names,
-            units: &[],
-            layout: &self.layout,
-            scenario: &self.scenario,
-            study: self.study.path(),
-            directory: None,
-        }
+        let plain = Call::new(inputs, &self.names, &self.layout, &self.scenario);
+        Call { study: self.study.path(), ..plain }
     }
 
     fn at(&self, inputs: [f64; 2]) -> Result<Vec<f64>, EvalError> {
