@@ -262,7 +262,7 @@ impl Curve {
     /// of the last one and no slope.
     pub fn segment(&self, x: f64) -> (f64, f64, f64) {
         let last = self.nodes.len() - 1;
-        let after = self.nodes.partition_point(|node| *node <= x);
+        let after = self.after(x);
         if after == 0 {
             return (self.nodes[0], self.values[0], 0.0);
         }
@@ -272,6 +272,18 @@ impl Curve {
         let i = after - 1;
         let slope = (self.values[after] - self.values[i]) / (self.nodes[after] - self.nodes[i]);
         (self.nodes[i], self.values[i], slope)
+    }
+
+    /// How many nodes are not behind `x`: nodes at even distances are not searched for.
+    fn after(&self, x: f64) -> usize {
+        let (nodes, last) = (&self.nodes, self.nodes.len() - 1);
+        let guess = ((x - nodes[0]) / (nodes[last] - nodes[0]) * last as f64) as usize;
+        for near in [guess, guess.saturating_sub(1), guess + 1] {
+            if near < last && nodes[near] <= x && x < nodes[near + 1] {
+                return near + 1;
+            }
+        }
+        nodes.partition_point(|node| *node <= x)
     }
 
     pub fn height(&self, x: f64) -> f64 {

@@ -112,7 +112,8 @@ impl<'a> Step<'a> {
             Action::Interpolate(curve, a) => {
                 let curve = &self.program.tables.curves[*curve];
                 for (i, (out, x)) in out.iter_mut().zip(self.get(*a)).enumerate() {
-                    *out = self.tangent(*a, i) * curve.segment(x[0]).2;
+                    let tangent = self.tangent(*a, i);
+                    *out = if tangent == 0.0 { 0.0 } else { tangent * curve.segment(x[0]).2 };
                 }
             }
         }

@@ -124,6 +124,28 @@ impl<'s> Flow<'s> {
         work.slopes(time, states, out);
     }
 
+    /// The rates of the states and behind them those of the sensitivities, channel by channel.
+    pub fn all(&self, time: f64, values: &[f64], out: &mut [f64]) {
+        let count = self.system.states.len();
+        let (states, sensitivities) = values.split_at(count);
+        let (rates, their_rates) = out.split_at_mut(count);
+        self.rates(time, states, rates);
+        if sensitivities.is_empty() {
+            return;
+        }
+        let mut work = self.work.borrow_mut();
+        let first = work.direction.len() - count;
+        work.direction.fill(0.0);
+        let both = sensitivities.chunks(count).zip(their_rates.chunks_mut(count));
+        for (channel, (sensitivity, rate)) in both.enumerate() {
+            let coordinate = self.coordinate(channel);
+            work.direction[coordinate] = 1.0;
+            work.direction[first..].copy_from_slice(sensitivity);
+            work.slopes_here(rate);
+            work.direction[coordinate] = 0.0;
+        }
+    }
+
     /// The last rate that was no number.
     pub fn undefined(&self) -> Option<Undefined> {
         self.work.borrow().undefined.clone()
@@ -138,10 +160,14 @@ impl Work<'_> {
         self.rates.at(&self.point);
     }
 
-    /// A slope that is no number counts as none: the rate there is none either, or the slope is infinite at the edge
-    /// of where the rate is defined.
     fn slopes(&mut self, time: f64, states: &[f64], out: &mut [f64]) {
         self.go(time, states);
+        self.slopes_here(out);
+    }
+
+    /// A slope that is no number counts as none: the rate there is none either, or the slope is infinite at the edge
+    /// of where the rate is defined.
+    fn slopes_here(&mut self, out: &mut [f64]) {
         self.rates.slopes(&self.direction, out);
         out.iter_mut().filter(|slope| !slope.is_finite()).for_each(|slope| *slope = 0.0);
     }
