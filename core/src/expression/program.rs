@@ -203,11 +203,12 @@ impl Program {
     pub fn push_forward(&self, point: &[f64], direction: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let registers = self.filled(point);
         let values = self.each_output(&self.constants, &registers).map(|lanes| lanes[0]).collect();
-        let mut tangents = vec![0.0; self.registers];
-        tangents[..self.unknowns].copy_from_slice(direction);
+        let mut tangents = vec![[0.0]; self.registers];
+        tangents.iter_mut().zip(direction).for_each(|(tangent, x)| *tangent = [*x]);
         tangent::run(self, &registers, &mut tangents);
         let of = |place: &Place| {
-            if place.constant { vec![0.0; place.length] } else { tangents[place.range()].to_vec() }
+            let lanes = |i: usize| if place.constant { 0.0 } else { tangents[i][0] };
+            place.range().map(lanes).collect::<Vec<f64>>()
         };
         (values, self.outputs.iter().flat_map(of).collect())
     }
