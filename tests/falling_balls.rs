@@ -68,8 +68,9 @@ fn study(drops: &BTreeMap<String, Drop>) -> String {
         variance = {{ known = {variance:?} }}
         [sampler]
         use = "no_u_turn"
-        warm_up = 150
-        steps = 450
+        metric = "dense"
+        warm_up = 120
+        steps = 520
         "#
     );
     for name in drops.keys() {

@@ -182,7 +182,9 @@ impl Work<'_> {
     fn slopes(&mut self, time: f64, states: &[f64], out: &mut [f64]) {
         self.go(time, states);
         self.rates.slopes(&self.direction, out);
-        out.iter_mut().for_each(|slope| *slope = defined(*slope));
+        for slope in out {
+            *slope = defined(*slope);
+        }
     }
 }
 

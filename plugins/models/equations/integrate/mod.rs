@@ -10,6 +10,8 @@ mod jumps;
 mod march;
 mod stepper;
 
+use lacuna::study::values::Positive;
+
 use super::flow::{Flow, Start};
 use super::options::{Method, Solver};
 use super::stops::{Stop, stops};
@@ -99,7 +101,7 @@ impl Run<'_, '_, '_> {
     /// One run by the explicit method, whose absolute tolerances follow the states on their way.
     fn explicit(&mut self, relative: f64, share: f64) -> Result<Effort, String> {
         let (flow, start) = (self.flow, &self.start);
-        let absolute = self.solver.absolute_tolerance.map(|tolerance| tolerance.get());
+        let absolute = self.solver.absolute_tolerance.map(Positive::get);
         let mut stepper = Explicit::new(flow, start, relative, absolute, share);
         let watched = self.solver.method == Method::Auto;
         let mut march = March::new(flow, start, self.solver, self.times, watched);
