@@ -4,6 +4,8 @@
 mod bad_input;
 mod commands;
 mod docs;
+mod falling_balls;
+mod forced_oscillator;
 mod kill;
 mod problems;
 mod python;

@@ -15,7 +15,7 @@ fn summary(study: &str, settings: &[&str], out: &Path) -> Value {
 
 /// Means and standard deviations of a normal posterior within four Monte Carlo errors, which are `sd / √n` and
 /// `sd / √2n` for `n` independent draws.
-fn is_normal(summary: &Value, exact: &[(&str, f64, f64)]) {
+pub fn is_normal(summary: &Value, exact: &[(&str, f64, f64)]) {
     assert_eq!(summary["converged"], true, "{}", summary["verdict"]);
     for &(name, mean, sd) in exact {
         let found = &summary["parameters"][name];

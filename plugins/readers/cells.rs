@@ -10,6 +10,9 @@ use super::sheet::{Conversion, Record, Sheet};
 /// spacing: room for the digits that a file does not print, and for nothing else.
 const CLOSE: f64 = 1e-4;
 
+/// Numbers that differ by less than this fraction are the same number, computed in two ways.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
 /// Place of a number on a numeric axis.
 pub fn on_grid(values: &[f64], x: f64) -> Option<usize> {
     let after = values.partition_point(|&v| v < x);
@@ -19,9 +22,14 @@ pub fn on_grid(values: &[f64], x: f64) -> Option<usize> {
         .flatten()
         .filter(|&i| i < values.len())
         .min_by(|&a, &b| (values[a] - x).abs().total_cmp(&(values[b] - x).abs()))?;
+    let distance = (values[nearest] - x).abs();
+    // The smallest spacing is sought among all: of long records only where rounding does not decide.
+    if distance <= ROUNDING * x.abs() {
+        return Some(nearest);
+    }
     let spacing = values.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
     let spacing = if spacing.is_finite() { spacing } else { values[nearest].abs() };
-    ((values[nearest] - x).abs() <= CLOSE * spacing).then_some(nearest)
+    (distance <= CLOSE * spacing).then_some(nearest)
 }
 
 /// Place on an axis of a text as a file has it.

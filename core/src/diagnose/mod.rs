@@ -84,6 +84,9 @@ pub struct Diagnosis {
     pub advice: Vec<String>,
 }
 
+/// So many unknowns on which chains disagree are told one by one.
+const NAMED: usize = 6;
+
 impl Diagnosis {
     /// Judges draws from which the burn-in has been dropped.
     pub fn of(draws: &Draws, ensemble: bool) -> Self {
@@ -167,14 +170,21 @@ impl Diagnosis {
                 draws.chains
             ));
         }
-        for c in &self.coordinates {
-            // An R-hat that could not be computed complains too.
-            if c.r_hat.is_nan() || c.r_hat > self.criteria.r_hat {
-                advice.push(format!(
-                    "the {kind} disagree on `{}`: R-hat is {:.3} and should be at most {}",
-                    c.name, c.r_hat, self.criteria.r_hat
-                ));
-            }
+        // An R-hat that could not be computed complains too.
+        let disagree = |c: &&Coordinate| c.r_hat.is_nan() || c.r_hat > self.criteria.r_hat;
+        let disputed: Vec<&Coordinate> = self.coordinates.iter().filter(disagree).collect();
+        let say = |what: String, r_hat: f64| {
+            let most = self.criteria.r_hat;
+            format!(
+                "the {kind} disagree on {what}: R-hat is {r_hat:.3} and should be at most {most}"
+            )
+        };
+        if disputed.len() <= NAMED {
+            advice.extend(disputed.iter().map(|c| say(format!("`{}`", c.name), c.r_hat)));
+        } else if let Some(worst) = disputed.iter().max_by(|a, b| a.r_hat.total_cmp(&b.r_hat)) {
+            let (count, all) = (disputed.len(), self.coordinates.len());
+            let what = format!("{count} of {all} unknowns, most on `{}`", worst.name);
+            advice.push(say(what, worst.r_hat));
         }
         if self.more_steps > 0 {
             advice.push(format!(

@@ -4,6 +4,9 @@ use super::operator::Lanes;
 use super::program::Program;
 use super::{forward, tangent};
 
+/// How many directions [`Evaluator::slopes_together`] takes.
+pub const DIRECTIONS: usize = 4;
+
 /// Evaluates a program again and again; what has been computed at a point serves its values and derivatives.
 ///
 /// ```
@@ -27,7 +30,8 @@ use super::{forward, tangent};
 pub struct Evaluator<'p> {
     program: &'p Program,
     registers: Vec<Lanes<1>>,
-    tangents: Vec<f64>,
+    tangents: Vec<Lanes<1>>,
+    wide: Vec<Lanes<DIRECTIONS>>,
     /// Whether the registers hold the values at their first entries.
     filled: bool,
 }
@@ -38,7 +42,8 @@ impl<'p> Evaluator<'p> {
         Self {
             program,
             registers: vec![[0.0]; program.registers],
-            tangents: vec![0.0; program.registers],
+            tangents: vec![[0.0]; program.registers],
+            wide: vec![[0.0; DIRECTIONS]; program.registers],
             filled: false,
         }
     }
@@ -70,13 +75,34 @@ impl<'p> Evaluator<'p> {
 
     /// The derivatives of the values along a direction.
     pub fn slopes(&mut self, direction: &[f64], out: &mut [f64]) {
-        self.tangents.fill(0.0);
-        self.tangents[..self.program.unknowns].copy_from_slice(direction);
+        self.tangents.fill([0.0]);
+        self.tangents.iter_mut().zip(direction).for_each(|(tangent, x)| *tangent = [*x]);
         tangent::run(self.program, &self.registers, &mut self.tangents);
-        let mut out = out.iter_mut();
+        self.slopes_of(&self.tangents, out.iter_mut(), |out, tangent| *out = tangent[0]);
+    }
+
+    /// The derivatives of the values along several directions at once: for each unknown its share in each direction,
+    /// for each value its slope along each.
+    pub fn slopes_together(
+        &mut self,
+        directions: &[[f64; DIRECTIONS]],
+        out: &mut [[f64; DIRECTIONS]],
+    ) {
+        self.wide.fill([0.0; DIRECTIONS]);
+        self.wide[..self.program.unknowns].copy_from_slice(directions);
+        tangent::run(self.program, &self.registers, &mut self.wide);
+        self.slopes_of(&self.wide, out.iter_mut(), |out, tangent| *out = tangent);
+    }
+
+    fn slopes_of<const L: usize, T>(
+        &self,
+        tangents: &[Lanes<L>],
+        mut out: impl Iterator<Item = T>,
+        put: impl Fn(T, Lanes<L>),
+    ) {
         for place in &self.program.outputs {
             for (i, out) in place.range().zip(out.by_ref()) {
-                *out = if place.constant { 0.0 } else { self.tangents[i] };
+                put(out, if place.constant { [0.0; L] } else { tangents[i] });
             }
         }
     }

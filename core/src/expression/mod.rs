@@ -52,7 +52,7 @@ mod tree;
 mod units;
 
 pub use breaks::Break;
-pub use evaluator::Evaluator;
+pub use evaluator::{DIRECTIONS, Evaluator};
 pub use fault::Fault;
 pub use function::{Function, functions};
 pub use program::Program;

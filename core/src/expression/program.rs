@@ -203,11 +203,12 @@ impl Program {
     pub fn push_forward(&self, point: &[f64], direction: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let registers = self.filled(point);
         let values = self.each_output(&self.constants, &registers).map(|lanes| lanes[0]).collect();
-        let mut tangents = vec![0.0; self.registers];
-        tangents[..self.unknowns].copy_from_slice(direction);
+        let mut tangents = vec![[0.0]; self.registers];
+        tangents.iter_mut().zip(direction).for_each(|(tangent, x)| *tangent = [*x]);
         tangent::run(self, &registers, &mut tangents);
         let of = |place: &Place| {
-            if place.constant { vec![0.0; place.length] } else { tangents[place.range()].to_vec() }
+            let lanes = |i: usize| if place.constant { 0.0 } else { tangents[i][0] };
+            place.range().map(lanes).collect::<Vec<f64>>()
         };
         (values, self.outputs.iter().flat_map(of).collect())
     }
@@ -262,7 +263,7 @@ impl Curve {
     /// of the last one and no slope.
     pub fn segment(&self, x: f64) -> (f64, f64, f64) {
         let last = self.nodes.len() - 1;
-        let after = self.nodes.partition_point(|node| *node <= x);
+        let after = self.after(x);
         if after == 0 {
             return (self.nodes[0], self.values[0], 0.0);
         }
@@ -272,6 +273,18 @@ impl Curve {
         let i = after - 1;
         let slope = (self.values[after] - self.values[i]) / (self.nodes[after] - self.nodes[i]);
         (self.nodes[i], self.values[i], slope)
+    }
+
+    /// How many nodes are not behind `x`: nodes at even distances are not searched for.
+    fn after(&self, x: f64) -> usize {
+        let (nodes, last) = (&self.nodes, self.nodes.len() - 1);
+        let guess = ((x - nodes[0]) / (nodes[last] - nodes[0]) * last as f64) as usize;
+        for near in [guess, guess.saturating_sub(1), guess + 1] {
+            if near < last && nodes[near] <= x && x < nodes[near + 1] {
+                return near + 1;
+            }
+        }
+        nodes.partition_point(|node| *node <= x)
     }
 
     pub fn height(&self, x: f64) -> f64 {

@@ -1,11 +1,15 @@
-//! Derivatives in forward mode: from the unknowns along one direction to the outputs.
+//! Derivatives in forward mode: from the unknowns along one direction, or several at once, to the outputs.
 
 use super::function::Reduction;
 use super::operator::{Lanes, Visit};
 use super::program::{Action, Place, Program};
 
 /// Fills the tangents behind those of the unknowns.
-pub(super) fn run(program: &Program, registers: &[Lanes<1>], tangents: &mut [f64]) {
+pub(super) fn run<const L: usize>(
+    program: &Program,
+    registers: &[Lanes<1>],
+    tangents: &mut [Lanes<L>],
+) {
     for instruction in &program.instructions {
         let (before, rest) = tangents.split_at_mut(instruction.start);
         let out = &mut rest[..instruction.length];
@@ -15,33 +19,36 @@ pub(super) fn run(program: &Program, registers: &[Lanes<1>], tangents: &mut [f64
 }
 
 /// One instruction on its way.
-struct Step<'a> {
+struct Step<'a, const L: usize> {
     program: &'a Program,
     registers: &'a [Lanes<1>],
-    tangents: &'a [f64],
+    tangents: &'a [Lanes<L>],
     result: &'a [Lanes<1>],
 }
 
 /// A derivative times the tangent of one argument, added to the tangent of the result.
-struct Push<'a> {
+struct Push<'a, const L: usize> {
     a: &'a [Lanes<1>],
     b: &'a [Lanes<1>],
     result: &'a [Lanes<1>],
-    tangent: &'a [f64],
-    out: &'a mut [f64],
+    tangent: &'a [Lanes<L>],
+    out: &'a mut [Lanes<L>],
 }
 
-impl Visit for Push<'_> {
+impl<const L: usize> Visit for Push<'_, L> {
     fn visit(self, slope: impl Fn(f64, f64, f64) -> f64) {
         for (i, out) in self.out.iter_mut().enumerate() {
             let t = self.tangent[at(self.tangent, i)];
-            if t == 0.0 {
+            if t == [0.0; L] {
                 continue;
             }
             let slope =
                 slope(self.a[at(self.a, i)][0], self.b[at(self.b, i)][0], self.result[i][0]);
             if slope != 0.0 {
-                *out += t * slope;
+                for l in 0..L {
+                    // No direction is none, whatever the slope.
+                    out[l] += if t[l] == 0.0 { 0.0 } else { t[l] * slope };
+                }
             }
         }
     }
@@ -52,19 +59,19 @@ fn at<T>(values: &[T], i: usize) -> usize {
     if values.len() == 1 { 0 } else { i }
 }
 
-impl<'a> Step<'a> {
+impl<'a, const L: usize> Step<'a, L> {
     fn get(&self, place: Place) -> &'a [Lanes<1>] {
         let from = if place.constant { &self.program.constants } else { self.registers };
         &from[place.range()]
     }
 
     /// The tangent of element `i`.
-    fn tangent(&self, place: Place, i: usize) -> f64 {
+    fn tangent(&self, place: Place, i: usize) -> Lanes<L> {
         let i = if place.length == 1 { 0 } else { i };
-        if place.constant { 0.0 } else { self.tangents[place.start + i] }
+        if place.constant { [0.0; L] } else { self.tangents[place.start + i] }
     }
 
-    fn push(&self, action: &Action, out: &mut [f64]) {
+    fn push(&self, action: &Action, out: &mut [Lanes<L>]) {
         match action {
             Action::Unary(operation, a) => {
                 let values = self.get(*a);
@@ -95,7 +102,7 @@ impl<'a> Step<'a> {
             Action::MatrixProduct(matrix, a) => {
                 let rows = self.program.tables.matrices[*matrix].iter_rows();
                 for (out, row) in out.iter_mut().zip(rows) {
-                    *out = row.iter().enumerate().map(|(j, x)| x * self.tangent(*a, j)).sum();
+                    *out = sum(row.iter().enumerate().map(|(j, x)| times(*x, self.tangent(*a, j))));
                 }
             }
             Action::Recurrence(start, factor, input) => {
@@ -103,8 +110,10 @@ impl<'a> Step<'a> {
                 let (mut value, mut tangent) = (self.get(*start)[0][0], self.tangent(*start, 0));
                 for (i, out) in out.iter_mut().enumerate() {
                     let f = factors[at(factors, i)][0];
-                    tangent =
-                        f * tangent + self.tangent(*factor, i) * value + self.tangent(*input, i);
+                    let (by_factor, by_input) = (self.tangent(*factor, i), self.tangent(*input, i));
+                    for l in 0..L {
+                        tangent[l] = f * tangent[l] + by_factor[l] * value + by_input[l];
+                    }
                     value = self.result[i][0];
                     *out = tangent;
                 }
@@ -112,7 +121,10 @@ impl<'a> Step<'a> {
             Action::Interpolate(curve, a) => {
                 let curve = &self.program.tables.curves[*curve];
                 for (i, (out, x)) in out.iter_mut().zip(self.get(*a)).enumerate() {
-                    *out = self.tangent(*a, i) * curve.segment(x[0]).2;
+                    let tangent = self.tangent(*a, i);
+                    if tangent != [0.0; L] {
+                        *out = times(curve.segment(x[0]).2, tangent);
+                    }
                 }
             }
         }
@@ -124,8 +136,8 @@ impl<'a> Step<'a> {
         place: Place,
         a: &[Lanes<1>],
         b: &[Lanes<1>],
-        out: &mut [f64],
-        add: impl FnOnce(Push<'_>),
+        out: &mut [Lanes<L>],
+        add: impl FnOnce(Push<'_, L>),
     ) {
         if !place.constant {
             let tangent = &self.tangents[place.range()];
@@ -133,19 +145,27 @@ impl<'a> Step<'a> {
         }
     }
 
-    fn reduce(&self, reduction: Reduction, a: Place) -> f64 {
+    fn reduce(&self, reduction: Reduction, a: Place) -> Lanes<L> {
         let (values, total) = (self.get(a), self.result[0][0]);
         let tangents = (0..a.length).map(|i| self.tangent(a, i));
         match reduction {
-            Reduction::Sum => tangents.sum(),
+            Reduction::Sum => sum(tangents),
             Reduction::Min | Reduction::Max => {
                 let chosen = values.iter().position(|x| x[0] == total);
-                chosen.map_or(0.0, |i| self.tangent(a, i))
+                chosen.map_or([0.0; L], |i| self.tangent(a, i))
             }
             Reduction::LogSumExp => {
                 let share = |x: f64| if x == total { 1.0 } else { (x - total).exp() };
-                tangents.zip(values).map(|(t, x)| t * share(x[0])).sum()
+                sum(tangents.zip(values).map(|(t, x)| times(share(x[0]), t)))
             }
         }
     }
+}
+
+fn times<const L: usize>(factor: f64, lanes: Lanes<L>) -> Lanes<L> {
+    lanes.map(|x| factor * x)
+}
+
+fn sum<const L: usize>(each: impl Iterator<Item = Lanes<L>>) -> Lanes<L> {
+    each.fold([0.0; L], |sum, lanes| std::array::from_fn(|l| sum[l] + lanes[l]))
 }

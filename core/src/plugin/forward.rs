@@ -22,6 +22,12 @@ pub trait Forward: Send + Sync {
     /// The derivative of each output (rows) by each parameter (columns) at a point.
     fn jacobian(&self, point: &[f64]) -> Matrix;
 
+    /// The response at a point as [`Forward::mean`] gives it, and its [`Forward::jacobian`], to the map's own accuracy.
+    fn mean_and_jacobian(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
+        let mean = self.mean(&Matrix::from_vec(1, point.len(), point.to_vec()));
+        (mean.into_vec(), self.jacobian(point))
+    }
+
     /// The map as a linear combination of basis functions, where it is one.
     fn linear(&self) -> Option<&dyn Linear> {
         None

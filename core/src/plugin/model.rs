@@ -63,6 +63,11 @@ pub trait Model: Component {
 pub trait Gradient: Send + Sync {
     /// The derivatives of each value of the response (rows) by each input (columns).
     fn jacobian(&self, call: &Call<'_>) -> Result<Matrix, EvalError>;
+
+    /// The response with its derivatives from one run, where that costs less than asking for each.
+    fn with_response(&self, _call: &Call<'_>) -> Option<Result<(Response, Matrix), EvalError>> {
+        None
+    }
 }
 
 /// What goes into a model and what comes out of it.

@@ -40,12 +40,13 @@ impl LogLikelihood for Given<'_> {
         values
     }
 
-    fn gradient(&self, theta: &[f64], _hyper: &[f64]) -> Vec<f64> {
-        let (_, mut gradient) = self.density.gradient(theta);
-        for ((slope, p), &x) in gradient.iter_mut().zip(self.included).zip(theta) {
+    fn value_and_gradient(&self, theta: &[f64], _hyper: &[f64]) -> (f64, Vec<f64>) {
+        let (value, mut gradient) = self.density.gradient(theta);
+        let priors = self.included.iter().zip(theta);
+        for (slope, (p, &x)) in gradient.iter_mut().zip(priors.clone()) {
             *slope -= p.prior.log_density_derivative(x);
         }
-        gradient
+        (value - priors.map(|(p, &x)| p.prior.log_density(x)).sum::<f64>(), gradient)
     }
 
     fn facts(&self) -> Vec<Fact> {

@@ -33,8 +33,8 @@ pub trait LogLikelihood: Sync {
     /// The log-likelihood for each row of the parameters and of the hyperparameters.
     fn values(&self, theta: &Matrix, hyper: &Matrix) -> Vec<f64>;
 
-    /// Its derivatives at one point, by the parameters and then by the hyperparameters.
-    fn gradient(&self, theta: &[f64], hyper: &[f64]) -> Vec<f64>;
+    /// The log-likelihood at one point and its derivatives, by the parameters and then by the hyperparameters.
+    fn value_and_gradient(&self, theta: &[f64], hyper: &[f64]) -> (f64, Vec<f64>);
 
     /// What is worth telling.
     fn facts(&self) -> Vec<Fact>;
@@ -162,13 +162,19 @@ impl<'a> Posterior<'a> {
 
     fn value_and_gradient(&self, point: &[f64], jacobian: bool) -> (f64, Vec<f64>) {
         let d = self.parameters.len();
-        let row = Matrix::from_vec(1, point.len(), point.to_vec());
-        let value = self.block(&row, jacobian)[0];
         let natural = self.natural(point);
-        if !value.is_finite() {
-            return (value, vec![0.0; point.len()]);
+        let nothing = || (f64::NEG_INFINITY, vec![0.0; point.len()]);
+        let prior =
+            self.log_prior(&natural) + if jacobian { self.log_jacobian(point) } else { 0.0 };
+        if !prior.is_finite() {
+            return nothing();
         }
-        let mut gradient = self.likelihood.gradient(&natural[..d], &natural[d..]);
+        let (value, mut gradient) =
+            self.likelihood.value_and_gradient(&natural[..d], &natural[d..]);
+        let value = prior + value;
+        if !value.is_finite() {
+            return nothing();
+        }
         for ((g, prior), &x) in gradient.iter_mut().zip(self.priors()).zip(&natural) {
             *g += prior.log_density_derivative(x);
         }

@@ -10,6 +10,9 @@ use crate::plugin::{Effect, Fact, Forward, Hyperparameter, Likelihood};
 
 use super::LogLikelihood;
 
+/// How many numbers are asked of the forward map at once.
+const BATCH: usize = 1 << 20;
+
 /// See the module. The hyperparameters are those of the effects, then those of the discrepancy.
 pub struct OfData<'a> {
     layouts: &'a Layouts,
@@ -56,6 +59,18 @@ impl<'a> OfData<'a> {
         self.effects.last().map_or(0, |(_, range)| range.end)
     }
 
+    /// The log-likelihood at a response of the forward map.
+    fn value(&self, mean: &[f64], hyper: &[f64]) -> f64 {
+        if mean.iter().any(|y| !y.is_finite()) {
+            return f64::NEG_INFINITY;
+        }
+        let own = &hyper[self.own()..];
+        if self.effects.is_empty() {
+            return self.likelihood.log_likelihood(mean, own);
+        }
+        self.likelihood.log_likelihood(&self.with_effects(mean.to_vec(), hyper), own)
+    }
+
     fn with_effects(&self, mut response: Vec<f64>, hyper: &[f64]) -> Vec<f64> {
         for (effect, range) in &self.effects {
             response = apply(*effect, self.layouts, &response, &hyper[range.clone()]);
@@ -80,35 +95,35 @@ impl LogLikelihood for OfData<'_> {
         if let Some((linear, compressed)) = &self.reduced {
             return compressed.log_likelihood_at(*linear, theta, hyper);
         }
-        let mean = self.forward.mean(theta);
-        let own = self.own();
-        mean.iter_rows()
-            .zip(hyper.iter_rows())
-            .map(|(mean, hyper)| {
-                if mean.iter().any(|y| !y.is_finite()) {
-                    return f64::NEG_INFINITY;
-                }
-                let response = self.with_effects(mean.to_vec(), hyper);
-                self.likelihood.log_likelihood(&response, &hyper[own..])
-            })
-            .collect()
+        // Long records are asked for in turn: many at once fill the memory.
+        let rows: Vec<usize> = (0..theta.rows()).collect();
+        let batches = rows.chunks((BATCH / self.forward.outputs().max(1)).max(1));
+        let batch = |rows: &[usize]| {
+            let mean = self.forward.mean(&theta.select_rows(rows));
+            let each = mean.iter_rows().zip(rows);
+            each.map(|(mean, &row)| self.value(mean, hyper.row(row))).collect::<Vec<f64>>()
+        };
+        batches.flat_map(batch).collect()
     }
 
-    fn gradient(&self, theta: &[f64], hyper: &[f64]) -> Vec<f64> {
+    fn value_and_gradient(&self, theta: &[f64], hyper: &[f64]) -> (f64, Vec<f64>) {
         if let Some((linear, compressed)) = &self.reduced {
+            let row = |values: &[f64]| Matrix::from_vec(1, values.len(), values.to_vec());
+            let value = compressed.log_likelihood_at(*linear, &row(theta), &row(hyper))[0];
             let (by_theta, by_hyper) = compressed.gradient_at(*linear, theta, hyper);
-            return [by_theta, by_hyper].concat();
+            return (value, [by_theta, by_hyper].concat());
         }
-        let row = Matrix::from_vec(1, theta.len(), theta.to_vec());
-        let mut responses = vec![self.forward.mean(&row).row(0).to_vec()];
+        let (mean, jacobian) = self.forward.mean_and_jacobian(theta);
+        let mut responses = vec![mean];
         for (effect, range) in &self.effects {
             let before = &responses[responses.len() - 1];
             responses.push(apply(*effect, self.layouts, before, &hyper[range.clone()]));
         }
         let last = &responses[responses.len() - 1];
         if last.iter().any(|y| !y.is_finite()) {
-            return vec![0.0; theta.len() + hyper.len()];
+            return (f64::NEG_INFINITY, vec![0.0; theta.len() + hyper.len()]);
         }
+        let value = self.likelihood.log_likelihood(last, &hyper[self.own()..]);
         let (mut weight, by_own) = self.likelihood.gradient(last, &hyper[self.own()..]);
         let mut by_effects = vec![0.0; self.own()];
         for ((effect, range), before) in self.effects.iter().zip(&responses).rev() {
@@ -123,8 +138,8 @@ impl LogLikelihood for OfData<'_> {
             }
             weight = pulled;
         }
-        let by_theta = transposed_multiply_vector(&self.forward.jacobian(theta), &weight);
-        [by_theta, by_effects, by_own].concat()
+        let by_theta = transposed_multiply_vector(&jacobian, &weight);
+        (value, [by_theta, by_effects, by_own].concat())
     }
 
     fn facts(&self) -> Vec<Fact> {

@@ -60,9 +60,9 @@ impl LogLikelihood for OneDatum {
         let each = theta.iter_rows().zip(hyper.iter_rows());
         each.map(|(a, v)| -0.5 * (2.0 - a[0]).powi(2) / v[0] - 0.5 * v[0].ln()).collect()
     }
-    fn gradient(&self, theta: &[f64], hyper: &[f64]) -> Vec<f64> {
+    fn value_and_gradient(&self, theta: &[f64], hyper: &[f64]) -> (f64, Vec<f64>) {
         let (r, v) = (2.0 - theta[0], hyper[0]);
-        vec![r / v, 0.5 * r * r / (v * v) - 0.5 / v]
+        (-0.5 * r * r / v - 0.5 * v.ln(), vec![r / v, 0.5 * r * r / (v * v) - 0.5 / v])
     }
     fn facts(&self) -> Vec<Fact> {
         Vec::new()

@@ -10,7 +10,7 @@ use serde_json::json;
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::plugin::Forward;
-use crate::plugin::model::{Call, EvalError};
+use crate::plugin::model::{Call, EvalError, Gradient, Response};
 use crate::report::findings::Findings;
 use crate::run::{Kept, Observer, RunDirectory, Stop, files};
 use crate::study::Study;
@@ -165,8 +165,21 @@ impl<'a> Direct<'a> {
         rows.iter().map(|_| self.note(setting.checked(next())).map(|r| r.values)).collect()
     }
 
-    /// Derivatives by central differences; one-sided where the model answers on one side only.
-    fn differences(&self, point: &[f64]) -> Matrix {
+    /// The answer to one scenario with its derivatives.
+    fn answered(
+        &self,
+        setting: &Setting<'_>,
+        gradient: &dyn Gradient,
+        point: &[f64],
+    ) -> Option<(Response, Matrix)> {
+        if self.failure().is_some() {
+            return None;
+        }
+        self.note(self.simulator.with_derivatives(setting, gradient, point))
+    }
+
+    /// The response, and derivatives by central differences; one-sided where the model answers on one side only.
+    fn differences(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
         let steps: Vec<f64> =
             self.priors.iter().zip(point).map(|(prior, &x)| step(prior, x)).collect();
         let mut around = vec![point.to_vec()];
@@ -186,7 +199,7 @@ impl<'a> Direct<'a> {
                 _ => (here - below) / steps[j],
             }
         };
-        Matrix::from_fn(self.outputs, point.len(), slope)
+        (responses.row(0).to_vec(), Matrix::from_fn(self.outputs, point.len(), slope))
     }
 }
 
@@ -230,25 +243,29 @@ impl Forward for Direct<'_> {
     }
 
     fn jacobian(&self, point: &[f64]) -> Matrix {
+        self.mean_and_jacobian(point).1
+    }
+
+    fn mean_and_jacobian(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
         let Some(gradient) = self.simulator.model.gradient() else {
             return self.differences(point);
         };
-        let mut all = Matrix::zeros(self.outputs, point.len());
-        let parts: Vec<Option<Matrix>> = self
+        let mut mean = vec![f64::NAN; self.outputs];
+        let mut jacobian = Matrix::from_fn(self.outputs, point.len(), |_, _| f64::NAN);
+        let parts: Vec<Option<(Response, Matrix)>> = self
             .simulator
             .settings
             .par_iter()
-            .map(|setting| self.note(self.simulator.jacobian(setting, gradient, point)))
+            .map(|setting| self.answered(setting, gradient, point))
             .collect();
         for (setting, part) in self.simulator.settings.iter().zip(parts) {
-            for (k, row) in setting.outputs.clone().enumerate() {
-                match &part {
-                    Some(part) => all.row_mut(row).copy_from_slice(part.row(k)),
-                    None => all.row_mut(row).fill(f64::NAN),
-                }
+            let Some((response, slopes)) = part else { continue };
+            mean[setting.outputs.clone()].copy_from_slice(&response.values);
+            for (row, slopes) in setting.outputs.clone().zip(slopes.iter_rows()) {
+                jacobian.row_mut(row).copy_from_slice(slopes);
             }
         }
-        all
+        (mean, jacobian)
     }
 
     fn failure(&self) -> Option<String> {

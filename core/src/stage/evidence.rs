@@ -30,7 +30,7 @@ pub struct Weighed {
     pub evidence: Option<Evidence>,
     /// The prediction of each datum from all others, where the discrepancy knows it.
     pub left_out: Option<LeaveOneOut>,
-    /// Why something is missing.
+    /// Why something is missing, or less than it could be.
     pub missing: Vec<String>,
 }
 
@@ -98,6 +98,8 @@ pub struct Predicting<'a> {
     pub forward: &'a dyn Forward,
     /// The likelihood.
     pub likelihood: &'a dyn Likelihood,
+    /// The number of data in it.
+    pub data: usize,
 }
 
 /// Weighs a calibrated study.
@@ -123,7 +125,7 @@ pub fn stage(
             .map_err(|reason| missing.push(format!("no evidence: {reason}")))
             .ok(),
         };
-        let left_out = predicting.and_then(|p| predictions(study, p, &draws));
+        let left_out = predicting.and_then(|p| predictions(study, p, &draws, &mut missing));
         Ok(Weighed { evidence, left_out, missing })
     })?;
     observer.end("evidence", &summary(&kept.value));
@@ -169,22 +171,38 @@ fn coordinates(posterior: &Posterior<'_>, draws: &Draws) -> Draws {
 /// The number of draws behind the predictions of left-out data.
 const PREDICTED: usize = 400;
 
-fn predictions(study: &Study, p: Predicting<'_>, draws: &Draws) -> Option<LeaveOneOut> {
-    let points = draws.points();
-    let count = PREDICTED.min(draws.len());
-    let rows: Vec<usize> = (0..count).map(|k| (2 * k + 1) * draws.len() / (2 * count)).collect();
-    let chosen = points.select_rows(&rows);
+/// How many draws are looked at together.
+const TOGETHER: usize = 40;
+
+fn predictions(
+    study: &Study,
+    p: Predicting<'_>,
+    draws: &Draws,
+    missing: &mut Vec<String>,
+) -> Option<LeaveOneOut> {
+    let wanted = PREDICTED.min(draws.len());
+    let count = predict::affordable(wanted, p.data);
+    let chosen = draws.points().select_rows(&predict::spaced(count, draws.len()));
     let own = p.likelihood.hyperparameters().len();
-    let responses = predict::responses(study, p.forward, &chosen);
-    let densities: Option<Vec<Vec<f64>>> = responses
-        .par_iter()
-        .enumerate()
-        .map(|(i, response)| {
-            let hyper = &chosen.row(i)[chosen.columns() - own..];
-            p.likelihood.left_out(response, hyper)
-        })
-        .collect();
-    let densities = densities?;
-    let data = densities.first()?.len();
-    Some(LeaveOneOut::of(&Matrix::from_rows(data, densities)))
+    let mut all: Option<Matrix> = None;
+    for first in (0..count).step_by(TOGETHER) {
+        let rows: Vec<usize> = (first..count.min(first + TOGETHER)).collect();
+        let some = chosen.select_rows(&rows);
+        let responses = predict::responses(study, p.forward, &some);
+        let left_out = |(i, response): (usize, &Vec<f64>)| {
+            p.likelihood.left_out(response, &some.row(i)[some.columns() - own..])
+        };
+        let densities: Option<Vec<_>> = responses.par_iter().enumerate().map(left_out).collect();
+        for (row, density) in rows.iter().zip(densities?) {
+            let all = all.get_or_insert_with(|| Matrix::zeros(count, density.len()));
+            all.row_mut(*row).copy_from_slice(&density);
+        }
+    }
+    if all.is_some() && count < wanted {
+        missing.push(format!(
+            "each of {} data is predicted from {count} draws, not from {wanted}: more would not fit into memory",
+            p.data
+        ));
+    }
+    all.as_ref().map(LeaveOneOut::of)
 }

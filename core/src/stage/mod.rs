@@ -112,7 +112,11 @@ fn weigh(
     };
     let parts = calibrate::Parts::of(study, measured, known)?;
     let posterior = parts.posterior(study, known);
-    let predicting = Predicting { forward: known.forward, likelihood: parts.likelihood() };
+    let predicting = Predicting {
+        forward: known.forward,
+        likelihood: parts.likelihood(),
+        data: measured.likelihood.count(),
+    };
     evidence::stage(study, &posterior, calibrated, Some(predicting), run, observer).map(Some)
 }
 

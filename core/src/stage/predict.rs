@@ -5,8 +5,33 @@ use crate::plugin::Forward;
 use crate::posterior::apply;
 use crate::study::Study;
 
+/// How many numbers may be held at once for what is predicted at many draws: 256 MiB.
+const ROOM: usize = 1 << 25;
+
+/// No fewer draws stand for a posterior, however long a record is.
+const FEWEST: usize = 100;
+
+/// How many numbers are asked of the forward map at once.
+const BATCH: usize = 1 << 22;
+
+/// At how many of these draws so many numbers each are held: at all, unless the records are long.
+pub fn affordable(draws: usize, numbers: usize) -> usize {
+    draws.min((ROOM / numbers.max(1)).max(FEWEST))
+}
+
+/// Some of many draws, evenly spaced.
+pub fn spaced(count: usize, draws: usize) -> Vec<usize> {
+    (0..count).map(|k| (2 * k + 1) * draws / (2 * count)).collect()
+}
+
 /// The response at each point: parameters, effects' parameters and hyperparameters in natural units, one a row.
 pub fn responses(study: &Study, forward: &dyn Forward, points: &Matrix) -> Vec<Vec<f64>> {
+    let rows: Vec<usize> = (0..points.rows()).collect();
+    let batches = rows.chunks((BATCH / forward.outputs().max(1)).max(1));
+    batches.flat_map(|rows| batch(study, forward, &points.select_rows(rows))).collect()
+}
+
+fn batch(study: &Study, forward: &dyn Forward, points: &Matrix) -> Vec<Vec<f64>> {
     let d = study.parameters.len();
     let theta = Matrix::from_rows(d, points.iter_rows().map(|p| &p[..d]));
     let mean = forward.mean(&theta);
@@ -25,4 +50,17 @@ pub fn responses(study: &Study, forward: &dyn Forward, points: &Matrix) -> Vec<V
             response
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_records_are_held_at_fewer_draws() {
+        assert_eq!(affordable(400, 1000), 400);
+        assert_eq!(affordable(400, 170_000), 197);
+        assert_eq!(affordable(1000, 100_000_000), 100);
+        assert_eq!(spaced(3, 9), [1, 4, 7]);
+    }
 }

@@ -161,6 +161,23 @@ impl<'a> Simulator<'a> {
         (0..parameters).filter(|i| !used(i)).collect()
     }
 
+    /// The response to one scenario and its derivatives by the study's parameters, in the study's unit.
+    pub fn with_derivatives(
+        &self,
+        setting: &Setting<'_>,
+        gradient: &dyn Gradient,
+        point: &[f64],
+    ) -> Result<(Response, Matrix), EvalError> {
+        let inputs = setting.inputs(point);
+        let call = self.call(setting, &inputs);
+        let Some(both) = gradient.with_response(&call) else {
+            let response = setting.checked(self.model.predict(&call))?;
+            return Ok((response, self.jacobian(setting, gradient, point)?));
+        };
+        let (response, jacobian) = both?;
+        Ok((setting.checked(Ok(response))?, setting.by_parameters(&jacobian, point)))
+    }
+
     /// The derivatives of the response to one scenario by the study's parameters, in the study's unit.
     pub fn jacobian(
         &self,
@@ -170,9 +187,7 @@ impl<'a> Simulator<'a> {
     ) -> Result<Matrix, EvalError> {
         let inputs = setting.inputs(point);
         let jacobian = gradient.jacobian(&self.call(setting, &inputs))?;
-        let mut product = multiply(&jacobian, &setting.slopes(point));
-        product.as_mut_slice().iter_mut().for_each(|value| *value *= setting.factor);
-        Ok(product)
+        Ok(setting.by_parameters(&jacobian, point))
     }
 
     /// What is asked of the model for one scenario, nothing of it being kept.
@@ -234,6 +249,13 @@ impl Setting<'_> {
             }
         }
         slopes
+    }
+
+    /// Derivatives by the model's inputs as those by the study's parameters, in the study's unit.
+    fn by_parameters(&self, jacobian: &Matrix, point: &[f64]) -> Matrix {
+        let mut product = multiply(jacobian, &self.slopes(point));
+        product.as_mut_slice().iter_mut().for_each(|value| *value *= self.factor);
+        product
     }
 
     /// A response in the study's unit, every value finite and as many as were asked for.

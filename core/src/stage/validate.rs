@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use crate::data::{Draws, Observations};
 use crate::linalg::Matrix;
 use crate::math::moments;
-use crate::math::random::Stream;
+use crate::math::random::{Stream, normal};
 use crate::plugin::model::EvalError;
 use crate::plugin::{Forward, Likelihood};
 use crate::report::findings::{ValidationCase, ValidationFindings};
@@ -217,30 +218,10 @@ impl Work<'_> {
         likelihood: &dyn Likelihood,
         random: &Stream,
     ) -> Prediction {
-        let d = self.study.parameters.len();
         let own = likelihood.hyperparameters().len();
         if draws.is_empty() {
             return Prediction::default();
         }
-        let points = draws.points();
-        let count = PREDICTED.min(draws.len());
-        let rows: Vec<usize> =
-            (0..count).map(|k| (2 * k + 1) * draws.len() / (2 * count)).collect();
-        let chosen = points.select_rows(&rows);
-        let mut responses = predict::responses(self.study, self.forward, &chosen);
-        for (i, response) in responses.iter_mut().enumerate() {
-            let hyper = &chosen.row(i)[chosen.columns() - own..];
-            let variance = total(&likelihood.predictive(response, hyper));
-            let mut rng = random.at(i as u64).generator();
-            for (y, v) in response.iter_mut().zip(variance) {
-                *y += v.sqrt() * crate::math::random::normal(&mut rng);
-            }
-        }
-        let outputs = self.study.layouts.len();
-        let ends = |p: f64| -> Vec<f64> {
-            let column = |j: usize| responses.iter().map(|r| r[j]).collect::<Vec<f64>>();
-            (0..outputs).map(|j| moments::quantile(&moments::sorted(&column(j)), p)).collect()
-        };
         let map = &calibrated.outcome.map;
         let at_map = &predict::responses(
             self.study,
@@ -262,13 +243,63 @@ impl Work<'_> {
         if !sds.is_empty() {
             spread.push(("replicates".to_owned(), moments::mean(&sds).sqrt()));
         }
-        debug_assert!(d + own <= map.len());
-        Prediction { band: Some((ends(0.025), ends(0.975))), spread }
+        Prediction { band: Some(self.band(draws, likelihood, random)), spread }
+    }
+
+    /// The 95 % band of data simulated at posterior draws. Of long records fewer draws are held, with several data at
+    /// each.
+    fn band(
+        &self,
+        draws: &Draws,
+        likelihood: &dyn Likelihood,
+        random: &Stream,
+    ) -> (Vec<f64>, Vec<f64>) {
+        let outputs = self.study.layouts.len();
+        let wanted = PREDICTED.min(draws.len());
+        let count = predict::affordable(wanted, outputs);
+        let chosen = draws.points().select_rows(&predict::spaced(count, draws.len()));
+        let responses = predict::responses(self.study, self.forward, &chosen);
+        let own = likelihood.hyperparameters().len();
+        let several = wanted.div_ceil(count);
+        let mut noises: Vec<_> =
+            (0..count * several).map(|i| random.at(i as u64).generator()).collect();
+        let mut band = (Vec::with_capacity(outputs), Vec::with_capacity(outputs));
+        // Data and their variances are held for a part of the outputs only, unless these are few.
+        let parts = if wanted * outputs > WHOLE { PARTS } else { 1 };
+        let outputs: Vec<usize> = (0..outputs).collect();
+        for part in outputs.chunks(outputs.len().div_ceil(parts).max(1)) {
+            let simulated: Vec<Vec<f64>> = noises
+                .par_iter_mut()
+                .enumerate()
+                .map(|(i, noise)| {
+                    let (response, point) = (&responses[i % count], chosen.row(i % count));
+                    let hyper = &point[point.len() - own..];
+                    let variance = total(&likelihood.predictive(response, hyper));
+                    let sd = |j: usize| variance.get(j).map_or(0.0, |v: &f64| v.sqrt());
+                    let datum = |&j: &usize| response[j] + sd(j) * normal(noise);
+                    part.iter().map(datum).collect()
+                })
+                .collect();
+            let ends = |j: usize| {
+                let sorted = moments::sorted(&simulated.iter().map(|r| r[j]).collect::<Vec<_>>());
+                [0.025, 0.975].map(|p| moments::quantile(&sorted, p))
+            };
+            let ends: Vec<[f64; 2]> = (0..part.len()).into_par_iter().map(ends).collect();
+            band.0.extend(ends.iter().map(|end| end[0]));
+            band.1.extend(ends.iter().map(|end| end[1]));
+        }
+        band
     }
 }
 
 /// Number of posterior draws behind the predictive band.
 const PREDICTED: usize = 1000;
+
+/// So many simulated numbers are held at once without a thought.
+const WHOLE: usize = 1 << 22;
+
+/// Into how many parts the outputs of longer records are cut.
+const PARTS: usize = 16;
 
 fn total(parts: &[crate::plugin::discrepancy::VariancePart]) -> Vec<f64> {
     let outputs = parts.first().map_or(0, |p| p.variance.len());

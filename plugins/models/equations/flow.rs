@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use lacuna::expression::{Evaluator, Program};
+use lacuna::expression::{DIRECTIONS, Evaluator, Program};
 
 use super::system::System;
 
@@ -22,6 +22,9 @@ struct Work<'s> {
     rates: Evaluator<'s>,
     point: Vec<f64>,
     direction: Vec<f64>,
+    /// The shares of each coordinate in several directions, and the slopes of each rate along them.
+    directions: Vec<[f64; DIRECTIONS]>,
+    slopes: Vec<[f64; DIRECTIONS]>,
     /// The last rate that was no number: its state, its value and where.
     undefined: Option<Undefined>,
 }
@@ -46,7 +49,14 @@ impl<'s> Flow<'s> {
         let variables = system.variables.len();
         point[variables..variables + inputs.len()].copy_from_slice(inputs);
         let rates = Evaluator::new(&system.rates);
-        let work = Work { rates, point, direction: vec![0.0; coordinates], undefined: None };
+        let work = Work {
+            rates,
+            point,
+            direction: vec![0.0; coordinates],
+            directions: vec![[0.0; DIRECTIONS]; coordinates],
+            slopes: vec![[0.0; DIRECTIONS]; system.states.len()],
+            undefined: None,
+        };
         Self { system, inputs, channels, work: RefCell::new(work) }
     }
 
@@ -124,6 +134,37 @@ impl<'s> Flow<'s> {
         work.slopes(time, states, out);
     }
 
+    /// The rates of the states and behind them those of the sensitivities, channel by channel.
+    pub fn all(&self, time: f64, values: &[f64], out: &mut [f64]) {
+        let count = self.system.states.len();
+        let (states, sensitivities) = values.split_at(count);
+        let (rates, their_rates) = out.split_at_mut(count);
+        self.rates(time, states, rates);
+        if sensitivities.is_empty() {
+            return;
+        }
+        let mut work = self.work.borrow_mut();
+        let first = work.direction.len() - count;
+        let Work { rates: evaluator, directions, slopes, .. } = &mut *work;
+        let some = sensitivities.chunks(DIRECTIONS * count);
+        let both = some.zip(their_rates.chunks_mut(DIRECTIONS * count));
+        for (chunk, (sensitivities, rates)) in both.enumerate() {
+            directions.fill([0.0; DIRECTIONS]);
+            for (l, sensitivity) in sensitivities.chunks(count).enumerate() {
+                directions[self.coordinate(chunk * DIRECTIONS + l)][l] = 1.0;
+                for (direction, s) in directions[first..].iter_mut().zip(sensitivity) {
+                    direction[l] = *s;
+                }
+            }
+            evaluator.slopes_together(directions, slopes);
+            for (l, rates) in rates.chunks_mut(count).enumerate() {
+                for (rate, slope) in rates.iter_mut().zip(&*slopes) {
+                    *rate = defined(slope[l]);
+                }
+            }
+        }
+    }
+
     /// The last rate that was no number.
     pub fn undefined(&self) -> Option<Undefined> {
         self.work.borrow().undefined.clone()
@@ -138,13 +179,19 @@ impl Work<'_> {
         self.rates.at(&self.point);
     }
 
-    /// A slope that is no number counts as none: the rate there is none either, or the slope is infinite at the edge
-    /// of where the rate is defined.
     fn slopes(&mut self, time: f64, states: &[f64], out: &mut [f64]) {
         self.go(time, states);
         self.rates.slopes(&self.direction, out);
-        out.iter_mut().filter(|slope| !slope.is_finite()).for_each(|slope| *slope = 0.0);
+        for slope in out {
+            *slope = defined(*slope);
+        }
     }
+}
+
+/// A slope that is no number counts as none: the rate there is none either, or the slope is infinite at the edge of
+/// where the rate is defined.
+fn defined(slope: f64) -> f64 {
+    if slope.is_finite() { slope } else { 0.0 }
 }
 
 /// The start of a run.

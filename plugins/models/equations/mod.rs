@@ -158,6 +158,14 @@ impl Equations {
     }
 }
 
+impl Equations {
+    fn with_derivatives(&self, call: &Call<'_>) -> Result<(Response, Matrix), EvalError> {
+        let Answer { values, jacobian, facts } = self.answer(call, true)?;
+        let missing = || EvalError::Fatal("the derivatives are missing".to_owned());
+        Ok((Response { values, valid: true, facts }, jacobian.ok_or_else(missing)?))
+    }
+}
+
 impl Component for Equations {
     fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
         check::check(self, context, complaints);
@@ -202,8 +210,11 @@ impl Model for Equations {
 
 impl Gradient for Equations {
     fn jacobian(&self, call: &Call<'_>) -> Result<Matrix, EvalError> {
-        let jacobian = self.answer(call, true)?.jacobian;
-        jacobian.ok_or_else(|| EvalError::Fatal("the derivatives are missing".to_owned()))
+        self.with_derivatives(call).map(|(_, jacobian)| jacobian)
+    }
+
+    fn with_response(&self, call: &Call<'_>) -> Option<Result<(Response, Matrix), EvalError>> {
+        Some(self.with_derivatives(call))
     }
 }
 

@@ -39,7 +39,8 @@ pub fn sentences(findings: &Findings) -> Vec<String> {
 }
 
 fn estimate(findings: &Findings, calibration: &CalibrationFindings) -> String {
-    let parameters = calibration.coordinates.iter().take(findings.parameters.len());
+    let (shown, further) = chosen(findings);
+    let parameters = calibration.coordinates.iter().take(shown);
     let values: Vec<String> = parameters
         .map(|c| {
             let unit = coordinate_unit(c);
@@ -49,7 +50,22 @@ fn estimate(findings: &Findings, calibration: &CalibrationFindings) -> String {
             format!("`{}` {}", c.name, unit.join(&format!("{} ({interval})", number(c.mean))))
         })
         .collect();
-    format!("Posterior means with 95 % credible intervals: {}.", values.join("; "))
+    let further = match further {
+        0 => String::new(),
+        further => format!("; those of {further} further parameters are in the table"),
+    };
+    format!("Posterior means with 95 % credible intervals: {}{further}.", values.join("; "))
+}
+
+/// More parameters than this are not all told at the top of the page, but so many.
+const MOST_TOLD: (usize, usize) = (12, 6);
+
+/// How many parameters are told at the top of the page, and how many are not.
+fn chosen(findings: &Findings) -> (usize, usize) {
+    let (most, told) = MOST_TOLD;
+    let all = findings.parameters.len();
+    let shown = if all > most { told } else { all };
+    (shown, all - shown)
 }
 
 fn convergence(calibration: &CalibrationFindings) -> String {
@@ -94,7 +110,7 @@ pub fn case_title(name: &str) -> &str {
 }
 
 fn cards(findings: &Findings, calibration: &CalibrationFindings) -> Markup {
-    let parameters = calibration.coordinates.iter().take(findings.parameters.len());
+    let parameters = calibration.coordinates.iter().take(chosen(findings).0);
     html! {
         div.cards {
             @for c in parameters {

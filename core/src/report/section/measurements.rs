@@ -3,6 +3,7 @@
 use maud::{Markup, html};
 
 use crate::data::Replicate;
+use crate::data::measurements::Summary;
 
 use super::{CurvePanel, Curves, group_word, response_label, response_unit};
 use crate::report::chart::{Axis, Band, Curve, Key, Panel, small_multiples};
@@ -21,7 +22,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
     let replicates = measured.used.replicates();
     let content = html! {
         p {
-            b { (count(replicates)) } " replicates with " (count(measured.used.count()))
+            b { (count(replicates)) } @if replicates == 1 { " replicate with " } @else { " replicates with " } (count(measured.used.count()))
             " measured values; " (count(measured.data_count)) " data enter the likelihood."
             @if !measured.added_curves.is_empty() {
                 " Beside the replicates the likelihood counts these curves of every group as data: "
@@ -38,18 +39,20 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
 fn figure(findings: &Findings, measured: &MeasuredFindings, numbers: &mut Numbers) -> Markup {
     let curves = Curves::of(findings);
     let unit = response_unit(findings);
+    let summaries = measured.used.summaries();
     let panels: Vec<Panel> =
-        curves.panels.iter().map(|outline| panel(measured, outline, &unit)).collect();
+        curves.panels.iter().map(|outline| panel(measured, &summaries, outline, &unit)).collect();
     let values = panels.iter().flat_map(|p| p.curves.iter().flat_map(|c| c.points.iter()));
     let range = extent(values.map(|p| p.1)).unwrap_or((0.0, 1.0));
     let x = Axis::new(curves.label.as_str(), curves.domain).ticks(6);
     let y = Axis::new(response_label(findings), padded(range, 0.06)).ticks(4);
     let drawing = small_multiples(&panels, &x, &y, "measured curves of every group");
-    let mut keys = vec![
-        Key::line("s-replicate", "replicate"),
-        Key::line("s-mean", "mean of the replicates"),
-        Key::area("s-band", "mean ± 1.96 sd of the replicates"),
-    ];
+    let mut keys = vec![Key::line("s-replicate", "replicate")];
+    let repeated = panels.iter().any(|panel| !panel.bands.is_empty());
+    if repeated {
+        keys.push(Key::line("s-mean", "mean of the replicates"));
+        keys.push(Key::area("s-band", "mean ± 1.96 sd of the replicates"));
+    }
     if measured.flagged.iter().any(|f| !f.left_out) {
         keys.insert(1, Key::line("s-flagged", "replicate flagged by the screen"));
     }
@@ -66,14 +69,22 @@ fn figure(findings: &Findings, measured: &MeasuredFindings, numbers: &mut Number
     );
     let caption = Caption::new(
         shows,
-        "the replicates: the band is where single repetitions fall, not the error of their mean.",
+        if repeated {
+            "the replicates: the band is where single repetitions fall, not the error of their mean."
+        } else {
+            ""
+        },
         "curves apart from the others, bands that widen late, gaps.",
     );
     numbers.figure(&drawing, &keys, &caption)
 }
 
-fn panel(measured: &MeasuredFindings, outline: &CurvePanel, unit: &ShownUnit) -> Panel {
-    let summaries = measured.used.summaries();
+fn panel(
+    measured: &MeasuredFindings,
+    summaries: &[Summary],
+    outline: &CurvePanel,
+    unit: &ShownUnit,
+) -> Panel {
     let is_flagged = |replicate: &str| {
         measured.flagged.iter().any(|f| f.replicate == replicate && f.group == outline.title)
     };
@@ -91,20 +102,26 @@ fn panel(measured: &MeasuredFindings, outline: &CurvePanel, unit: &ShownUnit) ->
         .collect();
     curves.sort_by_key(|c| c.class == "s-flagged");
     let mean = |i: usize| if summaries[i].count > 0 { summaries[i].mean } else { f64::NAN };
-    curves.push(Curve {
-        class: "s-mean",
-        name: String::from("mean"),
-        points: outline.curve(|i| unit.show(mean(i))),
-    });
     let edges = |i: usize| {
         let half = 1.96 * summaries[i].sd()?;
         Some((unit.show(mean(i) - half), unit.show(mean(i) + half)))
     };
     let most = outline.places.iter().map(|&(_, i)| summaries[i].count).max().unwrap_or(0);
+    let mut bands = Vec::new();
+    // The mean of one replicate is that replicate.
+    if most > 1 {
+        let points = outline.curve(|i| unit.show(mean(i)));
+        curves.push(Curve { class: "s-mean", name: String::from("mean"), points });
+        bands.push(Band { class: "s-band", edges: outline.band(edges) });
+    }
     Panel {
         title: outline.title.clone(),
-        remark: format!("{} replicates", count(most)),
-        bands: vec![Band { class: "s-band", edges: outline.band(edges) }],
+        remark: if most == 1 {
+            "1 replicate".to_owned()
+        } else {
+            format!("{} replicates", count(most))
+        },
+        bands,
         curves,
     }
 }

@@ -97,10 +97,15 @@ fn curves(findings: &Findings, validation: &ValidationFindings, numbers: &mut Nu
     let x = Axis::new(outlines.label.as_str(), outlines.domain).ticks(6);
     let range = padded(extent(values).unwrap_or((0.0, 1.0)), 0.06);
     let y = Axis::new(response_label(findings), range).ticks(4);
-    let mut keys = vec![
-        Key::line("s-mean", "mean of the replicates"),
-        Key::area("s-band", "replicates' 95 % interval (mean ± 1.96 sd)"),
-    ];
+    let repeated = validation.replicates.iter().any(|(count, ..)| *count > 1);
+    let mut keys = if repeated {
+        vec![
+            Key::line("s-mean", "mean of the replicates"),
+            Key::area("s-band", "replicates' 95 % interval (mean ± 1.96 sd)"),
+        ]
+    } else {
+        vec![Key::line("s-mean", "measured")]
+    };
     for (i, case) in validation.cases.iter().enumerate() {
         let how = if case.simulated { "simulated" } else { "emulated" };
         keys.push(Key::line(classes(i).0, format!("{how} at the {}", case_title(&case.name))));
@@ -108,15 +113,21 @@ fn curves(findings: &Findings, validation: &ValidationFindings, numbers: &mut Nu
     if validation.predictive.is_some() {
         keys.push(Key::line("s-predictive", "posterior predictive 95 %"));
     }
+    let (shows, bands) = if repeated {
+        let shows = "Each group's mean of the replicates with their 95 % interval, and the responses at the \
+             compared parameters; accuracies (share of points inside the interval) above each panel.";
+        let bands = "the grey band is of the replicates; the dotted lines enclose the posterior predictive of a \
+             new replicate.";
+        (shows, bands)
+    } else {
+        let shows =
+            "What was measured in each group, and the responses at the compared parameters.";
+        (shows, "the dotted lines enclose the posterior predictive of a new replicate.")
+    };
     let caption = Caption::new(
-        format!(
-            "Each group's mean of the replicates with their 95 % interval, and the responses at the \
-             compared parameters; accuracies (share of points inside the interval) above each panel.{}",
-            outlines.left_out_sentence()
-        ),
-        "the grey band is of the replicates; the dotted lines enclose the posterior predictive of a new \
-         replicate.",
-        "stretches where the calibrated curve leaves the band on one side: structured disagreement \
+        format!("{shows}{}", outlines.left_out_sentence()),
+        bands,
+        "stretches where the calibrated curve leaves the data on one side: structured disagreement \
          that no choice of these parameters removes.",
     );
     let drawing = small_multiples(&panels, &x, &y, "calibrated simulation against measurements");

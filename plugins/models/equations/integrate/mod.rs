@@ -1,17 +1,21 @@
-//! Integration of the states, with steps by diffsol.
+//! Integration of the states: explicit steps of our own, implicit ones by diffsol.
 //!
 //! C. Tsitouras, Comput. Math. Appl. 62 (2011) 770; G. Byrne and A. Hindmarsh, ACM Trans. Math. Softw. 1 (1975) 71;
 //! L. Shampine and M. Reichelt, SIAM J. Sci. Comput. 18 (1997) 1; J. Jørgensen, M. Kristensen and P. Thomsen,
 //! arXiv 1803.01613 (2018). Of stiffness: E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, 2nd
 //! edition, Springer 1996, section IV.2.
 
+mod explicit;
 mod jumps;
 mod march;
 mod stepper;
 
+use lacuna::study::values::Positive;
+
 use super::flow::{Flow, Start};
 use super::options::{Method, Solver};
 use super::stops::{Stop, stops};
+use explicit::Explicit;
 use march::March;
 use stepper::with_stepper;
 
@@ -72,14 +76,17 @@ struct Run<'r, 'f, 'k> {
 }
 
 impl Run<'_, '_, '_> {
-    /// Runs, and again where an absolute tolerance has proved too large for its state.
+    /// Runs, by an implicit method again where an absolute tolerance has proved too large for its state.
     fn with_tolerances(&mut self, method: Method) -> Result<Effort, String> {
         let relative = self.solver.relative_tolerance.get();
+        let share = SHARE * relative;
+        if matches!(method, Method::Auto | Method::RungeKutta) {
+            return self.explicit(relative, share);
+        }
         if let Some(absolute) = self.solver.absolute_tolerance {
             let tolerances = vec![absolute.get(); self.start.states.len()];
             return self.once(method, &tolerances).map(|(effort, _)| effort);
         }
-        let share = SHARE * relative;
         let size = |x: &f64| share * if *x == 0.0 { 1.0 } else { x.abs() };
         let mut tolerances: Vec<f64> = self.start.states.iter().map(size).collect();
         let (effort, peaks) = self.once(method, &tolerances)?;
@@ -91,12 +98,22 @@ impl Run<'_, '_, '_> {
         if repeat { Ok(self.once(method, &tolerances)?.0) } else { Ok(effort) }
     }
 
-    /// One run; also the largest magnitude of each state.
+    /// One run by the explicit method, whose absolute tolerances follow the states on their way.
+    fn explicit(&mut self, relative: f64, share: f64) -> Result<Effort, String> {
+        let (flow, start) = (self.flow, &self.start);
+        let absolute = self.solver.absolute_tolerance.map(Positive::get);
+        let mut stepper = Explicit::new(flow, start, relative, absolute, share);
+        let watched = self.solver.method == Method::Auto;
+        let mut march = March::new(flow, start, self.solver, self.times, watched);
+        let steps = march.run(&mut stepper, &self.stops, self.sink)?;
+        Ok(Effort { method: Method::RungeKutta, steps })
+    }
+
+    /// One run by an implicit method; also the largest magnitude of each state.
     fn once(&mut self, method: Method, absolute: &[f64]) -> Result<(Effort, Vec<f64>), String> {
         let (flow, start, sink) = (self.flow, &self.start, &mut *self.sink);
-        let watched = self.solver.method == Method::Auto && method == Method::RungeKutta;
         with_stepper(flow, start, self.solver, method, absolute, |stepper| {
-            let mut march = March::new(flow, start, self.solver, self.times, watched);
+            let mut march = March::new(flow, start, self.solver, self.times, false);
             let steps = march.run(stepper, &self.stops, sink)?;
             Ok((Effort { method, steps }, march.peaks))
         })

@@ -1,4 +1,4 @@
-//! Steps by diffsol: the one module that calls it.
+//! Implicit steps by diffsol: the one module that calls it.
 
 use std::marker::PhantomData;
 
@@ -93,10 +93,6 @@ pub fn with_stepper<R>(
     options.min_timestep = f64::MIN_POSITIVE;
     options.max_nonlinear_solver_failures = solver.steps;
     options.derivative_solve_tolerance = SENSITIVITY_SOLVE;
-    if method == Method::RungeKutta {
-        options.max_timestep_growth = Some(5.0);
-        options.min_timestep_shrink = Some(0.2);
-    }
     choose(&problem, method, channels > 0, make_use)
 }
 
@@ -106,21 +102,11 @@ fn choose<E: Equations, R>(
     sensitive: bool,
     make_use: impl FnOnce(&mut dyn Stepper) -> Result<R, String>,
 ) -> Result<R, String> {
-    match (method, sensitive) {
-        (Method::Auto | Method::RungeKutta, false) => {
-            make_use(&mut Steps::new(problem.tsit45().map_err(words)?))
-        }
-        (Method::Auto | Method::RungeKutta, true) => {
-            make_use(&mut Steps::new(problem.tsit45_sens().map_err(words)?))
-        }
-        (Method::Bdf, false) => make_use(&mut Steps::new(problem.bdf::<Linear>().map_err(words)?)),
-        (Method::Bdf, true) => {
-            make_use(&mut Steps::new(problem.bdf_sens::<Linear>().map_err(words)?))
-        }
-        (Method::Esdirk, false) => {
-            make_use(&mut Steps::new(problem.esdirk34::<Linear>().map_err(words)?))
-        }
-        (Method::Esdirk, true) => {
+    match (method == Method::Bdf, sensitive) {
+        (true, false) => make_use(&mut Steps::new(problem.bdf::<Linear>().map_err(words)?)),
+        (true, true) => make_use(&mut Steps::new(problem.bdf_sens::<Linear>().map_err(words)?)),
+        (false, false) => make_use(&mut Steps::new(problem.esdirk34::<Linear>().map_err(words)?)),
+        (false, true) => {
             make_use(&mut Steps::new(problem.esdirk34_sens::<Linear>().map_err(words)?))
         }
     }

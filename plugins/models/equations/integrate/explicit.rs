@@ -1,0 +1,274 @@
+//! The explicit method: the pair of orders 5 and 4 of Tsitouras with its interpolation, states and sensitivities side by
+//! side.
+//!
+//! C. Tsitouras, Comput. Math. Appl. 62 (2011) 770, and the coefficients of the interpolation given there; the control of
+//! the steps is that of E. Hairer, S. Nørsett and G. Wanner, Solving Ordinary Differential Equations I, 2nd edition,
+//! Springer 1993, section II.4.
+
+use super::stepper::Stepper;
+use crate::models::equations::flow::{Flow, Start};
+
+const STAGES: usize = 7;
+
+/// Where in a step the stages lie.
+const PLACES: [f64; STAGES] = [0.0, 0.161, 0.327, 0.9, 0.980_025_540_904_509_7, 1.0, 1.0];
+
+/// The shares of the earlier stages in each; those of the last one are the solution.
+#[rustfmt::skip]
+const SHARES: [[f64; STAGES - 1]; STAGES] = [
+    [0.0; 6],
+    [0.161, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [-0.008_480_655_492_356_989, 0.335_480_655_492_357, 0.0, 0.0, 0.0, 0.0],
+    [2.897_153_057_105_493_5, -6.359_448_489_975_075, 4.362_295_432_869_581_5, 0.0, 0.0, 0.0],
+    [5.325_864_828_439_257, -11.748_883_564_062_828, 7.495_539_342_889_836_5, -0.092_495_066_361_755_25, 0.0, 0.0],
+    [5.861_455_442_946_42, -12.920_969_317_847_11, 8.159_367_898_576_159, -0.071_584_973_281_401, -0.028_269_050_394_068_383, 0.0],
+    [0.096_460_766_818_065_23, 0.01, 0.479_889_650_414_499_6, 1.379_008_574_103_742, -3.290_069_515_436_081, 2.324_710_524_099_774],
+];
+
+/// The solution of order 5 less that of order 4.
+const ERRORS: [f64; STAGES] = [
+    -0.001_780_011_052_225_777,
+    -0.000_816_434_459_656_746_9,
+    0.007_880_878_010_261_995,
+    -0.144_711_007_173_262_9,
+    0.582_357_165_452_555_2,
+    -0.458_082_105_929_186_97,
+    0.015_151_515_151_515_152,
+];
+
+/// The polynomial of each stage's share in the step up to a place, from the first power.
+const BETWEEN: [[f64; 4]; STAGES] = [
+    [1.0, -2.763_706_197_274_826, 2.913_255_461_821_912_6, -1.053_088_497_729_021_6],
+    [0.0, 0.131_7, -0.223_4, 0.101_7],
+    [0.0, 3.930_296_236_894_751_6, -5.941_033_872_131_505, 2.490_627_285_651_253],
+    [0.0, -12.411_077_166_933_676, 30.338_188_630_282_32, -16.548_102_889_244_902],
+    [0.0, 37.509_313_416_511_04, -88.178_904_894_766_4, 47.379_521_962_819_28],
+    [0.0, -27.896_526_289_197_286, 65.091_894_674_793_66, -34.870_657_861_496_61],
+    [0.0, 1.5, -4.0, 2.5],
+];
+
+/// How much shorter or longer than the last a step may be.
+const CHANGE: (f64, f64) = (0.2, 5.0);
+
+/// A step is this much shorter than the error allows.
+const SAFETY: f64 = 0.9;
+
+/// The first step as a share of the way to the first stop, at most.
+const FIRST: f64 = 1e-3;
+
+/// A run by the explicit method.
+pub struct Explicit<'r, 'f> {
+    flow: &'r Flow<'f>,
+    relative: f64,
+    /// The absolute tolerance of each state; those of its sensitivities are divided by the size of the input.
+    absolute: Vec<f64>,
+    /// The absolute tolerance as a share of the largest magnitude of a state up to now, where it follows it.
+    following: Option<f64>,
+    sizes: Vec<f64>,
+    time: f64,
+    stop: f64,
+    /// The length of the next step, if no stop is nearer; zero before the first.
+    length: f64,
+    /// Where the last step began, and its length.
+    last: (f64, f64),
+    /// The states and behind them the sensitivities, channel by channel: now and at the begin of the last step.
+    now: Vec<f64>,
+    before: Vec<f64>,
+    trial: Vec<f64>,
+    scratch: Vec<f64>,
+    /// The rates at the stages of the last step; the last is that at the present moment.
+    rates: [Vec<f64>; STAGES],
+}
+
+impl<'r, 'f> Explicit<'r, 'f> {
+    /// At the start. Without absolute tolerances they are the share `following` of the magnitudes of the states.
+    pub fn new(
+        flow: &'r Flow<'f>,
+        start: &Start,
+        relative: f64,
+        absolute: Option<f64>,
+        following: f64,
+    ) -> Self {
+        let now = [start.states.as_slice(), &start.sensitivities].concat();
+        let absolute_of = |y: &f64| absolute.unwrap_or(following * y.abs());
+        let mut rates: [Vec<f64>; STAGES] = std::array::from_fn(|_| vec![0.0; now.len()]);
+        flow.all(start.time, &now, &mut rates[STAGES - 1]);
+        Self {
+            flow,
+            relative,
+            absolute: start.states.iter().map(absolute_of).collect(),
+            following: absolute.is_none().then_some(following),
+            sizes: (0..flow.channels()).map(|channel| flow.size(channel)).collect(),
+            time: start.time,
+            stop: start.time,
+            length: 0.0,
+            last: (start.time, 0.0),
+            before: now.clone(),
+            trial: now.clone(),
+            scratch: now.clone(),
+            now,
+            rates,
+        }
+    }
+
+    fn count(&self) -> usize {
+        self.absolute.len()
+    }
+
+    /// A step that is short against the way to the first stop and against the time in which a state changes.
+    fn first_length(&self) -> f64 {
+        let count = self.count();
+        let both = self.now[..count].iter().zip(&self.rates[STAGES - 1][..count]);
+        let times = both.filter(|(y, rate)| **y != 0.0 && **rate != 0.0);
+        let times = times.map(|(y, rate)| 0.01 * (y / rate).abs());
+        times.fold(FIRST * (self.stop - self.time), f64::min)
+    }
+
+    /// Fills the stages of a step of this length, and the values at its end into `trial`.
+    fn stages(&mut self, length: f64) {
+        for stage in 1..STAGES {
+            let (done, rest) = self.rates.split_at_mut(stage);
+            self.trial.copy_from_slice(&self.now);
+            for (share, rates) in SHARES[stage].iter().zip(&*done) {
+                add(length * share, rates, &mut self.trial);
+            }
+            self.flow.all(self.time + PLACES[stage] * length, &self.trial, &mut rest[0]);
+        }
+    }
+
+    /// The error of the trial in tolerances: the largest root mean square of the states and of those of each channel.
+    fn error(&mut self, length: f64) -> f64 {
+        let count = self.count();
+        self.scratch.fill(0.0);
+        for (share, rates) in ERRORS.iter().zip(&self.rates) {
+            add(length * share, rates, &mut self.scratch);
+        }
+        let mut largest = 0.0_f64;
+        for first in (0..self.now.len()).step_by(count) {
+            let size = if first == 0 { 1.0 } else { self.sizes[first / count - 1] };
+            let mut sum = 0.0;
+            for i in first..first + count {
+                let error = self.scratch[i];
+                if error != 0.0 {
+                    let magnitude = self.now[i].abs().max(self.trial[i].abs());
+                    let absolute = self.absolute_with_trial(i - first) / size;
+                    sum += (error / (self.relative * magnitude + absolute)).powi(2);
+                }
+            }
+            if sum.is_nan() {
+                return f64::INFINITY;
+            }
+            largest = largest.max(sum / count as f64);
+        }
+        largest.sqrt()
+    }
+
+    fn absolute_with_trial(&self, state: usize) -> f64 {
+        let follow = |share| share * f64::abs(self.trial[state]);
+        self.following.map_or(0.0, follow).max(self.absolute[state])
+    }
+}
+
+/// Adds a multiple of some numbers to others.
+fn add(factor: f64, numbers: &[f64], to: &mut [f64]) {
+    to.iter_mut().zip(numbers).for_each(|(to, number)| *to += factor * number);
+}
+
+/// How much longer the next step may be after this error, in tolerances.
+fn change(error: f64) -> f64 {
+    let (least, most) = CHANGE;
+    // The fifth power of what allows the longest step: nearly all errors are below it where stops are dense.
+    if error < (SAFETY / most).powi(5) {
+        return most;
+    }
+    (SAFETY * error.powf(-0.2)).clamp(least, most)
+}
+
+impl Stepper for Explicit<'_, '_> {
+    fn step(&mut self) -> Result<bool, String> {
+        if self.length == 0.0 {
+            self.length = self.first_length();
+        }
+        self.rates.swap(0, STAGES - 1);
+        loop {
+            let rest = self.stop - self.time;
+            // A little further rather than a crumb that is left over.
+            let stops = 1.01 * self.length >= rest;
+            let length = if stops { rest } else { self.length };
+            let end = if stops { self.stop } else { self.time + length };
+            if end <= self.time {
+                return Err("no step is short enough for the tolerance".to_owned());
+            }
+            self.stages(length);
+            let error = self.error(length);
+            let change = change(error);
+            if error <= 1.0 {
+                for state in 0..self.count() {
+                    self.absolute[state] = self.absolute_with_trial(state);
+                }
+                std::mem::swap(&mut self.before, &mut self.now);
+                std::mem::swap(&mut self.now, &mut self.trial);
+                self.last = (self.time, length);
+                self.time = end;
+                // That a stop was near says nothing against the length that was planned.
+                self.length = (change * length).max(if stops { self.length } else { 0.0 });
+                return Ok(stops);
+            }
+            self.length = change.min(SAFETY) * length;
+        }
+    }
+
+    fn stop_at(&mut self, time: f64) -> bool {
+        self.stop = time;
+        time > self.time
+    }
+
+    fn time(&self) -> f64 {
+        self.time
+    }
+
+    fn length(&self) -> f64 {
+        if self.last.1 > 0.0 { self.last.1 } else { self.length }
+    }
+
+    fn states(&self) -> &[f64] {
+        &self.now[..self.count()]
+    }
+
+    fn sensitivities(&self, out: &mut [f64]) {
+        out.copy_from_slice(&self.now[self.count()..]);
+    }
+
+    fn interpolate(
+        &mut self,
+        time: f64,
+        states: &mut [f64],
+        sensitivities: &mut [f64],
+    ) -> Result<(), String> {
+        let values = states.iter_mut().chain(sensitivities);
+        let (begin, length) = self.last;
+        if time >= self.time || length == 0.0 {
+            values.zip(&self.now).for_each(|(value, now)| *value = *now);
+            return Ok(());
+        }
+        let place = (time - begin) / length;
+        let share =
+            |[a, b, c, d]: [f64; 4]| length * place * (a + place * (b + place * (c + place * d)));
+        let shares = BETWEEN.map(share);
+        self.scratch.copy_from_slice(&self.before);
+        for (share, rates) in shares.iter().zip(&self.rates) {
+            add(*share, rates, &mut self.scratch);
+        }
+        values.zip(&self.scratch).for_each(|(value, found)| *value = *found);
+        Ok(())
+    }
+
+    fn go_on(&mut self, time: f64, rates: &[f64], sensitivities: &[f64], their_rates: &[f64]) {
+        let count = self.count();
+        self.time = time;
+        self.now[count..].copy_from_slice(sensitivities);
+        let (own, theirs) = self.rates[STAGES - 1].split_at_mut(count);
+        own.copy_from_slice(rates);
+        theirs.copy_from_slice(their_rates);
+    }
+}
