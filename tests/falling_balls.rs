@@ -69,8 +69,8 @@ fn study(drops: &BTreeMap<String, Drop>) -> String {
         [sampler]
         use = "no_u_turn"
         metric = "dense"
-        warm_up = 120
-        steps = 520
+        warm_up = 300
+        steps = 1300
         "#
     );
     for name in drops.keys() {
