@@ -2,19 +2,19 @@
 
 use std::ops::Range;
 
-use crate::data::{Layout, Layouts};
+use crate::linalg::vector::dot;
 use crate::linalg::{Matrix, transposed_multiply_vector};
 use crate::plugin::discrepancy::Compressed;
+use crate::plugin::effect::Placed;
 use crate::plugin::forward::Linear;
-use crate::plugin::{Effect, Fact, Forward, Hyperparameter, Likelihood};
+use crate::plugin::{Fact, Forward, Hyperparameter, Likelihood};
 
 use super::LogLikelihood;
 
 /// See the module. The hyperparameters are those of the effects, then those of the discrepancy.
 pub struct OfData<'a> {
-    layouts: &'a Layouts,
     forward: &'a dyn Forward,
-    effects: Vec<(&'a dyn Effect, Range<usize>)>,
+    effects: Vec<(Placed<'a>, Range<usize>)>,
     likelihood: &'a dyn Likelihood,
     reduced: Option<(&'a dyn Linear, Box<dyn Compressed>)>,
     hyper: Vec<Hyperparameter>,
@@ -23,25 +23,24 @@ pub struct OfData<'a> {
 impl<'a> OfData<'a> {
     /// Joins the parts. Without effects and with a linear forward map the likelihood is compressed.
     pub fn new(
-        layouts: &'a Layouts,
         forward: &'a dyn Forward,
-        effects: &[&'a dyn Effect],
+        effects: Vec<Placed<'a>>,
         likelihood: &'a dyn Likelihood,
     ) -> Self {
         let mut hyper = Vec::new();
         let mut placed = Vec::new();
-        for &effect in effects {
+        for effect in effects {
             let begin = hyper.len();
-            hyper.extend(effect.parameters(&layouts.blocks[0]));
+            hyper.extend(effect.hyperparameters());
             placed.push((effect, begin..hyper.len()));
         }
         hyper.extend_from_slice(likelihood.hyperparameters());
-        let reduced = if effects.is_empty() {
+        let reduced = if placed.is_empty() {
             forward.linear().and_then(|linear| Some((linear, likelihood.compress(linear)?)))
         } else {
             None
         };
-        Self { layouts, forward, effects: placed, likelihood, reduced, hyper }
+        Self { forward, effects: placed, likelihood, reduced, hyper }
     }
 
     /// The response at natural values: that of the forward map with the effects applied, and the discrepancy's
@@ -58,17 +57,39 @@ impl<'a> OfData<'a> {
 
     fn with_effects(&self, mut response: Vec<f64>, hyper: &[f64]) -> Vec<f64> {
         for (effect, range) in &self.effects {
-            response = apply(*effect, self.layouts, &response, &hyper[range.clone()]);
+            response = effect.apply(&response, &hyper[range.clone()]);
         }
         response
     }
-}
 
-/// An effect applied to the responses of all blocks.
-pub fn apply(effect: &dyn Effect, layouts: &Layouts, response: &[f64], values: &[f64]) -> Vec<f64> {
-    let one =
-        |(layout, range): (&Layout, Range<usize>)| effect.apply(layout, &response[range], values);
-    layouts.parts().flat_map(one).collect()
+    /// The response, and its derivatives by the parameters and then by the effects' unknowns, one a row.
+    fn tangents(&self, theta: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let row = Matrix::from_vec(1, theta.len(), theta.to_vec());
+        let mut response = self.forward.mean(&row).row(0).to_vec();
+        let slopes = self.forward.jacobian(theta);
+        let mut tangents: Vec<Vec<f64>> = (0..theta.len()).map(|j| slopes.column(j)).collect();
+        for (effect, range) in &self.effects {
+            let values = &hyper[range.clone()];
+            for tangent in &mut tangents {
+                *tangent = effect.push_forward(&response, values, tangent);
+            }
+            let own = effect.by_parameters(&response, values);
+            tangents.extend((0..values.len()).map(|j| own.column(j)));
+            response = effect.apply(&response, values);
+        }
+        (response, tangents)
+    }
+
+    fn gradient_without_effects(&self, theta: &[f64], hyper: &[f64]) -> Vec<f64> {
+        let row = Matrix::from_vec(1, theta.len(), theta.to_vec());
+        let mean = self.forward.mean(&row);
+        if mean.row(0).iter().any(|y| !y.is_finite()) {
+            return vec![0.0; theta.len() + hyper.len()];
+        }
+        let (weight, by_own) = self.likelihood.gradient(mean.row(0), hyper);
+        let by_theta = transposed_multiply_vector(&self.forward.jacobian(theta), &weight);
+        [by_theta, by_own].concat()
+    }
 }
 
 impl LogLikelihood for OfData<'_> {
@@ -99,32 +120,17 @@ impl LogLikelihood for OfData<'_> {
             let (by_theta, by_hyper) = compressed.gradient_at(*linear, theta, hyper);
             return [by_theta, by_hyper].concat();
         }
-        let row = Matrix::from_vec(1, theta.len(), theta.to_vec());
-        let mut responses = vec![self.forward.mean(&row).row(0).to_vec()];
-        for (effect, range) in &self.effects {
-            let before = &responses[responses.len() - 1];
-            responses.push(apply(*effect, self.layouts, before, &hyper[range.clone()]));
+        if self.effects.is_empty() {
+            return self.gradient_without_effects(theta, hyper);
         }
-        let last = &responses[responses.len() - 1];
-        if last.iter().any(|y| !y.is_finite()) {
+        let (response, tangents) = self.tangents(theta, hyper);
+        if response.iter().any(|y| !y.is_finite()) {
             return vec![0.0; theta.len() + hyper.len()];
         }
-        let (mut weight, by_own) = self.likelihood.gradient(last, &hyper[self.own()..]);
-        let mut by_effects = vec![0.0; self.own()];
-        for ((effect, range), before) in self.effects.iter().zip(&responses).rev() {
-            let values = &hyper[range.clone()];
-            let mut pulled = Vec::with_capacity(weight.len());
-            for (layout, part) in self.layouts.parts() {
-                let jacobian = effect.by_parameters(layout, &before[part.clone()], values);
-                let slopes = transposed_multiply_vector(&jacobian, &weight[part.clone()]);
-                by_effects[range.clone()].iter_mut().zip(slopes).for_each(|(b, s)| *b += s);
-                let (before, weight) = (&before[part.clone()], &weight[part]);
-                pulled.extend(effect.pull_back(layout, before, values, weight));
-            }
-            weight = pulled;
-        }
-        let by_theta = transposed_multiply_vector(&self.forward.jacobian(theta), &weight);
-        [by_theta, by_effects, by_own].concat()
+        let (weight, by_own) = self.likelihood.gradient(&response, &hyper[self.own()..]);
+        let mut all: Vec<f64> = tangents.iter().map(|tangent| dot(tangent, &weight)).collect();
+        all.extend(by_own);
+        all
     }
 
     fn facts(&self) -> Vec<Fact> {
