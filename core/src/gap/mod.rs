@@ -1,0 +1,7 @@
+//! The gap workflow: where simulation and data disagree, what is missing, and whether the gap shrinks with it.
+
+pub mod experiment;
+pub mod fit;
+pub mod noise;
+pub mod system;
+pub mod whitener;
