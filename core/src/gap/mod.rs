@@ -5,3 +5,5 @@ pub mod fit;
 pub mod noise;
 pub mod system;
 pub mod whitener;
+pub mod candidates;
+pub mod locate;
