@@ -6,8 +6,8 @@ mod regions;
 mod scan;
 mod score;
 
-pub use null::{Nulls, Statistics, probability};
+pub use null::{Bench, Nulls, Statistics, common_error, probability};
 pub use projection::Projection;
 pub use regions::{Region, regions};
 pub use scan::{Cell, Scan};
-pub use score::{Direction, Directions, Scores};
+pub use score::{Direction, Directions, Scores, Spread, differences};

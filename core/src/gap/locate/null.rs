@@ -54,7 +54,8 @@ impl Nulls {
 
     /// The probability of the best cell of all.
     pub fn of_scan(&self, statistics: &Statistics) -> f64 {
-        let largest = |cells: &mut dyn Iterator<Item = f64>| cells.fold(f64::NEG_INFINITY, f64::max);
+        let largest =
+            |cells: &mut dyn Iterator<Item = f64>| cells.fold(f64::NEG_INFINITY, f64::max);
         let null: Vec<f64> =
             self.cells.iter().map(|cells| largest(&mut cells.iter().copied())).collect();
         probability(&null, largest(&mut statistics.cells.iter().map(|cell| cell.statistic)))

@@ -34,7 +34,8 @@ pub fn regions(
     let mut p: f64 = 0.0;
     for (step, &place) in order.iter().enumerate() {
         let rest = &order[step..];
-        let largest = |null: &Vec<f64>| rest.iter().map(|&q| null[q]).fold(f64::NEG_INFINITY, f64::max);
+        let largest =
+            |null: &Vec<f64>| rest.iter().map(|&q| null[q]).fold(f64::NEG_INFINITY, f64::max);
         let null: Vec<f64> = nulls.cells.iter().map(largest).collect();
         p = p.max(super::probability(&null, cells[place].statistic));
         if p > level {

@@ -85,7 +85,8 @@ impl Directions {
         let mut rows = Matrix::zeros(0, experiment.outputs());
         let mut squares = Vec::new();
         for (c, candidate) in candidates.iter().enumerate() {
-            let own: Vec<usize> = (0..suspects.len()).filter(|&s| suspects[s].candidate == c).collect();
+            let own: Vec<usize> =
+                (0..suspects.len()).filter(|&s| suspects[s].candidate == c).collect();
             let slopes = slopes(experiment, candidate, situation);
             for s in own {
                 let placed = suspects[s].placed(experiment, candidates, "");
@@ -145,8 +146,8 @@ impl Directions {
                 let squares = parts.iter_rows().zip(&spread.weights);
                 let own: f64 = squares.map(|(row, w)| w * row[j] * row[j]).sum();
                 let model = (1.0 - self.common[j]).max(0.0);
-                let moderated = (MODERATION * model + spread.freedom * own)
-                    / (MODERATION + spread.freedom);
+                let moderated =
+                    (MODERATION * model + spread.freedom * own) / (MODERATION + spread.freedom);
                 mean / (moderated + self.common[j]).sqrt().max(f64::MIN_POSITIVE)
             })
             .collect();
