@@ -91,12 +91,20 @@ impl<'a> Experiment<'a> {
         }
         let (common, region) = (Vec::new(), None);
         let mut all = Self { layouts, parameters, forward, common, region, conditions, curves };
-        let (counts, _) = all.means();
         for curve in &mut all.curves {
-            let places = curve.outputs.clone().zip(&curve.at);
-            (curve.measured, curve.at) = places.filter(|(i, _)| counts[*i] > 0.0).unzip();
+            curve.measured = curve.outputs.clone().collect();
         }
-        all
+        all.remeasured()
+    }
+
+    /// The same whose curves have only the values that some replicate of these measured.
+    pub fn remeasured(mut self) -> Self {
+        let (counts, _) = self.means();
+        for curve in &mut self.curves {
+            let places = curve.measured.iter().zip(&curve.at);
+            (curve.measured, curve.at) = places.filter(|(i, _)| counts[**i] > 0.0).unzip();
+        }
+        self
     }
 
     /// The replicates of a curve that measured all that any of them did: its values, one replicate after another.

@@ -6,5 +6,6 @@ pub mod fit;
 pub mod locate;
 pub mod name;
 pub mod noise;
+pub mod prove;
 pub mod system;
 pub mod whitener;

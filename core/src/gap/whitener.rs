@@ -10,6 +10,7 @@ use crate::linalg::{
     Matrix, multiply, multiply_transposed, multiply_vector, symmetric_eigen, transposed_multiply,
     transposed_multiply_vector,
 };
+use crate::plugin::discrepancy::CommonError;
 
 /// Directions of a whitened covariance below this share of the white noise do not count.
 const NEGLIGIBLE: f64 = 1e-6;
@@ -129,6 +130,24 @@ fn decorrelate(factor: &Matrix, curves: &mut [Vec<f64>]) {
             curves[i][t] = (curves[i][t] - known) / factor[(i, i)];
         }
     }
+}
+
+/// The experiment's common errors in as few directions as the noise lets matter: those whose variance is below a hundredth of
+/// the noise's are left out.
+pub fn condensed(experiment: &Experiment<'_>, noise: &Noise, response: &[f64]) -> Vec<CommonError> {
+    let alone = Experiment { common: Vec::new(), ..experiment.clone() };
+    let whitener = Whitener::new(&alone, noise, response);
+    let condense = |error: &CommonError| {
+        let white = whitener.whiten_rows(&error.factor.transposed());
+        let Ok(eigen) = symmetric_eigen(&multiply_transposed(&white, &white)) else {
+            return error.clone();
+        };
+        let kept: Vec<usize> =
+            (0..eigen.values.len()).filter(|&k| eigen.values[k] > 0.01).collect();
+        let factor = multiply(&error.factor, &eigen.vectors.select_columns(&kept));
+        CommonError { factor, ..error.clone() }
+    };
+    experiment.common.iter().map(condense).collect()
 }
 
 /// Factors of the covariance of the mean that wander of whole replicates makes, by curve and shared.

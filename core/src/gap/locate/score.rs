@@ -10,7 +10,7 @@ use super::projection::Projection;
 use crate::gap::candidates::{Candidate, Suspect};
 use crate::gap::experiment::Experiment;
 use crate::gap::whitener::Whitener;
-use crate::linalg::vector::dot;
+use crate::linalg::vector::{dot, norm};
 use crate::linalg::{Matrix, multiply_transposed, multiply_vector};
 use crate::plugin::effect::{On, Placed, Situation};
 
@@ -188,7 +188,11 @@ pub fn differences(experiment: &Experiment<'_>) -> (Matrix, Spread) {
     (rows, Spread { weights, freedom })
 }
 
-/// The slope by the size of a candidate that acts everywhere, for the indices of each of its starts.
+/// A slope that is this much smaller than the change over its start is none: the effect is of second order.
+const FLAT: f64 = 1e-6;
+
+/// What a candidate that acts everywhere does per unit of its size, with a start: for each setting of its indices the
+/// slope at absence, or where that vanishes the change over each start.
 fn slopes(
     experiment: &Experiment<'_>,
     candidate: &Candidate,
@@ -197,15 +201,25 @@ fn slopes(
     let layout = &experiment.layouts.blocks[0];
     let placed = Placed::new("", &*candidate.effect, experiment.layouts, &On::new());
     let absent = placed.absent();
-    let mut seen: Vec<Vec<f64>> = Vec::new();
+    let mut by_indices: Vec<(Vec<f64>, bool)> = Vec::new();
     let mut slopes = Vec::new();
     for start in candidate.effect.starts(layout, situation) {
-        if seen.iter().any(|other| other[..] == start[1..]) {
+        let known = by_indices.iter().find(|(indices, _)| indices[..] == start[1..]);
+        if known.is_some_and(|(_, sloping)| *sloping) {
             continue;
         }
-        seen.push(start[1..].to_vec());
-        let values = [&absent[..1], &start[1..]].concat();
-        let slope = placed.by_parameters(situation.response, &values).column(0);
+        let change = placed.apply(situation.response, &start);
+        let over = |(with, without): (&f64, &f64)| (with - without) / (start[0] - absent[0]);
+        let mut slope: Vec<f64> = change.iter().zip(situation.response).map(over).collect();
+        if known.is_none() {
+            let values = [&absent[..1], &start[1..]].concat();
+            let tangent = placed.by_parameters(situation.response, &values).column(0);
+            let sloping = norm(&tangent) > FLAT * norm(&slope);
+            by_indices.push((start[1..].to_vec(), sloping));
+            if sloping {
+                slope = tangent;
+            }
+        }
         if slope.iter().all(|x| x.is_finite()) {
             slopes.push((start, slope));
         }

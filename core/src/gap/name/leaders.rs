@@ -6,13 +6,14 @@ use rayon::prelude::*;
 
 use super::evidence::weigh;
 use super::placement::log_prior;
-use crate::data::Layout;
 use crate::gap::candidates::{Candidate, Suspect};
 use crate::gap::fit::{Fit, fit_from};
-use crate::gap::locate::{Directions, Scores};
+use crate::gap::locate::{Directions, Projection, Scores};
 use crate::gap::system::System;
 use crate::gap::whitener::Whitener;
+use crate::linalg::Matrix;
 use crate::math::random::Stream;
+use crate::plugin::effect::Situation;
 
 /// The number of suspects that are refitted at least.
 const LEADERS: usize = 10;
@@ -23,7 +24,10 @@ const WITHIN: f64 = 10.0;
 /// The most suspects that are refitted.
 const MOST: usize = 24;
 
-/// Starts of a refit: the best directions of a suspect, each with both signs of its size.
+/// The best directions of a suspect give starts with the sizes that their scores estimate.
+const SCORED: usize = 8;
+
+/// Starts of a refit, of all those that a suspect has: the nearest to the data.
 const STARTS: usize = 3;
 
 /// A suspect with its best fit.
@@ -71,29 +75,30 @@ pub struct Lead {
 
 /// The suspects worth a refit, the best first; of every candidate at least the best place when it is near.
 pub fn leads(
-    layout: &Layout,
     suspects: &[Suspect],
     candidates: &[Candidate],
     directions: &Directions,
     scores: &Scores,
+    situation: &Situation<'_>,
 ) -> Vec<Lead> {
     let mut by_suspect: BTreeMap<usize, Vec<(f64, usize)>> = BTreeMap::new();
     for (j, direction) in directions.all.iter().enumerate() {
         let strength = direction.strength(scores.values[j]);
         by_suspect.entry(direction.suspect).or_default().push((strength, j));
     }
+    let layout = &situation.layouts.blocks[0];
     let mut leads: Vec<Lead> = Vec::new();
     for (suspect, mut own) in by_suspect {
         own.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let effect = &candidates[suspects[suspect].candidate].effect;
         let absent = effect.absent(layout)[0];
-        let starts = own.iter().take(STARTS).map(|&(_, j)| {
+        let starts = own.iter().take(SCORED).map(|&(_, j)| {
             let mut start = directions.all[j].start.clone();
             // A step of the size that the score itself estimates.
             start[0] = absent + scores.values[j] / directions.all[j].length;
             start
         });
-        let given = own.iter().take(STARTS).map(|&(_, j)| directions.all[j].start.clone());
+        let given = effect.starts(layout, situation);
         leads.push(Lead {
             suspect: suspects[suspect].clone(),
             score: own[0].0,
@@ -126,14 +131,12 @@ pub fn one(desk: &Desk<'_, '_>, base: &Fit, lead: &Lead, stream: &Stream) -> Opt
     let system = desk.with(&lead.suspect);
     let bounds = system.bounds();
     let begin = base.at.point.len();
-    let starts: Vec<Vec<f64>> = lead
-        .starts
-        .iter()
-        .map(|own| {
-            let own = own.iter().zip(&bounds[begin..]).map(|(x, (lo, hi))| x.clamp(*lo, *hi));
-            base.at.point.iter().copied().chain(own).collect()
-        })
-        .collect();
+    let clamped = lead.starts.iter().map(|own| -> Vec<f64> {
+        own.iter().zip(&bounds[begin..]).map(|(x, (lo, hi))| x.clamp(*lo, *hi)).collect()
+    });
+    let starts = desk.nearest(base, &lead.suspect, clamped.collect());
+    let starts: Vec<Vec<f64>> =
+        starts.iter().map(|own| base.at.point.iter().chain(own).copied().collect()).collect();
     let fit = fit_from(&system, desk.whitener, desk.means, &starts)?;
     let weighed = weigh(&system, desk.whitener, desk.means, &fit, stream);
     Some(Judged {
@@ -157,6 +160,25 @@ impl<'a> Desk<'a, '_> {
             name = format!("{kind}_{count}");
         }
         self.system.with(suspect.placed(self.system.experiment, self.candidates, &name))
+    }
+
+    /// The starts of a suspect's parameters whose responses come nearest to the data when the calibrated unknowns follow
+    /// along their slopes.
+    fn nearest(&self, base: &Fit, suspect: &Suspect, starts: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        if starts.len() <= STARTS {
+            return starts;
+        }
+        let placed = suspect.placed(self.system.experiment, self.candidates, "");
+        let misfit = |start: &Vec<f64>| -> Vec<f64> {
+            let response = placed.apply(&base.at.response, start);
+            self.means.iter().zip(response).map(|(y, m)| y - m).collect()
+        };
+        let misfits = Matrix::from_rows(self.means.len(), starts.iter().map(misfit));
+        let white = self.whitener.whiten_rows(&misfits);
+        let (_, squares) = Projection::of(self.system, base).rest_of_rows(white);
+        let mut order: Vec<usize> = (0..starts.len()).filter(|&i| squares[i].is_finite()).collect();
+        order.sort_by(|&a, &b| squares[a].total_cmp(&squares[b]));
+        order.into_iter().take(STARTS).map(|i| starts[i].clone()).collect()
     }
 
     /// The log prior mass of a suspect: its place's, and its share of its type's.

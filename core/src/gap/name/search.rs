@@ -1,122 +1,48 @@
 //! The search: forward with a gate, with groups, deletions and pairs, until nothing is left or nothing helps.
 
+use super::consistency::consistency;
 use super::groups::grow;
-use super::leaders::{Desk, Judged, judge, leads};
-use crate::gap::candidates::{Candidate, Suspect, suspects};
+use super::leaders::{Judged, Lead, judge, leads};
+use super::look::{Found, Look, Options, Step, Visible};
+use super::stability::stability;
+use super::state::{Common, State, kinds};
+use crate::gap::candidates::{Candidate, Suspect, sensors, suspects};
 use crate::gap::experiment::Experiment;
-use crate::gap::fit::{Fit, fit, fit_from};
-use crate::gap::locate::{Bench, Directions, Nulls, Projection, Region, Scan, Statistics, regions};
+use crate::gap::fit::fit_from;
+use crate::gap::locate::{
+    Bench, Directions, Nulls, Projection, Scan, Scores, differences, regions,
+};
 use crate::gap::noise::Noise;
 use crate::gap::system::System;
 use crate::gap::whitener::Whitener;
 use crate::math::random::Stream;
 use crate::plugin::effect::{On, Situation};
 
-/// How a search judges.
-#[derive(Debug, Clone, Copy)]
-pub struct Options {
-    /// The probability of naming an effect where there is none.
-    pub naming: f64,
-    /// The probability of finding a gap without a name where there is none.
-    pub unlisted: f64,
-    /// Simulations of the nulls.
-    pub simulations: usize,
-    /// The most effects.
-    pub most: usize,
-}
-
-/// A calibrated system as the tests see it.
-#[derive(Clone)]
-pub struct Look {
-    /// The unknowns and the response.
-    pub fit: Fit,
-    /// The statistics.
-    pub statistics: Statistics,
-    /// The energy of the residual that noise and common errors alone have.
-    pub expected_energy: f64,
-    /// The probabilities of the largest score, of the best cell and of the energy when nothing is missing.
-    pub p: [f64; 3],
-    /// Where data and model disagree.
-    pub regions: Vec<Region>,
-    /// What can be seen of each suspect: the share that is absorbed, and the size found in 80 % of cases.
-    pub visible: Vec<Visible>,
-}
-
-/// What an experiment can see of a suspect.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Visible {
-    /// The name of its plugin.
-    pub kind: String,
-    /// Where it acts.
-    pub on: On,
-    /// The share of it that the calibrated unknowns absorb, for the direction that shows best.
-    pub absorbed: f64,
-    /// The smallest change of its size that would be found in 80 % of cases, by linearisation.
-    pub smallest: f64,
-}
-
-/// One step of the path.
-#[derive(Clone)]
-pub struct Step {
-    /// The system before it.
-    pub before: Look,
-    /// What was weighed, the heaviest first.
-    pub judged: Vec<Judged>,
-    /// What was added.
-    pub added: Vec<Suspect>,
-    /// The names of effects that were dropped after it.
-    pub dropped: Vec<String>,
-}
-
-/// What a search found.
-#[derive(Clone)]
-pub struct Found<'a> {
-    /// The steps.
-    pub path: Vec<Step>,
-    /// The system at the end.
-    pub system: System<'a>,
-    /// Its effects as suspects.
-    pub chosen: Vec<Suspect>,
-    /// The system at the end as the tests see it.
-    pub last: Look,
-    /// The probability of each type for each effect, in the place of the one chosen, the most probable first.
-    pub types: Vec<Vec<(String, f64)>>,
-    /// The noise of the replicates.
-    pub noise: Noise,
-    /// Made of it.
-    pub whitener: Whitener,
-    /// The replicates' means.
-    pub means: Vec<f64>,
-}
-
 /// The normal quantile of 80 %.
 const EIGHTY: f64 = 0.8416;
+
+/// Suspects this much lighter than the heaviest, in logarithms, are no seeds of groups.
+const RIVAL: f64 = 20.0;
 
 /// Leaders of each step that are tried in pairs.
 const PAIRED: usize = 10;
 
-/// The state of a search.
+/// Rounds in which effects that have better rivals are exchanged for them.
+const EXCHANGES: usize = 3;
+
+/// A search: what does not change on its path.
 struct Search<'a> {
     experiment: &'a Experiment<'a>,
     candidates: &'a [Candidate],
     suspects: Vec<Suspect>,
     scan: Scan,
     means: Vec<f64>,
-    sensors: Vec<On>,
+    sensors: usize,
     options: Options,
     stream: Stream,
 }
 
-/// A system with its fit and what is made of it.
-struct State<'a> {
-    system: System<'a>,
-    chosen: Vec<Suspect>,
-    fit: Fit,
-    noise: Noise,
-    whitener: Whitener,
-}
-
-/// Searches for what is missing, from starting points of the parameters.
+/// Searches for what is missing, from starting points of the parameters; `None` when the forward map has no answer there.
 pub fn search<'a>(
     experiment: &'a Experiment<'a>,
     candidates: &'a [Candidate],
@@ -130,24 +56,54 @@ pub fn search<'a>(
         suspects: suspects(experiment, candidates),
         scan: Scan::new(experiment),
         means: experiment.means().1,
-        sensors: crate::gap::candidates::sensors(experiment),
+        sensors: sensors(experiment).len(),
         options,
         stream: stream.named("search"),
     };
     let mut state = search.base(starts)?;
-    let mut path = Vec::new();
+    let mut path: Vec<Step> = Vec::new();
     let last = loop {
         let round = path.len() as u64;
         let (look, directions) = search.look(&state, round);
         let Some(step) = search.step(&mut state, &look, &directions, round) else { break look };
         path.push(step);
     };
-    let types = search.types(&state, &path);
+    let slots = search.slots(&state, &path);
+    let stability = match slots.last() {
+        Some(judged) => {
+            let smaller = state.without(&search.common(), state.chosen.len() - 1);
+            stability(experiment, &smaller.desk(&search.common()), judged)
+        }
+        None => 1.0,
+    };
+    let consistency = consistency(&state.system, &state.fit, &state.whitener);
+    let types = slots.iter().map(|judged| search.shares(judged)).collect();
     let State { system, chosen, noise, whitener, .. } = state;
-    Some(Found { path, system, chosen, last, types, noise, whitener, means: search.means })
+    let means = search.means;
+    Some(Found {
+        path,
+        system,
+        chosen,
+        last,
+        types,
+        consistency,
+        stability,
+        noise,
+        whitener,
+        means,
+    })
 }
 
 impl<'a> Search<'a> {
+    fn common<'b>(&'b self) -> Common<'a, 'b> {
+        Common {
+            experiment: self.experiment,
+            candidates: self.candidates,
+            means: &self.means,
+            sensors: self.sensors,
+        }
+    }
+
     /// The calibration without effects: noise around a first fit, then around the fit with that noise.
     fn base(&self, starts: &[Vec<f64>]) -> Option<State<'a>> {
         let system = System::new(self.experiment, Vec::new());
@@ -165,22 +121,25 @@ impl<'a> Search<'a> {
         state
     }
 
-    fn desk<'b>(&'b self, state: &'b State<'a>) -> Desk<'a, 'b> {
-        Desk {
-            system: &state.system,
-            candidates: self.candidates,
-            whitener: &state.whitener,
-            means: &self.means,
-            sensors: self.sensors.len(),
-        }
+    /// What candidates may see of a state, handed to `use_it`.
+    fn situated<T>(&self, state: &State<'_>, use_it: impl FnOnce(&Situation<'_>) -> T) -> T {
+        let response = &state.fit.at.response;
+        let noise = state.noise.sd(self.experiment, response);
+        use_it(&Situation { layouts: self.experiment.layouts, response, noise: &noise })
     }
 
     fn directions(&self, state: &State<'_>, projection: &Projection) -> Directions {
-        let response = &state.fit.at.response;
-        let noise = state.noise.sd(self.experiment, response);
-        let situation = Situation { layouts: self.experiment.layouts, response, noise: &noise };
         let (whitener, suspects) = (&state.whitener, &self.suspects);
-        Directions::of(self.experiment, self.candidates, suspects, &situation, whitener, projection)
+        self.situated(state, |situation| {
+            let (experiment, candidates) = (self.experiment, self.candidates);
+            Directions::of(experiment, candidates, suspects, situation, whitener, projection)
+        })
+    }
+
+    fn leads(&self, state: &State<'_>, directions: &Directions, scores: &Scores) -> Vec<Lead> {
+        self.situated(state, |situation| {
+            leads(&self.suspects, self.candidates, directions, scores, situation)
+        })
     }
 
     fn look(&self, state: &State<'_>, round: u64) -> (Look, Directions) {
@@ -236,26 +195,37 @@ impl<'a> Search<'a> {
         directions: &Directions,
         round: u64,
     ) -> Option<Step> {
-        if state.chosen.len() >= self.options.most {
-            return None;
-        }
+        let room = self.options.most.saturating_sub(state.chosen.len());
         let stream = self.stream.named("weigh").at(round);
         let named = look.p[0] <= self.options.naming;
         let rest = look.p[1].min(look.p[2]) <= 0.5 * self.options.unlisted;
-        if !named && !(rest && state.chosen.len() + 2 <= self.options.most) {
+        if room == 0 || !(named || rest && room >= 2) {
             return None;
         }
-        let judged = self.judged(state, directions, look, &stream);
-        let added = if named {
-            vec![judged.first()?.suspect.clone()]
-        } else {
-            self.pair(state, &judged, &stream)?
+        let judged = self.judged(state, directions, &look.statistics.scores, &stream);
+        let now = state.weight(&self.common(), &stream);
+        let alone = judged.first().filter(|best| {
+            // The gate alone decides on the first effect; further ones must outweigh their absence.
+            named
+                && (state.chosen.is_empty()
+                    || best.log_weight - self.kinds() > now - state.prior(&self.common()))
+        });
+        let added = match alone {
+            Some(best) => vec![best.suspect.clone()],
+            None if room >= 2 => self.pair(state, &judged, now, &stream)?,
+            None => return None,
         };
         for suspect in &added {
-            self.add(state, suspect, &judged);
+            *state = state.with(&self.common(), suspect, &self.unknowns(suspect, &judged));
         }
+        self.exchange(state, &stream);
         let dropped = self.drop_needless(state, &stream);
         Some(Step { before: look.clone(), judged, added, dropped })
+    }
+
+    /// The log of the number of types.
+    fn kinds(&self) -> f64 {
+        (kinds(self.candidates) as f64).ln()
     }
 
     /// The leaders with the groups grown from them, the heaviest first.
@@ -263,31 +233,27 @@ impl<'a> Search<'a> {
         &self,
         state: &State<'a>,
         directions: &Directions,
-        look: &Look,
+        scores: &Scores,
         stream: &Stream,
     ) -> Vec<Judged> {
-        let layout = &self.experiment.layouts.blocks[0];
-        let scores = &look.statistics.scores;
-        let leads = leads(layout, &self.suspects, self.candidates, directions, scores);
-        let desk = self.desk(state);
+        let leads = self.leads(state, directions, scores);
+        let common = self.common();
+        let desk = state.desk(&common);
         let mut judged = judge(&desk, &state.fit, &leads, stream);
-        let mut grown: Vec<Judged> = Vec::new();
-        let mut seen: Vec<usize> = Vec::new();
         let best = judged.first().map_or(0.0, |j| j.log_weight);
+        let mut seen: Vec<usize> = Vec::new();
+        let mut grown: Vec<Judged> = Vec::new();
         for (i, seed) in judged.iter().enumerate() {
             let candidate = seed.suspect.candidate;
             if seen.contains(&candidate)
                 || seed.suspect.on.is_empty()
-                || seed.log_weight < best - 20.0
+                || seed.log_weight < best - RIVAL
             {
                 continue;
             }
             seen.push(candidate);
-            let others: Vec<On> = leads
-                .iter()
-                .filter(|lead| lead.suspect.candidate == candidate)
-                .map(|lead| lead.suspect.on.clone())
-                .collect();
+            let same = leads.iter().filter(|lead| lead.suspect.candidate == candidate);
+            let others: Vec<On> = same.map(|lead| lead.suspect.on.clone()).collect();
             let stream = stream.named("groups").at(i as u64);
             let group = grow(&desk, &state.fit, seed, &others, &stream);
             if group.suspect.on != seed.suspect.on {
@@ -299,95 +265,97 @@ impl<'a> Search<'a> {
         judged
     }
 
-    fn add(&self, state: &mut State<'a>, suspect: &Suspect, judged: &[Judged]) {
-        let system = self.desk(state).with(suspect);
+    /// What was fitted for the unknowns of a suspect.
+    fn unknowns(&self, suspect: &Suspect, judged: &[Judged]) -> Vec<f64> {
+        let effect = &self.candidates[suspect.candidate].effect;
+        let absent = effect.absent(&self.experiment.layouts.blocks[0]);
         let same =
             |j: &&Judged| j.suspect.candidate == suspect.candidate && j.suspect.on == suspect.on;
-        let known = judged.iter().find(same);
-        let own = known.map_or_else(
-            || self.candidates[suspect.candidate].effect.absent(&self.experiment.layouts.blocks[0]),
-            |j| j.fit.at.point[j.fit.at.point.len() - count(&system)..].to_vec(),
-        );
-        let start: Vec<f64> = state.fit.at.point.iter().copied().chain(own).collect();
-        state.chosen.push(suspect.clone());
-        self.refit(state, system, &start);
+        judged.iter().find(same).map_or(absent.clone(), |j| {
+            let point = &j.fit.at.point;
+            point[point.len() - absent.len()..].to_vec()
+        })
     }
 
-    /// The system fitted anew, with the noise around its response.
-    fn refit(&self, state: &mut State<'a>, system: System<'a>, start: &[f64]) {
-        let first = fit(&system, &state.whitener, &self.means, start);
-        let response = &first.at.response;
-        state.noise = Noise::of(self.experiment, response, Some(&state.noise));
-        state.whitener = Whitener::new(self.experiment, &state.noise, response);
-        state.fit = fit(&system, &state.whitener, &self.means, &first.at.point);
-        state.system = system;
+    /// What is weighed in the place of one of the effects, the heaviest first.
+    fn slot(&self, state: &State<'a>, i: usize, stream: &Stream) -> (State<'a>, Vec<Judged>) {
+        let smaller = state.without(&self.common(), i);
+        let projection = Projection::of(&smaller.system, &smaller.fit);
+        let directions = self.directions(&smaller, &projection);
+        let (rows, spread) = differences(self.experiment);
+        let left = projection.rest(&smaller.fit.residual);
+        let scores = directions.scores(&left, &smaller.whitener.whiten_rows(&rows), &spread);
+        let judged = self.judged(&smaller, &directions, &scores, stream);
+        (smaller, judged)
     }
 
-    /// Drops earlier effects whose absence weighs more than they do; their names.
+    /// Exchanges effects for what outweighs them in their places.
+    fn exchange(&self, state: &mut State<'a>, stream: &Stream) {
+        if state.chosen.len() < 2 {
+            return;
+        }
+        for round in 0..EXCHANGES {
+            let mut exchanged = false;
+            for i in 0..state.chosen.len() {
+                let stream = stream.named("exchange").at(round as u64).at(i as u64);
+                let (smaller, judged) = self.slot(state, i, &stream);
+                let Some(best) = judged.first() else { continue };
+                let chosen = &state.chosen[i];
+                let same =
+                    best.suspect.candidate == chosen.candidate && best.suspect.on == chosen.on;
+                if same {
+                    continue;
+                }
+                let own = self.unknowns(&best.suspect, &judged);
+                let next = smaller.with(&self.common(), &best.suspect, &own);
+                if next.weight(&self.common(), &stream)
+                    > state.weight(&self.common(), &stream) + 1.0
+                {
+                    *state = next;
+                    exchanged = true;
+                    break;
+                }
+            }
+            if !exchanged {
+                break;
+            }
+        }
+    }
+
+    /// Drops effects whose absence weighs more than they do; their names. The last one added stays.
     fn drop_needless(&self, state: &mut State<'a>, stream: &Stream) -> Vec<String> {
+        let common = self.common();
         let mut dropped = Vec::new();
         while state.chosen.len() > 1 {
-            let whole = self.weight(state, stream);
-            let worst = (0..state.chosen.len() - 1).find_map(|i| {
-                let (smaller, _) = self.without(state, i);
-                (self.weight(&smaller, stream) >= whole).then_some((i, smaller))
+            let whole = state.weight(&common, stream);
+            let needless = (0..state.chosen.len() - 1).find_map(|i| {
+                let smaller = state.without(&common, i);
+                (smaller.weight(&common, stream) >= whole).then_some((i, smaller))
             });
-            let Some((i, smaller)) = worst else { break };
+            let Some((i, smaller)) = needless else { break };
             dropped.push(state.system.effects[i].name.clone());
             *state = smaller;
         }
         dropped
     }
 
-    /// The state without one of its effects, refitted with the same noise, and what that effect was.
-    fn without(&self, state: &State<'a>, i: usize) -> (State<'a>, Suspect) {
-        let mut chosen = state.chosen.clone();
-        let taken = chosen.remove(i);
-        let mut effects = state.system.effects.clone();
-        let begin = self.experiment.parameters.len()
-            + effects[..i].iter().map(|e| e.absent().len()).sum::<usize>();
-        let end = begin + effects.remove(i).absent().len();
-        let system = System::new(self.experiment, effects);
-        let mut start = state.fit.at.point.clone();
-        start.drain(begin..end);
-        let fit = fit(&system, &state.whitener, &self.means, &start);
-        let (noise, whitener) = (state.noise.clone(), state.whitener.clone());
-        (State { system, chosen, fit, noise, whitener }, taken)
-    }
-
-    /// The log of evidence times the prior masses of the effects.
-    fn weight(&self, state: &State<'a>, stream: &Stream) -> f64 {
-        let weighed = super::weigh(&state.system, &state.whitener, &self.means, &state.fit, stream);
-        let desk = self.desk(state);
-        let kinds = (kinds(self.candidates) as f64).ln();
-        let prior = state.chosen.iter().map(|s| desk.log_prior(s) - kinds).sum::<f64>();
-        weighed.log_evidence + prior
-    }
-
     /// The heaviest pair of leaders, where it outweighs the system as it is.
-    fn pair(&self, state: &State<'a>, judged: &[Judged], stream: &Stream) -> Option<Vec<Suspect>> {
+    fn pair(
+        &self,
+        state: &State<'a>,
+        judged: &[Judged],
+        now: f64,
+        stream: &Stream,
+    ) -> Option<Vec<Suspect>> {
+        let common = self.common();
         let leaders: Vec<&Judged> = judged.iter().take(PAIRED).collect();
-        let now = self.weight(state, stream);
         let mut best: Option<(f64, Vec<Suspect>)> = None;
         for (i, first) in leaders.iter().enumerate() {
-            let mut one = State {
-                system: state.system.clone(),
-                chosen: state.chosen.clone(),
-                fit: state.fit.clone(),
-                noise: state.noise.clone(),
-                whitener: state.whitener.clone(),
-            };
-            self.add(&mut one, &first.suspect, judged);
+            let one = state.with(&common, &first.suspect, &self.unknowns(&first.suspect, judged));
             for second in &leaders[i + 1..] {
-                let system = self.desk(&one).with(&second.suspect);
-                let own = &second.fit.at.point[second.fit.at.point.len() - count(&system)..];
-                let start: Vec<f64> = one.fit.at.point.iter().chain(own).copied().collect();
-                let fit = fit(&system, &one.whitener, &self.means, &start);
-                let mut chosen = one.chosen.clone();
-                chosen.push(second.suspect.clone());
-                let (noise, whitener) = (one.noise.clone(), one.whitener.clone());
-                let both = State { system, chosen, fit, noise, whitener };
-                let weight = self.weight(&both, stream);
+                let own = self.unknowns(&second.suspect, judged);
+                let both = one.with(&common, &second.suspect, &own);
+                let weight = both.weight(&common, stream);
                 if weight > now && best.as_ref().is_none_or(|(most, _)| weight > *most) {
                     best = Some((weight, vec![first.suspect.clone(), second.suspect.clone()]));
                 }
@@ -396,31 +364,21 @@ impl<'a> Search<'a> {
         best.map(|(_, pair)| pair)
     }
 
-    /// The probability of each type in the place of each effect.
-    fn types(&self, state: &State<'a>, path: &[Step]) -> Vec<Vec<(String, f64)>> {
-        let only = state.chosen.len() == 1 && path.len() == 1 && path[0].added.len() == 1;
-        (0..state.chosen.len())
-            .map(|i| {
-                if only {
-                    return self.shares(&path[0].judged);
-                }
-                let (smaller, _) = self.without(state, i);
-                let projection = Projection::of(&smaller.system, &smaller.fit);
-                let directions = self.directions(&smaller, &projection);
-                let (rows, spread) = crate::gap::locate::differences(self.experiment);
-                let left = projection.rest(&smaller.fit.residual);
-                let white = smaller.whitener.whiten_rows(&rows);
-                let scores = directions.scores(&left, &white, &spread);
-                let layout = &self.experiment.layouts.blocks[0];
-                let leads = leads(layout, &self.suspects, self.candidates, &directions, &scores);
-                let stream = self.stream.named("types").at(i as u64);
-                self.shares(&judge(&self.desk(&smaller), &smaller.fit, &leads, &stream))
-            })
-            .collect()
+    /// What was weighed in the place of each effect at the end.
+    fn slots(&self, state: &State<'a>, path: &[Step]) -> Vec<Vec<Judged>> {
+        if let ([step], 1) = (path, state.chosen.len())
+            && step.added.len() == 1
+        {
+            return vec![step.judged.clone()];
+        }
+        let stream = self.stream.named("types");
+        let slot = |i: usize| self.slot(state, i, &stream.at(i as u64)).1;
+        (0..state.chosen.len()).map(slot).collect()
     }
 
+    /// The probability of each type among what was weighed for one place.
     fn shares(&self, judged: &[Judged]) -> Vec<(String, f64)> {
-        let best = judged.iter().map(|j| j.log_weight).fold(f64::NEG_INFINITY, f64::max);
+        let best = judged.first().map_or(0.0, |j| j.log_weight);
         let mut shares: Vec<(String, f64)> = Vec::new();
         for j in judged {
             let kind = &self.candidates[j.suspect.candidate].kind;
@@ -435,17 +393,4 @@ impl<'a> Search<'a> {
         shares.sort_by(|a, b| b.1.total_cmp(&a.1));
         shares
     }
-}
-
-/// The number of unknowns of the last effect of a system.
-fn count(system: &System<'_>) -> usize {
-    system.effects.last().map_or(0, |effect| effect.absent().len())
-}
-
-/// The number of types of effects.
-fn kinds(candidates: &[Candidate]) -> usize {
-    let mut names: Vec<&str> = candidates.iter().map(|c| c.kind.as_str()).collect();
-    names.sort_unstable();
-    names.dedup();
-    names.len().max(1)
 }

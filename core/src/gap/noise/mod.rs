@@ -63,6 +63,24 @@ impl Noise {
         noise
     }
 
+    /// The same noise for an experiment of the same curves that measured fewer values of them.
+    pub fn restricted(&self, whole: &Experiment<'_>, part: &Experiment<'_>) -> Self {
+        let mut own = self.clone();
+        for (s, noise) in own.curves.iter_mut().enumerate() {
+            let places = whole.curves[s].measured.iter().zip(&self.curves[s].profile);
+            let kept = places.filter(|(i, _)| part.curves[s].measured.contains(i));
+            noise.profile = kept.map(|(_, w)| *w).collect();
+        }
+        for (c, condition) in part.conditions.iter().enumerate() {
+            let mut lengths = condition.curves.clone().map(|s| part.curves[s].measured.len());
+            let first = lengths.next();
+            if lengths.any(|length| Some(length) != first) {
+                own.across[c] = None;
+            }
+        }
+        own
+    }
+
     /// The standard deviation of one replicate at each output; zero where nothing was measured.
     pub fn sd(&self, experiment: &Experiment<'_>, response: &[f64]) -> Vec<f64> {
         let mut all = vec![0.0; experiment.outputs()];

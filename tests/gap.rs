@@ -1,0 +1,6 @@
+//! The gap workflow on data in which an effect is hidden.
+
+use lacuna_plugins as _;
+
+#[path = "gap/chain.rs"]
+mod chain;
