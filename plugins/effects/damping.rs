@@ -20,10 +20,12 @@ use super::common::{Measure, Span, Unknown, check, each_curve, grid, parameters,
 /// y → y · exp(-rate · (t - t0))
 /// ```
 ///
-/// with `t0` the first time of the curve: losses before the record are a `gain`. One rate for all frequencies is the damping
-/// that is in proportion to the mass; a mode of angular frequency ω and damping ratio ζ has the rate ζ ω.
+/// with `t0` the first time of the curve: losses before the record are a `gain`. One rate for all frequencies is
+/// the damping that is in proportion to the mass; a mode of angular frequency ω and damping ratio ζ has the rate ζ
+/// ω.
 ///
-/// It is easily confused with `gain` on short records, with `low_pass` and `gas_attenuation`, which take the fast part first.
+/// It is easily confused with `gain` on short records, with `low_pass` and `gas_attenuation`, which take the fast
+/// part first.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Damping {

@@ -23,11 +23,11 @@ use super::common::{
 /// y(t) → y(t - time)
 /// ```
 ///
-/// Between its points a curve is a cubic spline; a sine of eight points a period is met within 0.2 %. Before its first
-/// point and after its last a curve is at rest, with the first and the last value.
+/// Between its points a curve is a cubic spline; a sine of eight points a period is met within 0.2 %. Before its
+/// first point and after its last a curve is at rest, with the first and the last value.
 ///
-/// It is easily confused with `low_pass`, which delays slow signals by its time constant (only what rises fast tells them
-/// apart), and with a wrong speed of waves, which delays far sensors more than near ones.
+/// It is easily confused with `low_pass`, which delays slow signals by its time constant (only what rises fast
+/// tells them apart), and with a wrong speed of waves, which delays far sensors more than near ones.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Delay {

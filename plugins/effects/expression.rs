@@ -28,16 +28,16 @@ use super::common::{all, grid, propose, signs, spaced};
 /// ]
 /// ```
 ///
-/// In the formula `y` is a value of the response in its unit, `t` its place on the last axis (its time) in the unit of that,
-/// and the other names are the effect's parameters. The language is that of all expressions in a study; derivatives are
-/// exact.
+/// In the formula `y` is a value of the response in its unit, `t` its place on the last axis (its time) in the unit
+/// of that, and the other names are the effect's parameters. The language is that of all expressions in a study;
+/// derivatives are exact.
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Expression {
     /// The formula, such as `"y + size * sin(2 * pi * frequency * t)"`.
     pub formula: String,
-    /// The unknowns of the formula. The first is the size of the effect: there is a value of it, `absent`, with which the
-    /// formula is `y`, whatever the others are.
+    /// The unknowns of the formula. The first is the size of the effect: there is a value of it, `absent`, with
+    /// which the formula is `y`, whatever the others are.
     pub parameters: Vec<Own>,
     /// The value of the first parameter with which there is no effect.
     pub absent: f64,
@@ -147,12 +147,17 @@ impl Expression {
 
 impl Component for Expression {
     fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        for (key, missing) in
-            [("formula", self.formula.is_empty()), ("parameters", self.parameters.is_empty())]
-        {
-            if missing {
-                complaints.at(key).say(format!("missing key `{key}`"));
-            }
+        if self.formula.is_empty() {
+            let problem = complaints.at("formula").say("missing key `formula`");
+            problem.expected(
+                "what becomes of a value `y` at `t`, such as `formula = \"y + size * t\"`",
+            );
+        }
+        if self.parameters.is_empty() {
+            let problem = complaints.at("parameters").say("missing key `parameters`");
+            problem.expected(
+                "such as `parameters = [{ name = \"size\", prior = { normal = [0, 1] } }]`",
+            );
         }
         if self.formula.is_empty() || self.parameters.is_empty() {
             return;

@@ -23,7 +23,8 @@ use super::common::{
 /// y → y + amplitude · exp(-(t - start) / decay) from start on
 /// ```
 ///
-/// It is easily confused with `offset` where it decays slowly, and with what the model itself says of the first moments.
+/// It is easily confused with `offset` where it decays slowly, and with what the model itself says of the first
+/// moments.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Flash {

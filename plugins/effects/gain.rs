@@ -26,8 +26,8 @@ use super::common::{Measure, Unknown, check, parameters, propose, signs};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Gain {
-    /// Prior of the factor, a number; one is no effect, and one below zero is a sensor with its poles exchanged. By default
-    /// 10 % about one: data sheets promise some per cent, bonding can cost more.
+    /// Prior of the factor, a number; one is no effect, and one below zero is a sensor with its poles exchanged. By
+    /// default 10 % about one: data sheets promise some per cent, bonding can cost more.
     pub factor: Distribution,
 }
 

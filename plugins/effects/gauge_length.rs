@@ -20,8 +20,9 @@ use super::common::{Along, Line, Measure, Stations, Unknown, check, lagrange, pa
 /// y(x) → y(x) + length² / 24 · y''(x)
 /// ```
 ///
-/// is the mean over the length to leading order. The curvature is that of the parabola through the place and its two neighbours on
-/// a line, at an end of the line through the last three. Around zero the change is of second order in the length.
+/// is the mean over the length to leading order. The curvature is that of the parabola through the place and its
+/// two neighbours on a line, at an end of the line through the last three. Around zero the change is of second
+/// order in the length.
 ///
 /// It is easily confused with `low_pass` and `timing_jitter` where waves run along the line, and with `misplacement`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

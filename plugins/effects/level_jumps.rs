@@ -17,18 +17,18 @@ use super::common::{
 
 /// A jump of the level: from some time on a curve is higher or lower by a number.
 ///
-/// An interferometer loses count of its fringes, a gauge comes loose, an amplifier changes its range. Several jumps are several
-/// effects.
+/// An interferometer loses count of its fringes, a gauge comes loose, an amplifier changes its range. Several jumps
+/// are several effects.
 ///
 /// ```text
 /// y → y + size from time on
 /// ```
 ///
-/// A jump between two points of the grid is seen at the second; the step between them is rounded off over their distance, so that
-/// the time has a slope for those who search along it. The time is known no better than the grid.
+/// A jump between two points of the grid is seen at the second; the step between them is rounded off over their
+/// distance, so that the time has a slope for those who search along it. The time is known no better than the grid.
 ///
-/// It is easily confused with `offset` near the first time and `secondary_pulse` near the last. Jumps of an interferometer are whole
-/// multiples of one size.
+/// It is easily confused with `offset` near the first time and `secondary_pulse` near the last. Jumps of an
+/// interferometer are whole multiples of one size.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LevelJumps {

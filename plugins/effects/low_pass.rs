@@ -21,9 +21,9 @@ use super::common::{
 /// time_constant · z'(t) = y(t) - z(t),     y → z
 /// ```
 ///
-/// A sine of angular frequency ω shrinks by `1 / sqrt(1 + ω² time_constant²)` and comes late by the angle
-/// `atan(ω time_constant)`; the cut-off frequency is `1 / (2 π time_constant)`. The equation is solved exactly for the spline
-/// through the points of a curve, from rest at its first value.
+/// A sine of angular frequency ω shrinks by `1 / sqrt(1 + ω² time_constant²)` and comes late by the angle `atan(ω
+/// time_constant)`; the cut-off frequency is `1 / (2 π time_constant)`. The equation is solved exactly for the
+/// spline through the points of a curve, from rest at its first value.
 ///
 /// It is easily confused with `delay`: slow signals come late by the time constant and are not rounded.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -22,9 +22,9 @@ use super::common::{Along, Measure, Row, Unknown, check, parameters, propose, si
 /// y → cos² angle · y + sin² angle · y across + sin angle · cos angle · shear
 /// ```
 ///
-/// `other` says which sensor shows the strain at the same place across the direction, and `shear` which shows the shear
-/// (as an angle, twice the tensor's component), where there is any. Without shear both signs of the angle are alike and
-/// small angles cannot be seen: the change is of second order.
+/// `other` says which sensor shows the strain at the same place across the direction, and `shear` which shows the
+/// shear (as an angle, twice the tensor's component), where there is any. Without shear both signs of the angle are
+/// alike and small angles cannot be seen: the change is of second order.
 ///
 /// It is easily confused with `gain` where both strains have one shape, and with `crosstalk`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

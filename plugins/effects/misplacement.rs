@@ -20,12 +20,13 @@ use super::common::{Along, Line, Measure, Stations, Unknown, check, lagrange, pa
 /// y(x) → y(x + distance)
 /// ```
 ///
-/// What the response is beside the place is read from its neighbours on a line: from the parabola through the place and the two
-/// next to it, or at an end of the line through the last three (a straight line where there are two places only). That is
-/// good for distances well below those between the places, and for a response that is smooth along the line.
+/// What the response is beside the place is read from its neighbours on a line: from the parabola through the place
+/// and the two next to it, or at an end of the line through the last three (a straight line where there are two
+/// places only). That is good for distances well below those between the places, and for a response that is smooth
+/// along the line.
 ///
-/// It is easily confused with `gain` where the response falls off evenly along the line, with `gauge_length`, and with `delay` where waves
-/// run along it.
+/// It is easily confused with `gain` where the response falls off evenly along the line, with `gauge_length`, and
+/// with `delay` where waves run along it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Misplacement {

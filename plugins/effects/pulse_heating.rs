@@ -17,8 +17,8 @@ use super::common::{
 
 /// Pulse heating: the structure itself is warmed by the pulse and stays longer.
 ///
-/// The part that carries the sensor takes up heat at once; strain of the order of the thermal expansion appears within a time
-/// of conduction and decays only long after the record.
+/// The part that carries the sensor takes up heat at once; strain of the order of the thermal expansion appears
+/// within a time of conduction and decays only long after the record.
 ///
 /// ```text
 /// y → y + rise · (1 - exp(-(t - start) / time_constant)) from start on

@@ -25,10 +25,11 @@ use super::common::{
 /// y → y + amplitude · exp(-damping · ω · (t - t0)) · sin(ω · (t - t0) + phase),     ω = 2 π frequency
 /// ```
 ///
-/// with `t0` the first time of the curve. The amplitude has either sign and the phase lies in half a circle, so that each
-/// vibration is written in one way only.
+/// with `t0` the first time of the curve. The amplitude has either sign and the phase lies in half a circle, so
+/// that each vibration is written in one way only.
 ///
-/// It is easily confused with `echo` where the signal rings itself, and for low frequencies with `offset` and `drift`.
+/// It is easily confused with `echo` where the signal rings itself, and for low frequencies with `offset` and
+/// `drift`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Resonance {
@@ -38,7 +39,8 @@ pub struct Resonance {
     /// Prior of the frequency, in the inverse unit of the last axis, not below zero.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frequency: Option<Distribution>,
-    /// Prior of the damping ratio, a number not below zero. By default of the order of 1 %: steel structures have 0.2 to 3 %.
+    /// Prior of the damping ratio, a number not below zero. By default of the order of 1 %: steel structures have
+    /// 0.2 to 3 %.
     pub damping: Distribution,
     /// Prior of the phase in radians, from -π/2 to π/2 by default.
     pub phase: Distribution,
@@ -105,8 +107,9 @@ impl Effect for Resonance {
     fn describe(&self) -> Description {
         Description {
             title: "a resonance: a vibration of its own".into(),
-            formula: "y + amplitude · exp(-damping · ω · (t - t0)) · sin(ω · (t - t0) + phase), ω = 2 π frequency".into(),
-            source: "standard: free vibration with viscous damping, as in Meirovitch, Fundamentals of Vibrations".into(),
+            formula: "y + amplitude · exp(-damping · ω · u) · sin(ω · u + phase), u = t - t0"
+                .into(),
+            source: "standard: free vibration, as in Meirovitch, Fundamentals of Vibrations".into(),
         }
     }
 

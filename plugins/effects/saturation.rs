@@ -20,10 +20,11 @@ use super::common::{Measure, Unknown, check, parameters, propose, spaced_by_rati
 /// y → limit · tanh(y / limit),     inverse_limit = 1 / limit
 /// ```
 ///
-/// Small values stay; no value passes the limit. Around zero the change is of second order in the inverse limit, as a distant limit
-/// cannot be seen.
+/// Small values stay; no value passes the limit. Around zero the change is of second order in the inverse limit, as
+/// a distant limit cannot be seen.
 ///
-/// It is easily confused with `gain` where all values are of one size, and with `damping` where the first are the largest.
+/// It is easily confused with `gain` where all values are of one size, and with `damping` where the first are the
+/// largest.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Saturation {

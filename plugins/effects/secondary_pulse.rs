@@ -23,7 +23,8 @@ use super::common::{
 /// y → y + amplitude · exp(-(t - time)² / (2 width²))
 /// ```
 ///
-/// It is easily confused with `echo` where the signal is one pulse itself, and with `level_jumps` where it ends after the record.
+/// It is easily confused with `echo` where the signal is one pulse itself, and with `level_jumps` where it ends
+/// after the record.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SecondaryPulse {
@@ -33,7 +34,8 @@ pub struct SecondaryPulse {
     /// Prior of the time of its peak, in the unit of the last axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<Distribution>,
-    /// Prior of its width, in the unit of the last axis, above zero: 0.6 of the height is left at this distance from the peak.
+    /// Prior of its width, in the unit of the last axis, above zero: 0.6 of the height is left at this distance
+    /// from the peak.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub width: Option<Distribution>,
 }

@@ -16,19 +16,19 @@ use super::common::{
 
 /// Jitter of the timing: replicates begin at random, and their mean is a blurred curve.
 ///
-/// Each replicate has a delay of its own, normal about zero with the standard deviation `deviation`. What they have in common is
-/// then the mean over the delays, with every fast change rounded off; a sine of angular frequency ω shrinks by
-/// `exp(-ω² deviation² / 2)`.
+/// Each replicate has a delay of its own, normal about zero with the standard deviation `deviation`. What they have
+/// in common is then the mean over the delays, with every fast change rounded off; a sine of angular frequency ω
+/// shrinks by `exp(-ω² deviation² / 2)`.
 ///
 /// ```text
 /// y(t) → mean of y(t - deviation · z) over normal z
 /// ```
 ///
-/// The mean is a sum over fifteen delays. Curves are splines between their points, and at rest before the first and after
-/// the last. Around zero the change is of second order: a small jitter cannot be seen.
+/// The mean is a sum over fifteen delays. Curves are splines between their points, and at rest before the first and
+/// after the last. Around zero the change is of second order: a small jitter cannot be seen.
 ///
-/// It is easily confused with `low_pass`, which delays as well, with `gauge_length`, and with noise that is larger where the curve
-/// is steep, which jitter also makes.
+/// It is easily confused with `low_pass`, which delays as well, with `gauge_length`, and with noise that is larger
+/// where the curve is steep, which jitter also makes.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TimingJitter {
@@ -50,8 +50,8 @@ impl TimingJitter {
     }
 }
 
-/// Nodes and weights of a mean over the standard normal law: the trapezoidal rule, whose error for smooth functions is
-/// that of its ends, 2e-7 (Trefethen and Weideman, SIAM Review 56 (2014) 385).
+/// Nodes and weights of a mean over the standard normal law: the trapezoidal rule, whose error for smooth functions
+/// is that of its ends, 2e-7 (Trefethen and Weideman, SIAM Review 56 (2014) 385).
 fn nodes() -> impl Iterator<Item = (f64, f64)> {
     let node = |k: i32| 0.75 * f64::from(k);
     let density = |z: f64| (-0.5 * z * z).exp();
@@ -71,7 +71,8 @@ impl Effect for TimingJitter {
         Description {
             title: "jitter of the timing: replicates that begin at random".into(),
             formula: "mean of y(t - deviation · z) over normal z".into(),
-            source: "standard: averages of signals with timing jitter, transfer function exp(-ω² deviation² / 2)".into(),
+            source: "standard: mean of signals with jitter, which passes exp(-ω² deviation² / 2)"
+                .into(),
         }
     }
 

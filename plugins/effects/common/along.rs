@@ -70,7 +70,10 @@ impl<'a> Along<'a> {
             return;
         }
         let name = &self.axis.name;
-        let problem = complaints.at(key).say(format!("the axis `{name}` has no `{label}`"));
+        let problem = complaints.at(key).say(match label {
+            "" => format!("missing key `{key}`"),
+            label => format!("the axis `{name}` has no `{label}`"),
+        });
         if let Coordinates::Labels(labels) = &self.axis.coordinates {
             problem.expected(one_of(labels.iter().map(String::as_str)));
         }

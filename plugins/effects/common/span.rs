@@ -60,8 +60,8 @@ impl Span {
         (share * self.duration()).max(self.step)
     }
 
-    /// Says in the options of an effect of a pulse that it begins at zero, where that is inside a record; a record that
-    /// does not reach back begins with the pulse.
+    /// Says in the options of an effect of a pulse that it begins at zero, where that is inside a record; a record
+    /// that does not reach back begins with the pulse.
     pub fn add_pulse(&self, options: &mut Table) {
         if self.first < 0.0 && self.last > 0.0 {
             options.insert("start".to_owned(), Value::Float(0.0));

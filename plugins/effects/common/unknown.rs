@@ -108,6 +108,7 @@ pub fn check(unknowns: &[Unknown<'_>], layout: &Layout, complaints: &mut Complai
             (low, f64::INFINITY) => format!("no values below {low}"),
             (low, high) => format!("values from {low} to {high}"),
         };
+        let expected = format!("{expected}, as in `{name} = {}`", unknown.example);
         if from < low || to > high {
             complaints
                 .at(name)
