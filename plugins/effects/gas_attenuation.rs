@@ -21,10 +21,9 @@ use super::common::{
 /// y → (1 - share) · y + share · z,     relaxation_time · z'(t) = y(t) - z(t)
 /// ```
 ///
-/// Bubbles give way to slow pressure and take the fast part of it. In the mercury target gas takes 25 to 75 % of
-/// the strain (by McClintock and others, Materials & Design (2022) 110937); this is how it looks at a sensor, not
-/// how it comes about: for that swap the model (`mercury_target_equilibrium_gas`). The lag is solved as in
-/// `low_pass`.
+/// Bubbles give way to slow pressure and take the fast part of it. In the mercury target of the SNS gas takes 25 to
+/// 75 % of the strain (Materials & Design (2022) 110937); this is how it looks at a sensor, not how it comes about: for
+/// that swap the model (`mercury_target_equilibrium_gas`). The lag is solved as in `low_pass`.
 ///
 /// It is easily confused with `gain` (relaxation time far above the record), with `low_pass` (share of one) and
 /// `damping`.
