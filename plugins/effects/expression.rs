@@ -156,7 +156,7 @@ impl Component for Expression {
         if self.parameters.is_empty() {
             let problem = complaints.at("parameters").say("missing key `parameters`");
             problem.expected(
-                "such as `parameters = [{ name = \"size\", prior = { normal = [0, 1] } }]`",
+                "its unknowns, such as `parameters = [{ name = \"size\", prior = { normal = [0, 1] } }]`",
             );
         }
         if self.formula.is_empty() || self.parameters.is_empty() {
