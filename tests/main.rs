@@ -4,6 +4,7 @@
 mod bad_input;
 mod commands;
 mod docs;
+mod effects;
 mod kill;
 mod problems;
 mod python;

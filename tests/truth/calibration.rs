@@ -131,7 +131,7 @@ fn likelihood(discrepancy: &dyn Discrepancy, data: &Measurements) -> Box<dyn Lik
 fn bins(sampler: (&str, &str), discrepancy: (&str, &str), stream: &Stream) -> Vec<usize> {
     let built = registry::from_text::<dyn Discrepancy>(discrepancy.0, discrepancy.1);
     let discrepancy = built.unwrap_or_else(|e| panic!("{e}")).plugin;
-    let (line, parameters, layouts) = (Line::default(), parameters(), layout().into());
+    let (line, parameters) = (Line::default(), parameters());
     let prior = likelihood(&*discrepancy, &pattern());
     let emulated = OfData::new(&line, Vec::new(), &*prior);
     let truth = Posterior::new(&parameters, emulated).prior_draws(1, &stream.named("truth"));
