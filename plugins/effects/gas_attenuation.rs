@@ -3,7 +3,7 @@
 use lacuna::data::Layout;
 use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::effect::{Description, Situation};
+use lacuna::plugin::effect::{Description, Reach, Situation};
 use lacuna::plugin::{Component, Context, Effect, Hyperparameter};
 use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
@@ -122,6 +122,11 @@ impl Effect for GasAttenuation {
         tangent: &[f64],
     ) -> Vec<f64> {
         self.apply(layout, tangent, values)
+    }
+
+    /// Gas in the liquid is between the source and every sensor.
+    fn reach(&self) -> Reach {
+        Reach::Whole
     }
 
     fn starts(&self, layout: &Layout, _: &Situation<'_>) -> Vec<Vec<f64>> {

@@ -13,7 +13,13 @@ const OPTIONS: &Table = &[
     ("crosstalk", &["from = \"B\"", "from = \"C\"\nshare = { uniform = [0, 0.5] }"]),
     ("damping", &["rate = { half_normal = 2000 }"]),
     ("delay", &["time = { normal = [0, 3e-5] }", "time = { uniform = [0, 2e-4] }"]),
-    ("drift", &["rate = { normal = [0, 0.1] }"]),
+    (
+        "drift",
+        &[
+            "rate = { normal = [0, 0.1] }",
+            "rate = { normal = [0, 0.1] }\nzero = { uniform = [1, 5] }",
+        ],
+    ),
     ("echo", &["lag = { uniform = [5e-5, 3e-4] }"]),
     (
         "expression",

@@ -68,10 +68,7 @@ fn difference(unit: &Unit) -> Unit {
 }
 
 /// The unknowns as a study samples them.
-pub fn parameters<const N: usize>(
-    unknowns: &[Unknown<'_>; N],
-    layout: &Layout,
-) -> Vec<Hyperparameter> {
+pub fn parameters(unknowns: &[Unknown<'_>], layout: &Layout) -> Vec<Hyperparameter> {
     let parameter = |unknown: &Unknown<'_>| {
         // The check refuses a study without the prior; what is only asked for proposals needs none.
         let prior = unknown.prior.cloned().unwrap_or(Distribution::HalfNormal(1.0));

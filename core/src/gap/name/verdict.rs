@@ -18,8 +18,11 @@ const STABLE: f64 = 0.8;
 /// An effect that differs between conditions or sensors with less probability than this is not what it is called.
 const INCONSISTENT: f64 = 0.001;
 
-/// An effect that closes less of the excess misfit than this is no explanation of it.
+/// An effect that closes less of the excess misfit than this is no explanation of it, where an excess remains.
 const HALF: f64 = 0.5;
+
+/// An excess of misfit less probable than this without a gap remains.
+const REMAINS: f64 = 0.05;
 
 /// Candidates of which less than this is left by the calibration cannot be seen.
 const INVISIBLE: f64 = 0.95;
@@ -125,7 +128,7 @@ fn doubts(found: &Found<'_>, gap: bool, closed: f64, options: Options, reasons: 
                 .into(),
         );
     }
-    if closed < HALF {
+    if closed < HALF && found.last.p[2] <= REMAINS {
         reasons.push(format!(
             "the effects that explain most close {:.0} % of the excess misfit",
             100.0 * closed.max(0.0)
