@@ -2,6 +2,7 @@
 
 pub mod designs;
 pub mod discrepancies;
+pub mod effects;
 pub mod executors;
 pub mod models;
 pub mod readers;

@@ -1,10 +1,11 @@
 //! Every registered plugin does what its kind demands: a listed plugin is a tested plugin.
 //!
 //! Plugins are built from their names and options as a study builds them. A plugin without an entry in the
-//! tables below fails here. In a binary of its own, because it registers an effect, which the
-//! generated documentation must not list.
+//! tables below fails here.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
+#[path = "contracts/effects.rs"]
+mod effects;
 #[path = "contracts/faults.rs"]
 mod faults;
 #[path = "contracts/gain.rs"]
@@ -21,7 +22,7 @@ use lacuna::data::{Axis, Layout, Parameter, Unit};
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::model::Response;
 use lacuna::plugin::registry::{self, Kind};
-use lacuna::plugin::{Density, Design, Discrepancy, Effect, Executor, Reader, Sampler, Surrogate};
+use lacuna::plugin::{Density, Design, Discrepancy, Executor, Reader, Sampler, Surrogate};
 use lacuna::run::write_response;
 // Without this line the linker leaves the plugins out.
 use lacuna_plugins as _;
@@ -214,11 +215,6 @@ fn samplers() {
         ("variational", &["", "refine = false"]),
     ];
     all::<dyn Sampler>(table, |case, plugin| contract::sampler(&case.label, plugin));
-}
-
-#[test]
-fn effects() {
-    all::<dyn Effect>(&[("gain", &[""])], |case, effect| contract::effect(&case.label, effect));
 }
 
 #[test]

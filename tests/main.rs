@@ -4,6 +4,7 @@
 mod bad_input;
 mod commands;
 mod docs;
+mod effects;
 mod falling_balls;
 mod forced_oscillator;
 mod kill;

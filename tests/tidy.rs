@@ -18,12 +18,13 @@ const MACHINE: [&str; 6] = ["/home/", "/Users/", "/root/", "/work/", "/tmp/", "C
 ///
 /// A study chooses plugins and plugins complain about their part of a study; both stop with what a run
 /// says, and expressions guess at names as a study does: these four are one layer.
-const LAYERS: [&[&str]; 10] = [
+const LAYERS: [&[&str]; 11] = [
     &["compare", "serve"],
     &["stage"],
     &["contract"],
     &["report"],
     &["diagnose"],
+    &["gap"],
     &["posterior"],
     &["plugin", "study", "run", "expression"],
     &["data"],

@@ -9,6 +9,7 @@ pub mod contract;
 pub mod data;
 pub mod diagnose;
 pub mod expression;
+pub mod gap;
 pub mod math;
 pub mod plugin;
 pub mod posterior;

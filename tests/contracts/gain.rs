@@ -1,4 +1,4 @@
-//! An effect of the tests' own, and the posterior with it against a computation by hand.
+//! The posterior with a gain, against a computation by hand.
 
 use std::f64::consts::PI;
 
@@ -6,51 +6,10 @@ use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Unit};
 use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::discrepancy::Known;
-use lacuna::plugin::effect::Description;
+use lacuna::plugin::effect::{On, Placed};
 use lacuna::plugin::registry;
-use lacuna::plugin::{Component, Discrepancy, Effect, Forward, Hyperparameter, Likelihood, Target};
+use lacuna::plugin::{Discrepancy, Effect, Forward, Likelihood, Target};
 use lacuna::posterior::{OfData, Posterior};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-/// A gauge factor that is not the one of the data sheet: all responses times one number.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-struct Gain {}
-
-impl Component for Gain {}
-
-impl Effect for Gain {
-    fn describe(&self) -> Description {
-        let text = |text: &str| text.to_owned();
-        Description { title: text("gain"), formula: text("g y"), source: text("a test") }
-    }
-
-    fn parameters(&self, _: &Layout) -> Vec<Hyperparameter> {
-        vec![Hyperparameter {
-            name: "gain".into(),
-            symbol: "g".into(),
-            unit: Unit::dimensionless(),
-            prior: Distribution::Normal([1.0, 0.1]),
-            log: false,
-            start: 1.0,
-        }]
-    }
-
-    fn absent(&self, _: &Layout) -> Vec<f64> {
-        vec![1.0]
-    }
-
-    fn apply(&self, _: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
-        response.iter().map(|y| values[0] * y).collect()
-    }
-
-    fn pull_back(&self, _: &Layout, _: &[f64], values: &[f64], w: &[f64]) -> Vec<f64> {
-        w.iter().map(|w| values[0] * w).collect()
-    }
-}
-
-lacuna::register!(Effect, "gain", Gain);
 
 /// `y(t) = a t + b t^2` at the times 1, 2 and 3.
 #[derive(Default)]
@@ -107,7 +66,8 @@ fn parameters() -> Vec<Parameter> {
 
 /// Hands a posterior with the gain over `y = a t + b t^2` to a test.
 fn with_posterior(test: impl FnOnce(&Posterior<'_>)) {
-    let effect = registry::from_text::<dyn Effect>("gain", "").unwrap().plugin;
+    let effect =
+        registry::from_text::<dyn Effect>("gain", "factor = { normal = [1, 0.1] }").unwrap().plugin;
     let options = "variance = { half_normal = 0.5 }";
     let discrepancy = registry::from_text::<dyn Discrepancy>("gaussian", options).unwrap().plugin;
     let replicates = DATA
@@ -119,7 +79,8 @@ fn with_posterior(test: impl FnOnce(&Posterior<'_>)) {
         discrepancy.likelihood(&Known::without_slopes(&data, &[])).unwrap();
     let (layout, parameters, emulator) = (layout(), parameters(), Quadratic);
     let layouts = layout.into();
-    test(&Posterior::new(&parameters, OfData::new(&layouts, &emulator, &[&*effect], &*likelihood)));
+    let effects = vec![Placed::new("gain", &*effect, &layouts, &On::new())];
+    test(&Posterior::new(&parameters, OfData::new(&emulator, effects, &*likelihood)));
 }
 
 fn log_normal_density(x: f64, mean: f64, sd: f64) -> f64 {
@@ -152,7 +113,7 @@ fn the_posterior_with_an_effect_is_the_one_computed_by_hand() {
     with_posterior(|posterior| {
         let names: Vec<&str> =
             posterior.hyperparameters().iter().map(|h| h.name.as_str()).collect();
-        assert_eq!(names, ["gain", "variance"]);
+        assert_eq!(names, ["gain.factor", "variance"]);
         let found = posterior.log_density(&Matrix::from_rows(4, POINTS));
         for (point, found) in POINTS.into_iter().zip(found) {
             let expected = by_hand(point);

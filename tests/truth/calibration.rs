@@ -131,18 +131,18 @@ fn likelihood(discrepancy: &dyn Discrepancy, data: &Measurements) -> Box<dyn Lik
 fn bins(sampler: (&str, &str), discrepancy: (&str, &str), stream: &Stream) -> Vec<usize> {
     let built = registry::from_text::<dyn Discrepancy>(discrepancy.0, discrepancy.1);
     let discrepancy = built.unwrap_or_else(|e| panic!("{e}")).plugin;
-    let (line, parameters, layouts) = (Line::default(), parameters(), layout().into());
+    let (line, parameters) = (Line::default(), parameters());
     let prior = likelihood(&*discrepancy, &pattern());
-    let emulated = OfData::new(&layouts, &line, &[], &*prior);
+    let emulated = OfData::new(&line, Vec::new(), &*prior);
     let truth = Posterior::new(&parameters, emulated).prior_draws(1, &stream.named("truth"));
     let natural = {
-        let emulated = OfData::new(&layouts, &line, &[], &*prior);
+        let emulated = OfData::new(&line, Vec::new(), &*prior);
         Posterior::new(&parameters, emulated).natural(truth.row(0))
     };
     let response = line.mean(&Matrix::from_rows(2, [&natural[..2]]));
     let data = prior.simulate(response.row(0), &natural[2..], &stream.named("data"));
     let likelihood = likelihood(&*discrepancy, &data[0]);
-    let posterior = Posterior::new(&parameters, OfData::new(&layouts, &line, &[], &*likelihood));
+    let posterior = Posterior::new(&parameters, OfData::new(&line, Vec::new(), &*likelihood));
     let method = runs::sampler(sampler.0, sampler.1);
     let found = runs::run(&*method, &posterior, &stream.named("run")).draws;
     let points = found.points();

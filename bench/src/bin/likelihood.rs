@@ -47,8 +47,7 @@ fn main() -> Fallible<()> {
     };
     let likelihood = gaussian.likelihood(&Known::without_slopes(&data, &error(rank)))?;
     let begun = processor_seconds()?;
-    let posterior =
-        Posterior::new(&parameters, OfData::new(&layouts, &*emulator, &[], &*likelihood));
+    let posterior = Posterior::new(&parameters, OfData::new(&*emulator, Vec::new(), &*likelihood));
     let preparation = processor_seconds()? - begun;
     let walkers = posterior.coordinates_of(&points(WALKERS, 4));
 

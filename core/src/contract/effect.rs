@@ -4,19 +4,22 @@ use super::judge::{Check, agree, judge, layout, slope, twice};
 use crate::linalg::Matrix;
 use crate::math::random::{Stream, normal};
 use crate::plugin::Effect;
+use crate::plugin::effect::Situation;
 
 /// Puts an effect through the contract.
 ///
 /// - it says in words what it is, and its parameters have different names;
-/// - with its parameters at `absent` it changes nothing, not even a bit;
+/// - with its size at `absent` it changes nothing, not even a bit, whatever its indices are;
 /// - `absent` and every `start` lie in the support of their priors;
 /// - a response has as many values after it as before, all finite, the same each time;
-/// - its derivatives by its parameters and by the response are those that differences give.
+/// - its starts are some, lie in the support of its priors, and change the response;
+/// - its derivatives by its parameters and along a direction of the response are those that differences give.
 pub fn effect(name: &str, effect: &dyn Effect) -> Result<(), Vec<String>> {
-    let checks: [Check<'_>; 4] = [
+    let checks: [Check<'_>; 5] = [
         ("describes itself", Box::new(|| describes_itself(effect))),
         ("can be absent", Box::new(|| can_be_absent(effect))),
         ("answers", Box::new(|| answers(effect))),
+        ("can be started", Box::new(|| can_be_started(effect))),
         ("knows its derivatives", Box::new(|| knows_its_derivatives(effect))),
     ];
     judge("effect", name, &checks)
@@ -65,11 +68,39 @@ fn can_be_absent(effect: &dyn Effect) -> Result<(), String> {
             }
         }
     }
-    if effect.apply(&layout, &response, &absent) == response {
-        Ok(())
-    } else {
-        Err("it changes the response".into())
+    for drawn in draws(effect).iter_rows() {
+        let without = [&absent[..1], &drawn[1..]].concat();
+        if effect.apply(&layout, &response, &without) != response {
+            return Err(format!("it changes the response with {without:?}"));
+        }
     }
+    Ok(())
+}
+
+fn can_be_started(effect: &dyn Effect) -> Result<(), String> {
+    let (layout, response) = (layout(), response());
+    let layouts = layout.clone().into();
+    let noise = vec![1e-5; response.len()];
+    let situation = Situation { layouts: &layouts, response: &response, noise: &noise };
+    let starts = effect.starts(&layout, &situation);
+    if starts.is_empty() {
+        return Err("it has no starts".into());
+    }
+    let parameters = effect.parameters(&layout);
+    for start in &starts {
+        if start.len() != parameters.len() {
+            return Err(format!("{start:?} for {} parameters", parameters.len()));
+        }
+        for (parameter, x) in parameters.iter().zip(start) {
+            if parameter.prior.log_density(*x) == f64::NEG_INFINITY {
+                return Err(format!("`{}` at its start {x} leaves its prior", parameter.name));
+            }
+        }
+        if effect.apply(&layout, &response, start) == response {
+            return Err(format!("with {start:?} it changes nothing"));
+        }
+    }
+    Ok(())
 }
 
 fn answers(effect: &dyn Effect) -> Result<(), String> {
@@ -95,7 +126,7 @@ const TOLERANCE: f64 = 1e-5;
 fn knows_its_derivatives(effect: &dyn Effect) -> Result<(), String> {
     let (layout, response) = (layout(), response());
     let mut rng = Stream::root(4).generator();
-    let weight: Vec<f64> = response.iter().map(|_| normal(&mut rng)).collect();
+    let tangent: Vec<f64> = response.iter().map(|y| y * normal(&mut rng)).collect();
     for values in draws(effect).iter_rows() {
         let jacobian = effect.by_parameters(&layout, &response, values);
         if (jacobian.rows(), jacobian.columns()) != (response.len(), values.len()) {
@@ -107,15 +138,13 @@ fn knows_its_derivatives(effect: &dyn Effect) -> Result<(), String> {
             let what = format!("the derivative by parameter {} of value", j + 1);
             agree(&what, &jacobian.column(j), &by, TOLERANCE)?;
         }
-        let pulled = effect.pull_back(&layout, &response, values, &weight);
-        let dot = |y: &[f64]| y.iter().zip(&weight).map(|(y, w)| y * w).sum::<f64>();
-        let expected: Vec<f64> = (0..response.len())
-            .map(|i| {
-                let step = 1e-5 * response[i].abs();
-                slope(|y| vec![dot(&effect.apply(&layout, y, values))], &response, i, step)[0]
-            })
-            .collect();
-        agree("the transposed derivative by value", &pulled, &expected, TOLERANCE)?;
+        let pushed = effect.push_forward(&layout, &response, values, &tangent);
+        let along = |h: &[f64]| {
+            let moved = response.iter().zip(&tangent).map(|(y, v)| y + h[0] * v);
+            effect.apply(&layout, &moved.collect::<Vec<_>>(), values)
+        };
+        let expected = slope(along, &[0.0], 0, 1e-5);
+        agree("the derivative along a direction of value", &pushed, &expected, TOLERANCE)?;
     }
     Ok(())
 }

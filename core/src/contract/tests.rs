@@ -6,7 +6,7 @@ use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::math::random::{Stream, uniform};
 use crate::plugin::density::BoundDensity;
-use crate::plugin::effect::Description;
+use crate::plugin::effect::{Description, Situation};
 use crate::plugin::executor::{Batch, Finished};
 use crate::plugin::{Component, Density, Design, Effect, Executor, Hyperparameter};
 use crate::run::Stop;
@@ -83,9 +83,15 @@ impl Effect for Shift {
         let skip = usize::from(self.0 == Fault::Shape);
         response.iter().skip(skip).map(|y| y + values[0]).collect()
     }
-    fn pull_back(&self, _: &Layout, _: &[f64], _: &[f64], w: &[f64]) -> Vec<f64> {
+    fn push_forward(&self, _: &Layout, _: &[f64], _: &[f64], v: &[f64]) -> Vec<f64> {
         let scale = if self.0 == Fault::Edge { 2.0 } else { 1.0 };
-        w.iter().map(|w| scale * w).collect()
+        v.iter().map(|v| scale * v).collect()
+    }
+    fn starts(&self, _: &Layout, _: &Situation<'_>) -> Vec<Vec<f64>> {
+        vec![vec![1e-4], vec![-1e-4]]
+    }
+    fn proposals(&self, _: &Situation<'_>) -> Vec<toml::Table> {
+        vec![toml::Table::new()]
     }
 }
 
@@ -93,7 +99,7 @@ impl Effect for Shift {
 fn faults_of_effects_are_found() {
     for (fault, expected) in [
         (Fault::Shape, "10 values become 9"),
-        (Fault::Edge, "the transposed derivative by value 1"),
+        (Fault::Edge, "the derivative along a direction of value 1"),
         (Fault::OffCentre, "it changes the response"),
     ] {
         let breaches = effect("shift", &Shift(fault)).unwrap_err();

@@ -19,7 +19,7 @@ mod of_data;
 
 pub use given::Given;
 pub use joint::Joint;
-pub use of_data::{OfData, apply};
+pub use of_data::OfData;
 
 /// Points that are evaluated together. Fixed, because the rounding of a matrix product depends on the
 /// number of its rows and results must not depend on the number of threads.

@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use crate::data::{Layout, Layouts};
-use crate::linalg::{Matrix, transposed_multiply_vector};
+use crate::linalg::{Matrix, multiply_vector};
 use crate::plugin::discrepancy::Compressed;
+use crate::plugin::effect::{Placed, with_tangents};
 use crate::plugin::forward::Linear;
-use crate::plugin::{Effect, Fact, Forward, Hyperparameter, Likelihood};
+use crate::plugin::{Fact, Forward, Hyperparameter, Likelihood};
 
 use super::LogLikelihood;
 
@@ -15,9 +15,8 @@ const BATCH: usize = 1 << 20;
 
 /// See the module. The hyperparameters are those of the effects, then those of the discrepancy.
 pub struct OfData<'a> {
-    layouts: &'a Layouts,
     forward: &'a dyn Forward,
-    effects: Vec<(&'a dyn Effect, Range<usize>)>,
+    effects: Vec<(Placed<'a>, Range<usize>)>,
     likelihood: &'a dyn Likelihood,
     reduced: Option<(&'a dyn Linear, Box<dyn Compressed>)>,
     hyper: Vec<Hyperparameter>,
@@ -26,25 +25,24 @@ pub struct OfData<'a> {
 impl<'a> OfData<'a> {
     /// Joins the parts. Without effects and with a linear forward map the likelihood is compressed.
     pub fn new(
-        layouts: &'a Layouts,
         forward: &'a dyn Forward,
-        effects: &[&'a dyn Effect],
+        effects: Vec<Placed<'a>>,
         likelihood: &'a dyn Likelihood,
     ) -> Self {
         let mut hyper = Vec::new();
         let mut placed = Vec::new();
-        for &effect in effects {
+        for effect in effects {
             let begin = hyper.len();
-            hyper.extend(effect.parameters(&layouts.blocks[0]));
+            hyper.extend(effect.hyperparameters());
             placed.push((effect, begin..hyper.len()));
         }
         hyper.extend_from_slice(likelihood.hyperparameters());
-        let reduced = if effects.is_empty() {
+        let reduced = if placed.is_empty() {
             forward.linear().and_then(|linear| Some((linear, likelihood.compress(linear)?)))
         } else {
             None
         };
-        Self { layouts, forward, effects: placed, likelihood, reduced, hyper }
+        Self { forward, effects: placed, likelihood, reduced, hyper }
     }
 
     /// The response at natural values: that of the forward map with the effects applied, and the discrepancy's
@@ -73,17 +71,10 @@ impl<'a> OfData<'a> {
 
     fn with_effects(&self, mut response: Vec<f64>, hyper: &[f64]) -> Vec<f64> {
         for (effect, range) in &self.effects {
-            response = apply(*effect, self.layouts, &response, &hyper[range.clone()]);
+            response = effect.apply(&response, &hyper[range.clone()]);
         }
         response
     }
-}
-
-/// An effect applied to the responses of all blocks.
-pub fn apply(effect: &dyn Effect, layouts: &Layouts, response: &[f64], values: &[f64]) -> Vec<f64> {
-    let one =
-        |(layout, range): (&Layout, Range<usize>)| effect.apply(layout, &response[range], values);
-    layouts.parts().flat_map(one).collect()
 }
 
 impl LogLikelihood for OfData<'_> {
@@ -114,32 +105,15 @@ impl LogLikelihood for OfData<'_> {
             return (value, [by_theta, by_hyper].concat());
         }
         let (mean, jacobian) = self.forward.mean_and_jacobian(theta);
-        let mut responses = vec![mean];
-        for (effect, range) in &self.effects {
-            let before = &responses[responses.len() - 1];
-            responses.push(apply(*effect, self.layouts, before, &hyper[range.clone()]));
-        }
-        let last = &responses[responses.len() - 1];
-        if last.iter().any(|y| !y.is_finite()) {
+        let effects = self.effects.iter().map(|(effect, range)| (effect, &hyper[range.clone()]));
+        let (response, tangents) = with_tangents(effects, mean, &jacobian);
+        if response.iter().any(|y| !y.is_finite()) {
             return (f64::NEG_INFINITY, vec![0.0; theta.len() + hyper.len()]);
         }
-        let value = self.likelihood.log_likelihood(last, &hyper[self.own()..]);
-        let (mut weight, by_own) = self.likelihood.gradient(last, &hyper[self.own()..]);
-        let mut by_effects = vec![0.0; self.own()];
-        for ((effect, range), before) in self.effects.iter().zip(&responses).rev() {
-            let values = &hyper[range.clone()];
-            let mut pulled = Vec::with_capacity(weight.len());
-            for (layout, part) in self.layouts.parts() {
-                let jacobian = effect.by_parameters(layout, &before[part.clone()], values);
-                let slopes = transposed_multiply_vector(&jacobian, &weight[part.clone()]);
-                by_effects[range.clone()].iter_mut().zip(slopes).for_each(|(b, s)| *b += s);
-                let (before, weight) = (&before[part.clone()], &weight[part]);
-                pulled.extend(effect.pull_back(layout, before, values, weight));
-            }
-            weight = pulled;
-        }
-        let by_theta = transposed_multiply_vector(&jacobian, &weight);
-        (value, [by_theta, by_effects, by_own].concat())
+        let own = &hyper[self.own()..];
+        let value = self.likelihood.log_likelihood(&response, own);
+        let (weight, by_own) = self.likelihood.gradient(&response, own);
+        (value, [multiply_vector(&tangents, &weight), by_own].concat())
     }
 
     fn facts(&self) -> Vec<Fact> {

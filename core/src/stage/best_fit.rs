@@ -18,7 +18,7 @@ use super::stream;
 pub fn point(study: &Study, data: &Observations, forward: &dyn Forward) -> Result<Vec<f64>, Stop> {
     let likelihood = LeastSquares::of(data)?;
     let posterior =
-        Posterior::new(&study.parameters, OfData::new(&study.layouts, forward, &[], &likelihood));
+        Posterior::new(&study.parameters, OfData::new(forward, Vec::new(), &likelihood));
     let maxima = maxima(&posterior, &stream(study, "best-fit"))?;
     Ok(maxima[0].point.clone())
 }

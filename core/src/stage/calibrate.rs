@@ -15,7 +15,7 @@ use crate::math::optimise;
 use crate::plugin::discrepancy;
 use crate::plugin::discrepancy::CommonError;
 use crate::plugin::sampler::Evidence;
-use crate::plugin::{Effect, Fact, Forward, Likelihood, Target};
+use crate::plugin::{Fact, Forward, Likelihood, Target};
 use crate::posterior::{Joint, OfData, Posterior};
 use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
@@ -174,8 +174,7 @@ impl Parts {
 
     /// The posterior of a study with this forward map.
     pub fn posterior<'a>(&'a self, study: &'a Study, known: &Known<'a>) -> Posterior<'a> {
-        let effects: Vec<&dyn Effect> = study.effects.iter().map(|e| &*e.built.plugin).collect();
-        let likelihood = OfData::new(&study.layouts, known.forward, &effects, self.likelihood());
+        let likelihood = OfData::new(known.forward, study.placed_effects(), self.likelihood());
         Posterior::new(&study.parameters, likelihood).within(known.region.map(<[_]>::to_vec))
     }
 }
@@ -214,7 +213,8 @@ pub fn stage(
         return Ok(None);
     };
     let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.prior, p.reference)).collect();
-    let effects: Vec<_> = study.effects.iter().map(|e| (e.built.name, &e.built.options)).collect();
+    let effects: Vec<_> =
+        study.effects.iter().map(|e| (e.built.name, &e.built.options, &e.common)).collect();
     let inputs = json!([
         known.data.hash,
         known.origin,

@@ -2,7 +2,6 @@
 
 use crate::linalg::Matrix;
 use crate::plugin::Forward;
-use crate::posterior::apply;
 use crate::study::Study;
 
 /// How many numbers may be held at once for what is predicted at many draws: 256 MiB.
@@ -35,16 +34,15 @@ fn batch(study: &Study, forward: &dyn Forward, points: &Matrix) -> Vec<Vec<f64>>
     let d = study.parameters.len();
     let theta = Matrix::from_rows(d, points.iter_rows().map(|p| &p[..d]));
     let mean = forward.mean(&theta);
-    let layouts = &study.layouts;
+    let effects = study.placed_effects();
     mean.iter_rows()
         .zip(points.iter_rows())
         .map(|(mean, point)| {
             let mut response = mean.to_vec();
             let mut from = d;
-            for effect in &study.effects {
-                let plugin = &*effect.built.plugin;
-                let count = plugin.parameters(&layouts.blocks[0]).len();
-                response = apply(plugin, layouts, &response, &point[from..from + count]);
+            for effect in &effects {
+                let count = effect.absent().len();
+                response = effect.apply(&response, &point[from..from + count]);
                 from += count;
             }
             response

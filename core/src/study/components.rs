@@ -1,9 +1,12 @@
 //! The plugins that a study chose.
 
+use super::file::EffectKeys;
 use super::resolve::Study;
 use super::{Complaints, Node, Problems};
 use crate::data::Layout;
-use crate::plugin::{Component, Context};
+use crate::plugin::effect::Placed;
+use crate::plugin::registry::Section;
+use crate::plugin::{Component, Context, Effect};
 
 /// A plugin that a study chose.
 pub struct Chosen<'a> {
@@ -13,6 +16,11 @@ pub struct Chosen<'a> {
     pub name: &'static str,
     /// The plugin with its options.
     pub plugin: &'a dyn Component,
+}
+
+/// What an effect is called: its own name, or that of its plugin.
+pub(super) fn effect_name(section: &Section<dyn Effect, EffectKeys>) -> &str {
+    section.common.name.as_ref().map_or(section.built.name, AsRef::as_ref)
 }
 
 impl Study {
@@ -53,6 +61,15 @@ impl Study {
             Chosen { section: "effect", name, plugin }
         }));
         all
+    }
+
+    /// The effects with their names and places.
+    pub fn placed_effects<'a>(&'a self) -> Vec<Placed<'a>> {
+        let place = |section: &'a Section<dyn Effect, EffectKeys>| {
+            let Section { built, common, .. } = section;
+            Placed::new(effect_name(section), &*built.plugin, &self.layouts, &common.on)
+        };
+        self.effects.iter().map(place).collect()
     }
 
     /// Calls `look` for every plugin with complaints about its own section.

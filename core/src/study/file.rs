@@ -15,6 +15,7 @@ pub use super::scenario::{FunctionSection, ScenarioSection};
 use super::values::{Count, Fraction, Name, Positive};
 use crate::data::Unit;
 use crate::math::distribution::Distribution;
+use crate::plugin::effect::On;
 
 /// What the study is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -230,6 +231,19 @@ impl NumericalErrorSection {
     pub fn whole(&self) -> f64 {
         1.0 / (1.0 - self.ratio.get().powf(-self.order.get()))
     }
+}
+
+/// The engine's keys of `[[effect]]`: a piece of physics that the model lacks, with unknowns of its own that are
+/// calibrated together with the model's parameters.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct EffectKeys {
+    /// Its name, which begins the names of its unknowns as in `damping.rate`; that of the plugin when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<Name>,
+    /// Where it acts: labels by axis, such as `{ sensor = ["R", "V"] }`; everywhere when left out.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub on: On,
 }
 
 /// The engine's keys of `[sampler]`.

@@ -5,9 +5,9 @@ use schemars::JsonSchema;
 use serde_json::Value;
 
 use super::file::{
-    DerivedSection, DesignKeys, DiscrepancyKeys, MeasurementKeys, ModelKeys, NumericalErrorSection,
-    ParameterSection, ResponseSection, SamplerKeys, ScenarioSection, StudySection, SurrogateKeys,
-    ValidateSection,
+    DerivedSection, DesignKeys, DiscrepancyKeys, EffectKeys, MeasurementKeys, ModelKeys,
+    NumericalErrorSection, ParameterSection, ResponseSection, SamplerKeys, ScenarioSection,
+    StudySection, SurrogateKeys, ValidateSection,
 };
 use super::schema::Language;
 use crate::plugin::manual::{Manual, generator, resolve};
@@ -36,7 +36,7 @@ pub fn schema() -> Value {
         .section::<dyn Surrogate, SurrogateKeys>("surrogate")
         .section::<dyn Discrepancy, DiscrepancyKeys>("discrepancy")
         .table::<NumericalErrorSection>("numerical_error")
-        .sections::<dyn Effect, NoKeys>("effect")
+        .sections::<dyn Effect, EffectKeys>("effect")
         .section::<dyn Sampler, SamplerKeys>("sampler")
         .table::<ValidateSection>("validate");
     language.finish()
@@ -56,6 +56,7 @@ pub fn manual() -> Vec<Manual> {
         page::<SurrogateKeys>("[surrogate]"),
         page::<DiscrepancyKeys>("[discrepancy]"),
         page::<NumericalErrorSection>("[numerical_error]"),
+        page::<EffectKeys>("[[effect]]"),
         page::<SamplerKeys>("[sampler]"),
         page::<ValidateSection>("[validate]"),
     ]

@@ -10,8 +10,9 @@ use toml::Table;
 use super::context;
 use super::decode::{decode, fields};
 use super::file::{
-    DerivedSection, DesignKeys, DiscrepancyKeys, MeasurementKeys, ModelKeys, NumericalErrorSection,
-    ResponseSection, SamplerKeys, StudySection, SurrogateKeys, ValidateSection,
+    DerivedSection, DesignKeys, DiscrepancyKeys, EffectKeys, MeasurementKeys, ModelKeys,
+    NumericalErrorSection, ResponseSection, SamplerKeys, StudySection, SurrogateKeys,
+    ValidateSection,
 };
 use super::sections::{
     chosen, chosen_or, derived, effects, layouts, numerical_error, parameters, scenarios, table,
@@ -68,7 +69,7 @@ pub struct Study {
     /// `[[derived]]`.
     pub derived_sections: Vec<DerivedSection>,
     /// `[[effect]]`.
-    pub effects: Vec<Section<dyn Effect, NoKeys>>,
+    pub effects: Vec<Section<dyn Effect, EffectKeys>>,
     /// `[validate]`.
     pub validate: ValidateSection,
     /// The whole study with every default filled in, for `resolved.toml`.
@@ -190,6 +191,7 @@ fn common_keys(section: &str) -> &'static [&'static str] {
         "sampler" => fields::<SamplerKeys>(),
         // Elements of named lists, such as the parts of a chain.
         "" => &["name", "takes", "gives"],
+        "effect" => fields::<EffectKeys>(),
         _ => &[],
     }
 }

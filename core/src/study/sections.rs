@@ -6,13 +6,14 @@ use serde::de::DeserializeOwned;
 
 use super::decode::decode;
 use super::file::{
-    Axes, DerivedSection, NumericalErrorSection, ParameterSection, ResponseSection, ScenarioSection,
+    Axes, DerivedSection, EffectKeys, NumericalErrorSection, ParameterSection, ResponseSection,
+    ScenarioSection,
 };
 use super::resolve::{NumericalError, SECTIONS};
 use super::{Complaints, Node, Problems, nearest};
 use crate::data::{Axis, Layout, Layouts, Scenario, Unit};
 use crate::plugin::reader::GridSource;
-use crate::plugin::registry::{Kind, NoKeys, Section, section};
+use crate::plugin::registry::{Kind, Section, section};
 use crate::plugin::{Effect, Reader};
 
 pub(super) fn unknown_sections(root: &Node, problems: &mut Problems) {
@@ -121,7 +122,7 @@ fn overlay(base: &mut Node, over: &Node) {
 pub(super) fn effects(
     root: &Node,
     problems: &mut Problems,
-) -> Option<Vec<Section<dyn Effect, NoKeys>>> {
+) -> Option<Vec<Section<dyn Effect, EffectKeys>>> {
     let list = root.get("effect").map(Node::elements).unwrap_or_default();
     let decoded: Vec<Option<_>> = list
         .iter()

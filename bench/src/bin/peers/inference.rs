@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lacuna::data::{Draws, Layouts, Measurements, Parameter};
+use lacuna::data::{Draws, Measurements, Parameter};
 use lacuna::diagnose::Diagnosis;
 use lacuna::diagnose::bridge::bridge;
 use lacuna::linalg::Matrix;
@@ -31,7 +31,6 @@ const SEEDS: u64 = 8;
 /// What a posterior consists of.
 struct Parts {
     parameters: Vec<Parameter>,
-    layouts: Layouts,
     data: Measurements,
     emulator: Box<dyn Emulator>,
 }
@@ -39,12 +38,7 @@ struct Parts {
 impl Parts {
     fn read(folder: &Path, name: &str) -> Fallible<Self> {
         let data = problem::measurements(folder)?;
-        Ok(Self {
-            parameters: problem::parameters()?,
-            layouts: data.layout.clone().into(),
-            data,
-            emulator: emulator(folder, name)?,
-        })
+        Ok(Self { parameters: problem::parameters()?, data, emulator: emulator(folder, name)? })
     }
 
     /// Calls `job` with the posterior and the time it took to prepare.
@@ -60,7 +54,7 @@ impl Parts {
         let known = Known::without_slopes(&self.data, &[]);
         let (likelihood, statistics) = timed(|| gaussian.likelihood(&known))?;
         let likelihood = likelihood?;
-        let join = || OfData::new(&self.layouts, &*self.emulator, &[], &*likelihood);
+        let join = || OfData::new(&*self.emulator, Vec::new(), &*likelihood);
         let (emulated, reduction) = timed(join)?;
         job(&Posterior::new(&self.parameters, emulated), statistics + reduction)
     }

@@ -1,0 +1,194 @@
+//! What a search for missing effects looks at: data by condition, a forward map, and its errors.
+
+use std::ops::Range;
+
+use crate::data::{Coordinates, Layout, Layouts, Observations, Parameter, layouts::SCENARIO};
+use crate::plugin::Forward;
+use crate::plugin::discrepancy::CommonError;
+
+/// Measurements with the forward map that should explain them.
+#[derive(Clone)]
+pub struct Experiment<'a> {
+    /// The shapes of the responses.
+    pub layouts: &'a Layouts,
+    /// The unknowns of the forward map.
+    pub parameters: &'a [Parameter],
+    /// From parameters to responses.
+    pub forward: &'a dyn Forward,
+    /// Errors of the forward map that all replicates share.
+    pub common: Vec<CommonError>,
+    /// Where the forward map holds, where that is narrower than the priors.
+    pub region: Option<Vec<(f64, f64)>>,
+    /// The measurements, by condition.
+    pub conditions: Vec<Condition>,
+    /// All curves, in the order of their outputs.
+    pub curves: Vec<Curve>,
+}
+
+/// The replicates under one set of conditions. Those of different conditions are independent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Condition {
+    /// The scenario's name; `None` where the study has none.
+    pub scenario: Option<String>,
+    /// Its outputs.
+    pub outputs: Range<usize>,
+    /// Its curves.
+    pub curves: Range<usize>,
+    /// What each replicate measured of the outputs.
+    pub replicates: Vec<Vec<Option<f64>>>,
+}
+
+/// One curve of a condition, such as what one sensor shows over time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    /// Its labels by axis, without the scenario.
+    pub labels: Vec<(String, String)>,
+    /// The condition that it belongs to.
+    pub condition: usize,
+    /// Its outputs.
+    pub outputs: Range<usize>,
+    /// The outputs that some replicate measured.
+    pub measured: Vec<usize>,
+    /// The place of each of them along the last axis, in its unit.
+    pub at: Vec<f64>,
+}
+
+impl Curve {
+    /// Its labels in words; the response's name where it has none.
+    pub fn name(&self, layouts: &Layouts) -> String {
+        if self.labels.is_empty() {
+            return layouts.name().to_owned();
+        }
+        self.labels.iter().map(|(_, label)| label.as_str()).collect::<Vec<_>>().join(" ")
+    }
+}
+
+impl<'a> Experiment<'a> {
+    /// Measurements sorted by condition and curve.
+    pub fn new(
+        layouts: &'a Layouts,
+        parameters: &'a [Parameter],
+        forward: &'a dyn Forward,
+        data: &Observations,
+    ) -> Self {
+        let mut conditions = Vec::new();
+        let mut curves = Vec::new();
+        for ((layout, range), block) in layouts.parts().zip(&data.blocks) {
+            let scenarios = scenarios(layout);
+            let length = layout.len() / scenarios.len().max(1);
+            for (k, scenario) in scenarios.into_iter().enumerate() {
+                let own = k * length..(k + 1) * length;
+                let begin = curves.len();
+                curves.extend(of_condition(layout, &own, range.start, conditions.len()));
+                let measured = block.replicates.iter().map(|r| r.values[own.clone()].to_vec());
+                conditions.push(Condition {
+                    scenario,
+                    outputs: range.start + own.start..range.start + own.end,
+                    curves: begin..curves.len(),
+                    replicates: measured.filter(|r| r.iter().any(Option::is_some)).collect(),
+                });
+            }
+        }
+        let (common, region) = (Vec::new(), None);
+        let mut all = Self { layouts, parameters, forward, common, region, conditions, curves };
+        for curve in &mut all.curves {
+            curve.measured = curve.outputs.clone().collect();
+        }
+        all.remeasured()
+    }
+
+    /// The same whose curves have only the values that some replicate of these measured.
+    pub fn remeasured(mut self) -> Self {
+        let (counts, _) = self.means();
+        for curve in &mut self.curves {
+            let places = curve.measured.iter().zip(&curve.at);
+            (curve.measured, curve.at) = places.filter(|(i, _)| counts[**i] > 0.0).unzip();
+        }
+        self
+    }
+
+    /// The replicates of a curve that measured all that any of them did: its values, one replicate after another.
+    pub fn complete(&self, curve: &Curve) -> Vec<Vec<f64>> {
+        let condition = &self.conditions[curve.condition];
+        let begin = condition.outputs.start;
+        let values = |replicate: &Vec<Option<f64>>| -> Option<Vec<f64>> {
+            curve.measured.iter().map(|i| replicate[i - begin]).collect()
+        };
+        if curve.measured.is_empty() {
+            return Vec::new();
+        }
+        condition.replicates.iter().filter_map(values).collect()
+    }
+
+    /// The number of outputs.
+    pub fn outputs(&self) -> usize {
+        self.layouts.len()
+    }
+
+    /// The number of replicates and their mean, one an output; zeros where nothing was measured.
+    pub fn means(&self) -> (Vec<f64>, Vec<f64>) {
+        let mut counts = vec![0.0; self.outputs()];
+        let mut means = vec![0.0; self.outputs()];
+        for condition in &self.conditions {
+            for replicate in &condition.replicates {
+                for (i, y) in condition.outputs.clone().zip(replicate) {
+                    if let Some(y) = y {
+                        counts[i] += 1.0;
+                        means[i] += y;
+                    }
+                }
+            }
+        }
+        means.iter_mut().zip(&counts).filter(|(_, n)| **n > 0.0).for_each(|(m, n)| *m /= n);
+        (counts, means)
+    }
+
+    /// The same with other measurements of the same shape: each condition with these replicates.
+    pub fn with_replicates(&self, replicates: Vec<Vec<Vec<Option<f64>>>>) -> Self {
+        let mut other = self.clone();
+        for (condition, replicates) in other.conditions.iter_mut().zip(replicates) {
+            condition.replicates = replicates;
+        }
+        other
+    }
+
+    /// The largest number of replicates of a condition.
+    pub fn most_replicates(&self) -> usize {
+        self.conditions.iter().map(|c| c.replicates.len()).max().unwrap_or(0)
+    }
+}
+
+fn scenarios(layout: &Layout) -> Vec<Option<String>> {
+    match layout.axes.first().filter(|axis| axis.name == SCENARIO) {
+        Some(axis) => (0..axis.len()).map(|i| Some(axis.text(i))).collect(),
+        None => vec![None],
+    }
+}
+
+/// The curves of one condition: outputs `own` of a block that begins at `begin`.
+fn of_condition(layout: &Layout, own: &Range<usize>, begin: usize, condition: usize) -> Vec<Curve> {
+    let grid = match layout.axes.last().map(|axis| &axis.coordinates) {
+        Some(Coordinates::Grid { values, .. }) => values.clone(),
+        _ => vec![0.0],
+    };
+    let length = grid.len().max(1);
+    let is_grid =
+        matches!(layout.axes.last().map(|axis| &axis.coordinates), Some(Coordinates::Grid { .. }));
+    let labelled = layout.axes.len() - usize::from(is_grid);
+    let label = |flat: usize| {
+        let places = layout.place(flat);
+        let named = layout.axes[..labelled].iter().zip(places);
+        let named = named.filter(|(axis, _)| axis.name != SCENARIO);
+        named.map(|(axis, i)| (axis.name.clone(), axis.text(i))).collect()
+    };
+    own.clone()
+        .step_by(length)
+        .map(|first| Curve {
+            labels: label(first),
+            condition,
+            outputs: begin + first..begin + first + length,
+            measured: Vec::new(),
+            at: grid.clone(),
+        })
+        .collect()
+}

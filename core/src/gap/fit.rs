@@ -1,0 +1,210 @@
+//! The best fit of a system to the replicates' means: largest posterior density under known noise.
+//!
+//! Levenberg and Marquardt's method on whitened residuals with rows for the prior (Nocedal and Wright, Numerical
+//! Optimization, 2nd ed., section 10.3), inside the bounds of the priors.
+
+use super::system::{Linearised, System};
+use super::whitener::Whitener;
+use crate::linalg::vector::dot;
+use crate::linalg::{Cholesky, Matrix, gram, multiply_vector};
+use crate::math::distribution::Distribution;
+
+/// The most steps of a search.
+const STEPS: usize = 40;
+
+/// A step that gains less of the log density ends the search.
+const GAIN: f64 = 1e-5;
+
+/// The best fit from one start.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// The unknowns, with the response and its derivatives there.
+    pub at: Linearised,
+    /// The whitened residual of the means.
+    pub residual: Vec<f64>,
+    /// The whitened derivatives, one unknown a row.
+    pub slopes: Matrix,
+    /// The precision that each prior adds.
+    pub prior_precision: Vec<f64>,
+    /// `-|residual|^2 / 2` plus the log prior density: the log posterior density up to what the noise alone decides.
+    pub log_density: f64,
+    /// The log prior density.
+    pub log_prior: f64,
+}
+
+impl Fit {
+    /// Half the sum of squares: minus the log-likelihood.
+    pub fn misfit(&self) -> f64 {
+        self.log_prior - self.log_density
+    }
+
+    /// The matrix of second derivatives of minus the log density, by Gauss and Newton.
+    pub fn precision(&self) -> Matrix {
+        let mut hessian = gram(&self.slopes.transposed());
+        for (j, p) in self.prior_precision.iter().enumerate() {
+            hessian[(j, j)] += p;
+        }
+        hessian
+    }
+
+    /// The standard deviation of each unknown by the normal approximation.
+    pub fn sd(&self) -> Vec<f64> {
+        let (scaled, scale) = equilibrated(&self.precision());
+        match Cholesky::new(&scaled) {
+            Ok(factor) => {
+                let inverse = factor.inverse();
+                scale.iter().enumerate().map(|(j, s)| s * inverse[(j, j)].sqrt()).collect()
+            }
+            Err(_) => vec![f64::INFINITY; scale.len()],
+        }
+    }
+
+    /// The log of the integral of the posterior density by Laplace's method, less what the noise alone decides: half of the
+    /// normal law where an unknown is pressed against a bound of its prior counts as such.
+    pub fn log_evidence(&self) -> f64 {
+        let (scaled, scale) = equilibrated(&self.precision());
+        let Ok(factor) = Cholesky::new(&scaled) else { return f64::NEG_INFINITY };
+        let log_scale: f64 = scale.iter().map(|s| s.ln()).sum();
+        let half = 0.5 * scale.len() as f64 * std::f64::consts::TAU.ln();
+        self.log_density + half + log_scale - 0.5 * factor.log_determinant()
+    }
+}
+
+/// A matrix with its diagonal made one, and the factors.
+fn equilibrated(a: &Matrix) -> (Matrix, Vec<f64>) {
+    let scale: Vec<f64> =
+        (0..a.rows()).map(|j| 1.0 / a[(j, j)].max(f64::MIN_POSITIVE).sqrt()).collect();
+    let scaled = Matrix::from_fn(a.rows(), a.rows(), |i, j| scale[i] * a[(i, j)] * scale[j]);
+    (scaled, scale)
+}
+
+/// The precision of the normal law that has a prior's width: what the prior says of a shift.
+pub fn precision(prior: &Distribution) -> f64 {
+    let sd = prior.sd();
+    let sd = if sd.is_finite() && sd > 0.0 {
+        sd
+    } else {
+        0.25 * (prior.quantile(0.975) - prior.quantile(0.025))
+    };
+    1.0 / (sd * sd)
+}
+
+/// The curvature of minus the log density of a prior at a point, not below zero.
+fn curvature(prior: &Distribution, x: f64) -> f64 {
+    let (low, high) = prior.support();
+    let step = 1e-4 / precision(prior).sqrt();
+    let (a, b) = ((x - step).max(low), (x + step).min(high));
+    let (left, right) = (prior.log_density_derivative(a), prior.log_density_derivative(b));
+    let curvature = (left - right) / (b - a);
+    if curvature.is_finite() { curvature.max(0.0) } else { 0.0 }
+}
+
+/// The best fit to the means, from a start.
+pub fn fit(system: &System<'_>, whitener: &Whitener, means: &[f64], start: &[f64]) -> Fit {
+    let bounds = inner(&system.bounds());
+    let start: Vec<f64> =
+        start.iter().zip(&bounds).map(|(x, (low, high))| x.clamp(*low, *high)).collect();
+    let mut best = at(system, whitener, means, &start);
+    let mut damping = 1e-3;
+    for _ in 0..STEPS {
+        let mut improved = None;
+        for _ in 0..8 {
+            let point = step(system, &best, damping, &bounds);
+            if point == best.at.point {
+                break;
+            }
+            let density = log_density(system, whitener, means, &point);
+            if density > best.log_density {
+                improved = Some(point);
+                break;
+            }
+            damping = (damping * 8.0).max(1e-8);
+        }
+        let Some(point) = improved else { break };
+        damping = (damping * 0.1).max(1e-12);
+        let next = at(system, whitener, means, &point);
+        let gain = next.log_density - best.log_density;
+        best = next;
+        if gain < GAIN {
+            break;
+        }
+    }
+    best
+}
+
+/// The best of the fits from several starts; the first of equals.
+pub fn fit_from(
+    system: &System<'_>,
+    whitener: &Whitener,
+    means: &[f64],
+    starts: &[Vec<f64>],
+) -> Option<Fit> {
+    let fits = starts.iter().map(|start| fit(system, whitener, means, start));
+    fits.filter(|fit| fit.log_density.is_finite())
+        .reduce(|best, next| if next.log_density > best.log_density + GAIN { next } else { best })
+}
+
+/// Bounds a hair inside, where densities are finite.
+fn inner(bounds: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let inset = |&(low, high): &(f64, f64)| {
+        let width = high - low;
+        if width.is_finite() { (low + 1e-9 * width, high - 1e-9 * width) } else { (low, high) }
+    };
+    bounds.iter().map(inset).collect()
+}
+
+fn residual(means: &[f64], response: &[f64]) -> Vec<f64> {
+    means.iter().zip(response).map(|(y, m)| y - m).collect()
+}
+
+fn log_density(system: &System<'_>, whitener: &Whitener, means: &[f64], point: &[f64]) -> f64 {
+    let response = system.response(point);
+    if response.iter().any(|y| !y.is_finite()) {
+        return f64::NEG_INFINITY;
+    }
+    let z = whitener.whiten(&residual(means, &response));
+    -0.5 * dot(&z, &z) + system.log_prior(point)
+}
+
+/// The fit as it stands at a point.
+pub fn at(system: &System<'_>, whitener: &Whitener, means: &[f64], point: &[f64]) -> Fit {
+    let at = system.linearised(point);
+    let residual = whitener.whiten(&residual(means, &at.response));
+    let log_prior = system.log_prior(point);
+    let finite = at.response.iter().all(|y| y.is_finite());
+    let log_density =
+        if finite { log_prior - 0.5 * dot(&residual, &residual) } else { f64::NEG_INFINITY };
+    let prior_precision =
+        system.priors().iter().zip(point).map(|(p, &x)| curvature(p, x)).collect();
+    let slopes = whitener.whiten_rows(&at.tangents);
+    Fit { at, residual, slopes, prior_precision, log_density, log_prior }
+}
+
+/// The next point: a damped step of Gauss and Newton in units of the priors' widths, along the free unknowns.
+fn step(system: &System<'_>, here: &Fit, damping: f64, bounds: &[(f64, f64)]) -> Vec<f64> {
+    let point = &here.at.point;
+    let mut gradient = multiply_vector(&here.slopes, &here.residual);
+    for (g, (prior, &x)) in gradient.iter_mut().zip(system.priors().iter().zip(point)) {
+        *g += prior.log_density_derivative(x);
+    }
+    let blocked = |j: usize| {
+        let (low, high) = bounds[j];
+        (point[j] <= low && gradient[j] < 0.0) || (point[j] >= high && gradient[j] > 0.0)
+    };
+    let free: Vec<usize> = (0..point.len()).filter(|&j| !blocked(j)).collect();
+    let hessian = here.precision();
+    let width: Vec<f64> = system.priors().iter().map(|p| 1.0 / precision(p).sqrt()).collect();
+    let reduced = Matrix::from_fn(free.len(), free.len(), |a, b| {
+        let (i, j) = (free[a], free[b]);
+        let value = width[i] * hessian[(i, j)] * width[j];
+        if a == b { value * (1.0 + damping) + 1e-12 + damping } else { value }
+    });
+    let Ok(factor) = Cholesky::new(&reduced) else { return point.clone() };
+    let mut shift: Vec<f64> = free.iter().map(|&j| gradient[j] * width[j]).collect();
+    factor.solve(&mut shift);
+    let mut next = point.clone();
+    for (&j, s) in free.iter().zip(&shift) {
+        next[j] = (point[j] + s * width[j]).clamp(bounds[j].0, bounds[j].1);
+    }
+    next
+}

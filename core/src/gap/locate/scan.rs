@@ -1,0 +1,217 @@
+//! A multiscale scan of whitened residuals: curves, windows along the last axis, octave bands.
+//!
+//! The energy of white noise in a window is chi squared. Made normal by the cube root (Wilson and Hilferty,
+//! Proceedings of the National Academy of Sciences 17 (1931) 684) and penalised for the number of windows of its length
+//! (Dümbgen and Spokoiny, Annals of Statistics 29 (2001) 124), the cells of all scales compete on equal terms.
+
+use std::sync::Arc;
+
+use rustdct::{DctPlanner, TransformType2And3};
+
+use crate::gap::experiment::Experiment;
+
+/// The fewest degrees of freedom of a cell.
+const FEWEST: f64 = 2.0;
+
+/// The fewest cosines in an octave band.
+const NARROWEST: usize = 4;
+
+/// A cell of the scan with its statistic.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cell {
+    /// The place that is scanned: a curve, or all curves of a condition together.
+    pub place: usize,
+    /// The first and the last measured value of the window.
+    pub window: (usize, usize),
+    /// The numbers of the first cosine of the band and of the one after the last; all when `None`.
+    pub band: Option<(usize, usize)>,
+    /// Its energy, standardised and penalised.
+    pub statistic: f64,
+}
+
+/// What is scanned.
+pub struct Scan {
+    /// The curves of each place.
+    pub places: Vec<Vec<usize>>,
+    curves: Vec<Vec<usize>>,
+    plans: Vec<Arc<Plan>>,
+}
+
+/// Windows and bands of curves of one length.
+struct Plan {
+    length: usize,
+    windows: Vec<(usize, usize)>,
+    bands: Vec<(usize, usize)>,
+    cosines: Arc<dyn TransformType2And3<f64>>,
+}
+
+impl Scan {
+    /// Of the curves of an experiment, and of all curves of a condition together where they are equally long.
+    pub fn new(experiment: &Experiment<'_>) -> Self {
+        let curves: Vec<Vec<usize>> =
+            experiment.curves.iter().map(|curve| curve.measured.clone()).collect();
+        let mut places: Vec<Vec<usize>> = (0..curves.len()).map(|s| vec![s]).collect();
+        for condition in &experiment.conditions {
+            let own: Vec<usize> =
+                condition.curves.clone().filter(|&s| !curves[s].is_empty()).collect();
+            if own.len() > 1 && own.iter().all(|&s| curves[s].len() == curves[own[0]].len()) {
+                places.push(own);
+            }
+        }
+        let mut plans: Vec<Arc<Plan>> = Vec::new();
+        for curve in &curves {
+            let known = plans.iter().find(|plan| plan.length == curve.len()).cloned();
+            plans.push(known.unwrap_or_else(|| Arc::new(Plan::new(curve.len()))));
+        }
+        Self { places, curves, plans }
+    }
+
+    /// The best cell of each place.
+    pub fn best(&self, white: &[f64]) -> Vec<Cell> {
+        let sums: Vec<Vec<Vec<f64>>> = self
+            .curves
+            .iter()
+            .zip(&self.plans)
+            .map(|(curve, plan)| plan.sums(&curve.iter().map(|&i| white[i]).collect::<Vec<_>>()))
+            .collect();
+        let place = |(place, curves): (usize, &Vec<usize>)| {
+            let plan = &self.plans[curves[0]];
+            let own: Vec<&Vec<Vec<f64>>> = curves.iter().map(|&s| &sums[s]).collect();
+            plan.best(place, &own)
+        };
+        self.places.iter().enumerate().map(place).collect()
+    }
+}
+
+impl Plan {
+    fn new(length: usize) -> Self {
+        let mut bands = Vec::new();
+        let mut begin = 0;
+        while begin < length {
+            let end = (begin * 2).max(begin + NARROWEST);
+            // A last band that would be narrow joins the one before.
+            let end = if end + NARROWEST > length { length } else { end };
+            bands.push((begin, end));
+            begin = end;
+        }
+        let cosines = DctPlanner::new().plan_dct2(length.max(1));
+        Self { length, windows: windows(length), bands, cosines }
+    }
+
+    /// The running sums of the squares of a curve, and of its part in each band.
+    fn sums(&self, curve: &[f64]) -> Vec<Vec<f64>> {
+        if curve.is_empty() {
+            return Vec::new();
+        }
+        let mut parts = vec![running(curve)];
+        if self.bands.len() > 1 {
+            let mut spectrum = curve.to_vec();
+            self.cosines.process_dct2(&mut spectrum);
+            for &(begin, end) in &self.bands {
+                let mut part = vec![0.0; curve.len()];
+                part[begin..end].copy_from_slice(&spectrum[begin..end]);
+                self.cosines.process_dct3(&mut part);
+                let scale = 2.0 / curve.len() as f64;
+                for x in &mut part {
+                    *x *= scale;
+                }
+                parts.push(running(&part));
+            }
+        }
+        parts
+    }
+
+    /// The best cell of some curves together.
+    fn best(&self, place: usize, sums: &[&Vec<Vec<f64>>]) -> Cell {
+        let mut best = Cell { place, window: (0, 0), band: None, statistic: f64::NEG_INFINITY };
+        if sums.iter().any(|parts| parts.is_empty()) {
+            return best;
+        }
+        for part in 0..sums[0].len() {
+            let band = part.checked_sub(1).map(|b| self.bands[b]);
+            let width = band.map_or(1.0, |(a, b)| (b - a) as f64 / self.length as f64);
+            for &(begin, end) in &self.windows {
+                let freedom = (end - begin) as f64 * width * sums.len() as f64;
+                if freedom < FEWEST {
+                    continue;
+                }
+                let energy: f64 = sums.iter().map(|p| p[part][end] - p[part][begin]).sum();
+                let statistic = standardised(energy, freedom) - self.penalty(end - begin);
+                if statistic > best.statistic {
+                    best = Cell { place, window: (begin, end - 1), band, statistic };
+                }
+            }
+        }
+        best
+    }
+
+    fn penalty(&self, width: usize) -> f64 {
+        (2.0 * (self.length as f64 / width as f64).ln()).sqrt()
+    }
+}
+
+/// The cube root of a mean square, made standard normal.
+fn standardised(energy: f64, freedom: f64) -> f64 {
+    let spread = 2.0 / (9.0 * freedom);
+    ((energy / freedom).cbrt() - (1.0 - spread)) / spread.sqrt()
+}
+
+/// Sums of the squares of the values before each place.
+fn running(values: &[f64]) -> Vec<f64> {
+    let mut sum = 0.0;
+    let mut all = Vec::with_capacity(values.len() + 1);
+    all.push(0.0);
+    for x in values {
+        sum += x * x;
+        all.push(sum);
+    }
+    all
+}
+
+/// Windows of lengths in steps of a root of two, each an eighth of its length from the next, and the whole.
+fn windows(length: usize) -> Vec<(usize, usize)> {
+    let mut all = vec![(0, length)];
+    let mut width = length as f64 / std::f64::consts::SQRT_2;
+    while width >= 3.0 {
+        let w = width.round() as usize;
+        let stride = (w / 8).max(1);
+        all.extend((0..=length - w).step_by(stride).map(|begin| (begin, begin + w)));
+        width /= std::f64::consts::SQRT_2;
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::{Stream, normal};
+
+    #[test]
+    fn bands_divide_the_energy_of_a_curve() {
+        let plan = Plan::new(100);
+        let curve: Vec<f64> = (0..100).map(|t| f64::from(t * t % 13) - 6.0).collect();
+        let sums = plan.sums(&curve);
+        let (all, parts) = (sums[0][100], sums[1..].iter().map(|s| s[100]).sum::<f64>());
+        assert!((all - parts).abs() < 1e-9 * all, "{all} {parts}");
+        assert_eq!(plan.bands[0], (0, 4));
+        assert_eq!(plan.bands[plan.bands.len() - 1].1, 100);
+    }
+
+    /// A bump of a height of 3 over 20 of 100 white numbers: the best window lies about it. White noise alone stays low.
+    #[test]
+    fn a_bump_is_found_where_it_is() {
+        let mut rng = Stream::root(3).generator();
+        let white: Vec<f64> = (0..100).map(|_| normal(&mut rng)).collect();
+        let plan = Plan::new(100);
+        let quiet = plan.best(0, &[&plan.sums(&white)]);
+        assert!(quiet.statistic < 3.0, "{quiet:?}");
+        let bumped: Vec<f64> = white
+            .iter()
+            .enumerate()
+            .map(|(t, z)| z + if (40..60).contains(&t) { 3.0 } else { 0.0 })
+            .collect();
+        let found = plan.best(0, &[&plan.sums(&bumped)]);
+        assert!(found.statistic > 6.0, "{found:?}");
+        assert!((36..=44).contains(&found.window.0) && (56..=63).contains(&found.window.1));
+    }
+}

@@ -1,0 +1,177 @@
+//! The verdict: nothing, a name, a class of names, something without a name, or nothing that could be seen.
+
+use serde::{Deserialize, Serialize};
+
+use super::look::{Found, Options};
+use crate::gap::candidates::Candidate;
+use crate::plugin::effect::On;
+
+/// A type is named alone from this probability on.
+const SURE: f64 = 0.9;
+
+/// A class holds the types that together have this probability.
+const CLASS: f64 = 0.95;
+
+/// The share of replicates without which a name must stay.
+const STABLE: f64 = 0.8;
+
+/// An effect that differs between conditions or sensors with less probability than this is not what it is called.
+const INCONSISTENT: f64 = 0.001;
+
+/// An effect that closes less of the excess misfit than this is no explanation of it, where an excess remains.
+const HALF: f64 = 0.5;
+
+/// An excess of misfit less probable than this without a gap remains.
+const REMAINS: f64 = 0.05;
+
+/// Candidates of which less than this is left by the calibration cannot be seen.
+const INVISIBLE: f64 = 0.95;
+
+/// The word of a verdict, as `summary.json` has it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Word {
+    /// Data and model agree within noise and common errors.
+    None,
+    /// What is missing is named.
+    Named,
+    /// What is missing is one of a class that these data cannot tell apart.
+    Class,
+    /// Something is missing that no candidate explains.
+    Unlisted,
+    /// Whatever may be missing, the calibrated parameters absorb it.
+    NotVisible,
+}
+
+/// An effect that is missing.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Named {
+    /// Its name in the system.
+    pub name: String,
+    /// The name of its plugin.
+    pub kind: String,
+    /// Where it acts.
+    pub on: On,
+    /// The values of its unknowns.
+    pub values: Vec<f64>,
+    /// Their standard deviations.
+    pub sd: Vec<f64>,
+    /// The probability of its type among the candidates.
+    pub probability: f64,
+    /// The types that these data cannot tell from it, itself first; itself alone when it is sure.
+    pub class: Vec<String>,
+}
+
+/// A verdict with its reasons.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// The word.
+    pub word: Word,
+    /// The effects that explain most, whether or not they are the name.
+    pub effects: Vec<Named>,
+    /// The share of the excess misfit that they close, in the replicates they were fitted to.
+    pub closed: f64,
+    /// Why, in words.
+    pub reasons: Vec<String>,
+}
+
+/// The verdict on what a search found.
+pub fn verdict(found: &Found<'_>, candidates: &[Candidate], options: Options) -> Verdict {
+    let first = found.path.first().map_or(&found.last, |step| &step.before);
+    let excess = |look: &super::Look| look.statistics.energy - look.expected_energy;
+    let (before, after) = (excess(first), excess(&found.last));
+    let closed = if before > 0.0 { 1.0 - after / before } else { 0.0 };
+    let effects = named(found, candidates);
+    let gap = found.last.p[1].min(found.last.p[2]) <= 0.5 * options.unlisted;
+    let mut reasons = Vec::new();
+    let word = if effects.is_empty() {
+        if gap || found.last.p[0] <= options.naming {
+            reasons.push("data and model disagree, and no candidate outweighs its absence".into());
+            Word::Unlisted
+        } else if !first.visible.is_empty() && first.visible.iter().all(|v| v.absorbed > INVISIBLE)
+        {
+            reasons.push(format!(
+                "the calibrated parameters absorb more than {:.0} % of every candidate",
+                100.0 * INVISIBLE
+            ));
+            Word::NotVisible
+        } else {
+            Word::None
+        }
+    } else {
+        doubts(found, gap, closed, options, &mut reasons);
+        let sure = effects.iter().all(|e| e.class.len() == 1);
+        if !reasons.is_empty() {
+            Word::Unlisted
+        } else if sure && found.stability >= STABLE {
+            Word::Named
+        } else {
+            Word::Class
+        }
+    };
+    if found.noise.assumed.contains(&true) {
+        reasons.push("noise assumed: there are no replicates to learn it from".into());
+    }
+    Verdict { word, effects, closed, reasons }
+}
+
+/// Why the effects are not what is missing.
+fn doubts(found: &Found<'_>, gap: bool, closed: f64, options: Options, reasons: &mut Vec<String>) {
+    if gap {
+        reasons.push("data and model still disagree with the effects that explain most".into());
+    } else if found.last.p[0] <= options.naming && found.chosen.len() >= options.most {
+        reasons.push(format!("more than {} effects would be needed", options.most));
+    }
+    if found.consistency < INCONSISTENT {
+        reasons.push(
+            "the effects that explain most are not the same under all conditions and on all their sensors"
+                .into(),
+        );
+    }
+    if closed < HALF && found.last.p[2] <= REMAINS {
+        reasons.push(format!(
+            "the effects that explain most close {:.0} % of the excess misfit",
+            100.0 * closed.max(0.0)
+        ));
+    }
+}
+
+fn named(found: &Found<'_>, candidates: &[Candidate]) -> Vec<Named> {
+    let sd = found.last.fit.sd();
+    let mut begin = found.system.experiment.parameters.len();
+    let mut all = Vec::new();
+    let effects = found.system.effects.iter().zip(&found.chosen).zip(&found.types);
+    for ((effect, suspect), types) in effects {
+        let end = begin + effect.absent().len();
+        let kind = &candidates[suspect.candidate].kind;
+        let own = types.iter().find(|(name, _)| name == kind).map_or(0.0, |(_, p)| *p);
+        all.push(Named {
+            name: effect.name.clone(),
+            kind: kind.clone(),
+            on: suspect.on.clone(),
+            values: found.last.fit.at.point[begin..end].to_vec(),
+            sd: sd[begin..end].to_vec(),
+            probability: own,
+            class: class(kind, own, types),
+        });
+        begin = end;
+    }
+    all
+}
+
+/// The types of the highest probability that together reach that of a class; the chosen one alone when it is sure.
+fn class(kind: &str, own: f64, types: &[(String, f64)]) -> Vec<String> {
+    let mut class = vec![kind.to_owned()];
+    let mut sum = own;
+    if own >= SURE {
+        return class;
+    }
+    for (other, p) in types.iter().filter(|(other, _)| other != kind) {
+        if sum >= CLASS {
+            break;
+        }
+        class.push(other.clone());
+        sum += p;
+    }
+    class
+}

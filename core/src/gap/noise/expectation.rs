@@ -1,0 +1,234 @@
+//! The noise of largest likelihood by expectation and maximisation (Dempster, Laird and Rubin, Journal of the Royal
+//! Statistical Society B 39 (1977) 1).
+
+use super::autoregression::Autoregression;
+use super::curve::{CurveNoise, Differences, Wander};
+use crate::linalg::vector::{add_scaled, dot};
+use crate::linalg::{Cholesky, Matrix};
+
+/// Steps of expectation and maximisation: with them the likelihood rises by less than a hundredth per step.
+const STEPS: usize = 20;
+
+/// Fewer independent differences say nothing of how whole replicates differ.
+const FEWEST: usize = 3;
+
+/// Expectation and maximisation: the directions' shares in each difference are what is not seen.
+pub(super) struct Fit<'a> {
+    data: &'a Differences,
+    order: usize,
+    memory: Autoregression,
+    variance: f64,
+    profile: Vec<f64>,
+    level: f64,
+    wander: [f64; 3],
+    /// Differences and directions, scaled and whitened with innovations of variance one.
+    pub whitened: Vec<Vec<f64>>,
+    directions: Vec<Vec<f64>>,
+    /// The products of the whitened directions.
+    pub gram: Matrix,
+}
+
+impl<'a> Fit<'a> {
+    pub fn new(data: &'a Differences, order: usize) -> Self {
+        let count = data.contrasts.len() * data.response.len();
+        let variance = data.contrasts.iter().flatten().map(|x| x * x).sum::<f64>() / count as f64;
+        let wander = if data.contrasts.len() < FEWEST {
+            [0.0; 3]
+        } else {
+            let size = |d: &Vec<f64>| dot(d, d) / d.len() as f64;
+            [0, 1, 2].map(|k| 0.1 * variance / size(&data.directions[k]).max(f64::MIN_POSITIVE))
+        };
+        let wander = wander.map(|v| if v.is_finite() { v } else { 0.0 });
+        let mut fit = Self {
+            data,
+            order,
+            memory: Autoregression::white(),
+            variance,
+            profile: vec![1.0; data.response.len()],
+            level: 0.0,
+            wander,
+            whitened: Vec::new(),
+            directions: Vec::new(),
+            gram: Matrix::zeros(3, 3),
+        };
+        fit.whiten();
+        fit
+    }
+
+    /// As an earlier fit left it.
+    pub fn of(data: &'a Differences, noise: &CurveNoise) -> Self {
+        let mut fit = Self::new(data, noise.memory.order());
+        fit.memory = noise.memory.clone();
+        fit.variance = noise.sd * noise.sd;
+        fit.profile.clone_from(&noise.profile);
+        fit.wander = noise.wander.variances();
+        fit.whiten();
+        fit
+    }
+
+    fn whiten(&mut self) {
+        let white = |x: &Vec<f64>| {
+            let mut x: Vec<f64> = x.iter().zip(&self.profile).map(|(x, w)| x / w).collect();
+            self.memory.whiten(&mut x);
+            x
+        };
+        self.whitened = self.data.contrasts.iter().map(white).collect();
+        self.directions = self.data.directions.iter().map(white).collect();
+        let products = |i: usize, j: usize| dot(&self.directions[i], &self.directions[j]);
+        self.gram = Matrix::from_fn(3, 3, products);
+    }
+
+    pub fn onto(&self, whitened: &[f64]) -> Vec<f64> {
+        self.directions.iter().map(|d| dot(d, whitened)).collect()
+    }
+
+    /// The matrix `I + V' G V / variance` with `V` the standard deviations of the wander.
+    fn inner(&self) -> (Matrix, [f64; 3]) {
+        let sd = self.wander.map(f64::sqrt);
+        let entry = |i: usize, j: usize| {
+            f64::from(u8::from(i == j)) + sd[i] * self.gram[(i, j)] * sd[j] / self.variance
+        };
+        (Matrix::from_fn(3, 3, entry), sd)
+    }
+
+    pub fn run(mut self) -> Self {
+        for step in 0..STEPS {
+            self.improve();
+            if step == STEPS / 2 && self.find_level() {
+                self.whiten();
+            }
+        }
+        self
+    }
+
+    /// One step: the expected shares of the directions, then the noise that is left.
+    fn improve(&mut self) {
+        let (inner, sd) = self.inner();
+        let Ok(factor) = Cholesky::new(&inner) else { return };
+        let inverse = factor.inverse();
+        let posterior = Matrix::from_fn(3, 3, |i, j| sd[i] * inverse[(i, j)] * sd[j]);
+        let n = self.whitened.len() as f64;
+        let length = self.data.response.len();
+        let mut squares = [0.0; 3];
+        let mut covariances = vec![0.0; self.order + 1];
+        for (contrast, whitened) in self.data.contrasts.iter().zip(&self.whitened) {
+            let onto = self.onto(whitened);
+            let share: [f64; 3] = [0, 1, 2].map(|i| dot(posterior.row(i), &onto) / self.variance);
+            (0..3).for_each(|i| squares[i] += share[i] * share[i]);
+            let rest: Vec<f64> = (0..length)
+                .map(|t| {
+                    let explained: f64 =
+                        (0..3).map(|i| share[i] * self.data.directions[i][t]).sum();
+                    (contrast[t] - explained) / self.profile[t]
+                })
+                .collect();
+            for (lag, c) in covariances.iter_mut().enumerate() {
+                *c += dot(&rest[lag..], &rest[..length - lag]);
+            }
+        }
+        self.add_uncertainty(&posterior, n, &mut covariances);
+        for (lag, c) in covariances.iter_mut().enumerate() {
+            *c /= n * (length - lag) as f64;
+        }
+        if n >= FEWEST as f64 {
+            (0..3).for_each(|i| self.wander[i] = squares[i] / n + posterior[(i, i)]);
+        }
+        let (memory, variance) = Autoregression::of_autocovariances(&covariances, self.order);
+        if variance > 0.0 && variance.is_finite() {
+            (self.memory, self.variance) = (memory, variance);
+        }
+        self.whiten();
+    }
+
+    /// What the shares' own uncertainty adds to the products of the noise.
+    fn add_uncertainty(&self, posterior: &Matrix, n: f64, covariances: &mut [f64]) {
+        let length = self.data.response.len();
+        let scaled = |i: usize| -> Vec<f64> {
+            self.data.directions[i].iter().zip(&self.profile).map(|(x, w)| x / w).collect()
+        };
+        let scaled = [scaled(0), scaled(1), scaled(2)];
+        for (lag, c) in covariances.iter_mut().enumerate() {
+            for i in 0..3 {
+                for j in 0..3 {
+                    let products = dot(&scaled[i][lag..], &scaled[j][..length - lag]);
+                    *c += n * posterior[(i, j)] * products;
+                }
+            }
+        }
+    }
+
+    /// The whitened differences without the expected shares of the directions.
+    pub fn innovations(&self) -> Vec<Vec<f64>> {
+        let (inner, sd) = self.inner();
+        let Ok(factor) = Cholesky::new(&inner) else { return self.whitened.clone() };
+        let without = |whitened: &Vec<f64>| {
+            let mut share = self.onto(whitened);
+            share.iter_mut().zip(&sd).for_each(|(x, s)| *x *= s / self.variance);
+            factor.solve(&mut share);
+            let mut rest = whitened.clone();
+            for ((direction, share), sd) in self.directions.iter().zip(&share).zip(&sd) {
+                add_scaled(&mut rest, -share * sd, direction);
+            }
+            rest
+        };
+        self.whitened.iter().map(without).collect()
+    }
+
+    /// Whether the variance grows with the square of the response, and how fast: the regression of the
+    /// squares of the innovations, taken as independent (Breusch and Pagan, Econometrica 47 (1979) 1287). Beyond four of its
+    /// standard errors it does.
+    fn find_level(&mut self) -> bool {
+        let (n, length) = (self.whitened.len() as f64, self.data.response.len());
+        let square = self.data.response.iter().map(|y| y * y).sum::<f64>() / length as f64;
+        if square <= 0.0 || n < FEWEST as f64 || length < 8 {
+            return false;
+        }
+        let level: Vec<f64> = self.data.response.iter().map(|y| y * y / square - 1.0).collect();
+        let spread = dot(&level, &level);
+        let innovations = self.innovations();
+        let mean = |t: usize| innovations.iter().map(|c| c[t] * c[t]).sum::<f64>() / n;
+        let relative: Vec<f64> = (0..length).map(|t| mean(t) / self.variance - 1.0).collect();
+        let slope = dot(&level, &relative) / spread;
+        let error = (2.0 / (n * spread)).sqrt();
+        let clear = slope > 4.0 * error;
+        if !clear {
+            return false;
+        }
+        // variance = 1 + slope (m^2 / mean - 1), as `(1 + level m^2 / mean) / (1 + level)`.
+        let slope = slope.min(0.95);
+        self.level = slope / (1.0 - slope);
+        self.profile = level.iter().map(|l| (1.0 + slope * l).max(0.05).sqrt()).collect();
+        true
+    }
+
+    /// Minus twice the log-likelihood with the corrected penalty of Akaike.
+    pub fn criterion(&self) -> f64 {
+        let (inner, sd) = self.inner();
+        let Ok(factor) = Cholesky::new(&inner) else { return f64::INFINITY };
+        let (n, length) = (self.whitened.len() as f64, self.data.response.len());
+        let scale: f64 = self.profile.iter().map(|w| w.ln()).sum();
+        let log_determinant = length as f64 * self.variance.ln()
+            + 2.0 * (scale - self.memory.log_determinant(length))
+            + factor.log_determinant();
+        let mut quadratic = 0.0;
+        for whitened in &self.whitened {
+            let mut onto = self.onto(whitened);
+            onto.iter_mut().zip(&sd).for_each(|(x, s)| *x *= s / self.variance);
+            quadratic += dot(whitened, whitened) / self.variance - factor.quadratic(&onto);
+        }
+        let unknowns = (self.order + 4) as f64;
+        let count = n * length as f64;
+        let correction = 2.0 * unknowns * count / (count - unknowns - 1.0).max(1.0);
+        n * log_determinant + quadratic + correction
+    }
+
+    pub fn noise(self) -> CurveNoise {
+        CurveNoise {
+            sd: self.variance.sqrt(),
+            memory: self.memory,
+            level: self.level,
+            wander: Wander::of(self.wander),
+            profile: self.profile,
+        }
+    }
+}

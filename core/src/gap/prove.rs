@@ -1,0 +1,174 @@
+//! Whether the gap shrank: misfit of replicates that nothing was fitted to, without and with the effects.
+//!
+//! The gap of a response is its whitened mean square misfit to new replicates less one, the share of the noise. The misfits of one
+//! replicate without and with the effects share its noise, so that their difference is far more exact than either:
+//! intervals are those of Student's law for the mean of the differences, replicates being independent.
+
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::experiment::Experiment;
+use super::noise::Noise;
+use super::whitener::Whitener;
+use crate::linalg::vector::dot;
+
+/// How two responses fit replicates that were held out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Proof {
+    /// All conditions together.
+    pub all: Comparison,
+    /// Each condition: its scenario and how it fares.
+    pub conditions: Vec<(Option<String>, Comparison)>,
+    /// Root mean square difference from the mean of the replicates, in the response's unit: without and with.
+    pub rmse: [f64; 2],
+    /// The share of held-out values inside the 95 % band of a replicate, without and with.
+    pub coverage: [f64; 2],
+    /// Whether the gap shrank: the lower bound of what closed is above zero, and no condition became significantly
+    /// worse.
+    pub shrank: bool,
+}
+
+/// The gaps of two responses over some replicates.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Comparison {
+    /// The gap without the effects, in standard deviations of the noise.
+    pub before: f64,
+    /// The gap with them.
+    pub after: f64,
+    /// The share of the squared gap that closed.
+    pub closed: f64,
+    /// The lower end of its 95 % interval.
+    pub lower: f64,
+    /// The upper end.
+    pub upper: f64,
+    /// The number of replicates.
+    pub replicates: usize,
+}
+
+/// The misfits of one replicate.
+#[derive(Debug, Clone, Copy)]
+struct Misfits {
+    before: f64,
+    after: f64,
+    values: f64,
+}
+
+/// Compares two responses with held-out replicates under a noise that is known; `None` without replicates.
+pub fn prove(
+    held_out: &Experiment<'_>,
+    noise: &Noise,
+    before: &[f64],
+    after: &[f64],
+) -> Option<Proof> {
+    let by_condition: Vec<Vec<Misfits>> = (0..held_out.conditions.len())
+        .map(|c| of_condition(held_out, noise, c, [before, after]))
+        .collect();
+    let all = Comparison::of(&by_condition.concat())?;
+    let conditions: Vec<(Option<String>, Comparison)> = held_out
+        .conditions
+        .iter()
+        .zip(&by_condition)
+        .filter_map(|(c, misfits)| Some((c.scenario.clone(), Comparison::of(misfits)?)))
+        .collect();
+    let worse = |comparison: &Comparison| comparison.upper < 0.0;
+    let shrank = all.lower > 0.0 && !conditions.iter().any(|(_, c)| worse(c));
+    let (counts, means) = held_out.means();
+    let rmse = [before, after].map(|response| {
+        let measured = (0..means.len()).filter(|&i| counts[i] > 0.0);
+        let (sum, count) = measured.fold((0.0, 0.0), |(sum, count), i| {
+            (sum + (means[i] - response[i]).powi(2), count + 1.0)
+        });
+        (sum / f64::max(count, 1.0)).sqrt()
+    });
+    let coverage = [before, after].map(|response| coverage(held_out, noise, response));
+    Some(Proof { all, conditions, rmse, coverage, shrank })
+}
+
+fn of_condition(
+    held_out: &Experiment<'_>,
+    noise: &Noise,
+    c: usize,
+    responses: [&[f64]; 2],
+) -> Vec<Misfits> {
+    let condition = &held_out.conditions[c];
+    let mut made: Option<(Vec<bool>, Whitener)> = None;
+    let mut misfits = Vec::new();
+    for replicate in &condition.replicates {
+        let pattern: Vec<bool> = replicate.iter().map(Option::is_some).collect();
+        if made.as_ref().is_none_or(|(known, _)| *known != pattern) {
+            let mut alone = vec![Vec::new(); held_out.conditions.len()];
+            alone[c] = vec![replicate.clone()];
+            let one = held_out.with_replicates(alone).remeasured();
+            let own = noise.restricted(held_out, &one);
+            let whitener = Whitener::new(&one, &own, responses[0]);
+            made = Some((pattern, whitener));
+        }
+        let Some((_, whitener)) = &made else { continue };
+        let square = |response: &[f64]| {
+            let mut difference = vec![0.0; held_out.outputs()];
+            for (i, y) in condition.outputs.clone().zip(replicate) {
+                difference[i] = y.map_or(0.0, |y| y - response[i]);
+            }
+            let z = whitener.whiten(&difference);
+            dot(&z, &z)
+        };
+        let values = replicate.iter().flatten().count() as f64;
+        misfits.push(Misfits { before: square(responses[0]), after: square(responses[1]), values });
+    }
+    misfits
+}
+
+impl Comparison {
+    fn of(misfits: &[Misfits]) -> Option<Self> {
+        let count = misfits.len() as f64;
+        if misfits.is_empty() {
+            return None;
+        }
+        let mean = |of: &dyn Fn(&Misfits) -> f64| misfits.iter().map(of).sum::<f64>() / count;
+        let excess_before = mean(&|m| m.before / m.values - 1.0);
+        let excess_after = mean(&|m| m.after / m.values - 1.0);
+        let gain = |m: &Misfits| (m.before - m.after) / m.values;
+        let mean_gain = mean(&gain);
+        let scatter = misfits.iter().map(|m| (gain(m) - mean_gain).powi(2)).sum::<f64>();
+        let half = if misfits.len() >= 2 {
+            let student = StudentsT::new(0.0, 1.0, count - 1.0).ok()?;
+            student.inverse_cdf(0.975) * (scatter / (count * (count - 1.0))).sqrt()
+        } else {
+            f64::INFINITY
+        };
+        // Where noise hides the gap before, its own size is no scale for what closed.
+        let scale = excess_before.abs().max(1e-12);
+        Some(Self {
+            before: excess_before.max(0.0).sqrt(),
+            after: excess_after.max(0.0).sqrt(),
+            closed: mean_gain / scale,
+            lower: (mean_gain - half) / scale,
+            upper: (mean_gain + half) / scale,
+            replicates: misfits.len(),
+        })
+    }
+}
+
+/// The share of values within 1.96 standard deviations of a replicate about a response, common errors included.
+fn coverage(held_out: &Experiment<'_>, noise: &Noise, response: &[f64]) -> f64 {
+    let sd = noise.sd(held_out, response);
+    let mut variance: Vec<f64> = sd.iter().map(|s| s * s).collect();
+    for error in &held_out.common {
+        for (v, row) in variance.iter_mut().zip(error.factor.iter_rows()) {
+            *v += dot(row, row);
+        }
+    }
+    let (mut inside, mut count) = (0.0, 0.0);
+    for condition in &held_out.conditions {
+        for replicate in &condition.replicates {
+            for (i, y) in condition.outputs.clone().zip(replicate) {
+                if let Some(y) = y {
+                    count += 1.0;
+                    inside +=
+                        f64::from(u8::from((y - response[i]).abs() <= 1.96 * variance[i].sqrt()));
+                }
+            }
+        }
+    }
+    inside / f64::max(count, 1.0)
+}

@@ -1,0 +1,148 @@
+//! A straight line with normal priors: fits, evidence and proof against their closed forms.
+#![allow(clippy::unwrap_used)]
+
+use super::experiment::Experiment;
+use super::fit::fit;
+use super::name::weigh;
+use super::noise::{Autoregression, CurveNoise, Noise, Wander};
+use super::prove::prove;
+use super::system::System;
+use super::whitener::Whitener;
+use crate::data::{Axis, Layout, Layouts, Measurements, Parameter, Replicate, Unit};
+use crate::linalg::Matrix;
+use crate::math::distribution::Distribution;
+use crate::math::random::{Stream, normal};
+use crate::plugin::Forward;
+
+const TIMES: usize = 12;
+const REPLICATES: usize = 5;
+const NOISE: f64 = 0.3;
+
+/// `y = a + b t`.
+struct Line;
+
+fn line(a: f64, b: f64) -> Vec<f64> {
+    (0..TIMES).map(|t| a + b * t as f64).collect()
+}
+
+impl Forward for Line {
+    fn dimension(&self) -> usize {
+        2
+    }
+    fn outputs(&self) -> usize {
+        TIMES
+    }
+    fn mean(&self, points: &Matrix) -> Matrix {
+        Matrix::from_rows(TIMES, points.iter_rows().map(|p| line(p[0], p[1])))
+    }
+    fn jacobian(&self, _: &[f64]) -> Matrix {
+        Matrix::from_fn(TIMES, 2, |i, j| if j == 0 { 1.0 } else { i as f64 })
+    }
+}
+
+fn layouts() -> Layouts {
+    let times = (0..TIMES).map(|t| t as f64).collect();
+    let axes = vec![Axis::grid("time", times, Unit::parse("s").unwrap())];
+    Layout { name: "y".into(), unit: Unit::dimensionless(), axes }.into()
+}
+
+fn parameters() -> Vec<Parameter> {
+    let parameter = |name: &str| {
+        let law = Distribution::Normal([0.5, 2.0]);
+        Parameter {
+            name: name.into(),
+            symbol: name.into(),
+            unit: Unit::dimensionless(),
+            design: law.clone(),
+            prior: law,
+            reference: None,
+        }
+    };
+    vec![parameter("a"), parameter("b")]
+}
+
+fn white() -> Noise {
+    let curve = CurveNoise {
+        sd: NOISE,
+        memory: Autoregression::white(),
+        level: 0.0,
+        wander: Wander::default(),
+        profile: vec![1.0; TIMES],
+    };
+    Noise {
+        curves: vec![curve],
+        shared: vec![Wander::default()],
+        across: vec![None],
+        assumed: vec![false],
+    }
+}
+
+fn data(seed: u64, truth: &[f64], count: usize) -> Measurements {
+    let replicate = |r: usize| {
+        let mut rng = Stream::root(seed).at(r as u64).generator();
+        let values = truth.iter().map(|y| Some(y + NOISE * normal(&mut rng))).collect();
+        Replicate { name: r.to_string(), values }
+    };
+    let layout = layouts().blocks[0].clone();
+    Measurements { layout, replicates: (0..count).map(replicate).collect() }
+}
+
+/// Bayesian linear regression: posterior precision `J'J R / s^2 + 1 / v`, evidence of the means `N(m0, s^2 / R + J v J')`
+/// (O'Hagan and Forster, Kendall's Advanced Theory of Statistics 2B, section 11.3).
+#[test]
+fn a_line_is_fitted_and_weighed_as_its_closed_form() {
+    let (layouts, parameters) = (layouts(), parameters());
+    let measured = data(7, &line(1.0, -0.4), REPLICATES).into();
+    let experiment = Experiment::new(&layouts, &parameters, &Line, &measured);
+    let (_, means) = experiment.means();
+    let whitener = Whitener::new(&experiment, &white(), &means);
+    let system = System::new(&experiment, Vec::new());
+    let found = fit(&system, &whitener, &means, &[3.0, 3.0]);
+    let weight = REPLICATES as f64 / (NOISE * NOISE);
+    let sum = |f: &dyn Fn(f64) -> f64| (0..TIMES).map(|t| f(t as f64)).sum::<f64>();
+    let prior = 1.0 / 4.0;
+    let [p, q, r] = [sum(&|_| 1.0), sum(&|t| t), sum(&|t| t * t)].map(|s| weight * s);
+    let (p, r) = (p + prior, r + prior);
+    let right = |f: &dyn Fn(f64) -> f64| {
+        weight * (0..TIMES).map(|t| f(t as f64) * means[t]).sum::<f64>() + prior * 0.5
+    };
+    let (x, y) = (right(&|_| 1.0), right(&|t| t));
+    let determinant = p * r - q * q;
+    let exact = [(r * x - q * y) / determinant, (p * y - q * x) / determinant];
+    for (found, exact) in found.at.point.iter().zip(exact) {
+        assert!((found - exact).abs() < 1e-6, "{found} {exact}");
+    }
+    let sd = found.sd();
+    assert!((sd[0] - (r / determinant).sqrt()).abs() < 1e-9);
+    assert!((sd[1] - (p / determinant).sqrt()).abs() < 1e-9);
+    // What the noise alone decides is left out: the integral of exp(-|z|^2 / 2) times the prior. With the precision matrix
+    // A it is the maximum times 2 pi / sqrt(|A|).
+    let log_maximum = found.log_density;
+    let exact = log_maximum + std::f64::consts::TAU.ln() - 0.5 * determinant.ln();
+    assert!((found.log_evidence() - exact).abs() < 1e-9);
+    let weighed = weigh(&system, &whitener, &means, &found, &Stream::root(3));
+    assert!(weighed.error > 0.0 && weighed.error < 0.1, "{weighed:?}");
+    assert!((weighed.log_evidence - exact).abs() < 4.0 * weighed.error, "{weighed:?} {exact}");
+}
+
+/// A response that is wrong by an offset of `d` has the gap `d / s`; the true one has none. The mean square of n white numbers
+/// has the standard deviation `sqrt(2 / n)`.
+#[test]
+fn a_gap_that_closes_is_proven() {
+    let (layouts, parameters, count) = (layouts(), parameters(), 40);
+    let truth = line(1.0, -0.4);
+    let held_out = data(8, &truth, count).into();
+    let experiment = Experiment::new(&layouts, &parameters, &Line, &held_out);
+    let wrong: Vec<f64> = truth.iter().map(|y| y + NOISE).collect();
+    let proof = prove(&experiment, &white(), &wrong, &truth).unwrap();
+    let bound = 4.0 * (2.0 / (count * TIMES) as f64).sqrt();
+    assert!((proof.all.before.powi(2) - 1.0).abs() < 2.0 * bound, "{proof:?}");
+    assert!(proof.all.after.powi(2) < bound, "{proof:?}");
+    assert!(proof.all.lower < 1.0 && proof.all.upper > 1.0 - bound && proof.shrank, "{proof:?}");
+    // 95 % of the values lie in the band; one standard deviation off 83.0 % do: normal table.
+    let error = (0.05 * 0.95 / (count * TIMES) as f64).sqrt();
+    assert!((proof.coverage[1] - 0.95).abs() < 4.0 * error, "{proof:?}");
+    assert!((proof.coverage[0] - 0.830).abs() < 8.0 * error, "{proof:?}");
+    let back = prove(&experiment, &white(), &truth, &wrong).unwrap();
+    assert!(!back.shrank && back.all.upper < 0.0, "{back:?}");
+}

@@ -1,0 +1,213 @@
+//! Whitening: differences from the replicates' mean in units of what they may be by noise and common errors.
+//!
+//! The covariance of the mean over the replicates is `S / R + K`: noise of one replicate over their number, and errors of
+//! the forward map that all share. `S` is made of whole replicates' wander (of low rank) and of autoregressions along the
+//! curves, so that whitening takes one pass over the curves and one product with a thin matrix.
+
+use super::experiment::Experiment;
+use super::noise::{Noise, directions};
+use crate::linalg::{
+    Matrix, multiply, multiply_transposed, multiply_vector, symmetric_eigen, transposed_multiply,
+    transposed_multiply_vector,
+};
+use crate::plugin::discrepancy::CommonError;
+
+/// Directions of a whitened covariance below this share of the white noise do not count.
+const NEGLIGIBLE: f64 = 1e-6;
+
+/// Makes differences from the replicates' mean white.
+#[derive(Debug, Clone)]
+pub struct Whitener {
+    curves: Vec<CurveWhitener>,
+    /// The curves of each condition with the lower factor of their correlation.
+    across: Vec<(std::ops::Range<usize>, Matrix)>,
+    outputs: usize,
+    low_rank: Option<LowRank>,
+}
+
+#[derive(Debug, Clone)]
+struct CurveWhitener {
+    measured: Vec<usize>,
+    /// The number of replicates' root over the noise's own scale, one a measured value.
+    scale: Vec<f64>,
+    memory: super::noise::Autoregression,
+}
+
+/// `(I + U U')^-1/2 = I - Q diag(shrink) Q'`.
+#[derive(Debug, Clone)]
+struct LowRank {
+    directions: Matrix,
+    shrink: Vec<f64>,
+}
+
+impl Whitener {
+    /// For the mean over the replicates of an experiment with this noise around a response.
+    pub fn new(experiment: &Experiment<'_>, noise: &Noise, response: &[f64]) -> Self {
+        let (counts, _) = experiment.means();
+        let curves: Vec<CurveWhitener> = experiment
+            .curves
+            .iter()
+            .zip(&noise.curves)
+            .map(|(curve, law)| {
+                let each = curve.measured.iter().zip(&law.profile);
+                CurveWhitener {
+                    measured: curve.measured.clone(),
+                    scale: each.map(|(&i, w)| counts[i].sqrt() / (law.sd * w)).collect(),
+                    memory: law.memory.clone(),
+                }
+            })
+            .collect();
+        let conditions = experiment.conditions.iter().zip(&noise.across);
+        let across = conditions
+            .filter_map(|(condition, factor)| Some((condition.curves.clone(), factor.clone()?)))
+            .collect();
+        let outputs = experiment.outputs();
+        let mut whitener = Self { curves, across, outputs, low_rank: None };
+        let mut spread = wander(experiment, noise, response, &counts);
+        spread.extend(experiment.common.iter().flat_map(|error| {
+            (0..error.factor.columns()).map(|j| error.factor.column(j)).collect::<Vec<_>>()
+        }));
+        let columns: Vec<Vec<f64>> = spread.iter().map(|u| whitener.base(u)).collect();
+        whitener.low_rank = LowRank::of(&columns, outputs);
+        whitener
+    }
+
+    /// White differences, one an output; zero where nothing was measured.
+    pub fn whiten(&self, differences: &[f64]) -> Vec<f64> {
+        let mut white = self.base(differences);
+        if let Some(low_rank) = &self.low_rank {
+            let along = transposed_multiply_vector(&low_rank.directions, &white);
+            let shrunk: Vec<f64> = along.iter().zip(&low_rank.shrink).map(|(a, s)| a * s).collect();
+            let taken = multiply_vector(&low_rank.directions, &shrunk);
+            white.iter_mut().zip(taken).for_each(|(w, t)| *w -= t);
+        }
+        white
+    }
+
+    /// The same of each row of a matrix `directions x outputs`.
+    pub fn whiten_rows(&self, rows: &Matrix) -> Matrix {
+        let base = rows.iter_rows().map(|row| self.base(row));
+        let mut white = Matrix::from_rows(self.outputs, base);
+        if let Some(low_rank) = &self.low_rank {
+            let mut along = multiply(&white, &low_rank.directions);
+            for i in 0..along.rows() {
+                along.row_mut(i).iter_mut().zip(&low_rank.shrink).for_each(|(a, s)| *a *= s);
+            }
+            let taken = multiply_transposed(&along, &low_rank.directions);
+            white.as_mut_slice().iter_mut().zip(taken.as_slice()).for_each(|(w, t)| *w -= t);
+        }
+        white
+    }
+
+    /// Whitening without the part of low rank.
+    fn base(&self, differences: &[f64]) -> Vec<f64> {
+        let mut own: Vec<Vec<f64>> = self
+            .curves
+            .iter()
+            .map(|curve| {
+                let each = curve.measured.iter().zip(&curve.scale);
+                let mut values: Vec<f64> = each.map(|(&i, s)| differences[i] * s).collect();
+                curve.memory.whiten(&mut values);
+                values
+            })
+            .collect();
+        for (curves, factor) in &self.across {
+            decorrelate(factor, &mut own[curves.clone()]);
+        }
+        let mut white = vec![0.0; self.outputs];
+        for (curve, values) in self.curves.iter().zip(own) {
+            curve.measured.iter().zip(values).for_each(|(&i, v)| white[i] = v);
+        }
+        white
+    }
+}
+
+/// Solves with a lower factor across curves, in place.
+fn decorrelate(factor: &Matrix, curves: &mut [Vec<f64>]) {
+    for t in 0..curves[0].len() {
+        for i in 0..curves.len() {
+            let known: f64 = (0..i).map(|j| factor[(i, j)] * curves[j][t]).sum();
+            curves[i][t] = (curves[i][t] - known) / factor[(i, i)];
+        }
+    }
+}
+
+/// The experiment's common errors in as few directions as the noise lets matter: those whose variance is below a hundredth of
+/// the noise's are left out.
+pub fn condensed(experiment: &Experiment<'_>, noise: &Noise, response: &[f64]) -> Vec<CommonError> {
+    let alone = Experiment { common: Vec::new(), ..experiment.clone() };
+    let whitener = Whitener::new(&alone, noise, response);
+    let condense = |error: &CommonError| {
+        if error.factor.columns() == 0 {
+            return error.clone();
+        }
+        let white = whitener.whiten_rows(&error.factor.transposed());
+        let Ok(eigen) = symmetric_eigen(&multiply_transposed(&white, &white)) else {
+            return error.clone();
+        };
+        let kept: Vec<usize> =
+            (0..eigen.values.len()).filter(|&k| eigen.values[k] > 0.01).collect();
+        let factor = multiply(&error.factor, &eigen.vectors.select_columns(&kept));
+        CommonError { factor, ..error.clone() }
+    };
+    experiment.common.iter().map(condense).collect()
+}
+
+/// Factors of the covariance of the mean that wander of whole replicates makes, by curve and shared.
+fn wander(
+    experiment: &Experiment<'_>,
+    noise: &Noise,
+    response: &[f64],
+    counts: &[f64],
+) -> Vec<Vec<f64>> {
+    let mut factors = Vec::new();
+    for (c, condition) in experiment.conditions.iter().enumerate() {
+        let mut shared = [0, 1, 2].map(|_| vec![0.0; experiment.outputs()]);
+        for s in condition.curves.clone() {
+            let curve = &experiment.curves[s];
+            let own: Vec<f64> = curve.measured.iter().map(|&i| response[i]).collect();
+            let directions = directions(&own, &curve.at);
+            for (d, variance) in noise.curves[s].wander.variances().into_iter().enumerate() {
+                let mut factor = vec![0.0; experiment.outputs()];
+                for (&i, slope) in curve.measured.iter().zip(&directions[d]) {
+                    factor[i] = (variance / counts[i]).sqrt() * slope;
+                    shared[d][i] = slope / counts[i].sqrt();
+                }
+                if variance > 0.0 {
+                    factors.push(factor);
+                }
+            }
+        }
+        for (mut factor, variance) in shared.into_iter().zip(noise.shared[c].variances()) {
+            if variance > 0.0 {
+                for x in &mut factor {
+                    *x *= variance.sqrt();
+                }
+                factors.push(factor);
+            }
+        }
+    }
+    factors
+}
+
+impl LowRank {
+    /// From the columns of `U`.
+    fn of(columns: &[Vec<f64>], outputs: usize) -> Option<Self> {
+        if columns.is_empty() {
+            return None;
+        }
+        let u = Matrix::from_rows(outputs, columns);
+        let eigen = symmetric_eigen(&multiply_transposed(&u, &u)).ok()?;
+        let kept: Vec<usize> =
+            (0..eigen.values.len()).filter(|&k| eigen.values[k] > NEGLIGIBLE).collect();
+        if kept.is_empty() {
+            return None;
+        }
+        let scaled = Matrix::from_fn(columns.len(), kept.len(), |i, k| {
+            eigen.vectors[(i, kept[k])] / eigen.values[kept[k]].sqrt()
+        });
+        let directions = transposed_multiply(&u, &scaled);
+        let shrink = kept.iter().map(|&k| 1.0 - 1.0 / (1.0 + eigen.values[k]).sqrt()).collect();
+        Some(Self { directions, shrink })
+    }
+}

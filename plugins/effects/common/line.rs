@@ -1,0 +1,72 @@
+//! Effects that need to know how the response changes along a line of places.
+
+use std::collections::BTreeMap;
+
+use lacuna::data::{Axis, Coordinates, Layout, Unit};
+use lacuna::math::distribution::Distribution;
+use lacuna::plugin::effect::Situation;
+use toml::{Table, Value};
+
+use super::{Along, Stations, propose};
+
+/// A line: an axis of the response, and where its places stand.
+#[derive(Debug, Clone, Copy)]
+pub struct Line<'a> {
+    /// The name of the axis.
+    pub axis: &'a str,
+    /// The coordinates of its labels.
+    pub positions: &'a BTreeMap<String, f64>,
+    /// Their unit.
+    pub unit: &'a Unit,
+}
+
+impl<'a> Line<'a> {
+    /// The axis of a layout with the places on it.
+    pub fn on(&self, layout: &'a Layout) -> Option<(Along<'a>, Stations)> {
+        let along = Along::new(layout, self.axis)?;
+        Some((along, Stations::new(along.axis, self.positions)))
+    }
+
+    /// The unit of coordinates: that of the axis where it is a grid.
+    pub fn unit(&self, layout: &Layout) -> Unit {
+        match layout.axis(self.axis).map(|(_, axis)| &axis.coordinates) {
+            Some(Coordinates::Grid { unit, .. }) => unit.clone(),
+            _ => self.unit.clone(),
+        }
+    }
+
+    /// What to try: along the places whose coordinates are known, and along every axis of lengths. `prior` is that of
+    /// the unknown `key`, given the mean distance between places.
+    pub fn proposals(
+        &self,
+        situation: &Situation<'_>,
+        least: usize,
+        key: &str,
+        prior: impl Fn(f64) -> Distribution,
+    ) -> Vec<Table> {
+        let metre = Unit::parse("m").unwrap_or_default();
+        let is_length = |axis: &Axis| match &axis.coordinates {
+            Coordinates::Grid { unit, .. } => unit.same_dimension(&metre),
+            Coordinates::Labels(_) => axis.name == self.axis,
+        };
+        let mut found: Vec<Table> = Vec::new();
+        for axis in situation.layouts.blocks.iter().flat_map(|b| &b.axes).filter(|a| is_length(a)) {
+            let stations = Stations::new(axis, self.positions);
+            if stations.count() < least || stations.coincide() {
+                continue;
+            }
+            let mut table = propose(&[(key, prior(stations.spacing()))]);
+            table.insert("axis".into(), Value::String(axis.name.clone()));
+            if matches!(axis.coordinates, Coordinates::Labels(_)) {
+                let entry = |(label, x): (&String, &f64)| (label.clone(), Value::Float(*x));
+                let positions: Table = self.positions.iter().map(entry).collect();
+                table.insert("positions".into(), Value::Table(positions));
+                table.insert("unit".into(), Value::String(self.unit.to_string()));
+            }
+            if !found.iter().any(|other| other.get("axis") == table.get("axis")) {
+                found.push(table);
+            }
+        }
+        found
+    }
+}

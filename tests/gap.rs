@@ -1,0 +1,7 @@
+//! The gap workflow on data in which an effect is hidden.
+#![allow(clippy::unwrap_used)]
+
+use lacuna_plugins as _;
+
+#[path = "gap/chain.rs"]
+mod chain;

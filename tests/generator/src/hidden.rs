@@ -1,0 +1,216 @@
+//! What is hidden in data: effects on sensors, made at fine sampling, and physics of the chain.
+
+use crate::chain::{CONDITIONS, Chain};
+use crate::noise::Source;
+use crate::{FINE, Fine, STEP, sampled};
+
+/// A kind of hidden effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// The gauge factor.
+    Gain,
+    /// A constant.
+    Offset,
+    /// A trend.
+    Drift,
+    /// A shift in time.
+    Delay,
+    /// A filter of first order.
+    LowPass,
+    /// A weaker copy that comes later.
+    Echo,
+    /// An exponential loss.
+    Damping,
+    /// A limit.
+    Saturation,
+    /// A bump.
+    SecondaryPulse,
+    /// A decaying exponential from the beginning.
+    Flash,
+    /// A rising exponential from the beginning.
+    PulseHeating,
+    /// A step.
+    LevelJump,
+    /// A decaying oscillation.
+    Resonance,
+    /// A share of the next sensor.
+    Crosstalk,
+    /// Drag with the square of a speed: not of a sensor.
+    Drag,
+    /// A cubic stiffness.
+    Cubic,
+    /// A stiffness under tension only.
+    Switching,
+    /// A half sine of some width at some time, on one condition: local, and of no library.
+    Burst,
+    /// Every second half of the curve is mirrored a little: of no library.
+    Rectified,
+}
+
+/// A hidden effect with its numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hidden {
+    /// What it is.
+    pub kind: Kind,
+    /// The sensors that it acts on.
+    pub sensors: Vec<usize>,
+    /// Its size.
+    pub size: f64,
+    /// Times or frequencies that it has.
+    pub shape: [f64; 3],
+}
+
+impl Hidden {
+    /// An effect of random shape and sign whose size changes its sensors by `ratio` times their noise.
+    pub fn sized(
+        kind: Kind,
+        sensors: &[usize],
+        truth: [f64; 4],
+        sd: &[f64; 4],
+        ratio: f64,
+        random: &mut Source,
+    ) -> Self {
+        let one_sided = [
+            Kind::LowPass,
+            Kind::Damping,
+            Kind::Saturation,
+            Kind::Drag,
+            Kind::Cubic,
+            Kind::Switching,
+            Kind::Rectified,
+        ];
+        let sign = if one_sided.contains(&kind) { 1.0 } else { random.sign() };
+        let shape = match kind {
+            Kind::Echo => [random.uniform(0.6, 2.5), 0.0, 0.0],
+            Kind::SecondaryPulse => [random.uniform(4.0, 8.0), random.uniform(0.3, 0.8), 0.0],
+            Kind::Flash => [random.uniform(0.4, 1.5), 0.0, 0.0],
+            Kind::PulseHeating => [random.uniform(0.5, 2.0), 0.0, 0.0],
+            Kind::LevelJump => [random.uniform(3.0, 7.0), 0.0, 0.0],
+            Kind::Resonance => {
+                [random.uniform(4.0, 9.0), random.uniform(0.01, 0.05), random.uniform(0.0, 6.2)]
+            }
+            Kind::Burst => {
+                let width = random.uniform(1.0, 3.5);
+                let condition = if random.sign() > 0.0 { 1.0 } else { 0.0 };
+                [random.uniform(0.0, 9.9 - width), width, condition]
+            }
+            _ => [0.0; 3],
+        };
+        let mut hidden = Self { kind, sensors: sensors.to_vec(), size: 0.0, shape };
+        let (mut low, mut high) = (0.0, 1e-3);
+        let change = |hidden: &mut Self, size: f64| {
+            hidden.size = sign * size;
+            hidden.change(truth, sd)
+        };
+        while change(&mut hidden, high) < ratio && high < 1e4 {
+            low = high;
+            high *= 2.0;
+        }
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if change(&mut hidden, middle) < ratio {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        hidden
+    }
+
+    /// The root mean square change of its sensors' samples over their noise.
+    fn change(&self, truth: [f64; 4], sd: &[f64; 4]) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for condition in 0..CONDITIONS {
+            if self.kind == Kind::Burst && condition as f64 != self.shape[2] {
+                continue;
+            }
+            let without = sampled(&Chain::plain(truth).curves(condition));
+            let with = sampled(&curves(std::slice::from_ref(self), truth, condition));
+            for &s in &self.sensors {
+                for (a, b) in with[s].iter().zip(&without[s]) {
+                    sum += ((a - b) / sd[s]).powi(2);
+                    count += 1.0;
+                }
+            }
+        }
+        (sum / count).sqrt()
+    }
+
+    fn on_sensor(&self, y: &[f64], all: &Fine, sensor: usize, condition: usize) -> Vec<f64> {
+        let h = STEP / FINE as f64;
+        let (a, [p, q, r]) = (self.size, self.shape);
+        let time = |i: usize| h * i as f64;
+        let before = |back: f64, i: usize| {
+            let at = i as f64 - back / h;
+            let low = at.floor().clamp(0.0, (y.len() - 1) as f64);
+            let high = (low + 1.0).min((y.len() - 1) as f64);
+            let share = (at - low).clamp(0.0, 1.0);
+            y[low as usize] * (1.0 - share) + y[high as usize] * share
+        };
+        let mapped = |f: &dyn Fn(usize) -> f64| (0..y.len()).map(f).collect();
+        match self.kind {
+            Kind::Gain => mapped(&|i| (1.0 + a) * y[i]),
+            Kind::Offset => mapped(&|i| y[i] + a),
+            Kind::Drift => mapped(&|i| y[i] + a * time(i)),
+            Kind::Delay => mapped(&|i| before(a, i)),
+            Kind::Echo => mapped(&|i| y[i] + if time(i) >= p { a * before(p, i) } else { 0.0 }),
+            Kind::Damping => mapped(&|i| y[i] * (-a * time(i)).exp()),
+            Kind::Saturation => mapped(&|i| (a * y[i]).tanh() / a.max(1e-12)),
+            Kind::SecondaryPulse => {
+                mapped(&|i| y[i] + a * (-0.5 * ((time(i) - p) / q).powi(2)).exp())
+            }
+            Kind::Flash => mapped(&|i| y[i] + a * (-time(i) / p).exp()),
+            Kind::PulseHeating => mapped(&|i| y[i] + a * (1.0 - (-time(i) / p).exp())),
+            Kind::LevelJump => mapped(&|i| y[i] + if time(i) >= p { a } else { 0.0 }),
+            Kind::Resonance => {
+                mapped(&|i| y[i] + a * (-q * p * time(i)).exp() * (p * time(i) + r).sin())
+            }
+            Kind::Crosstalk => {
+                let other = &all[(sensor + 1) % all.len()];
+                mapped(&|i| y[i] + a * other[i])
+            }
+            Kind::LowPass => {
+                let mut state = y[0];
+                let keep = (-h / a.max(1e-9)).exp();
+                y.iter()
+                    .map(|x| {
+                        state = keep * state + (1.0 - keep) * x;
+                        state
+                    })
+                    .collect()
+            }
+            Kind::Burst if condition as f64 != r => y.to_vec(),
+            Kind::Burst => mapped(&|i| {
+                let u = (time(i) - p) / q;
+                y[i] + if (0.0..=1.0).contains(&u) {
+                    a * (u * std::f64::consts::PI).sin()
+                } else {
+                    0.0
+                }
+            }),
+            Kind::Rectified => mapped(&|i| if y[i] < 0.0 { (1.0 - a) * y[i] } else { y[i] }),
+            Kind::Drag | Kind::Cubic | Kind::Switching => y.to_vec(),
+        }
+    }
+}
+
+/// The fine curves of a condition with everything that is hidden.
+pub fn curves(hidden: &[Hidden], truth: [f64; 4], condition: usize) -> Fine {
+    let mut chain = Chain::plain(truth);
+    for effect in hidden {
+        match effect.kind {
+            Kind::Drag => chain.drag += effect.size,
+            Kind::Cubic => chain.cubic += effect.size,
+            Kind::Switching => chain.switching += effect.size,
+            _ => {}
+        }
+    }
+    let mut curves = chain.curves(condition);
+    for effect in hidden {
+        let all = curves.clone();
+        for &sensor in &effect.sensors {
+            curves[sensor] = effect.on_sensor(&all[sensor], &all, sensor, condition);
+        }
+    }
+    curves
+}
