@@ -5,9 +5,10 @@
 
 use std::error::Error;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
-use lacuna::data::{Axis, Layout, Scenario, Unit};
+use lacuna::data::{Axis, Function, Layout, Scenario, Unit};
 use lacuna::plugin::model::Call;
 use lacuna::plugin::{Model, registry};
 use lacuna_plugins as _;
@@ -43,7 +44,78 @@ fn main() -> Result<(), Box<dyn Error>> {
         let seconds = ask(&*model, &study, points, batch, calls)?;
         println!("{what}: {:.1} microseconds a run", 1e6 * seconds);
     }
+    equations()?;
     Ok(std::fs::remove_dir_all(&study)?)
+}
+
+/// What equations cost: values, and values with the derivatives by three inputs.
+fn equations() -> Result<(), Box<dyn Error>> {
+    let free = "state = { x = 1.0, v = 0.0 }\nobserve = 'x'\n\
+                rate = { x = 'v', v = '(-a * v - b * x) / c' }";
+    let forced = "state = { x = 0.0, v = 0.0 }\nobserve = 'x'\n\
+                  rate = { x = 'v', v = '(force(time) - a * v - b * x) / c' }";
+    let stiff = format!("{free}\nsolver = {{ method = 'bdf' }}");
+    for (what, options, points, last, table) in [
+        ("a line, 31 points, no states", "observe = 'a * time + b + c'", 31, 9.0, 0),
+        ("oscillator, 1000 points, 9 periods", free, 1000, 9.0, 0),
+        ("the same by `bdf`", &stiff, 1000, 9.0, 0),
+        ("oscillator, 100 000 points, 900 periods", free, 100_000, 900.0, 0),
+        ("oscillator, 100 000 points, 9 periods", free, 100_000, 9.0, 0),
+        ("forced by a table of 100 000, 100 000 points", forced, 100_000, 900.0, 100_000),
+    ] {
+        let model = registry::from_text::<dyn Model>("equations", options)?.plugin;
+        let [values, both] = derive(&*model, points, last, table)?;
+        println!(
+            "equations: {what}: {:.1} microseconds, with derivatives {:.1}",
+            1e6 * values,
+            1e6 * both
+        );
+    }
+    Ok(())
+}
+
+/// The median times of a run for the response, and for the response with its derivatives, in seconds.
+fn derive(
+    model: &dyn Model,
+    points: u32,
+    last: f64,
+    table: u32,
+) -> Result<[f64; 2], Box<dyn Error>> {
+    let grid = |count: u32, last: f64| -> Vec<f64> {
+        (1..=count).map(|i| last * f64::from(i) / f64::from(count)).collect()
+    };
+    let unit = Unit::dimensionless;
+    let axes = vec![Axis::grid("time", grid(points, last), unit())];
+    let layout = Layout { name: "y".to_owned(), unit: unit(), axes };
+    let mut scenario = Scenario::default();
+    if table > 0 {
+        let at: Vec<f64> = std::iter::once(0.0).chain(grid(table, last)).collect();
+        let values = at.iter().map(|t| (0.7 * t).sin() + 0.3 * (5.3 * t).sin()).collect();
+        let (at_unit, unit) = (unit(), unit());
+        let force = Function { name: "force".to_owned(), at, at_unit, values, unit };
+        scenario.functions.push(Arc::new(force));
+    }
+    let names = ["a", "b", "c"].map(str::to_owned);
+    let inputs = [0.05, 39.478, 1.0];
+    let call = Call::new(&inputs, &names, &layout, &scenario);
+    let gradient = model.gradient().ok_or("equations have derivatives")?;
+    let calls = (2_000_000 / (points + 1000)).clamp(5, 1000);
+    let median = |ask: &dyn Fn() -> Result<(), Box<dyn Error>>| -> Result<f64, Box<dyn Error>> {
+        let mut seconds = Vec::new();
+        for _ in 0..=calls {
+            let begun = Instant::now();
+            ask()?;
+            seconds.push(begun.elapsed().as_secs_f64());
+        }
+        seconds.sort_by(f64::total_cmp);
+        Ok(seconds[seconds.len() / 2])
+    };
+    let values = median(&|| Ok(model.predict(&call).map(|_| ())?))?;
+    let both = median(&|| match gradient.with_response(&call) {
+        Some(both) => Ok(both.map(|_| ())?),
+        None => Ok(gradient.jacobian(&call).map(|_| ())?),
+    })?;
+    Ok([values, both])
 }
 
 /// The median time of a run, in seconds.
