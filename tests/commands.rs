@@ -35,7 +35,7 @@ fn finds_its_truth(study: &str, settings: &[&str]) {
 
 #[test]
 fn a_solver_that_is_driven_by_a_deck_finds_its_truth() {
-    let vessel = quick::program("lacuna-examples", "vessel");
+    let vessel = quick::program("vessel");
     let command = format!("model.command=[\"{}\", \"deck.i\"]", vessel.display());
     let short = ["design.runs=60", "surrogate.validation=10", "sampler.steps=400"];
     finds_its_truth("external/study.toml", &[&[&*command], &short[..]].concat());

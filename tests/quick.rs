@@ -148,14 +148,15 @@ pub fn summary(out: &Path) -> serde_json::Value {
     files::read_json(&out.join("summary.json")).unwrap()
 }
 
-/// A program of the workspace, built with the tests' profile.
-pub fn program(package: &str, name: &str) -> PathBuf {
+/// A program of the workspace, built with the tests' profile, and as part of the workspace: alone its package would need
+/// other features of what is below, and one more build of everything.
+pub fn program(name: &str) -> PathBuf {
     // The test is `target/<profile>/deps/all-…`.
     let test = std::env::current_exe().unwrap();
     let profile = test.parent().unwrap().parent().unwrap();
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut build = Command::new(cargo);
-    build.args(["build", "--quiet", "-p", package, "--bin", name, "--target-dir"]);
+    build.args(["build", "--quiet", "--workspace", "--bin", name, "--target-dir"]);
     build.arg(profile.parent().unwrap()).current_dir(root());
     if profile.ends_with("release") {
         build.arg("--release");
@@ -167,7 +168,7 @@ pub fn program(package: &str, name: &str) -> PathBuf {
 /// The command `lacuna`, built once for this test run.
 pub fn command() -> Command {
     static BUILT: OnceLock<PathBuf> = OnceLock::new();
-    let mut command = Command::new(BUILT.get_or_init(|| program("lacuna-cli", "lacuna")));
+    let mut command = Command::new(BUILT.get_or_init(|| program("lacuna")));
     command.stdin(Stdio::null());
     command
 }
