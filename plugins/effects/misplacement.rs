@@ -104,16 +104,11 @@ impl Effect for Misplacement {
     }
 
     fn apply(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
-        let Some((along, stations)) = self.line().on(layout) else { return response.to_vec() };
-        along.combine(response, &stations.rows(|nodes, x| weights(nodes, x, values[0])))
+        self.line().combined(layout, response, |nodes, x| weights(nodes, x, values[0]))
     }
 
     fn by_parameters(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Matrix {
-        let rows = self.line().on(layout).map(|(along, stations)| {
-            along.combine_slopes(response, &stations.rows(|nodes, x| slopes(nodes, x, values[0])))
-        });
-        let slopes = rows.unwrap_or_else(|| vec![0.0; response.len()]);
-        Matrix::from_vec(response.len(), 1, slopes)
+        self.line().combined_slopes(layout, response, |nodes, x| slopes(nodes, x, values[0]))
     }
 
     fn push_forward(

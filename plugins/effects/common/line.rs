@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use lacuna::data::{Axis, Coordinates, Layout, Unit};
+use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::effect::Situation;
 use toml::{Table, Value};
@@ -22,7 +23,7 @@ pub struct Line<'a> {
 
 impl<'a> Line<'a> {
     /// The axis of a layout with the places on it.
-    pub fn on(&self, layout: &'a Layout) -> Option<(Along<'a>, Stations)> {
+    fn on(&self, layout: &'a Layout) -> Option<(Along<'a>, Stations)> {
         let along = Along::new(layout, self.axis)?;
         Some((along, Stations::new(along.axis, self.positions)))
     }
@@ -33,6 +34,34 @@ impl<'a> Line<'a> {
             Some(Coordinates::Grid { unit, .. }) => unit.clone(),
             _ => self.unit.clone(),
         }
+    }
+
+    /// The response in which each place shows what `weights` make of the places nearby, given their coordinates and its own;
+    /// as it is where the layout has no such line.
+    pub fn combined(
+        &self,
+        layout: &'a Layout,
+        response: &[f64],
+        weights: impl Fn(&[f64], f64) -> [f64; 3],
+    ) -> Vec<f64> {
+        match self.on(layout) {
+            Some((along, stations)) => along.combine(response, &stations.rows(weights)),
+            None => response.to_vec(),
+        }
+    }
+
+    /// The derivative of [`Line::combined`] by an unknown, in one column, from those of the weights.
+    pub fn combined_slopes(
+        &self,
+        layout: &'a Layout,
+        response: &[f64],
+        slopes: impl Fn(&[f64], f64) -> [f64; 3],
+    ) -> Matrix {
+        let column = match self.on(layout) {
+            Some((along, stations)) => along.combine_slopes(response, &stations.rows(slopes)),
+            None => vec![0.0; response.len()],
+        };
+        Matrix::from_vec(response.len(), 1, column)
     }
 
     /// What to try: along the places whose coordinates are known, and along every axis of lengths. `prior` is that of
