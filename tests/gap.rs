@@ -5,3 +5,5 @@ use lacuna_plugins as _;
 
 #[path = "gap/chain.rs"]
 mod chain;
+#[path = "gap/workflow.rs"]
+mod workflow;
