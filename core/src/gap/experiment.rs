@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::wide::Wide;
 use crate::data::{Coordinates, Layout, Layouts, Observations, Parameter, layouts::SCENARIO};
 use crate::plugin::Forward;
 use crate::plugin::discrepancy::CommonError;
@@ -15,6 +16,8 @@ pub struct Experiment<'a> {
     pub parameters: &'a [Parameter],
     /// From parameters to responses.
     pub forward: &'a dyn Forward,
+    /// The forward map with inputs that the study holds fixed, where effects on the model are candidates.
+    pub wide: Option<&'a Wide<'a>>,
     /// Errors of the forward map that all replicates share.
     pub common: Vec<CommonError>,
     /// Where the forward map holds, where that is narrower than the priors.
@@ -89,8 +92,9 @@ impl<'a> Experiment<'a> {
                 });
             }
         }
-        let (common, region) = (Vec::new(), None);
-        let mut all = Self { layouts, parameters, forward, common, region, conditions, curves };
+        let (wide, common, region) = (None, Vec::new(), None);
+        let mut all =
+            Self { layouts, parameters, forward, wide, common, region, conditions, curves };
         for curve in &mut all.curves {
             curve.measured = curve.outputs.clone().collect();
         }

@@ -13,6 +13,7 @@ pub mod noise;
 pub mod prove;
 pub mod system;
 pub mod whitener;
+pub mod wide;
 
 #[cfg(test)]
 mod tests;

@@ -91,8 +91,20 @@ impl Study {
             name: error.model.built.name,
             plugin: &*error.model.built.plugin,
         });
-        for Chosen { section, plugin, .. } in self.components().into_iter().chain(finer) {
-            let node = if section == "effect" { effects.next() } else { root.get(section) };
+        let tried = self.gap.candidates.iter().map(|candidate| Chosen {
+            section: "gap.candidate",
+            name: candidate.built.name,
+            plugin: &*candidate.built.plugin,
+        });
+        let mut candidates =
+            root.find("gap.candidate").map(Node::elements).unwrap_or_default().iter();
+        let all = self.components().into_iter().chain(finer).chain(tried);
+        for Chosen { section, plugin, .. } in all {
+            let node = match section {
+                "effect" => effects.next(),
+                "gap.candidate" => candidates.next(),
+                _ => root.get(section),
+            };
             let of_records =
                 ["model", "numerical_error", "simulations", "measurements"].contains(&section);
             let layouts = if of_records { &records } else { &self.layouts.blocks };

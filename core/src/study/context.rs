@@ -1,6 +1,7 @@
 //! Second layer of checking: the sections of a study against each other.
 
 mod effects;
+mod gap;
 mod inputs;
 mod outputs;
 
@@ -33,6 +34,7 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     // What is wrong in one scenario is most often wrong in all.
     problems.dedup();
     effects::check(study, root, problems);
+    gap::check(study, root, problems);
     super::inputs::check(study, root, problems);
     super::derived::check(study, root, problems);
     study.each_plugin(root, problems, |_, component, context, complaints| {

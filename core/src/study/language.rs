@@ -9,6 +9,7 @@ use super::file::{
     NumericalErrorSection, ParameterSection, ResponseSection, SamplerKeys, ScenarioSection,
     StudySection, SurrogateKeys, ValidateSection,
 };
+use super::gap::{CandidateKeys, GapSection};
 use super::schema::Language;
 use crate::plugin::manual::{Manual, generator, resolve};
 use crate::plugin::registry::NoKeys;
@@ -38,7 +39,9 @@ pub fn schema() -> Value {
         .table::<NumericalErrorSection>("numerical_error")
         .sections::<dyn Effect, EffectKeys>("effect")
         .section::<dyn Sampler, SamplerKeys>("sampler")
-        .table::<ValidateSection>("validate");
+        .table::<ValidateSection>("validate")
+        .table::<GapSection>("gap")
+        .sections_in::<dyn Effect, CandidateKeys>("gap", "candidate");
     language.finish()
 }
 
@@ -59,6 +62,8 @@ pub fn manual() -> Vec<Manual> {
         page::<EffectKeys>("[[effect]]"),
         page::<SamplerKeys>("[sampler]"),
         page::<ValidateSection>("[validate]"),
+        page::<GapSection>("[gap]"),
+        page::<CandidateKeys>("[[gap.candidate]]"),
     ]
 }
 

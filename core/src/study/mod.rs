@@ -6,6 +6,7 @@ pub mod decode;
 pub mod derived;
 pub mod emit;
 pub mod file;
+pub mod gap;
 pub mod inherit;
 pub mod inputs;
 pub mod language;

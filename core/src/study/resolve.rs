@@ -14,6 +14,7 @@ use super::file::{
     NumericalErrorSection, ResponseSection, SamplerKeys, StudySection, SurrogateKeys,
     ValidateSection,
 };
+use super::gap::{Gap, gap};
 use super::sections::{
     chosen, chosen_or, derived, effects, layouts, numerical_error, parameters, scenarios, table,
     unknown_sections,
@@ -72,6 +73,8 @@ pub struct Study {
     pub effects: Vec<Section<dyn Effect, EffectKeys>>,
     /// `[validate]`.
     pub validate: ValidateSection,
+    /// `[gap]`.
+    pub gap: Gap,
     /// The whole study with every default filled in, for `resolved.toml`.
     pub resolved: Table,
 }
@@ -87,7 +90,7 @@ pub struct NumericalError {
 }
 
 /// The sections of the study language, in the order in which a study is written.
-pub const SECTIONS: [&str; 17] = [
+pub const SECTIONS: [&str; 18] = [
     "study",
     "parameter",
     "target",
@@ -105,6 +108,7 @@ pub const SECTIONS: [&str; 17] = [
     "effect",
     "sampler",
     "validate",
+    "gap",
 ];
 
 /// A study that was looked at: the texts it comes from, what is wrong with it, and the study itself
@@ -227,6 +231,7 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
         Some(node) => problems.within("validate", |problems| decode(node, problems)),
         None => Some(ValidateSection::default()),
     };
+    let gap = gap(root, problems);
     let measured: Option<&Section<dyn Reader, MeasurementKeys>> = measurements.as_ref();
     let reader = measured.map(|section| &*section.built.plugin);
     let layouts = match (&response, &scenarios) {
@@ -267,6 +272,7 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
         derived_sections: derived_sections?,
         effects: effects?,
         validate: validate?,
+        gap: gap?,
         resolved: Table::new(),
     };
     study.given = study.all_given();

@@ -67,6 +67,12 @@ pub(super) fn table(
     }
     sections!(sampler);
     whole.insert("validate".to_owned(), to_table(&study.validate)?.into());
+    let mut gap = to_table(&study.gap.keys)?;
+    if !study.gap.candidates.is_empty() {
+        let candidates: Result<Vec<Table>, _> = study.gap.candidates.iter().map(merged).collect();
+        gap.insert("candidate".to_owned(), candidates?.into());
+    }
+    whole.insert("gap".to_owned(), gap.into());
     Ok(whole)
 }
 

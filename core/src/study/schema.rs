@@ -106,6 +106,26 @@ impl Language {
         self.property(name, json!({ "type": "array", "items": items }))
     }
 
+    /// A list of tables inside a section, each of which chooses a plugin: `[[gap.candidate]]`.
+    pub fn sections_in<K: Kind + ?Sized, C: JsonSchema>(
+        &mut self,
+        outer: &str,
+        name: &str,
+    ) -> &mut Self {
+        let items = section::<K, C>(&mut self.generator).to_value();
+        // The outer section has keys of its own, whose schema stands among the definitions or here.
+        let own = self.properties.remove(outer).unwrap_or_default();
+        let mut whole = match own.get("$ref").and_then(Value::as_str) {
+            Some(reference) => {
+                let name = reference.rsplit('/').next().unwrap_or_default();
+                self.generator.definitions().get(name).cloned().unwrap_or_default()
+            }
+            None => own,
+        };
+        whole["properties"][name] = json!({ "type": "array", "items": items });
+        self.property(outer, whole)
+    }
+
     /// Says that every study has this section, itself or by what it extends.
     pub fn required(&mut self, name: &str) -> &mut Self {
         self.required.push(json!(name));

@@ -1,6 +1,7 @@
 //! Effects against the rest of the study: their names, and the places where they act.
 
 use crate::data::{Axis, Coordinates};
+use crate::plugin::effect::On;
 use crate::study::components::effect_name;
 use crate::study::nearest::{nearest, one_of};
 use crate::study::resolve::Study;
@@ -18,14 +19,24 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
                 .say(format!("there are two effects `{name}`"))
                 .help(format!("give one of them a name of its own, such as `name = \"{name}_2\"`"));
         }
-        for (axis, labels) in &section.common.on {
-            place(study, axis, labels, &mut complaints);
-        }
+        places(study, "on", &section.common.on, &mut complaints);
     }
 }
 
-/// One axis of an effect's `on`, which some block of scenarios must have with each of the labels.
-fn place(study: &Study, name: &str, labels: &[String], complaints: &mut Complaints<'_>) {
+/// Reports axes and labels, written under the key `path`, that no block of scenarios has.
+pub(super) fn places(study: &Study, path: &str, on: &On, complaints: &mut Complaints<'_>) {
+    for (axis, labels) in on {
+        place(study, path, axis, labels, complaints);
+    }
+}
+
+fn place(
+    study: &Study,
+    path: &str,
+    name: &str,
+    labels: &[String],
+    complaints: &mut Complaints<'_>,
+) {
     let all = || study.layouts.blocks.iter().flat_map(|block| &block.axes);
     let is_label = |axis: &&Axis| matches!(axis.coordinates, Coordinates::Labels(_));
     let known: Vec<String> = all()
@@ -36,22 +47,22 @@ fn place(study: &Study, name: &str, labels: &[String], complaints: &mut Complain
     if known.is_empty() {
         let mut names: Vec<&str> = all().filter(is_label).map(|axis| axis.name.as_str()).collect();
         names.dedup();
-        let spot = complaints.at("on");
+        let spot = complaints.at(path);
         let problem = spot.say(format!("the response has no axis of labels `{name}`"));
         if names.is_empty() {
-            problem.help("the response is one curve: leave `on` out");
+            problem.help(format!("the response is one curve: leave `{path}` out"));
         } else {
             problem.expected(one_of(names));
         }
         return;
     }
     if labels.is_empty() {
-        let path = format!("on.{name}");
-        complaints.at(&path).say("an effect that acts nowhere").expected("at least one label");
+        let path = format!("{path}.{name}");
+        complaints.at(&path).say("a place without labels").expected("at least one label");
     }
     for label in labels.iter().filter(|label| !known.contains(label)) {
         let names = known.iter().map(String::as_str);
-        let path = format!("on.{name}");
+        let path = format!("{path}.{name}");
         let problem = complaints.at(&path).say(format!("the axis `{name}` has no `{label}`"));
         problem.expected(one_of(names.clone()));
         if let Some(near) = nearest(label, names) {

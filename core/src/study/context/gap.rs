@@ -1,0 +1,87 @@
+//! `[gap]` against the rest of the study: what it tries is there, and so is what it sets aside.
+
+use crate::data::{Axis, Coordinates};
+use crate::plugin::{Effect, registry};
+use crate::study::nearest::{nearest, one_of};
+use crate::study::resolve::Study;
+use crate::study::{Complaints, Node, Problems};
+
+/// Reports effects that are not installed, and places that the response does not have.
+pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
+    let Some(node) = root.get("gap") else { return };
+    problems.within("gap", |problems| {
+        let mut complaints = Complaints::new(node, problems);
+        candidates(study, &mut complaints);
+        scenarios(study, &mut complaints);
+        super::effects::places(study, "hold_out.on", &study.gap.keys.hold_out.on, &mut complaints);
+        along(study, &mut complaints);
+        if study.measurements.is_none() {
+            complaints
+                .at("")
+                .say("the study has no `[measurements]` to search for a gap")
+                .help("add `[measurements]`, or take `[gap]` out");
+        }
+    });
+}
+
+fn candidates(study: &Study, complaints: &mut Complaints<'_>) {
+    let names: Vec<&str> = registry::entries::<dyn Effect>().iter().map(|e| e.name).collect();
+    for candidate in study.gap.keys.candidates.iter().flatten() {
+        if names.contains(&candidate.as_str()) {
+            continue;
+        }
+        let problem = complaints.at("candidates").say(format!("no effect is called `{candidate}`"));
+        problem.expected(one_of(names.iter().copied()));
+        if let Some(near) = nearest(candidate, names.iter().copied()) {
+            problem.help(format!("did you mean `{near}`?"));
+        }
+    }
+}
+
+fn scenarios(study: &Study, complaints: &mut Complaints<'_>) {
+    let names: Vec<&str> = study.scenarios.iter().filter_map(|s| s.label()).collect();
+    let held = &study.gap.keys.hold_out.scenarios;
+    for name in held.iter().filter(|name| !names.contains(&name.as_str())) {
+        let spot = complaints.at("hold_out.scenarios");
+        let problem = spot.say(format!("the study has no scenario `{name}`"));
+        if names.is_empty() {
+            problem.help(
+                "a study without `[[scenario]]` can set replicates, curves and intervals aside",
+            );
+        } else {
+            problem.expected(one_of(names.iter().copied()));
+        }
+    }
+    if !held.is_empty() && names.iter().all(|name| held.iter().any(|held| held == name)) {
+        complaints
+            .at("hold_out.scenarios")
+            .say("all scenarios are set aside")
+            .expected("at least one that is calibrated with");
+    }
+}
+
+fn along(study: &Study, complaints: &mut Complaints<'_>) {
+    let of_axis = |axis: &Axis| match &axis.coordinates {
+        Coordinates::Grid { values, .. } => Some((values[0], values[values.len() - 1])),
+        Coordinates::Labels(_) => None,
+    };
+    let blocks = study.layouts.blocks.iter();
+    let spans: Vec<(f64, f64)> =
+        blocks.filter_map(|block| block.axes.last().and_then(of_axis)).collect();
+    for interval in &study.gap.keys.hold_out.along {
+        let (low, high) = (interval.low(), interval.high());
+        if spans.iter().any(|(first, last)| low <= *last && high >= *first) {
+            continue;
+        }
+        let spot = complaints.at("hold_out.along");
+        let problem = spot.say(format!("no value of the response lies from {low} to {high}"));
+        match spans.first() {
+            Some((first, last)) => {
+                problem.expected(format!("intervals of the last axis, from {first} to {last}"));
+            }
+            None => {
+                problem.help("the response has no axis of numbers: take `along` out");
+            }
+        }
+    }
+}
