@@ -73,9 +73,6 @@ pub struct Switched {
     pub description: Description,
 }
 
-/// The most starts of a candidate with indices.
-const STARTS: usize = 96;
-
 impl Component for Switched {}
 
 impl Effect for Switched {
@@ -105,15 +102,16 @@ impl Effect for Switched {
     }
 
     fn starts(&self, _layout: &Layout, _situation: &Situation<'_>) -> Vec<Vec<f64>> {
-        let mut all: Vec<Vec<f64>> = vec![Vec::new()];
-        // The size varies fastest, so that a list that is cut short keeps all sizes.
-        for input in self.inputs.iter().rev() {
-            let with = |rest: &Vec<f64>| -> Vec<Vec<f64>> {
-                input.starts.iter().map(|x| [&[*x], &rest[..]].concat()).collect()
+        // What has indices is many candidates in one: the score of each estimates its size.
+        let sizes = if self.inputs.len() > 1 { 1 } else { usize::MAX };
+        let size = &self.inputs[0];
+        let mut all: Vec<Vec<f64>> = size.starts.iter().take(sizes).map(|x| vec![*x]).collect();
+        for index in &self.inputs[1..] {
+            let with = |first: &Vec<f64>| -> Vec<Vec<f64>> {
+                index.starts.iter().map(|x| [&first[..], &[*x]].concat()).collect()
             };
             all = all.iter().flat_map(with).collect();
         }
-        all.truncate(STARTS);
         all
     }
 
@@ -159,7 +157,8 @@ pub(super) fn slopes(
         let over = |(y, without): (&f64, &f64)| (y - without) / (start[0] - absent);
         slopes.push((start.clone(), response.iter().zip(&fit.at.response).map(over).collect()));
     }
-    let told = |slope: &[f64]| slope.iter().all(|x| x.is_finite()) && slope.iter().any(|x| *x != 0.0);
+    let told =
+        |slope: &[f64]| slope.iter().all(|x| x.is_finite()) && slope.iter().any(|x| *x != 0.0);
     slopes.retain(|(_, slope)| told(slope));
     slopes
 }

@@ -7,6 +7,7 @@ pub mod derived;
 pub mod design;
 pub mod direct;
 pub mod evidence;
+pub mod gap_model;
 mod idle;
 pub mod inference_data;
 pub mod manifest;
