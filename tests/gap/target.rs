@@ -32,8 +32,16 @@ fn cells(k: usize) -> [usize; 2] {
 }
 
 const SENSORS: [(&str, f64); 10] = [
-    ("B", 16.0), ("C", 26.0), ("G", 7.0), ("M", 6.0), ("R", 14.0),
-    ("T", 15.0), ("U", 28.0), ("V", 13.0), ("Y", 14.0), ("Z", 12.0),
+    ("B", 16.0),
+    ("C", 26.0),
+    ("G", 7.0),
+    ("M", 6.0),
+    ("R", 14.0),
+    ("T", 15.0),
+    ("U", 28.0),
+    ("V", 13.0),
+    ("Y", 14.0),
+    ("Z", 12.0),
 ];
 
 /// Parameters, then what the study holds fixed: name, absent value, prior.
@@ -75,7 +83,8 @@ fn layouts() -> Layouts {
         Axis::labels("sensor", SENSORS.map(|(name, _)| name)),
         Axis::grid("time", times, seconds),
     ];
-    Layout { name: "strain".into(), unit: Unit::parse("microstrain").unwrap_or_default(), axes }.into()
+    Layout { name: "strain".into(), unit: Unit::parse("microstrain").unwrap_or_default(), axes }
+        .into()
 }
 
 fn settings(mesh: [usize; 2]) -> Settings {
@@ -125,7 +134,12 @@ fn simulated(mesh: [usize; 2], points: &Matrix) -> Matrix {
     Matrix::from_rows(1000, rows)
 }
 
-fn fitted(parameters: &[Parameter], points: &Matrix, responses: &Matrix, options: &str) -> Box<dyn Emulator> {
+fn fitted(
+    parameters: &[Parameter],
+    points: &Matrix,
+    responses: &Matrix,
+    options: &str,
+) -> Box<dyn Emulator> {
     let layouts = layouts();
     let surrogate = registry::from_text::<dyn Surrogate>("polynomial_chaos", options).unwrap();
     let training = Training { parameters, layouts: &layouts, points, responses };
@@ -158,7 +172,9 @@ impl Forward for Widened {
         let absent = self.change.mean(&Matrix::from_rows(points.columns(), absent));
         let mut all = self.base.mean(&points.select_columns(&own));
         let change = self.change.mean(points);
-        for ((y, a), b) in all.as_mut_slice().iter_mut().zip(change.as_slice()).zip(absent.as_slice()) {
+        for ((y, a), b) in
+            all.as_mut_slice().iter_mut().zip(change.as_slice()).zip(absent.as_slice())
+        {
             *y += a - b;
         }
         all
@@ -191,7 +207,11 @@ fn lab() -> &'static Lab {
     static MADE: OnceLock<Lab> = OnceLock::new();
     MADE.get_or_init(|| {
         let k = env("LACUNA_TARGET_MESH", 1);
-        let (runs, wide_runs, finer) = (env("LACUNA_TARGET_RUNS", 150), env("LACUNA_TARGET_WIDE", 400), env("LACUNA_TARGET_FINER", 20));
+        let (runs, wide_runs, finer) = (
+            env("LACUNA_TARGET_RUNS", 150),
+            env("LACUNA_TARGET_WIDE", 400),
+            env("LACUNA_TARGET_FINER", 20),
+        );
         let all = unknowns();
         let everything: Vec<Parameter> = all.iter().map(parameter).collect();
         let parameters = everything[..3].to_vec();
@@ -200,11 +220,16 @@ fn lab() -> &'static Lab {
         let responses = simulated(cells(k), &points);
         let base = fitted(&parameters, &points, &responses, "degree = { max = 14 }");
         let residuals = base.fit_error().residuals.clone();
-        println!("base {:.1} s, leave-one-out {:.2}", clock.elapsed().as_secs_f64(), rms(&residuals));
+        println!(
+            "base {:.1} s, leave-one-out {:.2}",
+            clock.elapsed().as_secs_f64(),
+            rms(&residuals)
+        );
         let some: Vec<usize> = (0..finer).collect();
         let fine = simulated(cells(2 * k), &points.select_rows(&some));
         let whole = 1.0 / (1.0 - 2.0_f64.powf(-1.8));
-        let difference = Matrix::from_fn(finer, 1000, |i, j| whole * (fine[(i, j)] - responses[(i, j)]));
+        let difference =
+            Matrix::from_fn(finer, 1000, |i, j| whole * (fine[(i, j)] - responses[(i, j)]));
         println!("mesh {:.1} s, {:.2}", clock.elapsed().as_secs_f64(), rms(&difference));
         let points = design(&everything, wide_runs, 3);
         let own: Vec<usize> = (0..3).collect();
@@ -214,12 +239,18 @@ fn lab() -> &'static Lab {
         println!("wide runs {:.1} s", clock.elapsed().as_secs_f64());
         let change = fitted(&everything, &points, &changes, "degree = { max = 6 }\nq_norm = 0.7");
         let wide_residuals = change.fit_error().residuals.clone();
-        println!("wide {:.1} s, {:.2} of {:.2}", clock.elapsed().as_secs_f64(), rms(&wide_residuals), rms(&changes));
+        println!(
+            "wide {:.1} s, {:.2} of {:.2}",
+            clock.elapsed().as_secs_f64(),
+            rms(&wide_residuals),
+            rms(&changes)
+        );
         let freed = |(name, absent, prior): &(&str, f64, Distribution)| {
             Freed::new(name, Unit::dimensionless(), *absent, prior.clone())
         };
         let absent = all[3..].iter().map(|(_, absent, _)| *absent).collect();
-        let again = fitted(&parameters, &design(&parameters, runs, 1), &responses, "degree = { max = 14 }");
+        let again =
+            fitted(&parameters, &design(&parameters, runs, 1), &responses, "degree = { max = 14 }");
         let wide = Wide {
             forward: Box::new(Widened { base: again, change, absent }),
             inputs: all[3..].iter().map(freed).collect(),
@@ -265,7 +296,10 @@ fn measured(truth: &[f64], count: u64, seed: u64) -> Measurements {
         }
         Replicate { name: r.to_string(), values }
     };
-    Measurements { layout: layouts().blocks[0].clone(), replicates: (0..count).map(replicate).collect() }
+    Measurements {
+        layout: layouts().blocks[0].clone(),
+        replicates: (0..count).map(replicate).collect(),
+    }
 }
 
 fn ask(truth: &[f64], seed: u64) -> Verdict {
@@ -286,20 +320,54 @@ fn ask(truth: &[f64], seed: u64) -> Verdict {
     let mut candidates = proposed(None, &situation).unwrap();
     candidates.extend(switches(&lab.wide));
     let options = Options { naming: 0.03, unlisted: 0.02, simulations: 99, most: 3 };
-    let found: Found<'_> = search(&experiment, &candidates, &starts, options, &Stream::root(seed)).unwrap();
+    let found: Found<'_> =
+        search(&experiment, &candidates, &starts, options, &Stream::root(seed)).unwrap();
     for step in &found.path {
-        println!("  p {:?} energy {:.0} expected {:.0} at {:.5?} sd {:.3?}", step.before.p, step.before.statistics.energy, step.before.expected_energy, step.before.fit.at.point, step.before.fit.sd());
+        println!(
+            "  p {:?} energy {:.0} expected {:.0} at {:.5?} sd {:.3?}",
+            step.before.p,
+            step.before.statistics.energy,
+            step.before.expected_energy,
+            step.before.fit.at.point,
+            step.before.fit.sd()
+        );
         for j in step.judged.iter().take(12) {
             let n = j.fit.at.point.len();
-            println!("     {} {:?} score {:.1} absorbed {:.2} weight {:.1} at {:.4?}", candidates[j.suspect.candidate].kind, j.suspect.on.values().next(), j.score, j.absorbed, j.log_weight, &j.fit.at.point[..n]);
+            println!(
+                "     {} {:?} score {:.1} absorbed {:.2} weight {:.1} at {:.4?}",
+                candidates[j.suspect.candidate].kind,
+                j.suspect.on.values().next(),
+                j.score,
+                j.absorbed,
+                j.log_weight,
+                &j.fit.at.point[..n]
+            );
         }
-        println!("  added {:?} dropped {:?}", step.added.iter().map(|s| (&candidates[s.candidate].kind, &s.on)).collect::<Vec<_>>(), step.dropped);
+        println!(
+            "  added {:?} dropped {:?}",
+            step.added.iter().map(|s| (&candidates[s.candidate].kind, &s.on)).collect::<Vec<_>>(),
+            step.dropped
+        );
     }
     let v = verdict(&found, &candidates, options);
-    println!("  last p {:?} energy {:.0} expected {:.0} at {:.5?} sd {:.3?}", found.last.p, found.last.statistics.energy, found.last.expected_energy, found.last.fit.at.point, found.last.fit.sd());
+    println!(
+        "  last p {:?} energy {:.0} expected {:.0} at {:.5?} sd {:.3?}",
+        found.last.p,
+        found.last.statistics.energy,
+        found.last.expected_energy,
+        found.last.fit.at.point,
+        found.last.fit.sd()
+    );
     println!("  types {:?}", found.types);
     println!("  consistency {} stability {}", found.consistency, found.stability);
-    println!("  verdict {:?} {:?} closed {:.3} {:?} in {:.1} s", v.word, v.effects.iter().map(|e| (&e.name, &e.class, &e.values, &e.sd)).collect::<Vec<_>>(), v.closed, v.reasons, clock.elapsed().as_secs_f64());
+    println!(
+        "  verdict {:?} {:?} closed {:.3} {:?} in {:.1} s",
+        v.word,
+        v.effects.iter().map(|e| (&e.name, &e.class, &e.values, &e.sd)).collect::<Vec<_>>(),
+        v.closed,
+        v.reasons,
+        clock.elapsed().as_secs_f64()
+    );
     v
 }
 
@@ -317,7 +385,13 @@ fn truth(gas: Option<Gas>, change: impl FnOnce(&mut Settings)) -> Vec<f64> {
 
 #[test]
 fn gas_is_named() {
-    let gas = Gas { void_fraction: 2e-4, gradient: 0.5, depletion: 0.4, bubble_radius: 8e-5, ..Gas::default() };
+    let gas = Gas {
+        void_fraction: 2e-4,
+        gradient: 0.5,
+        depletion: 0.4,
+        bubble_radius: 8e-5,
+        ..Gas::default()
+    };
     ask(&truth(Some(gas), |_| ()), 5);
 }
 
@@ -326,36 +400,50 @@ fn nothing() {
     ask(&truth(None, |_| ()), 6);
 }
 
-use lacuna::gap::system::System;
 use lacuna::gap::fit::fit_from;
-use lacuna::gap::whitener::Whitener;
 use lacuna::gap::locate::Projection;
+use lacuna::gap::system::System;
+use lacuna::gap::whitener::Whitener;
 
 /// Error curves with a target.
 fn shrunk(samples: &Matrix, nu: f64, rho: f64) -> CommonError {
     let n = samples.rows() as f64;
     let mut own = error_of("sample", samples);
-    for x in own.factor.as_mut_slice() { *x *= (n / (n + nu)).sqrt(); }
-    let ms: Vec<f64> = (0..1000).map(|j| samples.column(j).iter().map(|x| x * x).sum::<f64>() / n).collect();
+    for x in own.factor.as_mut_slice() {
+        *x *= (n / (n + nu)).sqrt();
+    }
+    let ms: Vec<f64> =
+        (0..1000).map(|j| samples.column(j).iter().map(|x| x * x).sum::<f64>() / n).collect();
     // smooth over neighbours
     let mut columns: Vec<Vec<f64>> = Vec::new();
     for s in 0..10 {
-        let v: Vec<f64> = (0..100).map(|t| {
-            let (a, b) = (t.max(3) - 3, (t + 4).min(100));
-            (ms[100*s+a..100*s+b].iter().sum::<f64>() / (b - a) as f64).sqrt()
-        }).collect();
-        let c = Matrix::from_fn(100, 100, |i, j| v[i] * v[j] * rho.powi((i as i32 - j as i32).abs()));
+        let v: Vec<f64> = (0..100)
+            .map(|t| {
+                let (a, b) = (t.max(3) - 3, (t + 4).min(100));
+                (ms[100 * s + a..100 * s + b].iter().sum::<f64>() / (b - a) as f64).sqrt()
+            })
+            .collect();
+        let c =
+            Matrix::from_fn(100, 100, |i, j| v[i] * v[j] * rho.powi((i as i32 - j as i32).abs()));
         let e = lacuna::linalg::symmetric_eigen(&c).unwrap();
         for k in 0..100 {
             if e.values[k] > 0.3 {
                 let mut col = vec![0.0; 1000];
-                for t in 0..100 { col[100*s+t] = e.vectors[(t,k)] * (e.values[k] * nu / (n + nu)).sqrt(); }
+                for t in 0..100 {
+                    col[100 * s + t] = e.vectors[(t, k)] * (e.values[k] * nu / (n + nu)).sqrt();
+                }
                 columns.push(col);
             }
         }
     }
     let m = columns.len();
-    let factor = Matrix::from_fn(1000, own.factor.columns() + m, |i, j| if j < own.factor.columns() { own.factor[(i, j)] } else { columns[j - own.factor.columns()][i] });
+    let factor = Matrix::from_fn(1000, own.factor.columns() + m, |i, j| {
+        if j < own.factor.columns() {
+            own.factor[(i, j)]
+        } else {
+            columns[j - own.factor.columns()][i]
+        }
+    });
     CommonError { origin: "shrunk".into(), factor, predictive: true }
 }
 
@@ -375,7 +463,11 @@ fn energies() {
     let difference = Matrix::from_fn(150, 1000, |i, j| whole * (fine[(i, j)] - responses[(i, j)]));
     println!("loo {:.2} mesh {:.2}", rms(&residuals), rms(&difference));
     let mut truths = design(&parameters, 16, 77);
-    for i in 0..16 { truths[(i,0)] = 5e4 + 0.5 * truths[(i,0)]; truths[(i, 1)] = 0.5 * (13_300.0 + truths[(i,1)]); truths[(i,2)] = 0.5 * (1400.0 + truths[(i,2)]); }
+    for i in 0..16 {
+        truths[(i, 0)] = 5e4 + 0.5 * truths[(i, 0)];
+        truths[(i, 1)] = 0.5 * (13_300.0 + truths[(i, 1)]);
+        truths[(i, 2)] = 0.5 * (1400.0 + truths[(i, 2)]);
+    }
     let same = simulated(cells(k), &truths);
     let finer = simulated(cells(3 * k), &truths);
     let lay = layouts();
@@ -392,14 +484,25 @@ fn energies() {
         let fit = fit_from(&system, &whitener, &experiment.means().1, &[at.to_vec()]).unwrap();
         let left = Projection::of(&system, &fit).rest(&fit.residual);
         let sd = fit.sd();
-        let off: f64 = (0..3).map(|j| ((fit.at.point[j] - at[j]) / sd[j]).powi(2)).sum::<f64>() / 3.0;
+        let off: f64 =
+            (0..3).map(|j| ((fit.at.point[j] - at[j]) / sd[j]).powi(2)).sum::<f64>() / 3.0;
         (left.iter().map(|x| x * x).sum::<f64>(), off)
     };
     let run = |name: &str, which: &Matrix, common: &[CommonError]| {
-        let e: Vec<(f64, f64)> = (0..16).into_par_iter().map(|i| energy(which.row(i), truths.row(i), common, i as u64)).collect();
+        let e: Vec<(f64, f64)> = (0..16)
+            .into_par_iter()
+            .map(|i| energy(which.row(i), truths.row(i), common, i as u64))
+            .collect();
         let mut v: Vec<f64> = e.iter().map(|x| x.0).collect();
         v.sort_by(f64::total_cmp);
-        println!("{name}: mean {:.0} min {:.0} med {:.0} max {:.0}; param offsets {:.2}", v.iter().sum::<f64>() / 16.0, v[0], v[8], v[15], e.iter().map(|x| x.1).sum::<f64>() / 16.0);
+        println!(
+            "{name}: mean {:.0} min {:.0} med {:.0} max {:.0}; param offsets {:.2}",
+            v.iter().sum::<f64>() / 16.0,
+            v[0],
+            v[8],
+            v[15],
+            e.iter().map(|x| x.1).sum::<f64>() / 16.0
+        );
     };
     let em = error_of("emulator", &residuals);
     let rows = |n: usize| difference.select_rows(&(0..n).collect::<Vec<_>>());
@@ -410,7 +513,15 @@ fn energies() {
     for n in [20, 40, 80, 150] {
         run(&format!("finer, mesh {n}"), &finer, &[em.clone(), error_of("numerics", &rows(n))]);
     }
-    for n in [20, 40] { for nu in [n as f64 * 0.5, n as f64] { for rho in [0.0, 0.5, 0.8] {
-        run(&format!("finer, mesh {n} nu {nu} rho {rho}"), &finer, &[em.clone(), shrunk(&rows(n), nu, rho)]);
-    }}}
+    for n in [20, 40] {
+        for nu in [n as f64 * 0.5, n as f64] {
+            for rho in [0.0, 0.5, 0.8] {
+                run(
+                    &format!("finer, mesh {n} nu {nu} rho {rho}"),
+                    &finer,
+                    &[em.clone(), shrunk(&rows(n), nu, rho)],
+                );
+            }
+        }
+    }
 }

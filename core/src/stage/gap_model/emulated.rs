@@ -7,7 +7,7 @@ use serde_json::json;
 
 use crate::data::Parameter;
 use crate::gap::wide::{Freed, Wide};
-use crate::linalg::{self, Matrix};
+use crate::linalg::Matrix;
 use crate::plugin::discrepancy::CommonError;
 use crate::plugin::surrogate::Training;
 use crate::plugin::{Emulator, Forward};
@@ -89,7 +89,7 @@ pub(super) fn wide<'a>(
     let emulator = section.built.plugin.load(&kept.value.bytes)?;
     let absent = inputs.iter().map(|freed| freed.absent).collect();
     let forward = Added { base: known.forward, difference: emulator, absent };
-    Ok(Wide { forward: Box::new(forward), inputs, common: vec![common(errors)?] })
+    Ok(Wide { forward: Box::new(forward), inputs, common: vec![common(errors)] })
 }
 
 /// What is learned of the inputs.
@@ -149,22 +149,12 @@ fn points(study: &Study, pieces: &Pieces) -> Result<Matrix, Stop> {
     Ok(points)
 }
 
-/// The error of the difference, which all replicates share: the mean square of what runs left out show.
-fn common(errors: &Matrix) -> Result<CommonError, Stop> {
-    let svd = linalg::thin_svd(errors)
-        .map_err(|e| Stop::new(format!("the covariance of the emulator's error: {e}")))?;
-    let total: f64 = svd.values.iter().map(|s| s * s).sum();
-    let mut sum = 0.0;
-    let rank = svd.values.iter().take_while(|&s| {
-        let before = sum;
-        sum += s * s;
-        before < 0.999 * total
-    });
-    let rank = rank.count();
+/// The error of the difference, which all replicates share: what runs left out show, one a column over the root of their
+/// number.
+fn common(errors: &Matrix) -> CommonError {
     let scale = (errors.rows() as f64).sqrt();
-    let factor =
-        Matrix::from_fn(errors.columns(), rank, |i, k| svd.v[(i, k)] * svd.values[k] / scale);
-    Ok(CommonError { origin: "emulator of further inputs".to_owned(), factor, predictive: true })
+    let factor = Matrix::from_fn(errors.columns(), errors.rows(), |i, k| errors[(k, i)] / scale);
+    CommonError { origin: "emulator of further inputs".to_owned(), factor, predictive: true }
 }
 
 /// An emulator with the difference that further inputs make.
