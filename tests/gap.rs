@@ -5,3 +5,6 @@ use lacuna_plugins as _;
 
 #[path = "gap/chain.rs"]
 mod chain;
+
+#[path = "gap/inside.rs"]
+mod inside;
