@@ -6,5 +6,8 @@ use lacuna_plugins as _;
 #[path = "gap/chain.rs"]
 mod chain;
 
+#[path = "gap/inside.rs"]
+mod inside;
+
 #[path = "gap/target.rs"]
 mod target;

@@ -3,7 +3,7 @@
 use super::Component;
 use super::amend::State;
 use super::effect::Description;
-use crate::data::Unit;
+use crate::data::{Layout, Unit};
 use crate::math::distribution::Distribution;
 
 /// A summand of the rate of a state, with a coefficient of its own.
@@ -46,6 +46,16 @@ pub struct Time<'a> {
     pub duration: f64,
     /// The shortest step of the response along it.
     pub step: f64,
+}
+
+impl<'a> Time<'a> {
+    /// The time of a response: its axis of numbers, where it has one.
+    pub fn of(layout: &'a Layout) -> Option<Self> {
+        let (name, at, unit) = layout.abscissa()?;
+        let duration = at.last()? - at.first()?;
+        let steps = at.windows(2).map(|w| w[1] - w[0]);
+        Some(Self { name, unit, duration, step: steps.fold(f64::INFINITY, f64::min).min(duration) })
+    }
 }
 
 /// What a term adds.

@@ -326,7 +326,8 @@ fn source(
         let value = unit.convert(condition.value, &input.unit).ok_or_else(no_unit)?;
         return Ok(Source::Fixed(value));
     }
-    if let Some(quantity) = other.section.common.fixed.get(&input.name) {
+    let of_study = || study.model.as_ref()?.common.fixed.get(&input.name);
+    if let Some(quantity) = other.section.common.fixed.get(&input.name).or_else(of_study) {
         return quantity.in_unit(&input.unit).map(Source::Fixed).ok_or_else(no_unit);
     }
     let default = input.default.map(Source::Fixed);

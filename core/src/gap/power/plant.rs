@@ -176,8 +176,7 @@ fn effect(
     }
     let (low, high) = parameters[0].prior.support();
     let changed = |size: f64| {
-        let values: Vec<f64> =
-            std::iter::once(size).chain(values[1..].iter().copied()).collect();
+        let values: Vec<f64> = std::iter::once(size).chain(values[1..].iter().copied()).collect();
         (placed.apply(response, &values), values)
     };
     let reached = |size: f64| {

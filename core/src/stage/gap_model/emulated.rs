@@ -5,23 +5,20 @@
 
 use serde_json::json;
 
-use crate::data::Parameter;
+use crate::data::{Ensemble, Parameter};
 use crate::gap::wide::{Freed, Wide};
 use crate::linalg::Matrix;
 use crate::plugin::discrepancy::CommonError;
 use crate::plugin::surrogate::Training;
-use crate::plugin::{Emulator, Forward};
+use crate::plugin::{Emulator, Forward, Surrogate};
 use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Observer, Progress, RunDirectory, Stop, files};
 use crate::stage::read::{self, Runs};
+use crate::stage::simulator::Simulator;
 use crate::stage::{Known, design, simulate, stream};
 use crate::study::Study;
 
 use super::pieces::Pieces;
-
-/// The stages in the run directory.
-const SIMULATE: &str = "7-gap-simulate";
-const SURROGATE: &str = "7-gap-surrogate";
 
 /// The wide forward map: the study's emulator and what the inputs add to it.
 pub(super) fn wide<'a>(
@@ -32,64 +29,111 @@ pub(super) fn wide<'a>(
     observer: &dyn Observer,
 ) -> Result<Wide<'a>, Stop> {
     let inputs = pieces.inputs.clone();
-    let points = points(study, pieces)?;
-    let names: Vec<String> =
-        simulate::names(points.rows()).into_iter().map(|name| format!("gap-{name}")).collect();
-    let simulator = pieces.simulator(study)?;
-    let count = names.len() * simulator.settings.len();
-    observer.begin("gap-simulate", "run", count as u64);
-    let made = simulate::kept(
-        study,
-        &simulator,
-        SIMULATE,
-        &names,
-        &points,
-        &pieces.model(),
-        run,
-        observer,
-    )?;
-    observer.end("gap-simulate", &format!("{count} runs with pieces that may be missing"));
-    let section =
-        study.surrogate.as_ref().ok_or_else(|| Stop::new("the study has no surrogate"))?;
     let parameters = parameters(study, &inputs);
-    let laws: Vec<_> = parameters.iter().map(|p| (&p.name, &p.design)).collect();
-    let hashed = json!([
-        made.hash,
-        known.origin,
-        section.built.name,
-        section.built.options,
-        laws,
-        study.about.seed
-    ]);
-    observer.begin("gap-surrogate", "output", study.layouts.len() as u64);
-    let folder = run.stage_folder(SIMULATE);
-    let kept = run.keep(SURROGATE, &hashed, observer, |_| {
-        let runs = Runs { folder: &folder, made: &made.value };
-        let ensemble = read::ensemble_of(study, &parameters, Some(runs))?;
-        let own: Vec<usize> = (0..study.parameters.len()).collect();
-        let base = known.forward.mean(&ensemble.points.select_columns(&own));
-        let difference = Matrix::from_fn(base.rows(), base.columns(), |i, j| {
-            ensemble.responses[(i, j)] - base[(i, j)]
-        });
+    let lesson = Lesson {
+        name: "gap",
+        simulator: &pieces.simulator(study)?,
+        points: points(study, pieces)?,
+        used: (0..parameters.len()).collect(),
+        parameters,
+        base: Some((known.forward, known.origin)),
+        model: json!(pieces.model()),
+    };
+    let (difference, common) = lesson.learn(study, run, observer)?;
+    let absent = inputs.iter().map(|freed| freed.absent).collect();
+    let forward = Added { base: known.forward, difference, absent };
+    Ok(Wide { forward: Box::new(forward), inputs, common: vec![common] })
+}
+
+/// Runs from which the study's surrogate learns.
+pub(super) struct Lesson<'a> {
+    /// The name of the stages in the run directory: `7-NAME-simulate`, `7-NAME-surrogate`.
+    pub name: &'a str,
+    /// What is run.
+    pub simulator: &'a Simulator<'a>,
+    /// Where.
+    pub points: Matrix,
+    /// The parameters of the runs.
+    pub parameters: Vec<Parameter>,
+    /// Those of them that the surrogate is trained on.
+    pub used: Vec<usize>,
+    /// The forward map of the study's parameters from which the differences are learned, with its hash.
+    pub base: Option<(&'a dyn Forward, &'a str)>,
+    /// What the model is, for the hash of the runs.
+    pub model: serde_json::Value,
+}
+
+impl Lesson<'_> {
+    /// The emulator with its error.
+    pub fn learn(
+        &self,
+        study: &Study,
+        run: &mut RunDirectory,
+        observer: &dyn Observer,
+    ) -> Result<(Box<dyn Emulator>, CommonError), Stop> {
+        let [simulate, learn] =
+            ["simulate", "surrogate"].map(|what| format!("7-{}-{what}", self.name));
+        let points = &self.points;
+        let names: Vec<String> = simulate::names(points.rows())
+            .into_iter()
+            .map(|name| format!("{}-{name}", self.name))
+            .collect();
+        let count = names.len() * self.simulator.settings.len();
+        observer.begin("gap-simulate", "run", count as u64);
+        let (simulator, model) = (self.simulator, &self.model);
+        let made =
+            simulate::kept(study, simulator, &simulate, &names, points, model, run, observer)?;
+        observer.end("gap-simulate", &format!("{count} runs of `{}`", self.name));
+        let section =
+            study.surrogate.as_ref().ok_or_else(|| Stop::new("the study has no surrogate"))?;
+        let laws: Vec<_> = self
+            .used
+            .iter()
+            .map(|&i| (&self.parameters[i].name, &self.parameters[i].design))
+            .collect();
+        let base = self.base.map(|(_, origin)| origin);
+        let (name, options) = (section.built.name, &section.built.options);
+        let inputs = json!([made.hash, base, name, options, laws, study.about.seed]);
+        observer.begin("gap-surrogate", "output", study.layouts.len() as u64);
+        let folder = run.stage_folder(&simulate);
+        let kept = run.keep(&learn, &inputs, observer, |_| {
+            let runs = Runs { folder: &folder, made: &made.value };
+            let ensemble = read::ensemble_of(study, &self.parameters, Some(runs))?;
+            self.fit(study, &*section.built.plugin, &ensemble, observer)
+        })?;
+        let errors = &kept.value.errors;
+        let square = errors.as_slice().iter().map(|e| e * e).sum::<f64>();
+        let rmse = (square / errors.as_slice().len().max(1) as f64).sqrt();
+        observer.end("gap-surrogate", &format!("rmse {rmse:.3e} {}", study.layouts.unit()));
+        Ok((section.built.plugin.load(&kept.value.bytes)?, common(errors)))
+    }
+
+    fn fit(
+        &self,
+        study: &Study,
+        plugin: &dyn Surrogate,
+        ensemble: &Ensemble,
+        observer: &dyn Observer,
+    ) -> Result<Learned, Stop> {
+        let mut responses = ensemble.responses.clone();
+        if let Some((base, _)) = self.base {
+            let own: Vec<usize> = (0..study.parameters.len()).collect();
+            let mean = base.mean(&ensemble.points.select_columns(&own));
+            let pairs = responses.as_mut_slice().iter_mut().zip(mean.as_slice());
+            pairs.for_each(|(y, base)| *y -= base);
+        }
+        let parameters: Vec<Parameter> =
+            self.used.iter().map(|&i| self.parameters[i].clone()).collect();
         let training = Training {
             parameters: &parameters,
             layouts: &study.layouts,
-            points: &ensemble.points,
-            responses: &difference,
+            points: &ensemble.points.select_columns(&self.used),
+            responses: &responses,
         };
-        let progress = Progress::new(observer);
-        let emulator =
-            section.built.plugin.fit(&training, &stream(study, "gap-surrogate"), &progress)?;
+        let stream = stream(study, "gap-surrogate").named(self.name);
+        let emulator = plugin.fit(&training, &stream, &Progress::new(observer))?;
         Ok(Learned { bytes: emulator.save()?, errors: emulator.fit_error().residuals.clone() })
-    })?;
-    let errors = &kept.value.errors;
-    let square = errors.as_slice().iter().map(|e| e * e).sum::<f64>();
-    let rmse = (square / errors.as_slice().len().max(1) as f64).sqrt();
-    observer.end("gap-surrogate", &format!("rmse {rmse:.3e} {}", study.layouts.unit()));
-    let emulator = section.built.plugin.load(&kept.value.bytes)?;
-    let absent = inputs.iter().map(|freed| freed.absent).collect();
-    let forward = Added { base: known.forward, difference: emulator, absent };
-    Ok(Wide { forward: Box::new(forward), inputs, common: vec![common(errors)] })
+    }
 }
 
 /// What is learned of the inputs.
@@ -125,16 +169,21 @@ fn parameters(study: &Study, inputs: &[Freed]) -> Vec<Parameter> {
     study.parameters.iter().cloned().chain(freed).collect()
 }
 
-/// The runs by the study's own design.
-fn points(study: &Study, pieces: &Pieces) -> Result<Matrix, Stop> {
+/// Points of the study's own design for these parameters.
+pub(super) fn designed(study: &Study, parameters: &[Parameter]) -> Result<Matrix, Stop> {
     let section = study.design.as_ref().ok_or_else(|| {
-        Stop::new("the study has no design by which runs with other inputs could be made")
-            .help("add `[design]` and `[model]`, or take `[[gap.switch]]` and `[[gap.term]]` out")
+        Stop::new("the study has no design by which further runs could be made").help(
+            "add `[design]`, or take `[[gap.switch]]`, `[[gap.term]]` and `[[gap.model]]` out",
+        )
     })?;
-    let parameters = parameters(study, &pieces.inputs);
     let runs = section.common.runs.get();
-    let cube = section.built.plugin.place(&parameters, runs, &stream(study, "gap-design"))?;
-    let mut points = design::physical(&cube, &parameters);
+    let cube = section.built.plugin.place(parameters, runs, &stream(study, "gap-design"))?;
+    Ok(design::physical(&cube, parameters))
+}
+
+/// The runs for all pieces.
+fn points(study: &Study, pieces: &Pieces) -> Result<Matrix, Stop> {
+    let mut points = designed(study, &parameters(study, &pieces.inputs))?;
     let (first, count) = (study.parameters.len(), pieces.all.len());
     for run in 0..points.rows() {
         let present = run % (count + 1);

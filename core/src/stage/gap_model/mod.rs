@@ -5,9 +5,11 @@
 
 mod emulated;
 mod pieces;
+mod swap;
 mod terms;
 
 pub use pieces::{Piece, Pieces};
+pub use swap::{Compared, Rival, rivals};
 
 use crate::gap::candidates::Candidate;
 use crate::gap::wide::Wide;

@@ -107,12 +107,7 @@ impl Desk<'_> {
             .find(|state| state.name == section.common.state)
             .ok_or_else(|| format!("the model has no state `{}`", section.common.state))?;
         let size = |expression: &str| self.size(expression);
-        let time = setting.asked.abscissa().map(|(name, at, unit)| {
-            let steps = at.windows(2).map(|w| w[1] - w[0]);
-            let duration = at[at.len() - 1] - at[0];
-            let step = steps.fold(f64::INFINITY, f64::min).min(duration);
-            Time { name, unit, duration, step }
-        });
+        let time = Time::of(&setting.asked);
         let place = Place { state, name, time, size: &size };
         let summand = section.built.plugin.summand(&place)?;
         let unit = self.unit(&context, state, &summand)?;

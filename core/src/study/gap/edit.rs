@@ -58,7 +58,31 @@ impl Edit {
             parameters.push(to_table(added)?.into());
         }
         whole.insert("parameter".to_owned(), parameters.into());
+        if let Some(Value::Table(gap)) = whole.get_mut("gap") {
+            self.untried(gap);
+        }
         Ok(whole)
+    }
+
+    /// What is added is no candidate any more.
+    fn untried(&self, gap: &mut Table) {
+        let called = |table: &Value, key: &str| {
+            let name = table.get(key).and_then(Value::as_str);
+            name.is_some_and(|name| self.freed.iter().any(|freed| freed == name))
+        };
+        let names = |table: &Value| {
+            called(table, "name") || (table.get("name").is_none() && called(table, "use"))
+        };
+        for (list, is_added) in [
+            ("switch", &(|table: &Value| called(table, "input")) as &dyn Fn(&Value) -> bool),
+            ("term", &names),
+        ] {
+            let Some(Value::Array(all)) = gap.get_mut(list) else { continue };
+            all.retain(|table| !is_added(table));
+            if all.is_empty() {
+                gap.remove(list);
+            }
+        }
     }
 
     /// `[model]` with the changes made; `None` where nothing of it changes.

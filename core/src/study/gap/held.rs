@@ -1,5 +1,6 @@
 //! Inputs of the model that a study holds at a value.
 
+use crate::plugin::Model;
 use crate::plugin::model::{Input, Signature};
 use crate::study::Study;
 
@@ -14,7 +15,7 @@ pub struct Held {
 
 /// Why an input of the model is not held at a value.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Loose {
+pub(in crate::study) enum Loose {
     /// The model has no such input; those it has.
     Unknown(Vec<String>),
     /// A parameter sets it.
@@ -33,7 +34,7 @@ impl Study {
         self.hold(name).ok()
     }
 
-    pub(super) fn hold(&self, name: &str) -> Result<Held, Loose> {
+    pub(in crate::study) fn hold(&self, name: &str) -> Result<Held, Loose> {
         let Some(signature) = self.signature() else { return Err(Loose::Unknown(Vec::new())) };
         let names = || signature.inputs.iter().map(|input| input.name.clone()).collect();
         let input = signature.inputs.iter().find(|input| input.name == name);
@@ -53,10 +54,13 @@ impl Study {
         Ok(Held { input, value })
     }
 
-    /// The signature of the model under the first conditions.
-    pub(super) fn signature(&self) -> Option<Signature> {
+    fn signature(&self) -> Option<Signature> {
+        self.signature_of(&*self.model.as_ref()?.built.plugin)
+    }
+
+    /// The signature of a model under the first conditions.
+    pub fn signature_of(&self, model: &dyn Model) -> Option<Signature> {
         let (layout, _) = self.layouts.of_scenario(&self.scenarios.first()?.name)?;
-        let model = self.model.as_ref()?;
-        Some(model.built.plugin.signature(&self.context_of(&layout)))
+        Some(model.signature(&self.context_of(&layout)))
     }
 }

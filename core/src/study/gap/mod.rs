@@ -3,11 +3,13 @@
 mod edit;
 mod held;
 mod inside;
+mod text;
 
 use std::collections::BTreeMap;
 
 pub use edit::{Added, Edit};
 pub use held::Held;
+pub(super) use held::Loose;
 pub use inside::{Inside, Swap, SwapKeys, SwitchSection, TermKeys};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
