@@ -5,6 +5,7 @@ use std::sync::{Arc, OnceLock};
 
 use lacuna::data::{Axis, Layout, Layouts, Measurements, Parameter, Replicate, Unit};
 use lacuna::gap::candidates::{Candidate, proposed};
+use lacuna::gap::common::shared;
 use lacuna::gap::experiment::Experiment;
 use lacuna::gap::name::{Found, Options, Verdict, search, verdict};
 use lacuna::gap::noise::Noise;
@@ -264,6 +265,7 @@ fn lab() -> &'static Lab {
 fn switches(wide: &Wide<'_>) -> Vec<Candidate> {
     let one = |(i, input): (usize, &Freed)| Candidate {
         kind: input.name.clone(),
+        plugin: input.name.clone(),
         options: toml::Table::new(),
         effect: Arc::new(Switched {
             places: vec![i],
@@ -311,10 +313,10 @@ fn ask(truth: &[f64], seed: u64) -> Verdict {
     experiment.wide = Some(&lab.wide);
     let starts = vec![vec![1.5e5, 13_000.0, 1400.0], vec![1.0e5, 12_000.0, 1100.0]];
     let response = lab.base.mean(&Matrix::from_rows(3, [&starts[0]])).row(0).to_vec();
-    experiment.common = lab.common.clone();
-    experiment.common.extend(lab.wide.common.clone());
     let noise = Noise::of(&experiment, &response, None);
-    experiment.common = condensed(&experiment, &noise, &response);
+    let samples = [&lab.common[..], &lab.wide.common].concat();
+    let all = shared(&experiment, &noise, &response, &samples);
+    (experiment.common, experiment.remainder) = (all.common, all.remainder);
     let sd = noise.sd(&experiment, &response);
     let situation = Situation { layouts: &layouts, response: &response, noise: &sd };
     let mut candidates = proposed(None, &situation).unwrap();
@@ -405,48 +407,6 @@ use lacuna::gap::locate::Projection;
 use lacuna::gap::system::System;
 use lacuna::gap::whitener::Whitener;
 
-/// Error curves with a target.
-fn shrunk(samples: &Matrix, nu: f64, rho: f64) -> CommonError {
-    let n = samples.rows() as f64;
-    let mut own = error_of("sample", samples);
-    for x in own.factor.as_mut_slice() {
-        *x *= (n / (n + nu)).sqrt();
-    }
-    let ms: Vec<f64> =
-        (0..1000).map(|j| samples.column(j).iter().map(|x| x * x).sum::<f64>() / n).collect();
-    // smooth over neighbours
-    let mut columns: Vec<Vec<f64>> = Vec::new();
-    for s in 0..10 {
-        let v: Vec<f64> = (0..100)
-            .map(|t| {
-                let (a, b) = (t.max(3) - 3, (t + 4).min(100));
-                (ms[100 * s + a..100 * s + b].iter().sum::<f64>() / (b - a) as f64).sqrt()
-            })
-            .collect();
-        let c =
-            Matrix::from_fn(100, 100, |i, j| v[i] * v[j] * rho.powi((i as i32 - j as i32).abs()));
-        let e = lacuna::linalg::symmetric_eigen(&c).unwrap();
-        for k in 0..100 {
-            if e.values[k] > 0.3 {
-                let mut col = vec![0.0; 1000];
-                for t in 0..100 {
-                    col[100 * s + t] = e.vectors[(t, k)] * (e.values[k] * nu / (n + nu)).sqrt();
-                }
-                columns.push(col);
-            }
-        }
-    }
-    let m = columns.len();
-    let factor = Matrix::from_fn(1000, own.factor.columns() + m, |i, j| {
-        if j < own.factor.columns() {
-            own.factor[(i, j)]
-        } else {
-            columns[j - own.factor.columns()][i]
-        }
-    });
-    CommonError { origin: "shrunk".into(), factor, predictive: true }
-}
-
 #[test]
 fn energies() {
     let k = env("LACUNA_TARGET_MESH", 1);
@@ -471,14 +431,23 @@ fn energies() {
     let same = simulated(cells(k), &truths);
     let finer = simulated(cells(3 * k), &truths);
     let lay = layouts();
-    let energy = |truth: &[f64], at: &[f64], common: &[CommonError], seed: u64| -> (f64, f64) {
+    let energy = |truth: &[f64],
+                  at: &[f64],
+                  common: &[CommonError],
+                  seed: u64,
+                  shrink: bool|
+     -> (f64, f64) {
         let data = measured(truth, 12, seed).into();
         let mut experiment = Experiment::new(&lay, &parameters, &*base, &data);
         experiment.common = common.to_vec();
         let response = base.mean(&Matrix::from_rows(3, [at])).row(0).to_vec();
         let noise = Noise::of(&experiment, &response, None);
-        let cond = condensed(&experiment, &noise, &response);
-        experiment.common = cond;
+        if shrink {
+            let all = shared(&experiment, &noise, &response, common);
+            (experiment.common, experiment.remainder) = (all.common, all.remainder);
+        } else {
+            experiment.common = condensed(&experiment, &noise, &response);
+        }
         let system = System::new(&experiment, Vec::new());
         let whitener = Whitener::new(&experiment, &noise, &response);
         let fit = fit_from(&system, &whitener, &experiment.means().1, &[at.to_vec()]).unwrap();
@@ -489,39 +458,29 @@ fn energies() {
         (left.iter().map(|x| x * x).sum::<f64>(), off)
     };
     let run = |name: &str, which: &Matrix, common: &[CommonError]| {
-        let e: Vec<(f64, f64)> = (0..16)
-            .into_par_iter()
-            .map(|i| energy(which.row(i), truths.row(i), common, i as u64))
-            .collect();
-        let mut v: Vec<f64> = e.iter().map(|x| x.0).collect();
-        v.sort_by(f64::total_cmp);
-        println!(
-            "{name}: mean {:.0} min {:.0} med {:.0} max {:.0}; param offsets {:.2}",
-            v.iter().sum::<f64>() / 16.0,
-            v[0],
-            v[8],
-            v[15],
-            e.iter().map(|x| x.1).sum::<f64>() / 16.0
-        );
+        for shrink in [false, true] {
+            let e: Vec<(f64, f64)> = (0..16)
+                .into_par_iter()
+                .map(|i| energy(which.row(i), truths.row(i), common, i as u64, shrink))
+                .collect();
+            let mut v: Vec<f64> = e.iter().map(|x| x.0).collect();
+            v.sort_by(f64::total_cmp);
+            println!(
+                "{name} {shrink}: mean {:.0} min {:.0} med {:.0} max {:.0}; param offsets {:.2}",
+                v.iter().sum::<f64>() / 16.0,
+                v[0],
+                v[8],
+                v[15],
+                e.iter().map(|x| x.1).sum::<f64>() / 16.0
+            );
+        }
     };
     let em = error_of("emulator", &residuals);
     let rows = |n: usize| difference.select_rows(&(0..n).collect::<Vec<_>>());
     run("same mesh, no error", &same, &[]);
     run("same mesh, emulator", &same, &[em.clone()]);
-    run("same mesh, emulator shrunk 75 .5", &same, &[shrunk(&residuals, 75.0, 0.5)]);
     run("finer, emulator", &finer, &[em.clone()]);
     for n in [20, 40, 80, 150] {
         run(&format!("finer, mesh {n}"), &finer, &[em.clone(), error_of("numerics", &rows(n))]);
-    }
-    for n in [20, 40] {
-        for nu in [n as f64 * 0.5, n as f64] {
-            for rho in [0.0, 0.5, 0.8] {
-                run(
-                    &format!("finer, mesh {n} nu {nu} rho {rho}"),
-                    &finer,
-                    &[em.clone(), shrunk(&rows(n), nu, rho)],
-                );
-            }
-        }
     }
 }

@@ -1,13 +1,15 @@
 //! What inputs change, learned from runs of their own where a surrogate stands for the model.
 //!
 //! The surrogate is fitted to the difference of the runs from the study's emulator, and what it says at the absent values is
-//! taken off, so that both agree there. Every run has one piece present, or all of them, in turn.
+//! taken off, so that both agree there. Every run has about half of the pieces present, at random: what a piece does alone and
+//! what pieces do together are learned from the same runs, also of one that does nothing without another.
 
 use serde_json::json;
 
 use crate::data::{Ensemble, Parameter};
 use crate::gap::wide::{Freed, Wide};
 use crate::linalg::Matrix;
+use crate::math::random::uniform;
 use crate::plugin::discrepancy::CommonError;
 use crate::plugin::surrogate::Training;
 use crate::plugin::{Emulator, Forward, Surrogate};
@@ -185,10 +187,11 @@ pub(super) fn designed(study: &Study, parameters: &[Parameter]) -> Result<Matrix
 fn points(study: &Study, pieces: &Pieces) -> Result<Matrix, Stop> {
     let mut points = designed(study, &parameters(study, &pieces.inputs))?;
     let (first, count) = (study.parameters.len(), pieces.all.len());
+    let stream = stream(study, "gap-design").named("present");
     for run in 0..points.rows() {
-        let present = run % (count + 1);
-        for (i, piece) in pieces.all.iter().enumerate() {
-            if count > 1 && present < count && i != present {
+        let mut rng = stream.at(run as u64).generator();
+        for piece in &pieces.all {
+            if count > 1 && uniform(&mut rng) < 0.5 {
                 for &j in &piece.places {
                     points[(run, first + j)] = pieces.inputs[j].absent;
                 }
