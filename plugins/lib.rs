@@ -9,3 +9,4 @@ pub mod readers;
 pub mod samplers;
 pub mod surrogates;
 pub mod targets;
+pub mod terms;

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::wide::Wide;
 use crate::data::{Coordinates, Layout, Layouts, Observations, Parameter, layouts::SCENARIO};
 use crate::plugin::Forward;
 use crate::plugin::discrepancy::CommonError;
@@ -15,8 +16,13 @@ pub struct Experiment<'a> {
     pub parameters: &'a [Parameter],
     /// From parameters to responses.
     pub forward: &'a dyn Forward,
+    /// The forward map with inputs that the study holds fixed, where effects on the model are candidates.
+    pub wide: Option<&'a Wide<'a>>,
     /// Errors of the forward map that all replicates share.
     pub common: Vec<CommonError>,
+    /// What such errors have outside their directions, as [`common`](super::common) finds it: the variance of
+    /// innovations that follow each other as the noise's do, one an output; nothing where it is empty.
+    pub remainder: Vec<f64>,
     /// Where the forward map holds, where that is narrower than the priors.
     pub region: Option<Vec<(f64, f64)>>,
     /// The measurements, by condition.
@@ -89,8 +95,17 @@ impl<'a> Experiment<'a> {
                 });
             }
         }
-        let (common, region) = (Vec::new(), None);
-        let mut all = Self { layouts, parameters, forward, common, region, conditions, curves };
+        let mut all = Self {
+            layouts,
+            parameters,
+            forward,
+            wide: None,
+            common: Vec::new(),
+            remainder: Vec::new(),
+            region: None,
+            conditions,
+            curves,
+        };
         for curve in &mut all.curves {
             curve.measured = curve.outputs.clone().collect();
         }

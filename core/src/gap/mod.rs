@@ -7,6 +7,7 @@
 pub mod account;
 pub mod added;
 pub mod candidates;
+pub mod common;
 pub mod experiment;
 pub mod fit;
 pub mod hold_out;
@@ -17,6 +18,7 @@ pub mod power;
 pub mod prove;
 pub mod system;
 pub mod whitener;
+pub mod wide;
 pub mod with_effects;
 
 #[cfg(test)]

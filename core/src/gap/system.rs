@@ -1,16 +1,21 @@
 //! A forward map with effects: one vector of unknowns, the response and its derivatives.
 
+use std::ops::Range;
+
 use super::experiment::Experiment;
+use super::wide::Wide;
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
+use crate::plugin::Forward;
 use crate::plugin::effect::{Placed, with_tangents};
 
-/// The experiment's forward map with effects on top; the unknowns are its parameters, then those of the effects.
+/// The experiment's forward map with effects: on the model, through inputs of the [wide](Experiment::wide) forward map, and
+/// on its response. The unknowns are the experiment's parameters, then those of the effects.
 #[derive(Clone)]
 pub struct System<'a> {
     /// The experiment.
     pub experiment: &'a Experiment<'a>,
-    /// The effects in the order in which they act.
+    /// The effects: those on the response in the order in which they act.
     pub effects: Vec<Placed<'a>>,
     priors: Vec<Distribution>,
 }
@@ -76,16 +81,13 @@ impl<'a> System<'a> {
 
     /// The responses at several points.
     pub fn responses<P: AsRef<[f64]>>(&self, points: &[P]) -> Vec<Vec<f64>> {
-        let d = self.experiment.parameters.len();
-        let theta = Matrix::from_rows(d, points.iter().map(|p| &p.as_ref()[..d]));
-        let means = self.experiment.forward.mean(&theta);
+        let columns = self.input(&vec![0.0; self.dimension()]).len();
+        let inputs = points.iter().map(|p| self.input(p.as_ref()));
+        let means = self.forward().mean(&Matrix::from_rows(columns, inputs));
         let with_effects = |(mean, point): (&[f64], &P)| {
             let mut response = mean.to_vec();
-            let mut begin = d;
-            for effect in &self.effects {
-                let end = begin + effect.absent().len();
-                response = effect.apply(&response, &point.as_ref()[begin..end]);
-                begin = end;
+            for (effect, own) in self.on_the_response() {
+                response = effect.apply(&response, &point.as_ref()[own]);
             }
             response
         };
@@ -94,15 +96,63 @@ impl<'a> System<'a> {
 
     /// The response with its derivatives.
     pub fn linearised(&self, point: &[f64]) -> Linearised {
+        let (mean, jacobian) = self.forward().mean_and_jacobian(&self.input(point));
         let d = self.experiment.parameters.len();
-        let (mean, jacobian) = self.experiment.forward.mean_and_jacobian(&point[..d]);
-        let mut begin = d;
-        let effects = self.effects.iter().map(|effect| {
+        // The unknowns whose derivatives are known, each with the column of the forward map that it moves.
+        let mut moved: Vec<(usize, usize)> = (0..d).map(|j| (j, j)).collect();
+        for (effect, own) in self.on_the_model() {
+            moved.extend(own.zip(effect.effect.switches()).map(|(unknown, i)| (unknown, d + i)));
+        }
+        let columns: Vec<usize> = moved.iter().map(|(_, column)| *column).collect();
+        let on_top = self.on_the_response().map(|(effect, own)| (effect, &point[own]));
+        let (response, rows) = with_tangents(on_top, mean, &jacobian.select_columns(&columns));
+        let mut unknowns: Vec<usize> = moved.iter().map(|(unknown, _)| *unknown).collect();
+        unknowns.extend(self.on_the_response().flat_map(|(_, own)| own));
+        let mut tangents = Matrix::zeros(unknowns.len(), response.len());
+        for (row, unknown) in rows.iter_rows().zip(unknowns) {
+            tangents.row_mut(unknown).copy_from_slice(row);
+        }
+        Linearised { point: point.to_vec(), response, tangents }
+    }
+
+    /// The wide forward map, where an effect needs it.
+    fn wide(&self) -> Option<&'a Wide<'a>> {
+        self.experiment.wide.filter(|_| self.on_the_model().next().is_some())
+    }
+
+    fn forward(&self) -> &dyn Forward {
+        self.wide().map_or(self.experiment.forward, |wide| &*wide.forward)
+    }
+
+    /// The point of the forward map at these unknowns.
+    fn input(&self, point: &[f64]) -> Vec<f64> {
+        let d = self.experiment.parameters.len();
+        let mut input = point[..d].to_vec();
+        let Some(wide) = self.wide() else { return input };
+        input.extend(wide.inputs.iter().map(|freed| freed.absent));
+        for (effect, own) in self.on_the_model() {
+            for (i, x) in effect.effect.switches().iter().zip(&point[own]) {
+                input[d + i] = *x;
+            }
+        }
+        input
+    }
+
+    /// Each effect with the places of its unknowns.
+    fn places(&self) -> impl Iterator<Item = (&Placed<'a>, Range<usize>)> {
+        let mut begin = self.experiment.parameters.len();
+        self.effects.iter().map(move |effect| {
             let own = begin..begin + effect.absent().len();
             begin = own.end;
-            (effect, &point[own])
-        });
-        let (response, tangents) = with_tangents(effects, mean, &jacobian);
-        Linearised { point: point.to_vec(), response, tangents }
+            (effect, own)
+        })
+    }
+
+    fn on_the_model(&self) -> impl Iterator<Item = (&Placed<'a>, Range<usize>)> {
+        self.places().filter(|(effect, _)| !effect.effect.switches().is_empty())
+    }
+
+    fn on_the_response(&self) -> impl Iterator<Item = (&Placed<'a>, Range<usize>)> {
+        self.places().filter(|(effect, _)| effect.effect.switches().is_empty())
     }
 }

@@ -3,6 +3,7 @@
 //! A plugin is a struct of options that deserialises from its section of the study and implements
 //! the trait of its kind; one `register!` line at the end of its file lists it.
 
+pub mod amend;
 pub mod component;
 pub mod density;
 pub mod design;
@@ -17,7 +18,9 @@ pub mod reader;
 pub mod registry;
 pub mod sampler;
 pub mod surrogate;
+pub mod term;
 
+pub use amend::Amend;
 pub use component::{Component, Context, Fact, Given};
 pub use density::Density;
 pub use design::Design;
@@ -29,3 +32,4 @@ pub use model::{EvalError, Model};
 pub use reader::Reader;
 pub use sampler::{Sampler, Target};
 pub use surrogate::{Emulator, Sensitivity, Surrogate};
+pub use term::Term;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use super::{Component, Context, Fact};
+use super::{Amend, Component, Context, Fact};
 use crate::data::{Layout, Scenario, Unit};
 use crate::linalg::Matrix;
 
@@ -43,6 +43,11 @@ pub trait Model: Component {
 
     /// Derivatives of the response, where the model knows them.
     fn gradient(&self) -> Option<&dyn Gradient> {
+        None
+    }
+
+    /// Its equations, where a study can add terms to them.
+    fn amend(&self) -> Option<&dyn Amend> {
         None
     }
 

@@ -78,7 +78,7 @@ impl<'a> Prepared<'a> {
 /// where it has some, else differences.
 pub struct Direct<'a> {
     simulator: Simulator<'a>,
-    priors: Vec<&'a Distribution>,
+    priors: Vec<Distribution>,
     outputs: usize,
     evaluations: AtomicU64,
     failures: Mutex<Failures>,
@@ -100,13 +100,14 @@ impl<'a> Direct<'a> {
             Stop::new("the study has neither a surrogate nor a model")
                 .help("add `[model]`, or `[surrogate]` with simulation runs")
         })?;
-        Ok(Self {
-            simulator,
-            priors: study.parameters.iter().map(|p| &p.prior).collect(),
-            outputs: study.layouts.len(),
-            evaluations: AtomicU64::new(0),
-            failures: Mutex::default(),
-        })
+        let priors = study.parameters.iter().map(|p| p.prior.clone()).collect();
+        Ok(Self::with(simulator, priors, study.layouts.len()))
+    }
+
+    /// A simulator as the forward map of its unknowns, which have these priors.
+    pub fn with(simulator: Simulator<'a>, priors: Vec<Distribution>, outputs: usize) -> Self {
+        let (evaluations, failures) = (AtomicU64::new(0), Mutex::default());
+        Self { simulator, priors, outputs, evaluations, failures }
     }
 
     /// How often the model was asked and how often it had no answer, with the most frequent reasons.

@@ -8,6 +8,7 @@ pub mod design;
 pub mod direct;
 pub mod evidence;
 pub mod gap;
+pub mod gap_model;
 mod idle;
 pub mod inference_data;
 pub mod manifest;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use crate::data::{
-    Ensemble, FailedRun, Layouts, Measurements, Observations, Replicate, Scenario, Unit,
+    Ensemble, FailedRun, Layouts, Measurements, Observations, Parameter, Replicate, Scenario, Unit,
 };
 use crate::linalg::Matrix;
 use crate::plugin::Reader;
@@ -174,6 +174,15 @@ pub struct Runs<'a> {
 
 /// The runs of all scenarios through the study's reader, every response finite: those that have one in each.
 pub fn ensemble(study: &Study, runs: Option<Runs<'_>>) -> Result<Ensemble, Stop> {
+    ensemble_of(study, &study.parameters, runs)
+}
+
+/// The same of runs of other parameters.
+pub fn ensemble_of(
+    study: &Study,
+    parameters: &[Parameter],
+    runs: Option<Runs<'_>>,
+) -> Result<Ensemble, Stop> {
     let mut parts = Vec::new();
     for (i, scenario) in study.scenarios.iter().enumerate() {
         let (layout, outputs) = study
@@ -184,7 +193,7 @@ pub fn ensemble(study: &Study, runs: Option<Runs<'_>>) -> Result<Ensemble, Stop>
         let source = EnsembleSource {
             directory: &study.directory,
             simulated: simulated.as_deref(),
-            parameters: &study.parameters,
+            parameters,
             scenario: scenario.label(),
             layout: &layout,
         };

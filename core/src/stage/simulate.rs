@@ -260,7 +260,7 @@ fn simulate(
         let work = Work { study, simulator, setting, names, points, folder: &folder };
         scenarios.push(Made { folder: setting.folder.clone(), runs: work.run(&progress)? });
     }
-    let parameters = study.parameters.iter().map(|p| p.name.clone()).collect();
+    let parameters = simulator.unknowns.clone();
     Ok(Simulated { scenarios, parameters, points: points.clone() })
 }
 

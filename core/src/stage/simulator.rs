@@ -7,6 +7,7 @@ use crate::data::{Axis, Coordinates, Layout, Scenario, Unit};
 use crate::linalg::{Matrix, multiply};
 use crate::plugin::model::{Call, EvalError, Gradient, Input, Model, Response};
 use crate::plugin::registry::Section;
+use crate::plugin::{Context, Given};
 use crate::run::Stop;
 use crate::study::Study;
 use crate::study::file::ModelKeys;
@@ -24,6 +25,18 @@ pub struct Simulator<'a> {
     pub units: Vec<Unit>,
     /// One setting a scenario.
     pub settings: Vec<Setting<'a>>,
+    /// The names of what a point holds: the study's parameters, and behind them inputs that are set free.
+    pub unknowns: Vec<String>,
+}
+
+/// A model in place of the study's, with inputs that are free beside the study's parameters.
+pub struct Other<'a> {
+    /// The model.
+    pub section: &'a Section<dyn Model, ModelKeys>,
+    /// What is set of its inputs: at least what the study sets.
+    pub given: &'a [Given],
+    /// The names and the units of the inputs that are free.
+    pub free: Vec<(&'a str, &'a Unit)>,
 }
 
 /// The model under the conditions of one scenario.
@@ -79,6 +92,12 @@ impl<'a> Simulator<'a> {
         study: &'a Study,
         section: &'a Section<dyn Model, ModelKeys>,
     ) -> Result<Self, Stop> {
+        Self::of_other(study, &Other { section, given: &study.given, free: Vec::new() })
+    }
+
+    /// The simulator of a study with another model, some of whose inputs are free.
+    pub fn of_other(study: &'a Study, other: &Other<'a>) -> Result<Self, Stop> {
+        let section = other.section;
         let model = &*section.built.plugin;
         let mut settings = Vec::new();
         let (mut names, mut units) = (Vec::new(), Vec::new());
@@ -87,14 +106,14 @@ impl<'a> Simulator<'a> {
                 .layouts
                 .of_scenario(&scenario.name)
                 .ok_or_else(|| Stop::new(format!("no response to `{}`", scenario.name)))?;
-            let context = study.context_of(&layout);
+            let context = Context { given: other.given, ..study.context_of(&layout) };
             let signature = model.signature(&context);
             let unused = model.unused(&context);
             let computed = study.computed(place).map_err(|faults| {
                 let faults: Vec<String> = faults.iter().map(ToString::to_string).collect();
                 Stop::new(format!("`computed` in `[model]`: {}", faults.join("; ")))
             })?;
-            let source = |input: &Input| source(study, section, place, computed.as_ref(), input);
+            let source = |input: &Input| source(study, other, place, computed.as_ref(), input);
             let sources = signature.inputs.iter().map(source).collect::<Result<Vec<_>, Stop>>()?;
             let heeded = signature.inputs.iter().zip(&sources);
             let heeded = heeded.filter(|(input, _)| !unused.contains(&input.name));
@@ -117,7 +136,9 @@ impl<'a> Simulator<'a> {
                 factor,
             });
         }
-        Ok(Self { study: &study.directory, model, names, units, settings })
+        let free = other.free.iter().map(|(name, _)| (*name).to_owned());
+        let unknowns = study.parameters.iter().map(|p| p.name.clone()).chain(free).collect();
+        Ok(Self { study: &study.directory, model, names, units, settings, unknowns })
     }
 
     /// The responses to all scenarios at one point, in the study's unit.
@@ -279,12 +300,16 @@ impl Setting<'_> {
 
 fn source(
     study: &Study,
-    section: &Section<dyn Model, ModelKeys>,
+    other: &Other<'_>,
     scenario: usize,
     computed: Option<&Computed>,
     input: &Input,
 ) -> Result<Source, Stop> {
     let no_unit = || Stop::new(format!("`{}` has no unit of the model's", input.name));
+    if let Some(k) = other.free.iter().position(|(name, _)| *name == input.name) {
+        let factor = other.free[k].1.factor_to(&input.unit).ok_or_else(no_unit)?;
+        return Ok(Source::Parameter(study.parameters.len() + k, factor));
+    }
     if let Some(computed) = computed
         && let Some(k) = computed.names.iter().position(|name| name == &input.name)
     {
@@ -301,7 +326,8 @@ fn source(
         let value = unit.convert(condition.value, &input.unit).ok_or_else(no_unit)?;
         return Ok(Source::Fixed(value));
     }
-    if let Some(quantity) = section.common.fixed.get(&input.name) {
+    let of_study = || study.model.as_ref()?.common.fixed.get(&input.name);
+    if let Some(quantity) = other.section.common.fixed.get(&input.name).or_else(of_study) {
         return quantity.in_unit(&input.unit).map(Source::Fixed).ok_or_else(no_unit);
     }
     let default = input.default.map(Source::Fixed);

@@ -3,6 +3,7 @@
 mod effects;
 mod gap;
 mod inputs;
+mod inside;
 mod outputs;
 
 use super::nearest::one_of;

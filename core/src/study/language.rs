@@ -9,12 +9,12 @@ use super::file::{
     NumericalErrorSection, ParameterSection, ResponseSection, SamplerKeys, ScenarioSection,
     StudySection, SurrogateKeys, ValidateSection,
 };
-use super::gap::{CandidateKeys, GapSection};
+use super::gap::{CandidateKeys, GapSection, SwapKeys, SwitchSection, TermKeys};
 use super::schema::Language;
 use crate::plugin::manual::{Manual, generator, resolve};
 use crate::plugin::registry::NoKeys;
 use crate::plugin::{
-    Density, Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate,
+    Density, Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate, Term,
 };
 
 /// The schema, for editors that complete and check a study (`lacuna schema`).
@@ -41,7 +41,10 @@ pub fn schema() -> Value {
         .section::<dyn Sampler, SamplerKeys>("sampler")
         .table::<ValidateSection>("validate")
         .table::<GapSection>("gap")
-        .sections_in::<dyn Effect, CandidateKeys>("gap", "candidate");
+        .sections_in::<dyn Effect, CandidateKeys>("gap", "candidate")
+        .tables_in::<SwitchSection>("gap", "switch")
+        .sections_in::<dyn Term, TermKeys>("gap", "term")
+        .sections_in::<dyn Model, SwapKeys>("gap", "model");
     language.finish()
 }
 
@@ -64,6 +67,9 @@ pub fn manual() -> Vec<Manual> {
         page::<ValidateSection>("[validate]"),
         page::<GapSection>("[gap]"),
         page::<CandidateKeys>("[[gap.candidate]]"),
+        page::<SwitchSection>("[[gap.switch]]"),
+        page::<TermKeys>("[[gap.term]]"),
+        page::<SwapKeys>("[[gap.model]]"),
     ]
 }
 

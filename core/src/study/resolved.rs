@@ -4,6 +4,7 @@ use toml::Table;
 
 use super::emit::{Unwritable, to_table};
 use super::file::{ResponseSection, ScenarioSection};
+use super::gap::Swap;
 use super::resolve::Study;
 use crate::plugin::registry::Section;
 
@@ -72,8 +73,27 @@ pub(super) fn table(
         let candidates: Result<Vec<Table>, _> = study.gap.candidates.iter().map(merged).collect();
         gap.insert("candidate".to_owned(), candidates?.into());
     }
+    let inside = &study.gap.inside;
+    let mut list = |name: &str, tables: Result<Vec<Table>, Unwritable>| {
+        let tables = tables?;
+        if !tables.is_empty() {
+            gap.insert(name.to_owned(), tables.into());
+        }
+        Ok(())
+    };
+    list("switch", inside.switches.iter().map(to_table).collect())?;
+    list("term", inside.terms.iter().map(merged).collect())?;
+    list("model", inside.models.iter().map(swapped).collect())?;
     whole.insert("gap".to_owned(), gap.into());
     Ok(whole)
+}
+
+/// A model in place of the study's.
+fn swapped(swap: &Swap) -> Result<Table, Unwritable> {
+    let mut table = to_table(&swap.keys)?;
+    table.insert("use".to_owned(), swap.section.built.name.into());
+    table.extend(swap.section.built.options.clone());
+    Ok(table)
 }
 
 /// One table of `use`, the engine's keys and the plugin's.

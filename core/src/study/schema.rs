@@ -113,6 +113,16 @@ impl Language {
         name: &str,
     ) -> &mut Self {
         let items = section::<K, C>(&mut self.generator).to_value();
+        self.list_in(outer, name, &items)
+    }
+
+    /// A list of tables inside a section: `[[gap.switch]]`.
+    pub fn tables_in<T: JsonSchema>(&mut self, outer: &str, name: &str) -> &mut Self {
+        let items = self.generator.subschema_for::<T>().to_value();
+        self.list_in(outer, name, &items)
+    }
+
+    fn list_in(&mut self, outer: &str, name: &str, items: &Value) -> &mut Self {
         // The outer section has keys of its own, whose schema stands among the definitions or here.
         let own = self.properties.remove(outer).unwrap_or_default();
         let mut whole = match own.get("$ref").and_then(Value::as_str) {

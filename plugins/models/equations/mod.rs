@@ -1,5 +1,6 @@
 //! `equations`: a model written in the study, as ordinary differential equations or as formulas.
 
+mod amend;
 mod check;
 mod flow;
 mod integrate;
@@ -20,7 +21,7 @@ use lacuna::data::Layout;
 use lacuna::expression::Fault;
 use lacuna::linalg::Matrix;
 use lacuna::plugin::model::{Call, EvalError, Gradient, Input, Response, Signature};
-use lacuna::plugin::{Component, Context, Model};
+use lacuna::plugin::{Amend, Component, Context, Model};
 use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -205,6 +206,10 @@ impl Model for Equations {
 
     fn gradient(&self) -> Option<&dyn Gradient> {
         Some(self)
+    }
+
+    fn amend(&self) -> Option<&dyn Amend> {
+        (!self.state.is_empty()).then_some(self)
     }
 }
 

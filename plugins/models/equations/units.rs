@@ -19,6 +19,22 @@ pub fn check(
     scope: &Scope,
     context: &Context<'_>,
 ) -> Result<Unit, Vec<Located>> {
+    let known = known(equations, scope, context);
+    let (found, faults) = scope.find_units(&known);
+    let mut faults: Vec<Located> =
+        faults.into_iter().map(|fault| (option_of(&fault.definition), fault)).collect();
+    faults.extend(states(equations, &found, &known, context.layout));
+    let (unit, observed) = observed(equations, &found, &context.layout.unit);
+    faults.extend(observed);
+    if faults.is_empty() { Ok(unit) } else { Err(faults) }
+}
+
+/// The units of variables, inputs and states.
+pub fn known(
+    equations: &Equations,
+    scope: &Scope,
+    context: &Context<'_>,
+) -> BTreeMap<String, Unit> {
     let mut known = given(context);
     let (found, _) = scope.find_units(&known);
     for (name, state) in &equations.state {
@@ -30,13 +46,7 @@ pub fn check(
         let unit = state.unit().cloned().or(of_start).unwrap_or_default();
         known.insert(name.clone(), unit);
     }
-    let (found, faults) = scope.find_units(&known);
-    let mut faults: Vec<Located> =
-        faults.into_iter().map(|fault| (option_of(&fault.definition), fault)).collect();
-    faults.extend(states(equations, &found, &known, context.layout));
-    let (unit, observed) = observed(equations, &found, &context.layout.unit);
-    faults.extend(observed);
-    if faults.is_empty() { Ok(unit) } else { Err(faults) }
+    known
 }
 
 /// The units of variables and inputs.
@@ -85,7 +95,7 @@ fn states(
 }
 
 /// A unit by another, written as people do where that is a unit.
-fn ratio(unit: &Unit, time: &Unit) -> Option<Unit> {
+pub fn ratio(unit: &Unit, time: &Unit) -> Option<Unit> {
     let simple = |text: &str| text.chars().all(char::is_alphanumeric);
     let wrapped = |unit: &Unit| match unit.as_str() {
         "" => "1".to_owned(),

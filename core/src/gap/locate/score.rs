@@ -9,7 +9,10 @@
 use super::projection::Projection;
 use crate::gap::candidates::{Candidate, Suspect};
 use crate::gap::experiment::Experiment;
+use crate::gap::fit::Fit;
+use crate::gap::system::System;
 use crate::gap::whitener::Whitener;
+use crate::gap::wide;
 use crate::linalg::vector::{dot, norm};
 use crate::linalg::{Matrix, multiply_transposed, multiply_vector};
 use crate::plugin::effect::{On, Placed, Situation};
@@ -72,22 +75,24 @@ impl Direction {
 }
 
 impl Directions {
-    /// The directions of suspects at a response.
+    /// The directions of suspects at a fit, whose response is that of the situation.
     pub fn of(
-        experiment: &Experiment<'_>,
+        system: &System<'_>,
+        fit: &Fit,
         candidates: &[Candidate],
         suspects: &[Suspect],
         situation: &Situation<'_>,
         whitener: &Whitener,
         projection: &Projection,
     ) -> Self {
+        let experiment = system.experiment;
         let mut all = Vec::new();
         let mut rows = Matrix::zeros(0, experiment.outputs());
         let mut squares = Vec::new();
         for (c, candidate) in candidates.iter().enumerate() {
             let own: Vec<usize> =
                 (0..suspects.len()).filter(|&s| suspects[s].candidate == c).collect();
-            let slopes = slopes(experiment, candidate, situation);
+            let slopes = slopes(system, fit, candidate, situation);
             for s in own {
                 let placed = suspects[s].placed(experiment, candidates, "");
                 let kept = Self::one(s, &placed, &slopes, whitener, projection);
@@ -195,12 +200,17 @@ const FLAT: f64 = 1e-6;
 /// What a candidate that acts everywhere does per unit of its size, with a start: for each setting of its indices the
 /// slope at absence, or where that vanishes the change over each start.
 fn slopes(
-    experiment: &Experiment<'_>,
+    system: &System<'_>,
+    fit: &Fit,
     candidate: &Candidate,
     situation: &Situation<'_>,
 ) -> Vec<(Vec<f64>, Vec<f64>)> {
-    let layout = &experiment.layouts.blocks[0];
-    let placed = Placed::new("", &*candidate.effect, experiment.layouts, &On::new());
+    let layouts = system.experiment.layouts;
+    let layout = &layouts.blocks[0];
+    let placed = Placed::new("", &*candidate.effect, layouts, &On::new());
+    if !candidate.effect.switches().is_empty() {
+        return wide::slopes(system, fit, &placed, situation);
+    }
     let absent = placed.absent();
     let mut by_indices: Vec<(Vec<f64>, bool)> = Vec::new();
     let mut slopes = Vec::new();
@@ -251,5 +261,6 @@ fn common(experiment: &Experiment<'_>, whitener: &Whitener, rows: &Matrix) -> Ve
             *v += row.iter().map(|x| x * x).sum::<f64>();
         }
     }
+    variance.iter_mut().zip(whitener.of_remainder(rows)).for_each(|(v, own)| *v += own);
     variance.iter().map(|v| v.min(1.0)).collect()
 }

@@ -169,11 +169,16 @@ impl<'a> Desk<'a, '_> {
             return starts;
         }
         let placed = suspect.placed(self.system.experiment, self.candidates, "");
-        let misfit = |start: &Vec<f64>| -> Vec<f64> {
-            let response = placed.apply(&base.at.response, start);
+        let responses: Vec<Vec<f64>> = if placed.effect.switches().is_empty() {
+            starts.iter().map(|start| placed.apply(&base.at.response, start)).collect()
+        } else {
+            let point = |start: &Vec<f64>| [&base.at.point[..], start].concat();
+            self.with(suspect).responses(&starts.iter().map(point).collect::<Vec<_>>())
+        };
+        let misfit = |response: Vec<f64>| -> Vec<f64> {
             self.means.iter().zip(response).map(|(y, m)| y - m).collect()
         };
-        let misfits = Matrix::from_rows(self.means.len(), starts.iter().map(misfit));
+        let misfits = Matrix::from_rows(self.means.len(), responses.into_iter().map(misfit));
         let white = self.whitener.whiten_rows(&misfits);
         let (_, squares) = Projection::of(self.system, base).rest_of_rows(white);
         let mut order: Vec<usize> = (0..starts.len()).filter(|&i| squares[i].is_finite()).collect();

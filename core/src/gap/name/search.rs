@@ -131,8 +131,8 @@ impl<'a> Search<'a> {
     fn directions(&self, state: &State<'_>, projection: &Projection) -> Directions {
         let (whitener, suspects) = (&state.whitener, &self.suspects);
         self.situated(state, |situation| {
-            let (experiment, candidates) = (self.experiment, self.candidates);
-            Directions::of(experiment, candidates, suspects, situation, whitener, projection)
+            let (system, fit, candidates) = (&state.system, &state.fit, self.candidates);
+            Directions::of(system, fit, candidates, suspects, situation, whitener, projection)
         })
     }
 

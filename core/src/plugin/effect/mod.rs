@@ -12,7 +12,8 @@ use super::{Component, Hyperparameter};
 use crate::data::{Layout, Layouts};
 use crate::linalg::Matrix;
 
-/// One candidate piece of missing physics that acts on the model's response.
+/// One candidate piece of missing physics: on the model's response, or inside the model through its
+/// [switches](Effect::switches).
 ///
 /// Its first parameter is its *size*: with the size of [`Effect::absent`] it changes nothing, whatever
 /// the others are. Those, its *indices* (a lag, a frequency), say what kind of change it makes.
@@ -82,6 +83,12 @@ pub trait Effect: Component {
     /// Where a search may place it.
     fn reach(&self) -> Reach {
         Reach::Any
+    }
+
+    /// The inputs of the [wide](crate::gap::wide::Wide) forward map that its parameters set, in their order, for an effect on
+    /// the model; none for one on the response.
+    fn switches(&self) -> &[usize] {
+        &[]
     }
 }
 

@@ -29,8 +29,11 @@ impl<'a> Placed<'a> {
         Self { name: name.to_owned(), effect, acts, layouts }
     }
 
-    /// Its unknowns, called `name.unknown`.
+    /// Its unknowns, called `name.unknown`; those of an effect on the model have the names of the model's inputs.
     pub fn hyperparameters(&self) -> Vec<Hyperparameter> {
+        if !self.effect.switches().is_empty() {
+            return self.effect.parameters(&self.layouts.blocks[0]);
+        }
         let named = |own: Hyperparameter| Hyperparameter {
             name: format!("{}.{}", self.name, own.name),
             ..own

@@ -54,7 +54,7 @@ pub fn add(
         study: file,
         run: folder,
         parameters: moved(findings, &with),
-        unknowns: unknowns(&augmented, &with),
+        unknowns: unknowns(study, &augmented, &with),
         log_evidence: evidence(findings).zip(evidence(&with)).map(|(a, b)| [a, b]),
     };
     files::write_json(&run.stage_folder(FOLDER).join(FILE), &added)?;
@@ -92,11 +92,13 @@ fn moved(before: &Findings, after: &Findings) -> Vec<Moved> {
     both.collect()
 }
 
-/// The unknowns of the effects of a study.
-fn unknowns(study: &Study, findings: &Findings) -> Vec<Posterior> {
+/// The unknowns of the effects of a study: those on the response, and the parameters that it has besides those of `before`.
+fn unknowns(before: &Study, study: &Study, findings: &Findings) -> Vec<Posterior> {
     let effects = study.placed_effects();
-    let names: Vec<String> =
-        effects.iter().flat_map(|e| e.hyperparameters()).map(|unknown| unknown.name).collect();
+    let on_top = effects.iter().flat_map(|e| e.hyperparameters()).map(|unknown| unknown.name);
+    let new = |name: &str| !before.parameters.iter().any(|known| known.name == name);
+    let inside = study.parameters.iter().map(|p| p.name.clone()).filter(|name| new(name));
+    let names: Vec<String> = inside.chain(on_top).collect();
     let of = |calibration: &CalibrationFindings| -> Vec<Posterior> {
         let own = calibration.coordinates.iter().filter(|c| names.contains(&c.name));
         own.map(|c| Posterior {

@@ -16,6 +16,8 @@ use crate::run::{Artifact, Kept, Observer, RunDirectory, Stop, files};
 use crate::study::Study;
 
 use super::Known;
+use super::gap_model::Pieces;
+use search::Inside;
 
 const FOLDER: &str = "7-gap";
 const FILE: &str = "gap.toml";
@@ -45,9 +47,11 @@ pub fn stage(
     observer: &dyn Observer,
 ) -> Result<Option<Kept<Account>>, Stop> {
     let Some(measured) = &known.data.value.measured else { return Ok(None) };
+    let pieces = Pieces::of(study)?;
+    let inside = Inside::of(pieces.as_ref(), study, known, run, observer)?;
     observer.begin("gap", "", 0);
     let kept = run.keep(FOLDER, &inputs(study, known), observer, |_| {
-        search::account(study, known, measured, observer)
+        search::account(study, known, &inside, measured, observer)
     })?;
     observer.end("gap", &summary(&kept.value));
     Ok(Some(kept))
@@ -83,6 +87,7 @@ pub(super) fn inputs(study: &Study, known: &Known<'_>) -> Value {
         laws,
         effects,
         study.gap.keys,
+        study.gap.inside.switches,
         candidates,
         study.about.seed,
         env!("CARGO_PKG_VERSION"),

@@ -6,7 +6,9 @@ use serde::Serialize;
 
 use crate::gap::account::{Account, Addition, Estimate};
 use crate::run::{Stop, files};
+use crate::stage::gap_model::Pieces;
 use crate::study::emit::{key, string, to_line};
+use crate::study::gap::Edit;
 use crate::study::{Problems, Sources, Study, read};
 
 /// Writes `STUDY+EFFECT.toml` beside the study and returns its path. A file of that name with another text is set aside.
@@ -53,36 +55,68 @@ pub fn free_name(study: &Study, addition: &Addition) -> String {
     name
 }
 
-/// The old study, and a block for each effect that says why it is there.
+/// The old study with what is missing inside the model free, and a block for each effect on the response; each says why it
+/// is there.
 fn text(study: &Study, path: &Path, account: &Account) -> Result<String, Stop> {
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     let mut text = format!(
         "# Written by `lacuna gap` from `{file}`: that study, word for word, and at its end what its data say is\n\
          # missing. Run it like any other study.\n\n"
     );
-    text.push_str(&renamed(study, account));
+    let (inside, on_top) = divided(study, account)?;
+    let own = match inside {
+        Some((edit, why)) => {
+            let why = [reasons(account).join("\n"), why].join("\n");
+            edit.text(study, &why).map_err(|error| Stop::new(format!("the new study {error}")))?
+        }
+        None => study.text.clone(),
+    };
+    text.push_str(&renamed(own, study, account));
     if !text.ends_with('\n') {
         text.push('\n');
     }
-    for line in reasons(account) {
-        text.push_str(&format!("\n# {line}"));
+    if on_top.len() == account.additions.len() {
+        for line in reasons(account) {
+            text.push_str(&format!("\n# {line}"));
+        }
+        text.push('\n');
     }
-    text.push('\n');
-    for addition in &account.additions {
+    for addition in on_top {
         text.push('\n');
         text.push_str(&block(study, addition)?);
     }
     Ok(text)
 }
 
-/// The study's own text, with a name of its own where it gives one: two studies of one name share a run directory.
-fn renamed(study: &Study, account: &Account) -> String {
+/// What the study must say for the effects inside the model, with why, and the effects on the response.
+fn divided<'a>(
+    study: &Study,
+    account: &'a Account,
+) -> Result<(Option<(Edit, String)>, Vec<&'a Addition>), Stop> {
+    let Some(pieces) = Pieces::of(study)? else {
+        return Ok((None, account.additions.iter().collect()));
+    };
+    let (mut places, mut why, mut on_top) = (Vec::new(), String::new(), Vec::new());
+    for addition in &account.additions {
+        match pieces.all.iter().find(|piece| piece.kind == addition.plugin) {
+            Some(piece) => {
+                places.push(&piece.places[..]);
+                why.push_str(&found(addition).replace("# ", ""));
+            }
+            None => on_top.push(addition),
+        }
+    }
+    let edit = (!places.is_empty()).then(|| (pieces.edit(study, &places), why));
+    Ok((edit, on_top))
+}
+
+/// The text with a name of its own where it gives one: two studies of one name share a run directory.
+fn renamed(mut text: String, study: &Study, account: &Account) -> String {
     let mut sources = Sources::default();
-    let source = sources.add_file(Path::new("study"), study.text.clone());
+    let source = sources.add_file(Path::new("study"), text.clone());
     let root = read::read(source, &sources, &mut Problems::new());
     let name = root.as_ref().and_then(|root| root.find("study.name"));
-    let Some(name) = name else { return study.text.clone() };
-    let mut text = study.text.clone();
+    let Some(name) = name else { return text };
     text.replace_range(name.place.span.clone(), &string(&with_names(&study.name, study, account)));
     text
 }
@@ -119,7 +153,8 @@ fn probability(p: f64) -> String {
     format!("{p:.4}").trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-fn block(study: &Study, addition: &Addition) -> Result<String, Stop> {
+/// What was found of an effect, in comments.
+fn found(addition: &Addition) -> String {
     let mut text = format!("# {}\n#   {}\n", addition.title, addition.formula);
     for Estimate { name, unit, value, sd } in &addition.unknowns {
         let unit = match unit.as_str() {
@@ -142,6 +177,11 @@ fn block(study: &Study, addition: &Addition) -> Result<String, Stop> {
             addition.probability
         ));
     }
+    text
+}
+
+fn block(study: &Study, addition: &Addition) -> Result<String, Stop> {
+    let mut text = found(addition);
     text.push_str(&format!("[[effect]]\nuse = {}\n", string(&addition.plugin)));
     text.push_str(&format!("name = {}\n", string(&free_name(study, addition))));
     if !addition.on.is_empty() {

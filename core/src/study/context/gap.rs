@@ -21,6 +21,7 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
                 .say("the study has no `[measurements]` to search for a gap")
                 .help("add `[measurements]`, or take `[gap]` out");
         }
+        super::inside::check(study, node, problems);
     });
 }
 

@@ -1,7 +1,16 @@
 //! `[gap]`: how a search for missing effects works, and what it tries.
 
+mod edit;
+mod held;
+mod inside;
+mod text;
+
 use std::collections::BTreeMap;
 
+pub use edit::{Added, Edit};
+pub use held::Held;
+pub(super) use held::Loose;
+pub use inside::{Inside, Swap, SwapKeys, SwitchSection, TermKeys};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -87,10 +96,12 @@ pub struct Gap {
     pub keys: GapSection,
     /// `[[gap.candidate]]`: effects that are tried with the options given.
     pub candidates: Vec<Section<dyn Effect, CandidateKeys>>,
+    /// `[[gap.switch]]`, `[[gap.term]]`, `[[gap.model]]`: pieces that may be missing inside the model.
+    pub inside: Inside,
 }
 
 /// The lists of `[gap]`.
-const LISTS: [&str; 1] = ["candidate"];
+const LISTS: [&str; 4] = ["candidate", "switch", "term", "model"];
 
 /// `[gap]`; the defaults where it is not written.
 pub(super) fn gap(root: &Node, problems: &mut Problems) -> Option<Gap> {
@@ -106,6 +117,8 @@ pub(super) fn gap(root: &Node, problems: &mut Problems) -> Option<Gap> {
             .iter()
             .map(|node| problems.within("candidate", |problems| section(node, None, problems)))
             .collect();
-        Some(Gap { keys: keys?, candidates: candidates.into_iter().collect::<Option<_>>()? })
+        let inside = Inside::of(node, problems);
+        let candidates = candidates.into_iter().collect::<Option<_>>();
+        Some(Gap { keys: keys?, candidates: candidates?, inside: inside? })
     })
 }

@@ -1,0 +1,156 @@
+//! What `[gap]` says of the inside of the model, as one wider model with further inputs.
+
+use std::sync::Arc;
+
+use toml::Table;
+
+use crate::data::Unit;
+use crate::gap::candidates::Candidate;
+use crate::gap::wide::{Freed, Switched};
+use crate::plugin::amend::{Addition, changed};
+use crate::plugin::effect::Description;
+use crate::plugin::registry::{self, Section};
+use crate::plugin::{Effect, Given, Model};
+use crate::run::Stop;
+use crate::stage::simulator::{Other, Simulator};
+use crate::study::Study;
+use crate::study::file::ModelKeys;
+use crate::study::gap::{Added, Edit, SwitchSection};
+
+use super::terms;
+
+/// The pieces with the model that has all of them.
+pub struct Pieces {
+    /// The pieces, in the order of the candidates.
+    pub all: Vec<Piece>,
+    /// The inputs of the wider model that are free in some piece.
+    pub inputs: Vec<Freed>,
+    model: Section<dyn Model, ModelKeys>,
+    given: Vec<Given>,
+}
+
+/// One piece.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Piece {
+    /// Its type: the name of the input or of the term.
+    pub kind: String,
+    /// What it is, in words; the formula says what is fixed by itself.
+    pub description: Description,
+    /// Its inputs among those of all, the size first.
+    pub places: Vec<usize>,
+    /// What it adds to the equations, if it does.
+    pub addition: Option<Addition>,
+}
+
+impl Pieces {
+    /// The pieces of a study; `None` where it names none, or has no model.
+    pub fn of(study: &Study) -> Result<Option<Self>, Stop> {
+        let inside = &study.gap.inside;
+        let Some(section) = &study.model else { return Ok(None) };
+        if inside.switches.is_empty() && inside.terms.is_empty() {
+            return Ok(None);
+        }
+        let (mut all, mut inputs) = (Vec::new(), Vec::new());
+        for switch in &inside.switches {
+            let (freed, description) = freed(study, switch)?;
+            let kind = own_kind(&switch.input);
+            all.push(Piece { kind, description, places: vec![inputs.len()], addition: None });
+            inputs.push(freed);
+        }
+        terms::add(study, &mut all, &mut inputs)?;
+        let additions: Vec<Addition> = all.iter().filter_map(|p| p.addition.clone()).collect();
+        let mut given = study.given.clone();
+        for freed in &inputs {
+            if !given.iter().any(|known| known.name == freed.name) {
+                given.push(Given { name: freed.name.clone(), unit: Some(freed.unit.clone()) });
+            }
+        }
+        let options = match section.built.plugin.amend() {
+            Some(amend) => changed(&section.built.options, &amend.amended(&additions)),
+            None => section.built.options.clone(),
+        };
+        let built = registry::from_text::<dyn Model>(section.built.name, &options.to_string())
+            .map_err(|error| Stop::new(format!("the model with further terms: {error}")))?;
+        let model = Section { common: section.common.clone(), built };
+        Ok(Some(Self { all, inputs, model, given }))
+    }
+
+    /// The wider model as a function of the study's parameters and the inputs.
+    pub fn simulator<'a>(&'a self, study: &'a Study) -> Result<Simulator<'a>, Stop> {
+        let free: Vec<(&str, &Unit)> =
+            self.inputs.iter().map(|freed| (freed.name.as_str(), &freed.unit)).collect();
+        Simulator::of_other(study, &Other { section: &self.model, given: &self.given, free })
+    }
+
+    /// The name and the options of the wider model, for the hash of what is made with it.
+    pub(super) fn model(&self) -> (&'static str, &Table, &ModelKeys) {
+        (self.model.built.name, &self.model.built.options, &self.model.common)
+    }
+
+    /// The pieces as candidates of a search.
+    pub fn candidates(&self) -> Vec<Candidate> {
+        let candidate = |piece: &Piece| {
+            let inputs = piece.places.iter().map(|&i| self.inputs[i].clone()).collect();
+            let (places, description) = (piece.places.clone(), piece.description.clone());
+            let effect: Arc<dyn Effect> = Arc::new(Switched { places, inputs, description });
+            Candidate {
+                kind: piece.kind.clone(),
+                plugin: piece.kind.clone(),
+                options: Table::new(),
+                effect,
+            }
+        };
+        self.all.iter().map(candidate).collect()
+    }
+
+    /// What the study must say for the effects of these inputs; none where no piece has them.
+    ///
+    /// `switches` are those of the effects that were found, as [`Effect::switches`] gives them.
+    pub fn edit(&self, study: &Study, switches: &[&[usize]]) -> Edit {
+        let mut edit = Edit::default();
+        let mut additions = Vec::new();
+        for piece in self.all.iter().filter(|piece| switches.contains(&&piece.places[..])) {
+            additions.extend(piece.addition.clone());
+            for freed in piece.places.iter().map(|&i| &self.inputs[i]) {
+                edit.parameters.push(Added {
+                    name: freed.name.clone(),
+                    unit: freed.unit.clone(),
+                    prior: freed.prior.clone(),
+                    reference: freed.absent,
+                });
+                edit.freed.push(freed.name.clone());
+            }
+        }
+        let amend = study.model.as_ref().and_then(|model| model.built.plugin.amend());
+        if let Some(amend) = amend.filter(|_| !additions.is_empty()) {
+            edit.model = amend.amended(&additions);
+        }
+        edit
+    }
+}
+
+/// A type of an input's name that no effect of the library has.
+fn own_kind(input: &str) -> String {
+    let taken = registry::entries::<dyn Effect>().iter().any(|entry| entry.name == input);
+    if taken { format!("switch_{input}") } else { input.to_owned() }
+}
+
+/// An input set free, with its absent value in its own unit.
+fn freed(study: &Study, switch: &SwitchSection) -> Result<(Freed, Description), Stop> {
+    let Some(held) = study.held(&switch.input) else {
+        return Err(Stop::new(format!("the model holds no input `{}`", switch.input)));
+    };
+    let unit = switch.unit.clone().unwrap_or_else(|| held.input.unit.clone());
+    let absent = held.input.unit.convert(held.value, &unit).ok_or_else(|| {
+        Stop::new(format!("`{}` has no unit that converts to `{unit}`", switch.input))
+    })?;
+    let freed = Freed::new(&switch.input, unit.clone(), absent, switch.prior.clone());
+    let description = Description {
+        title: switch.title.clone().unwrap_or_else(|| held.input.description.clone()),
+        formula: format!("`{}` of the model free instead of {absent} {unit}", switch.input)
+            .trim_end()
+            .to_owned(),
+        source: "the model's own".to_owned(),
+    };
+    Ok((freed, description))
+}

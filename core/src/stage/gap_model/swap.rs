@@ -1,0 +1,219 @@
+//! Other models in place of the study's, calibrated and weighed against it.
+//!
+//! They are not nested in the study's model, so that only the probabilities of the data tell: each with its own
+//! calibration under the study's priors, where names agree, and the same noise.
+
+use serde_json::json;
+
+use crate::data::Parameter;
+use crate::gap::experiment::Experiment;
+use crate::gap::fit::{Fit, fit_from};
+use crate::gap::name::{Weighed, weigh};
+use crate::gap::noise::Noise;
+use crate::gap::system::System;
+use crate::gap::whitener::Whitener;
+use crate::linalg::Matrix;
+use crate::math::random::Stream;
+use crate::plugin::discrepancy::CommonError;
+use crate::plugin::{Emulator, Forward};
+use crate::run::{Observer, RunDirectory, Stop};
+use crate::stage::Known;
+use crate::stage::direct::Direct;
+use crate::stage::simulator::Simulator;
+use crate::study::Study;
+use crate::study::gap::{Edit, Swap};
+
+use super::emulated::{Lesson, designed};
+
+/// Another model as a forward map.
+pub struct Rival<'a> {
+    /// What the study calls it.
+    pub name: String,
+    /// The parameters of the study that it uses.
+    pub parameters: Vec<Parameter>,
+    /// From these to responses.
+    pub forward: Box<dyn Forward + 'a>,
+    /// Errors of it that all replicates share.
+    pub common: Vec<CommonError>,
+    /// What the study must say to have it.
+    pub edit: Edit,
+}
+
+/// A model against the study's own.
+#[derive(Debug, Clone)]
+pub struct Compared {
+    /// The best fit of the other model.
+    pub fit: Fit,
+    /// Its evidence, less what the noise alone decides.
+    pub with: Weighed,
+    /// That of the study's model, under the same noise.
+    pub without: Weighed,
+}
+
+/// The other models that the study names.
+pub fn rivals<'a>(
+    study: &'a Study,
+    known: &Known<'a>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Vec<Rival<'a>>, Stop> {
+    let models = study.gap.inside.models.iter();
+    models.map(|swap| rival(study, swap, known, run, observer)).collect()
+}
+
+fn rival<'a>(
+    study: &'a Study,
+    swap: &'a Swap,
+    known: &Known<'a>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Rival<'a>, Stop> {
+    let simulator = Simulator::with_model(study, &swap.section)?;
+    let idle = simulator.idle(study.parameters.len());
+    let used: Vec<usize> = (0..study.parameters.len()).filter(|i| !idle.contains(i)).collect();
+    let parameters: Vec<Parameter> = used.iter().map(|&i| study.parameters[i].clone()).collect();
+    let middle: Vec<f64> = study.parameters.iter().map(|p| p.prior.quantile(0.5)).collect();
+    let (forward, common): (Box<dyn Forward + 'a>, _) = if known.emulator.is_some() {
+        let section = &swap.section;
+        let lesson = Lesson {
+            name: &format!("gap-{}", swap.keys.name),
+            simulator: &simulator,
+            points: designed(study, &study.parameters)?,
+            parameters: study.parameters.clone(),
+            used,
+            base: None,
+            model: json!([section.built.name, &section.built.options, &section.common]),
+        };
+        let (emulator, common) = lesson.learn(study, run, observer)?;
+        (Box::new(Emulated(emulator)), vec![common])
+    } else {
+        let priors = study.parameters.iter().map(|p| p.prior.clone()).collect();
+        let whole = Direct::with(simulator, priors, study.layouts.len());
+        (Box::new(Partial { whole, used, middle }), Vec::new())
+    };
+    let edit = Edit { swapped: Some(table(study, swap)?), ..Edit::default() };
+    Ok(Rival { name: swap.keys.name.as_str().to_owned(), parameters, forward, common, edit })
+}
+
+/// `[model]` of a study that has the other model.
+fn table(study: &Study, swap: &Swap) -> Result<toml::Table, Stop> {
+    let mut table = swap.section.built.options.clone();
+    table.insert("use".to_owned(), swap.section.built.name.into());
+    let mut fixed = swap.keys.fixed.clone();
+    let signature = study.signature_of(&*swap.section.built.plugin);
+    let has = |name: &String| signature.iter().any(|s| s.inputs.iter().any(|i| &i.name == name));
+    for (name, quantity) in study.model.iter().flat_map(|model| &model.common.fixed) {
+        if has(name) {
+            fixed.entry(name.clone()).or_insert_with(|| quantity.clone());
+        }
+    }
+    let fixed = crate::study::emit::to_table(&fixed);
+    let fixed = fixed.map_err(|error| Stop::new(format!("the fixed values {error}")))?;
+    if !fixed.is_empty() {
+        table.insert("fixed".to_owned(), fixed.into());
+    }
+    Ok(table)
+}
+
+impl Rival<'_> {
+    /// The model against that of an experiment, whose fit is `base`; `None` where it has no answer.
+    pub fn compare(
+        &self,
+        experiment: &Experiment<'_>,
+        base: &Fit,
+        noise: &Noise,
+        stream: &Stream,
+    ) -> Option<Compared> {
+        let mut own = experiment.clone();
+        own.common.extend(self.common.clone());
+        let (_, means) = own.means();
+        // The same covariance for both: neither gains by what it says of its own error.
+        let whitener = Whitener::new(&own, noise, &base.at.response);
+        let system = System::new(&own, Vec::new());
+        let refitted = fit_from(&system, &whitener, &means, &[base.at.point.clone()])?;
+        let without = weigh(&system, &whitener, &means, &refitted, &stream.named("own"));
+        let mut other = own.clone();
+        (other.parameters, other.forward) = (&self.parameters, &*self.forward);
+        (other.wide, other.region) = (None, None);
+        let system = System::new(&other, Vec::new());
+        let starts = self.starts(experiment, &base.at.point);
+        let fit = fit_from(&system, &whitener, &means, &starts)?;
+        let with = weigh(&system, &whitener, &means, &fit, &stream.named("other"));
+        Some(Compared { fit, with, without })
+    }
+
+    /// From where its calibration starts: from the study's, and from the middle and the quarters of the priors.
+    fn starts(&self, experiment: &Experiment<'_>, point: &[f64]) -> Vec<Vec<f64>> {
+        let here = |p: &Parameter| {
+            let place = experiment.parameters.iter().position(|own| own.name == p.name);
+            place.map_or_else(|| p.prior.quantile(0.5), |i| point[i])
+        };
+        let at = |q: f64| self.parameters.iter().map(|p| p.prior.quantile(q)).collect();
+        let first = self.parameters.iter().map(here).collect();
+        vec![first, at(0.5), at(0.25), at(0.75)]
+    }
+}
+
+/// An emulator as a forward map.
+struct Emulated(Box<dyn Emulator>);
+
+impl Forward for Emulated {
+    fn dimension(&self) -> usize {
+        self.0.dimension()
+    }
+
+    fn outputs(&self) -> usize {
+        self.0.outputs()
+    }
+
+    fn mean(&self, points: &Matrix) -> Matrix {
+        self.0.mean(points)
+    }
+
+    fn jacobian(&self, point: &[f64]) -> Matrix {
+        self.0.jacobian(point)
+    }
+}
+
+/// A forward map of some of its parameters, the others where they do not matter.
+struct Partial<'a> {
+    whole: Direct<'a>,
+    used: Vec<usize>,
+    middle: Vec<f64>,
+}
+
+impl Partial<'_> {
+    fn point(&self, own: &[f64]) -> Vec<f64> {
+        let mut point = self.middle.clone();
+        self.used.iter().zip(own).for_each(|(&i, x)| point[i] = *x);
+        point
+    }
+}
+
+impl Forward for Partial<'_> {
+    fn dimension(&self) -> usize {
+        self.used.len()
+    }
+
+    fn outputs(&self) -> usize {
+        self.whole.outputs()
+    }
+
+    fn mean(&self, points: &Matrix) -> Matrix {
+        let rows = points.iter_rows().map(|own| self.point(own));
+        self.whole.mean(&Matrix::from_rows(self.middle.len(), rows))
+    }
+
+    fn jacobian(&self, point: &[f64]) -> Matrix {
+        self.whole.jacobian(&self.point(point)).select_columns(&self.used)
+    }
+
+    fn mean_and_jacobian(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
+        let (mean, jacobian) = self.whole.mean_and_jacobian(&self.point(point));
+        (mean, jacobian.select_columns(&self.used))
+    }
+
+    fn failure(&self) -> Option<String> {
+        self.whole.failure()
+    }
+}

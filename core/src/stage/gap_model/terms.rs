@@ -1,0 +1,188 @@
+//! Terms that equations may lack, each as inputs of the model that has it.
+
+use crate::data::Unit;
+use crate::gap::wide::Freed;
+use crate::math::distribution::Distribution;
+use crate::plugin::amend::{Addition, Amend, State};
+use crate::plugin::effect::Description;
+use crate::plugin::registry::Section;
+use crate::plugin::term::{Index, Place, Sign, Summand, Time};
+use crate::plugin::{Context, Given, Term};
+use crate::run::Stop;
+use crate::stage::simulator::Simulator;
+use crate::study::Study;
+use crate::study::gap::TermKeys;
+
+use super::pieces::Piece;
+
+/// The share of the rate that a term has at one standard deviation of its coefficient.
+const SHARE: f64 = 0.5;
+
+/// Adds the terms of a study to its pieces and inputs.
+pub(super) fn add(
+    study: &Study,
+    all: &mut Vec<Piece>,
+    inputs: &mut Vec<Freed>,
+) -> Result<(), Stop> {
+    let terms = &study.gap.inside.terms;
+    if terms.is_empty() {
+        return Ok(());
+    }
+    let simulator = Simulator::of(study)?.ok_or_else(|| Stop::new("the study has no model"))?;
+    let amend = simulator.model.amend().ok_or_else(|| {
+        Stop::new("the model has no equations to which terms could be added")
+            .help("take `[[gap.term]]` out, or write the model as `equations`")
+    })?;
+    for section in terms {
+        let name = section.common.name(&section.built);
+        let desk = Desk { study, simulator: &simulator, amend };
+        let (summand, first) = desk
+            .summand(section, name)
+            .map_err(|e| Stop::new(format!("the term `{name}`: {e}")))?;
+        let begin = inputs.len();
+        inputs.push(first);
+        inputs.extend(summand.indices.iter().map(index));
+        all.push(Piece {
+            kind: kind(section, name),
+            description: description(&*section.built.plugin, &summand),
+            places: (begin..inputs.len()).collect(),
+            addition: Some(addition(name, &section.common.state, summand)),
+        });
+    }
+    Ok(())
+}
+
+/// The name of the library's term; for an expression of the study's that of its coefficient.
+fn kind(section: &Section<dyn Term, TermKeys>, name: &str) -> String {
+    if section.built.plugin.listed() { section.built.name } else { name }.to_owned()
+}
+
+fn index(index: &Index) -> Freed {
+    // With the coefficient at zero it does not matter what an index is.
+    let absent = index.starts.first().copied().unwrap_or_else(|| index.prior.quantile(0.5));
+    Freed::new(&index.name, index.unit.clone(), absent, index.prior.clone())
+        .from_starts(index.starts.clone())
+}
+
+fn description(term: &dyn Term, summand: &Summand) -> Description {
+    let mut description = term.describe();
+    if let Some(fixed) = &summand.fixed {
+        description.formula = format!("{}, {fixed}", description.formula);
+    }
+    description
+}
+
+/// The coefficient times the shape, for each state.
+fn addition(name: &str, state: &str, summand: Summand) -> Addition {
+    let product = |shape: &str| format!("{name} * ({shape})");
+    let first = (state.to_owned(), product(&summand.shape));
+    let beside = summand.beside.iter().map(|(state, shape)| (state.clone(), product(shape)));
+    Addition { summands: std::iter::once(first).chain(beside).collect(), states: summand.states }
+}
+
+/// What terms are made with.
+struct Desk<'a> {
+    study: &'a Study,
+    simulator: &'a Simulator<'a>,
+    amend: &'a dyn Amend,
+}
+
+impl Desk<'_> {
+    /// What a term adds, and its coefficient.
+    fn summand(
+        &self,
+        section: &Section<dyn Term, TermKeys>,
+        name: &str,
+    ) -> Result<(Summand, Freed), String> {
+        let setting = &self.simulator.settings[0];
+        let (layout, _) = self
+            .study
+            .layouts
+            .of_scenario(&setting.scenario.name)
+            .ok_or("the study has no response")?;
+        let context = self.study.context_of(&layout);
+        let states = self.amend.states(&context);
+        let state = states
+            .iter()
+            .find(|state| state.name == section.common.state)
+            .ok_or_else(|| format!("the model has no state `{}`", section.common.state))?;
+        let size = |expression: &str| self.size(expression);
+        let time = Time::of(&setting.asked);
+        let place = Place { state, name, time, size: &size };
+        let summand = section.built.plugin.summand(&place)?;
+        let unit = self.unit(&context, state, &summand)?;
+        let prior = match &section.common.prior {
+            Some(prior) => prior.clone(),
+            None => self.prior(state, &summand)?,
+        };
+        Ok((summand, Freed::new(name, unit, 0.0, prior)))
+    }
+
+    /// The unit of the coefficient.
+    fn unit(
+        &self,
+        context: &Context<'_>,
+        state: &State,
+        summand: &Summand,
+    ) -> Result<Unit, String> {
+        let indices = summand.indices.iter();
+        let indices = indices.map(|i| Given { name: i.name.clone(), unit: Some(i.unit.clone()) });
+        let given: Vec<Given> = context.given.iter().cloned().chain(indices).collect();
+        let context = Context { given: &given, ..*context };
+        let shape = self.amend.unit(&context, &summand.shape, &summand.states);
+        let shape = shape.map_err(|fault| format!("`{}`: {fault}", summand.shape))?;
+        let rate = state.rate_unit.as_ref();
+        let unit = rate.and_then(|rate| rate.times(&shape.unwrap_or_default().power(-1.0)?));
+        unit.ok_or_else(|| {
+            format!(
+                "no unit is that of the rate of `{}` by that of `{}`",
+                state.name, summand.shape
+            )
+        })
+    }
+
+    /// The size of the rate that the term is added to, by that of the shape.
+    fn prior(&self, state: &State, summand: &Summand) -> Result<Distribution, String> {
+        // What the term brings has no size before the term is there.
+        let brought = |name: &str| {
+            summand.indices.iter().any(|i| i.name == name)
+                || summand.states.iter().any(|s| s.name == name)
+        };
+        let names = crate::expression::names(&summand.shape, &[]).unwrap_or_default();
+        let shape = if names.iter().any(|name| brought(name)) {
+            summand.scale.clone()
+        } else {
+            Some(summand.shape.clone())
+        };
+        let shape = shape.map_or(Ok(1.0), |shape| self.size(&shape))?;
+        let rate = self.size(&state.rate)?;
+        let sd = SHARE * rate / shape;
+        if !(sd.is_finite() && sd > 0.0) {
+            return Err(format!(
+                "the rate of `{}` is {rate} and the term {shape} along the run at the middle of the priors, so that its \
+                 coefficient has no natural size: give it a `prior`",
+                state.name
+            ));
+        }
+        Ok(match summand.sign {
+            Sign::Either => Distribution::Normal([0.0, sd]),
+            Sign::Positive => Distribution::HalfNormal(sd),
+        })
+    }
+
+    /// The root mean square of an expression over all scenarios, at the middle of the priors.
+    fn size(&self, expression: &str) -> Result<f64, String> {
+        let middle: Vec<f64> =
+            self.study.parameters.iter().map(|p| p.prior.quantile(0.5)).collect();
+        let (mut sum, mut count) = (0.0, 0.0);
+        for setting in &self.simulator.settings {
+            let inputs = setting.inputs(&middle);
+            let call = self.simulator.call(setting, &inputs);
+            let sizes = self.amend.sizes(&call, &[expression.to_owned()]);
+            let sizes = sizes.map_err(|error| format!("`{expression}`: {error}"))?;
+            sum += sizes.iter().map(|s| s * s).sum::<f64>();
+            count += sizes.len() as f64;
+        }
+        Ok((sum / f64::max(count, 1.0)).sqrt())
+    }
+}

@@ -1,0 +1,121 @@
+//! Equations with further terms.
+
+use std::collections::BTreeMap;
+
+use lacuna::data::{Axis, Coordinates, Layout, Unit};
+use lacuna::expression::Fault;
+use lacuna::plugin::amend::{Addition, Change, State as Given};
+use lacuna::plugin::model::{Call, EvalError};
+use lacuna::plugin::{Amend, Context};
+use toml::{Table, Value};
+
+use super::Equations;
+use super::options::{Formula, Observe, State, StateTable};
+use super::system::{Names, key, scope};
+use super::units;
+
+/// The key under which an expression stands whose unit is asked for.
+const ASKED: &str = "asked";
+
+/// The axis of what is observed for its size.
+const SIZES: &str = "size";
+
+impl Equations {
+    /// The same with further states.
+    fn with(&self, further: &[Given]) -> Self {
+        let mut wider = self.clone();
+        for state in further {
+            let start = Formula::Text(state.start.clone());
+            let table = StateTable { start, unit: Some(state.unit.clone()) };
+            wider.state.insert(state.name.clone(), State::Table(table));
+            wider.rate.insert(state.name.clone(), state.rate.clone());
+        }
+        wider
+    }
+}
+
+impl Amend for Equations {
+    fn states(&self, context: &Context<'_>) -> Vec<Given> {
+        let names = Names::of(context);
+        let Ok(scope) = scope(self, &names) else { return Vec::new() };
+        let known = units::known(self, &scope, context);
+        let time = context.layout.abscissa().map(|(_, _, unit)| unit);
+        let state = |(name, state): (&String, &State)| {
+            let unit = known.get(name).cloned().unwrap_or_default();
+            Given {
+                name: name.clone(),
+                rate_unit: time.and_then(|time| units::ratio(&unit, time)),
+                unit,
+                rate: self.rate.get(name).cloned().unwrap_or_default(),
+                start: state.start().0.text(),
+            }
+        };
+        self.state.iter().map(state).collect()
+    }
+
+    fn unit(
+        &self,
+        context: &Context<'_>,
+        expression: &str,
+        further: &[Given],
+    ) -> Result<Option<Unit>, Fault> {
+        let wider = self.with(further);
+        let names = Names::of(context);
+        let first = |mut faults: Vec<(String, Fault)>| faults.remove(0).1;
+        let mut scope = scope(&wider, &names).map_err(first)?;
+        scope.result(&key(ASKED), expression)?;
+        // A name that is not there is found before its unit is asked for.
+        scope.compile(&[&key(ASKED)]).map_err(|mut faults| faults.remove(0))?;
+        let (found, faults) = scope.find_units(&units::known(&wider, &scope, context));
+        match faults.into_iter().find(|fault| fault.definition == key(ASKED)) {
+            Some(fault) => Err(fault),
+            None => Ok(found.get(&key(ASKED)).cloned().flatten()),
+        }
+    }
+
+    fn sizes(&self, call: &Call<'_>, expressions: &[String]) -> Result<Vec<f64>, EvalError> {
+        let label = |i: usize| format!("{i:04}");
+        let labels: Vec<String> = (0..expressions.len()).map(label).collect();
+        let observe: BTreeMap<String, String> =
+            labels.iter().cloned().zip(expressions.iter().cloned()).collect();
+        let shown = Self { observe: Observe::Each(observe), ..self.clone() };
+        let is_grid = |axis: &&Axis| matches!(axis.coordinates, Coordinates::Grid { .. });
+        let grids = call.layout.axes.iter().filter(is_grid).cloned();
+        let axes = std::iter::once(Axis::labels(SIZES, labels)).chain(grids).collect();
+        let layout = Layout { axes, ..call.layout.clone() };
+        let values = shown.answer(&Call { layout: &layout, ..*call }, false)?.values;
+        let length = (values.len() / expressions.len().max(1)).max(1);
+        let square = |part: &[f64]| part.iter().map(|x| x * x).sum::<f64>() / part.len() as f64;
+        Ok(values.chunks(length).map(|part| square(part).sqrt()).collect())
+    }
+
+    fn amended(&self, additions: &[Addition]) -> Vec<Change> {
+        let mut rates = self.rate.clone();
+        let mut changes = Vec::new();
+        let mut touched: Vec<&String> = Vec::new();
+        for (state, summand) in additions.iter().flat_map(|addition| &addition.summands) {
+            let Some(rate) = rates.get_mut(state) else { continue };
+            *rate = format!("{rate} + {summand}");
+            if !touched.contains(&state) {
+                touched.push(state);
+            }
+        }
+        let change = |section: &str, name: &str, value: Value| Change {
+            path: vec![section.to_owned(), name.to_owned()],
+            value,
+        };
+        changes
+            .extend(touched.iter().map(|name| change("rate", name, rates[*name].clone().into())));
+        for state in additions.iter().flat_map(|addition| &addition.states) {
+            let start: Value = match state.start.parse::<f64>() {
+                Ok(number) => number.into(),
+                Err(_) => state.start.clone().into(),
+            };
+            let unit = state.unit.as_str().to_owned().into();
+            let table = Table::from_iter([("start".to_owned(), start), ("unit".to_owned(), unit)]);
+            changes.push(change("state", &state.name, table.into()));
+            changes.push(change("rate", &state.name, state.rate.clone().into()));
+        }
+        changes
+    }
+}

@@ -1,0 +1,63 @@
+//! `coulomb_friction`: dry friction, which does not grow with the speed.
+
+use lacuna::plugin::effect::Description;
+use lacuna::plugin::term::{Place, Sign, Summand};
+use lacuna::plugin::{Component, Term};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::common::{of, quantity};
+
+/// Coulomb friction: dry friction, against the speed and as large at any speed.
+///
+/// ```text
+/// rate = … - coefficient tanh(u / width),   coefficient ≥ 0
+/// ```
+///
+/// The sign of the speed is rounded off over `width`, which decides how the speed crosses zero and which data seldom
+/// tell: without it, it is the change of the speed within one step of the response, and the candidate's formula says so.
+/// It is easily confused with `linear_friction` where the amplitude varies little.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CoulombFriction {
+    /// The speed `u`, as an expression; the state itself when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
+    /// The speed over which the sign is rounded off, as an expression such as `"0.01 {m/s}"`. It must be given where `of`
+    /// is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub width: Option<String>,
+}
+
+impl Component for CoulombFriction {}
+
+impl Term for CoulombFriction {
+    fn describe(&self) -> Description {
+        Description {
+            title: "Coulomb friction: dry friction, as large at any speed".into(),
+            formula: "- coefficient * tanh(u / width)".into(),
+            source: "Coulomb, Théorie des machines simples (1785)".into(),
+        }
+    }
+
+    fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {
+        let u = of(self.of.as_deref(), place);
+        let (width, fixed) = match (&self.width, &self.of, place.time) {
+            (Some(width), ..) => (width.clone(), None),
+            (None, None, Some(time)) => {
+                let width = (place.size)(&place.state.rate)? * time.step;
+                if !(width.is_finite() && width > 0.0) {
+                    return Err("the speed does not change: give `width`".into());
+                }
+                let width = quantity(width, &place.state.unit);
+                let fixed = format!("width = {width}, the change of the speed within one step");
+                (width, Some(fixed))
+            }
+            _ => return Err("the unit of the speed is not known: give `width`".into()),
+        };
+        let shape = format!("-tanh(({u}) / ({width}))");
+        Ok(Summand { shape, sign: Sign::Positive, fixed, ..Summand::default() })
+    }
+}
+
+lacuna::register!(Term, "coulomb_friction", CoulombFriction);

@@ -1,0 +1,45 @@
+//! `cubic_stiffness`: a spring that hardens or softens.
+
+use lacuna::plugin::effect::Description;
+use lacuna::plugin::term::{Place, Sign, Summand};
+use lacuna::plugin::{Component, Term};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::common::of;
+
+/// Cubic stiffness: a spring that hardens, or softens where the coefficient is below zero.
+///
+/// ```text
+/// rate = … - coefficient u³
+/// ```
+///
+/// The spring of the Duffing oscillator (Duffing, Erzwungene Schwingungen bei veränderlicher Eigenfrequenz, 1918): the
+/// frequency depends on the amplitude.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CubicStiffness {
+    /// The deflection `u`, as an expression; the state itself when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
+}
+
+impl Component for CubicStiffness {}
+
+impl Term for CubicStiffness {
+    fn describe(&self) -> Description {
+        Description {
+            title: "cubic stiffness: a spring that hardens or softens".into(),
+            formula: "- coefficient * u^3".into(),
+            source: "Duffing, Erzwungene Schwingungen bei veränderlicher Eigenfrequenz (1918)"
+                .into(),
+        }
+    }
+
+    fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {
+        let u = of(self.of.as_deref(), place);
+        Ok(Summand { shape: format!("-({u})^3"), sign: Sign::Either, ..Summand::default() })
+    }
+}
+
+lacuna::register!(Term, "cubic_stiffness", CubicStiffness);

@@ -1,0 +1,70 @@
+//! `forcing`: a force at a frequency.
+
+use std::f64::consts::PI;
+
+use lacuna::data::Unit;
+use lacuna::math::distribution::Distribution;
+use lacuna::plugin::effect::Description;
+use lacuna::plugin::term::{Index, Place, Sign, Summand};
+use lacuna::plugin::{Component, Term};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The most frequencies from which a search starts.
+const MOST: usize = 48;
+
+/// Forcing at a frequency: something shakes that the model does not have.
+///
+/// ```text
+/// rate = … + coefficient cos(2 π frequency t + phase)
+/// ```
+///
+/// The frequency is looked for from one oscillation over the response to twelve, in steps in which the phase turns by half
+/// an oscillation; `frequency` says where else.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Forcing {
+    /// Prior of the frequency, in oscillations by the unit of the time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frequency: Option<Distribution>,
+}
+
+impl Component for Forcing {}
+
+impl Term for Forcing {
+    fn describe(&self) -> Description {
+        Description {
+            title: "forcing at a frequency".into(),
+            formula: "coefficient * cos(2 * pi * frequency * t + phase)".into(),
+            source: "standard: linear response".into(),
+        }
+    }
+
+    fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {
+        let time = place.time.ok_or("the model has no time")?;
+        let (frequency, phase) =
+            (format!("{}_frequency", place.name), format!("{}_phase", place.name));
+        let unit = time.unit.power(-1.0).ok_or("the time has no unit that can be inverted")?;
+        let (low, high) = (0.75 / time.duration, (12.0 / time.duration).min(0.5 / time.step));
+        let given = self.frequency.clone();
+        let prior = given.unwrap_or(Distribution::Uniform([low, high.max(2.0 * low)]));
+        let (from, to) = (prior.quantile(0.01), prior.quantile(0.99));
+        // Half an oscillation over the whole response between neighbours, unless that makes a long list.
+        let count = ((2.0 * (to - from) * time.duration).ceil() as usize + 1).clamp(2, MOST);
+        let step = (to - from) / (count - 1) as f64;
+        let starts = (0..count).map(|i| from + step * i as f64).collect();
+        let turn = Distribution::Uniform([-PI, PI]);
+        let quarter = vec![0.0, 0.5 * PI];
+        Ok(Summand {
+            shape: format!("cos(2 * pi * {frequency} * {} + {phase})", time.name),
+            sign: Sign::Either,
+            indices: vec![
+                Index { name: frequency, unit, prior, starts },
+                Index { name: phase, unit: Unit::dimensionless(), prior: turn, starts: quarter },
+            ],
+            ..Summand::default()
+        })
+    }
+}
+
+lacuna::register!(Term, "forcing", Forcing);

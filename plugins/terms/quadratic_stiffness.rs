@@ -1,0 +1,45 @@
+//! `quadratic_stiffness`: a restoring force with the square of the deflection.
+
+use lacuna::plugin::effect::Description;
+use lacuna::plugin::term::{Place, Sign, Summand};
+use lacuna::plugin::{Component, Term};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::common::of;
+
+/// Quadratic stiffness: a restoring force that differs between the two directions.
+///
+/// ```text
+/// rate = … - coefficient u²
+/// ```
+///
+/// Of either sign; it shifts the mean position of an oscillation and adds its second harmonic (Nayfeh and Mook, Nonlinear
+/// Oscillations, 1979, section 2.2).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct QuadraticStiffness {
+    /// The deflection `u`, as an expression; the state itself when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
+}
+
+impl Component for QuadraticStiffness {}
+
+impl Term for QuadraticStiffness {
+    fn describe(&self) -> Description {
+        Description {
+            title: "quadratic stiffness: a restoring force that differs between the two directions"
+                .into(),
+            formula: "- coefficient * u^2".into(),
+            source: "Nayfeh and Mook, Nonlinear Oscillations (1979), section 2.2".into(),
+        }
+    }
+
+    fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {
+        let u = of(self.of.as_deref(), place);
+        Ok(Summand { shape: format!("-({u})^2"), sign: Sign::Either, ..Summand::default() })
+    }
+}
+
+lacuna::register!(Term, "quadratic_stiffness", QuadraticStiffness);

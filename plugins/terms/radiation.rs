@@ -1,0 +1,46 @@
+//! `radiation`: a loss with the fourth power of the temperature.
+
+use lacuna::plugin::effect::Description;
+use lacuna::plugin::term::{Place, Sign, Summand};
+use lacuna::plugin::{Component, Term};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::common::of;
+
+/// Radiation: a loss of heat with the fourth power of the absolute temperature.
+///
+/// ```text
+/// rate = … - coefficient (u⁴ - ambient⁴),   coefficient ≥ 0
+/// ```
+///
+/// The law of Stefan and Boltzmann, with an exchange in both directions.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Radiation {
+    /// The absolute temperature `u`, as an expression; the state itself when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
+    /// The absolute temperature of the surroundings, as an expression such as `"293 {K}"`.
+    pub ambient: String,
+}
+
+impl Component for Radiation {}
+
+impl Term for Radiation {
+    fn describe(&self) -> Description {
+        Description {
+            title: "radiation: a loss with the fourth power of the temperature".into(),
+            formula: "- coefficient * (u^4 - ambient^4)".into(),
+            source: "Boltzmann, Annalen der Physik 258 (1884) 291".into(),
+        }
+    }
+
+    fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {
+        let (u, ambient) = (of(self.of.as_deref(), place), &self.ambient);
+        let shape = format!("({ambient})^4 - ({u})^4");
+        Ok(Summand { shape, sign: Sign::Positive, ..Summand::default() })
+    }
+}
+
+lacuna::register!(Term, "radiation", Radiation);
