@@ -1,10 +1,11 @@
 //! The gap workflow: where simulation and data disagree, what is missing, and whether the gap shrinks with it.
 //!
 //! [`experiment`] sorts measurements by condition and curve; [`noise`] learns from their replicates what is no gap;
-//! [`locate`] tests for one; [`name`] searches for what is missing; [`prove`] shows on other replicates whether the gap
+//! [`locate`] tests for one; [`drift`] asks whether model or sensor is wrong; [`name`] searches for what is missing; [`prove`] shows on other replicates whether the gap
 //! shrank.
 
 pub mod candidates;
+pub mod drift;
 pub mod experiment;
 pub mod fit;
 pub mod locate;
@@ -14,5 +15,7 @@ pub mod prove;
 pub mod system;
 pub mod whitener;
 
+#[cfg(test)]
+mod testing;
 #[cfg(test)]
 mod tests;
