@@ -13,6 +13,7 @@ pub mod name;
 pub mod noise;
 pub mod prove;
 pub mod system;
+pub mod unlisted;
 pub mod whitener;
 
 #[cfg(test)]
