@@ -11,6 +11,7 @@ pub mod fit;
 pub mod locate;
 pub mod name;
 pub mod noise;
+mod part;
 pub mod prove;
 pub mod system;
 pub mod unlisted;

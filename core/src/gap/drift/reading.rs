@@ -6,6 +6,7 @@ use super::equality::{Equality, Pieces};
 use super::map::{Bench, Drifting};
 use crate::gap::candidates::sensors;
 use crate::gap::experiment::{Curve, Experiment};
+use crate::gap::part::part;
 use crate::gap::whitener::Whitener;
 use crate::plugin::effect::On;
 
@@ -81,15 +82,7 @@ pub(super) fn without(bench: &Bench<'_>, sensors: &[Share]) -> Option<Equality> 
     for curve in bench.experiment.curves.iter().filter(|curve| is_of(curve, &first.on)) {
         curve.measured.iter().for_each(|&i| hidden[i] = true);
     }
-    let replicates = bench.experiment.conditions.iter().map(|condition| {
-        let seen = |replicate: &Vec<Option<f64>>| {
-            let each = condition.outputs.clone().zip(replicate);
-            each.map(|(i, y)| y.filter(|_| !hidden[i])).collect()
-        };
-        condition.replicates.iter().map(seen).collect()
-    });
-    let part = bench.experiment.with_replicates(replicates.collect()).remeasured();
-    let noise = bench.noise.restricted(bench.experiment, &part);
+    let (part, noise) = part(bench.experiment, bench.noise, |_, _, i| !hidden[i]);
     let whitener = Whitener::new(&part, &noise, bench.response);
     let stream = bench.stream.named("without");
     let own = Bench { experiment: &part, noise: &noise, stream: &stream, ..*bench };
