@@ -147,16 +147,16 @@ impl Pieces {
             let own_score: Vec<f64> = own.iter().map(|&a| score[a]).collect();
             alone.push(wald(&own_score, &part(&self.left), &part(&precision))?);
         }
-        let conditions = self.of_conditions(&score, conditions)?;
+        let measured: Vec<&Vec<usize>> = conditions.iter().filter(|own| !own.is_empty()).collect();
+        let conditions = match &measured[..] {
+            [] | [_] => None,
+            several => Some(self.of_conditions(&score, several)?),
+        };
         Some(Tests { all, conditions, marginal, alone })
     }
 
     /// The test with the parameters the same in all pieces of a condition.
-    fn of_conditions(&self, score: &[f64], of: &[Vec<usize>]) -> Option<Option<Equality>> {
-        let of: Vec<&Vec<usize>> = of.iter().filter(|pieces| !pieces.is_empty()).collect();
-        if of.len() < 2 {
-            return Some(None);
-        }
+    fn of_conditions(&self, score: &[f64], of: &[&Vec<usize>]) -> Option<Equality> {
         let p = self.parameters;
         let sum = Matrix::from_fn(of.len() * p, score.len(), |a, b| {
             f64::from(u8::from(a % p == b % p && of[a / p].contains(&(b / p))))
@@ -164,7 +164,7 @@ impl Pieces {
         let around = |m: &Matrix| multiply_transposed(&multiply(&sum, m), &sum);
         let mut precision = around(&self.information);
         (0..precision.rows()).for_each(|j| precision[(j, j)] += 1.0);
-        wald(&multiply_vector(&sum, score), &around(&self.left), &precision).map(Some)
+        wald(&multiply_vector(&sum, score), &around(&self.left), &precision)
     }
 }
 

@@ -70,7 +70,9 @@ pub(super) fn shares(experiment: &Experiment<'_>, pieces: &Pieces, residual: &[f
         })
         .collect();
     let total: f64 = all.iter().map(|own| own.share).sum();
-    all.iter_mut().for_each(|own| own.share /= total.max(f64::MIN_POSITIVE));
+    for own in &mut all {
+        own.share /= total.max(f64::MIN_POSITIVE);
+    }
     all.sort_by(|a, b| b.share.total_cmp(&a.share));
     all
 }

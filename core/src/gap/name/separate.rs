@@ -155,7 +155,9 @@ impl Bench<'_, '_> {
         let mut all = Vec::new();
         let outputs = |own: Vec<usize>| {
             let mut chosen = vec![false; experiment.outputs()];
-            own.into_iter().for_each(|i| chosen[i] = self.counts[i] > 0.0);
+            for i in own {
+                chosen[i] = self.counts[i] > 0.0;
+            }
             Further::Outputs(chosen)
         };
         for condition in &experiment.conditions {

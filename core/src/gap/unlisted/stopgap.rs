@@ -96,13 +96,15 @@ pub fn stopgap(
     })
 }
 
+/// Hyperparameters with their amplitude and log evidence.
+type Trial = Option<(Shape, f64, f64)>;
+
 /// The hyperparameters of largest marginal likelihood, with that: on a grid of lengths, then of frequencies, then refined.
 fn best(features: &Features) -> Option<(Shape, f64, f64)> {
     let at = |shape: Shape| {
         let (amplitude, value) = Process::new(features, &shape)?.best();
         Some((shape, amplitude, value))
     };
-    type Trial = Option<(Shape, f64, f64)>;
     let better = |best: Trial, next: Trial| match (best, next) {
         (Some(best), Some(next)) => Some(if next.2 > best.2 { next } else { best }),
         (best, next) => best.or(next),

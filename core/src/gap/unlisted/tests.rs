@@ -3,7 +3,8 @@
 
 use super::features::Features;
 use super::process::{Process, Shape};
-use super::{describe, stopgap};
+use super::{Symbolic, describe, stopgap, symbolic};
+use crate::expression::{Evaluator, Scope};
 use crate::gap::fit::{Fit, fit};
 use crate::gap::locate::{Cell, Region};
 use crate::gap::system::System;
@@ -133,4 +134,90 @@ fn regions_are_described() {
         whole.words,
         "`a` under `x`, over the whole time: 0 times the noise of the mean; not under `y`"
     );
+}
+
+/// A wave of known frequency and size that the parameters scale.
+fn waves() -> World {
+    World::new(&["x", "y"], &["a", "b"], TIMES, 0.3, &["wave", "level"], |j, c, s, t| {
+        let phase = 0.25 * (c + 1) as f64 * t + 0.4 * s as f64;
+        if j == 0 { 4.0 * phase.sin() } else { 1.0 }
+    })
+}
+
+fn form_of(world: &World, truth: &[f64], seed: u64) -> Option<Symbolic> {
+    let experiment = world.experiment(truth, 8, &Stream::root(seed));
+    let (_, means) = experiment.means();
+    let whitener = Whitener::new(&experiment, &world.noise, &means);
+    let system = System::new(&experiment, Vec::new());
+    let found = fit(&system, &whitener, &means, &[0.5, 0.0]);
+    let excess = dot(&found.residual, &found.residual) - (means.len() - 2) as f64;
+    symbolic(&system, &found, &whitener, &[], excess, 99, &Stream::root(2))
+}
+
+/// A quadratic loss on all sensors is found with its coefficient, and its expression gives it back.
+#[test]
+fn a_quadratic_loss_is_written_down() {
+    let world = waves();
+    let plain = world.response(&[1.0, 0.0]);
+    let truth: Vec<f64> = plain.iter().map(|y| y - 0.05 * y * y).collect();
+    let found = form_of(&world, &truth, 21).unwrap();
+    assert_eq!(found.terms.len(), 1, "{found:?}");
+    assert_eq!(found.terms[0].functions, ["y^2"], "{found:?}");
+    let own = &found.terms[0].coefficients[0];
+    assert!(own.on.is_empty() && (own.values[0] + 0.05).abs() < 4.0 * own.sd[0], "{found:?}");
+    assert!(found.gain > 4.0 * found.by_chance && found.explained > 0.5, "{found:?}");
+    let written = &found.expressions[0];
+    assert_eq!(written.formula, "y + size * (y^2)");
+    let mut scope = Scope::new();
+    for name in ["y", "t", "size"] {
+        scope.unknown(name).unwrap();
+    }
+    scope.result("formula ", &written.formula).unwrap();
+    let program = scope.compile(&["formula "]).unwrap();
+    let mut evaluator = Evaluator::new(&program);
+    evaluator.at(&[3.0, 1.0, written.parameters[0].1]);
+    let mut out = [0.0];
+    evaluator.values(&mut out);
+    assert!((out[0] - (3.0 + own.values[0] * 9.0)).abs() < 1e-12);
+}
+
+/// A sine of one sensor has its own coefficients there and none on the other; a friction of the sign of the slope is no
+/// formula of the response alone.
+#[test]
+fn terms_of_one_sensor_and_of_slopes_are_found() {
+    let world = waves();
+    let plain = world.response(&[1.0, 0.0]);
+    let sine: Vec<f64> = (0..plain.len())
+        .map(|i| {
+            let t = (i % TIMES) as f64;
+            let on_b = f64::from(u8::from(i / TIMES % 2 == 1));
+            plain[i] + 1.5 * on_b * (std::f64::consts::TAU * 10.0 / 59.0 * t).sin()
+        })
+        .collect();
+    let found = form_of(&world, &sine, 22).unwrap();
+    assert!(found.terms[0].functions[0].starts_with("sin(2 * pi * 0.169"), "{found:?}");
+    let coefficients = &found.terms[0].coefficients;
+    assert_eq!(coefficients.len(), 2, "{found:?}");
+    assert!(coefficients[0].values[0].abs() < 4.0 * coefficients[0].sd[0]);
+    assert!((coefficients[1].values[0] - 1.5).abs() < 4.0 * coefficients[1].sd[0]);
+    assert_eq!(found.expressions.len(), 2);
+    let rubbed: Vec<f64> = (0..plain.len())
+        .map(|i| {
+            let phase = 0.25 * (i / (2 * TIMES) + 1) as f64 * (i % TIMES) as f64;
+            plain[i] - 0.8 * (phase + 0.4 * (i / TIMES % 2) as f64).cos().signum()
+        })
+        .collect();
+    let found = form_of(&world, &rubbed, 23).unwrap();
+    assert_eq!(found.terms[0].functions, ["sign(dy)"], "{found:?}");
+    assert!(found.expressions.is_empty());
+}
+
+/// Of noise alone a form is found no more often than the level of its gate says: a twentieth of 40 cases is 2, four
+/// standard deviations above it are 7.5.
+#[test]
+fn noise_alone_has_no_form() {
+    let world = waves();
+    let truth = world.response(&[1.0, 0.5]);
+    let found = (0..40).filter(|seed| form_of(&world, &truth, 300 + seed).is_some());
+    assert!(found.count() <= 7);
 }

@@ -46,7 +46,7 @@ pub fn describe(experiment: &Experiment<'_>, region: &Region, left: &[f64]) -> D
             let (e, f) = energy_of(curve, region, left);
             (energy + e, freedom + f)
         });
-        (freedom > 0.0).then(|| (c, energy, freedom))
+        (freedom > 0.0).then_some((c, energy, freedom))
     });
     let conditions: Vec<(usize, Dependence)> = strengths
         .map(|(c, energy, freedom)| {
@@ -86,7 +86,9 @@ fn energy_of(curve: &Curve, region: &Region, left: &[f64]) -> (f64, f64) {
         });
         planner.plan_dct3(values.len()).process_dct3(&mut values);
         let scale = 2.0 / values.len() as f64;
-        values.iter_mut().for_each(|x| *x *= scale);
+        for x in &mut values {
+            *x *= scale;
+        }
         width = (end - begin) as f64 / values.len() as f64;
     }
     let (from, to) = region.span;
