@@ -7,7 +7,8 @@ use super::candidates::Candidate;
 use super::drift::{self, drift};
 use super::fit::Fit;
 use super::name::{
-    Foretelling, Found, Judged, Named, Rival, Separations, Verdict, Word, foretell, separate,
+    Foretelling, Found, Judged, LeftOut, Named, Rival, Separations, Verdict, Word, foretell,
+    separate,
 };
 use super::system::System;
 use super::unlisted::{Description, Stopgap, Symbolic, describe, stopgap, symbolic};
@@ -139,7 +140,10 @@ fn unnamed(found: &Found<'_>, insight: &mut Insight, stream: &Stream) {
 
 /// The verdict as far as it stands against what foretells better: a name that does not is one of a class with it.
 pub fn withhold(verdict: &mut Verdict, insight: &Insight) {
-    let worse = |f: &&Foretelling| f.error.is_some_and(|e| f.difference < -AGAINST * e);
+    // Without the sensor that an effect acts on nothing is known of it but its prior: that compares priors.
+    let informed = |f: &&Foretelling| f.left_out != LeftOut::Sensor;
+    let worse =
+        |f: &&Foretelling| informed(f) && f.error.is_some_and(|e| f.difference < -AGAINST * e);
     let against = insight.against.as_ref().filter(|kind| *kind != NOTHING);
     let (Some(worse), Some(against)) = (insight.foretold.iter().find(worse), against) else {
         return;
