@@ -3,5 +3,7 @@
 
 use lacuna_plugins as _;
 
+#[path = "gap/beside.rs"]
+mod beside;
 #[path = "gap/chain.rs"]
 mod chain;
