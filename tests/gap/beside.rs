@@ -69,10 +69,10 @@ fn reading(case: &Case) -> (Reading, String) {
 #[test]
 fn the_level_of_a_flaw_is_read() {
     let (mut right, mut count) = (0, 0);
-    let mut judge = |kind: Option<Kind>, sensors: Vec<usize>, seed: u64| {
+    let mut judge = |kind: Option<Kind>, sensors: Vec<usize>| {
         let hidden: Vec<(Kind, Vec<usize>)> =
             kind.map(|k| (k, sensors.clone())).into_iter().collect();
-        let (reading, words) = reading(&generator::case(900 + seed, &hidden, 1.0, 8));
+        let (reading, words) = reading(&generator::case(900, &hidden, 1.0, 8));
         let model = matches!(kind, Some(Kind::Drag | Kind::Cubic | Kind::Switching));
         let fits = match &reading {
             Reading::None => kind.is_none(),
@@ -86,17 +86,15 @@ fn the_level_of_a_flaw_is_read() {
         right += u64::from(fits);
         count += 1;
     };
-    for seed in 0..2 {
-        judge(None, Vec::new(), seed);
-        for kind in [Kind::Drag, Kind::Cubic, Kind::Switching] {
-            judge(Some(kind), vec![0, 1, 2, 3], seed);
-        }
-        for kind in [Kind::Gain, Kind::Offset, Kind::Delay, Kind::LevelJump, Kind::Burst] {
-            judge(Some(kind), vec![(seed as usize + kind as usize) % 4], seed);
-        }
+    judge(None, Vec::new());
+    for kind in [Kind::Drag, Kind::Cubic, Kind::Switching] {
+        judge(Some(kind), vec![0, 1, 2, 3]);
+    }
+    for kind in [Kind::Gain, Kind::Offset, Kind::Delay, Kind::LevelJump, Kind::Burst] {
+        judge(Some(kind), vec![kind as usize % 4]);
     }
     println!("{right} of {count} right");
-    assert!(3 * right >= 2 * count, "{right} of {count}");
+    assert!(right + 2 >= count, "{right} of {count}");
 }
 
 /// The true name foretells conditions and replicates better than none; a delay and a filter are told apart by what is
