@@ -3,6 +3,8 @@
 
 use lacuna_plugins as _;
 
+#[path = "gap/beside.rs"]
+mod beside;
 #[path = "gap/chain.rs"]
 mod chain;
 #[path = "gap/inside.rs"]

@@ -20,7 +20,7 @@ use lacuna::run::{Progress, Silent};
 
 const RUNS: usize = 150;
 
-fn layouts() -> Layouts {
+pub fn layouts() -> Layouts {
     let axes = || {
         let seconds = Unit::parse("s").unwrap();
         vec![Axis::labels("sensor", SENSORS), Axis::grid("time", times(), seconds)]
@@ -29,7 +29,7 @@ fn layouts() -> Layouts {
     Layouts::of_scenarios([("knock", layout()), ("sweep", layout())])
 }
 
-fn parameters() -> Vec<Parameter> {
+pub fn parameters() -> Vec<Parameter> {
     let parameter = |(name, x): (&str, f64)| Parameter {
         name: name.into(),
         symbol: name.into(),
@@ -47,7 +47,7 @@ fn model(point: &[f64]) -> Vec<f64> {
 }
 
 /// The emulator with its error by leaving runs out.
-fn emulator() -> &'static (Box<dyn Emulator>, CommonError) {
+pub fn emulator() -> &'static (Box<dyn Emulator>, CommonError) {
     static MADE: OnceLock<(Box<dyn Emulator>, CommonError)> = OnceLock::new();
     MADE.get_or_init(|| {
         let design = registry::from_text::<dyn Design>("latin_hypercube", "").unwrap().plugin;
@@ -73,7 +73,7 @@ fn emulator() -> &'static (Box<dyn Emulator>, CommonError) {
     })
 }
 
-fn observations(case: &Case, layouts: &Layouts) -> Observations {
+pub fn observations(case: &Case, layouts: &Layouts) -> Observations {
     let count = case.replicates[0].len();
     let replicate = |r: usize| Replicate {
         name: r.to_string(),
