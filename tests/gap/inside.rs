@@ -50,6 +50,7 @@ path = "data.csv"
 
 [discrepancy]
 use = "gaussian"
+variance = { half_normal = 1.0 }
 
 [sampler]
 use = "affine_invariant_ensemble"
