@@ -1,5 +1,6 @@
 //! The `lacuna` command: arguments and printing, no numerics.
 
+mod gap;
 mod inspect;
 mod new;
 mod plugins;
@@ -49,6 +50,31 @@ enum Verb {
         study: PathBuf,
         #[command(flatten)]
         settings: study::Settings,
+    },
+    /// Find what a study's model misses, write the study that has it, and show whether the gap shrank.
+    Gap {
+        /// The study file.
+        study: PathBuf,
+        #[command(flatten)]
+        settings: study::Settings,
+        /// The run directory; `runs/<study name>` when left out. The study with the effects runs beside it.
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        #[command(flatten)]
+        manner: gap::Manner,
+    },
+    /// Plant every effect in a study's own noise: what `lacuna gap` would find there, how small, and how often it errs.
+    Power {
+        /// The study file.
+        study: PathBuf,
+        #[command(flatten)]
+        settings: study::Settings,
+        /// The run directory; `runs/<study name>` when left out.
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        /// Fewer cases and simulations, for a first look.
+        #[arg(long)]
+        quick: bool,
     },
     /// Go on with a run that was interrupted, from its directory.
     Resume {
@@ -121,6 +147,12 @@ fn main() -> ExitCode {
     let result = match arguments.verb {
         Verb::Run { study, settings, out } => study::run(&study, &settings, out.as_deref()),
         Verb::Check { study, settings } => study::check(&study, &settings),
+        Verb::Gap { study, settings, out, manner } => {
+            gap::gap(&study, &settings, out.as_deref(), &manner)
+        }
+        Verb::Power { study, settings, out, quick } => {
+            gap::power(&study, &settings, out.as_deref(), quick)
+        }
         Verb::Resume { run } => study::resume(&run),
         Verb::Report { run } => study::report(&run),
         Verb::Compare { runs, json } => study::compare(&runs, json),

@@ -20,6 +20,13 @@ pub struct Settings {
     set: Vec<String>,
 }
 
+impl Settings {
+    /// What was set.
+    pub fn set(&self) -> &[String] {
+        &self.set
+    }
+}
+
 /// `lacuna run STUDY`
 pub fn run(path: &Path, settings: &Settings, out: Option<&Path>) -> Result<(), Failure> {
     let study = load(path, settings)?;

@@ -12,8 +12,10 @@ use crate::plugin::registry;
 /// An effect that may be missing.
 #[derive(Clone)]
 pub struct Candidate {
-    /// The name of its plugin.
+    /// What it is called: the name of its plugin, where the study gives no other.
     pub kind: String,
+    /// The name of its plugin.
+    pub plugin: String,
     /// Its options, as a study would say them.
     pub options: Table,
     /// The effect.
@@ -27,6 +29,21 @@ pub struct Suspect {
     pub candidate: usize,
     /// Where it acts.
     pub on: On,
+}
+
+impl Candidate {
+    /// An effect of this plugin with these options, known as `kind`.
+    pub fn of(kind: &str, plugin: &str, options: &Table) -> Result<Self, String> {
+        let built = registry::from_text::<dyn Effect>(plugin, &options.to_string())
+            .map_err(|error| format!("the options of `{plugin}`: {error}"))?;
+        let effect = Arc::from(built.plugin);
+        Ok(Self {
+            kind: kind.to_owned(),
+            plugin: plugin.to_owned(),
+            options: options.clone(),
+            effect,
+        })
+    }
 }
 
 /// The proposals of all installed effects, or of those named, on such data.
@@ -44,8 +61,7 @@ pub fn proposed(
                 .map_err(|error| format!("the proposal of `{}`: {error}", entry.name))
         };
         for options in build(&Table::new())?.plugin.proposals(situation) {
-            let effect = Arc::from(build(&options)?.plugin);
-            all.push(Candidate { kind: entry.name.to_owned(), options, effect });
+            all.push(Candidate::of(entry.name, entry.name, &options)?);
         }
     }
     Ok(all)

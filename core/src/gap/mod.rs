@@ -4,16 +4,21 @@
 //! [`locate`] tests for one; [`name`] searches for what is missing; [`prove`] shows on other replicates whether the gap
 //! shrank.
 
+pub mod account;
+pub mod added;
 pub mod candidates;
 pub mod experiment;
 pub mod fit;
+pub mod hold_out;
 pub mod locate;
 pub mod name;
 pub mod noise;
+pub mod power;
 pub mod prove;
 pub mod system;
 pub mod whitener;
 pub mod wide;
+pub mod with_effects;
 
 #[cfg(test)]
 mod tests;

@@ -17,8 +17,8 @@ use crate::linalg::vector::dot;
 pub struct Proof {
     /// All conditions together.
     pub all: Comparison,
-    /// Each condition: its scenario and how it fares.
-    pub conditions: Vec<(Option<String>, Comparison)>,
+    /// Each condition.
+    pub conditions: Vec<OfCondition>,
     /// Root mean square difference from the mean of the replicates, in the response's unit: without and with.
     pub rmse: [f64; 2],
     /// The share of held-out values inside the 95 % band of a replicate, without and with.
@@ -26,6 +26,15 @@ pub struct Proof {
     /// Whether the gap shrank: the lower bound of what closed is above zero, and no condition became significantly
     /// worse.
     pub shrank: bool,
+}
+
+/// How one condition fares.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OfCondition {
+    /// Its scenario; `None` where the study has none.
+    pub scenario: Option<String>,
+    /// Its replicates alone.
+    pub comparison: Comparison,
 }
 
 /// The gaps of two responses over some replicates.
@@ -64,14 +73,17 @@ pub fn prove(
         .map(|c| of_condition(held_out, noise, c, [before, after]))
         .collect();
     let all = Comparison::of(&by_condition.concat())?;
-    let conditions: Vec<(Option<String>, Comparison)> = held_out
+    let conditions: Vec<OfCondition> = held_out
         .conditions
         .iter()
         .zip(&by_condition)
-        .filter_map(|(c, misfits)| Some((c.scenario.clone(), Comparison::of(misfits)?)))
+        .filter_map(|(condition, misfits)| {
+            let comparison = Comparison::of(misfits)?;
+            Some(OfCondition { scenario: condition.scenario.clone(), comparison })
+        })
         .collect();
     let worse = |comparison: &Comparison| comparison.upper < 0.0;
-    let shrank = all.lower > 0.0 && !conditions.iter().any(|(_, c)| worse(c));
+    let shrank = all.lower > 0.0 && !conditions.iter().any(|c| worse(&c.comparison));
     let (counts, means) = held_out.means();
     let rmse = [before, after].map(|response| {
         let measured = (0..means.len()).filter(|&i| counts[i] > 0.0);

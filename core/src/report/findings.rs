@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::data::{FailedRun, Layouts, Observations, Parameter, Unit};
+use crate::gap::account::Account;
+use crate::gap::added::Added;
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::plugin::Fact;
@@ -35,12 +37,25 @@ pub struct Findings {
     pub calibration: Option<CalibrationFindings>,
     /// The validation.
     pub validation: Option<ValidationFindings>,
+    /// What the model misses.
+    pub gap: Option<GapFindings>,
     /// The time each stage took when it was made, in seconds.
     pub seconds: Vec<(String, f64)>,
     /// Things a reader must know first: not converged, stranded walkers, runs left out.
     pub warnings: Vec<String>,
     /// What the stand-in or the data are not, as the study's `note` says.
     pub note: Option<String>,
+}
+
+/// What the model misses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GapFindings {
+    /// What the search found.
+    pub account: Account,
+    /// The hash of the files that hold it.
+    pub hash: String,
+    /// What the study with the effects found, where it was run.
+    pub added: Option<Added>,
 }
 
 /// The simulation runs.

@@ -6,8 +6,10 @@
 mod chart;
 mod curve;
 pub mod findings;
+mod gap;
 pub(crate) mod number;
 mod page;
+mod power;
 mod scale;
 mod section;
 mod summary;
@@ -15,7 +17,9 @@ mod svg;
 pub(crate) mod table;
 mod terminal;
 
+pub use gap::gap_text;
 pub use page::render;
+pub use power::power_text;
 pub use summary::{SCHEMA, summary, summary_json};
 pub use table::Table;
 pub use terminal::summary_text;

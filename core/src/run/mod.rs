@@ -1,5 +1,6 @@
 //! The run directory: artifacts, checkpoints, manifest, progress.
 
+mod adopt;
 pub mod arrays;
 pub mod directory;
 pub mod files;

@@ -1,6 +1,6 @@
 //! Where the model fits the data best, before any discrepancy is chosen, and how its response changes there.
 
-use crate::data::{Measurements, Observations};
+use crate::data::{Measurements, Observations, Parameter};
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::math::random::Stream;
@@ -16,11 +16,19 @@ use super::stream;
 /// The parameters at the largest of prior times `|y - m|^-N`: the normal likelihood of independent data
 /// with its unknown variance integrated out under the prior `1 / variance`.
 pub fn point(study: &Study, data: &Observations, forward: &dyn Forward) -> Result<Vec<f64>, Stop> {
+    Ok(points(&study.parameters, data, forward, &stream(study, "best-fit"))?.remove(0))
+}
+
+/// The same with all local maxima, the best first.
+pub fn points(
+    parameters: &[Parameter],
+    data: &Observations,
+    forward: &dyn Forward,
+    stream: &Stream,
+) -> Result<Vec<Vec<f64>>, Stop> {
     let likelihood = LeastSquares::of(data)?;
-    let posterior =
-        Posterior::new(&study.parameters, OfData::new(forward, Vec::new(), &likelihood));
-    let maxima = maxima(&posterior, &stream(study, "best-fit"))?;
-    Ok(maxima[0].point.clone())
+    let posterior = Posterior::new(parameters, OfData::new(forward, Vec::new(), &likelihood));
+    Ok(maxima(&posterior, stream)?.into_iter().map(|maximum| maximum.point).collect())
 }
 
 /// The derivative of each output by each parameter at [`point`], per standard deviation of the prior.

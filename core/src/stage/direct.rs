@@ -17,11 +17,12 @@ use crate::study::Study;
 
 use super::read::Data;
 use super::simulator::{Setting, Simulator};
-use super::{Known, calibrate, read};
+use super::{Goal, Known, calibrate, read};
 
 /// Runs a study without a surrogate: calibration and validation call the model.
-pub fn run(
+pub(super) fn run(
     study: &Study,
+    goal: Goal,
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {
@@ -31,7 +32,7 @@ pub fn run(
     if let Some(tally) = prepared.direct.tally() {
         observer.warn(&tally);
     }
-    super::conclude(study, &known, calibrated.as_ref(), run, observer)
+    super::conclude(study, goal, &known, calibrated.as_ref(), run, observer)
 }
 
 /// The measurements and the model, all that there is before the posterior.

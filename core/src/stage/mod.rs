@@ -7,11 +7,13 @@ pub mod derived;
 pub mod design;
 pub mod direct;
 pub mod evidence;
+pub mod gap;
 pub mod gap_model;
 mod idle;
 pub mod inference_data;
 pub mod manifest;
 pub mod numerical_error;
+pub mod power;
 pub mod predict;
 pub mod read;
 pub mod refine;
@@ -39,17 +41,50 @@ use read::Data;
 use refine::Refinement;
 use surrogate::Fitted;
 
+/// What a study is run for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Goal {
+    /// Its posterior.
+    Calibrate,
+    /// What its model misses too.
+    FindGap,
+}
+
 /// Runs a study: what is kept and unchanged is taken, the rest is made.
 pub fn run(
     study: &Study,
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {
+    pursue(study, Goal::Calibrate, run, observer)
+}
+
+/// Runs a study and searches for what its model misses.
+pub fn find_gap(
+    study: &Study,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Findings, Stop> {
+    if study.target.is_some() {
+        return Err(Stop::new("a study with `[target]` has no data that could disagree with it"));
+    }
+    if study.measurements.is_none() {
+        return Err(Stop::new("the study has no `[measurements]` to search for a gap"));
+    }
+    pursue(study, Goal::FindGap, run, observer)
+}
+
+fn pursue(
+    study: &Study,
+    goal: Goal,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Findings, Stop> {
     manifest::begin(study, run)?;
     let findings = match (&study.target, &study.surrogate) {
         (Some(given), _) => target::run(study, given, run, observer)?,
-        (None, Some(_)) => with_surrogate(study, run, observer)?,
-        (None, None) => direct::run(study, run, observer)?,
+        (None, Some(_)) => with_surrogate(study, goal, run, observer)?,
+        (None, None) => direct::run(study, goal, run, observer)?,
     };
     manifest::end(study, run)?;
     Ok(findings)
@@ -57,11 +92,12 @@ pub fn run(
 
 fn with_surrogate(
     study: &Study,
+    goal: Goal,
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {
     let (learned, calibrated) = learn(study, run, observer)?;
-    conclude(study, &learned.known(), calibrated.as_ref(), run, observer)
+    conclude(study, goal, &learned.known(), calibrated.as_ref(), run, observer)
 }
 
 /// All stages of a study with a surrogate up to the posterior, which is there when the study has measurements.
@@ -81,9 +117,10 @@ pub fn learn(
     refine::stage(study, first, run, observer)
 }
 
-/// Evidence, validation and report of a calibration.
+/// Evidence, validation, gap and report of a calibration.
 fn conclude(
     study: &Study,
+    goal: Goal,
     known: &Known<'_>,
     calibrated: Option<&Kept<Calibrated>>,
     run: &mut RunDirectory,
@@ -91,11 +128,17 @@ fn conclude(
 ) -> Result<Findings, Stop> {
     let weighed = weigh(study, known, calibrated, run, observer)?;
     let validated = validate::stage(study, known, calibrated, run, observer)?;
+    let gap = match goal {
+        Goal::FindGap => gap::stage(study, known, run, observer)?,
+        // What was found before is not lost in a report that is written again.
+        Goal::Calibrate => gap::kept(study, known, run, observer)?,
+    };
     let made = report::Artifacts {
         known: Some(known),
         calibrated,
         weighed: weighed.as_ref(),
         validated: validated.as_ref(),
+        gap: gap.as_ref(),
     };
     report::stage(study, &made, run)
 }

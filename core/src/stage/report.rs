@@ -2,12 +2,13 @@
 
 use crate::data::{Draws, Ensemble, Observations};
 use crate::diagnose::Diagnosis;
+use crate::gap::account::Account;
 use crate::linalg::Matrix;
 use crate::math::fit;
 use crate::math::moments::{self, Moments};
 use crate::report::findings::{
     CalibrationFindings, CoordinateFindings, EnsembleFindings, Findings, FittedDistribution,
-    LeftOutFindings, MeasuredFindings, Role, SurrogateFindings,
+    GapFindings, LeftOutFindings, MeasuredFindings, Role, SurrogateFindings,
 };
 use crate::report::{render, summary_json};
 use crate::run::{Kept, RunDirectory, Stop, files};
@@ -17,7 +18,7 @@ use super::calibrate::Calibrated;
 use super::evidence::Weighed;
 use super::read::Measured;
 use super::validate::Validated;
-use super::{Known, derived, idle, inference_data};
+use super::{Known, derived, gap, idle, inference_data};
 
 /// Writes report, summary and posterior file; returns the findings.
 pub fn stage(study: &Study, all: &Artifacts<'_>, run: &RunDirectory) -> Result<Findings, Stop> {
@@ -49,6 +50,8 @@ pub struct Artifacts<'a> {
     pub weighed: Option<&'a Kept<Weighed>>,
     /// The calibrated model against the data.
     pub validated: Option<&'a Kept<Validated>>,
+    /// What the model misses, where that was searched for.
+    pub gap: Option<&'a Kept<Account>>,
 }
 
 impl<'a> Artifacts<'a> {
@@ -89,6 +92,11 @@ fn findings(
         warnings: warnings(study, all, calibration.as_ref()),
         calibration,
         validation,
+        gap: all.gap.map(|kept| GapFindings {
+            account: kept.value.clone(),
+            hash: kept.hash.clone(),
+            added: gap::add::kept(run, &kept.hash),
+        }),
         seconds,
         note: study.about.note.clone(),
     }

@@ -33,6 +33,7 @@ pub fn run(
         calibrated: Some(&calibrated),
         weighed: Some(&weighed),
         validated: None,
+        gap: None,
     };
     report::stage(study, &made, run)
 }

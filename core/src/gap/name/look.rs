@@ -1,5 +1,7 @@
 //! What a search sees and what it found, as plain data.
 
+use serde::{Deserialize, Serialize};
+
 use crate::gap::candidates::Suspect;
 use crate::gap::fit::Fit;
 use crate::gap::locate::{Region, Statistics};
@@ -41,7 +43,7 @@ pub struct Look {
 }
 
 /// What an experiment can see of a suspect.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Visible {
     /// The name of its plugin.
     pub kind: String,

@@ -4,7 +4,7 @@ mod curves;
 mod placed;
 
 pub use curves::{Curve, curves, each_curve};
-pub use placed::{On, Placed, with_tangents};
+pub use placed::{On, Placed, acts, with_tangents};
 
 use toml::Table;
 

@@ -115,8 +115,8 @@ pub fn with_tangents<'b>(
     (response, tangents)
 }
 
-/// Whether an effect acts on each output of a block.
-fn acts(layout: &Layout, on: &On) -> Vec<bool> {
+/// Which outputs of a block a place means.
+pub fn acts(layout: &Layout, on: &On) -> Vec<bool> {
     let chosen: Vec<Option<Vec<bool>>> = layout
         .axes
         .iter()

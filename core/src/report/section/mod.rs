@@ -3,6 +3,7 @@
 mod curves;
 mod ensemble;
 pub mod evidence;
+mod gap;
 pub mod headline;
 mod measurements;
 mod overview;
@@ -19,7 +20,7 @@ pub use validation::accuracy_table;
 use super::findings::{CoordinateFindings, Findings};
 use super::page::{Numbers, Section};
 use super::scale::ShownUnit;
-use crate::data::{Coordinates, Layouts};
+use crate::data::{Coordinates, Layouts, Unit};
 use crate::plugin::Fact;
 
 /// All sections that have something to show, in order.
@@ -33,6 +34,7 @@ pub fn all(findings: &Findings, numbers: &mut Numbers) -> Vec<Section> {
         posterior::section(findings, numbers),
         evidence::section(findings),
         validation::section(findings, numbers),
+        gap::section(findings, numbers),
         timing::section(findings, numbers),
     ];
     sections.into_iter().flatten().collect()
@@ -57,6 +59,30 @@ pub fn response_unit(findings: &Findings) -> ShownUnit {
     } else {
         ShownUnit::for_values(findings.layouts.unit(), values)
     }
+}
+
+/// The unit in which places along the last axis are shown.
+pub fn axis_unit(findings: &Findings) -> ShownUnit {
+    let Some((_, grid, unit)) = findings.layouts.blocks[0].abscissa() else {
+        return ShownUnit::of(&Unit::dimensionless(), 1.0);
+    };
+    ShownUnit::for_values(unit, grid.iter().copied())
+}
+
+/// The unit in which frequencies along the last axis are shown.
+pub fn frequency_unit(findings: &Findings) -> ShownUnit {
+    let abscissa = findings.layouts.blocks[0].abscissa();
+    let inverse = abscissa.and_then(|(_, _, unit)| unit.power(-1.0));
+    let hertz = Unit::parse("Hz").ok().zip(Unit::parse("1/s").ok());
+    let inverse = match (inverse, hertz) {
+        (Some(inverse), Some((hertz, per_second))) if inverse == per_second => hertz,
+        (inverse, _) => inverse.unwrap_or_default(),
+    };
+    let step = abscissa.map_or(1.0, |(_, grid, _)| match grid {
+        [first, .., last] if grid.len() > 1 => (grid.len() - 1) as f64 / (last - first),
+        _ => 1.0,
+    });
+    ShownUnit::for_values(&inverse, [0.1 * step])
 }
 
 /// The label of an axis that carries the response.

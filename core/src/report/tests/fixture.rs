@@ -45,6 +45,7 @@ pub fn findings() -> Findings {
         calibration: Some(calibration()),
         validation: Some(validation(&layout)),
         layouts: layout.into(),
+        gap: None,
         seconds: [
             ("design", 0.004),
             ("simulate", 1834.0),

@@ -1,5 +1,7 @@
 //! `summary.json`: the results that scripts read.
 
+mod gap;
+
 use serde_json::{Map, Value, json};
 
 use super::findings::{
@@ -51,6 +53,16 @@ pub const SCHEMA: u64 = 1;
 /// | `rmse.CASE` | root mean square difference from the replicates' mean, in the response's unit |
 /// | `simulated.CASE` | whether the model itself was run there (else the emulator answered) |
 /// | `spread.ORIGIN` | standard deviation of a new replicate by origin, root mean square over outputs, in the response's unit |
+/// | `gap.verdict` | after `lacuna gap`: `none`, `named`, `class`, `unlisted` or `not_visible`; `gap.reasons`: why, in words |
+/// | `gap.p`, `.p_after` | probabilities, if nothing were missing, of the largest score, the best cell of the scan and the energy, without and with the effects |
+/// | `gap.noise_assumed` | whether the noise of some curve is assumed, for want of replicates |
+/// | `gap.effects[]` | what explains most: `type`, `name`, `sensors` (labels; none: everywhere), `on` (labels by axis), `parameters.UNKNOWN` with `mean`, `sd`, `unit` (and `q025`, `q975` once the study with the effects was run; before, the largest density and the normal approximation), `probability` among the candidates, `class` |
+/// | `gap.class` | types that the data cannot tell apart, where the verdict is `class` |
+/// | `gap.regions[]`, `.regions_after[]` | where data and model disagree: `sensors`, `scenario`, `time` (first and last place on the last axis), `band` (frequencies, or `null` for all), `p` |
+/// | `gap.held_out` | `kind` of what was set aside, `names`, `count`; the gap `before` and `after` in standard deviations of the noise; the share of its square that `closed`, `lower` and `upper` end of the 95 % interval; `shrank`; `rmse`, `coverage` of the 95 % band, `conditions.SCENARIO` |
+/// | `gap.held_out_further[]` | the same of other kinds |
+/// | `gap.parameters.NAME` | `before` and `after`: `map` and `sd` without and with the effects, from the data that were not set aside |
+/// | `gap.study`, `.run`, `.log_evidence` | the study with the effects, its run directory, and the evidences `before` and `after`, once it was run |
 /// | `seconds.STAGE` | wall-clock time when the stage's result was made |
 pub fn summary(findings: &Findings) -> Value {
     let mut summary = Map::new();
@@ -95,6 +107,9 @@ pub fn summary(findings: &Findings) -> Value {
         put("rmse", by_case(cases, |case| json!(case.rmse)));
         put("simulated", by_case(cases, |case| json!(case.simulated)));
         put("spread", pairs(&validation.spread));
+    }
+    if let Some(found) = &findings.gap {
+        put("gap", gap::value(found));
     }
     put("seconds", pairs(&findings.seconds));
     Value::Object(summary)

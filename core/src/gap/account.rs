@@ -1,0 +1,356 @@
+//! What a search found, as plain data: for the report, for scripts, and for the study that is written.
+
+use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
+use toml::Table;
+
+use super::candidates::{Candidate, Suspect};
+use super::experiment::Experiment;
+use super::fit::precision;
+use super::hold_out::Kind;
+use super::locate::Region;
+use super::name::{Found, Look, Options, Step, Verdict, Visible, verdict};
+use super::prove::Proof;
+use crate::data::Unit;
+use crate::plugin::effect::On;
+
+/// The whole result of the gap workflow.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Account {
+    /// What is missing, in a word and with its reasons.
+    pub verdict: Verdict,
+    /// The probabilities of a false alarm that are spent on names and on gaps without one.
+    pub levels: [f64; 2],
+    /// Whether the noise of some curve is assumed, for want of replicates.
+    pub noise_assumed: bool,
+    /// The effects that were found, as a study would add them.
+    pub additions: Vec<Addition>,
+    /// The steps that led to them.
+    pub path: Vec<Passed>,
+    /// The probabilities, if nothing were missing, of the largest score, the best cell of the scan and the energy:
+    /// without the effects and with them.
+    pub p: [[f64; 3]; 2],
+    /// Where data and model disagree, without the effects and with them.
+    pub regions: [Vec<Spot>; 2],
+    /// What this experiment could see of each candidate.
+    pub visible: Vec<Visible>,
+    /// The size of each type of candidate.
+    pub sizes: Vec<Size>,
+    /// The calibrated unknowns without the effects and with them.
+    pub parameters: Vec<Shift>,
+    /// The curves in the order of their outputs.
+    pub curves: Vec<CurveAccount>,
+    /// The mean of the replicates at each output, and their number; those that were not set aside.
+    pub means: Vec<f64>,
+    /// See `means`.
+    pub counts: Vec<f64>,
+    /// The standard deviation of one replicate at each output.
+    pub sd: Vec<f64>,
+    /// The calibrated response without the effects and with them.
+    pub response: [Vec<f64>; 2],
+    /// What calibration cannot absorb of the difference from the mean, white, in standard deviations; without the effects
+    /// and with them.
+    pub left: [Vec<f64>; 2],
+    /// How the gap fares on what was set aside.
+    pub held_out: Vec<HeldOut>,
+}
+
+/// An effect as a study adds it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Addition {
+    /// Its name.
+    pub name: String,
+    /// What kind of effect it is: the name of its plugin, where the study gives no other.
+    pub kind: String,
+    /// The name of its plugin.
+    pub plugin: String,
+    /// What it is, for people.
+    pub title: String,
+    /// Its formula.
+    pub formula: String,
+    /// Where it acts.
+    pub on: On,
+    /// Its options.
+    pub options: Table,
+    /// The inputs of the wide forward map that it sets free, where it acts inside the model.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub switches: Vec<usize>,
+    /// Its unknowns.
+    pub unknowns: Vec<Estimate>,
+    /// The types that these data cannot tell from it, itself first.
+    pub class: Vec<String>,
+    /// The probability of its type among the candidates.
+    pub probability: f64,
+}
+
+/// An unknown with its value.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: Unit,
+    /// The value of largest posterior density.
+    pub value: f64,
+    /// The standard deviation by the normal approximation.
+    pub sd: f64,
+}
+
+/// The size of a type of effect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Size {
+    /// The type.
+    pub kind: String,
+    /// The size's name.
+    pub name: String,
+    /// Its unit.
+    pub unit: Unit,
+}
+
+/// A calibrated unknown without and with the effects.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Shift {
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: Unit,
+    /// Its values.
+    pub value: [f64; 2],
+    /// Their standard deviations by the normal approximation.
+    pub sd: [f64; 2],
+    /// The standard deviation of its prior, or of a normal law as wide.
+    pub prior_sd: f64,
+    /// Whether it lies at an end of its prior's support.
+    pub at_bound: [bool; 2],
+}
+
+/// A step of the path.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Passed {
+    /// The probabilities before it, as in [`Account::p`].
+    pub p: [f64; 3],
+    /// What was weighed, the heaviest first.
+    pub leaders: Vec<Leader>,
+    /// What was added: types and places.
+    pub added: Vec<(String, On)>,
+    /// The names of effects that were dropped after it.
+    pub dropped: Vec<String>,
+}
+
+/// An effect that was weighed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Leader {
+    /// The name of its plugin.
+    pub kind: String,
+    /// Where it acts.
+    pub on: On,
+    /// The log of evidence times prior mass, less that of the heaviest.
+    pub log_weight: f64,
+    /// Its largest studentised score.
+    pub score: f64,
+    /// The share of it that the calibrated unknowns absorb.
+    pub absorbed: f64,
+}
+
+/// A part of the response where data and model disagree.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Spot {
+    /// The curves, by their place in [`Account::curves`].
+    pub curves: Vec<usize>,
+    /// The first and the last place along the last axis.
+    pub span: (f64, f64),
+    /// The band of frequencies in which they disagree, in the inverse unit of the last axis; all when `None`.
+    pub band: Option<(f64, f64)>,
+    /// The probability of a false alarm anywhere.
+    pub p: f64,
+}
+
+/// A curve with the noise of its replicates.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CurveAccount {
+    /// Its name: its labels in words.
+    pub name: String,
+    /// Its labels by axis, the scenario aside.
+    pub labels: Vec<(String, String)>,
+    /// The scenario.
+    pub scenario: Option<String>,
+    /// Its outputs.
+    pub outputs: Range<usize>,
+    /// The outputs that were measured, and where along the last axis.
+    pub measured: Vec<usize>,
+    /// See `measured`.
+    pub at: Vec<f64>,
+    /// The standard deviation of one replicate, root mean square along the curve.
+    pub sd: f64,
+    /// The coefficients of the noise's autoregression.
+    pub memory: Vec<f64>,
+    /// The standard deviations of what whole replicates differ by: offset in the response's unit, gain, and clock in the
+    /// last axis's unit; its own and shared with other curves.
+    pub wander: [f64; 3],
+    /// Whether the noise is assumed for want of replicates.
+    pub assumed: bool,
+}
+
+/// What the comparison with one kind of held-out data shows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HeldOut {
+    /// What was set aside.
+    pub kind: Kind,
+    /// In words.
+    pub names: Vec<String>,
+    /// The comparison.
+    pub proof: Proof,
+}
+
+impl Account {
+    /// The account of a search, without what was held out.
+    pub fn of(found: &Found<'_>, candidates: &[Candidate], options: Options) -> Self {
+        let first = found.path.first().map_or(&found.last, |step| &step.before);
+        let looks = [first, &found.last];
+        let experiment = found.system.experiment;
+        let verdict = verdict(found, candidates, options);
+        let (counts, _) = experiment.means();
+        Self {
+            levels: [options.naming, options.unlisted],
+            noise_assumed: found.noise.assumed.contains(&true),
+            additions: additions(found, candidates, &verdict),
+            path: found.path.iter().map(|step| passed(step, candidates)).collect(),
+            p: looks.map(|look| look.p),
+            regions: looks.map(|look| spots(experiment, &look.regions)),
+            visible: first.visible.clone(),
+            sizes: sizes(experiment, candidates),
+            parameters: shifts(experiment, looks),
+            curves: curves(found),
+            means: found.means.clone(),
+            counts,
+            sd: found.noise.sd(experiment, &found.last.fit.at.response),
+            response: looks.map(|look| look.fit.at.response.clone()),
+            left: looks.map(|look| look.statistics.left.clone()),
+            held_out: Vec::new(),
+            verdict,
+        }
+    }
+}
+
+fn additions(found: &Found<'_>, candidates: &[Candidate], verdict: &Verdict) -> Vec<Addition> {
+    let placed = found.system.effects.iter().zip(&found.chosen).zip(&verdict.effects);
+    placed
+        .map(|((effect, suspect), named)| {
+            let candidate = &candidates[suspect.candidate];
+            let described = candidate.effect.describe();
+            let unknowns = effect.hyperparameters().into_iter().enumerate();
+            Addition {
+                name: named.name.clone(),
+                kind: named.kind.clone(),
+                plugin: candidate.plugin.clone(),
+                title: described.title,
+                formula: described.formula,
+                on: named.on.clone(),
+                options: candidate.options.clone(),
+                switches: candidate.effect.switches().to_vec(),
+                unknowns: unknowns
+                    .map(|(k, unknown)| Estimate {
+                        name: unknown.name,
+                        unit: unknown.unit,
+                        value: named.values[k],
+                        sd: named.sd[k],
+                    })
+                    .collect(),
+                class: named.class.clone(),
+                probability: named.probability,
+            }
+        })
+        .collect()
+}
+
+fn passed(step: &Step, candidates: &[Candidate]) -> Passed {
+    let kind = |suspect: &Suspect| candidates[suspect.candidate].kind.clone();
+    let best = step.judged.first().map_or(0.0, |j| j.log_weight);
+    Passed {
+        p: step.before.p,
+        leaders: step
+            .judged
+            .iter()
+            .map(|j| Leader {
+                kind: kind(&j.suspect),
+                on: j.suspect.on.clone(),
+                log_weight: j.log_weight - best,
+                score: j.score,
+                absorbed: j.absorbed,
+            })
+            .collect(),
+        added: step.added.iter().map(|s| (kind(s), s.on.clone())).collect(),
+        dropped: step.dropped.clone(),
+    }
+}
+
+fn spots(experiment: &Experiment<'_>, regions: &[Region]) -> Vec<Spot> {
+    let spot = |region: &Region| {
+        let at = &experiment.curves[region.curves[0]].at;
+        // Cosine k of a curve of n even steps has the frequency k / (2 n step).
+        let band = region.cell.band.filter(|_| at.len() > 1).map(|(begin, end)| {
+            let step = (at[at.len() - 1] - at[0]) / (at.len() - 1) as f64;
+            let frequency = |k: usize| k as f64 / (2.0 * at.len() as f64 * step);
+            (frequency(begin), frequency(end))
+        });
+        Spot { curves: region.curves.clone(), span: region.span, band, p: region.p }
+    };
+    regions.iter().map(spot).collect()
+}
+
+fn sizes(experiment: &Experiment<'_>, candidates: &[Candidate]) -> Vec<Size> {
+    let mut sizes: Vec<Size> = Vec::new();
+    for candidate in candidates {
+        let unknowns = candidate.effect.parameters(&experiment.layouts.blocks[0]);
+        if let Some(size) = unknowns.into_iter().next()
+            && !sizes.iter().any(|other| other.kind == candidate.kind)
+        {
+            sizes.push(Size { kind: candidate.kind.clone(), name: size.name, unit: size.unit });
+        }
+    }
+    sizes
+}
+
+fn shifts(experiment: &Experiment<'_>, looks: [&Look; 2]) -> Vec<Shift> {
+    let sd = looks.map(|look| look.fit.sd());
+    let shift = |(j, parameter): (usize, &crate::data::Parameter)| {
+        let value = looks.map(|look| look.fit.at.point[j]);
+        let (low, high) = parameter.prior.support();
+        let prior_sd = 1.0 / precision(&parameter.prior).sqrt();
+        let near = 1e-3 * prior_sd;
+        Shift {
+            name: parameter.name.clone(),
+            unit: parameter.unit.clone(),
+            value,
+            sd: [sd[0][j], sd[1][j]],
+            prior_sd,
+            at_bound: value.map(|x| x - low < near || high - x < near),
+        }
+    };
+    experiment.parameters.iter().enumerate().map(shift).collect()
+}
+
+fn curves(found: &Found<'_>) -> Vec<CurveAccount> {
+    let experiment = found.system.experiment;
+    let sd = found.noise.sd(experiment, &found.last.fit.at.response);
+    let account = |(s, curve): (usize, &super::experiment::Curve)| {
+        let noise = &found.noise.curves[s];
+        let squares: f64 = curve.measured.iter().map(|&i| sd[i] * sd[i]).sum();
+        let (own, shared) =
+            (noise.wander.variances(), found.noise.shared[curve.condition].variances());
+        CurveAccount {
+            name: curve.name(experiment.layouts),
+            labels: curve.labels.clone(),
+            scenario: experiment.conditions[curve.condition].scenario.clone(),
+            outputs: curve.outputs.clone(),
+            measured: curve.measured.clone(),
+            at: curve.at.clone(),
+            sd: (squares / curve.measured.len().max(1) as f64).sqrt(),
+            memory: noise.memory.coefficients().to_vec(),
+            wander: [0, 1, 2].map(|d| (own[d] + shared[d]).sqrt()),
+            assumed: found.noise.assumed[s],
+        }
+    };
+    experiment.curves.iter().enumerate().map(account).collect()
+}

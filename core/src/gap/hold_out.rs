@@ -1,0 +1,320 @@
+//! What is set aside before anything is looked at.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::data::layouts::SCENARIO;
+use crate::data::{Coordinates, Layout, Measurements, Observations, Replicate};
+use crate::math::random::{Stream, below, permutation};
+use crate::plugin::effect::acts;
+use crate::study::gap::HoldOut;
+
+/// The fewest replicates of a condition of which one is set aside.
+const FEWEST: usize = 3;
+
+/// Replicates of a condition that are left to learn its noise from.
+const LEFT: usize = 2;
+
+/// Blocks into which a curve is cut where there are no replicates to set aside.
+const BLOCKS: usize = 8;
+
+/// The fewest values of a curve of which blocks are set aside.
+const LONG: usize = 4 * BLOCKS;
+
+/// Measurements in two parts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Split {
+    /// What is calibrated and searched with.
+    pub training: Observations,
+    /// What is set aside, of each kind that there is.
+    pub held_out: Vec<HeldOutData>,
+}
+
+/// Measurements that were set aside.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeldOutData {
+    /// What they are.
+    pub kind: Kind,
+    /// In words, such as the replicates' names.
+    pub names: Vec<String>,
+    /// Their values; each replicate is one unit of the comparison, independent of the others.
+    pub data: Observations,
+}
+
+/// What was set aside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// Replicates under conditions that others were measured under too.
+    Replicates,
+    /// Whole scenarios.
+    Scenarios,
+    /// Whole curves, such as those of a sensor.
+    Curves,
+    /// Intervals of the last axis.
+    Intervals,
+    /// Blocks of curves without replicates.
+    Blocks,
+}
+
+impl Kind {
+    /// In words, as many as there are.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Replicates => "replicates",
+            Self::Scenarios => "scenarios",
+            Self::Curves => "curves",
+            Self::Intervals => "intervals",
+            Self::Blocks => "blocks of curves",
+        }
+    }
+}
+
+/// Where a replicate's values go.
+struct Masks {
+    scenarios: Vec<bool>,
+    curves: Vec<bool>,
+    intervals: Vec<bool>,
+}
+
+/// Sets aside what a study wishes; the stream decides which replicates.
+pub fn split(data: &Observations, wish: &HoldOut, stream: &Stream) -> Split {
+    let masks: Vec<Masks> = data.blocks.iter().map(|b| Masks::of(&b.layout, wish)).collect();
+    let chosen: Vec<Vec<bool>> = data
+        .blocks
+        .iter()
+        .enumerate()
+        .map(|(b, block)| chosen(block, wish.replicates.get(), &stream.at(b as u64)))
+        .collect();
+    let kept = |b: usize, i: usize| masks[b].kind(i).is_none();
+    let training = part(data, |b, r, _, i| !chosen[b][r] && kept(b, i));
+    let seen = training.summaries();
+    let mut held_out = Vec::new();
+    let mut add = |kind: Kind, part: Observations| {
+        if part.count() > 0 {
+            let names = part.blocks.iter().flat_map(|b| &b.replicates).map(|r| r.name.clone());
+            held_out.push(HeldOutData { kind, names: names.collect(), data: part });
+        }
+    };
+    // Values that no replicate of the training measured would have no noise to be compared with.
+    add(
+        Kind::Replicates,
+        part(data, |b, r, all, i| chosen[b][r] && kept(b, i) && seen[all].count > 0),
+    );
+    for kind in [Kind::Scenarios, Kind::Curves, Kind::Intervals] {
+        add(kind, part(data, |b, _, _, i| masks[b].kind(i) == Some(kind)));
+    }
+    if held_out.is_empty() && wish.replicates.get() > 0.0 {
+        return blocks(data, &stream.named("blocks"));
+    }
+    Split { training, held_out }
+}
+
+impl Masks {
+    fn of(layout: &Layout, wish: &HoldOut) -> Self {
+        let nothing = || vec![false; layout.len()];
+        let scenarios = if wish.scenarios.is_empty() {
+            nothing()
+        } else {
+            acts(layout, &BTreeMap::from([(SCENARIO.to_owned(), wish.scenarios.clone())]))
+        };
+        let curves = if wish.on.is_empty() { nothing() } else { acts(layout, &wish.on) };
+        let grid = match layout.axes.last().map(|axis| &axis.coordinates) {
+            Some(Coordinates::Grid { values, .. }) => values.as_slice(),
+            _ => &[],
+        };
+        let inside = |x: &f64| wish.along.iter().any(|interval| interval.contains(*x));
+        let intervals =
+            (0..layout.len()).map(|i| !grid.is_empty() && inside(&grid[i % grid.len()]));
+        Self { scenarios, curves, intervals: intervals.collect() }
+    }
+
+    /// What an output is set aside as.
+    fn kind(&self, i: usize) -> Option<Kind> {
+        if self.scenarios[i] {
+            Some(Kind::Scenarios)
+        } else if self.curves[i] {
+            Some(Kind::Curves)
+        } else {
+            self.intervals[i].then_some(Kind::Intervals)
+        }
+    }
+}
+
+/// The values that are wanted: by block, replicate, output of all, and output of the block.
+fn part(data: &Observations, wanted: impl Fn(usize, usize, usize, usize) -> bool) -> Observations {
+    let mut begin = 0;
+    let mut blocks = Vec::new();
+    for (b, block) in data.blocks.iter().enumerate() {
+        let mut replicates = Vec::new();
+        for (r, replicate) in block.replicates.iter().enumerate() {
+            let pick = |(i, y): (usize, &Option<f64>)| y.filter(|_| wanted(b, r, begin + i, i));
+            let values: Vec<Option<f64>> = replicate.values.iter().enumerate().map(pick).collect();
+            if values.iter().any(Option::is_some) {
+                replicates.push(Replicate { name: replicate.name.clone(), values });
+            }
+        }
+        blocks.push(Measurements { layout: block.layout.clone(), replicates });
+        begin += block.layout.len();
+    }
+    Observations { blocks }
+}
+
+/// Which replicates of a block are set aside: a share of those that measured under the same conditions.
+fn chosen(block: &Measurements, share: f64, stream: &Stream) -> Vec<bool> {
+    let mut groups: BTreeMap<Vec<bool>, Vec<usize>> = BTreeMap::new();
+    for (r, replicate) in block.replicates.iter().enumerate() {
+        groups.entry(conditions(&block.layout, replicate)).or_default().push(r);
+    }
+    let mut chosen = vec![false; block.replicates.len()];
+    for (g, (_, members)) in groups.iter().enumerate() {
+        let count = members.len();
+        if count < FEWEST || share <= 0.0 {
+            continue;
+        }
+        let held = ((share * count as f64).round() as usize).clamp(1, count - LEFT);
+        let order = permutation(&mut stream.at(g as u64).generator(), count);
+        order[..held].iter().for_each(|&k| chosen[members[k]] = true);
+    }
+    chosen
+}
+
+/// Under which scenarios of its block a replicate was measured.
+fn conditions(layout: &Layout, replicate: &Replicate) -> Vec<bool> {
+    let scenarios = match layout.axes.first().filter(|axis| axis.name == SCENARIO) {
+        Some(axis) => axis.len(),
+        None => 1,
+    };
+    let length = (layout.len() / scenarios.max(1)).max(1);
+    replicate.values.chunks(length).map(|own| own.iter().any(Option::is_some)).collect()
+}
+
+/// Two blocks inside each curve of each replicate, which do not touch each other.
+fn blocks(data: &Observations, stream: &Stream) -> Split {
+    let mut training = data.clone();
+    let mut held_out: Vec<Measurements> = data
+        .blocks
+        .iter()
+        .map(|block| Measurements { layout: block.layout.clone(), replicates: Vec::new() })
+        .collect();
+    let mut drawn = 0;
+    for (b, block) in data.blocks.iter().enumerate() {
+        let length = match block.layout.axes.last().map(|axis| &axis.coordinates) {
+            Some(Coordinates::Grid { values, .. }) => values.len(),
+            _ => continue,
+        };
+        for (r, replicate) in block.replicates.iter().enumerate() {
+            for begin in (0..replicate.values.len()).step_by(length) {
+                let measured: Vec<usize> =
+                    (begin..begin + length).filter(|&i| replicate.values[i].is_some()).collect();
+                if measured.len() < LONG {
+                    continue;
+                }
+                drawn += 1;
+                for k in inner(&stream.at(drawn)) {
+                    let edge = |k: usize| k * measured.len() / BLOCKS;
+                    let mut values = vec![None; replicate.values.len()];
+                    for &i in &measured[edge(k)..edge(k + 1)] {
+                        values[i] = training.blocks[b].replicates[r].values[i].take();
+                    }
+                    let place = block.layout.describe(measured[edge(k)]);
+                    let name = format!("{} from {place}", replicate.name);
+                    held_out[b].replicates.push(Replicate { name, values });
+                }
+            }
+        }
+    }
+    let data = Observations { blocks: held_out };
+    if data.count() == 0 {
+        return Split { training, held_out: Vec::new() };
+    }
+    let names = data.blocks.iter().flat_map(|b| &b.replicates).map(|r| r.name.clone()).collect();
+    Split { training, held_out: vec![HeldOutData { kind: Kind::Blocks, names, data }] }
+}
+
+/// Two of the inner blocks of a curve with one between them at least.
+fn inner(stream: &Stream) -> [usize; 2] {
+    let mut rng = stream.generator();
+    // Of the places 1 to 6 the first leaves room for a second one two further on.
+    let first = 1 + below(&mut rng, BLOCKS - 4);
+    let second = first + 2 + below(&mut rng, BLOCKS - 3 - first);
+    [first, second]
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::data::{Axis, Unit};
+    use crate::plugin::effect::On;
+    use crate::study::values::{Fraction, Interval};
+
+    fn observations(replicates: usize, length: usize) -> Observations {
+        let times = (0..length).map(|i| i as f64).collect();
+        let axes = vec![
+            Axis::labels("sensor", ["A", "B"]),
+            Axis::grid("time", times, Unit::parse("s").unwrap()),
+        ];
+        let layout = Layout { name: "y".into(), unit: Unit::dimensionless(), axes };
+        let replicate = |r: usize| Replicate {
+            name: r.to_string(),
+            values: (0..2 * length).map(|i| Some((r * 1000 + i) as f64)).collect(),
+        };
+        Measurements { layout, replicates: (0..replicates).map(replicate).collect() }.into()
+    }
+
+    /// Every value is in one part and in no other.
+    fn assert_apart(data: &Observations, split: &Split) {
+        let held: usize = split.held_out.iter().map(|part| part.data.count()).sum();
+        assert_eq!(split.training.count() + held, data.count());
+        let all = |data: &Observations| -> Vec<f64> {
+            let replicates = data.blocks.iter().flat_map(|b| &b.replicates);
+            replicates.flat_map(|r| r.values.iter().flatten().copied()).collect()
+        };
+        let mut found = all(&split.training);
+        split.held_out.iter().for_each(|part| found.extend(all(&part.data)));
+        let mut wanted = all(data);
+        found.sort_by(f64::total_cmp);
+        wanted.sort_by(f64::total_cmp);
+        assert_eq!(found, wanted);
+    }
+
+    #[test]
+    fn a_quarter_of_the_replicates_is_set_aside() {
+        for (count, held) in [(20, 5), (8, 2), (4, 1), (3, 1)] {
+            let data = observations(count, 10);
+            let split = split(&data, &HoldOut::default(), &Stream::root(1));
+            assert_apart(&data, &split);
+            assert_eq!(split.held_out[0].kind, Kind::Replicates);
+            assert_eq!(split.held_out[0].names.len(), held);
+        }
+    }
+
+    #[test]
+    fn curves_and_intervals_are_set_aside_from_all_replicates() {
+        let data = observations(4, 10);
+        let wish = HoldOut {
+            replicates: Fraction::new(0.25).unwrap(),
+            on: On::from([("sensor".to_owned(), vec!["B".to_owned()])]),
+            along: vec![Interval::new(2.5, 4.0).unwrap()],
+            ..HoldOut::default()
+        };
+        let split = split(&data, &wish, &Stream::root(1));
+        assert_apart(&data, &split);
+        let kinds: Vec<(Kind, usize)> =
+            split.held_out.iter().map(|part| (part.kind, part.data.count())).collect();
+        assert_eq!(kinds, [(Kind::Replicates, 8), (Kind::Curves, 40), (Kind::Intervals, 8)]);
+    }
+
+    #[test]
+    fn blocks_stand_in_for_replicates() {
+        let data = observations(1, 80);
+        for seed in 0..20 {
+            let split = split(&data, &HoldOut::default(), &Stream::root(seed));
+            assert_apart(&data, &split);
+            let part = &split.held_out[0];
+            assert_eq!((part.kind, part.names.len(), part.data.count()), (Kind::Blocks, 4, 40));
+        }
+    }
+}

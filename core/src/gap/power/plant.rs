@@ -1,0 +1,316 @@
+//! What is planted, and the response with it.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Amount, Ground};
+use crate::gap::candidates::{Candidate, Suspect, sensors};
+use crate::gap::experiment::Experiment;
+use crate::gap::locate::Region;
+use crate::gap::system::System;
+use crate::math::random::{Stream, below, uniform};
+use crate::plugin::effect::{On, Reach, Situation};
+
+/// What a case should have.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Plant {
+    /// Nothing.
+    Nothing,
+    /// An effect of this type and size.
+    Effect(String, f64),
+    /// Two effects of these types and this size.
+    Pair([String; 2], f64),
+    /// A half sine on one curve.
+    Bump(f64),
+    /// What no candidate is.
+    Unlisted(Shape, f64),
+}
+
+/// What no effect of the library does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shape {
+    /// Time runs faster from the middle of the record on, on all curves of one condition.
+    Stretch,
+    /// Each curve has a part of its own reversed copy.
+    Reversed,
+    /// A swelling and fading oscillation whose frequency rises, on half of the curves.
+    Chirp,
+}
+
+impl Shape {
+    const ALL: [Self; 3] = [Self::Stretch, Self::Reversed, Self::Chirp];
+}
+
+/// What was planted.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Planted {
+    /// In words: `nothing`, `bump`, or the types.
+    pub what: String,
+    /// The effects: type, place and values of the unknowns.
+    pub effects: Vec<(String, On, Vec<f64>)>,
+    /// The size of each, as a ratio to the noise.
+    pub ratio: f64,
+    /// Where the bump is.
+    pub bump: Option<Bump>,
+}
+
+/// A bump on one curve.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Bump {
+    /// The curve.
+    pub curve: usize,
+    /// The first and the last of its measured values.
+    pub window: (usize, usize),
+}
+
+/// The cases of an amount, in their order.
+pub fn plan(amount: &Amount, candidates: &[Candidate]) -> Vec<Plant> {
+    let mut kinds: Vec<&str> = candidates.iter().map(|c| c.kind.as_str()).collect();
+    kinds.dedup();
+    let largest = amount.ratios.iter().copied().fold(0.0, f64::max).min(1.0);
+    let mut all = vec![Plant::Nothing; amount.nothing];
+    for &ratio in &amount.ratios {
+        for _ in 0..amount.repeats {
+            all.extend(kinds.iter().map(|kind| Plant::Effect((*kind).to_owned(), ratio)));
+        }
+        all.extend((0..amount.bumps).map(|_| Plant::Bump(ratio)));
+    }
+    for i in 0..amount.pairs.min(if kinds.len() > 1 { usize::MAX } else { 0 }) {
+        // Every distance between two types comes in its turn.
+        let (first, apart) = (i % kinds.len(), 1 + (i / kinds.len() + i) % (kinds.len() - 1));
+        let second = (first + apart) % kinds.len();
+        all.push(Plant::Pair([kinds[first], kinds[second]].map(str::to_owned), largest));
+    }
+    all.extend((0..amount.unlisted).map(|i| Plant::Unlisted(Shape::ALL[i % 3], largest)));
+    all
+}
+
+/// What is planted, with the response of the truth; `None` where it cannot be made so large.
+pub fn plant(ground: &Ground<'_>, wanted: &Plant, stream: &Stream) -> Option<(Planted, Vec<f64>)> {
+    let mut response = ground.fit.at.response.clone();
+    let mut planted = Planted::default();
+    match wanted {
+        Plant::Nothing => planted.what = "nothing".into(),
+        Plant::Effect(kind, ratio) => {
+            planted.what = kind.clone();
+            planted.ratio = *ratio;
+            add_effect(ground, kind, *ratio, &mut response, &mut planted, stream)?;
+        }
+        Plant::Pair(kinds, ratio) => {
+            planted.what = kinds.join("+");
+            planted.ratio = *ratio;
+            for (i, kind) in kinds.iter().enumerate() {
+                let stream = stream.at(i as u64);
+                add_effect(ground, kind, *ratio, &mut response, &mut planted, &stream)?;
+            }
+        }
+        Plant::Bump(ratio) => {
+            planted.what = "bump".into();
+            planted.ratio = *ratio;
+            planted.bump = Some(add_bump(ground, *ratio, &mut response, stream)?);
+        }
+        Plant::Unlisted(shape, ratio) => {
+            planted.what = "unlisted".into();
+            planted.ratio = *ratio;
+            let change = unlisted(ground.experiment, *shape, &response, stream);
+            let scale = ratio / ratio_of(ground, &change)?;
+            response.iter_mut().zip(&change).for_each(|(y, c)| *y += scale * c);
+        }
+    }
+    Some((planted, response))
+}
+
+/// Tries at a version, a place and indices that can be made large enough.
+const TRIES: u64 = 20;
+
+fn add_effect(
+    ground: &Ground<'_>,
+    kind: &str,
+    ratio: f64,
+    response: &mut Vec<f64>,
+    planted: &mut Planted,
+    stream: &Stream,
+) -> Option<()> {
+    (0..TRIES).find_map(|i| {
+        let (on, values, changed) = effect(ground, kind, ratio, response, &stream.at(i))?;
+        planted.effects.push((kind.to_owned(), on, values));
+        *response = changed;
+        Some(())
+    })
+}
+
+/// An effect of random place and indices whose change has this size.
+fn effect(
+    ground: &Ground<'_>,
+    kind: &str,
+    ratio: f64,
+    response: &[f64],
+    stream: &Stream,
+) -> Option<(On, Vec<f64>, Vec<f64>)> {
+    let mut rng = stream.generator();
+    let experiment = ground.experiment;
+    let versions: Vec<usize> =
+        (0..ground.candidates.len()).filter(|&c| ground.candidates[c].kind == kind).collect();
+    let candidate = versions[below(&mut rng, versions.len())];
+    let known = &ground.candidates[candidate].effect;
+    let places = sensors(experiment);
+    let everywhere = match known.reach() {
+        _ if places.len() < 2 => true,
+        Reach::Whole => true,
+        Reach::Single => false,
+        Reach::Any => uniform(&mut rng) < 0.3,
+    };
+    let on = if everywhere { On::new() } else { places[below(&mut rng, places.len())].clone() };
+    let suspect = Suspect { candidate, on: on.clone() };
+    let placed = suspect.placed(experiment, ground.candidates, kind);
+    let layout = &experiment.layouts.blocks[0];
+    let noise = ground.noise.sd(experiment, response);
+    let situation = Situation { layouts: experiment.layouts, response, noise: &noise };
+    let starts = known.starts(layout, &situation);
+    let mut values = starts.get(below(&mut rng, starts.len().max(1)))?.clone();
+    let absent = known.absent(layout)[0];
+    let step = values[0] - absent;
+    let parameters = known.parameters(layout);
+    // Indices from their priors: those of the starts would be easier to find.
+    for (value, parameter) in values.iter_mut().zip(&parameters).skip(1) {
+        *value = parameter.prior.quantile(0.05 + 0.9 * uniform(&mut rng));
+    }
+    let (low, high) = parameters[0].prior.support();
+    let changed = |size: f64| {
+        let values: Vec<f64> = std::iter::once(size).chain(values[1..].iter().copied()).collect();
+        if known.switches().is_empty() {
+            return (placed.apply(response, &values), values);
+        }
+        let (system, base) = (System::new(experiment, vec![placed.clone()]), &ground.fit.at);
+        let changed = system.response(&[&base.point[..], &values].concat());
+        let changes = changed.iter().zip(&base.response).map(|(with, without)| with - without);
+        (response.iter().zip(changes).map(|(y, change)| y + change).collect(), values)
+    };
+    let reached = |size: f64| {
+        let change: Vec<f64> = changed(size).0.iter().zip(response).map(|(a, b)| a - b).collect();
+        ratio_of(ground, &change).unwrap_or(0.0)
+    };
+    // The change grows with the size: double until it is enough, then halve the interval.
+    let most = 1e12;
+    let (mut small, mut large) = (0.0, 1e-3);
+    while reached(absent + large * step) < ratio {
+        small = large;
+        large *= 2.0;
+        if large > most || !(low..=high).contains(&(absent + large * step)) {
+            return None;
+        }
+    }
+    for _ in 0..60 {
+        let middle = 0.5 * (small + large);
+        if reached(absent + middle * step) < ratio {
+            small = middle;
+        } else {
+            large = middle;
+        }
+    }
+    let (response, values) = changed(absent + large * step);
+    response.iter().all(|y| y.is_finite()).then_some((on, values, response))
+}
+
+/// The root mean square of a change over the noise, on the curves that it touches.
+fn ratio_of(ground: &Ground<'_>, change: &[f64]) -> Option<f64> {
+    let experiment = ground.experiment;
+    let noise = ground.noise.sd(experiment, &ground.fit.at.response);
+    let (mut sum, mut count) = (0.0, 0.0);
+    for curve in &experiment.curves {
+        if curve.measured.iter().all(|&i| change[i] == 0.0) {
+            continue;
+        }
+        for &i in curve.measured.iter().filter(|&&i| noise[i] > 0.0) {
+            sum += (change[i] / noise[i]).powi(2);
+            count += 1.0;
+        }
+    }
+    let ratio = f64::sqrt(sum / f64::max(count, 1.0));
+    (ratio > 0.0 && ratio.is_finite()).then_some(ratio)
+}
+
+/// A half sine over a tenth to a third of one curve; its size is the root mean square over itself.
+fn add_bump(
+    ground: &Ground<'_>,
+    ratio: f64,
+    response: &mut [f64],
+    stream: &Stream,
+) -> Option<Bump> {
+    let mut rng = stream.generator();
+    let long: Vec<usize> = (0..ground.experiment.curves.len())
+        .filter(|&s| ground.experiment.curves[s].measured.len() >= 20)
+        .collect();
+    if long.is_empty() {
+        return None;
+    }
+    let curve = long[below(&mut rng, long.len())];
+    let measured = &ground.experiment.curves[curve].measured;
+    let share = 0.1 + 0.25 * uniform(&mut rng);
+    let width = ((share * measured.len() as f64) as usize).max(4);
+    let begin = below(&mut rng, measured.len() - width);
+    let noise = ground.noise.sd(ground.experiment, &ground.fit.at.response);
+    for (k, &i) in measured[begin..begin + width].iter().enumerate() {
+        let phase = std::f64::consts::PI * (k as f64 + 0.5) / width as f64;
+        response[i] += ratio * std::f64::consts::SQRT_2 * noise[i] * phase.sin();
+    }
+    Some(Bump { curve, window: (begin, begin + width - 1) })
+}
+
+impl Bump {
+    /// Intersection over union of the bump with the places that were found.
+    pub fn overlap(&self, experiment: &Experiment<'_>, regions: &[Region]) -> f64 {
+        let (mut found, mut both) = (0, 0);
+        for (s, curve) in experiment.curves.iter().enumerate() {
+            for k in 0..curve.measured.len() {
+                let inside = |r: &Region| {
+                    r.curves.contains(&s) && (r.span.0..=r.span.1).contains(&curve.at[k])
+                };
+                let is_found = regions.iter().any(inside);
+                found += usize::from(is_found);
+                let is_bump = s == self.curve && (self.window.0..=self.window.1).contains(&k);
+                both += usize::from(is_found && is_bump);
+            }
+        }
+        let bump = self.window.1 - self.window.0 + 1;
+        both as f64 / (found + bump - both) as f64
+    }
+}
+
+/// The change that a shape makes, of no particular size.
+fn unlisted(
+    experiment: &Experiment<'_>,
+    shape: Shape,
+    response: &[f64],
+    stream: &Stream,
+) -> Vec<f64> {
+    let mut rng = stream.generator();
+    let condition = below(&mut rng, experiment.conditions.len());
+    let (middle, turns) = (0.3 + 0.4 * uniform(&mut rng), 2.0 + 4.0 * uniform(&mut rng));
+    let mut change = vec![0.0; response.len()];
+    for (s, curve) in experiment.curves.iter().enumerate() {
+        let length = curve.measured.len();
+        if length < 3 {
+            continue;
+        }
+        let value = |k: usize| response[curve.measured[k]];
+        let largest = (0..length).map(|k| value(k).abs()).fold(0.0, f64::max).max(1e-300);
+        for k in 0..length {
+            let share = k as f64 / (length - 1) as f64;
+            let moved = match shape {
+                Shape::Stretch if curve.condition == condition && share > middle => {
+                    let slope = value((k + 1).min(length - 1)) - value(k - 1);
+                    (share - middle) * slope
+                }
+                Shape::Reversed => value(length - 1 - k),
+                Shape::Chirp if s % 2 == 0 => {
+                    let envelope = (std::f64::consts::PI * share).sin().powi(2);
+                    largest * envelope * (std::f64::consts::TAU * turns * share * share).sin()
+                }
+                _ => 0.0,
+            };
+            change[curve.measured[k]] = moved;
+        }
+    }
+    change
+}

@@ -1,0 +1,181 @@
+//! The rates of many cases.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{Beta, ContinuousCDF};
+
+use super::Outcome;
+use crate::gap::name::Word;
+
+/// The share of cases that makes a size *found*.
+const FOUND: f64 = 0.8;
+
+/// What the workflow finds in a study.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Rates {
+    /// False alarms where nothing was planted.
+    pub alarms: Alarm,
+    /// Each type of effect.
+    pub kinds: Vec<KindRates>,
+    /// How often a planted type (first) was named another (second): single effects with the verdict `named`.
+    pub confusion: Vec<(String, String, usize)>,
+    /// Names that were given, and how many of them were right, over all single effects.
+    pub named: [usize; 2],
+    /// Pairs: how many, and in how many both were named or in their classes.
+    pub pairs: [usize; 2],
+    /// What no candidate is: how many, how many got no name, how many got a confident false name.
+    pub unlisted: [usize; 3],
+    /// Bumps by size: ratio, how many, how many were found, mean overlap of the places.
+    pub bumps: Vec<(f64, usize, usize, f64)>,
+}
+
+/// False alarms with their 95 % interval (Clopper and Pearson, Biometrika 26 (1934) 404).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Alarm {
+    /// The cases.
+    pub cases: usize,
+    /// The alarms.
+    pub alarms: usize,
+    /// The interval of their probability.
+    pub interval: [f64; 2],
+}
+
+/// What is found of a type of effect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct KindRates {
+    /// The type.
+    pub kind: String,
+    /// By size, the smallest first.
+    pub sizes: Vec<SizeRates>,
+    /// The smallest size that was found in 80 % of cases, as a ratio to the noise; `None`: none of those tried.
+    pub smallest: Option<f64>,
+}
+
+/// What is found of a type at one size.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SizeRates {
+    /// The size as a ratio to the noise.
+    pub ratio: f64,
+    /// The cases.
+    pub cases: usize,
+    /// With any alarm.
+    pub detected: usize,
+    /// With the type in the class.
+    pub in_class: usize,
+    /// With the type named alone.
+    pub named: usize,
+    /// The median of the sizes in the effect's own unit, without their signs.
+    pub size: f64,
+}
+
+/// The rates of outcomes.
+pub fn rates(outcomes: &[Outcome]) -> Rates {
+    let of = |what: &'static str| outcomes.iter().filter(move |o| o.planted.what == what);
+    let alarm = |o: &&Outcome| !matches!(o.word, Word::None | Word::NotVisible);
+    let (nothing, alarms) = (of("nothing").count(), of("nothing").filter(alarm).count());
+    let single: Vec<&Outcome> = outcomes
+        .iter()
+        .filter(|o| o.planted.effects.len() == 1 && o.planted.bump.is_none())
+        .collect();
+    let pairs: Vec<&Outcome> = outcomes.iter().filter(|o| o.planted.effects.len() == 2).collect();
+    let both = |o: &&&Outcome| o.planted.effects.iter().all(|(kind, ..)| in_class(o, kind));
+    let sure = |o: &&&Outcome| o.word == Word::Named;
+    let right = |o: &&&Outcome| o.effects.iter().all(|said| said.kind == o.planted.what);
+    Rates {
+        alarms: Alarm { cases: nothing, alarms, interval: interval(alarms, nothing) },
+        kinds: kinds(&single),
+        confusion: confusion(&single),
+        named: [
+            single.iter().filter(sure).count(),
+            single.iter().filter(sure).filter(right).count(),
+        ],
+        pairs: [pairs.len(), pairs.iter().filter(both).count()],
+        unlisted: [
+            of("unlisted").count(),
+            of("unlisted").filter(|o| o.word == Word::Unlisted).count(),
+            of("unlisted").filter(|o| o.word == Word::Named).count(),
+        ],
+        bumps: bumps(&of("bump").collect::<Vec<_>>()),
+    }
+}
+
+fn in_class(outcome: &Outcome, kind: &str) -> bool {
+    outcome.word != Word::None
+        && outcome.effects.iter().any(|said| said.class.iter().any(|other| other == kind))
+}
+
+fn kinds(single: &[&Outcome]) -> Vec<KindRates> {
+    let mut by_kind: BTreeMap<&str, BTreeMap<u64, Vec<&Outcome>>> = BTreeMap::new();
+    for &outcome in single {
+        let sizes = by_kind.entry(&outcome.planted.what).or_default();
+        // Ratios are not below zero, so that their bits are in their order.
+        sizes.entry(outcome.planted.ratio.to_bits()).or_default().push(outcome);
+    }
+    let of_kind = |(kind, sizes): (&str, BTreeMap<u64, Vec<&Outcome>>)| {
+        let sizes: Vec<SizeRates> = sizes.into_values().map(|own| of_size(kind, &own)).collect();
+        let found = |s: &&SizeRates| s.in_class as f64 >= FOUND * s.cases as f64;
+        let smallest = sizes.iter().find(found).map(|s| s.ratio);
+        KindRates { kind: kind.to_owned(), sizes, smallest }
+    };
+    by_kind.into_iter().map(of_kind).collect()
+}
+
+fn of_size(kind: &str, own: &[&Outcome]) -> SizeRates {
+    let count = |test: &dyn Fn(&Outcome) -> bool| own.iter().filter(|o| test(o)).count();
+    let mut sizes: Vec<f64> = own.iter().map(|o| o.planted.effects[0].2[0].abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    SizeRates {
+        ratio: own[0].planted.ratio,
+        cases: own.len(),
+        detected: count(&|o| !matches!(o.word, Word::None | Word::NotVisible)),
+        in_class: count(&|o| in_class(o, kind)),
+        named: count(&|o| o.word == Word::Named && o.effects.iter().all(|said| said.kind == kind)),
+        size: sizes[sizes.len() / 2],
+    }
+}
+
+fn confusion(single: &[&Outcome]) -> Vec<(String, String, usize)> {
+    let mut counts: BTreeMap<(String, String), usize> = BTreeMap::new();
+    for outcome in single.iter().filter(|o| o.word == Word::Named) {
+        for said in &outcome.effects {
+            *counts.entry((outcome.planted.what.clone(), said.kind.clone())).or_default() += 1;
+        }
+    }
+    counts.into_iter().map(|((planted, named), n)| (planted, named, n)).collect()
+}
+
+fn bumps(all: &[&Outcome]) -> Vec<(f64, usize, usize, f64)> {
+    let mut by_size: BTreeMap<u64, Vec<&Outcome>> = BTreeMap::new();
+    for &outcome in all {
+        by_size.entry(outcome.planted.ratio.to_bits()).or_default().push(outcome);
+    }
+    let of_size = |own: Vec<&Outcome>| {
+        let found = own.iter().filter(|o| o.word != Word::None).count();
+        let overlaps: f64 = own.iter().filter_map(|o| o.overlap).sum();
+        (own[0].planted.ratio, own.len(), found, overlaps / own.len() as f64)
+    };
+    by_size.into_values().map(of_size).collect()
+}
+
+/// The 95 % interval of a probability from `k` of `n`.
+fn interval(k: usize, n: usize) -> [f64; 2] {
+    let (k, n) = (k as f64, n as f64);
+    let quantile =
+        |a: f64, b: f64, p: f64| Beta::new(a, b).map_or(f64::NAN, |law| law.inverse_cdf(p));
+    let low = if k > 0.0 { quantile(k, n - k + 1.0, 0.025) } else { 0.0 };
+    let high = if k < n { quantile(k + 1.0, n - k, 0.975) } else { 1.0 };
+    [low, high]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 9 of 200: 2.1 to 8.4 % (as an exact binomial test gives in R's `binom.test(9, 200)`: 0.02078, 0.08370).
+    #[test]
+    fn the_interval_is_that_of_clopper_and_pearson() {
+        let [low, high] = interval(9, 200);
+        assert!((low - 0.020_78).abs() < 5e-5 && (high - 0.083_70).abs() < 5e-5, "{low} {high}");
+    }
+}

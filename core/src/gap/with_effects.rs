@@ -1,0 +1,78 @@
+//! A forward map with the effects that a study has already: what a search begins with.
+
+use crate::data::Parameter;
+use crate::linalg::Matrix;
+use crate::plugin::Forward;
+use crate::plugin::effect::{Placed, with_tangents};
+
+/// A forward map whose parameters are those of another and then the unknowns of effects on top of it.
+pub struct WithEffects<'a> {
+    forward: &'a dyn Forward,
+    effects: Vec<Placed<'a>>,
+}
+
+impl<'a> WithEffects<'a> {
+    /// A forward map with effects.
+    pub fn new(forward: &'a dyn Forward, effects: Vec<Placed<'a>>) -> Self {
+        Self { forward, effects }
+    }
+
+    /// The unknowns: those of the forward map, then those of the effects.
+    pub fn parameters(&self, own: &[Parameter]) -> Vec<Parameter> {
+        let unknowns = self.effects.iter().flat_map(Placed::hyperparameters);
+        let parameter = |unknown: crate::plugin::Hyperparameter| Parameter {
+            symbol: unknown.symbol,
+            unit: unknown.unit,
+            ..Parameter::plain(&unknown.name, unknown.prior)
+        };
+        own.iter().cloned().chain(unknowns.map(parameter)).collect()
+    }
+
+    /// Each effect with its values among those of all unknowns.
+    fn placed<'b>(&'b self, point: &'b [f64]) -> impl Iterator<Item = (&'b Placed<'b>, &'b [f64])> {
+        let mut begin = self.forward.dimension();
+        self.effects.iter().map(move |effect| {
+            let own = begin..begin + effect.absent().len();
+            begin = own.end;
+            (effect, &point[own])
+        })
+    }
+}
+
+impl Forward for WithEffects<'_> {
+    fn dimension(&self) -> usize {
+        self.forward.dimension() + self.effects.iter().map(|e| e.absent().len()).sum::<usize>()
+    }
+
+    fn outputs(&self) -> usize {
+        self.forward.outputs()
+    }
+
+    fn mean(&self, points: &Matrix) -> Matrix {
+        let own: Vec<usize> = (0..self.forward.dimension()).collect();
+        let mut means = self.forward.mean(&points.select_columns(&own));
+        for i in 0..means.rows() {
+            let response = self
+                .placed(points.row(i))
+                .fold(means.row(i).to_vec(), |response, (effect, values)| {
+                    effect.apply(&response, values)
+                });
+            means.row_mut(i).copy_from_slice(&response);
+        }
+        means
+    }
+
+    fn jacobian(&self, point: &[f64]) -> Matrix {
+        self.mean_and_jacobian(point).1
+    }
+
+    fn mean_and_jacobian(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
+        let (mean, jacobian) = self.forward.mean_and_jacobian(&point[..self.forward.dimension()]);
+        let (response, tangents) = with_tangents(self.placed(point), mean, &jacobian);
+        (response, tangents.transposed())
+    }
+
+    fn failure(&self) -> Option<String> {
+        self.forward.failure()
+    }
+}

@@ -1,0 +1,164 @@
+//! The figures of the gap.
+
+use maud::{Markup, html};
+
+use crate::gap::account::{Account, Passed};
+use crate::report::chart::{
+    Axis, Band, Curve, Key, Panel, Row, Strip, residual_map, row_chart, small_multiples,
+};
+use crate::report::findings::Findings;
+use crate::report::gap::on;
+use crate::report::number::{fixed, typeset};
+use crate::report::page::{Caption, Numbers};
+use crate::report::scale::{extent, padded};
+use crate::report::section::{Curves, axis_unit, response_label, response_unit};
+
+/// The most curves of a map.
+const MOST_CURVES: usize = 60;
+
+/// The most types that are shown by their evidence.
+const MOST_LEADERS: usize = 14;
+
+/// The residual maps without and with what was found.
+pub fn maps(findings: &Findings, account: &Account, numbers: &mut Numbers) -> Markup {
+    let unit = axis_unit(findings);
+    let places = || account.curves.iter().flat_map(|c| &c.at).map(|&t| unit.show(t));
+    let domain = extent(places()).unwrap_or((0.0, 1.0));
+    let name = findings.layouts.blocks[0].abscissa().map_or("", |(name, ..)| name);
+    let x = Axis::new(unit.label(name), domain).ticks(6);
+    let map = |k: usize| {
+        let strips: Vec<Strip> = account
+            .curves
+            .iter()
+            .enumerate()
+            .filter(|(_, curve)| !curve.measured.is_empty())
+            .take(MOST_CURVES)
+            .map(|(s, curve)| {
+                let each = curve.measured.iter().zip(&curve.at);
+                let spots = account.regions[k].iter().filter(|spot| spot.curves.contains(&s));
+                let scenario = curve.scenario.as_ref().map(|s| format!(" · {s}"));
+                Strip {
+                    name: format!("{}{}", curve.name, scenario.unwrap_or_default()),
+                    points: each.map(|(&i, t)| (unit.show(*t), account.left[k][i])).collect(),
+                    outlines: spots
+                        .map(|spot| (unit.show(spot.span.0), unit.show(spot.span.1)))
+                        .collect(),
+                }
+            })
+            .collect();
+        let title = ["without the effects", "with them"][k];
+        residual_map(&strips, &x, &format!("residual map {title}"))
+    };
+    let both = !account.additions.is_empty();
+    let drawings: Vec<String> = if both { vec![map(0), map(1)] } else { vec![map(0)] };
+    let shown = account.curves.len().min(MOST_CURVES);
+    let further = match account.curves.len() - shown {
+        0 => String::new(),
+        n => format!(" {n} further curves found no room."),
+    };
+    let which =
+        if both { "above without, below with what was found" } else { "no effect was found" };
+    let caption = Caption::new(
+        format!(
+            "What calibration cannot absorb of the difference between the replicates' mean and the calibrated \
+             response, in standard deviations of what noise and emulator make of it ({which}). Blue: measured above \
+             the model; red: below; the darkest colour is six or more. Outlined: places that are wrong beyond \
+             doubt, all of them together with the level of the tests.{further}"
+        ),
+        "white noise of standard deviation one where nothing is missing.",
+        "colour that stays with what was found; one sensor alone points at its chain, all sensors together at the \
+         model.",
+    );
+    numbers.figure(&drawings, &[], &caption)
+}
+
+/// What was measured against the calibrated responses without and with what was found.
+pub fn curves(findings: &Findings, account: &Account, numbers: &mut Numbers) -> Markup {
+    let outlines = Curves::of(findings);
+    let unit = response_unit(findings);
+    let both = !account.additions.is_empty();
+    let measured =
+        |i: usize| if account.counts[i] > 0.0 { unit.show(account.means[i]) } else { f64::NAN };
+    let panels: Vec<Panel> = outlines
+        .panels
+        .iter()
+        .map(|outline| {
+            let edges = |i: usize| {
+                let half = 1.96 * unit.show(account.sd[i]);
+                (account.counts[i] > 0.0).then(|| (measured(i) - half, measured(i) + half))
+            };
+            let curve = |class, name: &str, value: &dyn Fn(usize) -> f64| Curve {
+                class,
+                name: name.to_owned(),
+                points: outline.curve(value),
+            };
+            let mut curves = vec![
+                curve("s-mean", "measured", &measured),
+                curve("s-reference", "without", &|i| unit.show(account.response[0][i])),
+            ];
+            if both {
+                curves.push(curve("s-map", "with", &|i| unit.show(account.response[1][i])));
+            }
+            Panel {
+                title: outline.title.clone(),
+                remark: String::new(),
+                bands: vec![Band { class: "s-band", edges: outline.band(edges) }],
+                curves,
+            }
+        })
+        .collect();
+    let lines = panels.iter().flat_map(|p| p.curves.iter().flat_map(|c| c.points.iter()));
+    let range = padded(extent(lines.map(|p| p.1)).unwrap_or((0.0, 1.0)), 0.06);
+    let x = Axis::new(outlines.label.as_str(), outlines.domain).ticks(6);
+    let y = Axis::new(response_label(findings), range).ticks(4);
+    let mut keys = vec![
+        Key::line("s-mean", "mean of the replicates"),
+        Key::area("s-band", "a replicate's 95 % interval"),
+        Key::line("s-reference", "calibrated without the effects"),
+    ];
+    if both {
+        keys.push(Key::line("s-map", "calibrated with them"));
+    }
+    let caption = Caption::new(
+        format!(
+            "Measured against simulated, both calibrated to the replicates that were not set aside.{}",
+            outlines.left_out_sentence()
+        ),
+        "the grey band is of the replicates, by the noise that was found in them.",
+        "where the orange line leaves the blue one for the black one.",
+    );
+    let drawings = small_multiples(&panels, &x, &y, "measured and simulated curves");
+    numbers.figure(&drawings, &keys, &caption)
+}
+
+/// The best of each type by evidence.
+pub fn leaders(step: &Passed, numbers: &mut Numbers) -> Markup {
+    let mut seen: Vec<&str> = Vec::new();
+    let mut rows: Vec<Row> = Vec::new();
+    let lowest = step.leaders.iter().map(|l| l.log_weight).filter(|w| w.is_finite());
+    let lowest = lowest.fold(0.0, f64::min) - 1.0;
+    for leader in &step.leaders {
+        if seen.contains(&leader.kind.as_str()) || rows.len() == MOST_LEADERS {
+            continue;
+        }
+        seen.push(&leader.kind);
+        rows.push(Row {
+            name: leader.kind.clone(),
+            value: leader.log_weight - lowest,
+            text: format!(
+                "{}{} · score {}",
+                typeset(&fixed(leader.log_weight, 1)),
+                on(&leader.on),
+                fixed(leader.score, 1)
+            ),
+        });
+    }
+    let caption = Caption::new(
+        "Candidates by evidence: the logarithm of the probability of the data with the best version of each type, \
+         relative to the best of all, every type with the same prior mass divided among its places; parameters and \
+         effect calibrated together.",
+        "",
+        "types within three of the best: these data cannot tell them apart.",
+    );
+    html! { (numbers.figure(&[row_chart(&rows, "bar s-part", "candidates by evidence")], &[], &caption)) }
+}

@@ -1,0 +1,191 @@
+//! The tables of the gap.
+
+use maud::Markup;
+
+use crate::gap::account::Account;
+use crate::report::findings::{Findings, GapFindings};
+use crate::report::gap::{on, p_value};
+use crate::report::number::{fixed, percent, significant};
+use crate::report::page::{Caption, Numbers};
+use crate::report::scale::ShownUnit;
+use crate::report::section::{axis_unit, response_unit};
+use crate::report::table::Table;
+
+/// How the gap fares on what was set aside.
+pub fn held_out(findings: &Findings, account: &Account, numbers: &mut Numbers) -> Markup {
+    let unit = response_unit(findings);
+    let rmse = unit.label("RMSE");
+    let mut table = Table::new(
+        &["set aside"],
+        &[
+            "number",
+            "gap without",
+            "with",
+            "closed",
+            "95 % interval",
+            &rmse,
+            "with",
+            "inside 95 %",
+            "with",
+        ],
+    );
+    for part in &account.held_out {
+        let proof = &part.proof;
+        let mut row = |name: String, c: &crate::gap::prove::Comparison, whole: bool| {
+            let interval = format!("{} to {}", percent(c.lower), percent(c.upper));
+            let mut cells =
+                vec![name, c.replicates.to_string(), fixed(c.before, 3), fixed(c.after, 3)];
+            cells.extend([percent(c.closed), interval]);
+            if whole {
+                cells.extend(proof.rmse.map(|x| significant(unit.show(x), 3)));
+                cells.extend(proof.coverage.map(percent));
+            }
+            table.row(cells);
+        };
+        row(part.kind.words().to_owned(), &proof.all, true);
+        if proof.conditions.len() > 1 {
+            for condition in &proof.conditions {
+                let name = condition.scenario.clone().unwrap_or_default();
+                row(format!("· {name}"), &condition.comparison, false);
+            }
+        }
+    }
+    let caption = Caption::new(
+        "What was set aside before anything was looked at, against the calibrated response without and with what was \
+         found. The gap is the root of the whitened mean square misfit less what noise makes of it, in standard \
+         deviations of the noise; closed is the share of its square; intervals pair the misfits of each \
+         replicate.",
+        "sampling of the replicates (Student's law).",
+        "an interval above zero in all, and below zero under no condition.",
+    );
+    numbers.table(&table, &caption)
+}
+
+/// The steps of the search.
+pub fn path(account: &Account, numbers: &mut Numbers) -> Markup {
+    let mut table =
+        Table::new(&["step", "added", "dropped"], &["p of score", "p of place", "p of energy"]);
+    for (i, step) in account.path.iter().enumerate() {
+        let added: Vec<String> =
+            step.added.iter().map(|(kind, place)| format!("`{kind}`{}", on(place))).collect();
+        let mut cells = vec![(i + 1).to_string(), added.join(", "), step.dropped.join(", ")];
+        cells.extend(step.p.map(p_value));
+        table.row(cells);
+    }
+    let mut last = vec![String::from("end"), String::new(), String::new()];
+    last.extend(account.p[1].map(p_value));
+    table.emphasised(last);
+    let caption = Caption::new(
+        "The path of the search: at each step the probabilities, if nothing more were missing, of the largest \
+         candidate's score, of the place that disagrees most and of the whole misfit, and what was added.",
+        "data simulated without a missing effect, with the noise estimated and the model calibrated anew.",
+        "probabilities that are no longer small at the end.",
+    );
+    numbers.table(&table, &caption)
+}
+
+/// The calibrated parameters without and with what was found.
+pub fn parameters(gap: &GapFindings, numbers: &mut Numbers) -> Markup {
+    let account = &gap.account;
+    let mut table = Table::new(
+        &["parameter"],
+        &["without", "sd", "with", "sd", "shift in prior sd", "posterior mean without", "with"],
+    );
+    for shift in &account.parameters {
+        let unit = ShownUnit::for_values(&shift.unit, shift.value);
+        let show = |x: f64| significant(unit.show(x), 4);
+        let [before, after] = shift.value;
+        let mark = |k: usize| if shift.at_bound[k] { " (at a bound)" } else { "" };
+        let mut cells = vec![
+            unit.label(&shift.name),
+            format!("{}{}", show(before), mark(0)),
+            significant(unit.show(shift.sd[0]), 2),
+            format!("{}{}", show(after), mark(1)),
+            significant(unit.show(shift.sd[1]), 2),
+            fixed((after - before) / shift.prior_sd, 2),
+        ];
+        let moved = gap.added.iter().flat_map(|a| &a.parameters).find(|m| m.name == shift.name);
+        if let Some(moved) = moved {
+            cells.extend(
+                moved.mean.iter().zip(&moved.sd).map(|(mean, sd)| {
+                    format!("{} ± {}", show(*mean), significant(unit.show(*sd), 2))
+                }),
+            );
+        }
+        table.row(cells);
+    }
+    let caption = Caption::new(
+        "The parameters, calibrated without and with what was found to the replicates that were not set aside \
+         (largest posterior density, normal approximation), and the posteriors of the two studies from all data.",
+        "posterior.",
+        "parameters that had absorbed what was missing and move back.",
+    );
+    numbers.table(&table, &caption)
+}
+
+/// What could have been seen of each type.
+pub fn visible(account: &Account, numbers: &mut Numbers) -> Markup {
+    let mut table = Table::new(
+        &["candidate", "where it shows best"],
+        &["absorbed", "smallest size seen in 80 %"],
+    );
+    let mut kinds: Vec<&str> = account.visible.iter().map(|v| v.kind.as_str()).collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    for kind in kinds {
+        let own = account.visible.iter().filter(|v| v.kind == kind);
+        let Some(best) = own.min_by(|a, b| a.smallest.total_cmp(&b.smallest)) else { continue };
+        let size = account.sizes.iter().find(|size| size.kind == kind);
+        let smallest = size.map_or_else(String::new, |size| {
+            let unit = ShownUnit::for_values(&size.unit, [best.smallest]);
+            format!("{} {}", size.name, unit.text(best.smallest, 2))
+        });
+        let place = on(&best.on);
+        let place = if place.is_empty() { " everywhere" } else { &place };
+        table.row([
+            kind.to_owned(),
+            place.trim_start().to_owned(),
+            percent(best.absorbed),
+            smallest,
+        ]);
+    }
+    let caption = Caption::new(
+        "What this experiment could see: for each type the place where it shows best, the share of it that the \
+         calibrated parameters absorb there, and the smallest size that would be found in 80 % of cases \
+         (linearised).",
+        "",
+        "types of which nearly all is absorbed: that none was found says nothing of them.",
+    );
+    numbers.table(&table, &caption)
+}
+
+/// The noise of the replicates.
+pub fn noise(findings: &Findings, account: &Account, numbers: &mut Numbers) -> Markup {
+    let response = response_unit(findings);
+    let axis = axis_unit(findings);
+    let (sd, offset, clock) = (response.label("sd"), response.label("offset"), axis.label("clock"));
+    let mut table = Table::new(&["curve"], &[&sd, "autoregression", &offset, "gain [%]", &clock]);
+    for curve in account.curves.iter().filter(|curve| !curve.measured.is_empty()) {
+        let scenario = curve.scenario.as_ref().map(|s| format!(" · {s}")).unwrap_or_default();
+        let assumed = if curve.assumed { " (assumed)" } else { "" };
+        let memory: Vec<String> = curve.memory.iter().map(|a| fixed(*a, 2)).collect();
+        let memory = if memory.is_empty() { String::from("white") } else { memory.join(", ") };
+        let [o, g, c] = curve.wander;
+        table.row([
+            format!("{}{scenario}{assumed}", curve.name),
+            significant(response.show(curve.sd), 3),
+            memory,
+            significant(response.show(o), 2),
+            significant(100.0 * g, 2),
+            significant(axis.show(c), 2),
+        ]);
+    }
+    let caption = Caption::new(
+        "The noise of one replicate, from the differences between replicates alone: its standard deviation along the \
+         curve, how a value follows from those before it, and the standard deviations of what whole replicates \
+         differ by.",
+        "replicates.",
+        "curves without replicates, whose noise is assumed.",
+    );
+    numbers.table(&table, &caption)
+}

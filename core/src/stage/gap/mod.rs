@@ -1,0 +1,128 @@
+//! Stage 7: where data and calibrated model disagree, what is missing, and whether the gap shrinks with it.
+//!
+//! What proves is set aside before anything is looked at: the stage calibrates anew, with the rest alone.
+
+pub mod add;
+pub(super) mod search;
+mod study_file;
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use crate::gap::account::Account;
+use crate::gap::name::Word;
+use crate::run::{Artifact, Kept, Observer, RunDirectory, Stop, files};
+use crate::study::Study;
+
+use super::Known;
+use super::gap_model::{self, Pieces};
+
+const FOLDER: &str = "7-gap";
+const FILE: &str = "gap.toml";
+
+impl Artifact for Account {
+    fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
+        // Unlike JSON, TOML has words for numbers that are not finite.
+        let text = toml::to_string(self)
+            .map_err(|error| Stop::new(format!("what the search found: {error}")))?;
+        files::write_atomic(&folder.join(FILE), text.as_bytes())?;
+        Ok(vec![FILE.to_owned()])
+    }
+
+    fn load(folder: &Path) -> Result<Self, Stop> {
+        let path = folder.join(FILE);
+        let text = String::from_utf8_lossy(&files::read(&path)?).into_owned();
+        toml::from_str(&text)
+            .map_err(|error| Stop::new(format!("cannot read {}: {error}", path.display())))
+    }
+}
+
+/// Searches for what is missing; `None` where the study has no measurements.
+pub fn stage(
+    study: &Study,
+    known: &Known<'_>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Option<Kept<Account>>, Stop> {
+    let Some(measured) = &known.data.value.measured else { return Ok(None) };
+    observer.begin("gap", "", 0);
+    let pieces = Pieces::of(study)?;
+    let inside = inside(pieces.as_ref(), study, known, run, observer)?;
+    let kept = run.keep(FOLDER, &inputs(study, known), observer, |_| {
+        search::account(study, known, &inside, measured, observer)
+    })?;
+    observer.end("gap", &summary(&kept.value));
+    Ok(Some(kept))
+}
+
+/// The pieces that may be missing inside the model, ready for a search.
+pub(super) fn inside<'a>(
+    pieces: Option<&'a Pieces>,
+    study: &'a Study,
+    known: &'a Known<'a>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<search::Inside<'a>, Stop> {
+    pieces.map(|pieces| gap_model::candidates(pieces, study, known, run, observer)).transpose()
+}
+
+/// What the stage found in an earlier run with the same inputs.
+pub fn kept(
+    study: &Study,
+    known: &Known<'_>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Option<Kept<Account>>, Stop> {
+    if run.has(FOLDER, &inputs(study, known))? {
+        return stage(study, known, run, observer);
+    }
+    Ok(None)
+}
+
+/// Everything that the search depends on.
+pub(super) fn inputs(study: &Study, known: &Known<'_>) -> Value {
+    let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.prior)).collect();
+    let effects: Vec<_> =
+        study.effects.iter().map(|e| (e.built.name, &e.built.options, &e.common)).collect();
+    let candidates = study.gap.candidates.iter();
+    let candidates: Vec<_> =
+        candidates.map(|c| (c.built.name, &c.built.options, &c.common)).collect();
+    json!([
+        known.data.hash,
+        known.origin,
+        known.numerics.map(|n| &n.hash),
+        study.numerical_error.as_ref().map(|section| section.written.whole()),
+        known.region,
+        laws,
+        effects,
+        study.gap.keys,
+        candidates,
+        pieces(study),
+        study.about.seed,
+        env!("CARGO_PKG_VERSION"),
+    ])
+}
+
+/// What the study says of pieces inside the model.
+fn pieces(study: &Study) -> Value {
+    let inside = &study.gap.inside;
+    let terms: Vec<_> =
+        inside.terms.iter().map(|t| (t.built.name, &t.built.options, &t.common)).collect();
+    json!([inside.switches, terms])
+}
+
+fn summary(account: &Account) -> String {
+    let names: Vec<&str> = account.additions.iter().map(|a| a.name.as_str()).collect();
+    match account.verdict.word {
+        Word::None => "data and model agree within the noise".to_owned(),
+        Word::Named => format!("missing: {}", names.join(", ")),
+        Word::Class => {
+            let class: Vec<&str> =
+                account.additions.iter().flat_map(|a| a.class.iter().map(String::as_str)).collect();
+            format!("missing: one of {}", class.join(", "))
+        }
+        Word::Unlisted => "something is missing that no candidate explains".to_owned(),
+        Word::NotVisible => "whatever may be missing, the parameters absorb it".to_owned(),
+    }
+}

@@ -1,0 +1,214 @@
+//! From the study's data and emulator to the account of a search.
+
+use crate::data::{Observations, Parameter};
+use crate::gap::account::{Account, HeldOut};
+use crate::gap::candidates::{Candidate, proposed};
+use crate::gap::experiment::Experiment;
+use crate::gap::hold_out::{HeldOutData, Kind, Split, split};
+use crate::gap::name::{Found, Options, search};
+use crate::gap::noise::Noise;
+use crate::gap::prove::prove;
+use crate::gap::whitener::condensed;
+use crate::gap::wide::Wide;
+use crate::gap::with_effects::WithEffects;
+use crate::linalg::Matrix;
+use crate::math::random::Stream;
+use crate::plugin::Forward;
+use crate::plugin::discrepancy::CommonError;
+use crate::plugin::effect::Situation;
+use crate::run::{Observer, Stop};
+use crate::stage::calibrate::stated_variance;
+use crate::stage::read::Measured;
+use crate::stage::{Known, best_fit, stream};
+use crate::study::Study;
+
+/// The best of the base model's local maxima from which the calibration starts.
+const STARTS: usize = 4;
+
+/// The share of the false alarms that is spent on names.
+const NAMES: f64 = 0.6;
+
+/// All that a search begins with.
+pub struct Prepared<'a> {
+    base: &'a Base<'a>,
+    split: &'a Split,
+    starts: Vec<Vec<f64>>,
+    /// What is not set aside.
+    pub experiment: &'a Experiment<'a>,
+    /// What is tried.
+    pub candidates: &'a [Candidate],
+    /// How the search judges.
+    pub options: Options,
+    /// The stage's random numbers.
+    pub random: Stream,
+}
+
+/// Pieces that may be missing inside the model, as candidates with their forward map.
+pub type Inside<'a> = Option<(Vec<Candidate>, Wide<'a>)>;
+
+/// Splits the measurements, finds the best fit to what is not set aside, and asks the effects for proposals.
+pub fn prepared<T>(
+    study: &Study,
+    known: &Known<'_>,
+    inside: &Inside<'_>,
+    use_it: impl FnOnce(&Prepared<'_>) -> Result<T, Stop>,
+) -> Result<T, Stop> {
+    let Some(measured) = &known.data.value.measured else {
+        return Err(Stop::new("the study has no `[measurements]` to search for a gap"));
+    };
+    let random = stream(study, "gap");
+    let split = split(&measured.used, &study.gap.keys.hold_out, &random.named("hold out"));
+    let forward = WithEffects::new(known.forward, study.placed_effects());
+    let parameters = forward.parameters(&study.parameters);
+    let wide = inside.as_ref().map(|(_, wide)| wide.with_effects(study.placed_effects()));
+    let wide = wide.as_ref();
+    let base = Base { study, known, forward: &forward, wide, parameters: &parameters };
+    let starts = base.starts(&split.training, &random)?;
+    let experiment = base.experiment(&split.training, &starts[0])?;
+    let response = base.response(&starts[0]);
+    let noise = Noise::of(&experiment, &response, None).sd(&experiment, &response);
+    let situation = Situation { layouts: &study.layouts, response: &response, noise: &noise };
+    let mut candidates = candidates(study, &situation)?;
+    candidates.extend(inside.iter().flat_map(|(pieces, _)| pieces.iter().cloned()));
+    use_it(&Prepared {
+        base: &base,
+        split: &split,
+        starts,
+        experiment: &experiment,
+        candidates: &candidates,
+        options: options(study),
+        random,
+    })
+}
+
+impl<'a> Prepared<'a> {
+    /// Searches for what is missing.
+    pub fn search(&'a self) -> Result<Found<'a>, Stop> {
+        let Self { experiment, candidates, options, .. } = *self;
+        let found = search(experiment, candidates, &self.starts, options, &self.random);
+        if let Some(failure) = self.base.known.forward.failure() {
+            return Err(Stop::new(failure));
+        }
+        let stop = || {
+            Stop::new("the model gave no answer at the best fit")
+                .help("check the priors and the model's own limits")
+        };
+        found.ok_or_else(stop)
+    }
+}
+
+/// Searches and proves.
+pub fn account(
+    study: &Study,
+    known: &Known<'_>,
+    inside: &Inside<'_>,
+    measured: &Measured,
+    observer: &dyn Observer,
+) -> Result<Account, Stop> {
+    prepared(study, known, inside, |prepared| {
+        if prepared.candidates.is_empty() {
+            observer.warn("no effect proposes itself for these data: only the tests are made");
+        }
+        let found = prepared.search()?;
+        let mut account = Account::of(&found, prepared.candidates, prepared.options);
+        for part in &prepared.split.held_out {
+            account.held_out.extend(prepared.base.proof(part, &measured.used, &found)?);
+        }
+        Ok(account)
+    })
+}
+
+fn options(study: &Study) -> Options {
+    let keys = &study.gap.keys;
+    let alarm = keys.false_alarm.get();
+    Options {
+        naming: NAMES * alarm,
+        unlisted: (1.0 - NAMES) * alarm,
+        simulations: keys.simulations.get(),
+        most: keys.effects.get(),
+    }
+}
+
+/// What the study tries: proposals of the installed effects, and effects of its own.
+fn candidates(study: &Study, situation: &Situation<'_>) -> Result<Vec<Candidate>, Stop> {
+    let mut all = proposed(study.gap.keys.candidates.as_deref(), situation).map_err(Stop::new)?;
+    for section in &study.gap.candidates {
+        let kind = section.common.name.as_ref().map_or(section.built.name, AsRef::as_ref);
+        all.push(
+            Candidate::of(kind, section.built.name, &section.built.options).map_err(Stop::new)?,
+        );
+    }
+    Ok(all)
+}
+
+/// The study's model as the search begins with it.
+struct Base<'a> {
+    study: &'a Study,
+    known: &'a Known<'a>,
+    forward: &'a WithEffects<'a>,
+    wide: Option<&'a Wide<'a>>,
+    parameters: &'a [Parameter],
+}
+
+impl<'a> Base<'a> {
+    fn starts(&self, data: &Observations, random: &Stream) -> Result<Vec<Vec<f64>>, Stop> {
+        let stream = random.named("best fit");
+        let mut maxima = best_fit::points(self.parameters, data, self.forward, &stream)?;
+        maxima.truncate(STARTS);
+        Ok(maxima)
+    }
+
+    fn response(&self, point: &[f64]) -> Vec<f64> {
+        self.forward.mean(&Matrix::from_vec(1, point.len(), point.to_vec())).into_vec()
+    }
+
+    /// The measurements with the forward map and all errors that replicates share.
+    fn experiment(&self, data: &Observations, point: &[f64]) -> Result<Experiment<'a>, Stop> {
+        let Self { study, known, .. } = self;
+        let layouts = &study.layouts;
+        let mut experiment = Experiment::new(layouts, self.parameters, self.forward, data);
+        experiment.wide = self.wide;
+        experiment.region = known.region.map(<[_]>::to_vec);
+        experiment.common = self.common(data)?;
+        let response = self.response(point);
+        let noise = Noise::of(&experiment, &response, None);
+        experiment.common = condensed(&experiment, &noise, &response);
+        Ok(experiment)
+    }
+
+    fn common(&self, data: &Observations) -> Result<Vec<CommonError>, Stop> {
+        let Self { study, known, .. } = self;
+        let mut common: Vec<CommonError> =
+            self.wide.iter().flat_map(|wide| wide.common.clone()).collect();
+        if let Some(fitted) = known.fitted {
+            let stated = stated_variance(study, data, known.forward)?;
+            common.push(fitted.value.covariance(study, stated.as_deref())?);
+        }
+        if let (Some(kept), Some(section)) = (known.numerics, &study.numerical_error) {
+            common.push(kept.value.common_error(section.written.whole()));
+        }
+        Ok(common)
+    }
+
+    /// How the two responses fare on what was set aside.
+    fn proof(
+        &self,
+        part: &HeldOutData,
+        all: &Observations,
+        found: &Found<'_>,
+    ) -> Result<Option<HeldOut>, Stop> {
+        let point = &found.last.fit.at.point[..self.parameters.len()];
+        let held_out = self.experiment(&part.data, point)?;
+        let first = found.path.first().map_or(&found.last, |step| &step.before);
+        let (before, after) = (&first.fit.at.response, &found.last.fit.at.response);
+        let noise = if part.kind == Kind::Replicates {
+            found.noise.restricted(found.system.experiment, &held_out)
+        } else {
+            // What the training never measured has its noise from the replicates that were set aside.
+            let whole = self.experiment(all, point)?;
+            Noise::of(&whole, after, None).restricted(&whole, &held_out)
+        };
+        let proof = prove(&held_out, &noise, before, after);
+        Ok(proof.map(|proof| HeldOut { kind: part.kind, names: part.names.clone(), proof }))
+    }
+}

@@ -1,0 +1,179 @@
+//! The study with what is missing, as a file beside the old one.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use crate::gap::account::{Account, Addition, Estimate};
+use crate::run::{Stop, files};
+use crate::stage::gap_model::Pieces;
+use crate::study::emit::{key, string, to_line};
+use crate::study::{Problems, Sources, Study, read};
+
+/// Writes `STUDY+EFFECT.toml` beside the study and returns its path. A file of that name with another text is set aside.
+pub fn write(study: &Study, path: &Path, account: &Account) -> Result<PathBuf, Stop> {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let new = path.with_file_name(format!("{}.toml", with_names(&stem, study, account)));
+    let text = text(study, path, account)?;
+    match std::fs::read_to_string(&new) {
+        Ok(old) if old == text => return Ok(new),
+        Ok(_) => set_aside(&new)?,
+        Err(_) => {}
+    }
+    files::write_atomic(&new, text.as_bytes())?;
+    Ok(new)
+}
+
+/// A name with those of the effects behind it: `sns+damping`.
+pub fn with_names(name: &str, study: &Study, account: &Account) -> String {
+    let effects = account.additions.iter().map(|addition| free_name(study, addition));
+    std::iter::once(name.to_owned()).chain(effects).collect::<Vec<_>>().join("+")
+}
+
+/// Renames a file to the first free name with `.old`.
+fn set_aside(path: &Path) -> Result<(), Stop> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let free = (1..).map(|n| match n {
+        1 => path.with_file_name(format!("{name}.old")),
+        n => path.with_file_name(format!("{name}.old{n}")),
+    });
+    let free = free.into_iter().find(|candidate| !candidate.exists());
+    let free = free.unwrap_or_else(|| unreachable!("numbers do not end"));
+    std::fs::rename(path, &free).map_err(|error| files::cannot_write(&free, &error))
+}
+
+/// The name of an addition, unlike those of the effects that the study has already.
+pub fn free_name(study: &Study, addition: &Addition) -> String {
+    let taken: Vec<String> = study.placed_effects().into_iter().map(|e| e.name).collect();
+    let mut name = addition.name.clone();
+    let mut count = 1;
+    while taken.contains(&name) {
+        count += 1;
+        name = format!("{}_{count}", addition.name);
+    }
+    name
+}
+
+/// The old study, and a block for each effect that says why it is there.
+fn text(study: &Study, path: &Path, account: &Account) -> Result<String, Stop> {
+    let file = path.file_name().unwrap_or_default().to_string_lossy();
+    let mut text = format!(
+        "# Written by `lacuna gap` from `{file}`: that study, word for word, and at its end what its data say is\n\
+         # missing. Run it like any other study.\n\n"
+    );
+    let within = account.additions.iter().filter(|addition| !addition.switches.is_empty());
+    let within: Vec<&Addition> = within.collect();
+    if within.is_empty() {
+        text.push_str(&renamed(study, &study.text, account));
+    } else {
+        text.push_str(&renamed(study, &edited(study, &within)?, account));
+    }
+    if !text.ends_with('\n') {
+        text.push('\n');
+    }
+    for line in reasons(account) {
+        text.push_str(&format!("\n# {line}"));
+    }
+    text.push('\n');
+    for addition in account.additions.iter().filter(|addition| addition.switches.is_empty()) {
+        text.push('\n');
+        text.push_str(&block(study, addition)?);
+    }
+    Ok(text)
+}
+
+/// The study with what is missing inside its model.
+fn edited(study: &Study, within: &[&Addition]) -> Result<String, Stop> {
+    let pieces = Pieces::of(study)?;
+    let pieces = pieces.ok_or_else(|| Stop::new("the study names no pieces of its model"))?;
+    let switches: Vec<&[usize]> = within.iter().map(|addition| &addition.switches[..]).collect();
+    let why: Vec<String> = within.iter().map(|addition| why(addition)).collect();
+    let edit = pieces.edit(study, &switches);
+    edit.text(study, why.concat().trim_end())
+        .map_err(|error| Stop::new(format!("the new study {error}")))
+}
+
+/// The study's text, with a name of its own where it gives one: two studies of one name share a run directory.
+fn renamed(study: &Study, text: &str, account: &Account) -> String {
+    let mut sources = Sources::default();
+    let source = sources.add_file(Path::new("study"), text.to_owned());
+    let root = read::read(source, &sources, &mut Problems::new());
+    let name = root.as_ref().and_then(|root| root.find("study.name"));
+    let Some(name) = name else { return text.to_owned() };
+    let mut text = text.to_owned();
+    text.replace_range(name.place.span.clone(), &string(&with_names(&study.name, study, account)));
+    text
+}
+
+/// Why the effects are added.
+fn reasons(account: &Account) -> Vec<String> {
+    let mut lines = Vec::new();
+    if let Some(step) = account.path.first() {
+        lines.push(format!(
+            "Without any missing effect, such a score has the probability {}, such a place {}, such a misfit {}.",
+            probability(step.p[0]),
+            probability(step.p[1]),
+            probability(step.p[2]),
+        ));
+    }
+    for part in &account.held_out {
+        let all = &part.proof.all;
+        lines.push(format!(
+            "On data that were set aside ({} of {}): gap {:.3} before, {:.3} after, in standard deviations of the noise; {:.0} % closed ({:.0} to {:.0} %).",
+            all.replicates,
+            part.kind.words(),
+            all.before,
+            all.after,
+            100.0 * all.closed,
+            100.0 * all.lower,
+            100.0 * all.upper,
+        ));
+    }
+    lines.extend(account.verdict.reasons.iter().cloned());
+    lines
+}
+
+fn probability(p: f64) -> String {
+    format!("{p:.4}").trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// What an addition is and how sure that is, in lines without `#`.
+fn why(addition: &Addition) -> String {
+    let mut text = format!("{}\n  {}\n", addition.title, addition.formula);
+    for Estimate { name, unit, value, sd } in &addition.unknowns {
+        let unit = match unit.as_str() {
+            "" | "1" => String::new(),
+            unit => format!(" {unit}"),
+        };
+        text.push_str(&format!("found: {name} = {value:.4e} ± {sd:.1e}{unit}\n"));
+    }
+    let own = addition.class.iter().filter(|kind| **kind != addition.kind);
+    let others: Vec<String> = own.map(|kind| format!("`{kind}`")).collect();
+    if others.is_empty() {
+        text.push_str(&format!("probability among the candidates: {:.2}\n", addition.probability));
+    } else {
+        text.push_str(&format!(
+            "These data cannot tell it from {} (its own probability: {:.2}).\n",
+            others.join(", "),
+            addition.probability
+        ));
+    }
+    text
+}
+
+fn block(study: &Study, addition: &Addition) -> Result<String, Stop> {
+    let mut text: String = why(addition).lines().map(|line| format!("# {line}\n")).collect();
+    text.push_str(&format!("[[effect]]\nuse = {}\n", string(&addition.plugin)));
+    text.push_str(&format!("name = {}\n", string(&free_name(study, addition))));
+    if !addition.on.is_empty() {
+        text.push_str(&format!("on = {}\n", line(&addition.on)?));
+    }
+    for (name, value) in &addition.options {
+        text.push_str(&format!("{} = {}\n", key(name), line(value)?));
+    }
+    Ok(text)
+}
+
+fn line(value: &impl Serialize) -> Result<String, Stop> {
+    to_line(value).map_err(|error| Stop::new(format!("the new study {error}")))
+}
