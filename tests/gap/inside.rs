@@ -14,7 +14,7 @@ use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, normal};
 use lacuna::run::{RunDirectory, Silent};
 use lacuna::stage::direct::Prepared;
-use lacuna::stage::gap_model::{Compared, Pieces, candidates, rivals};
+use lacuna::stage::gap_model::{Pieces, candidates, rivals};
 use lacuna::study::emit::to_toml;
 use lacuna::study::resolve::load_text;
 use lacuna::study::{Study, gap::Edit};
@@ -314,15 +314,15 @@ fn another_model_is_weighed_after_its_own_calibration() {
     let whitener = Whitener::new(&experiment, &noise, &response);
     let means = experiment.means().1;
     let base = fit(&system, &whitener, &means, &[100.0]);
-    let compared: Vec<Compared> = rivals
+    let compared: Vec<_> = rivals
         .iter()
-        .map(|rival| rival.compare(&experiment, &base, &noise, &Stream::root(4)).unwrap())
+        .map(|r| r.compare(&experiment, Vec::new(), &base, &noise, &Stream::root(4)).unwrap())
         .collect();
-    let gains = compared.iter().map(|c| c.with.log_evidence - c.without.log_evidence);
-    let gains: Vec<f64> = gains.collect();
-    assert!(gains[0] > 20.0, "{gains:?}");
-    let error = compared[1].with.error.hypot(compared[1].without.error);
-    assert!(gains[1].abs() < 4.0 * error + 1e-3, "{gains:?} {error}");
+    assert!(compared[0].log_odds > 20.0, "{compared:?}");
+    let stiffness = &compared[0].parameters[0];
+    assert!((stiffness.value - STIFFNESS).abs() < 4.0 * stiffness.sd, "{stiffness:?}");
+    let same = &compared[1];
+    assert!(same.log_odds.abs() < 4.0 * same.error + 1e-3, "{same:?}");
     let text = to_toml(&rivals[0].edit.applied(&study.resolved).unwrap()).unwrap();
     let written = loaded(&folder, &text);
     assert_eq!(written.model.unwrap().common.fixed.len(), 2, "{text}");

@@ -54,6 +54,22 @@ pub struct Account {
     pub left: [Vec<f64>; 2],
     /// How the gap fares on what was set aside.
     pub held_out: Vec<HeldOut>,
+    /// Other models in place of the study's, each after its own calibration.
+    #[serde(default)]
+    pub models: Vec<OtherModel>,
+}
+
+/// Another model against the study's, neither with effects that were found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OtherModel {
+    /// What the study calls it.
+    pub name: String,
+    /// The log of the probability of the data with it over that with the study's model.
+    pub log_odds: f64,
+    /// The standard error of that.
+    pub error: f64,
+    /// Its calibrated parameters: name, unit, value and standard deviation by the normal approximation.
+    pub parameters: Vec<Estimate>,
 }
 
 /// An effect as a study adds it.
@@ -228,6 +244,7 @@ impl Account {
             response: looks.map(|look| look.fit.at.response.clone()),
             left: looks.map(|look| look.statistics.left.clone()),
             held_out: Vec::new(),
+            models: Vec::new(),
             verdict,
         }
     }

@@ -49,8 +49,9 @@ pub fn stage(
     observer.begin("gap", "", 0);
     let pieces = Pieces::of(study)?;
     let inside = inside(pieces.as_ref(), study, known, run, observer)?;
+    let rivals = gap_model::rivals(study, known, run, observer)?;
     let kept = run.keep(FOLDER, &inputs(study, known), observer, |_| {
-        search::account(study, known, &inside, measured, observer)
+        search::account(study, known, &inside, &rivals, measured, observer)
     })?;
     observer.end("gap", &summary(&kept.value));
     Ok(Some(kept))
@@ -109,7 +110,10 @@ fn pieces(study: &Study) -> Value {
     let inside = &study.gap.inside;
     let terms: Vec<_> =
         inside.terms.iter().map(|t| (t.built.name, &t.built.options, &t.common)).collect();
-    json!([inside.switches, terms])
+    let models = inside.models.iter();
+    let models: Vec<_> =
+        models.map(|m| (m.section.built.name, &m.section.built.options, &m.keys)).collect();
+    json!([inside.switches, terms, models])
 }
 
 fn summary(account: &Account) -> String {

@@ -1,7 +1,7 @@
 //! From the study's data and emulator to the account of a search.
 
 use crate::data::{Observations, Parameter};
-use crate::gap::account::{Account, HeldOut};
+use crate::gap::account::{Account, HeldOut, OtherModel};
 use crate::gap::candidates::{Candidate, proposed};
 use crate::gap::experiment::Experiment;
 use crate::gap::hold_out::{HeldOutData, Kind, Split, split};
@@ -18,6 +18,7 @@ use crate::plugin::discrepancy::CommonError;
 use crate::plugin::effect::Situation;
 use crate::run::{Observer, Stop};
 use crate::stage::calibrate::stated_variance;
+use crate::stage::gap_model::Rival;
 use crate::stage::read::Measured;
 use crate::stage::{Known, best_fit, stream};
 use crate::study::Study;
@@ -97,11 +98,27 @@ impl<'a> Prepared<'a> {
     }
 }
 
+impl Prepared<'_> {
+    /// Other models against the study's, those that explain most first.
+    fn compared(&self, study: &Study, rivals: &[Rival<'_>], found: &Found<'_>) -> Vec<OtherModel> {
+        let first = found.path.first().map_or(&found.last, |step| &step.before);
+        let compare = |rival: &Rival<'_>| {
+            let stream = self.random.named("models").named(&rival.name);
+            let effects = study.placed_effects();
+            rival.compare(self.experiment, effects, &first.fit, &found.noise, &stream)
+        };
+        let mut models: Vec<OtherModel> = rivals.iter().filter_map(compare).collect();
+        models.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
+        models
+    }
+}
+
 /// Searches and proves.
 pub fn account(
     study: &Study,
     known: &Known<'_>,
     inside: &Inside<'_>,
+    rivals: &[Rival<'_>],
     measured: &Measured,
     observer: &dyn Observer,
 ) -> Result<Account, Stop> {
@@ -114,6 +131,7 @@ pub fn account(
         for part in &prepared.split.held_out {
             account.held_out.extend(prepared.base.proof(part, &measured.used, &found)?);
         }
+        account.models = prepared.compared(study, rivals, &found);
         Ok(account)
     })
 }
