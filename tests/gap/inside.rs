@@ -14,6 +14,7 @@ use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, normal};
 use lacuna::run::{RunDirectory, Silent};
 use lacuna::stage::direct::Prepared;
+use lacuna::stage::gap::add::{Begun, add};
 use lacuna::stage::gap_model::{Pieces, candidates, rivals};
 use lacuna::study::emit::to_toml;
 use lacuna::study::resolve::load_text;
@@ -326,4 +327,33 @@ fn another_model_is_weighed_after_its_own_calibration() {
     let text = to_toml(&rivals[0].edit.applied(&study.resolved).unwrap()).unwrap();
     let written = loaded(&folder, &text);
     assert_eq!(written.model.unwrap().common.fixed.len(), 2, "{text}");
+}
+
+/// The whole workflow: the drag is found among effects on the response, proven on replicates that were set aside, written
+/// into the equations of the study, and sampled with its parameter.
+#[test]
+fn the_study_with_the_drag_is_written_and_run() {
+    let (g, terminal) = (9.81, 20.0);
+    let fall = |t: f64| terminal * terminal / g * (g * t / terminal).cosh().ln();
+    let times: Vec<f64> = (1..=50).map(|i| 0.03 * f64::from(i)).collect();
+    let rest = REST.replace(r#"ensemble""#, "ensemble\"\nwalkers = 16\nsteps = 400");
+    let own = "\n[gap]\ncandidates = [\"gain\", \"drift\"]\nsimulations = 99\n";
+    let (folder, study) = study(&[FALL, &rest, own, DRAGS].concat(), fall, &times, 0.02);
+    let path = folder.path().join("study.toml");
+    fs::write(&path, &study.text).unwrap();
+    let mut run = RunDirectory::open(&folder.path().join("run")).unwrap();
+    let findings = lacuna::stage::find_gap(&study, &mut run, &Silent).unwrap();
+    let gap = findings.gap.as_ref().unwrap();
+    let account = &gap.account;
+    let kinds: Vec<&str> = account.additions.iter().map(|a| a.kind.as_str()).collect();
+    assert_eq!((account.verdict.word, &kinds[..]), (Word::Named, &["quadratic_friction"][..]));
+    assert!(account.held_out[0].proof.shrank, "{:?}", account.held_out);
+    let begun = Begun { study: &study, path: &path, settings: &[], findings: &findings, gap };
+    let (added, _) = add(&begun, &run, &Silent).unwrap();
+    let unknown = &added.unknowns[0];
+    assert_eq!(unknown.name, "quadratic_friction");
+    let exact = g / (terminal * terminal);
+    assert!((unknown.mean - exact).abs() < 4.0 * unknown.sd, "{unknown:?} {exact}");
+    let text = fs::read_to_string(&added.study).unwrap();
+    assert!(text.contains("# and nothing else") && !text.contains("[[effect]]"), "{text}");
 }
