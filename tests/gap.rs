@@ -5,6 +5,9 @@ use lacuna_plugins as _;
 
 #[path = "gap/chain.rs"]
 mod chain;
-
 #[path = "gap/inside.rs"]
 mod inside;
+#[path = "gap/target.rs"]
+mod target;
+#[path = "gap/workflow.rs"]
+mod workflow;

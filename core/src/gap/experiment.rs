@@ -20,6 +20,9 @@ pub struct Experiment<'a> {
     pub wide: Option<&'a Wide<'a>>,
     /// Errors of the forward map that all replicates share.
     pub common: Vec<CommonError>,
+    /// What such errors have outside their directions, as [`common`](super::common) finds it: the variance of
+    /// innovations that follow each other as the noise's do, one an output; nothing where it is empty.
+    pub remainder: Vec<f64>,
     /// Where the forward map holds, where that is narrower than the priors.
     pub region: Option<Vec<(f64, f64)>>,
     /// The measurements, by condition.
@@ -92,9 +95,17 @@ impl<'a> Experiment<'a> {
                 });
             }
         }
-        let (wide, common, region) = (None, Vec::new(), None);
-        let mut all =
-            Self { layouts, parameters, forward, wide, common, region, conditions, curves };
+        let mut all = Self {
+            layouts,
+            parameters,
+            forward,
+            wide: None,
+            common: Vec::new(),
+            remainder: Vec::new(),
+            region: None,
+            conditions,
+            curves,
+        };
         for curve in &mut all.curves {
             curve.measured = curve.outputs.clone().collect();
         }

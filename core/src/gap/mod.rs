@@ -7,6 +7,7 @@
 pub mod account;
 pub mod added;
 pub mod candidates;
+pub mod common;
 pub mod experiment;
 pub mod fit;
 pub mod hold_out;

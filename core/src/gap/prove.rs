@@ -165,6 +165,12 @@ impl Comparison {
 fn coverage(held_out: &Experiment<'_>, noise: &Noise, response: &[f64]) -> f64 {
     let sd = noise.sd(held_out, response);
     let mut variance: Vec<f64> = sd.iter().map(|s| s * s).collect();
+    for (curve, law) in held_out.curves.iter().zip(&noise.curves) {
+        for &i in &curve.measured {
+            let rest = held_out.remainder.get(i).copied().unwrap_or(0.0);
+            variance[i] += rest * law.memory.variance();
+        }
+    }
     for error in &held_out.common {
         for (v, row) in variance.iter_mut().zip(error.factor.iter_rows()) {
             *v += dot(row, row);

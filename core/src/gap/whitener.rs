@@ -22,13 +22,15 @@ pub struct Whitener {
     /// The curves of each condition with the lower factor of their correlation.
     across: Vec<(std::ops::Range<usize>, Matrix)>,
     outputs: usize,
+    /// The share of the remainder in the variance of each output, without the part of low rank.
+    remainder: Vec<f64>,
     low_rank: Option<LowRank>,
 }
 
 #[derive(Debug, Clone)]
 struct CurveWhitener {
     measured: Vec<usize>,
-    /// The number of replicates' root over the noise's own scale, one a measured value.
+    /// One over the standard deviation of innovations of the mean and the remainder, one a measured value.
     scale: Vec<f64>,
     memory: super::noise::Autoregression,
 }
@@ -44,25 +46,25 @@ impl Whitener {
     /// For the mean over the replicates of an experiment with this noise around a response.
     pub fn new(experiment: &Experiment<'_>, noise: &Noise, response: &[f64]) -> Self {
         let (counts, _) = experiment.means();
-        let curves: Vec<CurveWhitener> = experiment
-            .curves
-            .iter()
-            .zip(&noise.curves)
-            .map(|(curve, law)| {
-                let each = curve.measured.iter().zip(&law.profile);
-                CurveWhitener {
-                    measured: curve.measured.clone(),
-                    scale: each.map(|(&i, w)| counts[i].sqrt() / (law.sd * w)).collect(),
-                    memory: law.memory.clone(),
-                }
-            })
-            .collect();
+        let mut remainder = vec![0.0; experiment.outputs()];
+        let mut curves = Vec::new();
+        for (curve, law) in experiment.curves.iter().zip(&noise.curves) {
+            let mut scale = Vec::new();
+            for (&i, w) in curve.measured.iter().zip(&law.profile) {
+                let rest = experiment.remainder.get(i).copied().unwrap_or(0.0);
+                let variance = (law.sd * w).powi(2) / counts[i] + rest;
+                scale.push(1.0 / variance.sqrt());
+                remainder[i] = rest / variance;
+            }
+            let (measured, memory) = (curve.measured.clone(), law.memory.clone());
+            curves.push(CurveWhitener { measured, scale, memory });
+        }
         let conditions = experiment.conditions.iter().zip(&noise.across);
         let across = conditions
             .filter_map(|(condition, factor)| Some((condition.curves.clone(), factor.clone()?)))
             .collect();
         let outputs = experiment.outputs();
-        let mut whitener = Self { curves, across, outputs, low_rank: None };
+        let mut whitener = Self { curves, across, outputs, remainder, low_rank: None };
         let mut spread = wander(experiment, noise, response, &counts);
         spread.extend(experiment.common.iter().flat_map(|error| {
             (0..error.factor.columns()).map(|j| error.factor.column(j)).collect::<Vec<_>>()
@@ -97,6 +99,35 @@ impl Whitener {
             white.as_mut_slice().iter_mut().zip(taken.as_slice()).for_each(|(w, t)| *w -= t);
         }
         white
+    }
+
+    /// The variance that the remainder of the common errors gives to a product with each row.
+    pub fn of_remainder(&self, rows: &Matrix) -> Vec<f64> {
+        let mut seen = rows.clone();
+        if let Some(low_rank) = &self.low_rank {
+            let mut along = multiply(&seen, &low_rank.directions);
+            for i in 0..along.rows() {
+                along.row_mut(i).iter_mut().zip(&low_rank.shrink).for_each(|(a, s)| *a *= s);
+            }
+            let taken = multiply_transposed(&along, &low_rank.directions);
+            seen.as_mut_slice().iter_mut().zip(taken.as_slice()).for_each(|(w, t)| *w -= t);
+        }
+        let one = |row: &[f64]| row.iter().zip(&self.remainder).map(|(x, r)| x * x * r).sum();
+        seen.iter_rows().map(one).collect()
+    }
+
+    /// One over the standard deviation of the innovations at each output; zero where nothing was measured.
+    pub(super) fn scale(&self) -> Vec<f64> {
+        let mut all = vec![0.0; self.outputs];
+        for curve in &self.curves {
+            curve.measured.iter().zip(&curve.scale).for_each(|(&i, s)| all[i] = *s);
+        }
+        all
+    }
+
+    /// Rows whitened without the part of low rank.
+    pub(super) fn base_rows(&self, rows: &Matrix) -> Matrix {
+        Matrix::from_rows(self.outputs, rows.iter_rows().map(|row| self.base(row)))
     }
 
     /// Whitening without the part of low rank.

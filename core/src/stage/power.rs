@@ -13,7 +13,7 @@ use crate::gap::power::{Amount, Ground, Outcome, Rates, plan, rates, run};
 use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
 use crate::study::Study;
 
-use super::gap::search::{Prepared, prepared};
+use super::gap::search::{Inside, Prepared, prepared};
 use super::gap_model::Pieces;
 use super::{Known, direct, gap, learn};
 
@@ -65,7 +65,7 @@ fn with(
 ) -> Result<Kept<Rates>, Stop> {
     let inputs = json!([gap::inputs(study, known), amount, simulations]);
     let pieces = Pieces::of(study)?;
-    let inside = gap::inside(pieces.as_ref(), study, known, directory, observer)?;
+    let inside = Inside::of(pieces.as_ref(), study, known, directory, observer)?;
     directory.keep("7-power", &inputs, observer, |folder| {
         prepared(study, known, &inside, |prepared| {
             outcomes(prepared, amount, simulations, folder, observer)

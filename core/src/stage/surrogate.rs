@@ -280,6 +280,19 @@ impl Fitted {
         if near.len() >= ENOUGH { self.samples.select_rows(&near) } else { self.samples.clone() }
     }
 
+    /// The emulator's errors near the prior as samples: one a column, over the root of their number. They have the size that an
+    /// emulator states of itself, as in [`Fitted::covariance`].
+    pub fn error_samples(&self, study: &Study, stated: Option<&[f64]>) -> CommonError {
+        let mut errors = self.errors_near_prior(study);
+        if let Some(stated) = stated {
+            rescale(&mut errors, stated, self.errors.inflation.map_or(1.0, |r| r.max(1.0)));
+        }
+        let scale = (errors.rows() as f64).sqrt();
+        let factor =
+            Matrix::from_fn(errors.columns(), errors.rows(), |i, k| errors[(k, i)] / scale);
+        CommonError { origin: "emulator".to_owned(), factor, predictive: true }
+    }
+
     /// The covariance of the emulator's error as a low-rank factor that carries 99.9 % of its variance.
     ///
     /// Each run's error curve is one sample of the error, which is common to all replicates and correlated

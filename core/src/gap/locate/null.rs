@@ -119,7 +119,7 @@ impl Bench<'_> {
         let experiment = self.experiment();
         let replicates = self.noise.simulate(experiment, response, stream);
         let simulated = experiment.with_replicates(replicates);
-        let error = common_error(experiment, &stream.named("common"));
+        let error = common_error(experiment, self.noise, &stream.named("common"));
         let (_, means) = simulated.means();
         let misfit: Vec<f64> =
             (0..means.len()).map(|i| means[i] - response[i] + error[i]).collect();
@@ -137,8 +137,8 @@ impl Bench<'_> {
 }
 
 /// A draw of the errors that all replicates share.
-pub fn common_error(experiment: &Experiment<'_>, stream: &Stream) -> Vec<f64> {
-    let mut all = vec![0.0; experiment.outputs()];
+pub fn common_error(experiment: &Experiment<'_>, noise: &Noise, stream: &Stream) -> Vec<f64> {
+    let mut all = noise.remainder(experiment, &stream.named("remainder"));
     let mut rng = stream.generator();
     for error in &experiment.common {
         let draw: Vec<f64> = (0..error.factor.columns()).map(|_| normal(&mut rng)).collect();

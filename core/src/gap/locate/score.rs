@@ -261,5 +261,6 @@ fn common(experiment: &Experiment<'_>, whitener: &Whitener, rows: &Matrix) -> Ve
             *v += row.iter().map(|x| x * x).sum::<f64>();
         }
     }
+    variance.iter_mut().zip(whitener.of_remainder(rows)).for_each(|(v, own)| *v += own);
     variance.iter().map(|v| v.min(1.0)).collect()
 }

@@ -28,6 +28,33 @@ impl Noise {
             .collect()
     }
 
+    /// A draw of what common errors have outside their directions.
+    pub fn remainder(&self, experiment: &Experiment<'_>, stream: &Stream) -> Vec<f64> {
+        let mut all = vec![0.0; experiment.outputs()];
+        if experiment.remainder.iter().all(|v| *v <= 0.0) {
+            return all;
+        }
+        for (c, condition) in experiment.conditions.iter().enumerate() {
+            let mut rng = stream.at(c as u64).generator();
+            let curves = &experiment.curves[condition.curves.clone()];
+            let mut white: Vec<Vec<f64>> = curves
+                .iter()
+                .map(|curve| curve.measured.iter().map(|_| normal(&mut rng)).collect())
+                .collect();
+            if let Some(factor) = &self.across[c] {
+                correlate(factor, &mut white);
+            }
+            for ((curve, values), s) in curves.iter().zip(&mut white).zip(condition.curves.clone())
+            {
+                self.curves[s].memory.colour(values);
+                for (&i, x) in curve.measured.iter().zip(values) {
+                    all[i] = experiment.remainder[i].sqrt() * *x;
+                }
+            }
+        }
+        all
+    }
+
     /// One new replicate of a condition around a response.
     fn replicate(
         &self,

@@ -94,7 +94,7 @@ pub struct Said {
 pub fn run(ground: &Ground<'_>, case: usize, wanted: &Plant, stream: &Stream) -> Option<Outcome> {
     let Ground { experiment, candidates, options, fit, noise } = *ground;
     let (planted, response) = plant(ground, wanted, &stream.named("plant"))?;
-    let error = common_error(experiment, &stream.named("common"));
+    let error = common_error(experiment, noise, &stream.named("common"));
     let mut replicates = noise.simulate(experiment, &response, &stream.named("noise"));
     for (condition, replicates) in experiment.conditions.iter().zip(&mut replicates) {
         for replicate in replicates {

@@ -92,17 +92,13 @@ pub fn plant(ground: &Ground<'_>, wanted: &Plant, stream: &Stream) -> Option<(Pl
     match wanted {
         Plant::Nothing => planted.what = "nothing".into(),
         Plant::Effect(kind, ratio) => {
-            planted.what = kind.clone();
             planted.ratio = *ratio;
-            add_effect(ground, kind, *ratio, &mut response, &mut planted, stream)?;
+            response = effects(ground, &[kind], *ratio, &mut planted, stream)?;
         }
         Plant::Pair(kinds, ratio) => {
-            planted.what = kinds.join("+");
             planted.ratio = *ratio;
-            for (i, kind) in kinds.iter().enumerate() {
-                let stream = stream.at(i as u64);
-                add_effect(ground, kind, *ratio, &mut response, &mut planted, &stream)?;
-            }
+            let kinds: Vec<&String> = kinds.iter().collect();
+            response = effects(ground, &kinds, *ratio, &mut planted, stream)?;
         }
         Plant::Bump(ratio) => {
             planted.what = "bump".into();
@@ -123,30 +119,45 @@ pub fn plant(ground: &Ground<'_>, wanted: &Plant, stream: &Stream) -> Option<(Pl
 /// Tries at a version, a place and indices that can be made large enough.
 const TRIES: u64 = 20;
 
-fn add_effect(
+/// Effects of these types one after another, each with a change of this size; the response with all.
+fn effects(
     ground: &Ground<'_>,
-    kind: &str,
+    kinds: &[&String],
     ratio: f64,
-    response: &mut Vec<f64>,
     planted: &mut Planted,
     stream: &Stream,
-) -> Option<()> {
-    (0..TRIES).find_map(|i| {
-        let (on, values, changed) = effect(ground, kind, ratio, response, &stream.at(i))?;
-        planted.effects.push((kind.to_owned(), on, values));
-        *response = changed;
-        Some(())
-    })
+) -> Option<Vec<f64>> {
+    planted.what = kinds.iter().map(|kind| kind.as_str()).collect::<Vec<_>>().join("+");
+    let mut truth = Truth {
+        system: System::new(ground.experiment, Vec::new()),
+        point: ground.fit.at.point[..ground.experiment.parameters.len()].to_vec(),
+        response: ground.fit.at.response.clone(),
+    };
+    for (i, kind) in kinds.iter().enumerate() {
+        let stream = stream.at(i as u64);
+        let (on, values, next) =
+            (0..TRIES).find_map(|i| with_effect(ground, &truth, kind, ratio, &stream.at(i)))?;
+        planted.effects.push(((*kind).clone(), on, values));
+        truth = next;
+    }
+    Some(truth.response)
 }
 
-/// An effect of random place and indices whose change has this size.
-fn effect(
-    ground: &Ground<'_>,
+/// The calibrated model with what is planted.
+struct Truth<'a> {
+    system: System<'a>,
+    point: Vec<f64>,
+    response: Vec<f64>,
+}
+
+/// The truth with an effect of random place and indices whose change has this size.
+fn with_effect<'a>(
+    ground: &Ground<'a>,
+    truth: &Truth<'a>,
     kind: &str,
     ratio: f64,
-    response: &[f64],
     stream: &Stream,
-) -> Option<(On, Vec<f64>, Vec<f64>)> {
+) -> Option<(On, Vec<f64>, Truth<'a>)> {
     let mut rng = stream.generator();
     let experiment = ground.experiment;
     let versions: Vec<usize> =
@@ -162,12 +173,14 @@ fn effect(
     };
     let on = if everywhere { On::new() } else { places[below(&mut rng, places.len())].clone() };
     let suspect = Suspect { candidate, on: on.clone() };
-    let placed = suspect.placed(experiment, ground.candidates, kind);
+    let name = format!("planted_{}", truth.system.effects.len());
+    let system = truth.system.with(suspect.placed(experiment, ground.candidates, &name));
     let layout = &experiment.layouts.blocks[0];
-    let noise = ground.noise.sd(experiment, response);
+    let noise = ground.noise.sd(experiment, &truth.response);
+    let response = &truth.response;
     let situation = Situation { layouts: experiment.layouts, response, noise: &noise };
     let starts = known.starts(layout, &situation);
-    let mut values = starts.get(below(&mut rng, starts.len().max(1)))?.clone();
+    let mut values: Vec<f64> = starts.get(below(&mut rng, starts.len().max(1)))?.clone();
     let absent = known.absent(layout)[0];
     let step = values[0] - absent;
     let parameters = known.parameters(layout);
@@ -176,41 +189,42 @@ fn effect(
         *value = parameter.prior.quantile(0.05 + 0.9 * uniform(&mut rng));
     }
     let (low, high) = parameters[0].prior.support();
-    let changed = |size: f64| {
+    let at = |share: f64| {
+        let size = absent + share * step;
         let values: Vec<f64> = std::iter::once(size).chain(values[1..].iter().copied()).collect();
-        if known.switches().is_empty() {
-            return (placed.apply(response, &values), values);
-        }
-        let (system, base) = (System::new(experiment, vec![placed.clone()]), &ground.fit.at);
-        let changed = system.response(&[&base.point[..], &values].concat());
-        let changes = changed.iter().zip(&base.response).map(|(with, without)| with - without);
-        (response.iter().zip(changes).map(|(y, change)| y + change).collect(), values)
-    };
-    let reached = |size: f64| {
-        let change: Vec<f64> = changed(size).0.iter().zip(response).map(|(a, b)| a - b).collect();
-        ratio_of(ground, &change).unwrap_or(0.0)
+        let point: Vec<f64> = truth.point.iter().chain(&values).copied().collect();
+        let response = system.response(&point);
+        let change: Vec<f64> = response.iter().zip(&truth.response).map(|(a, b)| a - b).collect();
+        let reached = ratio_of(ground, &change).unwrap_or(0.0);
+        let next = Truth { system: system.clone(), point, response };
+        (low..=high).contains(&size).then_some((reached, values, next))
     };
     // The change grows with the size: double until it is enough, then halve the interval.
-    let most = 1e12;
-    let (mut small, mut large) = (0.0, 1e-3);
-    while reached(absent + large * step) < ratio {
-        small = large;
-        large *= 2.0;
-        if large > most || !(low..=high).contains(&(absent + large * step)) {
+    let (mut small, mut large) = (0.0, SMALLEST);
+    while at(large)?.0 < ratio {
+        (small, large) = (large, 2.0 * large);
+        if large > LARGEST {
             return None;
         }
     }
-    for _ in 0..60 {
+    for _ in 0..HALVINGS {
         let middle = 0.5 * (small + large);
-        if reached(absent + middle * step) < ratio {
+        if at(middle)?.0 < ratio {
             small = middle;
         } else {
             large = middle;
         }
     }
-    let (response, values) = changed(absent + large * step);
-    response.iter().all(|y| y.is_finite()).then_some((on, values, response))
+    let (_, values, next) = at(large)?;
+    next.response.iter().all(|y| y.is_finite()).then_some((on, values, next))
 }
+
+/// The first and the last size that is tried, in steps of a start of the effect.
+const SMALLEST: f64 = 1e-3;
+/// See [`SMALLEST`].
+const LARGEST: f64 = 1e6;
+/// How often the interval that holds the size is halved.
+const HALVINGS: usize = 30;
 
 /// The root mean square of a change over the noise, on the curves that it touches.
 fn ratio_of(ground: &Ground<'_>, change: &[f64]) -> Option<f64> {

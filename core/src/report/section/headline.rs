@@ -4,6 +4,7 @@ use maud::{Markup, html};
 
 use super::{coordinate_unit, response_unit};
 use crate::report::findings::{CalibrationFindings, Findings, ValidationFindings};
+use crate::report::gap::verdict;
 use crate::report::number::{decimals, fixed, percent, typeset};
 use crate::report::page::paragraph;
 
@@ -32,6 +33,7 @@ pub fn sentences(findings: &Findings) -> Vec<String> {
         sentences.push(convergence(calibration));
     }
     sentences.extend(findings.validation.as_ref().and_then(|v| agreement(findings, v)));
+    sentences.extend(findings.gap.as_ref().map(|gap| verdict(&gap.account)));
     if sentences.is_empty() {
         sentences.push(String::from("This run has no calibration yet."));
     }

@@ -92,13 +92,13 @@ fn moved(before: &Findings, after: &Findings) -> Vec<Moved> {
     both.collect()
 }
 
-/// The unknowns of the effects of a study, and the parameters that the one before did not have.
+/// The unknowns of the effects of a study: those on the response, and the parameters that it has besides those of `before`.
 fn unknowns(before: &Study, study: &Study, findings: &Findings) -> Vec<Posterior> {
     let effects = study.placed_effects();
-    let unknowns = effects.iter().flat_map(|e| e.hyperparameters()).map(|unknown| unknown.name);
-    let is_new = |name: &&String| !before.parameters.iter().any(|own| own.name == **name);
-    let parameters = study.parameters.iter().map(|p| &p.name).filter(is_new).cloned();
-    let names: Vec<String> = unknowns.chain(parameters).collect();
+    let on_top = effects.iter().flat_map(|e| e.hyperparameters()).map(|unknown| unknown.name);
+    let new = |name: &str| !before.parameters.iter().any(|known| known.name == name);
+    let inside = study.parameters.iter().map(|p| p.name.clone()).filter(|name| new(name));
+    let names: Vec<String> = inside.chain(on_top).collect();
     let of = |calibration: &CalibrationFindings| -> Vec<Posterior> {
         let own = calibration.coordinates.iter().filter(|c| names.contains(&c.name));
         own.map(|c| Posterior {

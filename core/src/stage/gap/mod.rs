@@ -17,6 +17,7 @@ use crate::study::Study;
 
 use super::Known;
 use super::gap_model::{self, Pieces};
+use search::Inside;
 
 const FOLDER: &str = "7-gap";
 const FILE: &str = "gap.toml";
@@ -46,26 +47,15 @@ pub fn stage(
     observer: &dyn Observer,
 ) -> Result<Option<Kept<Account>>, Stop> {
     let Some(measured) = &known.data.value.measured else { return Ok(None) };
-    observer.begin("gap", "", 0);
     let pieces = Pieces::of(study)?;
-    let inside = inside(pieces.as_ref(), study, known, run, observer)?;
+    let inside = Inside::of(pieces.as_ref(), study, known, run, observer)?;
     let rivals = gap_model::rivals(study, known, run, observer)?;
+    observer.begin("gap", "", 0);
     let kept = run.keep(FOLDER, &inputs(study, known), observer, |_| {
         search::account(study, known, &inside, &rivals, measured, observer)
     })?;
     observer.end("gap", &summary(&kept.value));
     Ok(Some(kept))
-}
-
-/// The pieces that may be missing inside the model, ready for a search.
-pub(super) fn inside<'a>(
-    pieces: Option<&'a Pieces>,
-    study: &'a Study,
-    known: &'a Known<'a>,
-    run: &mut RunDirectory,
-    observer: &dyn Observer,
-) -> Result<search::Inside<'a>, Stop> {
-    pieces.map(|pieces| gap_model::candidates(pieces, study, known, run, observer)).transpose()
 }
 
 /// What the stage found in an earlier run with the same inputs.
@@ -98,22 +88,20 @@ pub(super) fn inputs(study: &Study, known: &Known<'_>) -> Value {
         laws,
         effects,
         study.gap.keys,
-        candidates,
         pieces(study),
+        candidates,
         study.about.seed,
         env!("CARGO_PKG_VERSION"),
     ])
 }
 
-/// What the study says of pieces inside the model.
+/// What the study says of pieces inside its model.
 fn pieces(study: &Study) -> Value {
     let inside = &study.gap.inside;
-    let terms: Vec<_> =
-        inside.terms.iter().map(|t| (t.built.name, &t.built.options, &t.common)).collect();
-    let models = inside.models.iter();
-    let models: Vec<_> =
-        models.map(|m| (m.section.built.name, &m.section.built.options, &m.keys)).collect();
-    json!([inside.switches, terms, models])
+    let terms = inside.terms.iter().map(|t| (t.built.name, &t.built.options, &t.common));
+    let models =
+        inside.models.iter().map(|m| (m.section.built.name, &m.section.built.options, &m.keys));
+    json!([inside.switches, terms.collect::<Vec<_>>(), models.collect::<Vec<_>>()])
 }
 
 fn summary(account: &Account) -> String {

@@ -3,12 +3,12 @@
 use crate::data::{Observations, Parameter};
 use crate::gap::account::{Account, HeldOut, OtherModel};
 use crate::gap::candidates::{Candidate, proposed};
+use crate::gap::common::shared;
 use crate::gap::experiment::Experiment;
 use crate::gap::hold_out::{HeldOutData, Kind, Split, split};
 use crate::gap::name::{Found, Options, search};
 use crate::gap::noise::Noise;
 use crate::gap::prove::prove;
-use crate::gap::whitener::condensed;
 use crate::gap::wide::Wide;
 use crate::gap::with_effects::WithEffects;
 use crate::linalg::Matrix;
@@ -16,9 +16,9 @@ use crate::math::random::Stream;
 use crate::plugin::Forward;
 use crate::plugin::discrepancy::CommonError;
 use crate::plugin::effect::Situation;
-use crate::run::{Observer, Stop};
+use crate::run::{Observer, RunDirectory, Stop};
 use crate::stage::calibrate::stated_variance;
-use crate::stage::gap_model::Rival;
+use crate::stage::gap_model::{self, Pieces, Rival};
 use crate::stage::read::Measured;
 use crate::stage::{Known, best_fit, stream};
 use crate::study::Study;
@@ -28,6 +28,28 @@ const STARTS: usize = 4;
 
 /// The share of the false alarms that is spent on names.
 const NAMES: f64 = 0.6;
+
+/// What may be missing inside the model, with the forward map that has it; nothing where the study names nothing.
+#[derive(Default)]
+pub struct Inside<'a> {
+    candidates: Vec<Candidate>,
+    wide: Option<Wide<'a>>,
+}
+
+impl<'a> Inside<'a> {
+    /// The runs and the emulator of these pieces.
+    pub fn of(
+        pieces: Option<&'a Pieces>,
+        study: &'a Study,
+        known: &Known<'a>,
+        run: &mut RunDirectory,
+        observer: &dyn Observer,
+    ) -> Result<Self, Stop> {
+        let Some(pieces) = pieces else { return Ok(Self::default()) };
+        let (candidates, wide) = gap_model::candidates(pieces, study, known, run, observer)?;
+        Ok(Self { candidates, wide: Some(wide) })
+    }
+}
 
 /// All that a search begins with.
 pub struct Prepared<'a> {
@@ -44,9 +66,6 @@ pub struct Prepared<'a> {
     pub random: Stream,
 }
 
-/// Pieces that may be missing inside the model, as candidates with their forward map.
-pub type Inside<'a> = Option<(Vec<Candidate>, Wide<'a>)>;
-
 /// Splits the measurements, finds the best fit to what is not set aside, and asks the effects for proposals.
 pub fn prepared<T>(
     study: &Study,
@@ -61,16 +80,16 @@ pub fn prepared<T>(
     let split = split(&measured.used, &study.gap.keys.hold_out, &random.named("hold out"));
     let forward = WithEffects::new(known.forward, study.placed_effects());
     let parameters = forward.parameters(&study.parameters);
-    let wide = inside.as_ref().map(|(_, wide)| wide.with_effects(study.placed_effects()));
+    let wide = inside.wide.as_ref().map(|wide| wide.with_effects(study.placed_effects()));
     let wide = wide.as_ref();
-    let base = Base { study, known, forward: &forward, wide, parameters: &parameters };
+    let base = Base { study, known, wide, forward: &forward, parameters: &parameters };
     let starts = base.starts(&split.training, &random)?;
     let experiment = base.experiment(&split.training, &starts[0])?;
     let response = base.response(&starts[0]);
     let noise = Noise::of(&experiment, &response, None).sd(&experiment, &response);
     let situation = Situation { layouts: &study.layouts, response: &response, noise: &noise };
     let mut candidates = candidates(study, &situation)?;
-    candidates.extend(inside.iter().flat_map(|(pieces, _)| pieces.iter().cloned()));
+    candidates.extend(inside.candidates.iter().cloned());
     use_it(&Prepared {
         base: &base,
         split: &split,
@@ -163,8 +182,8 @@ fn candidates(study: &Study, situation: &Situation<'_>) -> Result<Vec<Candidate>
 struct Base<'a> {
     study: &'a Study,
     known: &'a Known<'a>,
-    forward: &'a WithEffects<'a>,
     wide: Option<&'a Wide<'a>>,
+    forward: &'a WithEffects<'a>,
     parameters: &'a [Parameter],
 }
 
@@ -185,27 +204,28 @@ impl<'a> Base<'a> {
         let Self { study, known, .. } = self;
         let layouts = &study.layouts;
         let mut experiment = Experiment::new(layouts, self.parameters, self.forward, data);
-        experiment.wide = self.wide;
         experiment.region = known.region.map(<[_]>::to_vec);
-        experiment.common = self.common(data)?;
+        experiment.wide = self.wide;
         let response = self.response(point);
         let noise = Noise::of(&experiment, &response, None);
-        experiment.common = condensed(&experiment, &noise, &response);
+        let all = shared(&experiment, &noise, &response, &self.samples(data)?);
+        (experiment.common, experiment.remainder) = (all.common, all.remainder);
         Ok(experiment)
     }
 
-    fn common(&self, data: &Observations) -> Result<Vec<CommonError>, Stop> {
-        let Self { study, known, .. } = self;
-        let mut common: Vec<CommonError> =
-            self.wide.iter().flat_map(|wide| wide.common.clone()).collect();
+    /// Samples of the errors that replicates share.
+    fn samples(&self, data: &Observations) -> Result<Vec<CommonError>, Stop> {
+        let Self { study, known, wide, .. } = self;
+        let mut all = Vec::new();
         if let Some(fitted) = known.fitted {
             let stated = stated_variance(study, data, known.forward)?;
-            common.push(fitted.value.covariance(study, stated.as_deref())?);
+            all.push(fitted.value.error_samples(study, stated.as_deref()));
         }
         if let (Some(kept), Some(section)) = (known.numerics, &study.numerical_error) {
-            common.push(kept.value.common_error(section.written.whole()));
+            all.push(kept.value.common_error(section.written.whole()));
         }
-        Ok(common)
+        all.extend(wide.iter().flat_map(|wide| wide.common.iter().cloned()));
+        Ok(all)
     }
 
     /// How the two responses fare on what was set aside.

@@ -8,6 +8,7 @@ use crate::gap::account::{Account, Addition, Estimate};
 use crate::run::{Stop, files};
 use crate::stage::gap_model::Pieces;
 use crate::study::emit::{key, string, to_line};
+use crate::study::gap::Edit;
 use crate::study::{Problems, Sources, Study, read};
 
 /// Writes `STUDY+EFFECT.toml` beside the study and returns its path. A file of that name with another text is set aside.
@@ -54,53 +55,61 @@ pub fn free_name(study: &Study, addition: &Addition) -> String {
     name
 }
 
-/// The old study, and a block for each effect that says why it is there.
+/// The old study with what is missing inside the model free, and a block for each effect on the response; each says why it
+/// is there.
 fn text(study: &Study, path: &Path, account: &Account) -> Result<String, Stop> {
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     let mut text = format!(
         "# Written by `lacuna gap` from `{file}`: that study, word for word, and at its end what its data say is\n\
          # missing. Run it like any other study.\n\n"
     );
-    let within = account.additions.iter().filter(|addition| !addition.switches.is_empty());
-    let within: Vec<&Addition> = within.collect();
-    if within.is_empty() {
-        text.push_str(&renamed(study, &study.text, account));
-    } else {
-        text.push_str(&renamed(study, &edited(study, &within)?, account));
-    }
+    let (inside, on_top) = divided(study, account)?;
+    let own = match inside {
+        Some((edit, why)) => {
+            let why = [reasons(account).join("\n"), why].join("\n");
+            edit.text(study, &why).map_err(|error| Stop::new(format!("the new study {error}")))?
+        }
+        None => study.text.clone(),
+    };
+    text.push_str(&renamed(own, study, account));
     if !text.ends_with('\n') {
         text.push('\n');
     }
-    for line in reasons(account) {
-        text.push_str(&format!("\n# {line}"));
+    if on_top.len() == account.additions.len() {
+        for line in reasons(account) {
+            text.push_str(&format!("\n# {line}"));
+        }
+        text.push('\n');
     }
-    text.push('\n');
-    for addition in account.additions.iter().filter(|addition| addition.switches.is_empty()) {
+    for addition in on_top {
         text.push('\n');
         text.push_str(&block(study, addition)?);
     }
     Ok(text)
 }
 
-/// The study with what is missing inside its model.
-fn edited(study: &Study, within: &[&Addition]) -> Result<String, Stop> {
-    let pieces = Pieces::of(study)?;
-    let pieces = pieces.ok_or_else(|| Stop::new("the study names no pieces of its model"))?;
-    let switches: Vec<&[usize]> = within.iter().map(|addition| &addition.switches[..]).collect();
-    let why: Vec<String> = within.iter().map(|addition| why(addition)).collect();
-    let edit = pieces.edit(study, &switches);
-    edit.text(study, why.concat().trim_end())
-        .map_err(|error| Stop::new(format!("the new study {error}")))
+/// What the study must say for the effects inside the model, with why, and the effects on the response.
+fn divided<'a>(
+    study: &Study,
+    account: &'a Account,
+) -> Result<(Option<(Edit, String)>, Vec<&'a Addition>), Stop> {
+    let is_inside = |addition: &&Addition| !addition.switches.is_empty();
+    let (inside, on_top): (Vec<_>, Vec<_>) = account.additions.iter().partition(is_inside);
+    let Some(pieces) = Pieces::of(study)?.filter(|_| !inside.is_empty()) else {
+        return Ok((None, on_top));
+    };
+    let places: Vec<&[usize]> = inside.iter().map(|addition| &addition.switches[..]).collect();
+    let why: String = inside.iter().map(|addition| found(addition).replace("# ", "")).collect();
+    Ok((Some((pieces.edit(study, &places), why)), on_top))
 }
 
-/// The study's text, with a name of its own where it gives one: two studies of one name share a run directory.
-fn renamed(study: &Study, text: &str, account: &Account) -> String {
+/// The text with a name of its own where it gives one: two studies of one name share a run directory.
+fn renamed(mut text: String, study: &Study, account: &Account) -> String {
     let mut sources = Sources::default();
-    let source = sources.add_file(Path::new("study"), text.to_owned());
+    let source = sources.add_file(Path::new("study"), text.clone());
     let root = read::read(source, &sources, &mut Problems::new());
     let name = root.as_ref().and_then(|root| root.find("study.name"));
-    let Some(name) = name else { return text.to_owned() };
-    let mut text = text.to_owned();
+    let Some(name) = name else { return text };
     text.replace_range(name.place.span.clone(), &string(&with_names(&study.name, study, account)));
     text
 }
@@ -137,23 +146,26 @@ fn probability(p: f64) -> String {
     format!("{p:.4}").trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// What an addition is and how sure that is, in lines without `#`.
-fn why(addition: &Addition) -> String {
-    let mut text = format!("{}\n  {}\n", addition.title, addition.formula);
+/// What was found of an effect, in comments.
+fn found(addition: &Addition) -> String {
+    let mut text = format!("# {}\n#   {}\n", addition.title, addition.formula);
     for Estimate { name, unit, value, sd } in &addition.unknowns {
         let unit = match unit.as_str() {
             "" | "1" => String::new(),
             unit => format!(" {unit}"),
         };
-        text.push_str(&format!("found: {name} = {value:.4e} ± {sd:.1e}{unit}\n"));
+        text.push_str(&format!("# found: {name} = {value:.4e} ± {sd:.1e}{unit}\n"));
     }
     let own = addition.class.iter().filter(|kind| **kind != addition.kind);
     let others: Vec<String> = own.map(|kind| format!("`{kind}`")).collect();
     if others.is_empty() {
-        text.push_str(&format!("probability among the candidates: {:.2}\n", addition.probability));
+        text.push_str(&format!(
+            "# probability among the candidates: {:.2}\n",
+            addition.probability
+        ));
     } else {
         text.push_str(&format!(
-            "These data cannot tell it from {} (its own probability: {:.2}).\n",
+            "# These data cannot tell it from {} (its own probability: {:.2}).\n",
             others.join(", "),
             addition.probability
         ));
@@ -162,7 +174,7 @@ fn why(addition: &Addition) -> String {
 }
 
 fn block(study: &Study, addition: &Addition) -> Result<String, Stop> {
-    let mut text: String = why(addition).lines().map(|line| format!("# {line}\n")).collect();
+    let mut text = found(addition);
     text.push_str(&format!("[[effect]]\nuse = {}\n", string(&addition.plugin)));
     text.push_str(&format!("name = {}\n", string(&free_name(study, addition))));
     if !addition.on.is_empty() {

@@ -1,14 +1,16 @@
 //! What inputs change, learned from runs of their own where a surrogate stands for the model.
 //!
 //! The surrogate is fitted to the difference of the runs from the study's emulator, and what it says at the absent values is
-//! taken off, so that both agree there. Every run has one piece present, or all of them, in turn.
+//! taken off, so that both agree there. Every run has about half of the pieces present, at random: what a piece does alone and
+//! what pieces do together are learned from the same runs, also of one that does nothing without another.
 
 use serde_json::json;
 
 use crate::data::{Ensemble, Parameter};
 use crate::gap::wide::{Freed, Wide};
-use crate::linalg::{self, Matrix};
+use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
+use crate::math::random::uniform;
 use crate::plugin::discrepancy::CommonError;
 use crate::plugin::surrogate::Training;
 use crate::plugin::{Emulator, Forward, Surrogate};
@@ -109,7 +111,7 @@ impl Lesson<'_> {
         let square = errors.as_slice().iter().map(|e| e * e).sum::<f64>();
         let rmse = (square / errors.as_slice().len().max(1) as f64).sqrt();
         observer.end("gap-surrogate", &format!("rmse {rmse:.3e} {}", study.layouts.unit()));
-        Ok((section.built.plugin.load(&kept.value.bytes)?, common(errors)?))
+        Ok((section.built.plugin.load(&kept.value.bytes)?, common(errors)))
     }
 
     fn fit(
@@ -193,10 +195,11 @@ pub(super) fn designed(study: &Study, parameters: &[Parameter]) -> Result<Matrix
 fn points(study: &Study, pieces: &Pieces, parameters: &[Parameter]) -> Result<Matrix, Stop> {
     let mut points = designed(study, parameters)?;
     let (first, count) = (study.parameters.len(), pieces.all.len());
+    let stream = stream(study, "gap-design").named("present");
     for run in 0..points.rows() {
-        let present = run % (count + 1);
-        for (i, piece) in pieces.all.iter().enumerate() {
-            if count > 1 && present < count && i != present {
+        let mut rng = stream.at(run as u64).generator();
+        for piece in &pieces.all {
+            if count > 1 && uniform(&mut rng) < 0.5 {
                 for &j in &piece.places {
                     points[(run, first + j)] = pieces.inputs[j].absent;
                 }
@@ -206,22 +209,12 @@ fn points(study: &Study, pieces: &Pieces, parameters: &[Parameter]) -> Result<Ma
     Ok(points)
 }
 
-/// The error of the difference, which all replicates share: the mean square of what runs left out show.
-fn common(errors: &Matrix) -> Result<CommonError, Stop> {
-    let svd = linalg::thin_svd(errors)
-        .map_err(|e| Stop::new(format!("the covariance of the emulator's error: {e}")))?;
-    let total: f64 = svd.values.iter().map(|s| s * s).sum();
-    let mut sum = 0.0;
-    let rank = svd.values.iter().take_while(|&s| {
-        let before = sum;
-        sum += s * s;
-        before < 0.999 * total
-    });
-    let rank = rank.count();
+/// The error of the difference, which all replicates share: what runs left out show, one a column over the root of their
+/// number.
+fn common(errors: &Matrix) -> CommonError {
     let scale = (errors.rows() as f64).sqrt();
-    let factor =
-        Matrix::from_fn(errors.columns(), rank, |i, k| svd.v[(i, k)] * svd.values[k] / scale);
-    Ok(CommonError { origin: "emulator of further inputs".to_owned(), factor, predictive: true })
+    let factor = Matrix::from_fn(errors.columns(), errors.rows(), |i, k| errors[(k, i)] / scale);
+    CommonError { origin: "emulator of further inputs".to_owned(), factor, predictive: true }
 }
 
 /// An emulator with the difference that further inputs make.

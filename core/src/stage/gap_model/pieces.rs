@@ -93,8 +93,12 @@ impl Pieces {
             let inputs = piece.places.iter().map(|&i| self.inputs[i].clone()).collect();
             let (places, description) = (piece.places.clone(), piece.description.clone());
             let effect: Arc<dyn Effect> = Arc::new(Switched { places, inputs, description });
-            let (kind, plugin) = (piece.kind.clone(), piece.kind.clone());
-            Candidate { kind, plugin, options: Table::new(), effect }
+            Candidate {
+                kind: piece.kind.clone(),
+                plugin: piece.kind.clone(),
+                options: Table::new(),
+                effect,
+            }
         };
         self.all.iter().map(candidate).collect()
     }

@@ -7,6 +7,7 @@ use serde_json::json;
 
 use crate::data::Parameter;
 use crate::gap::account::{Estimate, OtherModel};
+use crate::gap::common::shared;
 use crate::gap::experiment::Experiment;
 use crate::gap::fit::{Fit, fit_from};
 use crate::gap::name::weigh;
@@ -119,7 +120,10 @@ impl Rival<'_> {
         stream: &Stream,
     ) -> Option<OtherModel> {
         let mut own = experiment.clone();
-        own.common.extend(self.common.clone());
+        let error = shared(&own, noise, &base.at.response, &self.common);
+        own.common.extend(error.common);
+        own.remainder.resize(own.outputs(), 0.0);
+        own.remainder.iter_mut().zip(error.remainder).for_each(|(all, rest)| *all += rest);
         let (_, means) = own.means();
         // The same covariance for both: neither gains by what it says of its own error.
         let whitener = Whitener::new(&own, noise, &base.at.response);

@@ -81,22 +81,25 @@ pub struct Explicit<'r, 'f> {
 }
 
 impl<'r, 'f> Explicit<'r, 'f> {
-    /// At the start. Without absolute tolerances they are the share `following` of the magnitudes of the states.
+    /// At the start. Without absolute tolerances they are the share `following` of the magnitudes of the states, and
+    /// `floors` at least.
     pub fn new(
         flow: &'r Flow<'f>,
         start: &Start,
         relative: f64,
         absolute: Option<f64>,
         following: f64,
+        floors: &[f64],
     ) -> Self {
         let now = [start.states.as_slice(), &start.sensitivities].concat();
-        let absolute_of = |y: &f64| absolute.unwrap_or(following * y.abs());
+        let absolute_of =
+            |(y, floor): (&f64, &f64)| absolute.unwrap_or(floor.max(following * y.abs()));
         let mut rates: [Vec<f64>; STAGES] = std::array::from_fn(|_| vec![0.0; now.len()]);
         flow.all(start.time, &now, &mut rates[STAGES - 1]);
         Self {
             flow,
             relative,
-            absolute: start.states.iter().map(absolute_of).collect(),
+            absolute: start.states.iter().zip(floors).map(absolute_of).collect(),
             following: absolute.is_none().then_some(following),
             sizes: (0..flow.channels()).map(|channel| flow.size(channel)).collect(),
             time: start.time,

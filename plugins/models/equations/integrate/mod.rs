@@ -25,6 +25,9 @@ const MANY_BREAKS: usize = 50;
 /// The absolute tolerance as a share of the relative one times the largest magnitude of the state.
 const SHARE: f64 = 0.01;
 
+/// The magnitude that a state at rest is first thought to reach.
+const SMALL: f64 = 1e-6;
+
 /// An absolute tolerance may be this many times too large for its state before the run is repeated.
 const TOO_LARGE: f64 = 3.0;
 
@@ -98,15 +101,36 @@ impl Run<'_, '_, '_> {
         if repeat { Ok(self.once(method, &tolerances)?.0) } else { Ok(effort) }
     }
 
-    /// One run by the explicit method, whose absolute tolerances follow the states on their way.
+    /// A run by the explicit method, whose absolute tolerances follow the states on their way.
+    ///
+    /// A state at rest has no magnitude: however short the step, the error of what first grows from zero is as large
+    /// as that itself. Such states begin with a tolerance for a small magnitude, and again where that proved too large.
     fn explicit(&mut self, relative: f64, share: f64) -> Result<Effort, String> {
+        let at_rest = |y: &f64| if *y == 0.0 { share * SMALL } else { 0.0 };
+        let mut floors: Vec<f64> = self.start.states.iter().map(at_rest).collect();
+        let (effort, peaks) = self.following(relative, share, &floors)?;
+        let mut repeat = false;
+        for (floor, peak) in floors.iter_mut().zip(peaks).filter(|(_, peak)| *peak > 0.0) {
+            repeat |= *floor > share * peak;
+            *floor = floor.min(share * SMALL * peak);
+        }
+        if repeat { Ok(self.following(relative, share, &floors)?.0) } else { Ok(effort) }
+    }
+
+    /// One run by the explicit method; also the largest magnitude of each state.
+    fn following(
+        &mut self,
+        relative: f64,
+        share: f64,
+        floors: &[f64],
+    ) -> Result<(Effort, Vec<f64>), String> {
         let (flow, start) = (self.flow, &self.start);
         let absolute = self.solver.absolute_tolerance.map(Positive::get);
-        let mut stepper = Explicit::new(flow, start, relative, absolute, share);
+        let mut stepper = Explicit::new(flow, start, relative, absolute, share, floors);
         let watched = self.solver.method == Method::Auto;
         let mut march = March::new(flow, start, self.solver, self.times, watched);
         let steps = march.run(&mut stepper, &self.stops, self.sink)?;
-        Ok(Effort { method: Method::RungeKutta, steps })
+        Ok((Effort { method: Method::RungeKutta, steps }, march.peaks))
     }
 
     /// One run by an implicit method; also the largest magnitude of each state.

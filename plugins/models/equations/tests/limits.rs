@@ -84,6 +84,24 @@ fn any_scale() {
     }
 }
 
+/// From rest, the last of a chain of integrators grows with the fifth power of the time, `t^5 / 120`: at first no step is
+/// short enough for an error that is small against it. Its scale is known to nobody.
+#[test]
+fn what_begins_at_rest() {
+    for scale in [1e-12, 1.0, 1e12] {
+        let options = r#"
+            state = { a = 0.0, b = 0.0, c = 0.0, d = 0.0, e = 0.0 }
+            rate = { a = "push", b = "a", c = "b", d = "c", e = "d" }
+            observe = "e"
+            solver = { steps = 1000, method = "runge_kutta" }
+        "#;
+        let times = times(10.0, 20);
+        let case = case(options, &["push"], &[], &times);
+        let form = |p: &[f64]| times.iter().map(|t| p[0] * t.powi(5) / 120.0).collect();
+        case.is(&[scale], form, 1e-7, 1e-6);
+    }
+}
+
 #[test]
 fn the_same_bits_on_any_thread() {
     let options = r#"

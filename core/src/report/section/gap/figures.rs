@@ -131,6 +131,60 @@ pub fn curves(findings: &Findings, account: &Account, numbers: &mut Numbers) -> 
     numbers.figure(&drawings, &keys, &caption)
 }
 
+/// What was measured less the calibrated responses without and with what was found.
+pub fn differences(findings: &Findings, account: &Account, numbers: &mut Numbers) -> Markup {
+    let outlines = Curves::of(findings);
+    let unit = response_unit(findings);
+    let both = !account.additions.is_empty();
+    let difference = |k: usize, i: usize| {
+        let known = account.counts[i] > 0.0;
+        if known { unit.show(account.means[i] - account.response[k][i]) } else { f64::NAN }
+    };
+    let panels: Vec<Panel> = outlines
+        .panels
+        .iter()
+        .map(|outline| {
+            let edges = |i: usize| {
+                let half = 1.96 * unit.show(account.sd[i]) / account.counts[i].sqrt();
+                (account.counts[i] > 0.0).then_some((-half, half))
+            };
+            let curve = |class, name: &str, k: usize| Curve {
+                class,
+                name: name.to_owned(),
+                points: outline.curve(|i| difference(k, i)),
+            };
+            let mut curves = vec![curve("s-reference", "measured less model without", 0)];
+            if both {
+                curves.push(curve("s-map", "measured less model with", 1));
+            }
+            Panel {
+                title: outline.title.clone(),
+                remark: String::new(),
+                bands: vec![Band { class: "s-band", edges: outline.band(edges) }],
+                curves,
+            }
+        })
+        .collect();
+    let lines = panels.iter().flat_map(|p| p.curves.iter().flat_map(|c| c.points.iter()));
+    let range = padded(extent(lines.map(|p| p.1)).unwrap_or((-1.0, 1.0)), 0.06);
+    let x = Axis::new(outlines.label.as_str(), outlines.domain).ticks(6);
+    let y = Axis::new(response_label(findings), range).ticks(4);
+    let mut keys = vec![
+        Key::line("s-reference", "measured less model without the effects"),
+        Key::area("s-band", "95 % interval of the replicates' mean, without emulator's error"),
+    ];
+    if both {
+        keys.insert(1, Key::line("s-map", "measured less model with them"));
+    }
+    let caption = Caption::new(
+        "The same as differences: the mean of the replicates less the calibrated response.",
+        "the grey band is of the mean of the replicates, point by point; neighbouring points are not independent.",
+        "differences with a shape, and whether they lose it.",
+    );
+    let drawings = small_multiples(&panels, &x, &y, "measured less simulated curves");
+    numbers.figure(&drawings, &keys, &caption)
+}
+
 /// The best of each type by evidence.
 pub fn leaders(step: &Passed, numbers: &mut Numbers) -> Markup {
     let mut seen: Vec<&str> = Vec::new();

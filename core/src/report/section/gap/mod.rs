@@ -25,6 +25,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
         @if !account.held_out.is_empty() { (tables::held_out(findings, account, numbers)) }
         (figures::maps(findings, account, numbers))
         (figures::curves(findings, account, numbers))
+        (figures::differences(findings, account, numbers))
         @if let Some(step) = account.path.first() { (figures::leaders(step, numbers)) }
         @if !account.path.is_empty() { (tables::path(account, numbers)) }
         (tables::parameters(gap, numbers))

@@ -1,0 +1,187 @@
+//! Errors that all replicates share, from few samples of them: what further samples have outside the span of these.
+//!
+//! The mean square of n curves spans n directions. A further error lies outside them in part, and a test that
+//! counts that part as noise sees a gap where there is none. So the covariance is shrunk toward that of
+//! independent errors of the same size, `n / (n + w) S + w / (n + w) diag(S)` (Ledoit and Wolf, Journal of Multivariate
+//! Analysis 88 (2004) 365), everything in units of the noise of the replicates' mean. The weight is the one under which each
+//! sample, seen through that noise, is most probable given the others.
+
+use super::experiment::Experiment;
+use super::noise::Noise;
+use super::whitener::{Whitener, condensed};
+use crate::linalg::vector::dot;
+use crate::linalg::{Cholesky, Matrix, multiply_transposed};
+use crate::plugin::discrepancy::CommonError;
+
+/// Weights that are tried, in units of the number of samples.
+const WEIGHTS: [f64; 10] = [0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0];
+
+/// The values on both sides over which the size of the errors is averaged along a curve.
+const NEAR: usize = 4;
+
+/// Errors as a calibration takes them into account.
+#[derive(Debug, Clone, Default)]
+pub struct Shared {
+    /// In the directions of the samples.
+    pub common: Vec<CommonError>,
+    /// Outside them: see [`Experiment::remainder`].
+    pub remainder: Vec<f64>,
+}
+
+/// The errors of an experiment whose samples are these, around a response. The columns of each factor must be the samples
+/// themselves, over the root of their number.
+pub fn shared(
+    experiment: &Experiment<'_>,
+    noise: &Noise,
+    response: &[f64],
+    samples: &[CommonError],
+) -> Shared {
+    let alone = Experiment { common: Vec::new(), remainder: Vec::new(), ..experiment.clone() };
+    let whitener = Whitener::new(&alone, noise, response);
+    let scale = whitener.scale();
+    let mut all = Shared { common: Vec::new(), remainder: vec![0.0; experiment.outputs()] };
+    for error in samples {
+        let count = error.factor.columns();
+        if count < 2 {
+            all.common.push(error.clone());
+            continue;
+        }
+        let root = (count as f64).sqrt();
+        let rows = (0..count).map(|k| error.factor.column(k));
+        let white = whitener.base_rows(&Matrix::from_rows(experiment.outputs(), rows));
+        let white = Matrix::from_fn(count, white.columns(), |k, i| root * white[(k, i)]);
+        let target = target(experiment, &white);
+        let weight = weight(&white, &target);
+        let kept = (1.0 - weight).sqrt();
+        let factor =
+            Matrix::from_fn(error.factor.rows(), count, |i, k| kept * error.factor[(i, k)]);
+        all.common.push(CommonError { factor, ..error.clone() });
+        for ((sum, t), s) in all.remainder.iter_mut().zip(&target).zip(&scale) {
+            if *s > 0.0 {
+                *sum += weight * t / (s * s);
+            }
+        }
+    }
+    let with =
+        Experiment { common: all.common, remainder: all.remainder.clone(), ..experiment.clone() };
+    Shared { common: condensed(&with, noise, response), remainder: all.remainder }
+}
+
+/// The mean square of the samples at each output, averaged over the values nearby of its curve.
+fn target(experiment: &Experiment<'_>, white: &Matrix) -> Vec<f64> {
+    let count = white.rows() as f64;
+    let square = |i: usize| white.iter_rows().map(|row| row[i] * row[i]).sum::<f64>() / count;
+    let mut target = vec![0.0; white.columns()];
+    for curve in &experiment.curves {
+        let squares: Vec<f64> = curve.measured.iter().map(|&i| square(i)).collect();
+        for (k, &i) in curve.measured.iter().enumerate() {
+            let (from, to) = (k.saturating_sub(NEAR), (k + NEAR + 1).min(squares.len()));
+            target[i] = squares[from..to].iter().sum::<f64>() / (to - from) as f64;
+        }
+    }
+    target
+}
+
+/// The share of the target under which the samples are most probable given the others.
+fn weight(white: &Matrix, target: &[f64]) -> f64 {
+    let count = white.rows() as f64;
+    let shares = WEIGHTS.map(|w| w / (1.0 + w));
+    let mut best = (f64::NEG_INFINITY, 0.0);
+    for share in shares {
+        let score = score(white, target, share).unwrap_or(f64::NEG_INFINITY);
+        if score > best.0 {
+            best = (score, share);
+        }
+    }
+    // All samples together are one more than a sample was judged by.
+    let others = best.1 / (1.0 - best.1) * (count - 1.0);
+    others / (count + others)
+}
+
+/// The expected log density of each sample with noise of variance one, under the covariance `D + (1 - share) E'E / (n - 1)` of the
+/// others, `D = 1 + share * target`; summed, and without constants.
+///
+/// Leaving a row out of `K = D + c E'E` needs only `M = (1 + c E D^-1 E')^-1`: with `q = (1 - M_ii) / c`, the quadratic form is
+/// `q / (1 - c q)` (Sherman and Morrison).
+fn score(white: &Matrix, target: &[f64], share: f64) -> Option<f64> {
+    let count = white.rows();
+    let c = (1.0 - share) / (count as f64 - 1.0);
+    let own: Vec<f64> = target.iter().map(|t| 1.0 + share * t).collect();
+    let over = |power: f64| {
+        let mut scaled = white.clone();
+        for k in 0..count {
+            scaled.row_mut(k).iter_mut().zip(&own).for_each(|(x, d)| *x *= d.powf(-0.5 * power));
+        }
+        multiply_transposed(&scaled, &scaled)
+    };
+    let (first, second) = (over(1.0), over(2.0));
+    let unit = |i: usize, j: usize| f64::from(u8::from(i == j));
+    let inner = Matrix::from_fn(count, count, |i, j| unit(i, j) + c * first[(i, j)]);
+    let factor = Cholesky::new(&inner).ok()?;
+    let inverse = factor.inverse();
+    let log_determinant = own.iter().map(|d| d.ln()).sum::<f64>() + factor.log_determinant();
+    let crossed = multiply_transposed(&inverse, &second);
+    let trace = own.iter().map(|d| 1.0 / d).sum::<f64>()
+        - c * (0..count).map(|i| crossed[(i, i)]).sum::<f64>();
+    let mut sum = 0.0;
+    for i in 0..count {
+        let q = (1.0 - inverse[(i, i)]) / c;
+        let left = 1.0 - c * q;
+        let length = dot(crossed.row(i), inverse.row(i));
+        let without = trace + c * length / left;
+        sum -= 0.5 * (log_determinant + left.ln() + q / left + without);
+    }
+    sum.is_finite().then_some(sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linalg::multiply;
+    use crate::math::random::{Stream, normal};
+
+    fn samples(count: usize, outputs: usize, directions: usize, white: f64) -> Matrix {
+        let mut rng = Stream::root(5).generator();
+        let shapes = Matrix::from_fn(directions, outputs, |_, _| normal(&mut rng));
+        let sizes = Matrix::from_fn(count, directions, |_, _| normal(&mut rng));
+        let mut all = multiply(&sizes, &shapes);
+        all.as_mut_slice().iter_mut().for_each(|x| *x += white * normal(&mut rng));
+        all
+    }
+
+    /// The definition, with the covariance of the others written out and solved.
+    #[test]
+    fn the_score_is_that_of_leaving_each_sample_out() {
+        let (count, outputs, share) = (6, 15, 0.3);
+        let white = samples(count, outputs, 2, 0.5);
+        let target: Vec<f64> = (0..outputs).map(|i| 0.5 + 0.1 * i as f64).collect();
+        let mut expected = 0.0;
+        for left in 0..count {
+            let others: Vec<usize> = (0..count).filter(|k| *k != left).collect();
+            let covariance = Matrix::from_fn(outputs, outputs, |i, j| {
+                let s: f64 = others.iter().map(|&k| white[(k, i)] * white[(k, j)]).sum();
+                let own = if i == j { 1.0 + share * target[i] } else { 0.0 };
+                own + (1.0 - share) * s / (count as f64 - 1.0)
+            });
+            let factor = Cholesky::new(&covariance).unwrap();
+            let trace: f64 = (0..outputs).map(|i| factor.inverse()[(i, i)]).sum();
+            let quadratic = factor.quadratic(white.row(left));
+            expected -= 0.5 * (factor.log_determinant() + quadratic + trace);
+        }
+        let found = score(&white, &target, share).unwrap();
+        assert!((found - expected).abs() < 1e-9 * expected.abs(), "{found} {expected}");
+    }
+
+    /// Errors of one direction need no more than it; independent errors are all target.
+    #[test]
+    fn the_weight_follows_how_errors_go_together() {
+        let mean_square = |white: &Matrix| -> Vec<f64> {
+            let count = white.rows() as f64;
+            let square = |i: usize| white.column(i).iter().map(|x| x * x).sum::<f64>() / count;
+            (0..white.columns()).map(square).collect()
+        };
+        let (together, apart) = (samples(20, 100, 1, 0.0), samples(20, 100, 1, 5.0));
+        assert!(weight(&together, &mean_square(&together)) < 0.01);
+        assert!(weight(&apart, &mean_square(&apart)) > 0.6);
+    }
+}

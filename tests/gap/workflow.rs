@@ -1,0 +1,74 @@
+//! The whole workflow on `configs/hidden_effect`: the search, the study that it writes, the run of that, and what the report
+//! and `summary.json` say. The answer is told by the generator, in the last assertions only.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use generator::{Kind, PARAMETERS};
+use lacuna::report::summary;
+use lacuna::run::{RunDirectory, Silent};
+use lacuna::stage;
+use lacuna::stage::gap::add::{Begun, add};
+use lacuna::study::resolve;
+
+/// As in `examples/hidden_effect.rs`.
+const SEED: u64 = 1846;
+
+fn copied(folder: &Path) -> PathBuf {
+    let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/hidden_effect");
+    for file in ["study.toml", "knock.csv", "sweep.csv"] {
+        fs::copy(from.join(file), folder.join(file)).unwrap();
+    }
+    folder.join("study.toml")
+}
+
+#[test]
+fn a_hidden_effect_is_found_added_and_shown_to_close_the_gap() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = copied(folder.path());
+    let checked = resolve::load(&path, &["sampler.steps=600".to_owned()]);
+    let complaints = checked.complaints();
+    let study = checked.study.unwrap_or_else(|| panic!("{complaints}"));
+    let mut run = RunDirectory::open(&folder.path().join("runs/base")).unwrap();
+    let findings = stage::find_gap(&study, &mut run, &Silent).unwrap();
+    let gap = findings.gap.as_ref().unwrap();
+    let settings = ["sampler.steps=600".to_owned()];
+    let begun = Begun { study: &study, path: &path, settings: &settings, findings: &findings, gap };
+    let (added, _) = add(&begun, &run, &Silent).unwrap();
+
+    // The old study, word for word but for its name, and a block that says why it is there.
+    let text = fs::read_to_string(&added.study).unwrap();
+    let old = fs::read_to_string(&path).unwrap();
+    let name = added.study.file_stem().unwrap().to_string_lossy().replace("study", "hidden_effect");
+    let renamed = old.replace("name = \"hidden_effect\"", &format!("name = \"{name}\""));
+    assert!(text.contains(renamed.trim_end()), "{text}");
+    assert!(text.contains("[[effect]]") && text.contains("# found:"), "{text}");
+    // Nothing was simulated or emulated twice.
+    for stage in ["2-simulate", "4-surrogate"] {
+        let file = |root: &Path| fs::read(root.join(stage).join("stage.json")).unwrap();
+        assert_eq!(file(run.root()), file(&added.run), "{stage}");
+    }
+
+    // Without a new search the report tells what became of it, and a second run of the study keeps it.
+    let again = stage::run(&study, &mut run, &Silent).unwrap();
+    assert_eq!(again.gap.as_ref().unwrap().added.as_ref(), Some(&added));
+    let summary = summary(&again);
+    let told = &summary["gap"];
+    assert_eq!(told["effects"][0]["parameters"].as_object().unwrap().len(), 1, "{told:#}");
+    assert!(told["held_out"]["lower"].as_f64().unwrap() > 0.0, "{told:#}");
+    assert!(told["held_out"]["closed"].as_f64().unwrap() > 0.8, "{told:#}");
+    assert_eq!(told["held_out"]["count"], 6);
+    assert_eq!(told["study"].as_str().unwrap(), added.study.to_str().unwrap());
+    let page = fs::read_to_string(run.root().join("report.html")).unwrap();
+    assert!(page.contains("What the model misses"));
+
+    let hidden = generator::case(SEED, &[(Kind::Saturation, vec![2])], 1.0, 12);
+    assert_eq!(told["verdict"], "named", "{told:#}");
+    assert_eq!(told["effects"][0]["type"], "saturation");
+    assert_eq!(told["effects"][0]["sensors"][0], "v1");
+    for (name, truth) in PARAMETERS.iter().zip(hidden.truth) {
+        let moved = added.parameters.iter().find(|moved| moved.name == *name).unwrap();
+        let away = (moved.mean[1] - truth) / moved.sd[1];
+        assert!(away.abs() < 4.0, "{name}: {moved:?}, true {truth}");
+    }
+}
