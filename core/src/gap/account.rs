@@ -9,10 +9,12 @@ use super::candidates::{Candidate, Suspect};
 use super::experiment::Experiment;
 use super::fit::precision;
 use super::hold_out::Kind;
+use super::insight::{Insight, insight, withhold};
 use super::locate::Region;
 use super::name::{Found, Look, Options, Step, Verdict, Visible, verdict};
 use super::prove::Proof;
 use crate::data::Unit;
+use crate::math::random::Stream;
 use crate::plugin::effect::On;
 
 /// The whole result of the gap workflow.
@@ -52,6 +54,8 @@ pub struct Account {
     /// What calibration cannot absorb of the difference from the mean, white, in standard deviations; without the effects
     /// and with them.
     pub left: [Vec<f64>; 2],
+    /// What else the search can tell.
+    pub insight: Insight,
     /// How the gap fares on what was set aside.
     pub held_out: Vec<HeldOut>,
     /// Other models in place of the study's, each after its own calibration.
@@ -221,11 +225,18 @@ pub struct HeldOut {
 
 impl Account {
     /// The account of a search, without what was held out.
-    pub fn of(found: &Found<'_>, candidates: &[Candidate], options: Options) -> Self {
+    pub fn of<'a>(
+        found: &Found<'a>,
+        candidates: &'a [Candidate],
+        options: Options,
+        stream: &Stream,
+    ) -> Self {
         let first = found.path.first().map_or(&found.last, |step| &step.before);
         let looks = [first, &found.last];
         let experiment = found.system.experiment;
-        let verdict = verdict(found, candidates, options);
+        let mut verdict = verdict(found, candidates, options);
+        let insight = insight(found, candidates, &verdict, stream);
+        withhold(&mut verdict, &insight);
         let (counts, _) = experiment.means();
         Self {
             levels: [options.naming, options.unlisted],
@@ -243,6 +254,7 @@ impl Account {
             sd: found.noise.sd(experiment, &found.last.fit.at.response),
             response: looks.map(|look| look.fit.at.response.clone()),
             left: looks.map(|look| look.statistics.left.clone()),
+            insight,
             held_out: Vec::new(),
             models: Vec::new(),
             verdict,

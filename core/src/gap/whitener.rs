@@ -33,6 +33,8 @@ struct CurveWhitener {
     /// One over the standard deviation of innovations of the mean and the remainder, one a measured value.
     scale: Vec<f64>,
     memory: super::noise::Autoregression,
+    /// Values without a hole between them over which noise forgets.
+    runs: Vec<std::ops::Range<usize>>,
 }
 
 /// `(I + U U')^-1/2 = I - Q diag(shrink) Q'`.
@@ -45,7 +47,16 @@ struct LowRank {
 impl Whitener {
     /// For the mean over the replicates of an experiment with this noise around a response.
     pub fn new(experiment: &Experiment<'_>, noise: &Noise, response: &[f64]) -> Self {
-        let (counts, _) = experiment.means();
+        Self::of_counts(experiment, noise, response, &experiment.means().0)
+    }
+
+    /// The same for means over other numbers of replicates, one an output.
+    pub fn of_counts(
+        experiment: &Experiment<'_>,
+        noise: &Noise,
+        response: &[f64],
+        counts: &[f64],
+    ) -> Self {
         let mut remainder = vec![0.0; experiment.outputs()];
         let mut curves = Vec::new();
         for (curve, law) in experiment.curves.iter().zip(&noise.curves) {
@@ -57,7 +68,8 @@ impl Whitener {
                 remainder[i] = rest / variance;
             }
             let (measured, memory) = (curve.measured.clone(), law.memory.clone());
-            curves.push(CurveWhitener { measured, scale, memory });
+            let runs = runs(&measured, memory.inflation());
+            curves.push(CurveWhitener { measured, scale, memory, runs });
         }
         let conditions = experiment.conditions.iter().zip(&noise.across);
         let across = conditions
@@ -65,7 +77,7 @@ impl Whitener {
             .collect();
         let outputs = experiment.outputs();
         let mut whitener = Self { curves, across, outputs, remainder, low_rank: None };
-        let mut spread = wander(experiment, noise, response, &counts);
+        let mut spread = wander(experiment, noise, response, counts);
         spread.extend(experiment.common.iter().flat_map(|error| {
             (0..error.factor.columns()).map(|j| error.factor.column(j)).collect::<Vec<_>>()
         }));
@@ -138,7 +150,7 @@ impl Whitener {
             .map(|curve| {
                 let each = curve.measured.iter().zip(&curve.scale);
                 let mut values: Vec<f64> = each.map(|(&i, s)| differences[i] * s).collect();
-                curve.memory.whiten(&mut values);
+                curve.runs.iter().for_each(|run| curve.memory.whiten(&mut values[run.clone()]));
                 values
             })
             .collect();
@@ -151,6 +163,25 @@ impl Whitener {
         }
         white
     }
+}
+
+/// Runs of measured values: a hole is wider than the noise goes together, twice the sum of its autocorrelations, counted in
+/// the usual step between two values.
+fn runs(measured: &[usize], together: f64) -> Vec<std::ops::Range<usize>> {
+    let mut steps: Vec<usize> = measured.windows(2).map(|w| w[1] - w[0]).collect();
+    steps.sort_unstable();
+    let usual = steps.get(steps.len() / 2).map_or(1.0, |step| *step as f64);
+    let hole = |k: usize| (measured[k] - measured[k - 1]) as f64 > 2.0 * together.max(1.0) * usual;
+    let mut begin = 0;
+    let mut all = Vec::new();
+    for k in 1..measured.len() {
+        if hole(k) {
+            all.push(begin..k);
+            begin = k;
+        }
+    }
+    all.push(begin..measured.len());
+    all
 }
 
 /// Solves with a lower factor across curves, in place.

@@ -44,12 +44,42 @@ pub fn value(gap: &GapFindings) -> Value {
         });
         value["models"] = each.collect::<Map<_, _>>().into();
     }
+    value["insight"] = insight(account);
     if let Some(added) = &gap.added {
         value["study"] = json!(added.study);
         value["run"] = json!(added.run);
         if let Some(log_evidence) = added.log_evidence {
             value["log_evidence"] = json!({ "before": log_evidence[0], "after": log_evidence[1] });
         }
+    }
+    value
+}
+
+/// What else the search can tell.
+fn insight(account: &Account) -> Value {
+    let insight = &account.insight;
+    let mut value = json!({ "foretold": insight.foretold, "against": insight.against });
+    if let Some(map) = &insight.drift {
+        let names = map.parameters.iter().map(|p| (p.name.clone(), json!(p.equality.p)));
+        value["drift"] = json!({
+            "reading": map.reading,
+            "words": map.words,
+            "p": map.all.p,
+            "parameters": names.collect::<Map<_, _>>(),
+        });
+    }
+    if let Some(separations) = &insight.separations {
+        value["separations"] = json!(separations);
+    }
+    if !insight.places.is_empty() {
+        let words: Vec<&str> = insight.places.iter().map(|p| p.words.as_str()).collect();
+        value["places"] = json!(words);
+    }
+    if let Some(symbolic) = &insight.symbolic {
+        value["symbolic"] = json!({ "form": symbolic.form, "explained": symbolic.explained });
+    }
+    if let Some(stopgap) = &insight.stopgap {
+        value["stopgap"] = json!({ "explained": stopgap.explained, "length": stopgap.length });
     }
     value
 }

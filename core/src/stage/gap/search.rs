@@ -146,7 +146,8 @@ pub fn account(
             observer.warn("no effect proposes itself for these data: only the tests are made");
         }
         let found = prepared.search()?;
-        let mut account = Account::of(&found, prepared.candidates, prepared.options);
+        let mut account =
+            Account::of(&found, prepared.candidates, prepared.options, &prepared.random);
         for part in &prepared.split.held_out {
             account.held_out.extend(prepared.base.proof(part, &measured.used, &found)?);
         }

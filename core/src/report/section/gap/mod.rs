@@ -1,6 +1,7 @@
 //! What the model misses: the verdict, where the gap is, what explains it, and whether it shrinks.
 
 mod figures;
+mod insight;
 mod tables;
 
 use maud::html;
@@ -28,6 +29,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
         (figures::differences(findings, account, numbers))
         @if let Some(step) = account.path.first() { (figures::leaders(step, numbers)) }
         @if !account.path.is_empty() { (tables::path(account, numbers)) }
+        (insight::all(findings, account, numbers))
         (tables::parameters(gap, numbers))
         (tables::visible(account, numbers))
         (tables::noise(findings, account, numbers))

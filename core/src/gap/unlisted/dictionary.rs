@@ -1,0 +1,197 @@
+//! The terms that a symbolic form may be made of: functions of the response, its derivatives along the last axis, and
+//! the place on that axis.
+
+use crate::gap::candidates::place;
+use crate::gap::experiment::Experiment;
+use crate::linalg::Matrix;
+use crate::plugin::effect::On;
+
+/// The most numbers of all terms together.
+const NUMBERS: usize = 12_000_000;
+
+/// Decays that are tried, from a sixty-fourth of the axis to the whole.
+const DECAYS: i32 = 7;
+
+/// A place on a curve with the response and its derivatives there.
+struct Point {
+    t: f64,
+    y: f64,
+    dy: f64,
+    ddy: f64,
+}
+
+/// A function of a point, as it is written.
+struct Function {
+    text: String,
+    value: Box<dyn Fn(&Point) -> f64>,
+}
+
+/// One term: one function, or two that belong together, on all sensors with one coefficient or on each with its own.
+pub(super) struct Candidate {
+    /// What its functions are called.
+    pub parts: Vec<String>,
+    /// Whether the language of expressions can say it.
+    pub expressible: bool,
+    /// Whether each sensor has its own coefficients.
+    pub by_sensor: bool,
+    /// Its rows: the functions in their order, on each sensor in turn.
+    pub rows: Vec<usize>,
+}
+
+/// All terms on some sensors.
+pub(super) struct Dictionary {
+    pub candidates: Vec<Candidate>,
+    /// Their values at every output, one function on one sensor or on all a row.
+    pub rows: Matrix,
+}
+
+impl Dictionary {
+    /// The terms on these sensors around a response; `None` where no curve has an axis of four places.
+    pub fn new(experiment: &Experiment<'_>, response: &[f64], sensors: &[On]) -> Option<Self> {
+        let mut points: Vec<(usize, usize, Point)> = Vec::new();
+        let (mut first, mut last, mut length) = (f64::INFINITY, f64::NEG_INFINITY, 0);
+        for curve in &experiment.curves {
+            let Some(sensor) = sensors.iter().position(|on| *on == place(curve)) else { continue };
+            let (layout, _) = experiment.layouts.block(curve.outputs.start);
+            let Some((_, at, _)) = layout.abscissa() else { continue };
+            if at.len() != curve.outputs.len() || at.len() < 4 || curve.measured.is_empty() {
+                continue;
+            }
+            (first, last) = (first.min(at[0]), last.max(at[at.len() - 1]));
+            length = length.max(at.len());
+            let y = &response[curve.outputs.clone()];
+            let dy = slope(y, at);
+            let ddy = slope(&dy, at);
+            for (k, i) in curve.outputs.clone().enumerate() {
+                points.push((sensor, i, Point { t: at[k], y: y[k], dy: dy[k], ddy: ddy[k] }));
+            }
+        }
+        if length == 0 || last <= first {
+            return None;
+        }
+        let each = 1 + if sensors.len() > 1 { sensors.len() } else { 0 };
+        let affordable = (NUMBERS / experiment.outputs() / each).saturating_sub(40) / 2;
+        let terms = terms(first, last, length.min(affordable));
+        let mut all = Self { candidates: Vec::new(), rows: Matrix::zeros(0, experiment.outputs()) };
+        for parts in terms {
+            all.add(&parts, None, &points);
+            if sensors.len() > 1 {
+                all.add(&parts, Some(sensors.len()), &points);
+            }
+        }
+        Some(all)
+    }
+
+    /// Adds a term, on each of some sensors with its own coefficients or on all together.
+    fn add(
+        &mut self,
+        parts: &[Function],
+        sensors: Option<usize>,
+        points: &[(usize, usize, Point)],
+    ) {
+        let begin = self.rows.rows();
+        for sensor in 0..sensors.unwrap_or(1) {
+            for part in parts {
+                let mut row = vec![0.0; self.rows.columns()];
+                for (own, i, point) in points {
+                    if sensors.is_none() || *own == sensor {
+                        row[*i] = (part.value)(point);
+                    }
+                }
+                let finite = row.iter().all(|x| x.is_finite());
+                self.rows.push_row(&if finite { row } else { vec![0.0; self.rows.columns()] });
+            }
+        }
+        self.candidates.push(Candidate {
+            parts: parts.iter().map(|part| part.text.clone()).collect(),
+            expressible: parts.iter().all(|part| !part.text.contains("dy")),
+            by_sensor: sensors.is_some(),
+            rows: (begin..self.rows.rows()).collect(),
+        });
+    }
+}
+
+/// The derivative along the axis by differences.
+fn slope(y: &[f64], at: &[f64]) -> Vec<f64> {
+    let last = y.len() - 1;
+    let of = |i: usize| {
+        let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
+        (y[b] - y[a]) / (at[b] - at[a])
+    };
+    (0..y.len()).map(of).collect()
+}
+
+/// The functions of all terms, on an axis from `first` to `last`, with so many frequencies in steps of half a period.
+fn terms(first: f64, last: f64, frequencies: usize) -> Vec<Vec<Function>> {
+    let length = last - first;
+    let mut all: Vec<Vec<Function>> = simple().into_iter().map(|one| vec![one]).collect();
+    let since = if first == 0.0 { "t".to_owned() } else { format!("(t - {})", short(first)) };
+    for k in 0..DECAYS {
+        let time = rounded(length / 2f64.powi(k));
+        let decay = format!("exp(-{since} / {})", short(time));
+        let value = move |p: &Point| (-(p.t - first) / time).exp();
+        all.push(vec![Function {
+            text: format!("y * {decay}"),
+            value: Box::new(move |p| p.y * value(p)),
+        }]);
+        all.push(vec![Function { text: decay, value: Box::new(value) }]);
+    }
+    for k in 2..frequencies {
+        let frequency = rounded(0.5 * k as f64 / length);
+        let angle = format!("2 * pi * {} * t", short(frequency));
+        let phase = move |p: &Point| std::f64::consts::TAU * frequency * p.t;
+        let sine = Box::new(move |p: &Point| phase(p).sin());
+        let cosine = Box::new(move |p: &Point| phase(p).cos());
+        all.push(vec![
+            Function { text: format!("sin({angle})"), value: sine },
+            Function { text: format!("cos({angle})"), value: cosine },
+        ]);
+    }
+    all
+}
+
+/// The functions without a constant of their own.
+fn simple() -> Vec<Function> {
+    let one = |text: &str, value: fn(&Point) -> f64| Function {
+        text: text.to_owned(),
+        value: Box::new(value),
+    };
+    vec![
+        one("1", |_| 1.0),
+        one("t", |p| p.t),
+        one("t^2", |p| p.t * p.t),
+        one("y", |p| p.y),
+        one("y^2", |p| p.y * p.y),
+        one("y^3", |p| p.y.powi(3)),
+        one("abs(y)", |p| p.y.abs()),
+        one("y * abs(y)", |p| p.y * p.y.abs()),
+        one("sign(y)", |p| sign(p.y)),
+        one("y * t", |p| p.y * p.t),
+        one("dy", |p| p.dy),
+        one("dy^2", |p| p.dy * p.dy),
+        one("dy * abs(dy)", |p| p.dy * p.dy.abs()),
+        one("abs(dy)", |p| p.dy.abs()),
+        one("sign(dy)", |p| sign(p.dy)),
+        one("t * dy", |p| p.t * p.dy),
+        one("y * dy", |p| p.y * p.dy),
+        one("y^2 * dy", |p| p.y * p.y * p.dy),
+        one("ddy", |p| p.ddy),
+        one("y * ddy", |p| p.y * p.ddy),
+    ]
+}
+
+fn sign(x: f64) -> f64 {
+    if x == 0.0 { 0.0 } else { x.signum() }
+}
+
+/// A number to six digits.
+fn rounded(x: f64) -> f64 {
+    format!("{x:.5e}").parse().unwrap_or(x)
+}
+
+/// A number of six digits as a formula has it.
+pub(super) fn short(x: f64) -> String {
+    let x = rounded(x);
+    let plain = x.to_string();
+    if plain.len() <= 12 { plain } else { format!("{x:e}") }
+}

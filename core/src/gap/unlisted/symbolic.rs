@@ -1,0 +1,252 @@
+//! A symbolic form of what is missing: few terms of a dictionary, by forward selection.
+//!
+//! The terms are judged in the metric that the noise and the calibrated unknowns leave. A term is on all curves of its sensors or
+//! on none (group sparsity: de Silva et al., Frontiers in Artificial Intelligence 3 (2020) 25). Each further term must beat the best
+//! of the whole dictionary on noise alone, and what so many terms gain from noise alone is told beside what they gain.
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::dictionary::{Candidate, Dictionary, short};
+use super::selection::{Blocks, Chosen, Metric};
+use crate::gap::candidates::{place, sensors};
+use crate::gap::fit::Fit;
+use crate::gap::locate::{Region, probability};
+use crate::gap::system::System;
+use crate::gap::whitener::Whitener;
+use crate::linalg::Matrix;
+use crate::linalg::vector::norm;
+use crate::math::random::Stream;
+use crate::plugin::effect::On;
+
+/// The most terms.
+const TERMS: usize = 3;
+
+/// A term that noise alone would give more often than this is none.
+const LEVEL: f64 = 0.05;
+
+/// Simulations of whole selections on noise alone.
+const SELECTIONS: usize = 40;
+
+/// A form of what is missing.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Symbolic {
+    /// Its terms, in the order in which they were found.
+    pub terms: Vec<Term>,
+    /// The sensors that it was looked for on.
+    pub sensors: Vec<On>,
+    /// What is added to the response, in words of the language of expressions: `y` the response, `t` the place on the
+    /// last axis, `dy` and `ddy` the derivatives of `y` along it.
+    pub form: String,
+    /// The same as effects of the user's own, where the language of the `expression` effect has all its functions: one for
+    /// all sensors, or one a sensor where coefficients differ. Empty otherwise.
+    pub expressions: Vec<Written>,
+    /// The log-likelihood that it gains in the data it was found in.
+    pub gain: f64,
+    /// What the best of so many terms gain from noise alone, on the mean of simulations.
+    pub by_chance: f64,
+    /// The number of terms that were tried.
+    pub tried: usize,
+    /// The share of the misfit beyond noise that it explains, less what it would of noise alone.
+    pub explained: f64,
+}
+
+/// One term.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Term {
+    /// Its functions: one, or sine and cosine.
+    pub functions: Vec<String>,
+    /// Their coefficients by sensor; those of all sensors together are on an empty place. In the response's unit per
+    /// unit of the function.
+    pub coefficients: Vec<Coefficient>,
+    /// The log-likelihood that it gained when it was added.
+    pub gain: f64,
+    /// The probability that the best term of all gains as much from noise alone.
+    pub p: f64,
+}
+
+/// The coefficients of a term's functions on a sensor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Coefficient {
+    /// The sensor: its labels by axis; empty: all.
+    pub on: On,
+    /// One a function.
+    pub values: Vec<f64>,
+    /// Their standard deviations.
+    pub sd: Vec<f64>,
+}
+
+/// An `expression` effect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Written {
+    /// Where it acts; empty: everywhere.
+    pub on: On,
+    /// Its formula, `y` where its first parameter, the size, is zero.
+    pub formula: String,
+    /// Its parameters with their values and, where they are coefficients of their own, standard deviations.
+    pub parameters: Vec<(String, f64, f64)>,
+}
+
+/// The form on the sensors of the regions, or on all without any; `excess` is the energy of the residual beyond what noise
+/// makes. `None` where no term beats the best on noise alone.
+pub fn symbolic(
+    system: &System<'_>,
+    fit: &Fit,
+    whitener: &Whitener,
+    regions: &[Region],
+    excess: f64,
+    simulations: usize,
+    stream: &Stream,
+) -> Option<Symbolic> {
+    let experiment = system.experiment;
+    let named = regions.iter().flat_map(|region| &region.curves);
+    let named: Vec<On> = named.map(|&s| place(&experiment.curves[s])).collect();
+    let mut all = sensors(experiment);
+    if all.is_empty() {
+        all.push(On::new());
+    }
+    all.retain(|on| named.is_empty() || named.contains(on));
+    let dictionary = Dictionary::new(experiment, &fit.at.response, &all)?;
+    let mut white = whitener.whiten_rows(&dictionary.rows);
+    let scale: Vec<f64> = white.iter_rows().map(|row| norm(row).max(1e-300)).collect();
+    for (a, scale) in scale.iter().enumerate() {
+        for x in white.row_mut(a) {
+            *x /= scale;
+        }
+    }
+    let metric = Metric::new(system, fit)?;
+    let rows: Vec<Vec<usize>> = dictionary.candidates.iter().map(|c| c.rows.clone()).collect();
+    let values = experiment.curves.iter().filter(|curve| all.contains(&place(curve)));
+    let values = values.map(|curve| curve.measured.len()).sum();
+    let blocks = Blocks::new(&metric, &white, &rows, values);
+    let chosen = select(&blocks, &fit.residual, simulations, stream);
+    if chosen.is_empty() {
+        return None;
+    }
+    let own: Vec<usize> = chosen.iter().map(|(chosen, _)| chosen.block).collect();
+    let (mut coefficients, mut sd) = blocks.coefficients(&own, &fit.residual)?;
+    let used = own.iter().flat_map(|&b| &rows[b]);
+    for ((c, s), &a) in coefficients.iter_mut().zip(&mut sd).zip(used) {
+        (*c, *s) = (*c / scale[a], *s / scale[a]);
+    }
+    let mut given = coefficients.into_iter().zip(sd);
+    let terms: Vec<Term> = chosen
+        .iter()
+        .map(|(chosen, p)| {
+            let candidate = &dictionary.candidates[chosen.block];
+            let mut coefficient = |on: On| {
+                let (values, sd) = given.by_ref().take(candidate.parts.len()).unzip();
+                Coefficient { on, values, sd }
+            };
+            let coefficients = if candidate.by_sensor {
+                all.iter().cloned().map(&mut coefficient).collect()
+            } else {
+                vec![coefficient(On::new())]
+            };
+            Term { functions: candidate.parts.clone(), coefficients, gain: chosen.gain, p: *p }
+        })
+        .collect();
+    let gains: Vec<f64> = (0..SELECTIONS)
+        .into_par_iter()
+        .map(|b| blocks.gained(&metric.noise(&stream.named("whole").at(b as u64)), own.len()))
+        .collect();
+    let by_chance = gains.iter().sum::<f64>() / SELECTIONS as f64;
+    let gain = chosen.iter().map(|(chosen, _)| chosen.gain).sum::<f64>();
+    let candidates: Vec<&Candidate> = own.iter().map(|&b| &dictionary.candidates[b]).collect();
+    Some(Symbolic {
+        form: form(&terms),
+        expressions: written(&terms, &candidates, &all),
+        terms,
+        gain,
+        by_chance,
+        tried: rows.len(),
+        explained: (2.0 * (gain - by_chance) / excess.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0),
+        sensors: all,
+    })
+}
+
+/// The terms that beat the best of all on noise alone, each beside those before, with the probability of that.
+fn select(
+    blocks: &Blocks<'_>,
+    residual: &[f64],
+    simulations: usize,
+    stream: &Stream,
+) -> Vec<(Chosen, f64)> {
+    let simulated: Vec<Vec<f64>> =
+        (0..simulations).map(|b| blocks.metric.noise(&stream.at(b as u64))).collect();
+    let null = blocks.scores_of(&Matrix::from_rows(residual.len(), &simulated));
+    let (mut left, scores) = (blocks.whole(), blocks.scores(residual));
+    let mut chosen = Vec::new();
+    while chosen.len() < TERMS {
+        let Some(best) = blocks.best(&left, &scores, residual) else { break };
+        let largest: Vec<f64> = simulated
+            .par_iter()
+            .enumerate()
+            .map(|(b, residual)| blocks.best(&left, null.row(b), residual))
+            .map(|best| best.map_or(f64::NEG_INFINITY, |best| best.criterion))
+            .collect();
+        let p = probability(&largest, best.criterion);
+        if best.criterion <= 0.0 || p > LEVEL {
+            break;
+        }
+        blocks.take(&mut left, best.block);
+        chosen.push((best, p));
+    }
+    chosen
+}
+
+/// What is added to the response.
+fn form(terms: &[Term]) -> String {
+    let mut text = String::new();
+    for (function, values) in terms.iter().flat_map(|term| {
+        term.functions.iter().enumerate().map(|(k, function)| {
+            (function, term.coefficients.iter().map(|own| own.values[k]).collect::<Vec<f64>>())
+        })
+    }) {
+        let coefficient = match &values[..] {
+            [one] => short(*one),
+            several => {
+                format!("[{}]", several.iter().map(|x| short(*x)).collect::<Vec<_>>().join(", "))
+            }
+        };
+        text += &format!("{}{coefficient} * {function}", if text.is_empty() { "" } else { " + " });
+    }
+    text
+}
+
+/// The terms as `expression` effects.
+fn written(terms: &[Term], candidates: &[&Candidate], sensors: &[On]) -> Vec<Written> {
+    if !candidates.iter().all(|candidate| candidate.expressible) {
+        return Vec::new();
+    }
+    let places: Vec<On> =
+        if terms.iter().any(|term| term.coefficients.len() > 1) || sensors.len() == 1 {
+            sensors.to_vec()
+        } else {
+            vec![On::new()]
+        };
+    let everywhere = |on: &On| on.is_empty();
+    places
+        .into_iter()
+        .map(|on| {
+            let mut parts: Vec<(&str, f64, f64)> = Vec::new();
+            for term in terms {
+                let own = term.coefficients.iter().find(|c| everywhere(&c.on) || c.on == on);
+                let Some(own) = own else { continue };
+                for (k, function) in term.functions.iter().enumerate() {
+                    parts.push((function, own.values[k], own.sd[k]));
+                }
+            }
+            // The first parameter is the size of the whole: the others are relative to it.
+            let size = parts[0];
+            let mut formula = size.0.to_owned();
+            let mut parameters = vec![("size".to_owned(), size.1, size.2)];
+            for (k, (function, value, sd)) in parts.iter().enumerate().skip(1) {
+                let name = format!("share_{}", k + 1);
+                formula += &format!(" + {name} * {function}");
+                parameters.push((name, value / size.1, (sd / size.1).abs()));
+            }
+            Written { on, formula: format!("y + size * ({formula})"), parameters }
+        })
+        .collect()
+}
