@@ -22,7 +22,7 @@ use lacuna::data::{Axis, Layout, Parameter, Unit};
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::model::Response;
 use lacuna::plugin::registry::{self, Kind};
-use lacuna::plugin::{Density, Design, Discrepancy, Executor, Reader, Sampler, Surrogate};
+use lacuna::plugin::{Density, Design, Discrepancy, Executor, Reader, Sampler, Surrogate, Term};
 use lacuna::run::write_response;
 // Without this line the linker leaves the plugins out.
 use lacuna_plugins as _;
@@ -70,6 +70,7 @@ fn every_kind_has_a_suite() {
         "sampler",
         "surrogate",
         "target",
+        "term",
     ];
     assert_eq!(kinds, suites);
     assert!(registry::audit().is_empty());
@@ -87,6 +88,25 @@ fn designs() {
         ("sobol", &["", "scramble = \"none\""]),
     ];
     all::<dyn Design>(table, |case, design| contract::design(&case.label, design));
+}
+
+#[test]
+fn terms() {
+    let table: &Table = &[
+        ("coulomb_friction", &["", "of = \"v - 1\"\nwidth = \"0.01\""]),
+        ("cubic_stiffness", &["of = \"x\""]),
+        ("delayed", &["", "of = \"2 * v\"\nstart = \"2\"\nlags = 1"]),
+        ("evaporation", &["ambient = \"293 {K}\"\nscale = \"16 {K}\""]),
+        ("expression", &["shape = \"v * x\"", "shape = \"t\"\nsign = \"positive\""]),
+        ("forcing", &["", "frequency = { uniform = [1, 2] }"]),
+        ("linear_friction", &["", "of = \"v - 1\""]),
+        ("pull", &["of = \"x\"\ndistance = \"hypot(x, y)\"\nbeside = { w = \"y\" }"]),
+        ("quadratic_friction", &[""]),
+        ("quadratic_stiffness", &["of = \"x\""]),
+        ("radiation", &["ambient = \"293 {K}\""]),
+        ("relaxation", &["toward = \"1\""]),
+    ];
+    all::<dyn Term>(table, |case, term| contract::term(&case.label, term));
 }
 
 #[test]

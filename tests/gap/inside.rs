@@ -14,7 +14,8 @@ use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, normal};
 use lacuna::run::{RunDirectory, Silent};
 use lacuna::stage::direct::Prepared;
-use lacuna::stage::gap_model::{Compared, Pieces, candidates, rivals};
+use lacuna::stage::gap::add::{Begun, add};
+use lacuna::stage::gap_model::{Pieces, candidates, rivals};
 use lacuna::study::emit::to_toml;
 use lacuna::study::resolve::load_text;
 use lacuna::study::{Study, gap::Edit};
@@ -50,6 +51,7 @@ path = "data.csv"
 
 [discrepancy]
 use = "gaussian"
+variance = { half_normal = 1.0 }
 
 [sampler]
 use = "affine_invariant_ensemble"
@@ -313,16 +315,45 @@ fn another_model_is_weighed_after_its_own_calibration() {
     let whitener = Whitener::new(&experiment, &noise, &response);
     let means = experiment.means().1;
     let base = fit(&system, &whitener, &means, &[100.0]);
-    let compared: Vec<Compared> = rivals
+    let compared: Vec<_> = rivals
         .iter()
-        .map(|rival| rival.compare(&experiment, &base, &noise, &Stream::root(4)).unwrap())
+        .map(|r| r.compare(&experiment, Vec::new(), &base, &noise, &Stream::root(4)).unwrap())
         .collect();
-    let gains = compared.iter().map(|c| c.with.log_evidence - c.without.log_evidence);
-    let gains: Vec<f64> = gains.collect();
-    assert!(gains[0] > 20.0, "{gains:?}");
-    let error = compared[1].with.error.hypot(compared[1].without.error);
-    assert!(gains[1].abs() < 4.0 * error + 1e-3, "{gains:?} {error}");
+    assert!(compared[0].log_odds > 20.0, "{compared:?}");
+    let stiffness = &compared[0].parameters[0];
+    assert!((stiffness.value - STIFFNESS).abs() < 4.0 * stiffness.sd, "{stiffness:?}");
+    let same = &compared[1];
+    assert!(same.log_odds.abs() < 4.0 * same.error + 1e-3, "{same:?}");
     let text = to_toml(&rivals[0].edit.applied(&study.resolved).unwrap()).unwrap();
     let written = loaded(&folder, &text);
     assert_eq!(written.model.unwrap().common.fixed.len(), 2, "{text}");
+}
+
+/// The whole workflow: the drag is found among effects on the response, proven on replicates that were set aside, written
+/// into the equations of the study, and sampled with its parameter.
+#[test]
+fn the_study_with_the_drag_is_written_and_run() {
+    let (g, terminal) = (9.81, 20.0);
+    let fall = |t: f64| terminal * terminal / g * (g * t / terminal).cosh().ln();
+    let times: Vec<f64> = (1..=50).map(|i| 0.03 * f64::from(i)).collect();
+    let rest = REST.replace(r#"ensemble""#, "ensemble\"\nwalkers = 16\nsteps = 400");
+    let own = "\n[gap]\ncandidates = [\"gain\", \"drift\"]\nsimulations = 99\n";
+    let (folder, study) = study(&[FALL, &rest, own, DRAGS].concat(), fall, &times, 0.02);
+    let path = folder.path().join("study.toml");
+    fs::write(&path, &study.text).unwrap();
+    let mut run = RunDirectory::open(&folder.path().join("run")).unwrap();
+    let findings = lacuna::stage::find_gap(&study, &mut run, &Silent).unwrap();
+    let gap = findings.gap.as_ref().unwrap();
+    let account = &gap.account;
+    let kinds: Vec<&str> = account.additions.iter().map(|a| a.kind.as_str()).collect();
+    assert_eq!((account.verdict.word, &kinds[..]), (Word::Named, &["quadratic_friction"][..]));
+    assert!(account.held_out[0].proof.shrank, "{:?}", account.held_out);
+    let begun = Begun { study: &study, path: &path, settings: &[], findings: &findings, gap };
+    let (added, _) = add(&begun, &run, &Silent).unwrap();
+    let unknown = &added.unknowns[0];
+    assert_eq!(unknown.name, "quadratic_friction");
+    let exact = g / (terminal * terminal);
+    assert!((unknown.mean - exact).abs() < 4.0 * unknown.sd, "{unknown:?} {exact}");
+    let text = fs::read_to_string(&added.study).unwrap();
+    assert!(text.contains("# and nothing else") && !text.contains("[[effect]]"), "{text}");
 }

@@ -12,6 +12,7 @@ mod model;
 mod reader;
 mod sampler;
 mod surrogate;
+mod term;
 
 pub use density::density;
 pub use design::design;
@@ -22,6 +23,7 @@ pub use model::model;
 pub use reader::{Sample, reader};
 pub use sampler::sampler;
 pub use surrogate::surrogate;
+pub use term::term;
 
 #[cfg(test)]
 mod tests;

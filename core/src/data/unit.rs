@@ -161,6 +161,32 @@ impl Unit {
         Some(Self { text, meaning })
     }
 
+    /// The same unit in the fewest words, where it is a coherent one such as `(m/s) (s^-1)`; itself otherwise.
+    #[must_use]
+    pub fn plain(self) -> Self {
+        const SYMBOLS: [&str; BASES] = ["m", "kg", "s", "A", "K", "mol", "cd"];
+        let power = |(symbol, sixths): (&&str, i16)| match (sixths / 6, sixths % 6) {
+            (1, 0) => (*symbol).to_owned(),
+            (whole, 0) => format!("{symbol}{whole}"),
+            _ => format!("{symbol}^({sixths}/6)"),
+        };
+        let factors = |sign: i16| -> Vec<String> {
+            let all = SYMBOLS.iter().zip(self.meaning.sixths.map(|sixths| sign * sixths));
+            // The mass first, as in kg/m3.
+            let (mass, rest): (Vec<_>, Vec<_>) =
+                all.filter(|(_, sixths)| *sixths > 0).partition(|(symbol, _)| **symbol == "kg");
+            mass.into_iter().chain(rest).map(power).collect()
+        };
+        let (above, below) = (factors(1), factors(-1));
+        let above = if above.is_empty() { "1".to_owned() } else { above.join(" ") };
+        let text = match &below[..] {
+            [] => above,
+            [one] => format!("{above}/{one}"),
+            several => format!("{above}/({})", several.join(" ")),
+        };
+        Self::parse(&text).ok().filter(|plain| *plain == self).unwrap_or(self)
+    }
+
     /// What a number in this unit is multiplied by to be in the other unit.
     ///
     /// `None` when the dimensions differ, and when the zero points do (`degC` and `K`).

@@ -58,6 +58,22 @@ pub struct Account {
     pub insight: Insight,
     /// How the gap fares on what was set aside.
     pub held_out: Vec<HeldOut>,
+    /// Other models in place of the study's, each after its own calibration.
+    #[serde(default)]
+    pub models: Vec<OtherModel>,
+}
+
+/// Another model against the study's, neither with effects that were found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OtherModel {
+    /// What the study calls it.
+    pub name: String,
+    /// The log of the probability of the data with it over that with the study's model.
+    pub log_odds: f64,
+    /// The standard error of that.
+    pub error: f64,
+    /// Its calibrated parameters: name, unit, value and standard deviation by the normal approximation.
+    pub parameters: Vec<Estimate>,
 }
 
 /// An effect as a study adds it.
@@ -77,6 +93,9 @@ pub struct Addition {
     pub on: On,
     /// Its options.
     pub options: Table,
+    /// The inputs of the wide forward map that it sets free, where it acts inside the model.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub switches: Vec<usize>,
     /// Its unknowns.
     pub unknowns: Vec<Estimate>,
     /// The types that these data cannot tell from it, itself first.
@@ -237,6 +256,7 @@ impl Account {
             left: looks.map(|look| look.statistics.left.clone()),
             insight,
             held_out: Vec::new(),
+            models: Vec::new(),
             verdict,
         }
     }
@@ -257,6 +277,7 @@ fn additions(found: &Found<'_>, candidates: &[Candidate], verdict: &Verdict) -> 
                 formula: described.formula,
                 on: named.on.clone(),
                 options: candidate.options.clone(),
+                switches: candidate.effect.switches().to_vec(),
                 unknowns: unknowns
                     .map(|(k, unknown)| Estimate {
                         name: unknown.name,

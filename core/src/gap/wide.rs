@@ -6,7 +6,9 @@
 
 use super::fit::Fit;
 use super::system::System;
+use super::with_effects::WithEffects;
 use crate::data::{Layout, Unit};
+use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::plugin::discrepancy::CommonError;
 use crate::plugin::effect::{Description, Placed, Reach, Situation};
@@ -21,6 +23,67 @@ pub struct Wide<'a> {
     /// Errors of the wide map that all replicates share, beside those of the study's own: for
     /// [`Experiment::common`](super::experiment::Experiment::common).
     pub common: Vec<CommonError>,
+}
+
+impl<'a> Wide<'a> {
+    /// The same with effects on top, whose unknowns stand between the parameters and the inputs.
+    pub fn with_effects<'b>(&'b self, effects: Vec<Placed<'b>>) -> Wide<'b> {
+        let inputs = self.inputs.len();
+        let forward = WithEffects::new(&*self.forward, effects);
+        let reordered =
+            Reordered { unknowns: forward.dimension() - self.forward.dimension(), inputs, forward };
+        let (inputs, common) = (self.inputs.clone(), self.common.clone());
+        Wide { forward: Box::new(reordered), inputs, common }
+    }
+}
+
+/// A forward map whose inputs stand behind the unknowns of the effects on top of it.
+struct Reordered<'a> {
+    forward: WithEffects<'a>,
+    unknowns: usize,
+    inputs: usize,
+}
+
+impl Reordered<'_> {
+    /// Where each number of the map's own point stands.
+    fn order(&self) -> Vec<usize> {
+        let (whole, behind) = (self.forward.dimension(), self.unknowns + self.inputs);
+        let own = 0..whole - behind;
+        let inputs = whole - self.inputs..whole;
+        let unknowns = own.end..own.end + self.unknowns;
+        own.chain(inputs).chain(unknowns).collect()
+    }
+}
+
+impl Forward for Reordered<'_> {
+    fn dimension(&self) -> usize {
+        self.forward.dimension()
+    }
+
+    fn outputs(&self) -> usize {
+        self.forward.outputs()
+    }
+
+    fn mean(&self, points: &Matrix) -> Matrix {
+        self.forward.mean(&points.select_columns(&self.order()))
+    }
+
+    fn jacobian(&self, point: &[f64]) -> Matrix {
+        self.mean_and_jacobian(point).1
+    }
+
+    fn mean_and_jacobian(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
+        let order = self.order();
+        let moved: Vec<f64> = order.iter().map(|&i| point[i]).collect();
+        let (mean, jacobian) = self.forward.mean_and_jacobian(&moved);
+        let mut back = vec![0; order.len()];
+        order.iter().enumerate().for_each(|(k, &i)| back[i] = k);
+        (mean, jacobian.select_columns(&back))
+    }
+
+    fn failure(&self) -> Option<String> {
+        self.forward.failure()
+    }
 }
 
 /// An input of the model that the study holds fixed.
@@ -162,3 +225,6 @@ pub(super) fn slopes(
     slopes.retain(|(_, slope)| told(slope));
     slopes
 }
+
+#[cfg(test)]
+mod tests;

@@ -2,7 +2,7 @@
 
 use super::findings::{Findings, GapFindings};
 use super::number::{fixed, percent, typeset};
-use crate::gap::account::{Account, Addition, HeldOut, Spot};
+use crate::gap::account::{Account, Addition, HeldOut, OtherModel, Spot};
 use crate::gap::name::Word;
 use crate::plugin::effect::On;
 
@@ -31,6 +31,7 @@ pub fn sentences(findings: &Findings, gap: &GapFindings) -> Vec<String> {
     sentences.extend(account.additions.iter().map(|addition| addition_sentence(gap, addition)));
     sentences
         .extend(account.held_out.iter().map(|part| held_out(part, !account.additions.is_empty())));
+    sentences.extend(account.models.iter().map(other_model));
     sentences
 }
 
@@ -128,6 +129,18 @@ fn addition_sentence(gap: &GapFindings, addition: &Addition) -> String {
         on(&addition.on),
         values.join(", "),
         fixed(addition.probability, 2)
+    )
+}
+
+/// Another model against the study's own.
+fn other_model(model: &OtherModel) -> String {
+    let (more, odds) =
+        if model.log_odds > 0.0 { ("more", model.log_odds) } else { ("less", -model.log_odds) };
+    format!(
+        "With the model `{}` in place of the study's the data are {more} probable, by a factor e^{} (± {} in the exponent).",
+        model.name,
+        fixed(odds, 1),
+        fixed(model.error, 1)
     )
 }
 

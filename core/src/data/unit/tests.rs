@@ -126,3 +126,14 @@ fn units_are_shown_as_written() {
     assert_eq!(serde_json::to_string(&written).unwrap(), "\"kg*m^-3\"");
     assert_eq!(format!("[{written:>9}]"), "[  kg*m^-3]");
 }
+
+#[test]
+fn products_are_written_plainly() {
+    let unit = |text: &str| Unit::parse(text).unwrap();
+    let rate = unit("m/s").times(&unit("s").power(-1.0).unwrap()).unwrap();
+    assert_eq!(rate.clone().plain().as_str(), "m/s2");
+    assert_eq!(rate.times(&unit("m").power(-2.0).unwrap()).unwrap().plain().as_str(), "1/(m s2)");
+    assert_eq!(unit("kg m/(m2 s)").plain().as_str(), "kg/(m s)");
+    assert_eq!(unit("mm/s").times(&unit("mm")).unwrap().plain().as_str(), "(mm/s) mm");
+    assert_eq!(unit("").plain().as_str(), "1");
+}

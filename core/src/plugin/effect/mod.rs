@@ -85,8 +85,8 @@ pub trait Effect: Component {
         Reach::Any
     }
 
-    /// The inputs of the [wide](crate::gap::wide::Wide) forward map that its parameters set, in their order, for an effect on
-    /// the model; none for one on the response.
+    /// The inputs of a wider forward map that its parameters set, in their order, for an effect on the model; none for
+    /// one on the response.
     fn switches(&self) -> &[usize] {
         &[]
     }

@@ -37,6 +37,13 @@ pub fn value(gap: &GapFindings) -> Value {
     if !others.is_empty() {
         value["held_out_further"] = json!(others);
     }
+    if !account.models.is_empty() {
+        let each = account.models.iter().map(|model| {
+            let value = json!({ "log_odds": model.log_odds, "error": model.error });
+            (model.name.clone(), value)
+        });
+        value["models"] = each.collect::<Map<_, _>>().into();
+    }
     value["insight"] = insight(account);
     if let Some(added) = &gap.added {
         value["study"] = json!(added.study);

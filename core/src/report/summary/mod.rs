@@ -62,6 +62,7 @@ pub const SCHEMA: u64 = 1;
 /// | `gap.held_out` | `kind` of what was set aside, `names`, `count`; the gap `before` and `after` in standard deviations of the noise; the share of its square that `closed`, `lower` and `upper` end of the 95 % interval; `shrank`; `rmse`, `coverage` of the 95 % band, `conditions.SCENARIO` |
 /// | `gap.held_out_further[]` | the same of other kinds |
 /// | `gap.parameters.NAME` | `before` and `after`: `map` and `sd` without and with the effects, from the data that were not set aside |
+/// | `gap.models.NAME` | another model in place of the study's, each after its own calibration: `log_odds`, the log of the probability of the data with it over that with the study's, and its standard `error` |
 /// | `gap.insight` | `foretold[]` (log score of left-out parts against `against`), `drift` (`reading`, `words`, `p` of equal parameters in all conditions and windows), and where there are any `separations`, `places`, `symbolic`, `stopgap` |
 /// | `gap.study`, `.run`, `.log_evidence` | the study with the effects, its run directory, and the evidences `before` and `after`, once it was run |
 /// | `seconds.STAGE` | wall-clock time when the stage's result was made |

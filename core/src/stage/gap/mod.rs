@@ -16,7 +16,7 @@ use crate::run::{Artifact, Kept, Observer, RunDirectory, Stop, files};
 use crate::study::Study;
 
 use super::Known;
-use super::gap_model::Pieces;
+use super::gap_model::{self, Pieces};
 use search::Inside;
 
 const FOLDER: &str = "7-gap";
@@ -49,9 +49,10 @@ pub fn stage(
     let Some(measured) = &known.data.value.measured else { return Ok(None) };
     let pieces = Pieces::of(study)?;
     let inside = Inside::of(pieces.as_ref(), study, known, run, observer)?;
+    let rivals = gap_model::rivals(study, known, run, observer)?;
     observer.begin("gap", "", 0);
     let kept = run.keep(FOLDER, &inputs(study, known), observer, |_| {
-        search::account(study, known, &inside, measured, observer)
+        search::account(study, known, &inside, &rivals, measured, observer)
     })?;
     observer.end("gap", &summary(&kept.value));
     Ok(Some(kept))
@@ -87,11 +88,20 @@ pub(super) fn inputs(study: &Study, known: &Known<'_>) -> Value {
         laws,
         effects,
         study.gap.keys,
-        study.gap.inside.switches,
+        pieces(study),
         candidates,
         study.about.seed,
         env!("CARGO_PKG_VERSION"),
     ])
+}
+
+/// What the study says of pieces inside its model.
+fn pieces(study: &Study) -> Value {
+    let inside = &study.gap.inside;
+    let terms = inside.terms.iter().map(|t| (t.built.name, &t.built.options, &t.common));
+    let models =
+        inside.models.iter().map(|m| (m.section.built.name, &m.section.built.options, &m.keys));
+    json!([inside.switches, terms.collect::<Vec<_>>(), models.collect::<Vec<_>>()])
 }
 
 fn summary(account: &Account) -> String {

@@ -1,7 +1,7 @@
 //! From the study's data and emulator to the account of a search.
 
 use crate::data::{Observations, Parameter};
-use crate::gap::account::{Account, HeldOut};
+use crate::gap::account::{Account, HeldOut, OtherModel};
 use crate::gap::candidates::{Candidate, proposed};
 use crate::gap::common::shared;
 use crate::gap::experiment::Experiment;
@@ -18,7 +18,7 @@ use crate::plugin::discrepancy::CommonError;
 use crate::plugin::effect::Situation;
 use crate::run::{Observer, RunDirectory, Stop};
 use crate::stage::calibrate::stated_variance;
-use crate::stage::gap_model::{self, Pieces};
+use crate::stage::gap_model::{self, Pieces, Rival};
 use crate::stage::read::Measured;
 use crate::stage::{Known, best_fit, stream};
 use crate::study::Study;
@@ -80,7 +80,9 @@ pub fn prepared<T>(
     let split = split(&measured.used, &study.gap.keys.hold_out, &random.named("hold out"));
     let forward = WithEffects::new(known.forward, study.placed_effects());
     let parameters = forward.parameters(&study.parameters);
-    let base = Base { study, known, inside, forward: &forward, parameters: &parameters };
+    let wide = inside.wide.as_ref().map(|wide| wide.with_effects(study.placed_effects()));
+    let wide = wide.as_ref();
+    let base = Base { study, known, wide, forward: &forward, parameters: &parameters };
     let starts = base.starts(&split.training, &random)?;
     let experiment = base.experiment(&split.training, &starts[0])?;
     let response = base.response(&starts[0]);
@@ -115,11 +117,27 @@ impl<'a> Prepared<'a> {
     }
 }
 
+impl Prepared<'_> {
+    /// Other models against the study's, those that explain most first.
+    fn compared(&self, study: &Study, rivals: &[Rival<'_>], found: &Found<'_>) -> Vec<OtherModel> {
+        let first = found.path.first().map_or(&found.last, |step| &step.before);
+        let compare = |rival: &Rival<'_>| {
+            let stream = self.random.named("models").named(&rival.name);
+            let effects = study.placed_effects();
+            rival.compare(self.experiment, effects, &first.fit, &found.noise, &stream)
+        };
+        let mut models: Vec<OtherModel> = rivals.iter().filter_map(compare).collect();
+        models.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
+        models
+    }
+}
+
 /// Searches and proves.
 pub fn account(
     study: &Study,
     known: &Known<'_>,
     inside: &Inside<'_>,
+    rivals: &[Rival<'_>],
     measured: &Measured,
     observer: &dyn Observer,
 ) -> Result<Account, Stop> {
@@ -133,6 +151,7 @@ pub fn account(
         for part in &prepared.split.held_out {
             account.held_out.extend(prepared.base.proof(part, &measured.used, &found)?);
         }
+        account.models = prepared.compared(study, rivals, &found);
         Ok(account)
     })
 }
@@ -164,7 +183,7 @@ fn candidates(study: &Study, situation: &Situation<'_>) -> Result<Vec<Candidate>
 struct Base<'a> {
     study: &'a Study,
     known: &'a Known<'a>,
-    inside: &'a Inside<'a>,
+    wide: Option<&'a Wide<'a>>,
     forward: &'a WithEffects<'a>,
     parameters: &'a [Parameter],
 }
@@ -187,7 +206,7 @@ impl<'a> Base<'a> {
         let layouts = &study.layouts;
         let mut experiment = Experiment::new(layouts, self.parameters, self.forward, data);
         experiment.region = known.region.map(<[_]>::to_vec);
-        experiment.wide = self.inside.wide.as_ref();
+        experiment.wide = self.wide;
         let response = self.response(point);
         let noise = Noise::of(&experiment, &response, None);
         let all = shared(&experiment, &noise, &response, &self.samples(data)?);
@@ -197,7 +216,7 @@ impl<'a> Base<'a> {
 
     /// Samples of the errors that replicates share.
     fn samples(&self, data: &Observations) -> Result<Vec<CommonError>, Stop> {
-        let Self { study, known, inside, .. } = self;
+        let Self { study, known, wide, .. } = self;
         let mut all = Vec::new();
         if let Some(fitted) = known.fitted {
             let stated = stated_variance(study, data, known.forward)?;
@@ -206,7 +225,7 @@ impl<'a> Base<'a> {
         if let (Some(kept), Some(section)) = (known.numerics, &study.numerical_error) {
             all.push(kept.value.common_error(section.written.whole()));
         }
-        all.extend(inside.wide.iter().flat_map(|wide| wide.common.iter().cloned()));
+        all.extend(wide.iter().flat_map(|wide| wide.common.iter().cloned()));
         Ok(all)
     }
 

@@ -93,21 +93,14 @@ fn divided<'a>(
     study: &Study,
     account: &'a Account,
 ) -> Result<(Option<(Edit, String)>, Vec<&'a Addition>), Stop> {
-    let Some(pieces) = Pieces::of(study)? else {
-        return Ok((None, account.additions.iter().collect()));
+    let is_inside = |addition: &&Addition| !addition.switches.is_empty();
+    let (inside, on_top): (Vec<_>, Vec<_>) = account.additions.iter().partition(is_inside);
+    let Some(pieces) = Pieces::of(study)?.filter(|_| !inside.is_empty()) else {
+        return Ok((None, on_top));
     };
-    let (mut places, mut why, mut on_top) = (Vec::new(), String::new(), Vec::new());
-    for addition in &account.additions {
-        match pieces.all.iter().find(|piece| piece.kind == addition.plugin) {
-            Some(piece) => {
-                places.push(&piece.places[..]);
-                why.push_str(&found(addition).replace("# ", ""));
-            }
-            None => on_top.push(addition),
-        }
-    }
-    let edit = (!places.is_empty()).then(|| (pieces.edit(study, &places), why));
-    Ok((edit, on_top))
+    let places: Vec<&[usize]> = inside.iter().map(|addition| &addition.switches[..]).collect();
+    let why: String = inside.iter().map(|addition| found(addition).replace("# ", "")).collect();
+    Ok((Some((pieces.edit(study, &places), why)), on_top))
 }
 
 /// The text with a name of its own where it gives one: two studies of one name share a run directory.

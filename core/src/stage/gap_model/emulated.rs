@@ -9,6 +9,7 @@ use serde_json::json;
 use crate::data::{Ensemble, Parameter};
 use crate::gap::wide::{Freed, Wide};
 use crate::linalg::Matrix;
+use crate::math::distribution::Distribution;
 use crate::math::random::uniform;
 use crate::plugin::discrepancy::CommonError;
 use crate::plugin::surrogate::Training;
@@ -31,19 +32,22 @@ pub(super) fn wide<'a>(
     observer: &dyn Observer,
 ) -> Result<Wide<'a>, Stop> {
     let inputs = pieces.inputs.clone();
-    let parameters = parameters(study, &inputs);
+    let parameters = parameters(study, &inputs, known.region);
+    let simulator = pieces.simulator(study)?;
+    let idle = simulator.idle(parameters.len());
+    let used: Vec<usize> = (0..parameters.len()).filter(|i| !idle.contains(i)).collect();
     let lesson = Lesson {
         name: "gap",
-        simulator: &pieces.simulator(study)?,
-        points: points(study, pieces)?,
-        used: (0..parameters.len()).collect(),
+        simulator: &simulator,
+        points: points(study, pieces, &parameters)?,
+        used: used.clone(),
         parameters,
         base: Some((known.forward, known.origin)),
         model: json!(pieces.model()),
     };
     let (difference, common) = lesson.learn(study, run, observer)?;
     let absent = inputs.iter().map(|freed| freed.absent).collect();
-    let forward = Added { base: known.forward, difference, absent };
+    let forward = Added { base: known.forward, difference, absent, used };
     Ok(Wide { forward: Box::new(forward), inputs, common: vec![common] })
 }
 
@@ -162,13 +166,17 @@ impl Artifact for Learned {
     }
 }
 
-/// The study's parameters and the inputs.
-fn parameters(study: &Study, inputs: &[Freed]) -> Vec<Parameter> {
+/// The study's parameters, where its emulator holds, and the inputs.
+fn parameters(study: &Study, inputs: &[Freed], region: Option<&[(f64, f64)]>) -> Vec<Parameter> {
+    let own = study.parameters.iter().enumerate().map(|(i, own)| {
+        let held = region.map(|region| Distribution::Uniform([region[i].0, region[i].1]));
+        Parameter { design: held.unwrap_or_else(|| own.design.clone()), ..own.clone() }
+    });
     let freed = inputs.iter().map(|freed| Parameter {
         unit: freed.unit.clone(),
         ..Parameter::plain(&freed.name, freed.prior.clone())
     });
-    study.parameters.iter().cloned().chain(freed).collect()
+    own.chain(freed).collect()
 }
 
 /// Points of the study's own design for these parameters.
@@ -184,8 +192,8 @@ pub(super) fn designed(study: &Study, parameters: &[Parameter]) -> Result<Matrix
 }
 
 /// The runs for all pieces.
-fn points(study: &Study, pieces: &Pieces) -> Result<Matrix, Stop> {
-    let mut points = designed(study, &parameters(study, &pieces.inputs))?;
+fn points(study: &Study, pieces: &Pieces, parameters: &[Parameter]) -> Result<Matrix, Stop> {
+    let mut points = designed(study, parameters)?;
     let (first, count) = (study.parameters.len(), pieces.all.len());
     let stream = stream(study, "gap-design").named("present");
     for run in 0..points.rows() {
@@ -214,6 +222,8 @@ struct Added<'a> {
     base: &'a dyn Forward,
     difference: Box<dyn Emulator>,
     absent: Vec<f64>,
+    /// What the difference depends on, of the parameters and the inputs.
+    used: Vec<usize>,
 }
 
 impl Added<'_> {
@@ -246,23 +256,29 @@ impl Forward for Added<'_> {
             points.iter_rows().map(|point| self.without(point)),
         );
         let mut mean = self.base.mean(&own);
-        let (with, without) = (self.difference.mean(points), self.difference.mean(&absent));
+        let difference = |points: &Matrix| self.difference.mean(&points.select_columns(&self.used));
+        let (with, without) = (difference(points), difference(&absent));
         let changes = with.as_slice().iter().zip(without.as_slice());
         mean.as_mut_slice().iter_mut().zip(changes).for_each(|(y, (a, b))| *y += a - b);
         mean
     }
 
     fn jacobian(&self, point: &[f64]) -> Matrix {
+        let mut jacobian = Matrix::zeros(self.outputs(), point.len());
         let base = self.base.jacobian(self.split(point).0);
-        let with = self.difference.jacobian(point);
-        let without = self.difference.jacobian(&self.without(point));
-        Matrix::from_fn(base.rows(), point.len(), |i, j| {
-            if j < base.columns() {
-                base[(i, j)] + with[(i, j)] - without[(i, j)]
-            } else {
-                with[(i, j)]
+        let slopes = |point: &[f64]| {
+            let used: Vec<f64> = self.used.iter().map(|&i| point[i]).collect();
+            self.difference.jacobian(&used)
+        };
+        let (with, without) = (slopes(point), slopes(&self.without(point)));
+        for i in 0..self.outputs() {
+            jacobian.row_mut(i)[..base.columns()].copy_from_slice(base.row(i));
+            for (k, &j) in self.used.iter().enumerate() {
+                let own = if j < base.columns() { without[(i, k)] } else { 0.0 };
+                jacobian[(i, j)] += with[(i, k)] - own;
             }
-        })
+        }
+        jacobian
     }
 
     fn failure(&self) -> Option<String> {

@@ -9,7 +9,7 @@ mod swap;
 mod terms;
 
 pub use pieces::{Piece, Pieces};
-pub use swap::{Compared, Rival, rivals};
+pub use swap::{Rival, rivals};
 
 use crate::gap::candidates::Candidate;
 use crate::gap::wide::Wide;

@@ -6,15 +6,19 @@
 use serde_json::json;
 
 use crate::data::Parameter;
+use crate::gap::account::{Estimate, OtherModel};
+use crate::gap::common::shared;
 use crate::gap::experiment::Experiment;
 use crate::gap::fit::{Fit, fit_from};
-use crate::gap::name::{Weighed, weigh};
+use crate::gap::name::weigh;
 use crate::gap::noise::Noise;
 use crate::gap::system::System;
 use crate::gap::whitener::Whitener;
+use crate::gap::with_effects::WithEffects;
 use crate::linalg::Matrix;
 use crate::math::random::Stream;
 use crate::plugin::discrepancy::CommonError;
+use crate::plugin::effect::Placed;
 use crate::plugin::{Emulator, Forward};
 use crate::run::{Observer, RunDirectory, Stop};
 use crate::stage::Known;
@@ -37,17 +41,6 @@ pub struct Rival<'a> {
     pub common: Vec<CommonError>,
     /// What the study must say to have it.
     pub edit: Edit,
-}
-
-/// A model against the study's own.
-#[derive(Debug, Clone)]
-pub struct Compared {
-    /// The best fit of the other model.
-    pub fit: Fit,
-    /// Its evidence, less what the noise alone decides.
-    pub with: Weighed,
-    /// That of the study's model, under the same noise.
-    pub without: Weighed,
 }
 
 /// The other models that the study names.
@@ -116,42 +109,63 @@ fn table(study: &Study, swap: &Swap) -> Result<toml::Table, Stop> {
 }
 
 impl Rival<'_> {
-    /// The model against that of an experiment, whose fit is `base`; `None` where it has no answer.
+    /// The model against that of an experiment, whose fit is `base`; both with the effects that the study has already.
+    /// `None` where it has no answer.
     pub fn compare(
         &self,
         experiment: &Experiment<'_>,
+        effects: Vec<Placed<'_>>,
         base: &Fit,
         noise: &Noise,
         stream: &Stream,
-    ) -> Option<Compared> {
+    ) -> Option<OtherModel> {
         let mut own = experiment.clone();
-        own.common.extend(self.common.clone());
+        let error = shared(&own, noise, &base.at.response, &self.common);
+        own.common.extend(error.common);
+        own.remainder.resize(own.outputs(), 0.0);
+        own.remainder.iter_mut().zip(error.remainder).for_each(|(all, rest)| *all += rest);
         let (_, means) = own.means();
         // The same covariance for both: neither gains by what it says of its own error.
         let whitener = Whitener::new(&own, noise, &base.at.response);
+        let weighed = |system: &System<'_>, starts: &[Vec<f64>], name: &str| {
+            let fit = fit_from(system, &whitener, &means, starts)?;
+            let weighed = weigh(system, &whitener, &means, &fit, &stream.named(name));
+            Some((fit, weighed))
+        };
         let system = System::new(&own, Vec::new());
-        let refitted = fit_from(&system, &whitener, &means, &[base.at.point.clone()])?;
-        let without = weigh(&system, &whitener, &means, &refitted, &stream.named("own"));
+        let (_, without) = weighed(&system, std::slice::from_ref(&base.at.point), "own")?;
+        let forward = WithEffects::new(&*self.forward, effects);
+        let parameters = forward.parameters(&self.parameters);
         let mut other = own.clone();
-        (other.parameters, other.forward) = (&self.parameters, &*self.forward);
+        (other.parameters, other.forward) = (&parameters, &forward);
         (other.wide, other.region) = (None, None);
         let system = System::new(&other, Vec::new());
-        let starts = self.starts(experiment, &base.at.point);
-        let fit = fit_from(&system, &whitener, &means, &starts)?;
-        let with = weigh(&system, &whitener, &means, &fit, &stream.named("other"));
-        Some(Compared { fit, with, without })
-    }
-
-    /// From where its calibration starts: from the study's, and from the middle and the quarters of the priors.
-    fn starts(&self, experiment: &Experiment<'_>, point: &[f64]) -> Vec<Vec<f64>> {
-        let here = |p: &Parameter| {
-            let place = experiment.parameters.iter().position(|own| own.name == p.name);
-            place.map_or_else(|| p.prior.quantile(0.5), |i| point[i])
+        let starts = starts(&parameters, experiment.parameters, &base.at.point);
+        let (fit, with) = weighed(&system, &starts, "other")?;
+        let estimates = parameters.iter().zip(&fit.at.point).zip(fit.sd());
+        let estimate = |((p, value), sd): ((&Parameter, &f64), f64)| Estimate {
+            name: p.name.clone(),
+            unit: p.unit.clone(),
+            value: *value,
+            sd,
         };
-        let at = |q: f64| self.parameters.iter().map(|p| p.prior.quantile(q)).collect();
-        let first = self.parameters.iter().map(here).collect();
-        vec![first, at(0.5), at(0.25), at(0.75)]
+        Some(OtherModel {
+            name: self.name.clone(),
+            log_odds: with.log_evidence - without.log_evidence,
+            error: with.error.hypot(without.error),
+            parameters: estimates.map(estimate).collect(),
+        })
     }
+}
+
+/// From where a calibration starts: from another's, and from the middle and the quarters of the priors.
+fn starts(parameters: &[Parameter], others: &[Parameter], point: &[f64]) -> Vec<Vec<f64>> {
+    let here = |p: &Parameter| {
+        let place = others.iter().position(|other| other.name == p.name);
+        place.map_or_else(|| p.prior.quantile(0.5), |i| point[i])
+    };
+    let at = |q: f64| parameters.iter().map(|p| p.prior.quantile(q)).collect();
+    vec![parameters.iter().map(here).collect(), at(0.5), at(0.25), at(0.75)]
 }
 
 /// An emulator as a forward map.

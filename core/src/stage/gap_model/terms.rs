@@ -133,7 +133,7 @@ impl Desk<'_> {
         let shape = shape.map_err(|fault| format!("`{}`: {fault}", summand.shape))?;
         let rate = state.rate_unit.as_ref();
         let unit = rate.and_then(|rate| rate.times(&shape.unwrap_or_default().power(-1.0)?));
-        unit.ok_or_else(|| {
+        unit.map(Unit::plain).ok_or_else(|| {
             format!(
                 "no unit is that of the rate of `{}` by that of `{}`",
                 state.name, summand.shape
