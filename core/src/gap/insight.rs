@@ -92,6 +92,10 @@ pub fn insight<'a>(
         let nothing = Rival { system: &base, fit: &first.fit };
         let second = rival.map_or(nothing, Weighed::rival);
         insight.foretold = foretell(winner, second, &found.noise, tried);
+        if found.chosen.iter().all(|suspect| !suspect.on.is_empty()) {
+            // Without the sensor that an effect acts on nothing is known of it but its prior: that compares priors.
+            insight.foretold.retain(|one| one.left_out != LeftOut::Sensor);
+        }
         insight.separations = separations(found, &alone, named);
     }
     if verdict.word == Word::Unlisted {
@@ -140,10 +144,7 @@ fn unnamed(found: &Found<'_>, insight: &mut Insight, stream: &Stream) {
 
 /// The verdict as far as it stands against what foretells better: a name that does not is one of a class with it.
 pub fn withhold(verdict: &mut Verdict, insight: &Insight) {
-    // Without the sensor that an effect acts on nothing is known of it but its prior: that compares priors.
-    let informed = |f: &&Foretelling| f.left_out != LeftOut::Sensor;
-    let worse =
-        |f: &&Foretelling| informed(f) && f.error.is_some_and(|e| f.difference < -AGAINST * e);
+    let worse = |f: &&Foretelling| f.error.is_some_and(|e| f.difference < -AGAINST * e);
     let against = insight.against.as_ref().filter(|kind| *kind != NOTHING);
     let (Some(worse), Some(against)) = (insight.foretold.iter().find(worse), against) else {
         return;
