@@ -166,11 +166,13 @@ fn two_effects_are_both_named() {
         Plan::new(i, vec![(kind(first), vec![a]), (kind(second), vec![b])], 1.0)
     };
     let all = asked(5, (0..count(30, 4)).map(plan).collect());
-    let both = Rate::of(&all, |a| kinds(a) == {
-        let mut truths = a.truths();
-        truths.sort();
-        truths.dedup();
-        truths
+    let both = Rate::of(&all, |a| {
+        kinds(a) == {
+            let mut truths = a.truths();
+            truths.sort();
+            truths.dedup();
+            truths
+        }
     });
     let rows = [
         both.row("both types right"),

@@ -53,7 +53,8 @@ fn a_bump_is_found_where_it_is() {
     let error = (variance / n).sqrt();
     println!("\n### A bump, rms 1\n\nmean overlap {mean:.3} ± {error:.3} of {n} cases");
     for (asked, overlap) in all.iter().zip(&overlaps).filter(|(_, o)| **o < 0.4) {
-        let found: Vec<_> = asked.answer.regions.iter().map(|r| (&r.curves, r.cell.window)).collect();
+        let found: Vec<_> =
+            asked.answer.regions.iter().map(|r| (&r.curves, r.cell.window)).collect();
         println!("missed: {overlap:.2} {:?} {found:?}", asked.case.hidden[0]);
     }
     assert!(mean > 0.55 - 4.0 * error, "{mean} ± {error}");

@@ -13,10 +13,7 @@ pub struct Rate {
 impl Rate {
     /// Of the things for which something holds.
     pub fn of<T>(all: &[T], holds: impl Fn(&T) -> bool) -> Self {
-        Self {
-            events: all.iter().filter(|x| holds(x)).count() as u64,
-            trials: all.len() as u64,
-        }
+        Self { events: all.iter().filter(|x| holds(x)).count() as u64, trials: all.len() as u64 }
     }
 
     /// The interval of Clopper and Pearson (Biometrika 26 (1934) 404) of 95 %.

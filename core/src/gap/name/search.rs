@@ -24,6 +24,10 @@ const EIGHTY: f64 = 0.8416;
 /// Suspects this much lighter than the heaviest, in logarithms, are no seeds of groups.
 const RIVAL: f64 = 20.0;
 
+/// What the first effect leaves may be its own form, a little wrong: a further one must outweigh its absence by 20 to 1, in
+/// logarithms (strong evidence by Kass and Raftery, Journal of the American Statistical Association 90 (1995) 773).
+const FURTHER: f64 = 3.0;
+
 /// Leaders of each step that are tried in pairs.
 const PAIRED: usize = 10;
 
@@ -155,18 +159,23 @@ impl<'a> Search<'a> {
             scan: &self.scan,
         };
         let statistics = bench.statistics();
-        let nulls = bench.nulls(self.options.simulations, &self.stream.named("null").at(round));
+        let stream = self.stream.named("null").at(round);
+        let nulls = bench.nulls(&statistics, self.options.simulations, &stream);
         let p = [
             nulls.of_score(&statistics, &directions),
             nulls.of_scan(&statistics),
             nulls.of_energy(&statistics),
         ];
         let level = self.options.naming + self.options.unlisted;
-        let regions = regions(self.experiment, &self.scan, &statistics.cells, &nulls, level);
-        let expected = nulls.energy.iter().sum::<f64>() / nulls.energy.len().max(1) as f64;
+        let regions = regions(self.experiment, &self.scan, &statistics, &nulls, level);
+        let count = nulls.energy.len().max(1) as f64;
+        let expected = nulls.energy.iter().sum::<f64>() / count;
+        let squares = nulls.energy.iter().map(|e| (e - expected).powi(2)).sum::<f64>();
+        let energy_sd = (squares / (count - 1.0).max(1.0)).sqrt();
         let visible = self.visible(&directions, &nulls);
         let fit = state.fit.clone();
-        let look = Look { fit, statistics, expected_energy: expected, p, regions, visible };
+        let expected_energy = expected;
+        let look = Look { fit, statistics, expected_energy, energy_sd, p, regions, visible };
         (look, directions)
     }
 
@@ -208,7 +217,7 @@ impl<'a> Search<'a> {
             // The gate alone decides on the first effect; further ones must outweigh their absence.
             named
                 && (state.chosen.is_empty()
-                    || best.log_weight - self.kinds() > now - state.prior(&self.common()))
+                    || best.log_weight - self.kinds() > now - state.prior(&self.common()) + FURTHER)
         });
         let added = match alone {
             Some(best) => vec![best.suspect.clone()],
@@ -284,7 +293,7 @@ impl<'a> Search<'a> {
         let directions = self.directions(&smaller, &projection);
         let (rows, spread) = differences(self.experiment);
         let left = projection.rest(&smaller.fit.residual);
-        let scores = directions.scores(&left, &smaller.whitener.whiten_rows(&rows), &spread);
+        let scores = directions.scores_of(&left, &smaller.whitener.whiten_rows(&rows), &spread);
         let judged = self.judged(&smaller, &directions, &scores, stream);
         (smaller, judged)
     }
@@ -356,7 +365,7 @@ impl<'a> Search<'a> {
                 let own = self.unknowns(&second.suspect, judged);
                 let both = one.with(&common, &second.suspect, &own);
                 let weight = both.weight(&common, stream);
-                if weight > now && best.as_ref().is_none_or(|(most, _)| weight > *most) {
+                if weight > now + FURTHER && best.as_ref().is_none_or(|(most, _)| weight > *most) {
                     best = Some((weight, vec![first.suspect.clone(), second.suspect.clone()]));
                 }
             }
