@@ -7,6 +7,7 @@ mod leaders;
 mod look;
 mod placement;
 mod search;
+mod shares;
 mod stability;
 mod state;
 mod verdict;

@@ -4,6 +4,7 @@ use super::consistency::consistency;
 use super::groups::grow;
 use super::leaders::{Judged, Lead, judge, leads};
 use super::look::{Found, Look, Options, Step, Visible};
+use super::shares::shares;
 use super::stability::stability;
 use super::state::{Common, State, kinds};
 use crate::gap::candidates::{Candidate, Suspect, sensors, suspects};
@@ -15,6 +16,7 @@ use crate::gap::locate::{
 use crate::gap::noise::Noise;
 use crate::gap::system::System;
 use crate::gap::whitener::Whitener;
+use crate::math::moments::{mean, quantile, variance};
 use crate::math::random::Stream;
 use crate::plugin::effect::{On, Situation};
 
@@ -81,7 +83,7 @@ pub fn search<'a>(
         None => 1.0,
     };
     let consistency = consistency(&state.system, &state.fit, &state.whitener);
-    let types = slots.iter().map(|judged| search.shares(judged)).collect();
+    let types = slots.iter().map(|judged| shares(candidates, judged)).collect();
     let State { system, chosen, noise, whitener, .. } = state;
     let means = search.means;
     Some(Found {
@@ -168,13 +170,10 @@ impl<'a> Search<'a> {
         ];
         let level = self.options.naming + self.options.unlisted;
         let regions = regions(self.experiment, &self.scan, &statistics, &nulls, level);
-        let count = nulls.energy.len().max(1) as f64;
-        let expected = nulls.energy.iter().sum::<f64>() / count;
-        let squares = nulls.energy.iter().map(|e| (e - expected).powi(2)).sum::<f64>();
-        let energy_sd = (squares / (count - 1.0).max(1.0)).sqrt();
+        let expected_energy = mean(&nulls.energy);
+        let energy_sd = variance(&nulls.energy).sqrt();
         let visible = self.visible(&directions, &nulls);
         let fit = state.fit.clone();
-        let expected_energy = expected;
         let look = Look { fit, statistics, expected_energy, energy_sd, p, regions, visible };
         (look, directions)
     }
@@ -182,7 +181,7 @@ impl<'a> Search<'a> {
     fn visible(&self, directions: &Directions, nulls: &Nulls) -> Vec<Visible> {
         let mut null = nulls.score.clone();
         null.sort_by(f64::total_cmp);
-        let threshold = crate::math::moments::quantile(&null, 1.0 - self.options.naming);
+        let threshold = quantile(&null, 1.0 - self.options.naming);
         let of = |(s, suspect): (usize, &Suspect)| {
             let own = directions.all.iter().filter(|d| d.suspect == s);
             let best = own.max_by(|a, b| a.length.total_cmp(&b.length));
@@ -383,25 +382,5 @@ impl<'a> Search<'a> {
         let stream = self.stream.named("types");
         let slot = |i: usize| self.slot(state, i, &stream.at(i as u64)).1;
         (0..state.chosen.len()).map(slot).collect()
-    }
-
-    /// The probability of each type among what was weighed for one place.
-    fn shares(&self, judged: &[Judged]) -> Vec<(String, f64)> {
-        let best = judged.first().map_or(0.0, |j| j.log_weight);
-        let mut shares: Vec<(String, f64)> = Vec::new();
-        for j in judged {
-            let kind = &self.candidates[j.suspect.candidate].kind;
-            let weight = (j.log_weight - best).exp();
-            match shares.iter_mut().find(|(other, _)| other == kind) {
-                Some((_, sum)) => *sum += weight,
-                None => shares.push((kind.clone(), weight)),
-            }
-        }
-        let total: f64 = shares.iter().map(|(_, w)| w).sum();
-        for (_, w) in &mut shares {
-            *w /= total;
-        }
-        shares.sort_by(|a, b| b.1.total_cmp(&a.1));
-        shares
     }
 }
