@@ -93,7 +93,9 @@ fn narrowed(system: &System<'_>, whitener: &Whitener, means: &[f64], fit: &Fit) 
         if steep.is_empty() {
             break;
         }
-        steep.iter().for_each(|&j| precision[(j, j)] *= 4.0);
+        for &j in &steep {
+            precision[(j, j)] *= 4.0;
+        }
     }
     precision
 }

@@ -80,7 +80,9 @@ impl<'a> Fit<'a> {
 
     fn whiten(&mut self) {
         let white = |mut curves: Vec<Vec<f64>>| {
-            curves.iter_mut().for_each(|x| self.memory.whiten(x));
+            for x in &mut curves {
+                self.memory.whiten(x);
+            }
             curves
         };
         let whitened = white(self.scaled(&self.data.contrasts));

@@ -58,7 +58,9 @@ impl Pair {
     pub fn whitened(&self, memory: &Autoregression) -> f64 {
         let p = self.order;
         let mut heads = self.heads;
-        heads.iter_mut().for_each(|head| memory.whiten(&mut head[..p]));
+        for head in &mut heads {
+            memory.whiten(&mut head[..p]);
+        }
         let mut weights = [0.0; LAGS];
         weights[0] = 1.0;
         weights[1..].iter_mut().zip(memory.coefficients()).for_each(|(w, a)| *w = -a);
