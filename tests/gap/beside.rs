@@ -20,7 +20,7 @@ use crate::chain::{emulator, layouts, observations, parameters};
 fn looked<T>(case: &Case, use_it: impl FnOnce(&Experiment<'_>, &[f64]) -> T) -> T {
     let (layouts, parameters) = (layouts(), parameters());
     let (emulator, error) = emulator();
-    let data = observations(case, &layouts);
+    let data = observations(case, 0..case.replicates[0].len());
     let mut experiment = Experiment::new(&layouts, &parameters, &**emulator, &data);
     let response = emulator.mean(&Matrix::from_rows(4, [REFERENCE])).row(0).to_vec();
     experiment.common = vec![error.clone()];
