@@ -120,7 +120,8 @@ impl Freed {
     }
 
     /// An input whose fits start from these values.
-    pub fn from_starts(self, starts: Vec<f64>) -> Self {
+    #[must_use]
+    pub fn starting_from(self, starts: Vec<f64>) -> Self {
         Self { starts, ..self }
     }
 }

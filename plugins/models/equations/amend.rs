@@ -61,14 +61,16 @@ impl Amend for Equations {
     ) -> Result<Option<Unit>, Fault> {
         let wider = self.with(further);
         let names = Names::of(context);
-        let first = |mut faults: Vec<(String, Fault)>| faults.remove(0).1;
+        // Where the expression stands the caller knows better.
+        let bare = |fault: Fault| Fault { definition: String::new(), ..fault };
+        let first = |mut faults: Vec<(String, Fault)>| bare(faults.remove(0).1);
         let mut scope = scope(&wider, &names).map_err(first)?;
-        scope.result(&key(ASKED), expression)?;
+        scope.result(&key(ASKED), expression).map_err(bare)?;
         // A name that is not there is found before its unit is asked for.
-        scope.compile(&[&key(ASKED)]).map_err(|mut faults| faults.remove(0))?;
+        scope.compile(&[&key(ASKED)]).map_err(|mut faults| bare(faults.remove(0)))?;
         let (found, faults) = scope.find_units(&units::known(&wider, &scope, context));
         match faults.into_iter().find(|fault| fault.definition == key(ASKED)) {
-            Some(fault) => Err(fault),
+            Some(fault) => Err(bare(fault)),
             None => Ok(found.get(&key(ASKED)).cloned().flatten()),
         }
     }

@@ -31,7 +31,7 @@ pub(super) fn add(
     let simulator = Simulator::of(study)?.ok_or_else(|| Stop::new("the study has no model"))?;
     let amend = simulator.model.amend().ok_or_else(|| {
         Stop::new("the model has no equations to which terms could be added")
-            .help("take `[[gap.term]]` out, or write the model as `equations`")
+            .help("take `[[gap.term]]` out, or write the model as equations")
     })?;
     for section in terms {
         let name = section.common.name(&section.built);
@@ -61,7 +61,7 @@ fn index(index: &Index) -> Freed {
     // With the coefficient at zero it does not matter what an index is.
     let absent = index.starts.first().copied().unwrap_or_else(|| index.prior.quantile(0.5));
     Freed::new(&index.name, index.unit.clone(), absent, index.prior.clone())
-        .from_starts(index.starts.clone())
+        .starting_from(index.starts.clone())
 }
 
 fn description(term: &dyn Term, summand: &Summand) -> Description {

@@ -165,7 +165,7 @@ fn one_term(
         complaints
             .at("")
             .say(format!("`{}` has no equations to which a term could be added", model.built.name))
-            .expected("a model such as `equations`, with states");
+            .expected("a model that the study writes as equations, with states");
         return;
     };
     let Some((layout, _)) =
@@ -229,7 +229,9 @@ fn one_model(study: &Study, swap: &Swap, complaints: &mut Complaints<'_>) {
     let model = &*swap.section.built.plugin;
     for scenario in &study.scenarios {
         let Some((layout, _)) = study.layouts.of_scenario(&scenario.name) else { continue };
-        let signature: Signature = model.signature(&study.context_of(&layout));
+        let context = study.context_of(&layout);
+        model.check(&context, complaints);
+        let signature: Signature = model.signature(&context);
         if layout.unit.factor_to(&signature.layout.unit).is_none() {
             complaints
                 .at("use")
