@@ -8,9 +8,9 @@
 
 use super::experiment::Experiment;
 use super::noise::Noise;
-use super::whitener::{Whitener, condensed};
+use super::whitener::Whitener;
 use crate::linalg::vector::dot;
-use crate::linalg::{Cholesky, Matrix, multiply_transposed};
+use crate::linalg::{Cholesky, Matrix, multiply_transposed, symmetric_eigen, transposed_multiply};
 use crate::plugin::discrepancy::CommonError;
 
 /// Weights that are tried, in units of the number of samples.
@@ -18,6 +18,9 @@ const WEIGHTS: [f64; 10] = [0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0]
 
 /// The values on both sides over which the size of the errors is averaged along a curve.
 const NEAR: usize = 4;
+
+/// Directions whose variance is below this share of the noise's are part of the remainder.
+const MATTERS: f64 = 0.1;
 
 /// Errors as a calibration takes them into account.
 #[derive(Debug, Clone, Default)]
@@ -62,9 +65,41 @@ pub fn shared(
             }
         }
     }
-    let with =
-        Experiment { common: all.common, remainder: all.remainder.clone(), ..experiment.clone() };
-    Shared { common: condensed(&with, noise, response), remainder: all.remainder }
+    all.joined(experiment, noise, response)
+}
+
+impl Shared {
+    /// All errors as one, in the directions that matter beside noise and remainder; the variance of the others joins the
+    /// remainder.
+    fn joined(self, experiment: &Experiment<'_>, noise: &Noise, response: &[f64]) -> Self {
+        let columns = self.common.iter().flat_map(|error| {
+            (0..error.factor.columns()).map(|k| error.factor.column(k)).collect::<Vec<_>>()
+        });
+        let rows = Matrix::from_rows(experiment.outputs(), columns);
+        if rows.rows() == 0 {
+            return self;
+        }
+        let alone = Experiment {
+            common: Vec::new(),
+            remainder: self.remainder.clone(),
+            ..experiment.clone()
+        };
+        let whitener = Whitener::new(&alone, noise, response);
+        let white = whitener.base_rows(&rows);
+        let Ok(eigen) = symmetric_eigen(&multiply_transposed(&white, &white)) else { return self };
+        let kept: Vec<usize> =
+            (0..eigen.values.len()).filter(|&k| eigen.values[k] > MATTERS).collect();
+        let vectors = eigen.vectors.select_columns(&kept);
+        let inside = transposed_multiply(&vectors, &white);
+        let square = |rows: &Matrix, i: usize| rows.iter_rows().map(|r| r[i] * r[i]).sum::<f64>();
+        let mut remainder = self.remainder;
+        for (i, s) in whitener.scale().iter().enumerate().filter(|(_, s)| **s > 0.0) {
+            remainder[i] += (square(&white, i) - square(&inside, i)).max(0.0) / (s * s);
+        }
+        let names: Vec<&str> = self.common.iter().map(|error| error.origin.as_str()).collect();
+        let (origin, factor) = (names.join(", "), transposed_multiply(&rows, &vectors));
+        Self { common: vec![CommonError { origin, factor, predictive: true }], remainder }
+    }
 }
 
 /// The mean square of the samples at each output, averaged over the values nearby of its curve.
