@@ -121,10 +121,9 @@ impl Effect for Drift {
     fn proposals(&self, situation: &Situation<'_>) -> Vec<Table> {
         let Some(span) = Span::of_all(situation) else { return Vec::new() };
         let rate = 0.2 * situation.scale() / span.duration();
-        vec![propose(&[
-            ("rate", Distribution::Normal([0.0, rate])),
-            ("zero", Distribution::Uniform([span.first, span.last])),
-        ])]
+        let rate = Distribution::Normal([0.0, rate]);
+        let zero = Distribution::Uniform([span.first, span.last]);
+        vec![propose(&[("rate", rate.clone())]), propose(&[("rate", rate), ("zero", zero)])]
     }
 }
 

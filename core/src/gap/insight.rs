@@ -7,7 +7,8 @@ use super::candidates::Candidate;
 use super::drift::{self, drift};
 use super::fit::Fit;
 use super::name::{
-    Foretelling, Found, Judged, Named, Rival, Separations, Verdict, Word, foretell, separate,
+    Foretelling, Found, Judged, LeftOut, Named, Rival, Separations, Verdict, Word, foretell,
+    separate,
 };
 use super::system::System;
 use super::unlisted::{Description, Stopgap, Symbolic, describe, stopgap, symbolic};
@@ -91,6 +92,10 @@ pub fn insight<'a>(
         let nothing = Rival { system: &base, fit: &first.fit };
         let second = rival.map_or(nothing, Weighed::rival);
         insight.foretold = foretell(winner, second, &found.noise, tried);
+        if found.chosen.iter().all(|suspect| !suspect.on.is_empty()) {
+            // Without the sensor that an effect acts on nothing is known of it but its prior: that compares priors.
+            insight.foretold.retain(|one| one.left_out != LeftOut::Sensor);
+        }
         insight.separations = separations(found, &alone, named);
     }
     if verdict.word == Word::Unlisted {

@@ -2,7 +2,8 @@
 //!
 //! The gap of a response is its whitened mean square misfit to new replicates less one, the share of the noise. The misfits of one
 //! replicate without and with the effects share its noise, so that their difference is far more exact than either:
-//! intervals are those of Student's law for the mean of the differences, replicates being independent.
+//! intervals are those of Student's law for the mean of the differences, replicates being independent. Conditions differ in what
+//! closes, so that the scatter is that within them (stratified sampling; Cochran, Sampling Techniques, 3rd ed., section 5.6).
 
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -72,13 +73,13 @@ pub fn prove(
     let by_condition: Vec<Vec<Misfits>> = (0..held_out.conditions.len())
         .map(|c| of_condition(held_out, noise, c, [before, after]))
         .collect();
-    let all = Comparison::of(&by_condition.concat())?;
+    let all = Comparison::of(&by_condition)?;
     let conditions: Vec<OfCondition> = held_out
         .conditions
         .iter()
         .zip(&by_condition)
         .filter_map(|(condition, misfits)| {
-            let comparison = Comparison::of(misfits)?;
+            let comparison = Comparison::of(std::slice::from_ref(misfits))?;
             Some(OfCondition { scenario: condition.scenario.clone(), comparison })
         })
         .collect();
@@ -131,20 +132,27 @@ fn of_condition(
 }
 
 impl Comparison {
-    fn of(misfits: &[Misfits]) -> Option<Self> {
-        let count = misfits.len() as f64;
-        if misfits.is_empty() {
+    /// Of the misfits by condition.
+    fn of(conditions: &[Vec<Misfits>]) -> Option<Self> {
+        let all: Vec<&Misfits> = conditions.iter().flatten().collect();
+        if all.is_empty() {
             return None;
         }
-        let mean = |of: &dyn Fn(&Misfits) -> f64| misfits.iter().map(of).sum::<f64>() / count;
+        let count = all.len() as f64;
+        let mean = |of: &dyn Fn(&Misfits) -> f64| all.iter().map(|m| of(m)).sum::<f64>() / count;
         let excess_before = mean(&|m| m.before / m.values - 1.0);
         let excess_after = mean(&|m| m.after / m.values - 1.0);
         let gain = |m: &Misfits| (m.before - m.after) / m.values;
         let mean_gain = mean(&gain);
-        let scatter = misfits.iter().map(|m| (gain(m) - mean_gain).powi(2)).sum::<f64>();
-        let half = if misfits.len() >= 2 {
-            let student = StudentsT::new(0.0, 1.0, count - 1.0).ok()?;
-            student.inverse_cdf(0.975) * (scatter / (count * (count - 1.0))).sqrt()
+        let (mut squares, mut freedom) = (0.0, 0.0);
+        for own in conditions.iter().filter(|own| own.len() >= 2) {
+            let mean = own.iter().map(gain).sum::<f64>() / own.len() as f64;
+            squares += own.iter().map(|m| (gain(m) - mean).powi(2)).sum::<f64>();
+            freedom += own.len() as f64 - 1.0;
+        }
+        let half = if freedom > 0.0 {
+            let student = StudentsT::new(0.0, 1.0, freedom).ok()?;
+            student.inverse_cdf(0.975) * (squares / (freedom * count)).sqrt()
         } else {
             f64::INFINITY
         };
@@ -156,7 +164,7 @@ impl Comparison {
             closed: mean_gain / scale,
             lower: (mean_gain - half) / scale,
             upper: (mean_gain + half) / scale,
-            replicates: misfits.len(),
+            replicates: all.len(),
         })
     }
 }

@@ -6,6 +6,7 @@
 
 use super::experiment::Experiment;
 use super::noise::{Noise, directions};
+use crate::linalg::vector::dot;
 use crate::linalg::{
     Matrix, multiply, multiply_transposed, multiply_vector, symmetric_eigen, transposed_multiply,
     transposed_multiply_vector,
@@ -81,7 +82,8 @@ impl Whitener {
         spread.extend(experiment.common.iter().flat_map(|error| {
             (0..error.factor.columns()).map(|j| error.factor.column(j)).collect::<Vec<_>>()
         }));
-        let columns: Vec<Vec<f64>> = spread.iter().map(|u| whitener.base(u)).collect();
+        let mut columns: Vec<Vec<f64>> = spread.iter().map(|u| whitener.base(u)).collect();
+        columns.retain(|u| dot(u, u) > NEGLIGIBLE);
         whitener.low_rank = LowRank::of(&columns, outputs);
         whitener
     }
@@ -150,12 +152,18 @@ impl Whitener {
             .map(|curve| {
                 let each = curve.measured.iter().zip(&curve.scale);
                 let mut values: Vec<f64> = each.map(|(&i, s)| differences[i] * s).collect();
-                curve.runs.iter().for_each(|run| curve.memory.whiten(&mut values[run.clone()]));
+                // Many directions are of one curve only.
+                if values.iter().any(|v| *v != 0.0) {
+                    curve.runs.iter().for_each(|run| curve.memory.whiten(&mut values[run.clone()]));
+                }
                 values
             })
             .collect();
         for (curves, factor) in &self.across {
-            decorrelate(factor, &mut own[curves.clone()]);
+            let own = &mut own[curves.clone()];
+            if own.iter().flatten().any(|v| *v != 0.0) {
+                decorrelate(factor, own);
+            }
         }
         let mut white = vec![0.0; self.outputs];
         for (curve, values) in self.curves.iter().zip(own) {

@@ -144,7 +144,8 @@ fn other_model(model: &OtherModel) -> String {
     )
 }
 
-fn capitalised(text: &str) -> String {
+/// With a capital at the beginning.
+pub fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }

@@ -40,7 +40,7 @@ impl Caption {
 
     fn html(&self) -> Markup {
         html! {
-            (self.shows)
+            (paragraph(&self.shows))
             @if !self.whose.is_empty() { " " b { "Whose distribution: " } (self.whose) }
             @if !self.look.is_empty() { " " b { "Look for: " } (self.look) }
         }

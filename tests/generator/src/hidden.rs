@@ -78,6 +78,7 @@ impl Hidden {
             Kind::Cubic,
             Kind::Switching,
             Kind::Rectified,
+            Kind::PulseHeating,
         ];
         let sign = if one_sided.contains(&kind) { 1.0 } else { random.sign() };
         let shape = match kind {

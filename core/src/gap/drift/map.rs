@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::equality::{Equality, Pieces, Tests};
 use super::pieces::{Window, windows};
 use super::reading::{Reading, Share, read, shares};
+use crate::data::Parameter;
 use crate::gap::experiment::Experiment;
 use crate::gap::fit::{Fit, precision};
 use crate::gap::locate::{common_error, probability};
@@ -199,19 +200,7 @@ pub fn drift(
         values: (0..p).map(|j| fit.at.point[j] + width[j] * deviations[w * p + j]).collect(),
         sd: (0..p).map(|j| width[j] * sd[(w * p + j, w * p + j)].sqrt()).collect(),
     };
-    let excess = |e: &Equality| (e.statistic - e.freedom as f64).max(0.0);
-    let parameters: Vec<Drifting> = experiment
-        .parameters
-        .iter()
-        .zip(tests.marginal.iter().zip(&tests.alone))
-        .map(|(parameter, (&equality, &alone))| Drifting {
-            name: parameter.name.clone(),
-            equality,
-            alone,
-            explains: excess(&alone) / excess(&tests.all).max(f64::MIN_POSITIVE),
-        })
-        .map(|own| Drifting { explains: own.explains.min(1.0), ..own })
-        .collect();
+    let parameters = drifting(experiment, &tests);
     let sensors = shares(experiment, &pieces, &fit.residual);
     let without_sensor = super::reading::without(&bench, &sensors);
     let (reading, words) = read(&parameters, &tests.all, &sensors, without_sensor.as_ref());
@@ -225,6 +214,20 @@ pub fn drift(
         reading,
         words,
     })
+}
+
+/// How each parameter differs.
+fn drifting(experiment: &Experiment<'_>, tests: &Tests) -> Vec<Drifting> {
+    let excess = |e: &Equality| (e.statistic - e.freedom as f64).max(0.0);
+    let whole = excess(&tests.all).max(f64::MIN_POSITIVE);
+    let each = tests.marginal.iter().zip(&tests.alone);
+    let of = |(parameter, (equality, alone)): (&Parameter, (&Equality, &Equality))| Drifting {
+        name: parameter.name.clone(),
+        equality: *equality,
+        alone: *alone,
+        explains: (excess(alone) / whole).min(1.0),
+    };
+    experiment.parameters.iter().zip(each).map(of).collect()
 }
 
 /// Slopes that act in one window each: `slope(window, parameter)`, of which the window's outputs count.

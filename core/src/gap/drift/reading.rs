@@ -38,7 +38,7 @@ pub enum Reading {
     None,
     /// The parameters differ, whichever sensor is left out: the model's physics.
     Model {
-        /// The parameters that differ, by the test with all others free or alone.
+        /// The parameters that differ, the one first that alone would explain most of the differences.
         parameters: Vec<String>,
     },
     /// One sensor makes the difference: its chain, or what happens at its place.
@@ -103,9 +103,7 @@ pub(super) fn read(
     without: Option<&Equality>,
 ) -> (Reading, String) {
     let drifts = all.p <= LEVEL;
-    let level = LEVEL / parameters.len().max(1) as f64;
-    let differ = parameters.iter().filter(|own| own.equality.p.min(own.alone.p) <= level);
-    let differ: Vec<String> = differ.map(|own| own.name.clone()).collect();
+    let differ = differing(parameters);
     let several = sensors.len() > 1;
     let stands_out = |own: &&Share| several && own.share >= DOMINATES && own.excess > CLEAR;
     let dominating = sensors.first().filter(stands_out);
@@ -145,6 +143,15 @@ pub(super) fn read(
             (Reading::Either { parameters: differ }, words)
         }
     }
+}
+
+/// The parameters that differ even when all others may, and the one that alone explains most; the latter first.
+fn differing(parameters: &[Drifting]) -> Vec<String> {
+    let mut order: Vec<&Drifting> = parameters.iter().collect();
+    order.sort_by(|a, b| b.explains.total_cmp(&a.explains));
+    let differs =
+        |(k, own): &(usize, &&Drifting)| own.equality.p <= LEVEL || *k == 0 && own.alone.p <= LEVEL;
+    order.iter().enumerate().filter(differs).map(|(_, own)| own.name.clone()).collect()
 }
 
 /// Which parameters differ, as the beginning of a sentence.

@@ -3,18 +3,30 @@
 //! Replicates are simulated from the fitted model, noise and common errors; the noise is estimated from them anew, the
 //! model is calibrated to them anew (a step along its slopes), and the statistics are computed as for the data.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::projection::Projection;
 use super::scan::{Cell, Scan};
-use super::score::{Directions, Scores, differences};
+use super::score::{Directions, Scores, Spread, differences};
 use crate::gap::experiment::Experiment;
 use crate::gap::fit::{Fit, precision};
 use crate::gap::noise::Noise;
 use crate::gap::system::System;
 use crate::gap::whitener::Whitener;
 use crate::linalg::Matrix;
+use crate::linalg::vector::dot;
 use crate::math::random::{Stream, normal};
+
+/// Simulations between two looks at whether there are enough.
+const ROUND: usize = 50;
+
+/// Simulations whose scores are taken together.
+const CHUNK: usize = 5;
+
+/// A statistic that so many simulations reach is not rare.
+const ENOUGH: usize = 10;
 
 /// What the tests look at.
 #[derive(Debug, Clone)]
@@ -40,6 +52,13 @@ pub struct Nulls {
     pub energy: Vec<f64>,
 }
 
+/// The statistics of one simulation.
+struct Drawn {
+    score: f64,
+    cells: Vec<f64>,
+    energy: f64,
+}
+
 /// The probability of such a value or a larger one under the null.
 pub fn probability(null: &[f64], value: f64) -> f64 {
     let above = null.iter().filter(|x| **x >= value).count();
@@ -54,16 +73,31 @@ impl Nulls {
 
     /// The probability of the best cell of all.
     pub fn of_scan(&self, statistics: &Statistics) -> f64 {
-        let largest =
-            |cells: &mut dyn Iterator<Item = f64>| cells.fold(f64::NEG_INFINITY, f64::max);
-        let null: Vec<f64> =
-            self.cells.iter().map(|cells| largest(&mut cells.iter().copied())).collect();
-        probability(&null, largest(&mut statistics.cells.iter().map(|cell| cell.statistic)))
+        probability(&self.best_cells(), statistics.best_cell())
     }
 
     /// The probability of the energy.
     pub fn of_energy(&self, statistics: &Statistics) -> f64 {
         probability(&self.energy, statistics.energy)
+    }
+
+    fn best_cells(&self) -> Vec<f64> {
+        let best = |cells: &Vec<f64>| cells.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        self.cells.iter().map(best).collect()
+    }
+
+    /// Whether none of the statistics of the data is rare.
+    fn settled(&self, data: &Statistics, directions: &Directions) -> bool {
+        let reached = |null: &[f64], value: f64| null.iter().filter(|x| **x >= value).count();
+        reached(&self.energy, data.energy) >= ENOUGH
+            && reached(&self.score, data.scores.largest(directions)) >= ENOUGH
+            && reached(&self.best_cells(), data.best_cell()) >= ENOUGH
+    }
+}
+
+impl Statistics {
+    fn best_cell(&self) -> f64 {
+        self.cells.iter().map(|cell| cell.statistic).fold(f64::NEG_INFINITY, f64::max)
     }
 }
 
@@ -95,44 +129,74 @@ impl Bench<'_> {
         let left = self.projection.rest(&self.fit.residual);
         let (rows, spread) = differences(self.experiment());
         let white = self.whitener.whiten_rows(&rows);
-        let scores = self.directions.scores(&left, &white, &spread);
+        let scores = self.directions.scores_of(&left, &white, &spread);
         let cells = self.scan.best(&left);
         let energy = left.iter().map(|z| z * z).sum();
         Statistics { scores, cells, energy, left }
     }
 
-    /// The statistics of `count` simulations.
-    pub fn nulls(&self, count: usize, stream: &Stream) -> Nulls {
-        let simulations: Vec<(f64, Vec<f64>, f64)> =
-            (0..count).into_par_iter().map(|b| self.simulation(&stream.at(b as u64))).collect();
+    /// The statistics of at most `count` simulations: fewer where all three statistics of the data have been reached so
+    /// often that none of them is rare (Besag and Clifford, Biometrika 78 (1991) 301).
+    pub fn nulls(&self, data: &Statistics, count: usize, stream: &Stream) -> Nulls {
         let mut nulls = Nulls::default();
-        for (score, cells, energy) in simulations {
-            nulls.score.push(score);
-            nulls.cells.push(cells);
-            nulls.energy.push(energy);
+        while nulls.energy.len() < count && !nulls.settled(data, self.directions) {
+            let begin = nulls.energy.len();
+            let end = count.min(begin + ROUND);
+            let chunks: Vec<usize> = (begin..end).step_by(CHUNK).collect();
+            let drawn: Vec<Vec<Drawn>> = chunks
+                .par_iter()
+                .map(|&first| self.simulations(first..end.min(first + CHUNK), stream))
+                .collect();
+            for one in drawn.into_iter().flatten() {
+                nulls.score.push(one.score);
+                nulls.cells.push(one.cells);
+                nulls.energy.push(one.energy);
+            }
         }
         nulls
     }
 
-    fn simulation(&self, stream: &Stream) -> (f64, Vec<f64>, f64) {
-        let response = &self.fit.at.response;
+    /// Some simulations, whose scores are one product of matrices.
+    fn simulations(&self, numbers: Range<usize>, stream: &Stream) -> Vec<Drawn> {
         let experiment = self.experiment();
-        let replicates = self.noise.simulate(experiment, response, stream);
-        let simulated = experiment.with_replicates(replicates);
-        let error = common_error(experiment, self.noise, &stream.named("common"));
-        let (_, means) = simulated.means();
-        let misfit: Vec<f64> =
-            (0..means.len()).map(|i| means[i] - response[i] + error[i]).collect();
-        let left = self.projection.rest(&self.whitener.whiten(&misfit));
-        let (rows, spread) = differences(&simulated);
+        let response = &self.fit.at.response;
+        let (mut misfits, mut rows) =
+            (Matrix::zeros(0, response.len()), Matrix::zeros(0, response.len()));
+        let mut spread = Spread::default();
+        let mut simulated = Vec::new();
+        for b in numbers {
+            let stream = stream.at(b as u64);
+            let replicates = self.noise.simulate(experiment, response, &stream);
+            let one = experiment.with_replicates(replicates);
+            let error = common_error(experiment, self.noise, &stream.named("common"));
+            let (_, means) = one.means();
+            let misfit: Vec<f64> =
+                (0..means.len()).map(|i| means[i] - response[i] + error[i]).collect();
+            misfits.push_row(&misfit);
+            let (own, of_one) = differences(&one);
+            own.iter_rows().for_each(|row| rows.push_row(row));
+            spread = of_one;
+            simulated.push(one);
+        }
+        let (left, _) = self.projection.rest_of_rows(self.whitener.whiten_rows(&misfits));
         let scores = self.directions.scores(&left, &self.whitener.whiten_rows(&rows), &spread);
-        let noise = Noise::of(&simulated, response, Some(self.noise));
-        let whitener = Whitener::new(&simulated, &noise, response);
+        let each = simulated.iter().zip(misfits.iter_rows()).zip(scores);
+        each.map(|((one, misfit), scores)| self.drawn(one, misfit, &scores)).collect()
+    }
+
+    /// One simulation with its noise estimated anew.
+    fn drawn(&self, simulated: &Experiment<'_>, misfit: &[f64], scores: &Scores) -> Drawn {
+        let response = &self.fit.at.response;
+        let noise = Noise::of(simulated, response, Some(self.noise));
+        let whitener = Whitener::new(simulated, &noise, response);
         let slopes = whitener.whiten_rows(&self.fit.at.tangents);
         let precisions: Vec<f64> = self.system.priors().iter().map(precision).collect();
-        let left = Projection::off(&slopes, &precisions).rest(&whitener.whiten(&misfit));
-        let cells = self.scan.best(&left).into_iter().map(|cell| cell.statistic).collect();
-        (scores.largest(self.directions), cells, left.iter().map(|z| z * z).sum())
+        let left = Projection::off(&slopes, &precisions).rest(&whitener.whiten(misfit));
+        Drawn {
+            score: scores.largest(self.directions),
+            cells: self.scan.best(&left).into_iter().map(|cell| cell.statistic).collect(),
+            energy: dot(&left, &left),
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! The places that are wrong beyond doubt, with their windows: family-wise error by stepping down.
 
-use super::null::Nulls;
+use super::null::{Nulls, Statistics};
 use super::scan::{Cell, Scan};
 use crate::gap::experiment::Experiment;
 
@@ -19,18 +19,20 @@ pub struct Region {
 
 /// The curves with a significant cell, largest first: at each step the largest statistic is judged by the null of the
 /// largest among those that are left (Romano and Wolf, Journal of the American Statistical Association 100
-/// (2005) 94).
+/// (2005) 94). The window is that with the most energy for its length, whatever band gave the alarm; curves together are
+/// named where none of them is alone.
 pub fn regions(
     experiment: &Experiment<'_>,
     scan: &Scan,
-    cells: &[Cell],
+    statistics: &Statistics,
     nulls: &Nulls,
     level: f64,
 ) -> Vec<Region> {
+    let cells = &statistics.cells;
     let mut order: Vec<usize> =
         (0..cells.len()).filter(|&p| cells[p].statistic.is_finite()).collect();
     order.sort_by(|&a, &b| cells[b].statistic.total_cmp(&cells[a].statistic));
-    let mut found = Vec::new();
+    let mut found: Vec<Region> = Vec::new();
     let mut p: f64 = 0.0;
     for (step, &place) in order.iter().enumerate() {
         let rest = &order[step..];
@@ -41,10 +43,14 @@ pub fn regions(
         if p > level {
             break;
         }
-        let cell = cells[place].clone();
+        let window = scan.window(&statistics.left, place);
+        let cell = Cell { window, ..cells[place].clone() };
         let curves = scan.places[place].clone();
         let at = &experiment.curves[curves[0]].at;
         found.push(Region { span: (at[cell.window.0], at[cell.window.1]), curves, cell, p });
     }
+    let alone: Vec<usize> =
+        found.iter().filter(|r| r.curves.len() == 1).map(|r| r.curves[0]).collect();
+    found.retain(|r| r.curves.len() == 1 || !r.curves.iter().any(|s| alone.contains(s)));
     found
 }

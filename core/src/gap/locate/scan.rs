@@ -1,7 +1,7 @@
 //! A multiscale scan of whitened residuals: curves, windows along the last axis, octave bands.
 //!
-//! The energy of white noise in a window is chi squared. Made normal by the cube root (Wilson and Hilferty,
-//! Proceedings of the National Academy of Sciences 17 (1931) 684) and penalised for the number of windows of its length
+//! The energy of white noise in a window is chi squared. Made normal by its deviance, which is exact far out in the tail
+//! too (Peizer and Pratt, Journal of the American Statistical Association 63 (1968) 1416), and penalised for the number of windows of its length
 //! (Dümbgen and Spokoiny, Annals of Statistics 29 (2001) 124), the cells of all scales compete on equal terms.
 
 use std::sync::Arc;
@@ -40,7 +40,8 @@ pub struct Scan {
 /// Windows and bands of curves of one length.
 struct Plan {
     length: usize,
-    windows: Vec<(usize, usize)>,
+    /// The lengths of windows, each with where they begin.
+    windows: Vec<(usize, Vec<usize>)>,
     bands: Vec<(usize, usize)>,
     cosines: Arc<dyn TransformType2And3<f64>>,
 }
@@ -80,6 +81,19 @@ impl Scan {
             plan.best(place, &own)
         };
         self.places.iter().enumerate().map(place).collect()
+    }
+
+    /// The window of a place with the largest statistic of all frequencies together: from the best of those that are scanned, by
+    /// moving its ends.
+    pub fn window(&self, white: &[f64], place: usize) -> (usize, usize) {
+        let curves = &self.places[place];
+        let plan = &self.plans[curves[0]];
+        let mut squares = vec![0.0; plan.length];
+        for &s in curves {
+            squares.iter_mut().zip(&self.curves[s]).for_each(|(q, &i)| *q += white[i].powi(2));
+        }
+        let roots: Vec<f64> = squares.iter().map(|q| q.sqrt()).collect();
+        plan.narrowed(&running(&roots), curves.len() as f64)
     }
 }
 
@@ -130,19 +144,65 @@ impl Plan {
         for part in 0..sums[0].len() {
             let band = part.checked_sub(1).map(|b| self.bands[b]);
             let width = band.map_or(1.0, |(a, b)| (b - a) as f64 / self.length as f64);
-            for &(begin, end) in &self.windows {
-                let freedom = (end - begin) as f64 * width * sums.len() as f64;
+            for (length, begins) in &self.windows {
+                let freedom = *length as f64 * width * sums.len() as f64;
                 if freedom < FEWEST {
                     continue;
                 }
-                let energy: f64 = sums.iter().map(|p| p[part][end] - p[part][begin]).sum();
-                let statistic = standardised(energy, freedom) - self.penalty(end - begin);
+                // Of windows of one length that with the most energy has the largest statistic.
+                let mut most = (f64::NEG_INFINITY, 0);
+                for &begin in begins {
+                    let end = begin + length;
+                    let energy: f64 = sums.iter().map(|p| p[part][end] - p[part][begin]).sum();
+                    if energy > most.0 {
+                        most = (energy, begin);
+                    }
+                }
+                let (energy, begin) = most;
+                let statistic = standardised(energy, freedom) - self.penalty(*length);
                 if statistic > best.statistic {
-                    best = Cell { place, window: (begin, end - 1), band, statistic };
+                    best = Cell { place, window: (begin, begin + length - 1), band, statistic };
                 }
             }
         }
         best
+    }
+
+    /// The window with the largest statistic, by the running sums of squares of so many curves together.
+    fn narrowed(&self, sums: &[f64], curves: f64) -> (usize, usize) {
+        let statistic = |begin: usize, end: usize| {
+            let freedom = (end - begin) as f64 * curves;
+            standardised(sums[end] - sums[begin], freedom) - self.penalty(end - begin)
+        };
+        let mut best = (f64::NEG_INFINITY, 0, self.length);
+        for (length, begins) in &self.windows {
+            for &begin in begins.iter().filter(|_| *length as f64 * curves >= FEWEST) {
+                let one = statistic(begin, begin + length);
+                if one > best.0 {
+                    best = (one, begin, begin + length);
+                }
+            }
+        }
+        let mut step = (best.2 - best.1) / 4;
+        while step > 0 {
+            let (_, begin, end) = best;
+            let moved = [
+                (begin.saturating_sub(step), end),
+                (begin + step, end),
+                (begin, end.saturating_sub(step)),
+                (begin, (end + step).min(self.length)),
+            ];
+            for (begin, end) in moved {
+                let wide = end >= begin + 3 && (end - begin) as f64 * curves >= FEWEST;
+                if wide && statistic(begin, end) > best.0 {
+                    best = (statistic(begin, end), begin, end);
+                }
+            }
+            if (best.1, best.2) == (begin, end) {
+                step /= 2;
+            }
+        }
+        (best.1, best.2.max(1) - 1)
     }
 
     fn penalty(&self, width: usize) -> f64 {
@@ -150,10 +210,17 @@ impl Plan {
     }
 }
 
-/// The cube root of a mean square, made standard normal.
+/// The normal deviate of an energy that is chi squared (Peizer and Pratt; freedom above one).
 fn standardised(energy: f64, freedom: f64) -> f64 {
-    let spread = 2.0 / (9.0 * freedom);
-    ((energy / freedom).cbrt() - (1.0 - spread)) / spread.sqrt()
+    let mode = freedom - 1.0;
+    let shift = energy - freedom + 2.0 / 3.0 - 0.08 / freedom;
+    let off = energy - mode;
+    // Near the mode the deviance is a parabola.
+    if off.abs() < 1e-4 * mode {
+        return shift / (2.0 * mode).sqrt();
+    }
+    let deviance = mode * (mode / energy.max(f64::MIN_POSITIVE)).ln() + off;
+    shift / off.abs() * deviance.max(0.0).sqrt()
 }
 
 /// Sums of the squares of the values before each place.
@@ -169,13 +236,13 @@ fn running(values: &[f64]) -> Vec<f64> {
 }
 
 /// Windows of lengths in steps of a root of two, each an eighth of its length from the next, and the whole.
-fn windows(length: usize) -> Vec<(usize, usize)> {
-    let mut all = vec![(0, length)];
+fn windows(length: usize) -> Vec<(usize, Vec<usize>)> {
+    let mut all = vec![(length, vec![0])];
     let mut width = length as f64 / std::f64::consts::SQRT_2;
     while width >= 3.0 {
         let w = width.round() as usize;
         let stride = (w / 8).max(1);
-        all.extend((0..=length - w).step_by(stride).map(|begin| (begin, begin + w)));
+        all.push((w, (0..=length - w).step_by(stride).collect()));
         width /= std::f64::consts::SQRT_2;
     }
     all
@@ -185,6 +252,20 @@ fn windows(length: usize) -> Vec<(usize, usize)> {
 mod tests {
     use super::*;
     use crate::math::random::{Stream, normal};
+
+    /// Quantiles of chi squared: 0.95 of 10, 1e-6 of 2 in the upper tail (27.631), 0.5 of 20 (19.337); tables of the normal law.
+    #[test]
+    fn energies_are_made_normal() {
+        for (energy, freedom, deviate) in [
+            (18.307, 10.0, 1.645),
+            (27.631, 2.0, 4.753),
+            (19.337, 20.0, 0.0),
+            (3.940, 10.0, -1.645),
+        ] {
+            let found = standardised(energy, freedom);
+            assert!((found - deviate).abs() < 0.02, "{energy} {freedom}: {found}");
+        }
+    }
 
     #[test]
     fn bands_divide_the_energy_of_a_curve() {
@@ -213,5 +294,7 @@ mod tests {
         let found = plan.best(0, &[&plan.sums(&bumped)]);
         assert!(found.statistic > 6.0, "{found:?}");
         assert!((36..=44).contains(&found.window.0) && (56..=63).contains(&found.window.1));
+        let (begin, end) = plan.narrowed(&running(&bumped), 1.0);
+        assert!((39..=41).contains(&begin) && (58..=60).contains(&end), "{begin} {end}");
     }
 }

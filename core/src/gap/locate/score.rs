@@ -14,7 +14,7 @@ use crate::gap::system::System;
 use crate::gap::whitener::Whitener;
 use crate::gap::wide;
 use crate::linalg::vector::{dot, norm};
-use crate::linalg::{Matrix, multiply_transposed, multiply_vector};
+use crate::linalg::{Matrix, multiply_transposed};
 use crate::plugin::effect::{On, Placed, Situation};
 
 /// The weight of the noise model in the scatter of a score, as a number of replicates.
@@ -142,27 +142,36 @@ impl Directions {
 
     /// The scores of a residual whose replicates differ from the mean by these whitened parts, one a row; `spread` is the
     /// freedom of the differences.
-    pub fn scores(&self, residual: &[f64], differences: &Matrix, spread: &Spread) -> Scores {
-        let means = multiply_vector(&self.left, residual);
+    pub fn scores_of(&self, residual: &[f64], differences: &Matrix, spread: &Spread) -> Scores {
+        let residual = Matrix::from_rows(residual.len(), [residual]);
+        self.scores(&residual, differences, spread).remove(0)
+    }
+
+    /// The same of several residuals, one a row, with as many differences each.
+    pub fn scores(&self, residuals: &Matrix, differences: &Matrix, spread: &Spread) -> Vec<Scores> {
+        let means = multiply_transposed(residuals, &self.left);
         let parts = multiply_transposed(differences, &self.left);
-        let values = means
-            .iter()
-            .enumerate()
-            .map(|(j, mean)| {
-                let squares = parts.iter_rows().zip(&spread.weights);
-                let own: f64 = squares.map(|(row, w)| w * row[j] * row[j]).sum();
-                let model = (1.0 - self.common[j]).max(0.0);
-                let moderated =
-                    (MODERATION * model + spread.freedom * own) / (MODERATION + spread.freedom);
-                mean / (moderated + self.common[j]).sqrt().max(f64::MIN_POSITIVE)
-            })
-            .collect();
-        Scores { values }
+        let each = spread.weights.len();
+        let own = |(b, means): (usize, &[f64])| {
+            let mut squares = vec![0.0; means.len()];
+            for (k, w) in spread.weights.iter().enumerate() {
+                let row = parts.row(b * each + k);
+                squares.iter_mut().zip(row).for_each(|(sum, part)| *sum += w * part * part);
+            }
+            let freedom = spread.freedom;
+            let student = |((mean, own), common): ((&f64, &f64), &f64)| {
+                let model = (1.0 - common).max(0.0);
+                let moderated = (MODERATION * model + freedom * own) / (MODERATION + freedom);
+                mean / (moderated + common).sqrt().max(f64::MIN_POSITIVE)
+            };
+            Scores { values: means.iter().zip(&squares).zip(&self.common).map(student).collect() }
+        };
+        means.iter_rows().enumerate().map(own).collect()
     }
 }
 
 /// How the differences of replicates add to the variance of a mean.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Spread {
     /// The weight of each difference squared.
     pub weights: Vec<f64>,

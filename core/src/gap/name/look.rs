@@ -34,6 +34,8 @@ pub struct Look {
     pub statistics: Statistics,
     /// The energy of the residual that noise and common errors alone have.
     pub expected_energy: f64,
+    /// The standard deviation of that.
+    pub energy_sd: f64,
     /// The probabilities of the largest score, of the best cell and of the energy when nothing is missing.
     pub p: [f64; 3],
     /// Where data and model disagree.

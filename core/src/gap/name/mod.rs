@@ -10,6 +10,7 @@ mod look;
 mod placement;
 mod search;
 mod separate;
+mod shares;
 mod stability;
 mod state;
 #[cfg(test)]

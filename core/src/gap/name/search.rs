@@ -4,6 +4,7 @@ use super::consistency::consistency;
 use super::groups::grow;
 use super::leaders::{Judged, Lead, judge, leads};
 use super::look::{Found, Look, Options, Step, Visible};
+use super::shares::shares;
 use super::stability::stability;
 use super::state::{Common, State, kinds};
 use crate::gap::candidates::{Candidate, Suspect, sensors, suspects};
@@ -15,6 +16,7 @@ use crate::gap::locate::{
 use crate::gap::noise::Noise;
 use crate::gap::system::System;
 use crate::gap::whitener::Whitener;
+use crate::math::moments::{mean, quantile, variance};
 use crate::math::random::Stream;
 use crate::plugin::effect::{On, Situation};
 
@@ -23,6 +25,10 @@ const EIGHTY: f64 = 0.8416;
 
 /// Suspects this much lighter than the heaviest, in logarithms, are no seeds of groups.
 const RIVAL: f64 = 20.0;
+
+/// What the first effect leaves may be its own form, a little wrong: a further one must outweigh its absence by 20 to 1, in
+/// logarithms (strong evidence by Kass and Raftery, Journal of the American Statistical Association 90 (1995) 773).
+const FURTHER: f64 = 3.0;
 
 /// Leaders of each step that are tried in pairs.
 const PAIRED: usize = 10;
@@ -77,7 +83,7 @@ pub fn search<'a>(
         None => 1.0,
     };
     let consistency = consistency(&state.system, &state.fit, &state.whitener);
-    let types = slots.iter().map(|judged| search.shares(judged)).collect();
+    let types = slots.iter().map(|judged| shares(candidates, judged)).collect();
     let State { system, chosen, noise, whitener, .. } = state;
     let means = search.means;
     Some(Found {
@@ -155,25 +161,27 @@ impl<'a> Search<'a> {
             scan: &self.scan,
         };
         let statistics = bench.statistics();
-        let nulls = bench.nulls(self.options.simulations, &self.stream.named("null").at(round));
+        let stream = self.stream.named("null").at(round);
+        let nulls = bench.nulls(&statistics, self.options.simulations, &stream);
         let p = [
             nulls.of_score(&statistics, &directions),
             nulls.of_scan(&statistics),
             nulls.of_energy(&statistics),
         ];
         let level = self.options.naming + self.options.unlisted;
-        let regions = regions(self.experiment, &self.scan, &statistics.cells, &nulls, level);
-        let expected = nulls.energy.iter().sum::<f64>() / nulls.energy.len().max(1) as f64;
+        let regions = regions(self.experiment, &self.scan, &statistics, &nulls, level);
+        let expected_energy = mean(&nulls.energy);
+        let energy_sd = variance(&nulls.energy).sqrt();
         let visible = self.visible(&directions, &nulls);
         let fit = state.fit.clone();
-        let look = Look { fit, statistics, expected_energy: expected, p, regions, visible };
+        let look = Look { fit, statistics, expected_energy, energy_sd, p, regions, visible };
         (look, directions)
     }
 
     fn visible(&self, directions: &Directions, nulls: &Nulls) -> Vec<Visible> {
         let mut null = nulls.score.clone();
         null.sort_by(f64::total_cmp);
-        let threshold = crate::math::moments::quantile(&null, 1.0 - self.options.naming);
+        let threshold = quantile(&null, 1.0 - self.options.naming);
         let of = |(s, suspect): (usize, &Suspect)| {
             let own = directions.all.iter().filter(|d| d.suspect == s);
             let best = own.max_by(|a, b| a.length.total_cmp(&b.length));
@@ -208,7 +216,7 @@ impl<'a> Search<'a> {
             // The gate alone decides on the first effect; further ones must outweigh their absence.
             named
                 && (state.chosen.is_empty()
-                    || best.log_weight - self.kinds() > now - state.prior(&self.common()))
+                    || best.log_weight - self.kinds() > now - state.prior(&self.common()) + FURTHER)
         });
         let added = match alone {
             Some(best) => vec![best.suspect.clone()],
@@ -284,7 +292,7 @@ impl<'a> Search<'a> {
         let directions = self.directions(&smaller, &projection);
         let (rows, spread) = differences(self.experiment);
         let left = projection.rest(&smaller.fit.residual);
-        let scores = directions.scores(&left, &smaller.whitener.whiten_rows(&rows), &spread);
+        let scores = directions.scores_of(&left, &smaller.whitener.whiten_rows(&rows), &spread);
         let judged = self.judged(&smaller, &directions, &scores, stream);
         (smaller, judged)
     }
@@ -356,7 +364,7 @@ impl<'a> Search<'a> {
                 let own = self.unknowns(&second.suspect, judged);
                 let both = one.with(&common, &second.suspect, &own);
                 let weight = both.weight(&common, stream);
-                if weight > now && best.as_ref().is_none_or(|(most, _)| weight > *most) {
+                if weight > now + FURTHER && best.as_ref().is_none_or(|(most, _)| weight > *most) {
                     best = Some((weight, vec![first.suspect.clone(), second.suspect.clone()]));
                 }
             }
@@ -374,25 +382,5 @@ impl<'a> Search<'a> {
         let stream = self.stream.named("types");
         let slot = |i: usize| self.slot(state, i, &stream.at(i as u64)).1;
         (0..state.chosen.len()).map(slot).collect()
-    }
-
-    /// The probability of each type among what was weighed for one place.
-    fn shares(&self, judged: &[Judged]) -> Vec<(String, f64)> {
-        let best = judged.first().map_or(0.0, |j| j.log_weight);
-        let mut shares: Vec<(String, f64)> = Vec::new();
-        for j in judged {
-            let kind = &self.candidates[j.suspect.candidate].kind;
-            let weight = (j.log_weight - best).exp();
-            match shares.iter_mut().find(|(other, _)| other == kind) {
-                Some((_, sum)) => *sum += weight,
-                None => shares.push((kind.clone(), weight)),
-            }
-        }
-        let total: f64 = shares.iter().map(|(_, w)| w).sum();
-        for (_, w) in &mut shares {
-            *w /= total;
-        }
-        shares.sort_by(|a, b| b.1.total_cmp(&a.1));
-        shares
     }
 }

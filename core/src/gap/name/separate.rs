@@ -19,7 +19,7 @@ use crate::linalg::Matrix;
 use crate::plugin::effect::On;
 
 /// The log evidence that tells two explanations apart.
-pub const ENOUGH: f64 = 20.0;
+const ENOUGH: f64 = 20.0;
 
 /// The most further replicates that are thought of.
 const MOST: usize = 1024;

@@ -21,8 +21,8 @@ const INCONSISTENT: f64 = 0.001;
 /// An effect that closes less of the excess misfit than this is no explanation of it, where an excess remains.
 const HALF: f64 = 0.5;
 
-/// An excess of misfit less probable than this without a gap remains.
-const REMAINS: f64 = 0.05;
+/// The normal quantile of 95 %: what remains is more than half when it is so many standard deviations above what was closed.
+const CLEAR: f64 = 1.645;
 
 /// Candidates of which less than this is left by the calibration cannot be seen.
 const INVISIBLE: f64 = 0.95;
@@ -82,6 +82,8 @@ pub fn verdict(found: &Found<'_>, candidates: &[Candidate], options: Options) ->
     let (before, after) = (excess(first), excess(&found.last));
     let closed = if before > 0.0 { 1.0 - after / before } else { 0.0 };
     let effects = named(found, candidates);
+    let noise = found.last.energy_sd;
+    let less_than_half = closed < HALF && after - (before - after).max(0.0) > CLEAR * noise;
     let gap = found.last.p[1].min(found.last.p[2]) <= 0.5 * options.unlisted;
     let mut reasons = Vec::new();
     let word = if effects.is_empty() {
@@ -99,7 +101,8 @@ pub fn verdict(found: &Found<'_>, candidates: &[Candidate], options: Options) ->
             Word::None
         }
     } else {
-        doubts(found, gap, closed, options, &mut reasons);
+        let half = less_than_half.then_some(closed);
+        doubts(found, gap, half, options, &mut reasons);
         let sure = effects.iter().all(|e| e.class.len() == 1);
         if !reasons.is_empty() {
             Word::Unlisted
@@ -116,7 +119,13 @@ pub fn verdict(found: &Found<'_>, candidates: &[Candidate], options: Options) ->
 }
 
 /// Why the effects are not what is missing.
-fn doubts(found: &Found<'_>, gap: bool, closed: f64, options: Options, reasons: &mut Vec<String>) {
+fn doubts(
+    found: &Found<'_>,
+    gap: bool,
+    less_than_half: Option<f64>,
+    options: Options,
+    reasons: &mut Vec<String>,
+) {
     if gap {
         reasons.push("data and model still disagree with the effects that explain most".into());
     } else if found.last.p[0] <= options.naming && found.chosen.len() >= options.most {
@@ -128,7 +137,7 @@ fn doubts(found: &Found<'_>, gap: bool, closed: f64, options: Options, reasons: 
                 .into(),
         );
     }
-    if closed < HALF && found.last.p[2] <= REMAINS {
+    if let Some(closed) = less_than_half {
         reasons.push(format!(
             "the effects that explain most close {:.0} % of the excess misfit",
             100.0 * closed.max(0.0)

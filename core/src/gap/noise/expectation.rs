@@ -3,6 +3,7 @@
 
 use super::autoregression::Autoregression;
 use super::curve::{CurveNoise, Differences, Wander};
+use super::products::Products;
 use crate::linalg::vector::{add_scaled, dot};
 use crate::linalg::{Cholesky, Matrix};
 
@@ -26,6 +27,9 @@ pub(super) struct Fit<'a> {
     directions: Vec<Vec<f64>>,
     /// The products of the whitened directions.
     pub gram: Matrix,
+    /// The products of each whitened difference with them.
+    onto: Vec<[f64; 3]>,
+    products: Products,
 }
 
 impl<'a> Fit<'a> {
@@ -50,6 +54,8 @@ impl<'a> Fit<'a> {
             whitened: Vec::new(),
             directions: Vec::new(),
             gram: Matrix::zeros(3, 3),
+            onto: Vec::new(),
+            products: Products::default(),
         };
         fit.whiten();
         fit
@@ -66,16 +72,40 @@ impl<'a> Fit<'a> {
         fit
     }
 
+    /// Curves relative to the profile.
+    fn scaled(&self, curves: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let scale = |x: &Vec<f64>| x.iter().zip(&self.profile).map(|(x, w)| x / w).collect();
+        curves.iter().map(scale).collect()
+    }
+
     fn whiten(&mut self) {
-        let white = |x: &Vec<f64>| {
-            let mut x: Vec<f64> = x.iter().zip(&self.profile).map(|(x, w)| x / w).collect();
-            self.memory.whiten(&mut x);
-            x
+        let white = |mut curves: Vec<Vec<f64>>| {
+            for x in &mut curves {
+                self.memory.whiten(x);
+            }
+            curves
         };
-        self.whitened = self.data.contrasts.iter().map(white).collect();
-        self.directions = self.data.directions.iter().map(white).collect();
-        let products = |i: usize, j: usize| dot(&self.directions[i], &self.directions[j]);
-        self.gram = Matrix::from_fn(3, 3, products);
+        let whitened = white(self.scaled(&self.data.contrasts));
+        let directions = white(self.scaled(&self.data.directions));
+        self.gram = Matrix::from_fn(3, 3, |i, j| dot(&directions[i], &directions[j]));
+        (self.whitened, self.directions) = (whitened, directions);
+    }
+
+    /// Takes the products that do not change with the noise.
+    fn prepare(&mut self) {
+        let contrasts = self.scaled(&self.data.contrasts);
+        let directions = self.scaled(&self.data.directions);
+        self.products = Products::new(&contrasts, &directions, self.order);
+        self.project();
+    }
+
+    /// Takes the products of the whitened curves.
+    fn project(&mut self) {
+        let (products, memory) = (&self.products, &self.memory);
+        let gram = |i: usize, j: usize| products.directions[i][j].whitened(memory);
+        self.gram = Matrix::from_fn(3, 3, gram);
+        let onto = products.mixed.iter().map(|p| [0, 1, 2].map(|i| p[i].whitened(memory)));
+        self.onto = onto.collect();
     }
 
     pub fn onto(&self, whitened: &[f64]) -> Vec<f64> {
@@ -92,12 +122,17 @@ impl<'a> Fit<'a> {
     }
 
     pub fn run(mut self) -> Self {
+        self.prepare();
         for step in 0..STEPS {
             self.improve();
-            if step == STEPS / 2 && self.find_level() {
+            if step == STEPS / 2 {
                 self.whiten();
+                if self.find_level() {
+                    self.prepare();
+                }
             }
         }
+        self.whiten();
         self
     }
 
@@ -107,54 +142,36 @@ impl<'a> Fit<'a> {
         let Ok(factor) = Cholesky::new(&inner) else { return };
         let inverse = factor.inverse();
         let posterior = Matrix::from_fn(3, 3, |i, j| sd[i] * inverse[(i, j)] * sd[j]);
-        let n = self.whitened.len() as f64;
+        let n = self.onto.len() as f64;
         let length = self.data.response.len();
-        let mut squares = [0.0; 3];
-        let mut covariances = vec![0.0; self.order + 1];
-        for (contrast, whitened) in self.data.contrasts.iter().zip(&self.whitened) {
-            let onto = self.onto(whitened);
-            let share: [f64; 3] = [0, 1, 2].map(|i| dot(posterior.row(i), &onto) / self.variance);
-            (0..3).for_each(|i| squares[i] += share[i] * share[i]);
-            let rest: Vec<f64> = (0..length)
-                .map(|t| {
-                    let explained: f64 =
-                        (0..3).map(|i| share[i] * self.data.directions[i][t]).sum();
-                    (contrast[t] - explained) / self.profile[t]
-                })
-                .collect();
-            for (lag, c) in covariances.iter_mut().enumerate() {
-                *c += dot(&rest[lag..], &rest[..length - lag]);
+        let shares = self.onto.iter().map(|onto| -> [f64; 3] {
+            [0, 1, 2].map(|i| dot(posterior.row(i), onto) / self.variance)
+        });
+        let shares: Vec<[f64; 3]> = shares.collect();
+        // The second moments of the shares: of their expectations, and their own uncertainty.
+        let expected = Matrix::from_fn(3, 3, |i, j| shares.iter().map(|s| s[i] * s[j]).sum());
+        let moments = Matrix::from_fn(3, 3, |i, j| expected[(i, j)] + n * posterior[(i, j)]);
+        let products = &self.products;
+        let covariance = |lag: usize| {
+            let mut sum = products.own[lag];
+            for (share, mixed) in shares.iter().zip(&products.mixed) {
+                sum -= (0..3).map(|i| share[i] * mixed[i].around(lag)).sum::<f64>();
             }
-        }
-        self.add_uncertainty(&posterior, n, &mut covariances);
-        for (lag, c) in covariances.iter_mut().enumerate() {
-            *c /= n * (length - lag) as f64;
-        }
+            for i in 0..3 {
+                let row = &products.directions[i];
+                sum += (0..3).map(|j| moments[(i, j)] * row[j].lagged(lag)).sum::<f64>();
+            }
+            sum / (n * (length - lag) as f64)
+        };
+        let covariances: Vec<f64> = (0..=self.order).map(covariance).collect();
         if n >= FEWEST as f64 {
-            (0..3).for_each(|i| self.wander[i] = squares[i] / n + posterior[(i, i)]);
+            (0..3).for_each(|i| self.wander[i] = moments[(i, i)] / n);
         }
         let (memory, variance) = Autoregression::of_autocovariances(&covariances, self.order);
         if variance > 0.0 && variance.is_finite() {
             (self.memory, self.variance) = (memory, variance);
         }
-        self.whiten();
-    }
-
-    /// What the shares' own uncertainty adds to the products of the noise.
-    fn add_uncertainty(&self, posterior: &Matrix, n: f64, covariances: &mut [f64]) {
-        let length = self.data.response.len();
-        let scaled = |i: usize| -> Vec<f64> {
-            self.data.directions[i].iter().zip(&self.profile).map(|(x, w)| x / w).collect()
-        };
-        let scaled = [scaled(0), scaled(1), scaled(2)];
-        for (lag, c) in covariances.iter_mut().enumerate() {
-            for i in 0..3 {
-                for j in 0..3 {
-                    let products = dot(&scaled[i][lag..], &scaled[j][..length - lag]);
-                    *c += n * posterior[(i, j)] * products;
-                }
-            }
-        }
+        self.project();
     }
 
     /// The whitened differences without the expected shares of the directions.

@@ -6,6 +6,7 @@
 mod autoregression;
 mod curve;
 mod expectation;
+mod products;
 mod shared;
 mod simulate;
 #[cfg(test)]

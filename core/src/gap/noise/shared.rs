@@ -79,6 +79,6 @@ fn across(differences: &[Differences], curves: &[CurveNoise]) -> Option<Matrix> 
     let freedom = (size * (size - 1)) as f64 / 2.0;
     let weight = count as f64 - 1.0 - (2.0 * size as f64 + 5.0) / 6.0;
     let statistic = -weight * factor.log_determinant();
-    let (_, probability) = gamma_tails(0.5 * freedom, 0.5 * statistic.max(0.0));
-    (probability < CLEAR).then(|| factor.lower().clone())
+    let (_, log_probability) = gamma_tails(0.5 * freedom, 0.5 * statistic.max(0.0));
+    (log_probability.exp() < CLEAR).then(|| factor.lower().clone())
 }

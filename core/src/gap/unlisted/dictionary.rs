@@ -12,6 +12,9 @@ const NUMBERS: usize = 12_000_000;
 /// Decays that are tried, from a sixty-fourth of the axis to the whole.
 const DECAYS: i32 = 7;
 
+/// Bumps that are tried, by how many of their widths the axis has.
+const BUMPS: [u32; 3] = [6, 12, 24];
+
 /// A place on a curve with the response and its derivatives there.
 struct Point {
     t: f64,
@@ -26,14 +29,25 @@ struct Function {
     value: Box<dyn Fn(&Point) -> f64>,
 }
 
-/// One term: one function, or two that belong together, on all sensors with one coefficient or on each with its own.
+/// Where a term is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Spread {
+    /// On all sensors, with the same coefficients.
+    All,
+    /// On all sensors, each with its own coefficients.
+    Each,
+    /// On one sensor.
+    One(usize),
+}
+
+/// One term: one function, or two that belong together.
 pub(super) struct Candidate {
     /// What its functions are called.
     pub parts: Vec<String>,
     /// Whether the language of expressions can say it.
     pub expressible: bool,
-    /// Whether each sensor has its own coefficients.
-    pub by_sensor: bool,
+    /// Where it is.
+    pub spread: Spread,
     /// Its rows: the functions in their order, on each sensor in turn.
     pub rows: Vec<usize>,
 }
@@ -70,43 +84,53 @@ impl Dictionary {
             return None;
         }
         let each = 1 + if sensors.len() > 1 { sensors.len() } else { 0 };
-        let affordable = (NUMBERS / experiment.outputs() / each).saturating_sub(40) / 2;
+        let affordable = (NUMBERS / experiment.outputs() / each).saturating_sub(130) / 2;
         let terms = terms(first, last, length.min(affordable));
         let mut all = Self { candidates: Vec::new(), rows: Matrix::zeros(0, experiment.outputs()) };
         for parts in terms {
-            all.add(&parts, None, &points);
+            let together = all.push(&parts, None, &points);
+            all.add(&parts, Spread::All, together);
             if sensors.len() > 1 {
-                all.add(&parts, Some(sensors.len()), &points);
+                let own: Vec<Vec<usize>> =
+                    (0..sensors.len()).map(|s| all.push(&parts, Some(s), &points)).collect();
+                all.add(&parts, Spread::Each, own.concat());
+                for (s, rows) in own.into_iter().enumerate() {
+                    all.add(&parts, Spread::One(s), rows);
+                }
             }
         }
         Some(all)
     }
 
-    /// Adds a term, on each of some sensors with its own coefficients or on all together.
-    fn add(
+    /// Adds the values of functions on one sensor, or on all; their rows.
+    fn push(
         &mut self,
         parts: &[Function],
-        sensors: Option<usize>,
+        sensor: Option<usize>,
         points: &[(usize, usize, Point)],
-    ) {
+    ) -> Vec<usize> {
         let begin = self.rows.rows();
-        for sensor in 0..sensors.unwrap_or(1) {
-            for part in parts {
-                let mut row = vec![0.0; self.rows.columns()];
-                for (own, i, point) in points {
-                    if sensors.is_none() || *own == sensor {
-                        row[*i] = (part.value)(point);
-                    }
+        for part in parts {
+            let mut row = vec![0.0; self.rows.columns()];
+            for (own, i, point) in points {
+                if sensor.is_none_or(|sensor| *own == sensor) {
+                    row[*i] = (part.value)(point);
                 }
-                let finite = row.iter().all(|x| x.is_finite());
-                self.rows.push_row(&if finite { row } else { vec![0.0; self.rows.columns()] });
             }
+            if !row.iter().all(|x| x.is_finite()) {
+                row.fill(0.0);
+            }
+            self.rows.push_row(&row);
         }
+        (begin..self.rows.rows()).collect()
+    }
+
+    fn add(&mut self, parts: &[Function], spread: Spread, rows: Vec<usize>) {
         self.candidates.push(Candidate {
             parts: parts.iter().map(|part| part.text.clone()).collect(),
             expressible: parts.iter().all(|part| !part.text.contains("dy")),
-            by_sensor: sensors.is_some(),
-            rows: (begin..self.rows.rows()).collect(),
+            spread,
+            rows,
         });
     }
 }
@@ -135,6 +159,16 @@ fn terms(first: f64, last: f64, frequencies: usize) -> Vec<Vec<Function>> {
             value: Box::new(move |p| p.y * value(p)),
         }]);
         all.push(vec![Function { text: decay, value: Box::new(value) }]);
+    }
+    for k in BUMPS {
+        let width = rounded(length / f64::from(k));
+        for step in 0..=2 * k {
+            let middle = rounded(first + 0.5 * width * f64::from(step));
+            all.push(vec![Function {
+                text: format!("exp(-((t - {}) / {})^2)", short(middle), short(width)),
+                value: Box::new(move |p| (-((p.t - middle) / width).powi(2)).exp()),
+            }]);
+        }
     }
     for k in 2..frequencies {
         let frequency = rounded(0.5 * k as f64 / length);

@@ -1,13 +1,14 @@
 //! A symbolic form of what is missing: few terms of a dictionary, by forward selection.
 //!
-//! The terms are judged in the metric that the noise and the calibrated unknowns leave. A term is on all curves of its sensors or
-//! on none (group sparsity: de Silva et al., Frontiers in Artificial Intelligence 3 (2020) 25). Each further term must beat the best
-//! of the whole dictionary on noise alone, and what so many terms gain from noise alone is told beside what they gain.
+//! The terms are judged in the metric that the noise and the calibrated unknowns leave. A term is on all
+//! sensors or on one, under all conditions (group sparsity: de Silva et al., Frontiers in Artificial Intelligence 3 (2020) 25). Each further term must beat the best
+//! of the whole dictionary on noise alone, and what so many terms gain from noise alone is told beside what they gain. The noise counts as known
+//! here: that there is a gap at all is for the tests of [`crate::gap::locate`] to say.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::dictionary::{Candidate, Dictionary, short};
+use super::dictionary::{Candidate, Dictionary, Spread, short};
 use super::selection::{Blocks, Chosen, Metric};
 use crate::gap::candidates::{place, sensors};
 use crate::gap::fit::Fit;
@@ -36,7 +37,7 @@ pub struct Symbolic {
     /// The sensors that it was looked for on.
     pub sensors: Vec<On>,
     /// What is added to the response, in words of the language of expressions: `y` the response, `t` the place on the
-    /// last axis, `dy` and `ddy` the derivatives of `y` along it.
+    /// last axis, `dy` and `ddy` the derivatives of `y` along it; `[a, b]` has one coefficient a sensor.
     pub form: String,
     /// The same as effects of the user's own, where the language of the `expression` effect has all its functions: one for
     /// all sensors, or one a sensor where coefficients differ. Empty otherwise.
@@ -56,8 +57,8 @@ pub struct Symbolic {
 pub struct Term {
     /// Its functions: one, or sine and cosine.
     pub functions: Vec<String>,
-    /// Their coefficients by sensor; those of all sensors together are on an empty place. In the response's unit per
-    /// unit of the function.
+    /// Their coefficients on the sensors that have them; those of all sensors together are on an empty place. In the
+    /// response's unit per unit of the function.
     pub coefficients: Vec<Coefficient>,
     /// The log-likelihood that it gained when it was added.
     pub gain: f64,
@@ -138,10 +139,10 @@ pub fn symbolic(
                 let (values, sd) = given.by_ref().take(candidate.parts.len()).unzip();
                 Coefficient { on, values, sd }
             };
-            let coefficients = if candidate.by_sensor {
-                all.iter().cloned().map(&mut coefficient).collect()
-            } else {
-                vec![coefficient(On::new())]
+            let coefficients = match candidate.spread {
+                Spread::All => vec![coefficient(On::new())],
+                Spread::Each => all.iter().cloned().map(&mut coefficient).collect(),
+                Spread::One(sensor) => vec![coefficient(all[sensor].clone())],
             };
             Term { functions: candidate.parts.clone(), coefficients, gain: chosen.gain, p: *p }
         })
@@ -197,56 +198,49 @@ fn select(
 
 /// What is added to the response.
 fn form(terms: &[Term]) -> String {
-    let mut text = String::new();
-    for (function, values) in terms.iter().flat_map(|term| {
-        term.functions.iter().enumerate().map(|(k, function)| {
-            (function, term.coefficients.iter().map(|own| own.values[k]).collect::<Vec<f64>>())
-        })
-    }) {
-        let coefficient = match &values[..] {
-            [one] => short(*one),
-            several => {
-                format!("[{}]", several.iter().map(|x| short(*x)).collect::<Vec<_>>().join(", "))
-            }
-        };
-        text += &format!("{}{coefficient} * {function}", if text.is_empty() { "" } else { " + " });
+    let label = |on: &On| on.values().flatten().cloned().collect::<Vec<_>>().join(" ");
+    let mut parts = Vec::new();
+    for term in terms {
+        for (k, function) in term.functions.iter().enumerate() {
+            let values: Vec<String> =
+                term.coefficients.iter().map(|own| short(own.values[k])).collect();
+            parts.push(match (&values[..], &term.coefficients[0].on) {
+                ([one], on) if on.is_empty() => format!("{one} * {function}"),
+                ([one], on) => format!("{one} * {function} on `{}`", label(on)),
+                (several, _) => format!("[{}] * {function}", several.join(", ")),
+            });
+        }
     }
-    text
+    parts.join(" + ")
 }
 
-/// The terms as `expression` effects.
+/// The terms as `expression` effects: one for all sensors where their coefficients are common, or one a sensor.
 fn written(terms: &[Term], candidates: &[&Candidate], sensors: &[On]) -> Vec<Written> {
     if !candidates.iter().all(|candidate| candidate.expressible) {
         return Vec::new();
     }
-    let places: Vec<On> =
-        if terms.iter().any(|term| term.coefficients.len() > 1) || sensors.len() == 1 {
-            sensors.to_vec()
-        } else {
-            vec![On::new()]
-        };
-    let everywhere = |on: &On| on.is_empty();
-    places
-        .into_iter()
-        .map(|on| {
-            let mut parts: Vec<(&str, f64, f64)> = Vec::new();
-            for term in terms {
-                let own = term.coefficients.iter().find(|c| everywhere(&c.on) || c.on == on);
-                let Some(own) = own else { continue };
-                for (k, function) in term.functions.iter().enumerate() {
-                    parts.push((function, own.values[k], own.sd[k]));
-                }
-            }
-            // The first parameter is the size of the whole: the others are relative to it.
-            let size = parts[0];
-            let mut formula = size.0.to_owned();
-            let mut parameters = vec![("size".to_owned(), size.1, size.2)];
-            for (k, (function, value, sd)) in parts.iter().enumerate().skip(1) {
-                let name = format!("share_{}", k + 1);
-                formula += &format!(" + {name} * {function}");
-                parameters.push((name, value / size.1, (sd / size.1).abs()));
-            }
-            Written { on, formula: format!("y + size * ({formula})"), parameters }
-        })
-        .collect()
+    let common = candidates.iter().all(|candidate| candidate.spread == Spread::All);
+    let places = if common && sensors.len() > 1 { vec![On::new()] } else { sensors.to_vec() };
+    places.into_iter().filter_map(|on| written_on(terms, on)).collect()
+}
+
+fn written_on(terms: &[Term], on: On) -> Option<Written> {
+    let mut parts: Vec<(&str, f64, f64)> = Vec::new();
+    for term in terms {
+        let own = term.coefficients.iter().find(|own| own.on.is_empty() || own.on == on);
+        let Some(own) = own else { continue };
+        for (k, function) in term.functions.iter().enumerate() {
+            parts.push((function, own.values[k], own.sd[k]));
+        }
+    }
+    // The first parameter is the size of the whole: the others are relative to it.
+    let size = *parts.first()?;
+    let mut formula = size.0.to_owned();
+    let mut parameters = vec![("size".to_owned(), size.1, size.2)];
+    for (k, (function, value, sd)) in parts.iter().enumerate().skip(1) {
+        let name = format!("share_{}", k + 1);
+        formula += &format!(" + {name} * {function}");
+        parameters.push((name, value / size.1, (sd / size.1).abs()));
+    }
+    Some(Written { on, formula: format!("y + size * ({formula})"), parameters })
 }

@@ -6,7 +6,7 @@ use crate::gap::account::Account;
 use crate::gap::drift::Map;
 use crate::gap::name::{Separations, What};
 use crate::report::findings::Findings;
-use crate::report::gap::{on, p_value};
+use crate::report::gap::{capitalised, on, p_value};
 use crate::report::number::{fixed, significant, typeset};
 use crate::report::page::{Caption, Numbers, paragraph};
 use crate::report::scale::ShownUnit;
@@ -151,8 +151,8 @@ fn drift(findings: &Findings, account: &Account, map: &Map, numbers: &mut Number
     table.emphasised(last);
     let caption = Caption::new(
         format!(
-            "The parameters recalibrated by condition and window, without any effect. {}",
-            map.words
+            "The parameters recalibrated by condition and window, without any effect. {}.",
+            capitalised(&map.words)
         ),
         "normal approximation, with the noise of all pieces together.",
         "parameters that differ between pieces while no sensor stands out: the model is wrong there, and not a sensor's \
