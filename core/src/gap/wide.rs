@@ -25,7 +25,7 @@ pub struct Wide<'a> {
     pub common: Vec<CommonError>,
 }
 
-impl<'a> Wide<'a> {
+impl Wide<'_> {
     /// The same with effects on top, whose unknowns stand between the parameters and the inputs.
     pub fn with_effects<'b>(&'b self, effects: Vec<Placed<'b>>) -> Wide<'b> {
         let inputs = self.inputs.len();

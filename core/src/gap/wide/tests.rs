@@ -97,7 +97,7 @@ fn unknowns_stand_in_the_order_of_the_effects() {
     let [a, f, g, e] = [2.0, 0.5, 0.25, -0.125];
     let at = system.linearised(&[a, f, g, e]);
     let names: Vec<String> =
-        system.effects.iter().flat_map(|e| e.hyperparameters()).map(|h| h.name).collect();
+        system.effects.iter().flat_map(Placed::hyperparameters).map(|h| h.name).collect();
     assert_eq!(names, ["f", "gain.g", "e"]);
     for k in 0..TIMES {
         let t = k as f64;

@@ -48,8 +48,8 @@ pub fn value(gap: &GapFindings) -> Value {
     if let Some(added) = &gap.added {
         value["study"] = json!(added.study);
         value["run"] = json!(added.run);
-        if let Some(log_evidence) = added.log_evidence {
-            value["log_evidence"] = json!({ "before": log_evidence[0], "after": log_evidence[1] });
+        if let Some([before, after]) = added.log_evidence {
+            value["log_evidence"] = json!({ "before": before, "after": after });
         }
     }
     value

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::{FOLDER, study_file};
 use crate::gap::added::{Added, Moved, Posterior};
+use crate::plugin::effect::Placed;
 use crate::report::findings::{CalibrationFindings, Findings, GapFindings, Role};
 use crate::run::{Observer, RunDirectory, Stop, files};
 use crate::stage;
@@ -95,7 +96,7 @@ fn moved(before: &Findings, after: &Findings) -> Vec<Moved> {
 /// The unknowns of the effects of a study: those on the response, and the parameters that it has besides those of `before`.
 fn unknowns(before: &Study, study: &Study, findings: &Findings) -> Vec<Posterior> {
     let effects = study.placed_effects();
-    let on_top = effects.iter().flat_map(|e| e.hyperparameters()).map(|unknown| unknown.name);
+    let on_top = effects.iter().flat_map(Placed::hyperparameters).map(|unknown| unknown.name);
     let new = |name: &str| !before.parameters.iter().any(|known| known.name == name);
     let inside = study.parameters.iter().map(|p| p.name.clone()).filter(|name| new(name));
     let names: Vec<String> = inside.chain(on_top).collect();

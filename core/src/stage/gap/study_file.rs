@@ -88,11 +88,10 @@ fn text(study: &Study, path: &Path, account: &Account) -> Result<String, Stop> {
     Ok(text)
 }
 
-/// What the study must say for the effects inside the model, with why, and the effects on the response.
-fn divided<'a>(
-    study: &Study,
-    account: &'a Account,
-) -> Result<(Option<(Edit, String)>, Vec<&'a Addition>), Stop> {
+/// What the study must say for the effects inside the model, with why; and the effects on the response.
+type Divided<'a> = (Option<(Edit, String)>, Vec<&'a Addition>);
+
+fn divided<'a>(study: &Study, account: &'a Account) -> Result<Divided<'a>, Stop> {
     let is_inside = |addition: &&Addition| !addition.switches.is_empty();
     let (inside, on_top): (Vec<_>, Vec<_>) = account.additions.iter().partition(is_inside);
     let Some(pieces) = Pieces::of(study)?.filter(|_| !inside.is_empty()) else {

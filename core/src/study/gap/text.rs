@@ -92,10 +92,7 @@ impl<'t> Written<'t> {
     /// The text with a value in braces replaced by what `change` makes of it.
     fn rewritten(&self, node: &Node, change: impl FnOnce(&mut Table)) -> Option<String> {
         let span = node.place.span.clone();
-        let mut table = match Value::try_from(node).ok()? {
-            Value::Table(table) => table,
-            _ => return None,
-        };
+        let Value::Table(mut table) = Value::try_from(node).ok()? else { return None };
         change(&mut table);
         Some(self.spliced(span, &to_line(&table).ok()?))
     }
