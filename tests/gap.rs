@@ -1,7 +1,7 @@
 //! The gap workflow on data in which an effect is hidden.
 //!
 //! `LACUNA_GAP_CASES` is the number of single effects at each of two sizes; all other numbers grow with it. An ordinary run
-//! takes 14, one of each kind. The nightly run, whose table stands in `docs/gap_rates.md`, takes 126:
+//! takes a few, of each kind at least one. The nightly run, whose tables stand in `docs/gap_rates.md`, takes 126:
 //!
 //! ```text
 //! LACUNA_GAP_CASES=126 LACUNA_GAP_SEED=1 cargo test --release --workspace --test gap -- --nocapture --test-threads 1

@@ -34,7 +34,7 @@ fn number(variable: &str, otherwise: u64) -> u64 {
 
 /// The share `of` 126 of as many single effects as `LACUNA_GAP_CASES` says; not less than `least`.
 pub fn count(of: u64, least: u64) -> u64 {
-    (number("LACUNA_GAP_CASES", 14) * of / 126).max(least)
+    (number("LACUNA_GAP_CASES", 7) * of / 126).max(least)
 }
 
 /// The name that a kind should get; its own where it is of no library.

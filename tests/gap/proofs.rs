@@ -12,7 +12,7 @@ fn the_gap_shrinks_on_replicates_held_out() {
         let kinds = vec![(kind, vec![((i + i / 14) % 4) as usize])];
         Plan { replicates: 8, held_out: 4, ..Plan::new(i, kinds, 0.8) }
     };
-    let all = asked(7, (0..count(56, 7)).map(plan).collect());
+    let all = asked(7, (0..count(56, 4)).map(plan).collect());
     let lower = |a: &Asked| a.answer.proof.as_ref().map_or(f64::NAN, |p| p.all.lower);
     let above = Rate::of(&all, |a| lower(a) > 0.0);
     let shrank = Rate::of(&all, |a| a.answer.proof.as_ref().is_some_and(|p| p.shrank));
