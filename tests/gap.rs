@@ -30,5 +30,7 @@ mod proofs;
 mod tally;
 #[path = "gap/target.rs"]
 mod target;
+#[path = "gap/truths.rs"]
+mod truths;
 #[path = "gap/workflow.rs"]
 mod workflow;
