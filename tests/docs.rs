@@ -100,11 +100,11 @@ fn the_schema_is_as_generated() {
 
 #[test]
 fn the_keys_of_the_summary_are_those_of_the_program() {
-    let source = fs::read_to_string(root().join("core/src/report/summary.rs")).unwrap();
+    let source = fs::read_to_string(root().join("core/src/report/summary/mod.rs")).unwrap();
     let rows: Vec<&str> = source.lines().filter_map(|l| l.strip_prefix("/// |")).collect();
     assert!(rows.len() > 20, "the table of keys in summary.rs");
     let page = fs::read_to_string(root().join("docs/run-directory.md")).unwrap();
-    let mark = "<!-- summary: written by tests/docs.rs from core/src/report/summary.rs -->\n\n";
+    let mark = "<!-- summary: written by tests/docs.rs from core/src/report/summary/mod.rs -->\n\n";
     let (before, rest) = page.split_once(mark).expect("the mark of the table");
     let (_, after) = rest.split_once("\n\n").expect("the end of the table");
     let table: Vec<String> = rows.iter().map(|row| format!("|{row}")).collect();

@@ -193,11 +193,15 @@ fn modules_of_the_core_depend_one_way() {
 }
 
 /// Words of the engine's own that are also the name of a plugin.
-const WORDS: [(&str, &str); 4] = [
+const WORDS: [(&str, &str); 6] = [
     // The executor of a study that chooses none.
     ("core/src/study/resolve.rs", "local"),
     // The indices.
-    ("core/src/report/summary.rs", "sobol"),
+    ("core/src/report/summary/mod.rs", "sobol"),
+    // What the parameters do from condition to condition.
+    ("core/src/report/summary/gap.rs", "drift"),
+    // The replicates' own.
+    ("core/src/report/section/gap/tables.rs", "offset"),
     // The distribution.
     ("core/src/math/distribution/mod.rs", "student_t"),
     ("core/src/math/distribution/written.rs", "student_t"),

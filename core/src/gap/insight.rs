@@ -80,7 +80,7 @@ pub fn insight<'a>(
     let first = found.path.first().map_or(&found.last, |step| &step.before);
     let whitener = Whitener::new(experiment, &found.noise, &first.fit.at.response);
     let options = drift::Options { simulations: SIMULATIONS, ..drift::Options::default() };
-    let drifting = stream.named("drift");
+    let drifting = stream.named("drift map");
     insight.drift = drift(&base, &first.fit, &found.noise, &whitener, options, &drifting);
     if let Some(named) = verdict.effects.first() {
         let winner = Rival { system: &found.system, fit: &found.last.fit };
