@@ -18,6 +18,12 @@ const STABLE: f64 = 0.8;
 /// An effect that differs between conditions or sensors with less probability than this is not what it is called.
 const INCONSISTENT: f64 = 0.001;
 
+/// Effects that close so much of the excess misfit, with no excess of the whole left, explain it.
+const NEARLY: f64 = 0.9;
+
+/// An excess of the whole misfit that is less probable than this without a gap remains.
+const REMAINS: f64 = 0.05;
+
 /// An effect that closes less of the excess misfit than this is no explanation of it, where an excess remains.
 const HALF: f64 = 0.5;
 
@@ -84,7 +90,10 @@ pub fn verdict(found: &Found<'_>, candidates: &[Candidate], options: Options) ->
     let effects = named(found, candidates);
     let noise = found.last.energy_sd;
     let less_than_half = closed < HALF && after - (before - after).max(0.0) > CLEAR * noise;
-    let gap = found.last.p[1].min(found.last.p[2]) <= 0.5 * options.unlisted;
+    let disagree = found.last.p[1].min(found.last.p[2]) <= 0.5 * options.unlisted;
+    // Effects whose misfit as a whole is that of noise explain the gap, whatever a single place still says.
+    let explained = closed >= NEARLY && found.last.p[2] > REMAINS;
+    let gap = disagree && !(explained && !effects.is_empty());
     let mut reasons = Vec::new();
     let word = if effects.is_empty() {
         if gap || found.last.p[0] <= options.naming {
@@ -112,6 +121,12 @@ pub fn verdict(found: &Found<'_>, candidates: &[Candidate], options: Options) ->
             Word::Class
         }
     };
+    if disagree && !gap {
+        reasons.push(
+            "a place still disagrees with the effects, though the misfit as a whole is that of noise"
+                .into(),
+        );
+    }
     if found.noise.assumed.contains(&true) {
         reasons.push("noise assumed: there are no replicates to learn it from".into());
     }
