@@ -244,7 +244,15 @@ impl<'a> Search<'a> {
         scores: &Scores,
         stream: &Stream,
     ) -> Vec<Judged> {
-        let leads = self.leads(state, directions, scores);
+        let mut leads = self.leads(state, directions, scores);
+        // What acts in a place already would act there twice.
+        let is_there = |lead: &Lead| {
+            let same = |chosen: &Suspect| {
+                chosen.candidate == lead.suspect.candidate && chosen.on == lead.suspect.on
+            };
+            state.chosen.iter().any(same)
+        };
+        leads.retain(|lead| !is_there(lead));
         let common = self.common();
         let desk = state.desk(&common);
         let mut judged = judge(&desk, &state.fit, &leads, stream);
