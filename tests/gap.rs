@@ -28,9 +28,5 @@ mod places;
 mod proofs;
 #[path = "gap/tally.rs"]
 mod tally;
-#[path = "gap/target.rs"]
-mod target;
-#[path = "gap/truths.rs"]
-mod truths;
 #[path = "gap/workflow.rs"]
 mod workflow;
