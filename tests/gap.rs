@@ -7,6 +7,8 @@ use lacuna_plugins as _;
 mod beside;
 #[path = "gap/chain.rs"]
 mod chain;
+#[path = "gap/falling_balls.rs"]
+mod falling_balls;
 #[path = "gap/inside.rs"]
 mod inside;
 #[path = "gap/target.rs"]
