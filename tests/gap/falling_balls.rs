@@ -69,13 +69,11 @@ steps = 60
 use = "linear_friction"
 state = "v"
 of = "v * diameter / mass"
-prior = { half_normal = 1.0 }
 
 [[gap.term]]
 use = "quadratic_friction"
 state = "v"
 of = "v * diameter / sqrt(mass)"
-prior = { half_normal = 0.5 }
 
 [gap]
 candidates = ["gain", "delay", "drift"]
