@@ -18,6 +18,8 @@ mod beside;
 mod cases;
 #[path = "gap/chain.rs"]
 mod chain;
+#[path = "gap/falling_balls.rs"]
+mod falling_balls;
 #[path = "gap/inside.rs"]
 mod inside;
 #[path = "gap/names.rs"]

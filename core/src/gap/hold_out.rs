@@ -190,7 +190,8 @@ fn conditions(layout: &Layout, replicate: &Replicate) -> Vec<bool> {
     replicate.values.chunks(length).map(|own| own.iter().any(Option::is_some)).collect()
 }
 
-/// Two blocks inside each curve of each replicate, which do not touch each other.
+/// Two blocks inside each curve, which do not touch each other: the same of all its replicates, so that two of them
+/// still show how they differ.
 fn blocks(data: &Observations, stream: &Stream) -> Split {
     let mut training = data.clone();
     let mut held_out: Vec<Measurements> = data
@@ -204,23 +205,25 @@ fn blocks(data: &Observations, stream: &Stream) -> Split {
             Some(Coordinates::Grid { values, .. }) => values.len(),
             _ => continue,
         };
-        for (r, replicate) in block.replicates.iter().enumerate() {
-            for begin in (0..replicate.values.len()).step_by(length) {
-                let measured: Vec<usize> =
-                    (begin..begin + length).filter(|&i| replicate.values[i].is_some()).collect();
-                if measured.len() < LONG {
-                    continue;
-                }
-                drawn += 1;
-                for k in inner(&stream.at(drawn)) {
-                    let edge = |k: usize| k * measured.len() / BLOCKS;
+        for begin in (0..block.layout.len()).step_by(length) {
+            let is_measured = |i: &usize| block.replicates.iter().any(|r| r.values[*i].is_some());
+            let measured: Vec<usize> = (begin..begin + length).filter(is_measured).collect();
+            if measured.len() < LONG {
+                continue;
+            }
+            drawn += 1;
+            for k in inner(&stream.at(drawn)) {
+                let edge = |k: usize| k * measured.len() / BLOCKS;
+                let place = block.layout.describe(measured[edge(k)]);
+                for replicate in &mut training.blocks[b].replicates {
                     let mut values = vec![None; replicate.values.len()];
                     for &i in &measured[edge(k)..edge(k + 1)] {
-                        values[i] = training.blocks[b].replicates[r].values[i].take();
+                        values[i] = replicate.values[i].take();
                     }
-                    let place = block.layout.describe(measured[edge(k)]);
-                    let name = format!("{} from {place}", replicate.name);
-                    held_out[b].replicates.push(Replicate { name, values });
+                    if values.iter().any(Option::is_some) {
+                        let name = format!("{} from {place}", replicate.name);
+                        held_out[b].replicates.push(Replicate { name, values });
+                    }
                 }
             }
         }
@@ -316,5 +319,17 @@ mod tests {
             let part = &split.held_out[0];
             assert_eq!((part.kind, part.names.len(), part.data.count()), (Kind::Blocks, 4, 40));
         }
+    }
+
+    #[test]
+    fn two_replicates_lack_the_same_blocks() {
+        let data = observations(2, 80);
+        let split = split(&data, &HoldOut::default(), &Stream::root(1));
+        assert_apart(&data, &split);
+        let lacks = |r: usize| -> Vec<bool> {
+            split.training.blocks[0].replicates[r].values.iter().map(Option::is_none).collect()
+        };
+        assert_eq!(lacks(0), lacks(1));
+        assert_eq!(split.held_out[0].names.len(), 8);
     }
 }

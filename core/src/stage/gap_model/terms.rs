@@ -5,11 +5,12 @@ use crate::gap::wide::Freed;
 use crate::math::distribution::Distribution;
 use crate::plugin::amend::{Addition, Amend, State};
 use crate::plugin::effect::Description;
+use crate::plugin::model::Call;
 use crate::plugin::registry::Section;
 use crate::plugin::term::{Index, Place, Sign, Summand, Time};
 use crate::plugin::{Context, Given, Term};
 use crate::run::Stop;
-use crate::stage::simulator::Simulator;
+use crate::stage::simulator::{Setting, Simulator};
 use crate::study::Study;
 use crate::study::gap::TermKeys;
 
@@ -176,13 +177,33 @@ impl Desk<'_> {
             self.study.parameters.iter().map(|p| p.prior.quantile(0.5)).collect();
         let (mut sum, mut count) = (0.0, 0.0);
         for setting in &self.simulator.settings {
-            let inputs = setting.inputs(&middle);
+            let mut inputs = setting.inputs(&middle);
+            let (mut names, mut units) =
+                (self.simulator.names.clone(), self.simulator.units.clone());
+            for (name, unit, value) in self.idle(setting) {
+                names.push(name.clone());
+                units.push(unit);
+                inputs.push(value);
+            }
             let call = self.simulator.call(setting, &inputs);
+            let call = Call { names: &names, units: &units, ..call };
             let sizes = self.amend.sizes(&call, &[expression.to_owned()]);
             let sizes = sizes.map_err(|error| format!("`{expression}`: {error}"))?;
             sum += sizes.iter().map(|s| s * s).sum::<f64>();
             count += sizes.len() as f64;
         }
         Ok((sum / f64::max(count, 1.0)).sqrt())
+    }
+
+    /// The values of a scenario that the study's equations do not use and a term may.
+    fn idle(&self, setting: &Setting<'_>) -> Vec<(String, Unit, f64)> {
+        let given = self.study.given.iter();
+        let idle = given.filter(|given| !self.simulator.names.contains(&given.name));
+        idle.filter_map(|given| {
+            let value = setting.scenario.value(&given.name)?;
+            let unit = value.unit.clone().unwrap_or_default();
+            Some((given.name.clone(), unit, value.value))
+        })
+        .collect()
     }
 }
