@@ -1,6 +1,7 @@
 //! Whether the gap shrank: misfit of replicates that nothing was fitted to, without and with the effects.
 //!
-//! The gap of a response is its whitened mean square misfit to new replicates less one, the share of the noise. The misfits of one
+//! The gap of a response is its whitened mean square misfit to new replicates less one, the share of the noise, and less what
+//! the known errors of emulator and numerics make on the mean: what is left could be explained. The misfits of one
 //! replicate without and with the effects share its noise, so that their difference is far more exact than either:
 //! intervals are those of Student's law for the mean of the differences, replicates being independent. Conditions differ in what
 //! closes, so that the scatter is that within them (stratified sampling; Cochran, Sampling Techniques, 3rd ed., section 5.6).
@@ -60,6 +61,8 @@ pub struct Comparison {
 struct Misfits {
     before: f64,
     after: f64,
+    /// What the known errors of emulator and numerics make of them, on the mean.
+    known: f64,
     values: f64,
 }
 
@@ -104,21 +107,22 @@ fn of_condition(
     responses: [&[f64]; 2],
 ) -> Vec<Misfits> {
     let condition = &held_out.conditions[c];
-    let mut made: Option<(Vec<bool>, Whitener)> = None;
+    let mut made: Option<(Vec<bool>, Whitener, f64)> = None;
     let mut misfits = Vec::new();
     for replicate in &condition.replicates {
         let pattern: Vec<bool> = replicate.iter().map(Option::is_some).collect();
-        if made.as_ref().is_none_or(|(known, _)| *known != pattern) {
+        if made.as_ref().is_none_or(|(of, ..)| *of != pattern) {
             let mut alone = vec![Vec::new(); held_out.conditions.len()];
             alone[c] = vec![replicate.clone()];
             let mut one = held_out.with_replicates(alone).remeasured();
-            // The noise of the replicates alone is the unit: errors of emulator and numerics are part of the gap.
+            // The noise of the replicates alone is the unit.
             (one.common, one.remainder) = (Vec::new(), Vec::new());
             let own = noise.restricted(held_out, &one);
             let whitener = Whitener::new(&one, &own, responses[0]);
-            made = Some((pattern, whitener));
+            let known = of_known_errors(held_out, &whitener);
+            made = Some((pattern, whitener, known));
         }
-        let Some((_, whitener)) = &made else { continue };
+        let Some((_, whitener, known)) = &made else { continue };
         let square = |response: &[f64]| {
             let mut difference = vec![0.0; held_out.outputs()];
             for (i, y) in condition.outputs.clone().zip(replicate) {
@@ -128,9 +132,22 @@ fn of_condition(
             dot(&z, &z)
         };
         let values = replicate.iter().flatten().count() as f64;
-        misfits.push(Misfits { before: square(responses[0]), after: square(responses[1]), values });
+        let (before, after) = (square(responses[0]), square(responses[1]));
+        misfits.push(Misfits { before, after, known: *known, values });
     }
     misfits
+}
+
+/// The mean square of white differences that known errors of emulator and numerics make, summed over the values.
+fn of_known_errors(held_out: &Experiment<'_>, whitener: &Whitener) -> f64 {
+    let factors = held_out.common.iter().map(|error| {
+        let white = whitener.whiten_rows(&error.factor.transposed());
+        white.as_slice().iter().map(|z| z * z).sum::<f64>()
+    });
+    // The remainder is white where the innovations of the noise are.
+    let scale = whitener.scale();
+    let rest = held_out.remainder.iter().zip(&scale).map(|(rest, s)| rest * s * s);
+    factors.sum::<f64>() + rest.sum::<f64>()
 }
 
 impl Comparison {
@@ -142,8 +159,8 @@ impl Comparison {
         }
         let count = all.len() as f64;
         let mean = |of: &dyn Fn(&Misfits) -> f64| all.iter().map(|m| of(m)).sum::<f64>() / count;
-        let excess_before = mean(&|m| m.before / m.values - 1.0);
-        let excess_after = mean(&|m| m.after / m.values - 1.0);
+        let excess_before = mean(&|m| (m.before - m.known) / m.values - 1.0);
+        let excess_after = mean(&|m| (m.after - m.known) / m.values - 1.0);
         let gain = |m: &Misfits| (m.before - m.after) / m.values;
         let mean_gain = mean(&gain);
         let (mut squares, mut freedom) = (0.0, 0.0);

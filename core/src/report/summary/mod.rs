@@ -53,7 +53,7 @@ pub const SCHEMA: u64 = 1;
 /// | `rmse.CASE` | root mean square difference from the replicates' mean, in the response's unit |
 /// | `simulated.CASE` | whether the model itself was run there (else the emulator answered) |
 /// | `spread.ORIGIN` | standard deviation of a new replicate by origin, root mean square over outputs, in the response's unit |
-/// | `gap.verdict` | after `lacuna gap`: `none`, `named`, `class`, `unlisted` or `not_visible`; `gap.reasons`: why, in words |
+/// | `gap.verdict` | after `lacuna gap STUDY`: `none`, `named`, `class`, `unlisted` or `not_visible`; `gap.reasons`: why, in words |
 /// | `gap.p`, `.p_after` | probabilities, if nothing were missing, of the largest score, the best cell of the scan and the energy, without and with the effects |
 /// | `gap.noise_assumed` | whether the noise of some curve is assumed, for want of replicates |
 /// | `gap.effects[]` | what explains most: `type`, `name`, `sensors` (labels; none: everywhere), `on` (labels by axis), `parameters.UNKNOWN` with `mean`, `sd`, `unit` (and `q025`, `q975` once the study with the effects was run; before, the largest density and the normal approximation), `probability` among the candidates, `class` |

@@ -21,7 +21,7 @@ use crate::plugin::Effect;
 use crate::plugin::effect::On;
 use crate::plugin::registry::{Section, section};
 
-/// How a search for missing effects (`lacuna gap`) works.
+/// How a search for missing effects (`lacuna gap STUDY`) works.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GapSection {

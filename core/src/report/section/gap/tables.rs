@@ -52,7 +52,7 @@ pub fn held_out(findings: &Findings, account: &Account, numbers: &mut Numbers) -
     }
     let caption = Caption::new(
         "What was set aside before anything was looked at, against the calibrated response without and with what was \
-         found. The gap is the root of the whitened mean square misfit less what noise makes of it, in standard \
+         found. The gap is the root of the whitened mean square misfit less what noise and the known errors of emulator and numerics make of it, in standard \
          deviations of the noise; closed is the share of its square; intervals pair the misfits of each \
          replicate.",
         "sampling of the replicates (Student's law).",
