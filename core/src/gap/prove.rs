@@ -1,7 +1,7 @@
 //! Whether the gap shrank: misfit of replicates that nothing was fitted to, without and with the effects.
 //!
 //! The gap of a response is its whitened mean square misfit to new replicates less one, the share of the noise, and less what
-//! the known errors of emulator and numerics make on the mean: what is left could be explained. The misfits of one
+//! of it the known errors of emulator and numerics can explain, with the effects: the rest could be closed. The misfits of one
 //! replicate without and with the effects share its noise, so that their difference is far more exact than either:
 //! intervals are those of Student's law for the mean of the differences, replicates being independent. Conditions differ in what
 //! closes, so that the scatter is that within them (stratified sampling; Cochran, Sampling Techniques, 3rd ed., section 5.6).
@@ -159,8 +159,11 @@ impl Comparison {
         }
         let count = all.len() as f64;
         let mean = |of: &dyn Fn(&Misfits) -> f64| all.iter().map(|m| of(m)).sum::<f64>() / count;
-        let excess_before = mean(&|m| (m.before - m.known) / m.values - 1.0);
-        let excess_after = mean(&|m| (m.after - m.known) / m.values - 1.0);
+        let excess_before = mean(&|m| m.before / m.values - 1.0);
+        let excess_after = mean(&|m| m.after / m.values - 1.0);
+        // Known errors may explain what is left, as far as they go; their covariance is no estimate of what they are.
+        let known = mean(&|m| m.known / m.values);
+        let explained = known.min(excess_before).min(excess_after).max(0.0);
         let gain = |m: &Misfits| (m.before - m.after) / m.values;
         let mean_gain = mean(&gain);
         let (mut squares, mut freedom) = (0.0, 0.0);
@@ -176,10 +179,10 @@ impl Comparison {
             f64::INFINITY
         };
         // Where noise hides the gap before, its own size is no scale for what closed.
-        let scale = excess_before.abs().max(1e-12);
+        let scale = (excess_before - explained).max(mean_gain.abs()).max(1e-12);
         Some(Self {
-            before: excess_before.max(0.0).sqrt(),
-            after: excess_after.max(0.0).sqrt(),
+            before: (excess_before - explained).max(0.0).sqrt(),
+            after: (excess_after - explained).max(0.0).sqrt(),
             closed: mean_gain / scale,
             lower: (mean_gain - half) / scale,
             upper: (mean_gain + half) / scale,
