@@ -92,8 +92,8 @@ pub fn verdict(found: &Found<'_>, candidates: &[Candidate], options: Options) ->
     let less_than_half = closed < HALF && after - (before - after).max(0.0) > CLEAR * noise;
     let disagree = found.last.p[1].min(found.last.p[2]) <= 0.5 * options.unlisted;
     // Effects whose misfit as a whole is that of noise explain the gap, whatever a single place still says.
-    let explained = closed >= NEARLY && found.last.p[2] > REMAINS;
-    let gap = disagree && !(explained && !effects.is_empty());
+    let explained = !effects.is_empty() && closed >= NEARLY && found.last.p[2] > REMAINS;
+    let gap = disagree && !explained;
     let mut reasons = Vec::new();
     let word = if effects.is_empty() {
         if gap || found.last.p[0] <= options.naming {
