@@ -119,9 +119,11 @@ impl Effect for PulseHeating {
 
     fn proposals(&self, situation: &Situation<'_>) -> Vec<Table> {
         let Some(span) = Span::of_all(situation) else { return Vec::new() };
+        // Faster it is an offset, slower a drift.
+        let bends = [span.step.min(0.1 * span.duration()), 0.5 * span.duration()];
         let mut table = propose(&[
             ("rise", Distribution::HalfNormal(0.2 * situation.scale())),
-            ("time_constant", Distribution::LogUniform([0.5 * span.step, 1.5 * span.duration()])),
+            ("time_constant", Distribution::LogUniform(bends)),
         ]);
         span.add_pulse(&mut table);
         vec![table]

@@ -105,12 +105,13 @@ impl Asked {
         let verdict = &self.answer.verdict;
         let effects: Vec<String> = verdict.effects.iter().map(one).collect();
         format!(
-            "R {} rms {}: {} -> {:?} {:?} [{}] closed {:.2} {:?}",
+            "R {} rms {}: {} -> {:?} {:?} odds {:.1} [{}] closed {:.2} {:?}",
             self.plan.replicates,
             self.plan.ratio,
             hidden.collect::<Vec<_>>().join(", "),
             verdict.word,
             self.answer.p,
+            self.answer.log_odds,
             effects.join("; "),
             verdict.closed,
             verdict.reasons

@@ -91,6 +91,8 @@ pub fn observations(case: &Case, replicates: Range<usize>) -> Observations {
 pub struct Answer {
     /// Probabilities without a gap of the largest score, the best cell of the scan and the energy.
     pub p: [f64; 3],
+    /// The log of the odds that any candidate acts.
+    pub log_odds: f64,
     /// The verdict.
     pub verdict: Verdict,
     /// Where data and model disagree.
@@ -119,13 +121,14 @@ pub fn ask(case: &Case, replicates: usize, seed: u64) -> Answer {
     let found: Found<'_> = search(&experiment, &candidates, &[centre], options, &stream).unwrap();
     let first = found.path.first().map_or(&found.last, |step| &step.before);
     let verdict = verdict(&found, &candidates, options);
+    let log_odds = found.path.first().map_or(f64::NAN, |step| step.log_odds);
     let held_out = observations(case, replicates..case.replicates[0].len());
     let mut held_out = Experiment::new(&layouts, &parameters, &**emulator, &held_out);
     held_out.common.clone_from(&experiment.common);
     held_out.remainder.clone_from(&experiment.remainder);
     let (before, after) = (&first.fit.at.response, &found.last.fit.at.response);
     let proof = prove(&held_out, &found.noise, before, after);
-    Answer { p: first.p, verdict, regions: first.regions.clone(), proof }
+    Answer { p: first.p, log_odds, verdict, regions: first.regions.clone(), proof }
 }
 
 /// Makes what all cases share, before they run in parallel.

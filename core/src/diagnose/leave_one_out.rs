@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::pareto::{LARGEST_K, smooth};
 use crate::linalg::Matrix;
-use crate::math::moments::mean;
+use crate::math::moments::{log_sum, mean};
 
 /// The prediction of one datum.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -99,15 +99,6 @@ pub fn compare(a: &LeaveOneOut, b: &LeaveOneOut) -> Result<Difference, String> {
 fn error_of_sum(values: &[f64]) -> f64 {
     let centre = mean(values);
     values.iter().map(|x| (x - centre).powi(2)).sum::<f64>().sqrt()
-}
-
-/// The log of the sum of exponentials.
-fn log_sum(logs: impl Iterator<Item = f64> + Clone) -> f64 {
-    let largest = logs.clone().fold(f64::NEG_INFINITY, f64::max);
-    if !largest.is_finite() {
-        return largest;
-    }
-    largest + logs.map(|l| (l - largest).exp()).sum::<f64>().ln()
 }
 
 #[cfg(test)]

@@ -152,6 +152,8 @@ pub struct Passed {
     pub p: [f64; 3],
     /// What was weighed, the heaviest first.
     pub leaders: Vec<Leader>,
+    /// The log of the odds that any of it acts, against nothing further.
+    pub log_odds: f64,
     /// What was added: types and places.
     pub added: Vec<(String, On)>,
     /// The names of effects that were dropped after it.
@@ -221,6 +223,9 @@ pub struct HeldOut {
     pub names: Vec<String>,
     /// The comparison.
     pub proof: Proof,
+    /// The accuracy without and with the effects: the share of outputs inside the held-out replicates' 95 % interval, on the mean
+    /// over the groups (Radaideh et al., arXiv 2202.03959); `None` without two replicates.
+    pub accuracy: Option<[f64; 2]>,
 }
 
 impl Account {
@@ -298,6 +303,7 @@ fn passed(step: &Step, candidates: &[Candidate]) -> Passed {
     let best = step.judged.first().map_or(0.0, |j| j.log_weight);
     Passed {
         p: step.before.p,
+        log_odds: step.log_odds,
         leaders: step
             .judged
             .iter()

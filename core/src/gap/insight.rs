@@ -21,6 +21,9 @@ const SIMULATIONS: usize = 99;
 /// An explanation that foretells worse than another by so many standard errors is not named alone.
 const AGAINST: f64 = 2.0;
 
+/// Conditions that may disagree about two explanations.
+const SEVERAL: usize = 4;
+
 /// What an explanation without a rival is compared with.
 const NOTHING: &str = "nothing";
 
@@ -142,19 +145,35 @@ fn unnamed(found: &Found<'_>, insight: &mut Insight, stream: &Stream) {
     insight.symbolic = symbolic(system, fit, &whitener, regions, excess, SIMULATIONS, &stream);
 }
 
-/// The verdict as far as it stands against what foretells better: a name that does not is one of a class with it.
+/// The verdict as far as it stands against another explanation: a name is one of a class with what foretells better, and with what
+/// some conditions prefer where they do not tell the two apart together.
+///
+/// Where neither is quite true, the probability of the data is decided by a few conditions, overly sure (Yang and Zhu, Proceedings
+/// of the National Academy of Sciences 115 (2018) 1854); how conditions differ shows it.
 pub fn withhold(verdict: &mut Verdict, insight: &Insight) {
+    let Some(against) = insight.against.as_ref().filter(|kind| *kind != NOTHING) else { return };
+    if verdict.word != Word::Named || verdict.effects.len() != 1 {
+        return;
+    }
     let worse = |f: &&Foretelling| f.error.is_some_and(|e| f.difference < -AGAINST * e);
-    let against = insight.against.as_ref().filter(|kind| *kind != NOTHING);
-    let (Some(worse), Some(against)) = (insight.foretold.iter().find(worse), against) else {
+    let divided = |f: &&Foretelling| {
+        f.left_out == LeftOut::Condition
+            && f.parts >= SEVERAL
+            && f.against > 0
+            && f.scatter.is_some_and(|e| f.difference < AGAINST * e)
+    };
+    let reason = if let Some(worse) = insight.foretold.iter().find(worse) {
+        let left_out = worse.left_out.words();
+        format!("`{against}` foretells better what is left out by {left_out}")
+    } else if let Some(divided) = insight.foretold.iter().find(divided) {
+        let (parts, against_it) = (divided.parts, divided.against);
+        format!(
+            "`{against}` foretells {against_it} of {parts} conditions better by far, and all together do not decide"
+        )
+    } else {
         return;
     };
-    if verdict.word == Word::Named && verdict.effects.len() == 1 {
-        verdict.word = Word::Class;
-        verdict.effects[0].class.push(against.clone());
-        verdict.reasons.push(format!(
-            "`{against}` foretells better what is left out by {}",
-            worse.left_out.words()
-        ));
-    }
+    verdict.word = Word::Class;
+    verdict.effects[0].class.push(against.clone());
+    verdict.reasons.push(reason);
 }

@@ -25,6 +25,9 @@ pub struct Proof {
     pub rmse: [f64; 2],
     /// The share of held-out values inside the 95 % band of a replicate, without and with.
     pub coverage: [f64; 2],
+    /// The log of the joint predictive density of all held-out values with the effects, less that without: noise and known errors in
+    /// its covariance, all unknowns at their best fit.
+    pub log_score: f64,
     /// Whether the gap shrank: the lower bound of what closed is above zero, and no condition became significantly
     /// worse.
     pub shrank: bool,
@@ -52,8 +55,21 @@ pub struct Comparison {
     pub lower: f64,
     /// The upper end.
     pub upper: f64,
+    /// The same with nothing explained by known errors: the misfit beyond the noise of replicates alone.
+    pub beyond_noise: Closing,
     /// The number of replicates.
     pub replicates: usize,
+}
+
+/// How much of a gap closed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Closing {
+    /// The gap without the effects, in standard deviations of the noise.
+    pub before: f64,
+    /// The gap with them.
+    pub after: f64,
+    /// The share of the squared gap that closed, and the ends of its 95 % interval.
+    pub closed: [f64; 3],
 }
 
 /// The misfits of one replicate.
@@ -97,7 +113,15 @@ pub fn prove(
         (sum / f64::max(count, 1.0)).sqrt()
     });
     let coverage = [before, after].map(|response| coverage(held_out, noise, response));
-    Some(Proof { all, conditions, rmse, coverage, shrank })
+    // How replicates differ from their mean is the same for both.
+    let whitener = Whitener::new(held_out, noise, before);
+    let squares = [before, after].map(|response| {
+        let misfit: Vec<f64> = means.iter().zip(response).map(|(y, m)| y - m).collect();
+        let z = whitener.whiten(&misfit);
+        dot(&z, &z)
+    });
+    let log_score = 0.5 * (squares[0] - squares[1]);
+    Some(Proof { all, conditions, rmse, coverage, log_score, shrank })
 }
 
 fn of_condition(
@@ -151,6 +175,12 @@ fn of_known_errors(held_out: &Experiment<'_>, whitener: &Whitener) -> f64 {
 }
 
 impl Comparison {
+    /// The gap beyond noise and known errors, and how much of it closed.
+    pub fn closing(&self) -> Closing {
+        let closed = [self.closed, self.lower, self.upper];
+        Closing { before: self.before, after: self.after, closed }
+    }
+
     /// Of the misfits by condition.
     fn of(conditions: &[Vec<Misfits>]) -> Option<Self> {
         let all: Vec<&Misfits> = conditions.iter().flatten().collect();
@@ -178,16 +208,18 @@ impl Comparison {
         } else {
             f64::INFINITY
         };
-        // Where noise hides the gap before, its own size is no scale for what closed.
-        let scale = (excess_before - explained).max(mean_gain.abs()).max(1e-12);
-        Some(Self {
-            before: (excess_before - explained).max(0.0).sqrt(),
-            after: (excess_after - explained).max(0.0).sqrt(),
-            closed: mean_gain / scale,
-            lower: (mean_gain - half) / scale,
-            upper: (mean_gain + half) / scale,
-            replicates: all.len(),
-        })
+        let closing = |explained: f64| {
+            // Where noise hides the gap before, its own size is no scale for what closed.
+            let scale = (excess_before - explained).max(mean_gain.abs()).max(1e-12);
+            Closing {
+                before: (excess_before - explained).max(0.0).sqrt(),
+                after: (excess_after - explained).max(0.0).sqrt(),
+                closed: [mean_gain, mean_gain - half, mean_gain + half].map(|x| x / scale),
+            }
+        };
+        let Closing { before, after, closed: [closed, lower, upper] } = closing(explained);
+        let beyond_noise = closing(0.0);
+        Some(Self { before, after, closed, lower, upper, beyond_noise, replicates: all.len() })
     }
 }
 

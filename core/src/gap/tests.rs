@@ -143,6 +143,14 @@ fn a_gap_that_closes_is_proven() {
     let error = (0.05 * 0.95 / (count * TIMES) as f64).sqrt();
     assert!((proof.coverage[1] - 0.95).abs() < 4.0 * error, "{proof:?}");
     assert!((proof.coverage[0] - 0.830).abs() < 8.0 * error, "{proof:?}");
+    // The log of a ratio of normal densities of independent values.
+    let ratio = |y: &f64, i: usize| {
+        ((y - wrong[i]).powi(2) - (y - truth[i]).powi(2)) / (2.0 * NOISE * NOISE)
+    };
+    let values = experiment.conditions[0].replicates.iter();
+    let each = values.flat_map(|r| r.iter().flatten().enumerate().map(|(i, y)| ratio(y, i)));
+    let gained: f64 = each.sum();
+    assert!((proof.log_score - gained).abs() < 1e-9 * gained, "{proof:?} {gained}");
     let back = prove(&experiment, &white(), &truth, &wrong).unwrap();
     assert!(!back.shrank && back.all.upper < 0.0, "{back:?}");
 }

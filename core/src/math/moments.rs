@@ -91,6 +91,15 @@ pub fn variance(values: &[f64]) -> f64 {
     values.iter().map(|x| (x - centre).powi(2)).sum::<f64>() / (values.len() as f64 - 1.0)
 }
 
+/// The log of the sum of exponentials.
+pub fn log_sum(logs: impl Iterator<Item = f64> + Clone) -> f64 {
+    let largest = logs.clone().fold(f64::NEG_INFINITY, f64::max);
+    if !largest.is_finite() {
+        return largest;
+    }
+    largest + logs.map(|l| (l - largest).exp()).sum::<f64>().ln()
+}
+
 /// Numbers in ascending order.
 pub fn sorted(values: &[f64]) -> Vec<f64> {
     let mut sorted = values.to_vec();

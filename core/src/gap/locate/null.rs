@@ -25,6 +25,10 @@ const ROUND: usize = 50;
 /// Simulations whose scores are taken together.
 const CHUNK: usize = 5;
 
+/// Directions whose scores are taken through the noise of a simulation: those that score most through that of the data. The
+/// largest is among them but for differences between the two noises.
+const STRONGEST: usize = 40;
+
 /// A statistic that so many simulations reach is not rare.
 const ENOUGH: usize = 10;
 
@@ -184,16 +188,21 @@ impl Bench<'_> {
         each.map(|((one, misfit), scores)| self.drawn(one, misfit, &scores)).collect()
     }
 
-    /// One simulation with its noise estimated anew.
-    fn drawn(&self, simulated: &Experiment<'_>, misfit: &[f64], scores: &Scores) -> Drawn {
+    /// One simulation with its noise estimated anew; `near` are its scores through the noise of the data.
+    fn drawn(&self, simulated: &Experiment<'_>, misfit: &[f64], near: &Scores) -> Drawn {
         let response = &self.fit.at.response;
         let noise = Noise::of(simulated, response, Some(self.noise));
         let whitener = Whitener::new(simulated, &noise, response);
         let slopes = whitener.whiten_rows(&self.fit.at.tangents);
         let precisions: Vec<f64> = self.system.priors().iter().map(precision).collect();
-        let left = Projection::off(&slopes, &precisions).rest(&whitener.whiten(misfit));
+        let projection = Projection::off(&slopes, &precisions);
+        let left = projection.rest(&whitener.whiten(misfit));
+        let strongest =
+            self.directions.strongest(near, STRONGEST, simulated, &whitener, &projection);
+        let (rows, spread) = differences(simulated);
+        let scores = strongest.scores_of(&left, &whitener.whiten_rows(&rows), &spread);
         Drawn {
-            score: scores.largest(self.directions),
+            score: scores.largest(&strongest),
             cells: self.scan.best(&left).into_iter().map(|cell| cell.statistic).collect(),
             energy: dot(&left, &left),
         }

@@ -20,6 +20,9 @@ use crate::linalg::vector::dot;
 use crate::linalg::{Cholesky, Matrix, multiply_transposed, multiply_vector};
 use crate::math::special::normal_quantile;
 
+/// A log score that is strong evidence: 20 to 1 (Kass and Raftery, Journal of the American Statistical Association 90 (1995) 773).
+const STRONG: f64 = 3.0;
+
 /// What is left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -70,6 +73,10 @@ pub struct Foretelling {
     pub error: Option<f64>,
     /// Whether replicates were paired for it, or the parts.
     pub by_replicates: bool,
+    /// Its standard error by the scatter between the parts; `None` below three.
+    pub scatter: Option<f64>,
+    /// The number of parts that speak for the second by more than 20 to 1.
+    pub against: usize,
     /// The probability that the best of so many is ahead by so much when all are alike; `None` without an error.
     pub p: Option<f64>,
 }
@@ -224,11 +231,12 @@ fn summary(
     tried: usize,
 ) -> Foretelling {
     let difference: f64 = all.iter().map(|told| told.difference).sum();
+    let of_parts = of_parts(all);
     let found = if left_out == LeftOut::Replicate {
         of_replicates(experiment, all).map(|found| (found, true))
     } else {
         let paired = jackknife(experiment, all).map(|found| (found, true));
-        paired.or_else(|| of_parts(all).map(|found| (found, false)))
+        paired.or_else(|| of_parts.map(|found| (found, false)))
     };
     let (mut corrected, mut p) = (difference, None);
     if let Some(((error, freedom), _)) = found {
@@ -245,6 +253,8 @@ fn summary(
         corrected,
         error: found.map(|((error, _), _)| error),
         by_replicates: found.is_some_and(|(_, by_replicates)| by_replicates),
+        scatter: of_parts.map(|(error, _)| error),
+        against: all.iter().filter(|told| told.difference < -STRONG).count(),
         p,
     }
 }

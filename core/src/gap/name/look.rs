@@ -64,6 +64,8 @@ pub struct Step {
     pub before: Look,
     /// What was weighed, the heaviest first.
     pub judged: Vec<Judged>,
+    /// The log of the odds that any of it acts, against nothing further.
+    pub log_odds: f64,
     /// What was added.
     pub added: Vec<Suspect>,
     /// The names of effects that were dropped after it.

@@ -16,7 +16,7 @@ use crate::gap::locate::{
 use crate::gap::noise::Noise;
 use crate::gap::system::System;
 use crate::gap::whitener::Whitener;
-use crate::math::moments::{mean, quantile, variance};
+use crate::math::moments::{log_sum, mean, quantile, variance};
 use crate::math::random::Stream;
 use crate::plugin::effect::{On, Situation};
 
@@ -212,12 +212,14 @@ impl<'a> Search<'a> {
         }
         let judged = self.judged(state, directions, &look.statistics.scores, &stream);
         let now = state.weight(&self.common(), &stream);
-        let alone = judged.first().filter(|best| {
-            // The gate alone decides on the first effect; further ones must outweigh their absence.
-            named
-                && (state.chosen.is_empty()
-                    || best.log_weight - self.kinds() > now - state.prior(&self.common()) + FURTHER)
-        });
+        let nothing = now - state.prior(&self.common()) + self.kinds();
+        let log_odds = log_sum(judged.iter().map(|j| j.log_weight)) - nothing;
+        let outweighs = |best: &&Judged| {
+            // A rare score alone is what a rare noise makes as well. Further effects must each be clear.
+            let alone = state.chosen.is_empty() && log_odds > 0.0;
+            alone || !state.chosen.is_empty() && best.log_weight > nothing + FURTHER
+        };
+        let alone = judged.first().filter(|best| named && outweighs(best));
         let added = match alone {
             Some(best) => vec![best.suspect.clone()],
             None if room >= 2 => self.pair(state, &judged, now, &stream)?,
@@ -228,7 +230,7 @@ impl<'a> Search<'a> {
         }
         self.exchange(state, &stream);
         let dropped = self.drop_needless(state, &stream);
-        Some(Step { before: look.clone(), judged, added, dropped })
+        Some(Step { before: look.clone(), judged, log_odds, added, dropped })
     }
 
     /// The log of the number of types.

@@ -96,7 +96,7 @@ pub fn verdict(found: &Found<'_>, candidates: &[Candidate], options: Options) ->
     let gap = disagree && !explained;
     let mut reasons = Vec::new();
     let word = if effects.is_empty() {
-        if gap || found.last.p[0] <= options.naming {
+        if gap {
             reasons.push("data and model disagree, and no candidate outweighs its absence".into());
             Word::Unlisted
         } else if !first.visible.is_empty() && first.visible.iter().all(|v| v.absorbed > INVISIBLE)
@@ -107,6 +107,12 @@ pub fn verdict(found: &Found<'_>, candidates: &[Candidate], options: Options) ->
             ));
             Word::NotVisible
         } else {
+            if found.last.p[0] <= options.naming {
+                let p = found.last.p[0];
+                reasons.push(format!(
+                    "a candidate's score is rare without a gap (p = {p:.3}), but none outweighs its absence"
+                ));
+            }
             Word::None
         }
     } else {

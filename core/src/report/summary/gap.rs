@@ -6,6 +6,7 @@ use crate::gap::account::{Account, Addition, HeldOut, Spot};
 use crate::gap::added::Added;
 use crate::gap::hold_out::Kind;
 use crate::gap::name::Word;
+use crate::gap::prove::{Closing, Comparison};
 use crate::plugin::effect::On;
 use crate::report::findings::GapFindings;
 
@@ -177,11 +178,20 @@ fn held_out(part: &HeldOut) -> Value {
         "closed": all.closed,
         "lower": all.lower,
         "upper": all.upper,
+        "beyond_noise": beyond_noise(all),
         "shrank": proof.shrank,
         "rmse": { "before": proof.rmse[0], "after": proof.rmse[1] },
         "coverage": { "before": proof.coverage[0], "after": proof.coverage[1] },
+        "accuracy": part.accuracy.map(|[before, after]| json!({ "before": before, "after": after })),
+        "log_score": proof.log_score,
         "conditions": conditions.collect::<Map<_, _>>(),
     })
+}
+
+/// The gap with nothing explained by known errors.
+fn beyond_noise(all: &Comparison) -> Value {
+    let Closing { before, after, closed: [closed, lower, upper] } = all.beyond_noise;
+    json!({ "before": before, "after": after, "closed": closed, "lower": lower, "upper": upper })
 }
 
 fn parameters(account: &Account) -> Value {

@@ -12,6 +12,7 @@ use crate::gap::prove::prove;
 use crate::gap::wide::Wide;
 use crate::gap::with_effects::WithEffects;
 use crate::linalg::Matrix;
+use crate::math::moments::mean;
 use crate::math::random::Stream;
 use crate::plugin::Forward;
 use crate::plugin::discrepancy::CommonError;
@@ -20,6 +21,7 @@ use crate::run::{Observer, RunDirectory, Stop};
 use crate::stage::calibrate::stated_variance;
 use crate::stage::gap_model::{self, Pieces, Rival};
 use crate::stage::read::Measured;
+use crate::stage::validate::accuracy;
 use crate::stage::{Known, best_fit, stream};
 use crate::study::Study;
 
@@ -248,6 +250,15 @@ impl<'a> Base<'a> {
             Noise::of(&whole, after, None).restricted(&whole, &held_out)
         };
         let proof = prove(&held_out, &noise, before, after);
-        Ok(proof.map(|proof| HeldOut { kind: part.kind, names: part.names.clone(), proof }))
+        let [without, with] = [before, after].map(|response| average(&part.data, response));
+        let accuracy = without.zip(with).map(|(without, with)| [without, with]);
+        let names = part.names.clone();
+        Ok(proof.map(|proof| HeldOut { kind: part.kind, names, proof, accuracy }))
     }
+}
+
+/// The accuracy on the mean over the groups of sensors.
+fn average(data: &Observations, response: &[f64]) -> Option<f64> {
+    let shares: Vec<f64> = accuracy(data, response).into_iter().map(|(_, share)| share).collect();
+    (!shares.is_empty()).then(|| mean(&shares))
 }

@@ -23,7 +23,10 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
         @if !account.verdict.reasons.is_empty() {
             ul { @for reason in &account.verdict.reasons { li { (paragraph(reason)) } } }
         }
-        @if !account.held_out.is_empty() { (tables::held_out(findings, account, numbers)) }
+        @if !account.held_out.is_empty() {
+            (tables::held_out(account, numbers))
+            (tables::scores(findings, account, numbers))
+        }
         (figures::maps(findings, account, numbers))
         (figures::curves(findings, account, numbers))
         (figures::differences(findings, account, numbers))

@@ -3,6 +3,7 @@
 use maud::Markup;
 
 use crate::gap::account::Account;
+use crate::gap::prove::Closing;
 use crate::report::findings::{Findings, GapFindings};
 use crate::report::gap::{on, p_value};
 use crate::report::number::{fixed, percent, significant};
@@ -12,72 +13,91 @@ use crate::report::section::{axis_unit, response_unit};
 use crate::report::table::Table;
 
 /// How the gap fares on what was set aside.
-pub fn held_out(findings: &Findings, account: &Account, numbers: &mut Numbers) -> Markup {
-    let unit = response_unit(findings);
-    let rmse = unit.label("RMSE");
-    let mut table = Table::new(
-        &["set aside"],
-        &[
-            "number",
-            "gap without",
-            "with",
-            "closed",
-            "95 % interval",
-            &rmse,
-            "with",
-            "inside 95 %",
-            "with",
-        ],
-    );
+pub fn held_out(account: &Account, numbers: &mut Numbers) -> Markup {
+    let columns = ["number", "gap without", "with", "closed", "95 % interval"];
+    let mut table = Table::new(&["set aside"], &columns);
     for part in &account.held_out {
         let proof = &part.proof;
-        let mut row = |name: String, c: &crate::gap::prove::Comparison, whole: bool| {
-            let interval = format!("{} to {}", percent(c.lower), percent(c.upper));
-            let mut cells =
-                vec![name, c.replicates.to_string(), fixed(c.before, 3), fixed(c.after, 3)];
-            cells.extend([percent(c.closed), interval]);
-            if whole {
-                cells.extend(proof.rmse.map(|x| significant(unit.show(x), 3)));
-                cells.extend(proof.coverage.map(percent));
-            }
+        let mut row = |name: String, count: usize, c: Closing| {
+            let [closed, lower, upper] = c.closed.map(percent);
+            let gaps = [c.before, c.after].map(|gap| fixed(gap, 3));
+            let mut cells = vec![name, count.to_string()];
+            cells.extend(gaps);
+            cells.extend([closed, format!("{lower} to {upper}")]);
             table.row(cells);
         };
-        row(part.kind.words().to_owned(), &proof.all, true);
+        let (all, beyond) = (proof.all.closing(), proof.all.beyond_noise);
+        row(part.kind.words().to_owned(), proof.all.replicates, all);
+        if beyond != all {
+            row("· known errors explaining nothing".to_owned(), proof.all.replicates, beyond);
+        }
         if proof.conditions.len() > 1 {
             for condition in &proof.conditions {
                 let name = condition.scenario.clone().unwrap_or_default();
-                row(format!("· {name}"), &condition.comparison, false);
+                let own = &condition.comparison;
+                row(format!("· {name}"), own.replicates, own.closing());
             }
         }
     }
     let caption = Caption::new(
         "What was set aside before anything was looked at, against the calibrated response without and with what was \
-         found. The gap is the root of the whitened mean square misfit less what noise and the known errors of emulator and numerics make of it, in standard \
-         deviations of the noise; closed is the share of its square; intervals pair the misfits of each \
-         replicate.",
+         found. The gap is the root of the whitened mean square misfit less what noise and the known errors of emulator \
+         and numerics make of it, in standard deviations of the noise; closed is the share of its square. What is known \
+         of those errors is how large they may be, not what they are: with them explaining nothing, all that is beyond the \
+         noise of replicates is gap. Intervals pair the misfits of each replicate.",
         "sampling of the replicates (Student's law).",
         "an interval above zero in all, and below zero under no condition.",
     );
     numbers.table(&table, &caption)
 }
 
+/// What else can be said of what was set aside.
+pub fn scores(findings: &Findings, account: &Account, numbers: &mut Numbers) -> Markup {
+    let unit = response_unit(findings);
+    let rmse = unit.label("RMSE without");
+    let columns =
+        [&rmse, "with", "inside 95 % without", "with", "accuracy without", "with", "log score"];
+    let mut table = Table::new(&["set aside"], &columns);
+    for part in &account.held_out {
+        let proof = &part.proof;
+        let mut cells = vec![part.kind.words().to_owned()];
+        cells.extend(proof.rmse.map(|x| significant(unit.show(x), 3)));
+        cells.extend(proof.coverage.map(percent));
+        let accuracy = part.accuracy.map(|both| both.map(percent));
+        cells.extend(accuracy.unwrap_or_else(|| ["–", "–"].map(str::to_owned)));
+        cells.push(format!("{:+.1}", proof.log_score));
+        table.row(cells);
+    }
+    let caption = Caption::new(
+        "The same responses against what was set aside: root mean square difference from the mean of the replicates; share of \
+         values inside the 95 % band of a replicate; accuracy, the share of points inside the replicates' own 95 % interval \
+         (Radaideh et al., arXiv 2202.03959); log score, the gain in the log of the joint predictive density.",
+        "the replicates that were set aside.",
+        "a band that holds 95 %, and a gain above zero.",
+    );
+    numbers.table(&table, &caption)
+}
+
 /// The steps of the search.
 pub fn path(account: &Account, numbers: &mut Numbers) -> Markup {
-    let mut table =
-        Table::new(&["step", "added", "dropped"], &["p of score", "p of place", "p of energy"]);
+    let columns = ["p of score", "p of place", "p of energy", "log odds"];
+    let mut table = Table::new(&["step", "added", "dropped"], &columns);
     for (i, step) in account.path.iter().enumerate() {
         let added: Vec<String> =
             step.added.iter().map(|(kind, place)| format!("`{kind}`{}", on(place))).collect();
         let mut cells = vec![(i + 1).to_string(), added.join(", "), step.dropped.join(", ")];
         cells.extend(step.p.map(p_value));
+        cells.push(fixed(step.log_odds, 1));
         table.row(cells);
     }
     let mut last = vec![String::from("end"), String::new(), String::new()];
     last.extend(account.p[1].map(p_value));
+    last.push(String::new());
     table.emphasised(last);
     let caption = Caption::new(
         "The path of the search: at each step the probabilities, if nothing more were missing, of the largest \
-         candidate's score, of the place that disagrees most and of the whole misfit, and what was added.",
+         candidate's score, of the place that disagrees most and of the whole misfit; what was added; and the log of the odds \
+         that any candidate acts, against nothing further.",
         "data simulated without a missing effect, with the noise estimated and the model calibrated anew.",
         "probabilities that are no longer small at the end.",
     );
