@@ -87,13 +87,14 @@ pub fn verdict(found: &Found<'_>, candidates: &[Candidate], options: Options) ->
     let excess = |look: &super::Look| look.statistics.energy - look.expected_energy;
     let (before, after) = (excess(first), excess(&found.last));
     let closed = if before > 0.0 { 1.0 - after / before } else { 0.0 };
-    let effects = named(found, candidates);
+    let mut effects = named(found, candidates);
     let noise = found.last.energy_sd;
     let less_than_half = closed < HALF && after - (before - after).max(0.0) > CLEAR * noise;
     let disagree = found.last.p[1].min(found.last.p[2]) <= 0.5 * options.unlisted;
     // Effects whose misfit as a whole is that of noise explain the gap, whatever a single place still says.
     let explained = !effects.is_empty() && closed >= NEARLY && found.last.p[2] > REMAINS;
     let gap = disagree && !explained;
+    let differs = found.consistency < INCONSISTENT;
     let mut reasons = Vec::new();
     let word = if effects.is_empty() {
         if gap {
@@ -121,6 +122,14 @@ pub fn verdict(found: &Found<'_>, candidates: &[Candidate], options: Options) ->
         let sure = effects.iter().all(|e| e.class.len() == 1);
         if !reasons.is_empty() {
             Word::Unlisted
+        } else if differs {
+            // With all of the misfit closed they are of the right kind, and not quite of the right form.
+            let kind = explained && widened(&mut effects, &found.types);
+            let though = if kind { ", though all of the misfit is theirs" } else { "" };
+            reasons.push(format!(
+                "the effects that explain most are not the same under all conditions and on all their sensors{though}"
+            ));
+            if kind { Word::Class } else { Word::Unlisted }
         } else if sure && found.stability >= STABLE {
             Word::Named
         } else {
@@ -152,18 +161,24 @@ fn doubts(
     } else if found.last.p[0] <= options.naming && found.chosen.len() >= options.most {
         reasons.push(format!("more than {} effects would be needed", options.most));
     }
-    if found.consistency < INCONSISTENT {
-        reasons.push(
-            "the effects that explain most are not the same under all conditions and on all their sensors"
-                .into(),
-        );
-    }
     if let Some(closed) = less_than_half {
         reasons.push(format!(
             "the effects that explain most close {:.0} % of the excess misfit",
             100.0 * closed.max(0.0)
         ));
     }
+}
+
+/// Adds the next type to those that are alone in their class; whether all have company then.
+fn widened(effects: &mut [Named], types: &[Vec<(String, f64)>]) -> bool {
+    for (effect, types) in effects.iter_mut().zip(types) {
+        if effect.class.len() == 1
+            && let Some((other, _)) = types.iter().find(|(other, _)| *other != effect.kind)
+        {
+            effect.class.push(other.clone());
+        }
+    }
+    effects.iter().all(|effect| effect.class.len() > 1)
 }
 
 fn named(found: &Found<'_>, candidates: &[Candidate]) -> Vec<Named> {
