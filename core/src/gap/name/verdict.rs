@@ -93,10 +93,10 @@ pub fn verdict(found: &Found<'_>, candidates: &[Candidate], options: Options) ->
     let disagree = found.last.p[1].min(found.last.p[2]) <= 0.5 * options.unlisted;
     // Effects whose misfit as a whole is that of noise explain the gap, whatever a single place still says.
     let explained = !effects.is_empty() && closed >= NEARLY && found.last.p[2] > REMAINS;
-    let gap = disagree && !explained;
+    let gap = (disagree || found.last.p[0] <= options.naming) && !explained;
     let mut reasons = Vec::new();
     let word = if effects.is_empty() {
-        if gap || found.last.p[0] <= options.naming {
+        if gap {
             reasons.push("data and model disagree, and no candidate outweighs its absence".into());
             Word::Unlisted
         } else if !first.visible.is_empty() && first.visible.iter().all(|v| v.absorbed > INVISIBLE)
