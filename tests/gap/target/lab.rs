@@ -189,4 +189,3 @@ pub fn wide() -> &'static Wide<'static> {
         Wide { forward, inputs: unknowns[3..].iter().map(freed).collect(), common }
     })
 }
-

@@ -4,8 +4,7 @@
 //! here says what a search should call them.
 
 use lacuna_plugins::models::mercury_target::{
-    Cells, EquationOfState, Gas, Mercury, Outcome, Rear, Sampling, Settings, Target,
-    TensileCutoff,
+    Cells, EquationOfState, Gas, Mercury, Outcome, Rear, Sampling, Settings, Target, TensileCutoff,
 };
 use serde::Deserialize;
 
