@@ -30,5 +30,7 @@ mod places;
 mod proofs;
 #[path = "gap/tally.rs"]
 mod tally;
+#[path = "gap/target/mod.rs"]
+mod target;
 #[path = "gap/workflow.rs"]
 mod workflow;

@@ -90,3 +90,43 @@ fn a_killed_study_ends_with_the_bits_it_would_have_had() {
     let kept = fs::metadata(broken.join("2-simulate/run001.h")).unwrap().modified().unwrap();
     assert_eq!(kept, first_run);
 }
+
+/// The power of a small study, 70 cases.
+fn power(folder: &Path, out: &Path) -> Command {
+    let mut command = quick::command();
+    command.args(["power", "--quick", "--threads", "1", "--out"]).arg(out);
+    command.arg(folder.join("study.toml"));
+    command.args(["--set", "gap.candidates=[\"gain\", \"offset\"]", "--set", "sampler.steps=200"]);
+    command
+}
+
+#[test]
+fn a_killed_power_goes_on_with_the_cases_it_has() {
+    let folder = quick::tables();
+    let (whole, broken) = (folder.path().join("whole"), folder.path().join("broken"));
+    let cases = |out: &Path| out.join("7-power/cases.jsonl");
+    let rates = |out: &Path| fs::read_to_string(out.join("7-power/power.json"));
+    kill_when(&mut power(folder.path(), &broken), || lines(&cases(&broken)) >= 5);
+    let kept = fs::read_to_string(cases(&broken)).unwrap();
+    assert!(kept.lines().count() < 70 && rates(&broken).is_err());
+    // A kill may come in the middle of a line.
+    let (before, _) = kept.trim_end().rsplit_once('\n').unwrap();
+    let cut = &kept[..before.len() + 20];
+    fs::write(cases(&broken), cut).unwrap();
+
+    let (code, text) = quick::said(&mut power(folder.path(), &broken));
+    assert_eq!(code, Some(0), "{text}");
+    let (code, text) = quick::said(&mut power(folder.path(), &whole));
+    assert_eq!(code, Some(0), "{text}");
+    assert_eq!(rates(&broken).unwrap(), rates(&whole).unwrap());
+    let all = fs::read_to_string(cases(&broken)).unwrap();
+    assert!(all.starts_with(&format!("{cut}\n")));
+    let sorted = |text: &str| {
+        let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        lines.retain(|line| line != &cut[before.len() + 1..]);
+        lines.sort();
+        lines
+    };
+    // Each case stands there once.
+    assert_eq!(sorted(&all), sorted(&fs::read_to_string(cases(&whole)).unwrap()));
+}

@@ -153,10 +153,8 @@ impl Unit {
         let meaning = self.meaning.power(fits.then_some(sixths as i16)?)?;
         let text = if exponent == 1.0 || matches!(self.text.as_str(), "" | "1") {
             self.text.clone()
-        } else if sixths % 6.0 == 0.0 {
-            format!("{}^{exponent}", in_parentheses(&self.text))
         } else {
-            format!("{}^({sixths}/6)", in_parentheses(&self.text))
+            format!("{}^{}", in_parentheses(&self.text), exponent_text(sixths as i16))
         };
         Some(Self { text, meaning })
     }
@@ -168,7 +166,7 @@ impl Unit {
         let power = |(symbol, sixths): (&&str, i16)| match (sixths / 6, sixths % 6) {
             (1, 0) => (*symbol).to_owned(),
             (whole, 0) => format!("{symbol}{whole}"),
-            _ => format!("{symbol}^({sixths}/6)"),
+            _ => format!("{symbol}^{}", exponent_text(sixths)),
         };
         let factors = |sign: i16| -> Vec<String> {
             let all = SYMBOLS.iter().zip(self.meaning.sixths.map(|sixths| sign * sixths));
@@ -211,6 +209,15 @@ impl Unit {
         let si = |unit: &Self| unit.meaning.factor * 10f64.powi(unit.meaning.decimals);
         self.same_dimension(other)
             .then(|| (x * si(self) + self.meaning.offset - other.meaning.offset) / si(other))
+    }
+}
+
+/// An exponent in the lowest terms: `2`, `(1/2)`, `(-2/3)`.
+fn exponent_text(sixths: i16) -> String {
+    let common = [6, 3, 2, 1].into_iter().find(|divisor| sixths % divisor == 0).unwrap_or(1);
+    match (sixths / common, 6 / common) {
+        (whole, 1) => whole.to_string(),
+        (above, below) => format!("({above}/{below})"),
     }
 }
 

@@ -76,6 +76,9 @@ pub struct OtherModel {
     pub parameters: Vec<Estimate>,
 }
 
+/// An excess of the whole misfit that is more probable than this without a gap has no share that effects could explain.
+const EXCESS: f64 = 0.05;
+
 /// An effect as a study adds it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Addition {
@@ -229,6 +232,13 @@ pub struct HeldOut {
 }
 
 impl Account {
+    /// The share of the excess misfit, none to all, that the effects explain in the data they were found in; `None` where there is
+    /// no effect, and where the misfit as a whole is that of noise.
+    pub fn explained(&self) -> Option<f64> {
+        let has_share = !self.additions.is_empty() && self.p[0][2] <= EXCESS;
+        has_share.then(|| self.verdict.closed.clamp(0.0, 1.0))
+    }
+
     /// The account of a search, without what was held out.
     pub fn of<'a>(
         found: &Found<'a>,

@@ -64,11 +64,29 @@ pub fn verdict(account: &Account) -> String {
         Word::Unlisted if account.additions.is_empty() => {
             "Data and calibrated model disagree, and no candidate explains it.".into()
         }
-        Word::Unlisted => format!(
-            "Data and calibrated model disagree, and no candidate explains it. What explains most is {}, and that is not enough.",
-            listed(&account.additions)
-        ),
+        Word::Unlisted => unlisted(account),
         Word::NotVisible => "Whatever may be missing, the calibrated parameters absorb it: this experiment cannot show it.".into(),
+    }
+}
+
+/// What explains most of a gap that has no sure name, and how much of it.
+fn unlisted(account: &Account) -> String {
+    let one = |addition: &Addition| {
+        let class: Vec<String> = addition.class.iter().map(|kind| format!("`{kind}`")).collect();
+        format!("{}{}", class.join(" or "), on(&addition.on))
+    };
+    let each: Vec<String> = account.additions.iter().map(one).collect();
+    let all = match each.split_last() {
+        Some((last, before)) if !before.is_empty() => format!("{} and {last}", before.join(", ")),
+        _ => each.concat(),
+    };
+    let verb = if each.len() == 1 { "explains" } else { "explain" };
+    match account.explained() {
+        Some(share) => format!(
+            "Something is missing that has no sure name; {all} {verb} {} of it.",
+            percent(share)
+        ),
+        None => format!("Something is missing that has no sure name; nearest to it: {all}."),
     }
 }
 

@@ -20,6 +20,13 @@ pub fn power_text(rates: &Rates) -> String {
         ));
     }
     parts.push(kinds(rates).text());
+    if rates.kinds.iter().flat_map(|kind| &kind.sizes).any(|size| size.absorbed > 0) {
+        parts.push(
+            "In parentheses: cases of which the calibrated parameters absorb more than 99 %, so that nothing is left to be \
+             found; the sizes in the last columns are those of the others.\n"
+                .to_owned(),
+        );
+    }
     if rates.named[0] > 0 {
         parts.push(format!(
             "Names that were given: {}; right: {}.\n",
@@ -66,8 +73,10 @@ fn kinds(rates: &Rates) -> Table {
             |ratio: f64| kind.sizes.iter().find(|size| size.ratio.to_bits() == ratio.to_bits());
         let mut cells = vec![kind.kind.clone()];
         cells.extend(ratios.iter().map(|&ratio| {
-            at(ratio)
-                .map_or_else(String::new, |s| format!("{}/{}/{}", s.in_class, s.named, s.cases))
+            at(ratio).map_or_else(String::new, |s| match s.absorbed {
+                0 => format!("{}/{}/{}", s.in_class, s.named, s.cases),
+                n => format!("{}/{}/{} ({n})", s.in_class, s.named, s.cases),
+            })
         }));
         let smallest = kind.smallest.and_then(at);
         cells.push(smallest.map_or_else(|| "none".to_owned(), |s| fixed(s.ratio, 2)));

@@ -265,26 +265,27 @@ pub fn printed(unit: &Unit) -> String {
     if text.is_empty() { "1".to_owned() } else { text }
 }
 
-/// A unit with exponents as superscripts; the unit of plain numbers is not written.
+/// A unit with whole exponents as superscripts, others as written (`kg^(1/2)`); the unit of plain numbers is not written.
 fn pretty(unit: &str) -> String {
     if unit == "1" {
         return String::new();
     }
     let unit = unit.replace("**", "^").replace('*', "·");
     let mut text = String::new();
-    let mut exponent = String::new();
-    let mut after_letter = false;
-    for c in unit.chars().chain([' ']) {
-        let continues = c.is_ascii_digit() || (c == '-' && exponent.is_empty());
-        if after_letter && continues {
-            exponent.push(c);
-        } else if after_letter && c == '^' {
-            // The caret only announces the exponent.
+    let mut rest = unit.as_str();
+    while let Some(c) = rest.chars().next() {
+        let after_symbol = text.ends_with(|c: char| c.is_alphabetic() || c == ')');
+        let raised = rest.strip_prefix('^').unwrap_or(rest);
+        let sign = usize::from(raised.starts_with('-'));
+        let end = sign + raised[sign..].bytes().take_while(u8::is_ascii_digit).count();
+        // Without a caret a point multiplies.
+        let is_broken = c == '^' && raised[end..].starts_with('.');
+        if after_symbol && end > sign && !is_broken {
+            text.push_str(&superscript(&raised[..end]));
+            rest = &raised[end..];
         } else {
-            text.push_str(&superscript(&exponent));
-            exponent.clear();
-            after_letter = c.is_alphabetic() || c == ')';
             text.push(c);
+            rest = &rest[c.len_utf8()..];
         }
     }
     text.trim_end().to_owned()
@@ -366,6 +367,10 @@ mod tests {
         assert_eq!(
             ["kg/m3", "J/(kg K)", "1"].map(|u| printed(&unit(u))),
             ["kg/m³", "J/(kg K)", "1"]
+        );
+        assert_eq!(
+            ["kg^(1/2)/(m s)", "Hz^0.5", "m^-2 s2.A", "(m/s)^3"].map(|u| printed(&unit(u))),
+            ["kg^(1/2)/(m s)", "Hz^0.5", "m⁻² s².A", "(m/s)³"]
         );
         assert_eq!(shown("Pa", 0.0), "x [Pa]");
         assert_eq!(ShownUnit::of(&unit("Pa"), 6.5e4).text(64_873.0, 3), "64.9 kPa");

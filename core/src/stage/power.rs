@@ -127,12 +127,18 @@ fn read(path: &Path) -> Result<BTreeMap<usize, Option<Outcome>>, Stop> {
     Ok(text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect())
 }
 
+/// The file to which cases are added, a last line that was cut ended.
 fn append(path: &Path) -> Result<File, Stop> {
-    OpenOptions::new()
+    let is_cut = path.exists() && !files::read(path)?.ends_with(b"\n");
+    let mut file = OpenOptions::new()
         .create(true)
         .append(true)
         .open(path)
-        .map_err(|error| files::cannot_write(path, &error))
+        .map_err(|error| files::cannot_write(path, &error))?;
+    if is_cut {
+        file.write_all(b"\n").map_err(|error| files::cannot_write(path, &error))?;
+    }
+    Ok(file)
 }
 
 fn write(

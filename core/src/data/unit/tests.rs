@@ -137,3 +137,24 @@ fn products_are_written_plainly() {
     assert_eq!(unit("mm/s").times(&unit("mm")).unwrap().plain().as_str(), "(mm/s) mm");
     assert_eq!(unit("").plain().as_str(), "1");
 }
+
+/// A rate of 1/s for each `v * diameter / sqrt(mass)`, among others.
+#[test]
+fn roots_are_written_in_the_lowest_terms_and_read_again() {
+    let unit = |text: &str| Unit::parse(text).unwrap();
+    let shape = unit("m/s").times(&unit("m")).unwrap();
+    let shape = shape.times(&unit("kg").power(-0.5).unwrap()).unwrap();
+    let rate = unit("m/s2").times(&shape.power(-1.0).unwrap()).unwrap();
+    assert_eq!(unit("kg").power(0.5).unwrap().as_str(), "kg^(1/2)");
+    assert_eq!(unit("m").power(-2.0 / 3.0).unwrap().as_str(), "m^(-2/3)");
+    assert_eq!(unit("s").power(1.0 / 6.0).unwrap().as_str(), "s^(1/6)");
+    assert_eq!(unit("m/s").power(-1.5).unwrap().as_str(), "(m/s)^(-3/2)");
+    assert_eq!(rate.clone().plain().as_str(), "kg^(1/2)/(m s)");
+    assert_eq!(unit("s").power(-0.5).unwrap().plain().as_str(), "1/s^(1/2)");
+    for sixths in (-12..=12).filter(|sixths| *sixths != 0) {
+        let power = unit("kg").power(f64::from(sixths) / 6.0).unwrap();
+        for written in [power.as_str(), power.clone().plain().as_str()] {
+            assert_eq!(unit(written), power, "{written}");
+        }
+    }
+}

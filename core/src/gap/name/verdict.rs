@@ -93,7 +93,8 @@ pub fn verdict(found: &Found<'_>, candidates: &[Candidate], options: Options) ->
     let disagree = found.last.p[1].min(found.last.p[2]) <= 0.5 * options.unlisted;
     // Effects whose misfit as a whole is that of noise explain the gap, whatever a single place still says.
     let explained = !effects.is_empty() && closed >= NEARLY && found.last.p[2] > REMAINS;
-    let gap = disagree && !explained;
+    let scores = !effects.is_empty() && found.last.p[0] <= options.naming;
+    let gap = (disagree || scores) && !explained;
     let differs = found.consistency < INCONSISTENT;
     let mut reasons = Vec::new();
     let word = if effects.is_empty() {

@@ -12,9 +12,13 @@ use serde::{Deserialize, Serialize};
 use super::candidates::Candidate;
 use super::experiment::Experiment;
 use super::fit::Fit;
-use super::locate::common_error;
+use super::locate::{Projection, common_error};
 use super::name::{Options, Word, search, verdict};
 use super::noise::Noise;
+use super::system::System;
+use super::whitener::Whitener;
+use crate::linalg::Matrix;
+use crate::linalg::vector::dot;
 use crate::math::random::Stream;
 use crate::plugin::effect::On;
 
@@ -75,6 +79,8 @@ pub struct Outcome {
     pub word: Word,
     /// The effects that explain most: type, place, and the types that cannot be told from it.
     pub effects: Vec<Said>,
+    /// The share of what was planted that the calibrated parameters absorb.
+    pub absorbed: f64,
     /// For a bump, the overlap of the places that were found with it: intersection over union of sensor and time.
     pub overlap: Option<f64>,
 }
@@ -94,6 +100,7 @@ pub struct Said {
 pub fn run(ground: &Ground<'_>, case: usize, wanted: &Plant, stream: &Stream) -> Option<Outcome> {
     let Ground { experiment, candidates, options, fit, noise } = *ground;
     let (planted, response) = plant(ground, wanted, &stream.named("plant"))?;
+    let absorbed = absorbed(ground, &response);
     let error = common_error(experiment, noise, &stream.named("common"));
     let mut replicates = noise.simulate(experiment, &response, &stream.named("noise"));
     for (condition, replicates) in experiment.conditions.iter().zip(&mut replicates) {
@@ -116,6 +123,21 @@ pub fn run(ground: &Ground<'_>, case: usize, wanted: &Plant, stream: &Stream) ->
         planted,
         word: verdict.word,
         effects: effects.map(|e| Said { kind: e.kind, on: e.on, class: e.class }).collect(),
+        absorbed,
         overlap,
     })
+}
+
+/// The share of a change of the calibrated response, squared and whitened, that a shift of the parameters makes too; none
+/// where nothing changes.
+fn absorbed(ground: &Ground<'_>, response: &[f64]) -> f64 {
+    let Ground { experiment, fit, noise, .. } = *ground;
+    let whitener = Whitener::new(experiment, noise, &fit.at.response);
+    let change = response.iter().zip(&fit.at.response).map(|(a, b)| a - b);
+    let white =
+        whitener.whiten_rows(&Matrix::from_rows(response.len(), [change.collect::<Vec<_>>()]));
+    let length = dot(white.row(0), white.row(0));
+    let system = System::new(experiment, Vec::new());
+    let (_, left) = Projection::of(&system, fit).rest_of_rows(white);
+    if length > 0.0 { (1.0 - left[0] / length).clamp(0.0, 1.0) } else { 0.0 }
 }

@@ -48,6 +48,8 @@ pub struct Planted {
     pub what: String,
     /// The effects: type, place and values of the unknowns.
     pub effects: Vec<(String, On, Vec<f64>)>,
+    /// How far the first unknown of each is from the value at which the effect is absent.
+    pub sizes: Vec<f64>,
     /// The size of each, as a ratio to the noise.
     pub ratio: f64,
     /// Where the bump is.
@@ -137,6 +139,9 @@ fn effects(
         let stream = stream.at(i as u64);
         let (on, values, next) =
             (0..TRIES).find_map(|i| with_effect(ground, &truth, kind, ratio, &stream.at(i)))?;
+        let (layout, known) =
+            (&ground.experiment.layouts.blocks[0], &next.system.effects[i].effect);
+        planted.sizes.push((values[0] - known.absent(layout)[0]).abs());
         planted.effects.push(((*kind).clone(), on, values));
         truth = next;
     }

@@ -11,6 +11,9 @@ use crate::gap::name::Word;
 /// The share of cases that makes a size *found*.
 const FOUND: f64 = 0.8;
 
+/// Of what the calibrated parameters absorb by more than this nothing is left to be found.
+const ABSORBED: f64 = 0.99;
+
 /// What the workflow finds in a study.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Rates {
@@ -48,7 +51,8 @@ pub struct KindRates {
     pub kind: String,
     /// By size, the smallest first.
     pub sizes: Vec<SizeRates>,
-    /// The smallest size that was found in 80 % of cases, as a ratio to the noise; `None`: none of those tried.
+    /// The smallest size from which on effects were found in 80 % of the cases that the parameters do not absorb, as a ratio
+    /// to the noise; `None`: none of those tried.
     pub smallest: Option<f64>,
 }
 
@@ -59,13 +63,15 @@ pub struct SizeRates {
     pub ratio: f64,
     /// The cases.
     pub cases: usize,
+    /// Those that the calibrated parameters absorb.
+    pub absorbed: usize,
     /// With any alarm.
     pub detected: usize,
     /// With the type in the class.
     pub in_class: usize,
     /// With the type named alone.
     pub named: usize,
-    /// The median of the sizes in the effect's own unit, without their signs.
+    /// The median of the sizes in the effect's own unit: how far it is from being absent, without its sign.
     pub size: f64,
 }
 
@@ -113,21 +119,44 @@ fn kinds(single: &[&Outcome]) -> Vec<KindRates> {
         sizes.entry(outcome.planted.ratio.to_bits()).or_default().push(outcome);
     }
     let of_kind = |(kind, sizes): (&str, BTreeMap<u64, Vec<&Outcome>>)| {
-        let sizes: Vec<SizeRates> = sizes.into_values().map(|own| of_size(kind, &own)).collect();
-        let found = |s: &&SizeRates| s.in_class as f64 >= FOUND * s.cases as f64;
-        let smallest = sizes.iter().find(found).map(|s| s.ratio);
+        let sizes: Vec<(SizeRates, Vec<&Outcome>)> =
+            sizes.into_values().map(|own| (of_size(kind, &own), own)).collect();
+        let smallest = smallest(kind, &sizes);
+        let sizes = sizes.into_iter().map(|(rates, _)| rates).collect();
         KindRates { kind: kind.to_owned(), sizes, smallest }
     };
     by_kind.into_iter().map(of_kind).collect()
 }
 
+fn is_absorbed(outcome: &Outcome) -> bool {
+    outcome.absorbed > ABSORBED
+}
+
+/// The smallest size from which on all are found that are not absorbed.
+fn smallest(kind: &str, sizes: &[(SizeRates, Vec<&Outcome>)]) -> Option<f64> {
+    let mut smallest = None;
+    for (rates, own) in sizes.iter().rev() {
+        let seen: Vec<&&Outcome> = own.iter().filter(|o| !is_absorbed(o)).collect();
+        let found = seen.iter().filter(|o| in_class(o, kind)).count();
+        if seen.is_empty() {
+            continue;
+        }
+        if (found as f64) < FOUND * seen.len() as f64 {
+            break;
+        }
+        smallest = Some(rates.ratio);
+    }
+    smallest
+}
+
 fn of_size(kind: &str, own: &[&Outcome]) -> SizeRates {
     let count = |test: &dyn Fn(&Outcome) -> bool| own.iter().filter(|o| test(o)).count();
-    let mut sizes: Vec<f64> = own.iter().map(|o| o.planted.effects[0].2[0].abs()).collect();
+    let mut sizes: Vec<f64> = own.iter().map(|o| o.planted.sizes[0]).collect();
     sizes.sort_by(f64::total_cmp);
     SizeRates {
         ratio: own[0].planted.ratio,
         cases: own.len(),
+        absorbed: count(&is_absorbed),
         detected: count(&|o| !matches!(o.word, Word::None | Word::NotVisible)),
         in_class: count(&|o| in_class(o, kind)),
         named: count(&|o| o.word == Word::Named && o.effects.iter().all(|said| said.kind == kind)),
@@ -170,12 +199,43 @@ fn interval(k: usize, n: usize) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Planted, Said};
     use super::*;
+    use crate::plugin::effect::On;
 
     /// 9 of 200: 2.1 to 8.4 % (as an exact binomial test gives in R's `binom.test(9, 200)`: 0.02078, 0.08370).
     #[test]
     fn the_interval_is_that_of_clopper_and_pearson() {
         let [low, high] = interval(9, 200);
         assert!((low - 0.020_78).abs() < 5e-5 && (high - 0.083_70).abs() < 5e-5, "{low} {high}");
+    }
+
+    /// Effects of one type: absorbed ones count for no size, and a size counts only when no larger one is missed.
+    #[test]
+    fn what_is_absorbed_says_nothing_of_the_smallest_size() {
+        let outcome = |ratio: f64, absorbed: f64, found: bool| Outcome {
+            case: 0,
+            planted: Planted {
+                what: "gain".into(),
+                effects: vec![("gain".into(), On::new(), vec![1.05])],
+                sizes: vec![0.05],
+                ratio,
+                bump: None,
+            },
+            word: if found { Word::Named } else { Word::None },
+            effects: found
+                .then(|| Said { kind: "gain".into(), on: On::new(), class: vec!["gain".into()] })
+                .into_iter()
+                .collect(),
+            absorbed,
+            overlap: None,
+        };
+        let smallest = |outcomes: &[Outcome]| rates(outcomes).kinds[0].smallest;
+        let seen = [outcome(0.5, 0.2, true), outcome(1.0, 0.2, true), outcome(1.0, 1.0, false)];
+        assert_eq!(smallest(&seen), Some(0.5));
+        assert_eq!(rates(&seen).kinds[0].sizes[1].absorbed, 1);
+        assert_eq!(smallest(&[outcome(0.5, 0.2, true), outcome(1.0, 0.2, false)]), None);
+        assert_eq!(smallest(&[outcome(1.0, 1.0, false)]), None);
+        assert!((rates(&seen).kinds[0].sizes[0].size - 0.05).abs() < 1e-12);
     }
 }

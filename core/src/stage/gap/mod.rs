@@ -114,7 +114,17 @@ fn summary(account: &Account) -> String {
                 account.additions.iter().flat_map(|a| a.class.iter().map(String::as_str)).collect();
             format!("missing: one of {}", class.join(", "))
         }
-        Word::Unlisted => "something is missing that no candidate explains".to_owned(),
+        Word::Unlisted => match (account.explained(), &names[..]) {
+            (_, []) => "something is missing that no candidate explains".to_owned(),
+            (None, _) => {
+                format!("something is missing without a sure name; nearest: {}", names.join(", "))
+            }
+            (Some(share), _) => format!(
+                "something is missing without a sure name; {:.0} % of it explained by: {}",
+                100.0 * share,
+                names.join(", ")
+            ),
+        },
         Word::NotVisible => "whatever may be missing, the parameters absorb it".to_owned(),
     }
 }

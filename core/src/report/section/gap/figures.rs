@@ -72,53 +72,45 @@ pub fn maps(findings: &Findings, account: &Account, numbers: &mut Numbers) -> Ma
     numbers.figure(&drawings, &[], &caption)
 }
 
+/// A line of a figure of curves: its class, what it is called there and in the key, and its value at an output.
+struct Line<'a> {
+    class: &'static str,
+    name: &'static str,
+    key: &'static str,
+    value: &'a dyn Fn(usize) -> f64,
+}
+
+/// A band of a figure of curves: what it is called in the key, and its edges at an output, where there are any.
+struct Edges<'a> {
+    key: &'static str,
+    at: &'a dyn Fn(usize) -> Option<(f64, f64)>,
+}
+
 /// What was measured against the calibrated responses without and with what was found.
 pub fn curves(findings: &Findings, account: &Account, numbers: &mut Numbers) -> Markup {
-    let outlines = Curves::of(findings);
     let unit = response_unit(findings);
-    let both = !account.additions.is_empty();
-    let measured =
-        |i: usize| if account.counts[i] > 0.0 { unit.show(account.means[i]) } else { f64::NAN };
-    let panels: Vec<Panel> = outlines
-        .panels
-        .iter()
-        .map(|outline| {
-            let edges = |i: usize| {
-                let half = 1.96 * unit.show(account.sd[i]);
-                (account.counts[i] > 0.0).then(|| (measured(i) - half, measured(i) + half))
-            };
-            let curve = |class, name: &str, value: &dyn Fn(usize) -> f64| Curve {
-                class,
-                name: name.to_owned(),
-                points: outline.curve(value),
-            };
-            let mut curves = vec![
-                curve("s-mean", "measured", &measured),
-                curve("s-reference", "without", &|i| unit.show(account.response[0][i])),
-            ];
-            if both {
-                curves.push(curve("s-map", "with", &|i| unit.show(account.response[1][i])));
-            }
-            Panel {
-                title: outline.title.clone(),
-                remark: String::new(),
-                bands: vec![Band { class: "s-band", edges: outline.band(edges) }],
-                curves,
-            }
-        })
-        .collect();
-    let lines = panels.iter().flat_map(|p| p.curves.iter().flat_map(|c| c.points.iter()));
-    let range = padded(extent(lines.map(|p| p.1)).unwrap_or((0.0, 1.0)), 0.06);
-    let x = Axis::new(outlines.label.as_str(), outlines.domain).ticks(6);
-    let y = Axis::new(response_label(findings), range).ticks(4);
-    let mut keys = vec![
-        Key::line("s-mean", "mean of the replicates"),
-        Key::area("s-band", "a replicate's 95 % interval"),
-        Key::line("s-reference", "calibrated without the effects"),
+    let is_known = |i: usize| account.counts[i] > 0.0;
+    let measured = |i: usize| if is_known(i) { unit.show(account.means[i]) } else { f64::NAN };
+    let response = |k: usize, i: usize| unit.show(account.response[k][i]);
+    let edges = |i: usize| {
+        let half = 1.96 * unit.show(account.sd[i]);
+        is_known(i).then(|| (measured(i) - half, measured(i) + half))
+    };
+    let (without, with) = (|i: usize| response(0, i), |i: usize| response(1, i));
+    let mut lines = vec![
+        Line { class: "s-mean", name: "measured", key: "mean of the replicates", value: &measured },
+        Line {
+            class: "s-reference",
+            name: "without",
+            key: "calibrated without the effects",
+            value: &without,
+        },
     ];
-    if both {
-        keys.push(Key::line("s-map", "calibrated with them"));
+    if !account.additions.is_empty() {
+        let key = "calibrated with them";
+        lines.push(Line { class: "s-map", name: "with", key, value: &with });
     }
+    let outlines = Curves::of(findings);
     let caption = Caption::new(
         format!(
             "Measured against simulated, both calibrated to the replicates that were not set aside.{}",
@@ -127,62 +119,79 @@ pub fn curves(findings: &Findings, account: &Account, numbers: &mut Numbers) -> 
         "the grey band is of the replicates, by the noise that was found in them.",
         "where the orange line leaves the blue one for the black one.",
     );
-    let drawings = small_multiples(&panels, &x, &y, "measured and simulated curves");
-    numbers.figure(&drawings, &keys, &caption)
+    let band = Edges { key: "a replicate's 95 % interval", at: &edges };
+    let title = "measured and simulated curves";
+    figure(&outlines, &response_label(findings), &lines, &band, title, &caption, numbers)
 }
 
 /// What was measured less the calibrated responses without and with what was found.
 pub fn differences(findings: &Findings, account: &Account, numbers: &mut Numbers) -> Markup {
-    let outlines = Curves::of(findings);
     let unit = response_unit(findings);
-    let both = !account.additions.is_empty();
+    let is_known = |i: usize| account.counts[i] > 0.0;
     let difference = |k: usize, i: usize| {
-        let known = account.counts[i] > 0.0;
-        if known { unit.show(account.means[i] - account.response[k][i]) } else { f64::NAN }
+        if is_known(i) { unit.show(account.means[i] - account.response[k][i]) } else { f64::NAN }
     };
-    let panels: Vec<Panel> = outlines
-        .panels
-        .iter()
-        .map(|outline| {
-            let edges = |i: usize| {
-                let half = 1.96 * unit.show(account.sd[i]) / account.counts[i].sqrt();
-                (account.counts[i] > 0.0).then_some((-half, half))
-            };
-            let curve = |class, name: &str, k: usize| Curve {
-                class,
-                name: name.to_owned(),
-                points: outline.curve(|i| difference(k, i)),
-            };
-            let mut curves = vec![curve("s-reference", "measured less model without", 0)];
-            if both {
-                curves.push(curve("s-map", "measured less model with", 1));
-            }
-            Panel {
-                title: outline.title.clone(),
-                remark: String::new(),
-                bands: vec![Band { class: "s-band", edges: outline.band(edges) }],
-                curves,
-            }
-        })
-        .collect();
-    let lines = panels.iter().flat_map(|p| p.curves.iter().flat_map(|c| c.points.iter()));
-    let range = padded(extent(lines.map(|p| p.1)).unwrap_or((-1.0, 1.0)), 0.06);
-    let x = Axis::new(outlines.label.as_str(), outlines.domain).ticks(6);
-    let y = Axis::new(response_label(findings), range).ticks(4);
-    let mut keys = vec![
-        Key::line("s-reference", "measured less model without the effects"),
-        Key::area("s-band", "95 % interval of the replicates' mean, without emulator's error"),
-    ];
-    if both {
-        keys.insert(1, Key::line("s-map", "measured less model with them"));
+    let edges = |i: usize| {
+        let half = 1.96 * unit.show(account.sd[i]) / account.counts[i].sqrt();
+        is_known(i).then_some((-half, half))
+    };
+    let (without, with) = (|i: usize| difference(0, i), |i: usize| difference(1, i));
+    let mut lines = vec![Line {
+        class: "s-reference",
+        name: "measured less model without",
+        key: "measured less model without the effects",
+        value: &without,
+    }];
+    if !account.additions.is_empty() {
+        let (name, key) = ("measured less model with", "measured less model with them");
+        lines.push(Line { class: "s-map", name, key, value: &with });
     }
     let caption = Caption::new(
         "The same as differences: the mean of the replicates less the calibrated response.",
         "the grey band is of the mean of the replicates, point by point; neighbouring points are not independent.",
         "differences with a shape, and whether they lose it.",
     );
-    let drawings = small_multiples(&panels, &x, &y, "measured less simulated curves");
-    numbers.figure(&drawings, &keys, &caption)
+    let key = "95 % interval of the replicates' mean, without emulator's error";
+    let (band, outlines) = (Edges { key, at: &edges }, Curves::of(findings));
+    let title = "measured less simulated curves";
+    figure(&outlines, &response_label(findings), &lines, &band, title, &caption, numbers)
+}
+
+/// Lines over a band, curve by curve.
+fn figure(
+    outlines: &Curves,
+    label: &str,
+    lines: &[Line<'_>],
+    band: &Edges<'_>,
+    title: &str,
+    caption: &Caption,
+    numbers: &mut Numbers,
+) -> Markup {
+    let panels: Vec<Panel> = outlines
+        .panels
+        .iter()
+        .map(|outline| {
+            let curve = |line: &Line<'_>| Curve {
+                class: line.class,
+                name: line.name.to_owned(),
+                points: outline.curve(line.value),
+            };
+            Panel {
+                title: outline.title.clone(),
+                remark: String::new(),
+                bands: vec![Band { class: "s-band", edges: outline.band(band.at) }],
+                curves: lines.iter().map(curve).collect(),
+            }
+        })
+        .collect();
+    let points = panels.iter().flat_map(|p| p.curves.iter().flat_map(|c| c.points.iter()));
+    let range = padded(extent(points.map(|p| p.1)).unwrap_or((-1.0, 1.0)), 0.06);
+    let x = Axis::new(outlines.label.as_str(), outlines.domain).ticks(6);
+    let y = Axis::new(label, range).ticks(4);
+    let mut keys: Vec<Key> = lines.iter().map(|line| Key::line(line.class, line.key)).collect();
+    keys.insert(1, Key::area("s-band", band.key));
+    let drawings = small_multiples(&panels, &x, &y, title);
+    numbers.figure(&drawings, &keys, caption)
 }
 
 /// The best of each type by evidence.
