@@ -22,6 +22,8 @@ mod chain;
 mod falling_balls;
 #[path = "gap/inside.rs"]
 mod inside;
+#[path = "gap/models.rs"]
+mod models;
 #[path = "gap/names.rs"]
 mod names;
 #[path = "gap/places.rs"]
@@ -30,5 +32,9 @@ mod places;
 mod proofs;
 #[path = "gap/tally.rs"]
 mod tally;
+#[path = "gap/term_forms.rs"]
+mod term_forms;
+#[path = "gap/terms.rs"]
+mod terms;
 #[path = "gap/workflow.rs"]
 mod workflow;

@@ -22,7 +22,7 @@ const SIMULATIONS: usize = 99;
 const AGAINST: f64 = 2.0;
 
 /// What an explanation without a rival is compared with.
-const NOTHING: &str = "nothing";
+pub const NOTHING: &str = "nothing";
 
 /// What a search can tell besides its verdict; all empty where nothing is missing.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
