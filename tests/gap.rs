@@ -22,6 +22,8 @@ mod chain;
 mod falling_balls;
 #[path = "gap/inside.rs"]
 mod inside;
+#[path = "gap/models.rs"]
+mod models;
 #[path = "gap/names.rs"]
 mod names;
 #[path = "gap/places.rs"]
@@ -32,5 +34,9 @@ mod proofs;
 mod tally;
 #[path = "gap/target/mod.rs"]
 mod target;
+#[path = "gap/term_forms.rs"]
+mod term_forms;
+#[path = "gap/terms.rs"]
+mod terms;
 #[path = "gap/workflow.rs"]
 mod workflow;

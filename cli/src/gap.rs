@@ -105,6 +105,9 @@ fn wanted(account: &Account, manner: &Manner) -> Result<Account, Failure> {
         for addition in wanted.additions {
             if is_wanted(&addition)? {
                 kept.push(addition);
+            } else if addition.model {
+                // What was found with it was found with no other.
+                break;
             }
         }
         wanted.additions = kept;
@@ -116,7 +119,11 @@ fn is_wanted(addition: &Addition) -> Result<bool, Failure> {
     let places: Vec<String> = addition.on.values().map(|labels| labels.join(", ")).collect();
     let on = if places.is_empty() { String::new() } else { format!(" on {}", places.join("; ")) };
     let mut out = std::io::stderr();
-    let _ = write!(out, "add `{}`{on} ({})? [y/N] ", addition.name, addition.title);
+    let _ = if addition.model {
+        write!(out, "put {}? [y/N] ", addition.title)
+    } else {
+        write!(out, "add `{}`{on} ({})? [y/N] ", addition.name, addition.title)
+    };
     let _ = out.flush();
     let mut answer = String::new();
     std::io::stdin()

@@ -1,10 +1,11 @@
 //! `coulomb_friction`: dry friction, which does not grow with the speed.
 
 use lacuna::plugin::effect::Description;
-use lacuna::plugin::term::{Place, Sign, Summand};
+use lacuna::plugin::term::{Place, Sign, Site, Summand};
 use lacuna::plugin::{Component, Term};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use toml::Table;
 
 use super::common::{of, quantity};
 
@@ -38,6 +39,10 @@ impl Term for CoulombFriction {
             formula: "- coefficient * tanh(u / width)".into(),
             source: "Coulomb, Théorie des machines simples (1785)".into(),
         }
+    }
+
+    fn proposals(&self, _: &Site<'_>) -> Vec<Table> {
+        vec![Table::new()]
     }
 
     fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {

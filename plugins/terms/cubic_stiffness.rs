@@ -1,12 +1,13 @@
 //! `cubic_stiffness`: a spring that hardens or softens.
 
 use lacuna::plugin::effect::Description;
-use lacuna::plugin::term::{Place, Sign, Summand};
+use lacuna::plugin::term::{Place, Sign, Site, Summand};
 use lacuna::plugin::{Component, Term};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use toml::Table;
 
-use super::common::of;
+use super::common::{of, of_each};
 
 /// Cubic stiffness: a spring that hardens, or softens where the coefficient is below zero.
 ///
@@ -34,6 +35,13 @@ impl Term for CubicStiffness {
             source: "Duffing, Erzwungene Schwingungen bei veränderlicher Eigenfrequenz (1918)"
                 .into(),
         }
+    }
+
+    fn proposals(&self, site: &Site<'_>) -> Vec<Table> {
+        if site.positions.is_empty() {
+            return std::iter::once(Table::new()).chain(of_each(site.others)).collect();
+        }
+        of_each(site.positions).collect()
     }
 
     fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {

@@ -3,11 +3,12 @@
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::amend::State;
 use lacuna::plugin::effect::Description;
-use lacuna::plugin::term::{Index, Place, Summand};
+use lacuna::plugin::term::{Index, Place, Site, Summand};
 use lacuna::plugin::{Component, Term};
 use lacuna::study::values::Count;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use toml::Table;
 
 use super::common::of;
 
@@ -52,6 +53,10 @@ impl Term for Delayed {
         }
     }
 
+    fn proposals(&self, _: &Site<'_>) -> Vec<Table> {
+        vec![Table::new()]
+    }
+
     fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {
         let u = of(self.of.as_deref(), place);
         let time = place.time.ok_or("the model has no time")?;
@@ -68,6 +73,7 @@ impl Term for Delayed {
                 unit: place.state.unit.clone(),
                 rate_unit: None,
                 rate: format!("{count} * ({before} - {}) / {delay}", name(i)),
+                uses: Vec::new(),
                 start: start.clone(),
             }
         };

@@ -5,10 +5,11 @@ use std::f64::consts::PI;
 use lacuna::data::Unit;
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::effect::Description;
-use lacuna::plugin::term::{Index, Place, Sign, Summand};
+use lacuna::plugin::term::{Index, Place, Sign, Site, Summand};
 use lacuna::plugin::{Component, Term};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use toml::Table;
 
 /// The most frequencies from which a search starts.
 const MOST: usize = 48;
@@ -38,6 +39,10 @@ impl Term for Forcing {
             formula: "coefficient * cos(2 * pi * frequency * t + phase)".into(),
             source: "standard: linear response".into(),
         }
+    }
+
+    fn proposals(&self, _: &Site<'_>) -> Vec<Table> {
+        vec![Table::new()]
     }
 
     fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {

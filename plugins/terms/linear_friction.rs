@@ -1,12 +1,13 @@
 //! `linear_friction`: a drag that grows with the speed.
 
 use lacuna::plugin::effect::Description;
-use lacuna::plugin::term::{Place, Sign, Summand};
+use lacuna::plugin::term::{Place, Sign, Site, Summand};
 use lacuna::plugin::{Component, Term};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use toml::Table;
 
-use super::common::of;
+use super::common::{of, of_each};
 
 /// Linear friction: a drag in proportion to the speed.
 ///
@@ -33,6 +34,10 @@ impl Term for LinearFriction {
             formula: "- coefficient * u".into(),
             source: "Stokes, Trans. Camb. Phil. Soc. 9 (1851) 8".into(),
         }
+    }
+
+    fn proposals(&self, site: &Site<'_>) -> Vec<Table> {
+        std::iter::once(Table::new()).chain(of_each(site.others)).collect()
     }
 
     fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {

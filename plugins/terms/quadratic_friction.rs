@@ -1,12 +1,13 @@
 //! `quadratic_friction`: a drag that grows with the square of the speed.
 
 use lacuna::plugin::effect::Description;
-use lacuna::plugin::term::{Place, Sign, Summand};
+use lacuna::plugin::term::{Place, Sign, Site, Summand};
 use lacuna::plugin::{Component, Term};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use toml::Table;
 
-use super::common::of;
+use super::common::{of, of_each};
 
 /// Quadratic friction: a drag in proportion to the square of the speed, against it.
 ///
@@ -33,6 +34,10 @@ impl Term for QuadraticFriction {
             formula: "- coefficient * u * abs(u)".into(),
             source: "Newton, Principia (1687), book II, section VII".into(),
         }
+    }
+
+    fn proposals(&self, site: &Site<'_>) -> Vec<Table> {
+        std::iter::once(Table::new()).chain(of_each(site.others)).collect()
     }
 
     fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {

@@ -1,12 +1,13 @@
 //! `quadratic_stiffness`: a restoring force with the square of the deflection.
 
 use lacuna::plugin::effect::Description;
-use lacuna::plugin::term::{Place, Sign, Summand};
+use lacuna::plugin::term::{Place, Sign, Site, Summand};
 use lacuna::plugin::{Component, Term};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use toml::Table;
 
-use super::common::of;
+use super::common::{of, of_each};
 
 /// Quadratic stiffness: a restoring force that differs between the two directions.
 ///
@@ -34,6 +35,10 @@ impl Term for QuadraticStiffness {
             formula: "- coefficient * u^2".into(),
             source: "Nayfeh and Mook, Nonlinear Oscillations (1979), section 2.2".into(),
         }
+    }
+
+    fn proposals(&self, site: &Site<'_>) -> Vec<Table> {
+        of_each(site.positions).collect()
     }
 
     fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {

@@ -24,7 +24,12 @@ use tempfile::TempDir;
 const REPLICATES: usize = 8;
 
 /// A study in a folder of its own, with replicates of a curve plus white noise.
-fn study(text: &str, curve: impl Fn(f64) -> f64, times: &[f64], noise: f64) -> (TempDir, Study) {
+pub fn study(
+    text: &str,
+    curve: impl Fn(f64) -> f64,
+    times: &[f64],
+    noise: f64,
+) -> (TempDir, Study) {
     let folder = tempfile::tempdir().unwrap();
     let mut csv = "replicate,t [s],x [m]\n".to_owned();
     for r in 0..REPLICATES {
@@ -38,7 +43,7 @@ fn study(text: &str, curve: impl Fn(f64) -> f64, times: &[f64], noise: f64) -> (
     (folder, study)
 }
 
-fn loaded(folder: &TempDir, text: &str) -> Study {
+pub fn loaded(folder: &TempDir, text: &str) -> Study {
     let checked = load_text(&folder.path().join("study.toml"), text, &[]);
     let complaints = checked.complaints();
     checked.study.unwrap_or_else(|| panic!("{complaints}\n{text}"))
@@ -80,6 +85,9 @@ fixed = { drag = { value = 0.0, unit = "kg/s" }, mass = { value = 2.0, unit = "k
 "#;
 
 const PIECES: &str = r#"
+[gap]
+candidates = []
+
 [[gap.switch]]
 input = "drag"
 prior = { half_normal = 1.0 }
@@ -195,6 +203,8 @@ x = "v"
 v = "gravity" # and nothing else
 "#;
 
+const NONE: &str = "\n[gap]\ncandidates = []\n";
+
 const DRAGS: &str = r#"
 [[gap.term]]
 use = "linear_friction"
@@ -218,7 +228,7 @@ fn the_drag_of_a_falling_body_is_named() {
     let (g, terminal) = (9.81, 20.0);
     let fall = |t: f64| terminal * terminal / g * (g * t / terminal).cosh().ln();
     let times: Vec<f64> = (1..=50).map(|i| 0.03 * f64::from(i)).collect();
-    let (folder, study) = study(&[FALL, REST, DRAGS].concat(), fall, &times, 0.02);
+    let (folder, study) = study(&[FALL, REST, NONE, DRAGS].concat(), fall, &times, 0.02);
     let (verdict, _, edit) = ask(&folder, &study, &[9.81]);
     assert_eq!(kinds(&verdict), ["quadratic_friction"], "{verdict:?}");
     assert_eq!(verdict.word, Word::Named, "{verdict:?}");

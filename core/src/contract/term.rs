@@ -32,6 +32,7 @@ fn summand(term: &dyn Term) -> Result<Summand, String> {
         unit: unit("m/s")?,
         rate_unit: Some(unit("m/s2")?),
         rate: "-v".into(),
+        uses: vec!["v".into()],
         start: "1".into(),
     };
     let seconds = unit("s")?;

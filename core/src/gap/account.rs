@@ -12,7 +12,9 @@ use super::hold_out::Kind;
 use super::insight::{Insight, insight, withhold};
 use super::locate::Region;
 use super::name::{Found, Look, Options, Step, Verdict, Visible, verdict};
+use super::needless::Needless;
 use super::prove::Proof;
+use super::replaced::OtherModel;
 use crate::data::Unit;
 use crate::math::random::Stream;
 use crate::plugin::effect::On;
@@ -61,19 +63,9 @@ pub struct Account {
     /// Other models in place of the study's, each after its own calibration.
     #[serde(default)]
     pub models: Vec<OtherModel>,
-}
-
-/// Another model against the study's, neither with effects that were found.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct OtherModel {
-    /// What the study calls it.
-    pub name: String,
-    /// The log of the probability of the data with it over that with the study's model.
-    pub log_odds: f64,
-    /// The standard error of that.
-    pub error: f64,
-    /// Its calibrated parameters: name, unit, value and standard deviation by the normal approximation.
-    pub parameters: Vec<Estimate>,
+    /// What of the study's own is not needed beside the effects.
+    #[serde(default)]
+    pub needless: Vec<Needless>,
 }
 
 /// An excess of the whole misfit that is more probable than this without a gap has no share that effects could explain.
@@ -99,12 +91,22 @@ pub struct Addition {
     /// The inputs of the wide forward map that it sets free, where it acts inside the model.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub switches: Vec<usize>,
-    /// Its unknowns.
+    /// Whether it is another model in place of the study's; its options are then those of `[model]`.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub model: bool,
+    /// Its unknowns; of another model the parameters that it shares with the study's.
     pub unknowns: Vec<Estimate>,
     /// The types that these data cannot tell from it, itself first.
     pub class: Vec<String>,
     /// The probability of its type among the candidates.
     pub probability: f64,
+}
+
+impl Addition {
+    /// What it is told by: its type, or what the study calls the model that it is.
+    pub fn label(&self) -> &str {
+        if self.model { &self.name } else { &self.kind }
+    }
 }
 
 /// An unknown with its value.
@@ -246,7 +248,7 @@ impl Account {
         options: Options,
         stream: &Stream,
     ) -> Self {
-        let first = found.path.first().map_or(&found.last, |step| &step.before);
+        let first = found.first();
         let looks = [first, &found.last];
         let experiment = found.system.experiment;
         let mut verdict = verdict(found, candidates, options);
@@ -272,6 +274,7 @@ impl Account {
             insight,
             held_out: Vec::new(),
             models: Vec::new(),
+            needless: Vec::new(),
             verdict,
         }
     }
@@ -293,6 +296,7 @@ fn additions(found: &Found<'_>, candidates: &[Candidate], verdict: &Verdict) -> 
                 on: named.on.clone(),
                 options: candidate.options.clone(),
                 switches: candidate.effect.switches().to_vec(),
+                model: false,
                 unknowns: unknowns
                     .map(|(k, unknown)| Estimate {
                         name: unknown.name,

@@ -25,7 +25,7 @@ const AGAINST: f64 = 2.0;
 const SEVERAL: usize = 4;
 
 /// What an explanation without a rival is compared with.
-const NOTHING: &str = "nothing";
+pub const NOTHING: &str = "nothing";
 
 /// What a search can tell besides its verdict; all empty where nothing is missing.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]

@@ -96,7 +96,6 @@ impl<'a> System<'a> {
 
     /// The response with its derivatives.
     pub fn linearised(&self, point: &[f64]) -> Linearised {
-        let (mean, jacobian) = self.forward().mean_and_jacobian(&self.input(point));
         let d = self.experiment.parameters.len();
         // The unknowns whose derivatives are known, each with the column of the forward map that it moves.
         let mut moved: Vec<(usize, usize)> = (0..d).map(|j| (j, j)).collect();
@@ -104,8 +103,9 @@ impl<'a> System<'a> {
             moved.extend(own.zip(effect.effect.switches()).map(|(unknown, i)| (unknown, d + i)));
         }
         let columns: Vec<usize> = moved.iter().map(|(_, column)| *column).collect();
+        let (mean, jacobian) = self.forward().mean_and_jacobian_by(&self.input(point), &columns);
         let on_top = self.on_the_response().map(|(effect, own)| (effect, &point[own]));
-        let (response, rows) = with_tangents(on_top, mean, &jacobian.select_columns(&columns));
+        let (response, rows) = with_tangents(on_top, mean, &jacobian);
         let mut unknowns: Vec<usize> = moved.iter().map(|(unknown, _)| *unknown).collect();
         unknowns.extend(self.on_the_response().flat_map(|(_, own)| own));
         let mut tangents = Matrix::zeros(unknowns.len(), response.len());

@@ -73,12 +73,17 @@ impl Forward for Reordered<'_> {
     }
 
     fn mean_and_jacobian(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
+        let all: Vec<usize> = (0..point.len()).collect();
+        self.mean_and_jacobian_by(point, &all)
+    }
+
+    fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
         let order = self.order();
         let moved: Vec<f64> = order.iter().map(|&i| point[i]).collect();
-        let (mean, jacobian) = self.forward.mean_and_jacobian(&moved);
         let mut back = vec![0; order.len()];
         order.iter().enumerate().for_each(|(k, &i)| back[i] = k);
-        (mean, jacobian.select_columns(&back))
+        let inner: Vec<usize> = parameters.iter().map(|&i| back[i]).collect();
+        self.forward.mean_and_jacobian_by(&moved, &inner)
     }
 
     fn failure(&self) -> Option<String> {
@@ -192,8 +197,11 @@ impl Effect for Switched {
     }
 }
 
+/// The most settings of indices at which the slope is taken.
+const SLOPES: usize = 8;
+
 /// What an effect on the model does per unit of its size, with a start: for each setting of its indices the slope at
-/// absence, and the change over each start. None where the system has the effect already.
+/// absence unless they are many, and the change over each start. None where the system has the effect already.
 pub(super) fn slopes(
     system: &System<'_>,
     fit: &Fit,
@@ -212,8 +220,10 @@ pub(super) fn slopes(
     let responses = with.responses(&starts.iter().map(|own| at(own)).collect::<Vec<_>>());
     let mut seen: Vec<&[f64]> = Vec::new();
     let mut slopes = Vec::new();
+    // A slope costs several responses: of many settings the changes alone tell as much.
+    let many = starts.len() > SLOPES && starts[0].len() > 1;
     for (start, response) in starts.iter().zip(&responses) {
-        if !seen.contains(&&start[1..]) {
+        if !many && !seen.contains(&&start[1..]) {
             seen.push(&start[1..]);
             let there = with.linearised(&at(&[&[absent], &start[1..]].concat()));
             slopes.push((start.clone(), there.tangents.row(fit.at.point.len()).to_vec()));

@@ -72,6 +72,21 @@ impl Forward for WithEffects<'_> {
         (response, tangents.transposed())
     }
 
+    fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
+        let d = self.forward.dimension();
+        let own: Vec<usize> = parameters.iter().copied().filter(|&i| i < d).collect();
+        let (mean, jacobian) = self.forward.mean_and_jacobian_by(&point[..d], &own);
+        let (response, tangents) = with_tangents(self.placed(point), mean, &jacobian);
+        // Behind the derivatives that were asked for stand those by all unknowns of the effects.
+        let mut seen = 0;
+        let column = |&i: &usize| {
+            seen += usize::from(i < d);
+            if i < d { seen - 1 } else { own.len() + i - d }
+        };
+        let columns: Vec<usize> = parameters.iter().map(column).collect();
+        (response, tangents.transposed().select_columns(&columns))
+    }
+
     fn failure(&self) -> Option<String> {
         self.forward.failure()
     }

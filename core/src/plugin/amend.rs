@@ -24,6 +24,9 @@ pub trait Amend: Send + Sync {
     /// The root mean squares of expressions along a run.
     fn sizes(&self, call: &Call<'_>, expressions: &[String]) -> Result<Vec<f64>, EvalError>;
 
+    /// The inputs that are coefficients of summands of rates and nothing else: at zero the summand is absent.
+    fn factors(&self, context: &Context<'_>) -> Vec<String>;
+
     /// The options that become others when these terms are added: paths of keys and their new values.
     fn amended(&self, additions: &[Addition]) -> Vec<Change>;
 }
@@ -39,6 +42,8 @@ pub struct State {
     pub rate_unit: Option<Unit>,
     /// Its rate, as an expression.
     pub rate: String,
+    /// The states on which its rate depends.
+    pub uses: Vec<String>,
     /// Its start, as an expression of the model's inputs.
     pub start: String,
 }

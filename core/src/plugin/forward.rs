@@ -28,6 +28,12 @@ pub trait Forward: Send + Sync {
         (mean.into_vec(), self.jacobian(point))
     }
 
+    /// The same with the derivatives by these parameters alone, in this order.
+    fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
+        let (mean, jacobian) = self.mean_and_jacobian(point);
+        (mean, jacobian.select_columns(parameters))
+    }
+
     /// The map as a linear combination of basis functions, where it is one.
     fn linear(&self) -> Option<&dyn Linear> {
         None

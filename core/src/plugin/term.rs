@@ -1,5 +1,7 @@
 //! Terms: named pieces of physics that the equations of a model may lack.
 
+use toml::Table;
+
 use super::Component;
 use super::amend::State;
 use super::effect::Description;
@@ -19,8 +21,24 @@ pub trait Term: Component {
         true
     }
 
+    /// Options with which it may be missing there when nobody names it; none where it needs what only a study knows.
+    fn proposals(&self, _site: &Site<'_>) -> Vec<Table> {
+        Vec::new()
+    }
+
     /// What is added to the rate of a state.
     fn summand(&self, place: &Place<'_>) -> Result<Summand, String>;
+}
+
+/// A state whose rate may lack a term.
+pub struct Site<'a> {
+    /// The state.
+    pub state: &'a State,
+    /// The states that only move with others (their rate is another state alone) and that its rate depends on, or whose
+    /// rate it is: the positions of a speed.
+    pub positions: &'a [String],
+    /// The other states, besides itself, on which its rate depends.
+    pub others: &'a [String],
 }
 
 /// Where a term is added.

@@ -2,8 +2,10 @@
 
 use super::findings::{Findings, GapFindings};
 use super::number::{fixed, percent, typeset};
-use crate::gap::account::{Account, Addition, HeldOut, OtherModel, Spot};
+use crate::gap::account::{Account, Addition, HeldOut, Spot};
 use crate::gap::name::Word;
+use crate::gap::needless::Needless;
+use crate::gap::replaced::OtherModel;
 use crate::plugin::effect::On;
 
 /// The verdict and what it rests on, one sentence a line, for a terminal.
@@ -31,6 +33,7 @@ pub fn sentences(findings: &Findings, gap: &GapFindings) -> Vec<String> {
     sentences.extend(account.additions.iter().map(|addition| addition_sentence(gap, addition)));
     sentences
         .extend(account.held_out.iter().map(|part| held_out(part, !account.additions.is_empty())));
+    sentences.extend(account.needless.iter().map(Needless::words));
     sentences.extend(account.models.iter().map(other_model));
     sentences
 }
@@ -41,11 +44,21 @@ const TOLD: usize = 4;
 /// What is missing, in a sentence.
 pub fn verdict(account: &Account) -> String {
     let listed = |additions: &[Addition]| {
-        let each = additions.iter().map(|a| format!("`{}`{}", a.kind, on(&a.on)));
+        let each = additions.iter().map(|a| format!("`{}`{}", a.label(), on(&a.on)));
         each.collect::<Vec<_>>().join(" and ")
     };
+    let is_swap = account.additions.first().is_some_and(|first| first.model);
     match account.verdict.word {
         Word::None => "Data and calibrated model agree within the noise: nothing is missing that these data can show.".into(),
+        Word::Named if is_swap => {
+            let (model, effects) = account.additions.split_at(1);
+            let besides = if effects.is_empty() {
+                String::new()
+            } else {
+                format!(", and with it {}", listed(effects))
+            };
+            format!("The data need the model {} in place of the study's{besides}.", listed(model))
+        }
         Word::Named => format!("The model misses {}.", listed(&account.additions)),
         Word::Class => {
             let each: Vec<String> = account
@@ -59,7 +72,8 @@ pub fn verdict(account: &Account) -> String {
                     }
                 })
                 .collect();
-            format!("The model misses {}; these data cannot tell which.", each.join(" and "))
+            let what = if is_swap { "The data need" } else { "The model misses" };
+            format!("{what} {}; these data cannot tell which.", each.join(" and "))
         }
         Word::Unlisted if account.additions.is_empty() => {
             "Data and calibrated model disagree, and no candidate explains it.".into()
@@ -136,7 +150,13 @@ fn addition_sentence(gap: &GapFindings, addition: &Addition) -> String {
                 .iter()
                 .flat_map(|added| &added.unknowns)
                 .find(|posterior| posterior.name == unknown.name);
-            let (value, sd) = posterior.map_or((unknown.value, unknown.sd), |p| (p.mean, p.sd));
+            let shared = gap.added.iter().flat_map(|added| &added.parameters);
+            let shared = shared.filter(|_| addition.model).find(|p| p.name == unknown.name);
+            let (value, sd) = match (posterior, shared) {
+                (Some(p), _) => (p.mean, p.sd),
+                (_, Some(p)) => (p.mean[1], p.sd[1]),
+                _ => (unknown.value, unknown.sd),
+            };
             let unit = super::scale::ShownUnit::for_values(&unknown.unit, [value, sd]);
             format!("`{}` {} ± {}", unknown.name, unit.text(value, 3), unit.text(sd, 2))
         })

@@ -13,7 +13,7 @@ use crate::gap::power::{Amount, Ground, Outcome, Rates, plan, rates, run};
 use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
 use crate::study::Study;
 
-use super::gap::search::{Inside, Prepared, prepared};
+use super::gap::search::{Beginning, Inside, Prepared, prepared};
 use super::gap_model::Pieces;
 use super::{Known, direct, gap, learn};
 
@@ -67,7 +67,8 @@ fn with(
     let pieces = Pieces::of(study)?;
     let inside = Inside::of(pieces.as_ref(), study, known, directory, observer)?;
     directory.keep("7-power", &inputs, observer, |folder| {
-        prepared(study, known, &inside, |prepared| {
+        let beginning = Beginning::own(study, known, &inside);
+        prepared(study, known, &beginning, &super::stream(study, "gap"), |prepared| {
             outcomes(prepared, amount, simulations, folder, observer)
         })
         .map(|outcomes| rates(&outcomes))

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use lacuna::data::{Axis, Coordinates, Layout, Unit};
-use lacuna::expression::Fault;
+use lacuna::expression::{Fault, Scope};
 use lacuna::plugin::amend::{Addition, Change, State as Given};
 use lacuna::plugin::model::{Call, EvalError};
 use lacuna::plugin::{Amend, Context};
@@ -11,7 +11,7 @@ use toml::{Table, Value};
 
 use super::Equations;
 use super::options::{Formula, Observe, State, StateTable};
-use super::system::{Names, key, scope};
+use super::system::{self, Names, System, key, scope};
 use super::units;
 
 /// The key under which an expression stands whose unit is asked for.
@@ -21,6 +21,16 @@ const ASKED: &str = "asked";
 const SIZES: &str = "size";
 
 impl Equations {
+    /// The states on which the rate of a state depends.
+    fn used(&self, scope: &Scope, names: &Names, state: &str) -> Vec<String> {
+        let Ok(rate) = system::program(scope, &[format!("rate.{state}")]) else {
+            return Vec::new();
+        };
+        let first = names.variables.len() + names.inputs.len();
+        let states = self.state.keys().enumerate();
+        states.filter(|(i, _)| rate.depends_on(first + i)).map(|(_, name)| name.clone()).collect()
+    }
+
     /// The same with further states.
     fn with(&self, further: &[Given]) -> Self {
         let mut wider = self.clone();
@@ -47,6 +57,7 @@ impl Amend for Equations {
                 rate_unit: time.and_then(|time| units::ratio(&unit, time)),
                 unit,
                 rate: self.rate.get(name).cloned().unwrap_or_default(),
+                uses: self.used(&scope, &names, name),
                 start: state.start().0.text(),
             }
         };
@@ -89,6 +100,13 @@ impl Amend for Equations {
         let length = (values.len() / expressions.len().max(1)).max(1);
         let square = |part: &[f64]| part.iter().map(|x| x * x).sum::<f64>() / part.len() as f64;
         Ok(values.chunks(length).map(|part| square(part).sqrt()).collect())
+    }
+
+    fn factors(&self, context: &Context<'_>) -> Vec<String> {
+        let names = Names::of(context);
+        let Ok(system) = System::compile(self, &names) else { return Vec::new() };
+        let inputs = names.inputs.iter().enumerate();
+        inputs.filter(|(i, _)| system.is_factor(*i)).map(|(_, name)| name.clone()).collect()
     }
 
     fn amended(&self, additions: &[Addition]) -> Vec<Change> {

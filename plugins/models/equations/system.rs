@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use lacuna::data::{Axis, Coordinates, Function, Layout};
-use lacuna::expression::{Break, Fault, Program, Scope, is_name};
+use lacuna::expression::{Break, Evaluator, Fault, Program, Scope, is_name};
 use lacuna::plugin::Context;
 
 use super::Equations;
@@ -21,6 +21,9 @@ pub struct Names {
 
 /// The option that says when the start is.
 pub const START_TIME: &str = "start_time";
+
+/// Points at which rates are tried for being linear.
+const POINTS: usize = 5;
 
 /// A fault and the option it is in.
 pub type Located = (String, Fault);
@@ -160,6 +163,37 @@ impl System {
         self.start.depends_on(coordinate) || self.rates.depends_on(coordinate)
     }
 
+    /// Whether the rates are linear in the input of this index, and nothing else depends on it.
+    pub fn is_factor(&self, input: usize) -> bool {
+        let coordinate = self.variables.len() + input;
+        let elsewhere = [&self.start, &self.observed].iter().any(|p| p.depends_on(coordinate));
+        !elsewhere && self.rates.depends_on(coordinate) && self.are_linear_in(coordinate)
+    }
+
+    /// Whether the rates at a few points with the coordinate at 0, 1 and 2 lie on lines.
+    fn are_linear_in(&self, coordinate: usize) -> bool {
+        let mut rates = Evaluator::new(&self.rates);
+        let mut at = |point: &[f64]| {
+            let mut row = vec![0.0; self.states.len()];
+            rates.at(point);
+            rates.values(&mut row);
+            row
+        };
+        (1..=POINTS).all(|k| {
+            // Any numbers of ordinary size do, as long as they have nothing to do with each other.
+            let number = |i: usize| 0.5 + (0.618_034 * (i + 1) as f64 * k as f64).fract();
+            let mut point: Vec<f64> = (0..self.coordinates()).map(number).collect();
+            let [none, one, two] = [0.0, 1.0, 2.0].map(|x| {
+                point[coordinate] = x;
+                at(&point)
+            });
+            none.iter().zip(&one).zip(&two).all(|((none, one), two)| {
+                let size = none.abs().max(one.abs()).max(two.abs());
+                (none - 2.0 * one + two).abs() <= 1e-9 * size
+            })
+        })
+    }
+
     /// The number of coordinates of a point.
     pub fn coordinates(&self) -> usize {
         self.variables.len() + self.inputs + self.states.len()
@@ -193,7 +227,7 @@ impl System {
 }
 
 /// The program of these results, one number each.
-fn program(scope: &Scope, results: &[String]) -> Result<Program, Vec<Located>> {
+pub fn program(scope: &Scope, results: &[String]) -> Result<Program, Vec<Located>> {
     let keys: Vec<String> = results.iter().map(|option| key(option)).collect();
     let keys: Vec<&str> = keys.iter().map(String::as_str).collect();
     let program = scope.compile(&keys).map_err(|faults| {

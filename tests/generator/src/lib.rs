@@ -7,6 +7,7 @@
 pub mod chain;
 pub mod hidden;
 pub mod noise;
+pub mod oscillator;
 
 pub use chain::{Chain, PARAMETERS, REFERENCE};
 pub use hidden::{Hidden, Kind};

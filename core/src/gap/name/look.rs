@@ -44,6 +44,13 @@ pub struct Look {
     pub visible: Vec<Visible>,
 }
 
+impl Look {
+    /// The energy of the residual beyond that of noise and common errors.
+    pub fn excess(&self) -> f64 {
+        self.statistics.energy - self.expected_energy
+    }
+}
+
 /// What an experiment can see of a suspect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Visible {
@@ -96,4 +103,17 @@ pub struct Found<'a> {
     pub whitener: Whitener,
     /// The replicates' means.
     pub means: Vec<f64>,
+}
+
+impl Found<'_> {
+    /// The calibrated system before the first step.
+    pub fn first(&self) -> &Look {
+        self.path.first().map_or(&self.last, |step| &step.before)
+    }
+
+    /// Whether some test rejected the system before the first step.
+    pub fn alarmed(&self, options: Options) -> bool {
+        let [score, scan, energy] = self.first().p;
+        score <= options.naming || scan.min(energy) <= 0.5 * options.unlisted
+    }
 }

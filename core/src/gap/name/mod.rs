@@ -26,4 +26,5 @@ pub use placement::log_prior;
 pub use search::search;
 pub use separate::{Separation, Separations, What, separate};
 pub use stability::stability;
-pub use verdict::{Named, Verdict, Word, verdict};
+pub use state::kinds;
+pub use verdict::{Named, SURE, Verdict, Word, class, explains, verdict};

@@ -95,7 +95,7 @@ impl<'a> State<'a> {
 }
 
 /// The number of types of effects.
-pub(super) fn kinds(candidates: &[Candidate]) -> usize {
+pub fn kinds(candidates: &[Candidate]) -> usize {
     let mut names: Vec<&str> = candidates.iter().map(|c| c.kind.as_str()).collect();
     names.sort_unstable();
     names.dedup();

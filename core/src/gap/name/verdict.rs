@@ -2,12 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::look::{Found, Options};
+use super::look::{Found, Look, Options};
 use crate::gap::candidates::Candidate;
 use crate::plugin::effect::On;
 
 /// A type is named alone from this probability on.
-const SURE: f64 = 0.9;
+pub const SURE: f64 = 0.9;
 
 /// A class holds the types that together have this probability.
 const CLASS: f64 = 0.95;
@@ -83,16 +83,14 @@ pub struct Verdict {
 
 /// The verdict on what a search found.
 pub fn verdict(found: &Found<'_>, candidates: &[Candidate], options: Options) -> Verdict {
-    let first = found.path.first().map_or(&found.last, |step| &step.before);
-    let excess = |look: &super::Look| look.statistics.energy - look.expected_energy;
-    let (before, after) = (excess(first), excess(&found.last));
+    let first = found.first();
+    let (before, after) = (first.excess(), found.last.excess());
     let closed = if before > 0.0 { 1.0 - after / before } else { 0.0 };
     let mut effects = named(found, candidates);
     let noise = found.last.energy_sd;
     let less_than_half = closed < HALF && after - (before - after).max(0.0) > CLEAR * noise;
     let disagree = found.last.p[1].min(found.last.p[2]) <= 0.5 * options.unlisted;
-    // Effects whose misfit as a whole is that of noise explain the gap, whatever a single place still says.
-    let explained = !effects.is_empty() && closed >= NEARLY && found.last.p[2] > REMAINS;
+    let explained = !effects.is_empty() && explains(closed, &found.last);
     let scores = !effects.is_empty() && found.last.p[0] <= options.naming;
     let gap = (disagree || scores) && !explained;
     let differs = found.consistency < INCONSISTENT;
@@ -147,6 +145,11 @@ pub fn verdict(found: &Found<'_>, candidates: &[Candidate], options: Options) ->
         reasons.push("noise assumed: there are no replicates to learn it from".into());
     }
     Verdict { word, effects, closed, reasons }
+}
+
+/// Whether what closes this share of the excess misfit explains it, whatever a single place still says.
+pub fn explains(closed: f64, last: &Look) -> bool {
+    closed >= NEARLY && last.p[2] > REMAINS
 }
 
 /// Why the effects are not what is missing.
@@ -206,7 +209,7 @@ fn named(found: &Found<'_>, candidates: &[Candidate]) -> Vec<Named> {
 }
 
 /// The types of the highest probability that together reach that of a class; the chosen one alone when it is sure.
-fn class(kind: &str, own: f64, types: &[(String, f64)]) -> Vec<String> {
+pub fn class(kind: &str, own: f64, types: &[(String, f64)]) -> Vec<String> {
     let mut class = vec![kind.to_owned()];
     let mut sum = own;
     if own >= SURE {

@@ -45,6 +45,12 @@ pub fn value(gap: &GapFindings) -> Value {
         });
         value["models"] = each.collect::<Map<_, _>>().into();
     }
+    if !account.needless.is_empty() {
+        let each = account.needless.iter().map(|piece| {
+            (piece.name.clone(), json!({ "log_odds": piece.log_odds, "error": piece.error }))
+        });
+        value["needless"] = each.collect::<Map<_, _>>().into();
+    }
     value["insight"] = insight(account);
     if let Some(added) = &gap.added {
         value["study"] = json!(added.study);
@@ -117,7 +123,11 @@ fn effect(addition: &Addition, added: Option<&Added>) -> Value {
                 "unit": p.unit.to_string(),
             }),
             None => {
-                json!({ "mean": unknown.value, "sd": unknown.sd, "unit": unknown.unit.to_string() })
+                let moved = added.iter().flat_map(|added| &added.parameters);
+                let shared = moved.filter(|_| addition.model).find(|p| p.name == unknown.name);
+                let (mean, sd) =
+                    shared.map_or((unknown.value, unknown.sd), |p| (p.mean[1], p.sd[1]));
+                json!({ "mean": mean, "sd": sd, "unit": unknown.unit.to_string() })
             }
         };
         (short.to_owned(), value)

@@ -56,13 +56,14 @@ pub const SCHEMA: u64 = 1;
 /// | `gap.verdict` | after `lacuna gap STUDY`: `none`, `named`, `class`, `unlisted` or `not_visible`; `gap.reasons`: why, in words |
 /// | `gap.p`, `.p_after` | probabilities, if nothing were missing, of the largest score, the best cell of the scan and the energy, without and with the effects |
 /// | `gap.noise_assumed` | whether the noise of some curve is assumed, for want of replicates |
-/// | `gap.effects[]` | what explains most: `type`, `name`, `sensors` (labels; none: everywhere), `on` (labels by axis), `parameters.UNKNOWN` with `mean`, `sd`, `unit` (and `q025`, `q975` once the study with the effects was run; before, the largest density and the normal approximation), `probability` among the candidates, `class` |
+/// | `gap.effects[]` | what explains most: `type` (`model_swap`: another model in place of the study's, then first), `name`, `sensors` (labels; none: everywhere), `on` (labels by axis), `parameters.UNKNOWN` with `mean`, `sd`, `unit` (and `q025`, `q975` once the study with the effects was run; before, the largest density and the normal approximation), `probability` among the candidates, `class` |
 /// | `gap.class` | types that the data cannot tell apart, where the verdict is `class` |
 /// | `gap.regions[]`, `.regions_after[]` | where data and model disagree: `sensors`, `scenario`, `time` (first and last place on the last axis), `band` (frequencies, or `null` for all), `p` |
 /// | `gap.held_out` | `kind` of what was set aside, `names`, `count`; the gap `before` and `after` in standard deviations of the noise; the share of its square that `closed`, `lower` and `upper` end of the 95 % interval; `beyond_noise`, the same five counting all misfit beyond the noise of replicates as gap, whatever the known errors of emulator and numerics could explain; `shrank`; `rmse`, `coverage` of the 95 % band and `accuracy`, each `before` and `after`; `log_score`, the log predictive density gained, `conditions.SCENARIO` |
 /// | `gap.held_out_further[]` | the same of other kinds |
 /// | `gap.parameters.NAME` | `before` and `after`: `map` and `sd` without and with the effects, from the data that were not set aside |
-/// | `gap.models.NAME` | another model in place of the study's, each after its own calibration: `log_odds`, the log of the probability of the data with it over that with the study's, and its standard `error` |
+/// | `gap.models.NAME` | another model in place of the study's, each after its own calibration and without effects: `log_odds`, the log of the probability of the data with it over that with the study's, and its standard `error` |
+/// | `gap.needless.NAME` | a coefficient or an effect of the study's own that is not needed beside what was found: `log_odds`, the log of the probability of the data without it over that with it (above log 3), and its standard `error` |
 /// | `gap.insight` | `foretold[]` (log score of left-out parts against `against`), `drift` (`reading`, `words`, `p` of equal parameters in all conditions and windows), and where there are any `separations`, `places`, `symbolic`, `stopgap` |
 /// | `gap.study`, `.run`, `.log_evidence` | the study with the effects, its run directory, and the evidences `before` and `after`, once it was run |
 /// | `seconds.STAGE` | wall-clock time when the stage's result was made |

@@ -48,7 +48,9 @@ pub fn add(
     let own = run.root().file_name().unwrap_or_default().to_string_lossy().into_owned();
     let folder = run.root().with_file_name(study_file::with_names(&own, study, account));
     let mut directory = RunDirectory::open(&folder)?;
-    directory.adopt(run.root(), is_of_the_model)?;
+    if !account.additions.iter().any(|addition| addition.model) {
+        directory.adopt(run.root(), is_of_the_model)?;
+    }
     let with = stage::run(&augmented, &mut directory, observer)?;
     let added = Added {
         search: gap.hash.clone(),

@@ -3,6 +3,8 @@
 //! What proves is set aside before anything is looked at: the stage calibrates anew, with the rest alone.
 
 pub mod add;
+mod models;
+mod own;
 pub(super) mod search;
 mod study_file;
 
@@ -17,6 +19,7 @@ use crate::study::Study;
 
 use super::Known;
 use super::gap_model::{self, Pieces};
+use models::Models;
 use search::Inside;
 
 const FOLDER: &str = "7-gap";
@@ -52,7 +55,7 @@ pub fn stage(
     let rivals = gap_model::rivals(study, known, run, observer)?;
     observer.begin("gap", "", 0);
     let kept = run.keep(FOLDER, &inputs(study, known), observer, |_| {
-        search::account(study, known, &inside, &rivals, measured, observer)
+        Models { study, known, inside: &inside, rivals: &rivals, measured }.account(observer)
     })?;
     observer.end("gap", &summary(&kept.value));
     Ok(Some(kept))

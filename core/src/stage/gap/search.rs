@@ -1,7 +1,7 @@
-//! From the study's data and emulator to the account of a search.
+//! From the study's data and a model to the account of a search.
 
 use crate::data::{Observations, Parameter};
-use crate::gap::account::{Account, HeldOut, OtherModel};
+use crate::gap::account::{Account, HeldOut};
 use crate::gap::candidates::{Candidate, proposed};
 use crate::gap::common::shared;
 use crate::gap::experiment::Experiment;
@@ -19,8 +19,7 @@ use crate::plugin::discrepancy::CommonError;
 use crate::plugin::effect::Situation;
 use crate::run::{Observer, RunDirectory, Stop};
 use crate::stage::calibrate::stated_variance;
-use crate::stage::gap_model::{self, Pieces, Rival};
-use crate::stage::read::Measured;
+use crate::stage::gap_model::{self, Pieces};
 use crate::stage::validate::accuracy;
 use crate::stage::{Known, best_fit, stream};
 use crate::study::Study;
@@ -53,6 +52,29 @@ impl<'a> Inside<'a> {
     }
 }
 
+/// A model with which a search begins: the study's, or another in its place.
+#[derive(Clone, Copy)]
+pub struct Beginning<'a> {
+    /// From parameters to responses.
+    pub forward: &'a dyn Forward,
+    /// The parameters.
+    pub parameters: &'a [Parameter],
+    /// Where the forward map holds, where that is narrower than the priors.
+    pub region: Option<&'a [(f64, f64)]>,
+    /// What may be missing inside it.
+    pub inside: &'a Inside<'a>,
+    /// The errors that all replicates share of another model than the study's.
+    pub other: Option<&'a [CommonError]>,
+}
+
+impl<'a> Beginning<'a> {
+    /// The study's model.
+    pub fn own(study: &'a Study, known: &Known<'a>, inside: &'a Inside<'a>) -> Self {
+        let (forward, region) = (known.forward, known.region);
+        Self { forward, parameters: &study.parameters, region, inside, other: None }
+    }
+}
+
 /// All that a search begins with.
 pub struct Prepared<'a> {
     base: &'a Base<'a>,
@@ -72,26 +94,27 @@ pub struct Prepared<'a> {
 pub fn prepared<T>(
     study: &Study,
     known: &Known<'_>,
-    inside: &Inside<'_>,
+    beginning: &Beginning<'_>,
+    random: &Stream,
     use_it: impl FnOnce(&Prepared<'_>) -> Result<T, Stop>,
 ) -> Result<T, Stop> {
     let Some(measured) = &known.data.value.measured else {
         return Err(Stop::new("the study has no `[measurements]` to search for a gap"));
     };
-    let random = stream(study, "gap");
-    let split = split(&measured.used, &study.gap.keys.hold_out, &random.named("hold out"));
-    let forward = WithEffects::new(known.forward, study.placed_effects());
-    let parameters = forward.parameters(&study.parameters);
-    let wide = inside.wide.as_ref().map(|wide| wide.with_effects(study.placed_effects()));
+    let stream = stream(study, "gap").named("hold out");
+    let split = split(&measured.used, &study.gap.keys.hold_out, &stream);
+    let forward = WithEffects::new(beginning.forward, study.placed_effects());
+    let parameters = forward.parameters(beginning.parameters);
+    let wide = beginning.inside.wide.as_ref().map(|wide| wide.with_effects(study.placed_effects()));
     let wide = wide.as_ref();
-    let base = Base { study, known, wide, forward: &forward, parameters: &parameters };
-    let starts = base.starts(&split.training, &random)?;
+    let base = Base { study, known, beginning, wide, forward: &forward, parameters: &parameters };
+    let starts = base.starts(&split.training, random)?;
     let experiment = base.experiment(&split.training, &starts[0])?;
     let response = base.response(&starts[0]);
     let noise = Noise::of(&experiment, &response, None).sd(&experiment, &response);
     let situation = Situation { layouts: &study.layouts, response: &response, noise: &noise };
     let mut candidates = candidates(study, &situation)?;
-    candidates.extend(inside.candidates.iter().cloned());
+    candidates.extend(beginning.inside.candidates.iter().cloned());
     use_it(&Prepared {
         base: &base,
         split: &split,
@@ -99,7 +122,7 @@ pub fn prepared<T>(
         experiment: &experiment,
         candidates: &candidates,
         options: options(study),
-        random,
+        random: random.clone(),
     })
 }
 
@@ -108,7 +131,7 @@ impl<'a> Prepared<'a> {
     pub fn search(&'a self) -> Result<Found<'a>, Stop> {
         let Self { experiment, candidates, options, .. } = *self;
         let found = search(experiment, candidates, &self.starts, options, &self.random);
-        if let Some(failure) = self.base.known.forward.failure() {
+        if let Some(failure) = self.base.beginning.forward.failure() {
             return Err(Stop::new(failure));
         }
         let stop = || {
@@ -117,45 +140,20 @@ impl<'a> Prepared<'a> {
         };
         found.ok_or_else(stop)
     }
-}
 
-impl Prepared<'_> {
-    /// Other models against the study's, those that explain most first.
-    fn compared(&self, study: &Study, rivals: &[Rival<'_>], found: &Found<'_>) -> Vec<OtherModel> {
-        let first = found.path.first().map_or(&found.last, |step| &step.before);
-        let compare = |rival: &Rival<'_>| {
-            let stream = self.random.named("models").named(&rival.name);
-            let effects = study.placed_effects();
-            rival.compare(self.experiment, effects, &first.fit, &found.noise, &stream)
-        };
-        let mut models: Vec<OtherModel> = rivals.iter().filter_map(compare).collect();
-        models.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
-        models
-    }
-}
-
-/// Searches and proves.
-pub fn account(
-    study: &Study,
-    known: &Known<'_>,
-    inside: &Inside<'_>,
-    rivals: &[Rival<'_>],
-    measured: &Measured,
-    observer: &dyn Observer,
-) -> Result<Account, Stop> {
-    prepared(study, known, inside, |prepared| {
-        if prepared.candidates.is_empty() {
-            observer.warn("no effect proposes itself for these data: only the tests are made");
+    /// What was found, and how it fares against the response `before` on what was set aside of all measurements.
+    pub fn account(
+        &'a self,
+        found: &Found<'a>,
+        before: &[f64],
+        all: &Observations,
+    ) -> Result<Account, Stop> {
+        let mut account = Account::of(found, self.candidates, self.options, &self.random);
+        for part in &self.split.held_out {
+            account.held_out.extend(self.base.proof(part, all, before, found)?);
         }
-        let found = prepared.search()?;
-        let mut account =
-            Account::of(&found, prepared.candidates, prepared.options, &prepared.random);
-        for part in &prepared.split.held_out {
-            account.held_out.extend(prepared.base.proof(part, &measured.used, &found)?);
-        }
-        account.models = prepared.compared(study, rivals, &found);
         Ok(account)
-    })
+    }
 }
 
 fn options(study: &Study) -> Options {
@@ -181,10 +179,11 @@ fn candidates(study: &Study, situation: &Situation<'_>) -> Result<Vec<Candidate>
     Ok(all)
 }
 
-/// The study's model as the search begins with it.
+/// The model as the search begins with it.
 struct Base<'a> {
     study: &'a Study,
     known: &'a Known<'a>,
+    beginning: &'a Beginning<'a>,
     wide: Option<&'a Wide<'a>>,
     forward: &'a WithEffects<'a>,
     parameters: &'a [Parameter],
@@ -204,10 +203,9 @@ impl<'a> Base<'a> {
 
     /// The measurements with the forward map and all errors that replicates share.
     fn experiment(&self, data: &Observations, point: &[f64]) -> Result<Experiment<'a>, Stop> {
-        let Self { study, known, .. } = self;
-        let layouts = &study.layouts;
+        let layouts = &self.study.layouts;
         let mut experiment = Experiment::new(layouts, self.parameters, self.forward, data);
-        experiment.region = known.region.map(<[_]>::to_vec);
+        experiment.region = self.beginning.region.map(<[_]>::to_vec);
         experiment.wide = self.wide;
         let response = self.response(point);
         let noise = Noise::of(&experiment, &response, None);
@@ -218,9 +216,11 @@ impl<'a> Base<'a> {
 
     /// Samples of the errors that replicates share.
     fn samples(&self, data: &Observations) -> Result<Vec<CommonError>, Stop> {
-        let Self { study, known, wide, .. } = self;
+        let Self { study, known, wide, beginning, .. } = self;
         let mut all = Vec::new();
-        if let Some(fitted) = known.fitted {
+        if let Some(errors) = beginning.other {
+            all.extend(errors.iter().cloned());
+        } else if let Some(fitted) = known.fitted {
             let stated = stated_variance(study, data, known.forward)?;
             all.push(fitted.value.error_samples(study, stated.as_deref()));
         }
@@ -236,12 +236,12 @@ impl<'a> Base<'a> {
         &self,
         part: &HeldOutData,
         all: &Observations,
+        before: &[f64],
         found: &Found<'_>,
     ) -> Result<Option<HeldOut>, Stop> {
         let point = &found.last.fit.at.point[..self.parameters.len()];
         let held_out = self.experiment(&part.data, point)?;
-        let first = found.path.first().map_or(&found.last, |step| &step.before);
-        let (before, after) = (&first.fit.at.response, &found.last.fit.at.response);
+        let after = &found.last.fit.at.response;
         let noise = if part.kind == Kind::Replicates {
             found.noise.restricted(found.system.experiment, &held_out)
         } else {

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::gap::account::{Account, Addition, Estimate};
+use crate::gap::needless::Needless;
 use crate::run::{Stop, files};
-use crate::stage::gap_model::Pieces;
+use crate::stage::gap_model::{self, Pieces};
 use crate::study::emit::{key, string, to_line};
 use crate::study::gap::Edit;
 use crate::study::{Problems, Sources, Study, read};
@@ -92,14 +93,21 @@ fn text(study: &Study, path: &Path, account: &Account) -> Result<String, Stop> {
 type Divided<'a> = (Option<(Edit, String)>, Vec<&'a Addition>);
 
 fn divided<'a>(study: &Study, account: &'a Account) -> Result<Divided<'a>, Stop> {
-    let is_inside = |addition: &&Addition| !addition.switches.is_empty();
+    let is_inside = |addition: &&Addition| addition.model || !addition.switches.is_empty();
     let (inside, on_top): (Vec<_>, Vec<_>) = account.additions.iter().partition(is_inside);
-    let Some(pieces) = Pieces::of(study)?.filter(|_| !inside.is_empty()) else {
+    if inside.is_empty() {
         return Ok((None, on_top));
-    };
-    let places: Vec<&[usize]> = inside.iter().map(|addition| &addition.switches[..]).collect();
+    }
     let why: String = inside.iter().map(|addition| found(addition).replace("# ", "")).collect();
-    Ok((Some((pieces.edit(study, &places), why)), on_top))
+    let mut edit = Edit::default();
+    if let Some(other) = inside.iter().find(|addition| addition.model) {
+        edit = gap_model::swapped(study, &other.name)?.unwrap_or_default();
+    }
+    let places: Vec<&[usize]> = inside.iter().map(|addition| &addition.switches[..]).collect();
+    if let Some(pieces) = Pieces::of(study)?.filter(|_| !edit.is_swap()) {
+        edit = pieces.edit(study, &places);
+    }
+    Ok((Some((edit, why)), on_top))
 }
 
 /// The text with a name of its own where it gives one: two studies of one name share a run directory.
@@ -139,6 +147,7 @@ fn reasons(account: &Account) -> Vec<String> {
         ));
     }
     lines.extend(account.verdict.reasons.iter().cloned());
+    lines.extend(account.needless.iter().map(Needless::words));
     lines
 }
 
@@ -156,7 +165,7 @@ fn found(addition: &Addition) -> String {
         };
         text.push_str(&format!("# found: {name} = {value:.4e} ± {sd:.1e}{unit}\n"));
     }
-    let own = addition.class.iter().filter(|kind| **kind != addition.kind);
+    let own = addition.class.iter().filter(|kind| **kind != addition.label());
     let others: Vec<String> = own.map(|kind| format!("`{kind}`")).collect();
     if others.is_empty() {
         text.push_str(&format!(

@@ -33,7 +33,7 @@ pub(super) fn wide<'a>(
 ) -> Result<Wide<'a>, Stop> {
     let inputs = pieces.inputs.clone();
     let parameters = parameters(study, &inputs, known.region);
-    let simulator = pieces.simulator(study)?;
+    let simulator = pieces.simulator(study, pieces.whole())?;
     let idle = simulator.idle(parameters.len());
     let used: Vec<usize> = (0..parameters.len()).filter(|i| !idle.contains(i)).collect();
     let lesson = Lesson {

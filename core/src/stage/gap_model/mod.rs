@@ -1,15 +1,19 @@
 //! Pieces that may be missing inside the model, as candidates of a search: inputs set free, and terms added to equations.
 //!
-//! All of them are inputs of one wider model. Where the model is its own forward map the wide forward map is the
-//! wider model; where a surrogate stands for it, further runs teach what the inputs change.
+//! All of them are inputs of one wider model. Where the model is its own forward map it is asked with the pieces that are
+//! present; where a surrogate stands for it, further runs teach what the inputs change.
 
 mod emulated;
+mod narrow;
 mod pieces;
 mod swap;
 mod terms;
+mod unasked;
 
 pub use pieces::{Piece, Pieces};
-pub use swap::{Rival, rivals};
+pub use swap::{Odds, Rival, Side, rivals, swapped};
+
+use narrow::Narrow;
 
 use crate::gap::candidates::Candidate;
 use crate::gap::wide::Wide;
@@ -17,7 +21,6 @@ use crate::run::{Observer, RunDirectory, Stop};
 use crate::study::Study;
 
 use super::Known;
-use super::direct::Direct;
 
 /// The candidates among the pieces, and the forward map in which they are inputs.
 pub fn candidates<'a>(
@@ -30,11 +33,8 @@ pub fn candidates<'a>(
     let wide = if known.emulator.is_some() {
         emulated::wide(pieces, study, known, run, observer)?
     } else {
-        let inputs = pieces.inputs.clone();
-        let priors = study.parameters.iter().map(|p| p.prior.clone());
-        let priors = priors.chain(inputs.iter().map(|freed| freed.prior.clone())).collect();
-        let direct = Direct::with(pieces.simulator(study)?, priors, study.layouts.len());
-        Wide { forward: Box::new(direct), inputs, common: Vec::new() }
+        let forward = Box::new(Narrow::new(study, pieces, pieces.narrower())?);
+        Wide { forward, inputs: pieces.inputs.clone(), common: Vec::new() }
     };
     Ok((pieces.candidates(), wide))
 }

@@ -17,6 +17,7 @@ use crate::study::Study;
 use crate::study::file::ModelKeys;
 use crate::study::gap::{Added, Edit, SwitchSection};
 
+use super::narrow::Narrower;
 use super::terms;
 
 /// The pieces with the model that has all of them.
@@ -25,6 +26,14 @@ pub struct Pieces {
     pub all: Vec<Piece>,
     /// The inputs of the wider model that are free in some piece.
     pub inputs: Vec<Freed>,
+    whole: Wider,
+    narrower: Narrower,
+}
+
+/// The study's model with some of the pieces.
+pub struct Wider {
+    /// The inputs that are free.
+    pub inputs: Vec<usize>,
     model: Section<dyn Model, ModelKeys>,
     given: Vec<Given>,
 }
@@ -43,48 +52,54 @@ pub struct Piece {
 }
 
 impl Pieces {
-    /// The pieces of a study; `None` where it names none, or has no model.
+    /// The pieces of a study; `None` where it has none, or no model.
     pub fn of(study: &Study) -> Result<Option<Self>, Stop> {
-        let inside = &study.gap.inside;
-        let Some(section) = &study.model else { return Ok(None) };
-        if inside.switches.is_empty() && inside.terms.is_empty() {
-            return Ok(None);
-        }
         let (mut all, mut inputs) = (Vec::new(), Vec::new());
-        for switch in &inside.switches {
+        for switch in &study.gap.inside.switches {
             let (freed, description) = freed(study, switch)?;
             let kind = own_kind(&switch.input);
             all.push(Piece { kind, description, places: vec![inputs.len()], addition: None });
             inputs.push(freed);
         }
         terms::add(study, &mut all, &mut inputs)?;
-        let additions: Vec<Addition> = all.iter().filter_map(|p| p.addition.clone()).collect();
-        let mut given = study.given.clone();
-        for freed in &inputs {
-            if !given.iter().any(|known| known.name == freed.name) {
-                given.push(Given { name: freed.name.clone(), unit: Some(freed.unit.clone()) });
-            }
-        }
-        let options = match section.built.plugin.amend() {
-            Some(amend) => changed(&section.built.options, &amend.amended(&additions)),
-            None => section.built.options.clone(),
-        };
-        let built = registry::from_text::<dyn Model>(section.built.name, &options.to_string())
-            .map_err(|error| Stop::new(format!("the model with further terms: {error}")))?;
-        let model = Section { common: section.common.clone(), built };
-        Ok(Some(Self { all, inputs, model, given }))
+        let every: Vec<usize> = (0..all.len()).collect();
+        let whole = Wider::of(study, &all, &inputs, &every)?;
+        let narrower = Narrower::new(all.len());
+        let whole = whole.filter(|_| !all.is_empty());
+        Ok(whole.map(|whole| Self { all, inputs, whole, narrower }))
     }
 
-    /// The wider model as a function of the study's parameters and the inputs.
-    pub fn simulator<'a>(&'a self, study: &'a Study) -> Result<Simulator<'a>, Stop> {
+    /// The model with all pieces.
+    pub fn whole(&self) -> &Wider {
+        &self.whole
+    }
+
+    /// The models with few of the pieces.
+    pub(super) fn narrower(&self) -> &Narrower {
+        &self.narrower
+    }
+
+    /// The model with these pieces.
+    pub fn wider(&self, study: &Study, pieces: &[usize]) -> Result<Option<Wider>, Stop> {
+        Wider::of(study, &self.all, &self.inputs, pieces)
+    }
+
+    /// The model with some of the pieces as a function of the study's parameters and the inputs that are free there.
+    pub fn simulator<'a>(
+        &'a self,
+        study: &'a Study,
+        wider: &'a Wider,
+    ) -> Result<Simulator<'a>, Stop> {
+        let free = wider.inputs.iter().map(|&i| &self.inputs[i]);
         let free: Vec<(&str, &Unit)> =
-            self.inputs.iter().map(|freed| (freed.name.as_str(), &freed.unit)).collect();
-        Simulator::of_other(study, &Other { section: &self.model, given: &self.given, free })
+            free.map(|freed| (freed.name.as_str(), &freed.unit)).collect();
+        Simulator::of_other(study, &Other { section: &wider.model, given: &wider.given, free })
     }
 
     /// The name and the options of the wider model, for the hash of what is made with it.
     pub(super) fn model(&self) -> (&'static str, &Table, &ModelKeys) {
-        (self.model.built.name, &self.model.built.options, &self.model.common)
+        let model = &self.whole.model;
+        (model.built.name, &model.built.options, &model.common)
     }
 
     /// The pieces as candidates of a search.
@@ -126,6 +141,34 @@ impl Pieces {
             edit.model = amend.amended(&additions);
         }
         edit
+    }
+}
+
+impl Wider {
+    fn of(
+        study: &Study,
+        all: &[Piece],
+        inputs: &[Freed],
+        pieces: &[usize],
+    ) -> Result<Option<Self>, Stop> {
+        let Some(section) = &study.model else { return Ok(None) };
+        let additions: Vec<Addition> =
+            pieces.iter().filter_map(|&p| all[p].addition.clone()).collect();
+        let free: Vec<usize> = pieces.iter().flat_map(|&p| all[p].places.iter().copied()).collect();
+        let mut given = study.given.clone();
+        for freed in free.iter().map(|&i| &inputs[i]) {
+            if !given.iter().any(|known| known.name == freed.name) {
+                given.push(Given { name: freed.name.clone(), unit: Some(freed.unit.clone()) });
+            }
+        }
+        let options = match section.built.plugin.amend() {
+            Some(amend) => changed(&section.built.options, &amend.amended(&additions)),
+            None => section.built.options.clone(),
+        };
+        let built = registry::from_text::<dyn Model>(section.built.name, &options.to_string())
+            .map_err(|error| Stop::new(format!("the model with further terms: {error}")))?;
+        let model = Section { common: section.common.clone(), built };
+        Ok(Some(Self { inputs: free, model, given }))
     }
 }
 

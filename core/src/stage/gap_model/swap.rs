@@ -6,12 +6,13 @@
 use serde_json::json;
 
 use crate::data::Parameter;
-use crate::gap::account::{Estimate, OtherModel};
+use crate::gap::account::Estimate;
 use crate::gap::common::shared;
 use crate::gap::experiment::Experiment;
 use crate::gap::fit::{Fit, fit_from};
 use crate::gap::name::weigh;
 use crate::gap::noise::Noise;
+use crate::gap::replaced::OtherModel;
 use crate::gap::system::System;
 use crate::gap::whitener::Whitener;
 use crate::gap::with_effects::WithEffects;
@@ -25,7 +26,7 @@ use crate::stage::Known;
 use crate::stage::direct::Direct;
 use crate::stage::simulator::Simulator;
 use crate::study::Study;
-use crate::study::gap::{Edit, Swap};
+use crate::study::gap::{Edit, Swap, Swapped};
 
 use super::emulated::{Lesson, designed};
 
@@ -84,8 +85,28 @@ fn rival<'a>(
         let whole = Direct::with(simulator, priors, study.layouts.len());
         (Box::new(Partial { whole, used, middle }), Vec::new())
     };
-    let edit = Edit { swapped: Some(table(study, swap)?), ..Edit::default() };
-    Ok(Rival { name: swap.keys.name.as_str().to_owned(), parameters, forward, common, edit })
+    let name = swap.keys.name.as_str().to_owned();
+    Ok(Rival { name, parameters, forward, common, edit: edit(study, swap)? })
+}
+
+/// What the study must say to have the other model that it calls `name`; `None` where it names no such model.
+pub fn swapped(study: &Study, name: &str) -> Result<Option<Edit>, Stop> {
+    let mut models = study.gap.inside.models.iter();
+    models.find(|swap| swap.keys.name.as_str() == name).map(|swap| edit(study, swap)).transpose()
+}
+
+fn edit(study: &Study, swap: &Swap) -> Result<Edit, Stop> {
+    let idle = Simulator::with_model(study, &swap.section)?.idle(study.parameters.len());
+    let of = |name: &str| {
+        let mut own = study.unknowns.iter().enumerate().filter(|(_, unknown)| unknown.name == name);
+        own.all(|(i, _)| idle.contains(&i))
+    };
+    let mut names: Vec<String> = study.unknowns.iter().map(|u| u.name.clone()).collect();
+    names.dedup();
+    names.retain(|name| of(name));
+    let (name, model) = (swap.keys.name.as_str().to_owned(), table(study, swap)?);
+    let swapped = Some(Swapped { name, model, idle: names });
+    Ok(Edit { swapped, ..Edit::default() })
 }
 
 /// `[model]` of a study that has the other model.
@@ -105,6 +126,14 @@ fn table(study: &Study, swap: &Swap) -> Result<toml::Table, Stop> {
     if !fixed.is_empty() {
         table.insert("fixed".to_owned(), fixed.into());
     }
+    let computed = study.model.iter().flat_map(|model| &model.common.computed);
+    let computed: toml::Table = computed
+        .filter(|(name, _)| has(name))
+        .map(|(name, text)| (name.clone(), text.as_str().into()))
+        .collect();
+    if !computed.is_empty() {
+        table.insert("computed".to_owned(), computed.into());
+    }
     Ok(table)
 }
 
@@ -119,29 +148,21 @@ impl Rival<'_> {
         noise: &Noise,
         stream: &Stream,
     ) -> Option<OtherModel> {
-        let mut own = experiment.clone();
-        let error = shared(&own, noise, &base.at.response, &self.common);
-        own.common.extend(error.common);
-        own.remainder.resize(own.outputs(), 0.0);
-        own.remainder.iter_mut().zip(error.remainder).for_each(|(all, rest)| *all += rest);
-        let (_, means) = own.means();
-        // The same covariance for both: neither gains by what it says of its own error.
-        let whitener = Whitener::new(&own, noise, &base.at.response);
-        let weighed = |system: &System<'_>, starts: &[Vec<f64>], name: &str| {
-            let fit = fit_from(system, &whitener, &means, starts)?;
-            let weighed = weigh(system, &whitener, &means, &fit, &stream.named(name));
-            Some((fit, weighed))
-        };
-        let system = System::new(&own, Vec::new());
-        let (_, without) = weighed(&system, std::slice::from_ref(&base.at.point), "own")?;
         let forward = WithEffects::new(&*self.forward, effects);
         let parameters = forward.parameters(&self.parameters);
-        let mut other = own.clone();
+        let mut other = experiment.clone();
         (other.parameters, other.forward) = (&parameters, &forward);
         (other.wide, other.region) = (None, None);
+        let own = System::new(experiment, Vec::new());
         let system = System::new(&other, Vec::new());
-        let starts = starts(&parameters, experiment.parameters, &base.at.point);
-        let (fit, with) = weighed(&system, &starts, "other")?;
+        let sides = [
+            Side { system: &own, starts: vec![base.at.point.clone()] },
+            Side {
+                system: &system,
+                starts: starts(&parameters, experiment.parameters, &base.at.point),
+            },
+        ];
+        let Odds { log_odds, error, fit } = self.odds(&sides, noise, stream)?;
         let estimates = parameters.iter().zip(&fit.at.point).zip(fit.sd());
         let estimate = |((p, value), sd): ((&Parameter, &f64), f64)| Estimate {
             name: p.name.clone(),
@@ -149,13 +170,54 @@ impl Rival<'_> {
             value: *value,
             sd,
         };
-        Some(OtherModel {
-            name: self.name.clone(),
-            log_odds: with.log_evidence - without.log_evidence,
-            error: with.error.hypot(without.error),
-            parameters: estimates.map(estimate).collect(),
-        })
+        let parameters = estimates.map(estimate).collect();
+        Some(OtherModel { name: self.name.clone(), log_odds, error, parameters })
     }
+
+    /// The odds of a system with this model over one with the study's, each after its own calibration. The covariance is the
+    /// same for both, with the errors of both models: neither gains by what it says of its own error.
+    pub fn odds(
+        &self,
+        [own, other]: &[Side<'_, '_>; 2],
+        noise: &Noise,
+        stream: &Stream,
+    ) -> Option<Odds> {
+        let response = own.system.response(own.starts.first()?);
+        let mut both = own.system.experiment.clone();
+        let error = shared(&both, noise, &response, &self.common);
+        both.common.extend(error.common);
+        both.remainder.resize(both.outputs(), 0.0);
+        both.remainder.iter_mut().zip(error.remainder).for_each(|(all, rest)| *all += rest);
+        let (_, means) = both.means();
+        let whitener = Whitener::new(&both, noise, &response);
+        let weighed = |side: &Side<'_, '_>, name: &str| {
+            let fit = fit_from(side.system, &whitener, &means, &side.starts)?;
+            let weighed = weigh(side.system, &whitener, &means, &fit, &stream.named(name));
+            Some((fit, weighed))
+        };
+        let (_, without) = weighed(own, "own")?;
+        let (fit, with) = weighed(other, "other")?;
+        let log_odds = with.log_evidence - without.log_evidence;
+        Some(Odds { log_odds, error: with.error.hypot(without.error), fit })
+    }
+}
+
+/// One of two systems that are weighed against each other.
+pub struct Side<'a, 'b> {
+    /// The system.
+    pub system: &'b System<'a>,
+    /// From where its calibration starts.
+    pub starts: Vec<Vec<f64>>,
+}
+
+/// The outcome of weighing two systems.
+pub struct Odds {
+    /// The log of the probability of the data with the second over that with the first.
+    pub log_odds: f64,
+    /// Its standard error.
+    pub error: f64,
+    /// The fit of the second.
+    pub fit: Fit,
 }
 
 /// From where a calibration starts: from another's, and from the middle and the quarters of the priors.

@@ -15,18 +15,20 @@ use crate::study::Study;
 use crate::study::gap::TermKeys;
 
 use super::pieces::Piece;
+use super::unasked;
 
 /// The share of the rate that a term has at one standard deviation of its coefficient.
 const SHARE: f64 = 0.5;
 
-/// Adds the terms of a study to its pieces and inputs.
+/// Adds the terms of a study to its pieces and inputs: those that it names, and those of the library that nobody has to name.
 pub(super) fn add(
     study: &Study,
     all: &mut Vec<Piece>,
     inputs: &mut Vec<Freed>,
 ) -> Result<(), Stop> {
     let terms = &study.gap.inside.terms;
-    if terms.is_empty() {
+    let library = unasked::library(study);
+    if terms.is_empty() && library.is_empty() {
         return Ok(());
     }
     let simulator = Simulator::of(study)?.ok_or_else(|| Stop::new("the study has no model"))?;
@@ -34,23 +36,40 @@ pub(super) fn add(
         Stop::new("the model has no equations to which terms could be added")
             .help("take `[[gap.term]]` out, or write the model as equations")
     })?;
+    let desk = Desk { study, simulator: &simulator, amend };
     for section in terms {
         let name = section.common.name(&section.built);
-        let desk = Desk { study, simulator: &simulator, amend };
-        let (summand, first) = desk
-            .summand(section, name)
-            .map_err(|e| Stop::new(format!("the term `{name}`: {e}")))?;
-        let begin = inputs.len();
-        inputs.push(first);
-        inputs.extend(summand.indices.iter().map(index));
-        all.push(Piece {
-            kind: kind(section, name),
-            description: description(&*section.built.plugin, &summand),
-            places: (begin..inputs.len()).collect(),
-            addition: Some(addition(name, &section.common.state, summand)),
-        });
+        let found = desk.summand(section, name);
+        let found = found.map_err(|e| Stop::new(format!("the term `{name}`: {e}")))?;
+        put(section, name, found, all, inputs);
+    }
+    for section in unasked::sections(study, &library, &desk.states()) {
+        let name = section.common.name(&section.built);
+        // Where the units or the sizes of the equations have no place for a term it is none of theirs.
+        if let Ok(found) = desk.summand(&section, name) {
+            put(&section, name, found, all, inputs);
+        }
     }
     Ok(())
+}
+
+/// A term with its coefficient among the pieces.
+fn put(
+    section: &Section<dyn Term, TermKeys>,
+    name: &str,
+    (summand, first): (Summand, Freed),
+    all: &mut Vec<Piece>,
+    inputs: &mut Vec<Freed>,
+) {
+    let begin = inputs.len();
+    inputs.push(first);
+    inputs.extend(summand.indices.iter().map(index));
+    all.push(Piece {
+        kind: kind(section, name),
+        description: description(&*section.built.plugin, &summand),
+        places: (begin..inputs.len()).collect(),
+        addition: Some(addition(name, &section.common.state, summand)),
+    });
 }
 
 /// The name of the library's term; for an expression of the study's that of its coefficient.
@@ -89,6 +108,14 @@ struct Desk<'a> {
 }
 
 impl Desk<'_> {
+    /// The states to whose rates terms can be added.
+    fn states(&self) -> Vec<State> {
+        let setting = &self.simulator.settings[0];
+        let layout = self.study.layouts.of_scenario(&setting.scenario.name);
+        layout
+            .map_or_else(Vec::new, |(layout, _)| self.amend.states(&self.study.context_of(&layout)))
+    }
+
     /// What a term adds, and its coefficient.
     fn summand(
         &self,

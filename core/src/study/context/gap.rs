@@ -1,7 +1,7 @@
 //! `[gap]` against the rest of the study: what it tries is there, and so is what it sets aside.
 
 use crate::data::{Axis, Coordinates};
-use crate::plugin::{Effect, registry};
+use crate::plugin::{Effect, Term, registry};
 use crate::study::nearest::{nearest, one_of};
 use crate::study::resolve::Study;
 use crate::study::{Complaints, Node, Problems};
@@ -26,17 +26,43 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
 }
 
 fn candidates(study: &Study, complaints: &mut Complaints<'_>) {
-    let names: Vec<&str> = registry::entries::<dyn Effect>().iter().map(|e| e.name).collect();
+    let effects: Vec<&str> = registry::entries::<dyn Effect>().iter().map(|e| e.name).collect();
+    let terms: Vec<&str> = registry::entries::<dyn Term>().iter().map(|e| e.name).collect();
+    let has_equations = study.model.as_ref().is_some_and(|m| m.built.plugin.amend().is_some());
     for candidate in study.gap.keys.candidates.iter().flatten() {
-        if names.contains(&candidate.as_str()) {
+        let name = candidate.as_str();
+        if effects.contains(&name) {
             continue;
         }
-        let problem = complaints.at("candidates").say(format!("no effect is called `{candidate}`"));
+        if terms.contains(&name) {
+            if study.surrogate.is_some() || !has_equations {
+                complaints
+                    .at("candidates")
+                    .say(format!("the study has no place for the term `{name}`"))
+                    .expected("a model that the study writes as equations, and no `[surrogate]`")
+                    .help("with a surrogate, name the term and its state in `[[gap.term]]`");
+            } else if needs_options(name) {
+                complaints
+                    .at("candidates")
+                    .say(format!("the term `{name}` needs numbers that only the study knows"))
+                    .help("name it with its state and its options in `[[gap.term]]`");
+            }
+            continue;
+        }
+        let names: Vec<&str> = effects.iter().chain(&terms).copied().collect();
+        let problem = complaints
+            .at("candidates")
+            .say(format!("no effect and no term is called `{candidate}`"));
         problem.expected(one_of(names.iter().copied()));
         if let Some(near) = nearest(candidate, names.iter().copied()) {
             problem.help(format!("did you mean `{near}`?"));
         }
     }
+}
+
+/// Whether nothing is tried of a term that is only named.
+fn needs_options(term: &str) -> bool {
+    registry::from_text::<dyn Term>(term, "").is_err()
 }
 
 fn scenarios(study: &Study, complaints: &mut Complaints<'_>) {

@@ -16,8 +16,19 @@ pub struct Edit {
     pub freed: Vec<String>,
     /// Options of `[model]` that become others.
     pub model: Vec<Change>,
-    /// The table that takes the place of `[model]`.
-    pub swapped: Option<Table>,
+    /// The model that takes the place of the study's.
+    pub swapped: Option<Swapped>,
+}
+
+/// Another model in place of the study's. What the study says in `[gap]` of pieces inside its own model goes with that.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Swapped {
+    /// What the study calls it.
+    pub name: String,
+    /// Its `[model]`.
+    pub model: Table,
+    /// The parameters that it does not have.
+    pub idle: Vec<String>,
 }
 
 /// A further `[[parameter]]`.
@@ -34,6 +45,11 @@ pub struct Added {
 }
 
 impl Edit {
+    /// Whether another model takes the place of the study's.
+    pub fn is_swap(&self) -> bool {
+        self.swapped.is_some()
+    }
+
     /// All changes of both.
     #[must_use]
     pub fn and(mut self, other: Self) -> Self {
@@ -54,6 +70,12 @@ impl Edit {
             Some(Value::Array(all)) => all.clone(),
             _ => Vec::new(),
         };
+        if let Some(swapped) = &self.swapped {
+            parameters.retain(|parameter| {
+                let name = parameter.get("name").and_then(Value::as_str);
+                !name.is_some_and(|name| swapped.idle.iter().any(|idle| idle == name))
+            });
+        }
         for added in &self.parameters {
             parameters.push(to_table(added)?.into());
         }
@@ -66,6 +88,16 @@ impl Edit {
 
     /// What is added is no candidate any more.
     fn untried(&self, gap: &mut Table) {
+        if let Some(swapped) = &self.swapped {
+            gap.remove("switch");
+            gap.remove("term");
+            if let Some(Value::Array(models)) = gap.get_mut("model") {
+                models.retain(|m| m.get("name").and_then(Value::as_str) != Some(&swapped.name));
+                if models.is_empty() {
+                    gap.remove("model");
+                }
+            }
+        }
         let called = |table: &Value, key: &str| {
             let name = table.get(key).and_then(Value::as_str);
             name.is_some_and(|name| self.freed.iter().any(|freed| freed == name))
@@ -88,7 +120,7 @@ impl Edit {
     /// `[model]` with the changes made; `None` where nothing of it changes.
     fn model_of(&self, study: &Table) -> Option<Table> {
         if let Some(swapped) = &self.swapped {
-            return Some(swapped.clone());
+            return Some(swapped.model.clone());
         }
         let old = study.get("model").and_then(Value::as_table)?;
         let mut model = changed(old, &self.model);

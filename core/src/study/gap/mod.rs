@@ -3,11 +3,12 @@
 mod edit;
 mod held;
 mod inside;
+mod swap;
 mod text;
 
 use std::collections::BTreeMap;
 
-pub use edit::{Added, Edit};
+pub use edit::{Added, Edit, Swapped};
 pub use held::Held;
 pub(super) use held::Loose;
 pub use inside::{Inside, Swap, SwapKeys, SwitchSection, TermKeys};
@@ -33,9 +34,13 @@ pub struct GapSection {
     /// How many data without any missing effect are simulated to know what the tests make of them.
     pub simulations: Count,
     /// The effects that are tried, by the names of their plugins (`lacuna plugins effect`), each with priors that it
-    /// proposes for the data; all that are installed when left out. `[[gap.candidate]]` adds others.
+    /// proposes for the data; all that are installed when left out. `[[gap.candidate]]` adds others. In a study whose model
+    /// is written as equations and that has no surrogate, terms too (`lacuna plugins term`): each wherever the
+    /// equations have a place for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub candidates: Option<Vec<String>>,
+    /// Whether terms are tried that nobody names.
+    pub terms: bool,
     /// What is set aside before anything is looked at, to show whether the gap shrank.
     pub hold_out: HoldOut,
 }
@@ -49,6 +54,7 @@ impl Default for GapSection {
             effects: count(3),
             simulations: count(399),
             candidates: None,
+            terms: true,
             hold_out: HoldOut::default(),
         }
     }

@@ -5,6 +5,7 @@ use std::path::Path;
 use toml::{Table, Value};
 
 use super::edit::Edit;
+use super::swap::swapped;
 use crate::study::emit::{Unwritable, key, to_line, to_table, to_toml};
 use crate::study::node::{self, Node};
 use crate::study::resolve::load_text;
@@ -24,10 +25,10 @@ impl Edit {
 
     /// The study's own text changed; `None` where that would be another study than `whole`.
     fn of_own_text(&self, study: &Study, whole: &Table, comments: &str) -> Option<String> {
-        if self.swapped.is_some() {
-            return None;
-        }
         let mut text = study.text.clone();
+        if let Some(swap) = &self.swapped {
+            text = swapped(&text, swap, comments)?;
+        }
         for change in &self.model {
             text = set(&text, &change.path, &change.value)?;
         }
@@ -39,7 +40,7 @@ impl Edit {
             text.push('\n');
         }
         for (i, added) in self.parameters.iter().enumerate() {
-            let above = if i == 0 { comments } else { "" };
+            let above = if i == 0 && self.swapped.is_none() { comments } else { "" };
             let parameter = Table::from_iter([(
                 "parameter".to_owned(),
                 Value::Array(vec![to_table(added).ok()?.into()]),
@@ -57,7 +58,7 @@ fn resolved(path: &Path, text: &str) -> Option<Table> {
     load_text(path, text, &[]).study.map(|study| study.resolved)
 }
 
-/// Whether two studies with all their defaults are one; a new parameter has defaults of its own.
+/// Whether two studies with all their defaults are one; a new parameter has defaults of its own, and so has another model.
 fn same(a: &Table, b: &Table) -> bool {
     let bare = |table: &Table| {
         let mut bare = table.clone();
@@ -66,6 +67,11 @@ fn same(a: &Table, b: &Table) -> bool {
                 parameter.remove("design");
                 parameter.remove("symbol");
             }
+        }
+        if let Some(Value::Table(model)) = bare.get_mut("model")
+            && model.get("fixed").and_then(Value::as_table).is_some_and(Table::is_empty)
+        {
+            model.remove("fixed");
         }
         bare
     };

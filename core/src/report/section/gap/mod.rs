@@ -30,7 +30,9 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
         (figures::maps(findings, account, numbers))
         (figures::curves(findings, account, numbers))
         (figures::differences(findings, account, numbers))
-        @if let Some(step) = account.path.first() { (figures::leaders(step, numbers)) }
+        @if let Some(step) = account.path.iter().find(|step| !step.leaders.is_empty()) {
+            (figures::leaders(step, numbers))
+        }
         @if !account.path.is_empty() { (tables::path(account, numbers)) }
         (insight::all(findings, account, numbers))
         (tables::parameters(gap, numbers))

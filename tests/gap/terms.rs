@@ -1,0 +1,115 @@
+//! Terms that nobody named, in a study that says nothing of `[gap]`: the truth is an oscillator that the generator integrates
+//! by a scheme of its own.
+
+use std::fs;
+
+use generator::oscillator::Oscillator;
+use lacuna::gap::account::Account;
+use lacuna::gap::name::Word;
+use lacuna::run::{RunDirectory, Silent};
+use lacuna::stage::gap::add::{Begun, add};
+
+use super::inside::study;
+
+const STUDY: &str = r#"
+[study]
+title = "a mass on a spring"
+
+[[parameter]]
+name = "stiffness"
+unit = "1/s2"
+prior = { uniform = [20.0, 60.0] }
+
+[[parameter]]
+name = "damping"
+unit = "1/s"
+prior = { uniform = [0.0, 1.0] }
+
+[response]
+name = "x"
+unit = "m"
+axes = { t = { first = 0.05, last = 6.0, count = 120, unit = "s" } }
+
+[model]
+use = "equations"
+state = { x = { start = 0.1, unit = "m" }, v = { start = 0.0, unit = "m/s" } }
+rate = { x = "v", v = "-stiffness * x - damping * v" }
+observe = "x"
+
+[measurements]
+use = "csv"
+path = "data.csv"
+
+[discrepancy]
+use = "gaussian"
+variance = { half_normal = 1.0 }
+
+[sampler]
+use = "affine_invariant_ensemble"
+walkers = 16
+steps = 300
+"#;
+
+const PLAIN: Oscillator =
+    Oscillator { stiffness: 40.0, damping: 0.2, cubic: 0.0, quadratic: 0.0, start: 0.1 };
+
+/// The account of a search in data of this oscillator, and what is written where it has something to add.
+fn searched(truth: Oscillator) -> (Account, Option<String>) {
+    let curve = truth.deflection(50, 120);
+    let times: Vec<f64> = (1..=120).map(|i| 0.05 * f64::from(i)).collect();
+    let at = |t: f64| curve[(t / 0.05).round() as usize - 1];
+    let (folder, study) = study(STUDY, at, &times, 2e-3);
+    let path = folder.path().join("study.toml");
+    fs::write(&path, &study.text).unwrap();
+    let mut run = RunDirectory::open(&folder.path().join("run")).unwrap();
+    let findings = lacuna::stage::find_gap(&study, &mut run, &Silent).unwrap();
+    let gap = findings.gap.as_ref().unwrap();
+    let written = (!gap.account.additions.is_empty()).then(|| {
+        let begun = Begun { study: &study, path: &path, settings: &[], findings: &findings, gap };
+        let (added, _) = add(&begun, &run, &Silent).unwrap();
+        fs::read_to_string(&added.study).unwrap()
+    });
+    (gap.account.clone(), written)
+}
+
+fn names(account: &Account, kind: &str, coefficient: f64) {
+    let kinds: Vec<&str> = account.additions.iter().map(|a| a.kind.as_str()).collect();
+    let leaders: Vec<_> = account.path.iter().map(|step| &step.leaders).collect();
+    assert_eq!((account.verdict.word, &kinds[..]), (Word::Named, &[kind][..]), "{leaders:#?}");
+    let found = &account.additions[0].unknowns[0];
+    assert!((found.value - coefficient).abs() < 4.0 * found.sd, "{found:?}");
+    assert!(account.held_out[0].proof.shrank, "{:?}", account.held_out);
+}
+
+#[test]
+fn a_spring_that_hardens_is_named_unasked() {
+    let (account, text) = searched(Oscillator { cubic: 600.0, ..PLAIN });
+    names(&account, "cubic_stiffness", 600.0);
+    let text = text.unwrap();
+    let rate = r#"v = "-stiffness * x - damping * v + cubic_stiffness * (-(x)^3)""#;
+    assert!(text.contains(rate) && text.contains("name = \"cubic_stiffness\""), "{text}");
+}
+
+/// The linear drag of the study stood in for the quadratic one: beside that it is not needed.
+#[test]
+fn a_term_that_stood_in_for_another_is_needless() {
+    let (account, text) = searched(Oscillator { quadratic: 1.5, damping: 0.0, ..PLAIN });
+    names(&account, "quadratic_friction", 1.5);
+    let own: Vec<&str> = account.needless.iter().map(|piece| piece.name.as_str()).collect();
+    assert_eq!(own, ["damping"], "{:?}", account.needless);
+    assert!(text.unwrap().contains("the study's own `damping` is not needed"));
+}
+
+#[test]
+fn a_drag_with_the_square_of_the_speed_is_named_unasked() {
+    let (account, _) = searched(Oscillator { quadratic: 1.5, ..PLAIN });
+    names(&account, "quadratic_friction", 1.5);
+    assert!(account.needless.is_empty(), "{:?}", account.needless);
+}
+
+#[test]
+fn where_the_equations_are_right_no_term_is_named() {
+    let (account, text) = searched(PLAIN);
+    assert_eq!(account.verdict.word, Word::None, "{:?}", account.verdict);
+    assert!(text.is_none());
+}
