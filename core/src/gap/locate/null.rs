@@ -12,7 +12,7 @@ use super::scan::{Cell, Scan};
 use super::score::{Directions, Scores, Spread, differences};
 use crate::gap::experiment::Experiment;
 use crate::gap::fit::{Fit, precision};
-use crate::gap::noise::Noise;
+use crate::gap::noise::{Around, Noise};
 use crate::gap::system::System;
 use crate::gap::whitener::Whitener;
 use crate::linalg::Matrix;
@@ -139,13 +139,14 @@ impl Bench<'_> {
     /// often that none of them is rare (Besag and Clifford, Biometrika 78 (1991) 301).
     pub fn nulls(&self, data: &Statistics, count: usize, stream: &Stream) -> Nulls {
         let mut nulls = Nulls::default();
+        let around = Around::fit(self.system, &self.fit.at);
         while nulls.energy.len() < count && !nulls.settled(data, self.directions) {
             let begin = nulls.energy.len();
             let end = count.min(begin + ROUND);
             let chunks: Vec<usize> = (begin..end).step_by(CHUNK).collect();
             let drawn: Vec<Vec<Drawn>> = chunks
                 .par_iter()
-                .map(|&first| self.simulations(first..end.min(first + CHUNK), stream))
+                .map(|&first| self.simulations(first..end.min(first + CHUNK), &around, stream))
                 .collect();
             for one in drawn.into_iter().flatten() {
                 nulls.score.push(one.score);
@@ -157,7 +158,7 @@ impl Bench<'_> {
     }
 
     /// Some simulations, whose scores are one product of matrices.
-    fn simulations(&self, numbers: Range<usize>, stream: &Stream) -> Vec<Drawn> {
+    fn simulations(&self, numbers: Range<usize>, around: &Around, stream: &Stream) -> Vec<Drawn> {
         let experiment = self.experiment();
         let response = &self.fit.at.response;
         let (mut misfits, mut rows) =
@@ -181,19 +182,35 @@ impl Bench<'_> {
         let (left, _) = self.projection.rest_of_rows(self.whitener.whiten_rows(&misfits));
         let scores = self.directions.scores(&left, &self.whitener.whiten_rows(&rows), &spread);
         let each = simulated.iter().zip(misfits.iter_rows()).zip(scores);
-        each.map(|((one, misfit), scores)| self.drawn(one, misfit, &scores)).collect()
+        each.map(|((one, misfit), scores)| self.drawn(one, misfit, &scores, around)).collect()
     }
 
-    /// One simulation with its noise estimated anew.
-    fn drawn(&self, simulated: &Experiment<'_>, misfit: &[f64], scores: &Scores) -> Drawn {
-        let response = &self.fit.at.response;
-        let noise = Noise::of(simulated, response, Some(self.noise));
-        let whitener = Whitener::new(simulated, &noise, response);
+    /// One simulation with its noise estimated anew. Scores studentised by replicates need no other noise; those of a noise
+    /// that is assumed do.
+    fn drawn(
+        &self,
+        simulated: &Experiment<'_>,
+        misfit: &[f64],
+        scores: &Scores,
+        around: &Around,
+    ) -> Drawn {
+        let noise = Noise::of(simulated, around, Some(self.noise));
+        let whitener = Whitener::new(simulated, &noise, &around.response);
         let slopes = whitener.whiten_rows(&self.fit.at.tangents);
         let precisions: Vec<f64> = self.system.priors().iter().map(precision).collect();
-        let left = Projection::off(&slopes, &precisions).rest(&whitener.whiten(misfit));
+        let projection = Projection::off(&slopes, &precisions);
+        let left = projection.rest(&whitener.whiten(misfit));
+        let anew = self.directions.whitened_anew(simulated, &whitener, &projection);
+        let score = match anew {
+            Some(anew) => {
+                let (rows, spread) = differences(simulated);
+                let white = whitener.whiten_rows(&rows);
+                anew.scores_of(&left, &white, &spread).largest(&anew)
+            }
+            None => scores.largest(self.directions),
+        };
         Drawn {
-            score: scores.largest(self.directions),
+            score,
             cells: self.scan.best(&left).into_iter().map(|cell| cell.statistic).collect(),
             energy: dot(&left, &left),
         }

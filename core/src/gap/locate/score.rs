@@ -50,6 +50,15 @@ pub struct Directions {
     pub left: Matrix,
     /// The variance of each score due to errors that all replicates share.
     pub common: Vec<f64>,
+    /// What each does to the response, one a row, where the noise is assumed: for other noises.
+    changes: Option<Matrix>,
+}
+
+/// A direction that was kept: what is left of it whitened, of length one, and what it does to the response.
+struct Kept {
+    direction: Direction,
+    left: Vec<f64>,
+    change: Vec<f64>,
 }
 
 /// Studentised scores.
@@ -88,7 +97,7 @@ impl Directions {
         let experiment = system.experiment;
         let mut all = Vec::new();
         let mut rows = Matrix::zeros(0, experiment.outputs());
-        let mut squares = Vec::new();
+        let mut changes = experiment.has_records().then(|| rows.clone());
         for (c, candidate) in candidates.iter().enumerate() {
             let own: Vec<usize> =
                 (0..suspects.len()).filter(|&s| suspects[s].candidate == c).collect();
@@ -96,15 +105,32 @@ impl Directions {
             for s in own {
                 let placed = suspects[s].placed(experiment, candidates, "");
                 let kept = Self::one(s, &placed, &slopes, whitener, projection);
-                for (direction, row, square) in kept {
-                    all.push(direction);
-                    rows.push_row(&row);
-                    squares.push(square);
+                for one in kept {
+                    all.push(one.direction);
+                    rows.push_row(&one.left);
+                    changes.iter_mut().for_each(|changes| changes.push_row(&one.change));
                 }
             }
         }
         let common = common(experiment, whitener, &rows);
-        Self { all, left: rows, common }
+        Self { all, left: rows, common, changes }
+    }
+
+    /// The same directions by another noise; `None` where noise is known from replicates, or stated.
+    pub fn whitened_anew(
+        &self,
+        experiment: &Experiment<'_>,
+        whitener: &Whitener,
+        projection: &Projection,
+    ) -> Option<Self> {
+        let changes = self.changes.as_ref()?;
+        let (mut left, squares) = projection.rest_of_rows(whitener.whiten_rows(changes));
+        for (i, square) in squares.iter().enumerate() {
+            let scale = 1.0 / square.max(f64::MIN_POSITIVE).sqrt();
+            left.row_mut(i).iter_mut().for_each(|x| *x *= scale);
+        }
+        let common = common(experiment, whitener, &left);
+        Some(Self { all: self.all.clone(), left, common, changes: None })
     }
 
     /// The different directions of one suspect.
@@ -114,15 +140,16 @@ impl Directions {
         slopes: &[(Vec<f64>, Vec<f64>)],
         whitener: &Whitener,
         projection: &Projection,
-    ) -> Vec<(Direction, Vec<f64>, f64)> {
+    ) -> Vec<Kept> {
         let masked = slopes.iter().map(|(_, slope)| -> Vec<f64> {
             slope.iter().zip(&placed.acts).map(|(x, acts)| if *acts { *x } else { 0.0 }).collect()
         });
-        let white = whitener.whiten_rows(&Matrix::from_rows(placed.acts.len(), masked));
+        let changes = Matrix::from_rows(placed.acts.len(), masked);
+        let white = whitener.whiten_rows(&changes);
         let lengths: Vec<f64> = white.iter_rows().map(|row| dot(row, row)).collect();
         let (left, squares) = projection.rest_of_rows(white);
         let sign = sign(placed);
-        let mut kept: Vec<(Direction, Vec<f64>, f64)> = Vec::new();
+        let mut kept: Vec<Kept> = Vec::new();
         for (i, (start, _)) in slopes.iter().enumerate() {
             let seen = squares[i] > ABSORBED * lengths[i] && lengths[i] > 0.0;
             if !seen {
@@ -130,12 +157,12 @@ impl Directions {
             }
             let length = squares[i].sqrt();
             let row: Vec<f64> = left.row(i).iter().map(|x| x / length).collect();
-            if kept.iter().any(|(_, other, _)| dot(other, &row).abs() > SAME) {
+            if kept.iter().any(|other| dot(&other.left, &row).abs() > SAME) {
                 continue;
             }
             let absorbed = 1.0 - squares[i] / lengths[i];
             let direction = Direction { suspect, start: start.clone(), sign, absorbed, length };
-            kept.push((direction, row, squares[i]));
+            kept.push(Kept { direction, left: row, change: changes.row(i).to_vec() });
         }
         kept
     }
