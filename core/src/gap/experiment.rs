@@ -200,10 +200,8 @@ impl<'a> Experiment<'a> {
 
     /// Whether the noise of some curve has to be assumed from one record.
     pub fn has_records(&self) -> bool {
-        let alone = |curve: &&Curve| {
-            !curve.measured.is_empty() && self.conditions[curve.condition].replicates.len() < 2
-        };
-        self.stated.is_none() && self.curves.iter().any(|curve| alone(&curve))
+        let alone = |curve: &Curve| !curve.measured.is_empty() && self.complete(curve).len() < 2;
+        self.stated.is_none() && self.curves.iter().any(alone)
     }
 
     /// The largest number of replicates of a condition.

@@ -141,3 +141,48 @@ impl Record<'_> {
         all[self.unknowns.len()..].iter().map(gain).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::gap::noise::Autoregression;
+    use crate::math::random::{Stream, normal};
+
+    /// Records of first order about something else, and the noise that is found in them.
+    fn found(length: usize, a: f64, records: u64, slow: impl Fn(f64) -> f64) -> Vec<[f64; 2]> {
+        let places: Vec<usize> = (0..length).collect();
+        let level = vec![(length as f64).sqrt().recip(); length];
+        let memory = Autoregression::of_reflections(&[a]);
+        let record = |b: u64| {
+            let mut rng = Stream::root(21).at(b).generator();
+            let mut values: Vec<f64> = (0..length).map(|_| normal(&mut rng)).collect();
+            memory.colour(&mut values);
+            let at = (0..length).map(|t| t as f64 / length as f64);
+            values.iter_mut().zip(at).for_each(|(y, x)| *y += slow(x));
+            let law = law(&values, &[level.clone()], &places).unwrap();
+            [law.sd, law.memory.autocovariances(2)[1] / law.memory.variance()]
+        };
+        (0..records).map(record).collect()
+    }
+
+    /// A curve ten times as large as the noise changes little of what is found: innovations of size one, a correlation of a
+    /// half; the edges of a cycle's band pass for a slower noise. The standard errors of n values are `1 / sqrt(2 n)` and
+    /// `sqrt((1 - a^2) / n)` (Brockwell and Davis, section 8.1).
+    #[test]
+    fn noise_is_found_about_what_is_slow() {
+        let (length, a, records) = (300, 0.5, 12);
+        let shapes: [(fn(f64) -> f64, f64); 3] = [
+            (|_| 0.0, 0.03),
+            (|x| 40.0 * (x * x - x / 3.0), 0.1),
+            (|x| 14.0 * (75.0 * x).sin(), 0.4),
+        ];
+        for (shape, bound) in shapes {
+            let found = found(length, a, records, shape);
+            let mean = |k: usize| found.iter().map(|own| own[k]).sum::<f64>() / records as f64;
+            let n = length as f64 * records as f64;
+            assert!((mean(0) - 1.0).abs() < bound + 4.0 / (2.0 * n).sqrt(), "{}", mean(0));
+            assert!((mean(1) - a).abs() < bound + 4.0 * ((1.0 - a * a) / n).sqrt(), "{}", mean(1));
+        }
+    }
+}
