@@ -30,6 +30,8 @@ mod names;
 mod places;
 #[path = "gap/proofs.rs"]
 mod proofs;
+#[path = "gap/records.rs"]
+mod records;
 #[path = "gap/tally.rs"]
 mod tally;
 #[path = "gap/target/mod.rs"]

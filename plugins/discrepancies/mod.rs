@@ -6,3 +6,6 @@ pub mod gaussian;
 pub mod gaussian_process;
 pub mod multiplicative_gaussian;
 pub mod student_t;
+
+#[cfg(test)]
+mod tests;

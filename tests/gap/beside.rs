@@ -6,7 +6,7 @@ use lacuna::gap::drift::{self, Reading, drift};
 use lacuna::gap::experiment::Experiment;
 use lacuna::gap::fit::fit;
 use lacuna::gap::name::{Desk, Found, LeftOut, Options, Rival, What, foretell, search, separate};
-use lacuna::gap::noise::Noise;
+use lacuna::gap::noise::{Around, Noise};
 use lacuna::gap::system::System;
 use lacuna::gap::unlisted::{describe, stopgap, symbolic};
 use lacuna::gap::whitener::{Whitener, condensed};
@@ -24,7 +24,7 @@ fn looked<T>(case: &Case, use_it: impl FnOnce(&Experiment<'_>, &[f64]) -> T) -> 
     let mut experiment = Experiment::new(&layouts, &parameters, &**emulator, &data);
     let response = emulator.mean(&Matrix::from_rows(4, [REFERENCE])).row(0).to_vec();
     experiment.common = vec![error.clone()];
-    let noise = Noise::of(&experiment, &response, None);
+    let noise = Noise::of(&experiment, &Around::fixed(&response), None);
     experiment.common = condensed(&experiment, &noise, &response);
     use_it(&experiment, &response)
 }
@@ -36,7 +36,7 @@ fn searched<T>(
     use_it: impl FnOnce(&Experiment<'_>, &[Candidate], &Found<'_>) -> T,
 ) -> T {
     looked(case, |experiment, response| {
-        let noise = Noise::of(experiment, response, None);
+        let noise = Noise::of(experiment, &Around::fixed(response), None);
         let sd = noise.sd(experiment, response);
         let situation = Situation { layouts: experiment.layouts, response, noise: &sd };
         let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
@@ -53,10 +53,10 @@ fn reading(case: &Case) -> (Reading, String) {
     looked(case, |experiment, response| {
         let system = System::new(experiment, Vec::new());
         let (_, means) = experiment.means();
-        let noise = Noise::of(experiment, response, None);
+        let noise = Noise::of(experiment, &Around::fixed(response), None);
         let whitener = Whitener::new(experiment, &noise, response);
         let found = fit(&system, &whitener, &means, &REFERENCE);
-        let noise = Noise::of(experiment, &found.at.response, None);
+        let noise = Noise::of(experiment, &Around::fixed(&found.at.response), None);
         let whitener = Whitener::new(experiment, &noise, &found.at.response);
         let found = fit(&system, &whitener, &means, &found.at.point);
         let options = drift::Options { simulations: 99, ..drift::Options::default() };

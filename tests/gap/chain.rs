@@ -10,7 +10,7 @@ use lacuna::gap::common::shared;
 use lacuna::gap::experiment::Experiment;
 use lacuna::gap::locate::Region;
 use lacuna::gap::name::{Found, Options, Verdict, search, verdict};
-use lacuna::gap::noise::Noise;
+use lacuna::gap::noise::{Around, Noise};
 use lacuna::gap::prove::{Proof, prove};
 use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
@@ -110,7 +110,7 @@ pub fn ask(case: &Case, replicates: usize, seed: u64) -> Answer {
     let mut experiment = Experiment::new(&layouts, &parameters, &**emulator, &data);
     let centre: Vec<f64> = REFERENCE.to_vec();
     let response = emulator.mean(&Matrix::from_rows(4, [&centre])).row(0).to_vec();
-    let noise = Noise::of(&experiment, &response, None);
+    let noise = Noise::of(&experiment, &Around::fixed(&response), None);
     let all = shared(&experiment, &noise, &response, std::slice::from_ref(error));
     (experiment.common, experiment.remainder) = (all.common, all.remainder);
     let sd = noise.sd(&experiment, &response);

@@ -7,7 +7,7 @@ use std::fs;
 use lacuna::gap::experiment::Experiment;
 use lacuna::gap::fit::fit;
 use lacuna::gap::name::{Options, Verdict, Word, search, verdict};
-use lacuna::gap::noise::Noise;
+use lacuna::gap::noise::{Around, Noise};
 use lacuna::gap::system::System;
 use lacuna::gap::whitener::Whitener;
 use lacuna::linalg::Matrix;
@@ -321,7 +321,7 @@ fn another_model_is_weighed_after_its_own_calibration() {
     let experiment = Experiment::new(&study.layouts, &study.parameters, known.forward, measured);
     let system = System::new(&experiment, Vec::new());
     let response = system.response(&[100.0]);
-    let noise = Noise::of(&experiment, &response, None);
+    let noise = Noise::of(&experiment, &Around::fixed(&response), None);
     let whitener = Whitener::new(&experiment, &noise, &response);
     let means = experiment.means().1;
     let base = fit(&system, &whitener, &means, &[100.0]);

@@ -11,7 +11,7 @@ use lacuna::data::{Axis, Layout, Layouts, Measurements, Observations, Parameter,
 use lacuna::gap::candidates::proposed;
 use lacuna::gap::experiment::Experiment;
 use lacuna::gap::name::{Options, search, verdict};
-use lacuna::gap::noise::Noise;
+use lacuna::gap::noise::{Around, Noise};
 use lacuna::gap::prove::prove;
 use lacuna::gap::whitener::condensed;
 use lacuna::linalg::Matrix;
@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let centre = vec![0.5; 3];
     let response = emulator.mean(&Matrix::from_rows(3, [&centre])).row(0).to_vec();
     let whole = Instant::now();
-    let noise = stage("noise", || Noise::of(&experiment, &response, None))?;
+    let noise = stage("noise", || Noise::of(&experiment, &Around::fixed(&response), None))?;
     experiment.common =
         stage("common errors condensed", || condensed(&experiment, &noise, &response))?;
     println!("  directions of the common error: {}", experiment.common[0].factor.columns());

@@ -13,6 +13,7 @@ use super::insight::{Insight, insight, withhold};
 use super::locate::Region;
 use super::name::{Found, Look, Options, Step, Verdict, Visible, verdict};
 use super::needless::Needless;
+use super::noise::Origin;
 use super::prove::Proof;
 use super::replaced::OtherModel;
 use crate::data::Unit;
@@ -215,8 +216,8 @@ pub struct CurveAccount {
     /// The standard deviations of what whole replicates differ by: offset in the response's unit, gain, and clock in the
     /// last axis's unit; its own and shared with other curves.
     pub wander: [f64; 3],
-    /// Whether the noise is assumed for want of replicates.
-    pub assumed: bool,
+    /// Where the noise is known from.
+    pub origin: Origin,
 }
 
 /// What the comparison with one kind of held-out data shows.
@@ -257,7 +258,7 @@ impl Account {
         let (counts, _) = experiment.means();
         Self {
             levels: [options.naming, options.unlisted],
-            noise_assumed: found.noise.assumed.contains(&true),
+            noise_assumed: found.noise.is_assumed(),
             additions: additions(found, candidates, &verdict),
             path: found.path.iter().map(|step| passed(step, candidates)).collect(),
             p: looks.map(|look| look.p),
@@ -398,7 +399,7 @@ fn curves(found: &Found<'_>) -> Vec<CurveAccount> {
             sd: (squares / curve.measured.len().max(1) as f64).sqrt(),
             memory: noise.memory.coefficients().to_vec(),
             wander: [0, 1, 2].map(|d| (own[d] + shared[d]).sqrt()),
-            assumed: found.noise.assumed[s],
+            origin: found.noise.origins[s],
         }
     };
     experiment.curves.iter().enumerate().map(account).collect()

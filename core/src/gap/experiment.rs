@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::wide::Wide;
 use crate::data::{Coordinates, Layout, Layouts, Observations, Parameter, layouts::SCENARIO};
 use crate::plugin::Forward;
-use crate::plugin::discrepancy::CommonError;
+use crate::plugin::discrepancy::{CommonError, StatedNoise};
 
 /// Measurements with the forward map that should explain them.
 #[derive(Clone)]
@@ -23,6 +23,8 @@ pub struct Experiment<'a> {
     /// What such errors have outside their directions, as [`common`](super::common) finds it: the variance of
     /// innovations that follow each other as the noise's do, one an output; nothing where it is empty.
     pub remainder: Vec<f64>,
+    /// The noise of one replicate as the study states it, where it does: that of curves without replicates.
+    pub stated: Option<StatedNoise>,
     /// Where the forward map holds, where that is narrower than the priors.
     pub region: Option<Vec<(f64, f64)>>,
     /// The measurements, by condition.
@@ -60,6 +62,34 @@ pub struct Curve {
 }
 
 impl Curve {
+    /// The place of each measured value in usual steps between two, counted from the first.
+    pub fn places(&self) -> Vec<usize> {
+        let usual = self.usual();
+        let mut places = Vec::with_capacity(self.measured.len());
+        for (k, &i) in self.measured.iter().enumerate() {
+            let next = match k {
+                0 => 0,
+                _ => places[k - 1] + ((i - self.measured[k - 1] + usual / 2) / usual).max(1),
+            };
+            places.push(next);
+        }
+        places
+    }
+
+    /// The usual distance of two values next to each other along the last axis, in its unit; one below two values.
+    pub fn step(&self) -> f64 {
+        let mut steps: Vec<f64> = self.at.windows(2).map(|w| w[1] - w[0]).collect();
+        steps.sort_by(f64::total_cmp);
+        steps.get(steps.len() / 2).copied().unwrap_or(1.0)
+    }
+
+    /// The usual distance of two measured outputs next to each other.
+    fn usual(&self) -> usize {
+        let mut steps: Vec<usize> = self.measured.windows(2).map(|w| w[1] - w[0]).collect();
+        steps.sort_unstable();
+        steps.get(steps.len() / 2).copied().unwrap_or(1)
+    }
+
     /// Its labels in words; the response's name where it has none.
     pub fn name(&self, layouts: &Layouts) -> String {
         if self.labels.is_empty() {
@@ -102,6 +132,7 @@ impl<'a> Experiment<'a> {
             wide: None,
             common: Vec::new(),
             remainder: Vec::new(),
+            stated: None,
             region: None,
             conditions,
             curves,
@@ -165,6 +196,12 @@ impl<'a> Experiment<'a> {
             condition.replicates = replicates;
         }
         other
+    }
+
+    /// Whether the noise of some curve has to be assumed from one record.
+    pub fn has_records(&self) -> bool {
+        let alone = |curve: &Curve| !curve.measured.is_empty() && self.complete(curve).len() < 2;
+        self.stated.is_none() && self.curves.iter().any(alone)
     }
 
     /// The largest number of replicates of a condition.

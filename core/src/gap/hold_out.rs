@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::blocks::set_aside;
 use crate::data::layouts::SCENARIO;
 use crate::data::{Coordinates, Layout, Measurements, Observations, Replicate};
-use crate::math::random::{Stream, below, permutation};
+use crate::math::random::{Stream, permutation};
 use crate::plugin::effect::acts;
 use crate::study::gap::HoldOut;
 
@@ -15,12 +16,6 @@ const FEWEST: usize = 3;
 
 /// Replicates of a condition that are left to learn its noise from.
 const LEFT: usize = 2;
-
-/// Blocks into which a curve is cut where there are no replicates to set aside.
-const BLOCKS: usize = 8;
-
-/// The fewest values of a curve of which blocks are set aside.
-const LONG: usize = 4 * BLOCKS;
 
 /// Measurements in two parts.
 #[derive(Debug, Clone, PartialEq)]
@@ -106,7 +101,7 @@ pub fn split(data: &Observations, wish: &HoldOut, stream: &Stream) -> Split {
         add(kind, part(data, |b, _, _, i| masks[b].kind(i) == Some(kind)));
     }
     if held_out.is_empty() && wish.replicates.get() > 0.0 {
-        return blocks(data, &stream.named("blocks"));
+        return blocks(data, wish.replicates.get(), &stream.named("blocks"));
     }
     Split { training, held_out }
 }
@@ -190,9 +185,8 @@ fn conditions(layout: &Layout, replicate: &Replicate) -> Vec<bool> {
     replicate.values.chunks(length).map(|own| own.iter().any(Option::is_some)).collect()
 }
 
-/// Two blocks inside each curve, which do not touch each other: the same of all its replicates, so that two of them
-/// still show how they differ.
-fn blocks(data: &Observations, stream: &Stream) -> Split {
+/// Blocks inside each curve: the same of all its replicates, so that two of them still show how they differ.
+fn blocks(data: &Observations, share: f64, stream: &Stream) -> Split {
     let mut training = data.clone();
     let mut held_out: Vec<Measurements> = data
         .blocks
@@ -208,16 +202,12 @@ fn blocks(data: &Observations, stream: &Stream) -> Split {
         for begin in (0..block.layout.len()).step_by(length) {
             let is_measured = |i: &usize| block.replicates.iter().any(|r| r.values[*i].is_some());
             let measured: Vec<usize> = (begin..begin + length).filter(is_measured).collect();
-            if measured.len() < LONG {
-                continue;
-            }
             drawn += 1;
-            for k in inner(&stream.at(drawn)) {
-                let edge = |k: usize| k * measured.len() / BLOCKS;
-                let place = block.layout.describe(measured[edge(k)]);
+            for own in set_aside(measured.len(), share, &stream.at(drawn)) {
+                let place = block.layout.describe(measured[own.start]);
                 for replicate in &mut training.blocks[b].replicates {
                     let mut values = vec![None; replicate.values.len()];
-                    for &i in &measured[edge(k)..edge(k + 1)] {
+                    for &i in &measured[own.clone()] {
                         values[i] = replicate.values[i].take();
                     }
                     if values.iter().any(Option::is_some) {
@@ -234,15 +224,6 @@ fn blocks(data: &Observations, stream: &Stream) -> Split {
     }
     let names = data.blocks.iter().flat_map(|b| &b.replicates).map(|r| r.name.clone()).collect();
     Split { training, held_out: vec![HeldOutData { kind: Kind::Blocks, names, data }] }
-}
-
-/// Two of the inner blocks of a curve with one between them at least.
-fn inner(stream: &Stream) -> [usize; 2] {
-    let mut rng = stream.generator();
-    // Of the places 1 to 6 the first leaves room for a second one two further on.
-    let first = 1 + below(&mut rng, BLOCKS - 4);
-    let second = first + 2 + below(&mut rng, BLOCKS - 3 - first);
-    [first, second]
 }
 
 #[cfg(test)]
@@ -317,7 +298,7 @@ mod tests {
             let split = split(&data, &HoldOut::default(), &Stream::root(seed));
             assert_apart(&data, &split);
             let part = &split.held_out[0];
-            assert_eq!((part.kind, part.names.len(), part.data.count()), (Kind::Blocks, 4, 40));
+            assert_eq!((part.kind, part.names.len(), part.data.count()), (Kind::Blocks, 10, 40));
         }
     }
 
@@ -330,6 +311,6 @@ mod tests {
             split.training.blocks[0].replicates[r].values.iter().map(Option::is_none).collect()
         };
         assert_eq!(lacks(0), lacks(1));
-        assert_eq!(split.held_out[0].names.len(), 8);
+        assert_eq!(split.held_out[0].names.len(), 20);
     }
 }

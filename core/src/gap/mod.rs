@@ -6,6 +6,7 @@
 
 pub mod account;
 pub mod added;
+mod blocks;
 pub mod candidates;
 pub mod common;
 pub mod drift;

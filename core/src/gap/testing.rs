@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use super::experiment::Experiment;
-use super::noise::{Autoregression, CurveNoise, Noise, Wander};
+use super::noise::{Autoregression, CurveNoise, Noise, Origin, Wander};
 use crate::data::{Axis, Layout, Layouts, Measurements, Observations, Parameter, Replicate, Unit};
 use crate::linalg::{Matrix, multiply, transposed_multiply_vector};
 use crate::math::distribution::Distribution;
@@ -84,7 +84,7 @@ impl World {
             curves: vec![curve; curves],
             shared: vec![Wander::default(); conditions.len()],
             across: vec![None; conditions.len()],
-            assumed: vec![false; curves],
+            origins: vec![Origin::Replicates; curves],
         };
         let parameters = names.iter().map(parameter).collect();
         Self { layouts, parameters, forward: Linear { slopes }, noise }

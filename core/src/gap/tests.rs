@@ -4,7 +4,7 @@
 use super::experiment::Experiment;
 use super::fit::fit;
 use super::name::weigh;
-use super::noise::{Autoregression, CurveNoise, Noise, Wander};
+use super::noise::{Autoregression, CurveNoise, Noise, Origin, Wander};
 use super::prove::prove;
 use super::system::System;
 use super::whitener::Whitener;
@@ -73,7 +73,7 @@ fn white() -> Noise {
         curves: vec![curve],
         shared: vec![Wander::default()],
         across: vec![None],
-        assumed: vec![false],
+        origins: vec![Origin::Replicates],
     }
 }
 

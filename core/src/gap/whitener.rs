@@ -5,7 +5,7 @@
 //! curves, so that whitening takes one pass over the curves and one product with a thin matrix.
 
 use super::experiment::Experiment;
-use super::noise::{Noise, directions};
+use super::noise::{Noise, Succession, directions};
 use crate::linalg::vector::dot;
 use crate::linalg::{
     Matrix, multiply, multiply_transposed, multiply_vector, symmetric_eigen, transposed_multiply,
@@ -33,9 +33,7 @@ struct CurveWhitener {
     measured: Vec<usize>,
     /// One over the standard deviation of innovations of the mean and the remainder, one a measured value.
     scale: Vec<f64>,
-    memory: super::noise::Autoregression,
-    /// Values without a hole between them over which noise forgets.
-    runs: Vec<std::ops::Range<usize>>,
+    succession: Succession,
 }
 
 /// `(I + U U')^-1/2 = I - Q diag(shrink) Q'`.
@@ -68,9 +66,8 @@ impl Whitener {
                 scale.push(1.0 / variance.sqrt());
                 remainder[i] = rest / variance;
             }
-            let (measured, memory) = (curve.measured.clone(), law.memory.clone());
-            let runs = runs(&measured, memory.inflation());
-            curves.push(CurveWhitener { measured, scale, memory, runs });
+            let (measured, succession) = (curve.measured.clone(), law.succession(curve));
+            curves.push(CurveWhitener { measured, scale, succession });
         }
         let conditions = experiment.conditions.iter().zip(&noise.across);
         let across = conditions
@@ -139,6 +136,21 @@ impl Whitener {
         all
     }
 
+    /// The logarithm of the determinant of [`Whitener::whiten`] on what was measured.
+    pub fn log_determinant(&self) -> f64 {
+        let curves = self.curves.iter().map(|curve| {
+            let scales = curve.scale.iter().map(|s| s.ln()).sum::<f64>();
+            scales + curve.succession.log_determinant()
+        });
+        let across = self.across.iter().map(|(curves, factor)| {
+            let length = self.curves[curves.start].measured.len() as f64;
+            -length * (0..factor.rows()).map(|i| factor[(i, i)].ln()).sum::<f64>()
+        });
+        let shrink = self.low_rank.iter().flat_map(|low_rank| &low_rank.shrink);
+        let low_rank = shrink.map(|s| (1.0 - s).ln()).sum::<f64>();
+        curves.sum::<f64>() + across.sum::<f64>() + low_rank
+    }
+
     /// Rows whitened without the part of low rank.
     pub(super) fn base_rows(&self, rows: &Matrix) -> Matrix {
         Matrix::from_rows(self.outputs, rows.iter_rows().map(|row| self.base(row)))
@@ -154,7 +166,7 @@ impl Whitener {
                 let mut values: Vec<f64> = each.map(|(&i, s)| differences[i] * s).collect();
                 // Many directions are of one curve only.
                 if values.iter().any(|v| *v != 0.0) {
-                    curve.runs.iter().for_each(|run| curve.memory.whiten(&mut values[run.clone()]));
+                    curve.succession.whiten(&mut values);
                 }
                 values
             })
@@ -171,25 +183,6 @@ impl Whitener {
         }
         white
     }
-}
-
-/// Runs of measured values: a hole is wider than the noise goes together, twice the sum of its autocorrelations, counted in
-/// the usual step between two values.
-fn runs(measured: &[usize], together: f64) -> Vec<std::ops::Range<usize>> {
-    let mut steps: Vec<usize> = measured.windows(2).map(|w| w[1] - w[0]).collect();
-    steps.sort_unstable();
-    let usual = steps.get(steps.len() / 2).map_or(1.0, |step| *step as f64);
-    let hole = |k: usize| (measured[k] - measured[k - 1]) as f64 > 2.0 * together.max(1.0) * usual;
-    let mut begin = 0;
-    let mut all = Vec::new();
-    for k in 1..measured.len() {
-        if hole(k) {
-            all.push(begin..k);
-            begin = k;
-        }
-    }
-    all.push(begin..measured.len());
-    all
 }
 
 /// Solves with a lower factor across curves, in place.

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::forward::Linear;
 use super::{Component, Fact};
-use crate::data::{Measurements, Unit};
+use crate::data::{Layout, Measurements, Unit};
 use crate::linalg::{Matrix, transposed_multiply_vector};
 use crate::math::distribution::Distribution;
 use crate::math::random::Stream;
@@ -14,6 +14,22 @@ use crate::run::Stop;
 pub trait Discrepancy: Component {
     /// The likelihood of what is known.
     fn likelihood(&self, known: &Known<'_>) -> Result<Box<dyn Likelihood>, Stop>;
+
+    /// The noise of one replicate around a response of this layout, where the options say how large it is: nothing of it
+    /// is an unknown, and it does not come from the replicates.
+    fn stated_noise(&self, _layout: &Layout, _response: &[f64]) -> Option<StatedNoise> {
+        None
+    }
+}
+
+/// The noise of one replicate as a study states it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StatedNoise {
+    /// The standard deviation of each output, in the response's unit.
+    pub sd: Vec<f64>,
+    /// The time over which correlations along the last axis fall by a factor e, one an output, in the axis's unit; `None`
+    /// where values are independent.
+    pub correlation_time: Option<Vec<f64>>,
 }
 
 /// What a likelihood is built from.

@@ -5,8 +5,9 @@ mod steps;
 #[cfg(test)]
 mod tests;
 
+use lacuna::data::Layout;
 use lacuna::plugin::component::{Component, Context};
-use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood};
+use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood, StatedNoise};
 use lacuna::run::Stop;
 use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
@@ -79,6 +80,15 @@ impl Component for Autoregressive {
 impl Discrepancy for Autoregressive {
     fn likelihood(&self, known: &Known<'_>) -> Result<Box<dyn Likelihood>, Stop> {
         Ok(Box::new(AutoregressiveLikelihood::new(self, known)?))
+    }
+
+    fn stated_noise(&self, layout: &Layout, _: &[f64]) -> Option<StatedNoise> {
+        // Values along another axis than the last do not follow each other in a curve.
+        let last = Series::of(layout, None).ok()?.axis;
+        let sd = self.variance.known_sd(layout, &self.by)?;
+        let times = self.correlation_time.known(layout, &self.correlation_by)?;
+        let along_last = self.along.as_ref().is_none_or(|along| *along == last);
+        along_last.then_some(StatedNoise { sd, correlation_time: Some(times) })
     }
 }
 

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::fmt;
 
+use lacuna::data::Layout;
 use lacuna::math::distribution::Distribution;
 use lacuna::study::problem::Complaints;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -11,7 +12,7 @@ use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
 
-use super::Groups;
+use super::{By, Groups};
 
 /// A number that is known, `{ known = 2.5e-11 }` (or one for each group,
 /// `{ known = [1e-11, 4e-11] }`), or the prior of one that is not, such as
@@ -34,6 +35,18 @@ pub enum Variance {
 }
 
 impl Quantity {
+    /// The number of each output of a layout whose outputs share it like this, where it is known.
+    pub fn known(&self, layout: &Layout, by: &By) -> Option<Vec<f64>> {
+        let Self::Known(values) = self else { return None };
+        let groups = Groups::of(layout, by).ok()?;
+        let of_group = |g: &usize| match values.as_slice() {
+            [one] => Some(*one),
+            many => many.get(*g).copied(),
+        };
+        let each: Option<Vec<f64>> = groups.position.iter().map(of_group).collect();
+        Some(groups.spread(&each?))
+    }
+
     /// Complains about a number that is not above zero and about a prior that allows none that is.
     pub fn check_positive(&self, at: &str, groups: usize, complaints: &mut Complaints<'_>) {
         match self {
@@ -64,6 +77,13 @@ impl Quantity {
 }
 
 impl Variance {
+    /// The standard deviation of each output of a layout, where the variance is known and not the replicates'.
+    pub fn known_sd(&self, layout: &Layout, by: &By) -> Option<Vec<f64>> {
+        let Self::Of(quantity) = self else { return None };
+        let variance = quantity.known(layout, by)?;
+        Some(variance.into_iter().map(f64::sqrt).collect())
+    }
+
     /// The prior of the unknown variances or multipliers.
     pub fn prior(&self) -> Option<&Distribution> {
         let (Self::Of(quantity) | Self::Measured(quantity)) = self;

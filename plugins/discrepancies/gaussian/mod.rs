@@ -9,8 +9,9 @@ mod statistics;
 #[cfg(test)]
 mod tests;
 
+use lacuna::data::Layout;
 use lacuna::plugin::component::{Component, Context};
-use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood};
+use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood, StatedNoise};
 use lacuna::run::Stop;
 use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
@@ -84,6 +85,11 @@ impl Component for Gaussian {
 impl Discrepancy for Gaussian {
     fn likelihood(&self, known: &Known<'_>) -> Result<Box<dyn Likelihood>, Stop> {
         Ok(Box::new(GaussianLikelihood::new(self, known)?))
+    }
+
+    fn stated_noise(&self, layout: &Layout, _: &[f64]) -> Option<StatedNoise> {
+        let sd = self.variance.known_sd(layout, &self.by)?;
+        Some(StatedNoise { sd, correlation_time: None })
     }
 }
 

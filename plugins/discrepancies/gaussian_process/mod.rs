@@ -9,8 +9,9 @@ mod solve;
 #[cfg(test)]
 mod tests;
 
+use lacuna::data::Layout;
 use lacuna::plugin::component::{Component, Context};
-use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood};
+use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood, StatedNoise};
 use lacuna::run::Stop;
 use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
@@ -102,6 +103,11 @@ impl Component for GaussianProcess {
 impl Discrepancy for GaussianProcess {
     fn likelihood(&self, known: &Known<'_>) -> Result<Box<dyn Likelihood>, Stop> {
         Ok(Box::new(BiasedLikelihood::new(self, known)?))
+    }
+
+    fn stated_noise(&self, layout: &Layout, _: &[f64]) -> Option<StatedNoise> {
+        let sd = self.variance.known_sd(layout, &self.by)?;
+        Some(StatedNoise { sd, correlation_time: None })
     }
 }
 

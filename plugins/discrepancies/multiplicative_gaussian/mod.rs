@@ -3,10 +3,12 @@
 #[cfg(test)]
 mod tests;
 
-use lacuna::data::{Measurements, Unit};
+use lacuna::data::{Layout, Measurements, Unit};
 use lacuna::math::random::Stream;
 use lacuna::plugin::component::{Component, Context};
-use lacuna::plugin::discrepancy::{Discrepancy, Hyperparameter, Known, Likelihood, VariancePart};
+use lacuna::plugin::discrepancy::{
+    Discrepancy, Hyperparameter, Known, Likelihood, StatedNoise, VariancePart,
+};
 use lacuna::run::Stop;
 use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
@@ -80,6 +82,17 @@ impl Discrepancy for MultiplicativeGaussian {
             floor,
             hyper,
         }))
+    }
+
+    fn stated_noise(&self, layout: &Layout, response: &[f64]) -> Option<StatedNoise> {
+        let relative = self.relative.known(layout, &self.by)?;
+        let floor = match &self.floor {
+            Some(floor) => floor.known(layout, &By::default())?,
+            None => vec![0.0; layout.len()],
+        };
+        let each = relative.iter().zip(response).zip(floor);
+        let sd = each.map(|((r, m), floor)| (r * m).hypot(floor)).collect();
+        Some(StatedNoise { sd, correlation_time: None })
     }
 }
 

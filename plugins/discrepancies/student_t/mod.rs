@@ -5,9 +5,10 @@ mod likelihood;
 #[cfg(test)]
 mod tests;
 
+use lacuna::data::Layout;
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::component::{Component, Context};
-use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood};
+use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood, StatedNoise};
 use lacuna::run::Stop;
 use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
@@ -101,6 +102,13 @@ impl Component for StudentT {
 impl Discrepancy for StudentT {
     fn likelihood(&self, known: &Known<'_>) -> Result<Box<dyn Likelihood>, Stop> {
         Ok(Box::new(StudentLikelihood::new(self, known)?))
+    }
+
+    fn stated_noise(&self, layout: &Layout, _: &[f64]) -> Option<StatedNoise> {
+        let scales = self.scale.known(layout, &self.by)?;
+        let degrees = self.degrees_of_freedom.known(layout, &By::default())?;
+        let sd = scales.iter().zip(degrees).map(|(s, d)| s * (d / (d - 2.0)).sqrt()).collect();
+        Some(StatedNoise { sd, correlation_time: None })
     }
 }
 

@@ -10,7 +10,7 @@ use crate::data::Parameter;
 use crate::gap::experiment::Experiment;
 use crate::gap::fit::{Fit, precision};
 use crate::gap::locate::{common_error, probability};
-use crate::gap::noise::Noise;
+use crate::gap::noise::{Around, Noise};
 use crate::gap::system::System;
 use crate::gap::whitener::Whitener;
 use crate::linalg::vector::dot;
@@ -137,7 +137,8 @@ impl Bench<'_> {
         let simulated = self.experiment.with_replicates(replicates);
         let error = common_error(self.experiment, self.noise, &stream.named("common"));
         let (_, means) = simulated.means();
-        let noise = Noise::of(&simulated, self.response, Some(self.noise));
+        let around = Around { response: self.response.to_vec(), slopes: self.common.clone() };
+        let noise = Noise::of(&simulated, &around, Some(self.noise));
         let whitener = Whitener::new(&simulated, &noise, self.response);
         let misfit: Vec<f64> =
             (0..means.len()).map(|i| means[i] - self.response[i] + error[i]).collect();

@@ -12,7 +12,7 @@ use super::scan::{Cell, Scan};
 use super::score::{Directions, Scores, Spread, differences};
 use crate::gap::experiment::Experiment;
 use crate::gap::fit::{Fit, precision};
-use crate::gap::noise::Noise;
+use crate::gap::noise::{Around, Noise};
 use crate::gap::system::System;
 use crate::gap::whitener::Whitener;
 use crate::linalg::Matrix;
@@ -143,13 +143,14 @@ impl Bench<'_> {
     /// often that none of them is rare (Besag and Clifford, Biometrika 78 (1991) 301).
     pub fn nulls(&self, data: &Statistics, count: usize, stream: &Stream) -> Nulls {
         let mut nulls = Nulls::default();
+        let around = Around::fit(self.system, &self.fit.at);
         while nulls.energy.len() < count && !nulls.settled(data, self.directions) {
             let begin = nulls.energy.len();
             let end = count.min(begin + ROUND);
             let chunks: Vec<usize> = (begin..end).step_by(CHUNK).collect();
             let drawn: Vec<Vec<Drawn>> = chunks
                 .par_iter()
-                .map(|&first| self.simulations(first..end.min(first + CHUNK), stream))
+                .map(|&first| self.simulations(first..end.min(first + CHUNK), &around, stream))
                 .collect();
             for one in drawn.into_iter().flatten() {
                 nulls.score.push(one.score);
@@ -161,7 +162,7 @@ impl Bench<'_> {
     }
 
     /// Some simulations, whose scores are one product of matrices.
-    fn simulations(&self, numbers: Range<usize>, stream: &Stream) -> Vec<Drawn> {
+    fn simulations(&self, numbers: Range<usize>, around: &Around, stream: &Stream) -> Vec<Drawn> {
         let experiment = self.experiment();
         let response = &self.fit.at.response;
         let (mut misfits, mut rows) =
@@ -185,20 +186,26 @@ impl Bench<'_> {
         let (left, _) = self.projection.rest_of_rows(self.whitener.whiten_rows(&misfits));
         let scores = self.directions.scores(&left, &self.whitener.whiten_rows(&rows), &spread);
         let each = simulated.iter().zip(misfits.iter_rows()).zip(scores);
-        each.map(|((one, misfit), scores)| self.drawn(one, misfit, &scores)).collect()
+        each.map(|((one, misfit), scores)| self.drawn(one, misfit, &scores, around)).collect()
     }
 
     /// One simulation with its noise estimated anew; `near` are its scores through the noise of the data.
-    fn drawn(&self, simulated: &Experiment<'_>, misfit: &[f64], near: &Scores) -> Drawn {
-        let response = &self.fit.at.response;
-        let noise = Noise::of(simulated, response, Some(self.noise));
-        let whitener = Whitener::new(simulated, &noise, response);
+    fn drawn(
+        &self,
+        simulated: &Experiment<'_>,
+        misfit: &[f64],
+        near: &Scores,
+        around: &Around,
+    ) -> Drawn {
+        let noise = Noise::of(simulated, around, Some(self.noise));
+        let whitener = Whitener::new(simulated, &noise, &around.response);
         let slopes = whitener.whiten_rows(&self.fit.at.tangents);
         let precisions: Vec<f64> = self.system.priors().iter().map(precision).collect();
         let projection = Projection::off(&slopes, &precisions);
         let left = projection.rest(&whitener.whiten(misfit));
-        let strongest =
-            self.directions.strongest(near, STRONGEST, simulated, &whitener, &projection);
+        // The noise of a record follows from its misfit and may be quite another.
+        let count = if simulated.has_records() { usize::MAX } else { STRONGEST };
+        let strongest = self.directions.strongest(near, count, simulated, &whitener, &projection);
         let (rows, spread) = differences(simulated);
         let scores = strongest.scores_of(&left, &whitener.whiten_rows(&rows), &spread);
         Drawn {

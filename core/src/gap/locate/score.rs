@@ -46,12 +46,19 @@ pub struct Direction {
 pub struct Directions {
     /// What they are.
     pub all: Vec<Direction>,
-    /// What each does to the response, one a row.
-    slopes: Matrix,
     /// What is left of each, of length one, one a row.
     pub left: Matrix,
     /// The variance of each score due to errors that all replicates share.
     pub common: Vec<f64>,
+    /// What each does to the response, one a row.
+    changes: Matrix,
+}
+
+/// A direction that was kept: what is left of it whitened, of length one, and what it does to the response.
+struct Kept {
+    direction: Direction,
+    left: Vec<f64>,
+    change: Vec<f64>,
 }
 
 /// Studentised scores.
@@ -89,8 +96,8 @@ impl Directions {
     ) -> Self {
         let experiment = system.experiment;
         let mut all = Vec::new();
-        let mut acting = Matrix::zeros(0, experiment.outputs());
         let mut rows = Matrix::zeros(0, experiment.outputs());
+        let mut changes = rows.clone();
         for (c, candidate) in candidates.iter().enumerate() {
             let own: Vec<usize> =
                 (0..suspects.len()).filter(|&s| suspects[s].candidate == c).collect();
@@ -98,15 +105,15 @@ impl Directions {
             for s in own {
                 let placed = suspects[s].placed(experiment, candidates, "");
                 let kept = Self::one(s, &placed, &slopes, whitener, projection);
-                for (direction, slope, row) in kept {
-                    all.push(direction);
-                    acting.push_row(&slope);
-                    rows.push_row(&row);
+                for one in kept {
+                    all.push(one.direction);
+                    rows.push_row(&one.left);
+                    changes.push_row(&one.change);
                 }
             }
         }
         let common = common(experiment, whitener, &rows);
-        Self { all, slopes: acting, left: rows, common }
+        Self { all, left: rows, common, changes }
     }
 
     /// Those that score most, so many at most, seen through another noise.
@@ -122,34 +129,34 @@ impl Directions {
         let mut chosen: Vec<usize> = (0..self.all.len()).collect();
         chosen.sort_by(|a, b| strength(b).total_cmp(&strength(a)).then(a.cmp(b)));
         chosen.truncate(count);
-        let slopes = self.slopes.select_rows(&chosen);
-        let (mut left, squares) = projection.rest_of_rows(whitener.whiten_rows(&slopes));
+        let changes = self.changes.select_rows(&chosen);
+        let (mut left, squares) = projection.rest_of_rows(whitener.whiten_rows(&changes));
         for (j, square) in squares.iter().enumerate() {
             let length = square.max(f64::MIN_POSITIVE).sqrt();
             left.row_mut(j).iter_mut().for_each(|x| *x /= length);
         }
         let common = common(experiment, whitener, &left);
         let all = chosen.iter().map(|&j| self.all[j].clone()).collect();
-        Self { all, slopes, left, common }
+        Self { all, left, common, changes }
     }
 
-    /// The different directions of one suspect, each with what it does to the response and what is left of that.
+    /// The different directions of one suspect.
     fn one(
         suspect: usize,
         placed: &Placed<'_>,
         slopes: &[(Vec<f64>, Vec<f64>)],
         whitener: &Whitener,
         projection: &Projection,
-    ) -> Vec<(Direction, Vec<f64>, Vec<f64>)> {
+    ) -> Vec<Kept> {
         let masked = slopes.iter().map(|(_, slope)| -> Vec<f64> {
             slope.iter().zip(&placed.acts).map(|(x, acts)| if *acts { *x } else { 0.0 }).collect()
         });
-        let masked = Matrix::from_rows(placed.acts.len(), masked);
-        let white = whitener.whiten_rows(&masked);
+        let changes = Matrix::from_rows(placed.acts.len(), masked);
+        let white = whitener.whiten_rows(&changes);
         let lengths: Vec<f64> = white.iter_rows().map(|row| dot(row, row)).collect();
         let (left, squares) = projection.rest_of_rows(white);
         let sign = sign(placed);
-        let mut kept: Vec<(Direction, Vec<f64>, Vec<f64>)> = Vec::new();
+        let mut kept: Vec<Kept> = Vec::new();
         for (i, (start, _)) in slopes.iter().enumerate() {
             let seen = squares[i] > ABSORBED * lengths[i] && lengths[i] > 0.0;
             if !seen {
@@ -157,12 +164,12 @@ impl Directions {
             }
             let length = squares[i].sqrt();
             let row: Vec<f64> = left.row(i).iter().map(|x| x / length).collect();
-            if kept.iter().any(|(_, _, other)| dot(other, &row).abs() > SAME) {
+            if kept.iter().any(|other| dot(&other.left, &row).abs() > SAME) {
                 continue;
             }
             let absorbed = 1.0 - squares[i] / lengths[i];
             let direction = Direction { suspect, start: start.clone(), sign, absorbed, length };
-            kept.push((direction, masked.row(i).to_vec(), row));
+            kept.push(Kept { direction, left: row, change: changes.row(i).to_vec() });
         }
         kept
     }

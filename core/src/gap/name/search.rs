@@ -13,7 +13,7 @@ use crate::gap::fit::fit_from;
 use crate::gap::locate::{
     Bench, Directions, Nulls, Projection, Scan, Scores, differences, regions,
 };
-use crate::gap::noise::Noise;
+use crate::gap::noise::{Around, Noise};
 use crate::gap::system::System;
 use crate::gap::whitener::Whitener;
 use crate::math::moments::{log_sum, mean, quantile, variance};
@@ -116,9 +116,9 @@ impl<'a> Search<'a> {
         let mut starts = starts.to_vec();
         let mut state: Option<State<'a>> = None;
         for _ in 0..2 {
-            let response = system.response(starts.first()?);
-            let noise = Noise::of(self.experiment, &response, None);
-            let whitener = Whitener::new(self.experiment, &noise, &response);
+            let around = Around::fit(&system, &system.linearised(starts.first()?));
+            let noise = Noise::of(self.experiment, &around, None);
+            let whitener = Whitener::new(self.experiment, &noise, &around.response);
             let fit = fit_from(&system, &whitener, &self.means, &starts)?;
             starts = vec![fit.at.point.clone()];
             let system = system.clone();

@@ -4,7 +4,7 @@ use super::leaders::Desk;
 use crate::gap::candidates::{Candidate, Suspect};
 use crate::gap::experiment::Experiment;
 use crate::gap::fit::{Fit, fit};
-use crate::gap::noise::Noise;
+use crate::gap::noise::{Around, Noise};
 use crate::gap::system::System;
 use crate::gap::whitener::Whitener;
 use crate::math::random::Stream;
@@ -58,9 +58,9 @@ impl<'a> State<'a> {
     /// The system fitted anew, with the noise around its response.
     fn refit(&mut self, common: &Common<'a, '_>, system: System<'a>, start: &[f64]) {
         let first = fit(&system, &self.whitener, common.means, start);
-        let response = &first.at.response;
-        self.noise = Noise::of(common.experiment, response, Some(&self.noise));
-        self.whitener = Whitener::new(common.experiment, &self.noise, response);
+        let around = Around::fit(&system, &first.at);
+        self.noise = Noise::of(common.experiment, &around, Some(&self.noise));
+        self.whitener = Whitener::new(common.experiment, &self.noise, &around.response);
         self.fit = fit(&system, &self.whitener, common.means, &first.at.point);
         self.system = system;
     }
@@ -80,10 +80,12 @@ impl<'a> State<'a> {
         Self { system, chosen, fit, noise: self.noise.clone(), whitener: self.whitener.clone() }
     }
 
-    /// The log of evidence times the prior masses of the effects.
+    /// The log of evidence times the prior masses of the effects. Where the noise is assumed it changes with what is left, and
+    /// what it alone decides counts.
     pub fn weight(&self, common: &Common<'a, '_>, stream: &Stream) -> f64 {
         let weighed = super::weigh(&self.system, &self.whitener, common.means, &self.fit, stream);
-        weighed.log_evidence + self.prior(common)
+        let of_noise = if self.noise.is_assumed() { self.whitener.log_determinant() } else { 0.0 };
+        weighed.log_evidence + of_noise + self.prior(common)
     }
 
     /// The log prior mass of the effects: of their types and of their places.

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::look::{Found, Look, Options};
 use crate::gap::candidates::Candidate;
+use crate::gap::noise::Origin;
 use crate::plugin::effect::On;
 
 /// A type is named alone from this probability on.
@@ -141,8 +142,14 @@ pub fn verdict(found: &Found<'_>, candidates: &[Candidate], options: Options) ->
                 .into(),
         );
     }
-    if found.noise.assumed.contains(&true) {
-        reasons.push("noise assumed: there are no replicates to learn it from".into());
+    if found.noise.is_assumed() {
+        reasons.push(
+            "noise assumed: without replicates, what one record leaves beside its slow part counts as noise"
+                .into(),
+        );
+    } else if found.noise.origins.contains(&Origin::Stated) {
+        reasons
+            .push("noise stated: without replicates, it is as large as `discrepancy` says".into());
     }
     Verdict { word, effects, closed, reasons }
 }

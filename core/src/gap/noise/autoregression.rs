@@ -4,6 +4,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::succession::Succession;
+
 /// The largest reflection coefficient: a random walk is no stationary noise.
 const LARGEST: f64 = 0.995;
 
@@ -35,15 +37,49 @@ impl Autoregression {
             }
             let predicted: f64 = last.iter().zip((0..m).rev()).map(|(a, lag)| a * c[lag]).sum();
             let reflection = ((c[m] - predicted) / variance).clamp(-LARGEST, LARGEST);
-            let mut next: Vec<f64> =
-                (0..m - 1).map(|i| last[i] - reflection * last[m - 2 - i]).collect();
-            next.push(reflection);
-            predictors.push(next);
+            predictors.push(longer(last, reflection));
             variances.push(variance * (1.0 - reflection * reflection));
         }
-        let innovation = variances[order];
+        (Self::of(predictors, &variances), variances[order])
+    }
+
+    /// The autoregression with these reflection coefficients (partial autocorrelations), each held inside the bounds of
+    /// what is stationary.
+    pub fn of_reflections(reflections: &[f64]) -> Self {
+        let mut predictors = vec![Vec::new()];
+        let mut variances = vec![1.0];
+        for (m, reflection) in reflections.iter().enumerate() {
+            let reflection = reflection.clamp(-LARGEST, LARGEST);
+            predictors.push(longer(&predictors[m], reflection));
+            variances.push(variances[m] * (1.0 - reflection * reflection));
+        }
+        Self::of(predictors, &variances)
+    }
+
+    fn of(predictors: Vec<Vec<f64>>, variances: &[f64]) -> Self {
+        let innovation = variances[variances.len() - 1];
         let errors = variances.iter().map(|v| (v / innovation).sqrt()).collect();
-        (Self { predictors, errors }, innovation)
+        Self { predictors, errors }
+    }
+
+    /// This autoregression at places of a grid, which increase.
+    pub fn on(&self, places: &[usize]) -> Succession {
+        Succession::new(self, places)
+    }
+
+    /// The best predictor from so many values before, at most the order, and the standard deviation of its error.
+    pub(super) fn predictor(&self, values: usize) -> (&[f64], f64) {
+        (&self.predictors[values], self.errors[values])
+    }
+
+    /// Its autocovariances at the lags `0, 1, ..., count - 1`.
+    pub(super) fn autocovariances(&self, count: usize) -> Vec<f64> {
+        let mut all = vec![self.variance()];
+        for lag in 1..count {
+            let predictor = &self.predictors[lag.min(self.order())];
+            all.push(predictor.iter().zip(all.iter().rev()).map(|(a, c)| a * c).sum());
+        }
+        all
     }
 
     /// The order `p`.
@@ -98,6 +134,14 @@ impl Autoregression {
         let first = length.min(self.order());
         -self.errors[..first].iter().map(|e| e.ln()).sum::<f64>()
     }
+}
+
+/// The predictor from one value more, by Durbin's and Levinson's step with this reflection coefficient.
+fn longer(last: &[f64], reflection: f64) -> Vec<f64> {
+    let m = last.len();
+    let mut next: Vec<f64> = (0..m).map(|i| last[i] - reflection * last[m - 1 - i]).collect();
+    next.push(reflection);
+    next
 }
 
 #[cfg(test)]

@@ -4,6 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::autoregression::Autoregression;
 use super::expectation::Fit;
+use super::succession::Succession;
+use crate::gap::experiment::Curve;
 use crate::linalg::{Cholesky, Matrix};
 
 /// The highest order of autoregression that is tried.
@@ -44,6 +46,13 @@ pub struct CurveNoise {
     pub wander: Wander,
     /// The standard deviation of the noise at each measured value relative to `sd`.
     pub profile: Vec<f64>,
+}
+
+impl CurveNoise {
+    /// Its memory at the places of a curve.
+    pub fn succession(&self, curve: &Curve) -> Succession {
+        self.memory.on(&curve.places())
+    }
 }
 
 /// The differences between replicates of a curve, and what they may be made of.

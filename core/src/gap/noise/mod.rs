@@ -1,24 +1,44 @@
-//! How replicates differ: the noise that a search for missing effects must not take for one.
+//! The noise that a search for missing effects must not take for one.
 //!
-//! Everything is estimated from the differences between replicates of one condition, so that nothing that the model
-//! misses can enter.
+//! Where there are replicates, everything is estimated from the differences between those of one condition, so that nothing
+//! that the model misses can enter. Without, the study may say how large the noise is; else the one record tells, less surely.
 
+mod around;
 mod autoregression;
 mod curve;
 mod expectation;
 mod products;
+mod record;
+mod restricted;
 mod shared;
 mod simulate;
+mod slow;
+mod succession;
 #[cfg(test)]
 mod tests;
 
+pub use around::Around;
 pub use autoregression::Autoregression;
 pub use curve::{CurveNoise, Differences, Wander, directions};
+pub use succession::Succession;
 
 use serde::{Deserialize, Serialize};
 
 use super::experiment::{Curve, Experiment};
 use crate::linalg::Matrix;
+use crate::plugin::discrepancy::StatedNoise;
+
+/// Where the noise of a curve is known from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Origin {
+    /// From its replicates, or from those of the same curve under another condition.
+    Replicates,
+    /// From what the study's discrepancy says.
+    Stated,
+    /// From the one record that there is, which may hold what the model misses too: it is assumed.
+    Record,
+}
 
 /// The noise of one replicate of an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -30,48 +50,61 @@ pub struct Noise {
     /// The lower factor of the correlation of the innovations between the curves of a condition, where there is
     /// one.
     pub across: Vec<Option<Matrix>>,
-    /// Whether each curve's noise is assumed from its misfit, for want of replicates.
-    pub assumed: Vec<bool>,
+    /// Where that of each curve is known from.
+    pub origins: Vec<Origin>,
 }
 
 impl Noise {
-    /// From the replicates around this response; `like` gives the orders of the autoregressions.
-    pub fn of(experiment: &Experiment<'_>, response: &[f64], like: Option<&Self>) -> Self {
+    /// Around a calibrated response; `like` gives the orders of the autoregressions of replicates.
+    pub fn of(experiment: &Experiment<'_>, around: &Around, like: Option<&Self>) -> Self {
         let differences: Vec<Differences> = experiment
             .curves
             .iter()
             .map(|curve| {
-                let own: Vec<f64> = curve.measured.iter().map(|&i| response[i]).collect();
+                let own: Vec<f64> = curve.measured.iter().map(|&i| around.response[i]).collect();
                 Differences::new(&experiment.complete(curve), &own, &curve.at)
             })
             .collect();
         let order = |s: usize| like.map(|like| like.curves[s].memory.order());
         let estimated: Vec<Option<CurveNoise>> =
             differences.iter().enumerate().map(|(s, d)| d.noise(order(s))).collect();
-        let curves = (0..differences.len())
-            .map(|s| {
-                let own = estimated[s].clone();
-                own.or_else(|| borrowed(experiment, s, &estimated))
-                    .unwrap_or_else(|| assumed(experiment, s, response))
-            })
-            .collect();
-        let assumed = (0..differences.len())
-            .map(|s| estimated[s].is_none() && borrowed(experiment, s, &estimated).is_none())
-            .collect();
+        let (_, means) = experiment.means();
+        let one = |s: usize| {
+            let curve = &experiment.curves[s];
+            let replicates = || estimated[s].clone().map(|own| (own, Origin::Replicates));
+            let stated = || {
+                let stated = experiment.stated.as_ref()?;
+                Some((of_statement(curve, stated), Origin::Stated))
+            };
+            let others = || Some((borrowed(experiment, s, &estimated)?, Origin::Replicates));
+            let record = || (of_record(curve, &means, around), Origin::Record);
+            replicates().or_else(stated).or_else(others).unwrap_or_else(record)
+        };
+        let (curves, origins) = (0..differences.len()).map(one).unzip();
         let conditions = experiment.conditions.len();
         let (shared, across) = (vec![Wander::default(); conditions], vec![None; conditions]);
-        let mut noise = Self { curves, shared, across, assumed };
+        let mut noise = Self { curves, shared, across, origins };
         shared::find(experiment, &differences, &mut noise);
         noise
+    }
+
+    /// Whether that of some curve is assumed from its one record.
+    pub fn is_assumed(&self) -> bool {
+        self.origins.contains(&Origin::Record)
     }
 
     /// The same noise for an experiment of the same curves that measured fewer values of them.
     pub fn restricted(&self, whole: &Experiment<'_>, part: &Experiment<'_>) -> Self {
         let mut own = self.clone();
         for (s, noise) in own.curves.iter_mut().enumerate() {
-            let places = whole.curves[s].measured.iter().zip(&self.curves[s].profile);
-            let kept = places.filter(|(i, _)| part.curves[s].measured.contains(i));
-            noise.profile = kept.map(|(_, w)| *w).collect();
+            let mut wanted = part.curves[s].measured.iter().peekable();
+            let mut kept = Vec::with_capacity(part.curves[s].measured.len());
+            for (i, w) in whole.curves[s].measured.iter().zip(&self.curves[s].profile) {
+                if wanted.next_if_eq(&i).is_some() {
+                    kept.push(*w);
+                }
+            }
+            noise.profile = kept;
         }
         for (c, condition) in part.conditions.iter().enumerate() {
             let mut lengths = condition.curves.clone().map(|s| part.curves[s].measured.len());
@@ -115,21 +148,32 @@ fn borrowed(
     Some(CurveNoise { profile: vec![1.0; curve.measured.len()], level: 0.0, ..found.clone() })
 }
 
-/// White noise of the size of the differences between neighbouring values of the misfit (von Neumann, Annals of
-/// Mathematical Statistics 12 (1941) 367): what varies slowly does not enter.
-fn assumed(experiment: &Experiment<'_>, s: usize, response: &[f64]) -> CurveNoise {
-    let curve = &experiment.curves[s];
-    let (_, means) = experiment.means();
-    let misfit: Vec<f64> = curve.measured.iter().map(|&i| means[i] - response[i]).collect();
-    let squares: f64 = misfit.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum();
-    let steps = misfit.len().saturating_sub(1).max(1) as f64;
-    let largest = misfit.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
-    let sd = (squares / (2.0 * steps)).sqrt().max(1e-6 * largest);
+/// The noise of a curve as the study states it.
+fn of_statement(curve: &Curve, stated: &StatedNoise) -> CurveNoise {
+    let sd: Vec<f64> = curve.measured.iter().map(|&i| stated.sd[i]).collect();
+    let squares = sd.iter().map(|s| s * s).sum::<f64>();
+    let mean = (squares / sd.len().max(1) as f64).sqrt();
+    let times = stated.correlation_time.as_ref();
+    let time = times.zip(curve.measured.first()).map(|(times, first)| times[*first]);
+    let memory = match time {
+        Some(time) if time > 0.0 => Autoregression::of_reflections(&[(-curve.step() / time).exp()]),
+        _ => Autoregression::white(),
+    };
     CurveNoise {
-        sd: if sd > 0.0 { sd } else { 1.0 },
-        memory: Autoregression::white(),
+        sd: mean / memory.variance().sqrt(),
+        memory,
         level: 0.0,
         wander: Wander::default(),
-        profile: vec![1.0; curve.measured.len()],
+        // A response of zero may have no noise at all.
+        profile: sd.iter().map(|s| (s / mean).max(1e-6)).collect(),
     }
+}
+
+/// The noise of a curve from its one record.
+fn of_record(curve: &Curve, means: &[f64], around: &Around) -> CurveNoise {
+    let misfit: Vec<f64> = curve.measured.iter().map(|&i| means[i] - around.response[i]).collect();
+    let slopes = around.slopes.select_columns(&curve.measured);
+    let (sd, memory) = record::noise(&misfit, &slopes, &curve.places());
+    let profile = vec![1.0; curve.measured.len()];
+    CurveNoise { sd, memory, level: 0.0, wander: Wander::default(), profile }
 }

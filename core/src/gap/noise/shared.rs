@@ -1,7 +1,7 @@
 //! What the curves of one condition share: wander of whole replicates, and innovations that go together.
 
 use super::curve::{Differences, Wander};
-use super::{CurveNoise, Noise};
+use super::{CurveNoise, Noise, Origin};
 use crate::gap::experiment::Experiment;
 use crate::linalg::{Cholesky, Matrix};
 use crate::math::special::gamma_tails;
@@ -13,7 +13,8 @@ const CLEAR: f64 = 0.01;
 pub(super) fn find(experiment: &Experiment<'_>, differences: &[Differences], noise: &mut Noise) {
     for (c, condition) in experiment.conditions.iter().enumerate() {
         let curves = condition.curves.clone();
-        if curves.len() < 2 || noise.assumed[curves.clone()].contains(&true) {
+        let of_replicates = |s: usize| noise.origins[s] == Origin::Replicates;
+        if curves.len() < 2 || !curves.clone().all(of_replicates) {
             continue;
         }
         let own = &differences[curves.clone()];

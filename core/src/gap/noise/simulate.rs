@@ -46,7 +46,7 @@ impl Noise {
             }
             for ((curve, values), s) in curves.iter().zip(&mut white).zip(condition.curves.clone())
             {
-                self.curves[s].memory.colour(values);
+                self.curves[s].succession(curve).colour(values);
                 for (&i, x) in curve.measured.iter().zip(values) {
                     all[i] = experiment.remainder[i].sqrt() * *x;
                 }
@@ -76,7 +76,7 @@ impl Noise {
         let mut values: Vec<f64> = response[condition.outputs.clone()].to_vec();
         for (s, mut noise) in condition.curves.clone().zip(white) {
             let (curve, law) = (&experiment.curves[s], &self.curves[s]);
-            law.memory.colour(&mut noise);
+            law.succession(curve).colour(&mut noise);
             let own: Vec<f64> = curve.measured.iter().map(|&i| response[i]).collect();
             let directions = directions(&own, &curve.at);
             let wander: Vec<f64> = law

@@ -58,7 +58,7 @@ fn truth() -> Noise {
         curves: vec![curve(1.0, 0.5), curve(0.5, 0.3), curve(2.0, 0.0)],
         shared: vec![Wander { gain: 0.01, ..Wander::default() }],
         across: vec![Some(factor)],
-        assumed: vec![false; 3],
+        origins: vec![Origin::Replicates; 3],
     }
 }
 
@@ -82,7 +82,7 @@ fn measured<'a>(
 fn the_noise_that_made_the_replicates_is_found() {
     let (layouts, forward, count) = (layouts(), Fixed(response()), 120);
     let experiment = measured(&layouts, &[], &forward, count);
-    let noise = Noise::of(&experiment, &forward.0, Some(&truth()));
+    let noise = Noise::of(&experiment, &Around::fixed(&forward.0), Some(&truth()));
     let n = count as f64 - 1.0;
     let gain = noise.shared[0].gain;
     assert!((gain / 0.01 - 1.0).abs() < 4.0 * (2.0 / n).sqrt(), "{gain}");
@@ -96,7 +96,7 @@ fn the_noise_that_made_the_replicates_is_found() {
     }
     let factor = noise.across[0].as_ref().unwrap();
     assert!((factor[(1, 0)] - 0.5).abs() < 4.0 * 0.75 / (n * LENGTH as f64).sqrt());
-    assert_eq!(noise.assumed, [false; 3]);
+    assert_eq!(noise.origins, [Origin::Replicates; 3]);
 }
 
 /// White numbers have covariance one: over B draws an entry has standard error `1 / sqrt(B)` off the diagonal. What is

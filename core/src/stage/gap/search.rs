@@ -5,9 +5,10 @@ use crate::gap::account::{Account, HeldOut};
 use crate::gap::candidates::{Candidate, proposed};
 use crate::gap::common::shared;
 use crate::gap::experiment::Experiment;
+use crate::gap::fit::precision;
 use crate::gap::hold_out::{HeldOutData, Kind, Split, split};
 use crate::gap::name::{Found, Options, search};
-use crate::gap::noise::Noise;
+use crate::gap::noise::{Around, Noise};
 use crate::gap::prove::prove;
 use crate::gap::wide::Wide;
 use crate::gap::with_effects::WithEffects;
@@ -15,7 +16,7 @@ use crate::linalg::Matrix;
 use crate::math::moments::mean;
 use crate::math::random::Stream;
 use crate::plugin::Forward;
-use crate::plugin::discrepancy::CommonError;
+use crate::plugin::discrepancy::{CommonError, StatedNoise};
 use crate::plugin::effect::Situation;
 use crate::run::{Observer, RunDirectory, Stop};
 use crate::stage::calibrate::stated_variance;
@@ -111,7 +112,7 @@ pub fn prepared<T>(
     let starts = base.starts(&split.training, random)?;
     let experiment = base.experiment(&split.training, &starts[0])?;
     let response = base.response(&starts[0]);
-    let noise = Noise::of(&experiment, &response, None).sd(&experiment, &response);
+    let noise = Noise::of(&experiment, &base.around(&starts[0]), None).sd(&experiment, &response);
     let situation = Situation { layouts: &study.layouts, response: &response, noise: &noise };
     let mut candidates = candidates(study, &situation)?;
     candidates.extend(beginning.inside.candidates.iter().cloned());
@@ -201,15 +202,42 @@ impl<'a> Base<'a> {
         self.forward.mean(&Matrix::from_vec(1, point.len(), point.to_vec())).into_vec()
     }
 
+    /// The response at a point with what the parameters can do to it.
+    fn around(&self, point: &[f64]) -> Around {
+        let (response, jacobian) = self.forward.mean_and_jacobian(point);
+        let widths: Vec<f64> =
+            self.parameters.iter().map(|p| 1.0 / precision(&p.prior).sqrt()).collect();
+        let slopes = Matrix::from_fn(jacobian.columns(), jacobian.rows(), |j, i| {
+            widths[j] * jacobian[(i, j)]
+        });
+        Around { response, slopes }
+    }
+
+    /// The noise as the study's discrepancy states it, for all outputs.
+    fn stated(&self, response: &[f64]) -> Option<StatedNoise> {
+        let plugin = &self.study.discrepancy.as_ref()?.built.plugin;
+        let mut all = StatedNoise { sd: Vec::new(), correlation_time: None };
+        for (layout, range) in self.study.layouts.parts() {
+            let own = plugin.stated_noise(layout, &response[range])?;
+            all.sd.extend(own.sd);
+            if let Some(times) = own.correlation_time {
+                all.correlation_time.get_or_insert_default().extend(times);
+            }
+        }
+        Some(all)
+    }
+
     /// The measurements with the forward map and all errors that replicates share.
     fn experiment(&self, data: &Observations, point: &[f64]) -> Result<Experiment<'a>, Stop> {
         let layouts = &self.study.layouts;
         let mut experiment = Experiment::new(layouts, self.parameters, self.forward, data);
         experiment.region = self.beginning.region.map(<[_]>::to_vec);
         experiment.wide = self.wide;
-        let response = self.response(point);
-        let noise = Noise::of(&experiment, &response, None);
-        let all = shared(&experiment, &noise, &response, &self.samples(data)?);
+        let around = self.around(point);
+        let response = &around.response;
+        experiment.stated = self.stated(response);
+        let noise = Noise::of(&experiment, &around, None);
+        let all = shared(&experiment, &noise, response, &self.samples(data)?);
         (experiment.common, experiment.remainder) = (all.common, all.remainder);
         Ok(experiment)
     }
@@ -247,7 +275,8 @@ impl<'a> Base<'a> {
         } else {
             // What the training never measured has its noise from the replicates that were set aside.
             let whole = self.experiment(all, point)?;
-            Noise::of(&whole, after, None).restricted(&whole, &held_out)
+            let around = Around::fit(&found.system, &found.last.fit.at);
+            Noise::of(&whole, &around, None).restricted(&whole, &held_out)
         };
         let proof = prove(&held_out, &noise, before, after);
         let [without, with] = [before, after].map(|response| average(&part.data, response));

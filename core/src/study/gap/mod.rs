@@ -65,8 +65,8 @@ impl Default for GapSection {
 #[serde(default, deny_unknown_fields)]
 pub struct HoldOut {
     /// The share of the replicates of each condition, chosen by the study's seed: at least one of three or more, and at
-    /// most all but two. Where no condition has three replicates and nothing else is set aside, two of eight blocks
-    /// of each curve stand in for them.
+    /// most all but two. Where no condition has three replicates and nothing else is set aside, the same share of up to
+    /// 24 blocks of each curve stands in for them, at most every third block.
     pub replicates: Fraction,
     /// Whole scenarios.
     #[serde(skip_serializing_if = "Vec::is_empty")]

@@ -3,6 +3,7 @@
 use maud::Markup;
 
 use crate::gap::account::Account;
+use crate::gap::noise::Origin;
 use crate::gap::prove::Closing;
 use crate::report::findings::{Findings, GapFindings};
 use crate::report::gap::{on, p_value};
@@ -187,7 +188,11 @@ pub fn noise(findings: &Findings, account: &Account, numbers: &mut Numbers) -> M
     let mut table = Table::new(&["curve"], &[&sd, "autoregression", &offset, "gain [%]", &clock]);
     for curve in account.curves.iter().filter(|curve| !curve.measured.is_empty()) {
         let scenario = curve.scenario.as_ref().map(|s| format!(" · {s}")).unwrap_or_default();
-        let assumed = if curve.assumed { " (assumed)" } else { "" };
+        let assumed = match curve.origin {
+            Origin::Replicates => "",
+            Origin::Stated => " (stated)",
+            Origin::Record => " (assumed)",
+        };
         let memory: Vec<String> = curve.memory.iter().map(|a| fixed(*a, 2)).collect();
         let memory = if memory.is_empty() { String::from("white") } else { memory.join(", ") };
         let [o, g, c] = curve.wander;
@@ -205,7 +210,7 @@ pub fn noise(findings: &Findings, account: &Account, numbers: &mut Numbers) -> M
          curve, how a value follows from those before it, and the standard deviations of what whole replicates \
          differ by.",
         "replicates.",
-        "curves without replicates, whose noise is assumed.",
+        "curves without replicates: their noise is stated by the study, or assumed from one record.",
     );
     numbers.table(&table, &caption)
 }

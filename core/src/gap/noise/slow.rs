@@ -1,0 +1,188 @@
+//! The slow part of a record's misfit, which noise of the memory that is found would not make.
+//!
+//! The slow part is a band of the record's first cosines: a drift is in the slowest, a cycle in those about its frequency.
+//! Noise is taken about it. Which band there is, if any, is chosen by the likelihood with a price of each cosine: the one at
+//! which pure noise gets a first cosine in one of a hundred records (Eubank and Hart, Annals of Statistics 20 (1992)
+//! 1412), and for a band that does not begin with the slowest cosine that of the choice where it begins (Chen and Chen,
+//! Biometrika 95 (2008) 759).
+
+use std::ops::Range;
+
+use super::restricted::{self, Law, Restricted};
+use crate::linalg::vector::{add_scaled, dot};
+
+/// The price of a cosine, as twice a log-likelihood: `sum over j of P(chi2_j > j price) / j` is one in a hundred.
+const PRICE: f64 = 6.74;
+
+/// The most cosines.
+const MOST: usize = 48;
+
+/// Values for each cosine, at least.
+const EACH: usize = 3;
+
+/// A cosine of which less than this share is left, squared, by what the unknowns can do and by slower ones is none of its own.
+const OWN: f64 = 0.05;
+
+/// Bands that are tried one after another from each beginning.
+const STEPS: usize = 4;
+
+/// A record, what unknowns can do to it, and the cosines beside that.
+struct Record<'a> {
+    values: &'a [f64],
+    places: &'a [usize],
+    unknowns: &'a [Vec<f64>],
+    /// Off the unknowns and off each other, of length one; the slowest first.
+    cosines: Vec<Vec<f64>>,
+}
+
+/// The law of a record's noise about its slow part; `unknowns` are orthonormal. `None` where too little is left.
+pub(super) fn law(values: &[f64], unknowns: &[Vec<f64>], places: &[usize]) -> Option<Law> {
+    let record = Record { values, places, unknowns, cosines: cosines(unknowns, places) };
+    let mut seen: Vec<(Range<usize>, Law)> = Vec::new();
+    // The noise that all of the misfit would be, and roughly the noise that only its fast part would be.
+    for (mut band, mut most) in [(0..0, restricted::MOST), (0..record.cosines.len(), 1)] {
+        for _ in 0..STEPS {
+            if seen.iter().any(|(other, _)| *other == band) {
+                break;
+            }
+            let Some(law) = record.law(&band, most) else { break };
+            let next = record.band(&law);
+            seen.push((band, law));
+            (band, most) = (next, restricted::MOST);
+        }
+    }
+    let value = |(band, law): &(Range<usize>, Law)| law.deviance + record.price(band);
+    let best = seen.into_iter().min_by(|a, b| value(a).total_cmp(&value(b)));
+    best.map(|(_, law)| law)
+}
+
+/// The cosines of a record beside what its unknowns can do.
+fn cosines(unknowns: &[Vec<f64>], places: &[usize]) -> Vec<Vec<f64>> {
+    let most = MOST.min(places.len().saturating_sub(unknowns.len()) / EACH);
+    let mut all = unknowns.to_vec();
+    for k in 0..most {
+        all.extend(off(cosine(k, places), &all, OWN));
+    }
+    all.split_off(unknowns.len())
+}
+
+/// A cosine with `k` half waves over a record, at these places.
+fn cosine(k: usize, places: &[usize]) -> Vec<f64> {
+    let (Some(first), Some(last)) = (places.first(), places.last()) else { return Vec::new() };
+    let wave = std::f64::consts::PI * k as f64 / (last - first + 1) as f64;
+    places.iter().map(|place| (wave * ((place - first) as f64 + 0.5)).cos()).collect()
+}
+
+/// What is left of a curve off some orthonormal ones, of length one; `None` where less than a share is left.
+fn off(mut curve: Vec<f64>, others: &[Vec<f64>], share: f64) -> Option<Vec<f64>> {
+    let size = dot(&curve, &curve);
+    // Twice is enough (Giraud and others, Numerische Mathematik 101 (2005) 87).
+    for _ in 0..2 {
+        for other in others {
+            let along = dot(other, &curve);
+            add_scaled(&mut curve, -along, other);
+        }
+    }
+    let left = dot(&curve, &curve);
+    curve.iter_mut().for_each(|x| *x /= left.sqrt());
+    (left > share * size).then_some(curve)
+}
+
+impl Record<'_> {
+    /// The law of the noise about a band, of an order up to `most`.
+    fn law(&self, band: &Range<usize>, most: usize) -> Option<Law> {
+        let columns = [self.unknowns, &self.cosines[band.clone()]].concat();
+        Restricted { values: self.values, columns: &columns, places: self.places }.law(most)
+    }
+
+    /// The price of a band, as twice a log-likelihood.
+    fn price(&self, band: &Range<usize>) -> f64 {
+        let choice = if band.start > 0 { 2.0 * (self.cosines.len() as f64).ln() } else { 0.0 };
+        PRICE * band.len() as f64 + choice
+    }
+
+    /// The best band by the noise of a law: that with the largest sum of what its cosines explain above their price.
+    fn band(&self, law: &Law) -> Range<usize> {
+        let mut best = (0.0, 0..0);
+        let (mut begin, mut inner, mut all) = (0, 0.0, 0.0);
+        for (k, gain) in self.gains(law).into_iter().enumerate() {
+            if inner <= 0.0 {
+                (begin, inner) = (k, 0.0);
+            }
+            inner += gain - PRICE;
+            all += gain - PRICE;
+            let own = begin..k + 1;
+            let choice = self.price(&own) - PRICE * own.len() as f64;
+            for (sum, band) in [(all, 0..k + 1), (inner - choice, own)] {
+                if sum > best.0 {
+                    best = (sum, band);
+                }
+            }
+        }
+        best.1
+    }
+
+    /// What each cosine explains beside the unknowns and the slower ones: squares of white numbers where there is noise alone.
+    fn gains(&self, law: &Law) -> Vec<f64> {
+        let succession = law.memory.on(self.places);
+        let white = |curve: &Vec<f64>| {
+            let mut curve = curve.clone();
+            succession.whiten(&mut curve);
+            curve
+        };
+        let values = white(&self.values.to_vec());
+        let mut all: Vec<Vec<f64>> = Vec::new();
+        for curve in self.unknowns.iter().chain(&self.cosines) {
+            let nothing = || vec![0.0; values.len()];
+            let next = off(white(curve), &all, 0.0).unwrap_or_else(nothing);
+            all.push(next);
+        }
+        let gain = |curve: &Vec<f64>| (dot(curve, &values) / law.sd).powi(2);
+        all[self.unknowns.len()..].iter().map(gain).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::gap::noise::Autoregression;
+    use crate::math::random::{Stream, normal};
+
+    /// Records of first order about something else, and the noise that is found in them.
+    fn found(length: usize, a: f64, records: u64, slow: impl Fn(f64) -> f64) -> Vec<[f64; 2]> {
+        let places: Vec<usize> = (0..length).collect();
+        let level = vec![(length as f64).sqrt().recip(); length];
+        let memory = Autoregression::of_reflections(&[a]);
+        let record = |b: u64| {
+            let mut rng = Stream::root(21).at(b).generator();
+            let mut values: Vec<f64> = (0..length).map(|_| normal(&mut rng)).collect();
+            memory.colour(&mut values);
+            let at = (0..length).map(|t| t as f64 / length as f64);
+            values.iter_mut().zip(at).for_each(|(y, x)| *y += slow(x));
+            let law = law(&values, &[level.clone()], &places).unwrap();
+            [law.sd, law.memory.autocovariances(2)[1] / law.memory.variance()]
+        };
+        (0..records).map(record).collect()
+    }
+
+    /// A curve ten times as large as the noise changes little of what is found: innovations of size one, a correlation of a
+    /// half; the edges of a cycle's band pass for a slower noise. The standard errors of n values are `1 / sqrt(2 n)` and
+    /// `sqrt((1 - a^2) / n)` (Brockwell and Davis, section 8.1).
+    #[test]
+    fn noise_is_found_about_what_is_slow() {
+        let (length, a, records) = (300, 0.5, 12);
+        let shapes: [(fn(f64) -> f64, f64); 3] = [
+            (|_| 0.0, 0.03),
+            (|x| 40.0 * (x * x - x / 3.0), 0.1),
+            (|x| 14.0 * (75.0 * x).sin(), 0.4),
+        ];
+        for (shape, bound) in shapes {
+            let found = found(length, a, records, shape);
+            let mean = |k: usize| found.iter().map(|own| own[k]).sum::<f64>() / records as f64;
+            let n = length as f64 * records as f64;
+            assert!((mean(0) - 1.0).abs() < bound + 4.0 / (2.0 * n).sqrt(), "{}", mean(0));
+            assert!((mean(1) - a).abs() < bound + 4.0 * ((1.0 - a * a) / n).sqrt(), "{}", mean(1));
+        }
+    }
+}
