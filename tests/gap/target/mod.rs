@@ -177,7 +177,9 @@ impl Answer {
                 class.join("/")
             );
         }
-        reasons.iter().for_each(|reason| _ = writeln!(text, "  {reason}"));
+        for reason in reasons {
+            let _ = writeln!(text, "  {reason}");
+        }
         let _ = writeln!(text, "  parameters {parameters:.1?}");
         text
     }
@@ -245,7 +247,9 @@ fn truths_of_the_target_get_no_false_name() {
     }
     let wide = Some(wide());
     let answers: Vec<Answer> = Truth::ALL.par_iter().map(|truth| ask(*truth, wide)).collect();
-    answers.iter().for_each(|answer| println!("{}", answer.said()));
+    for answer in &answers {
+        println!("{}", answer.said());
+    }
     answers.iter().for_each(judged);
     // What gas does is absorbed by the sound speed, and moves back.
     let bubbles = answers.iter().find(|answer| answer.truth == Truth::Bubbles).unwrap();
