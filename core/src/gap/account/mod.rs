@@ -1,22 +1,23 @@
 //! What a search found, as plain data: for the report, for scripts, and for the study that is written.
 
-use std::ops::Range;
+mod curve;
+
+pub use curve::CurveAccount;
 
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::candidates::{Candidate, Suspect};
-use super::experiment::Experiment;
-use super::fit::precision;
-use super::hold_out::Kind;
-use super::insight::{Insight, insight, withhold};
-use super::locate::Region;
-use super::name::{Found, Look, Options, Step, Verdict, Visible, verdict};
-use super::needless::Needless;
-use super::noise::Origin;
-use super::prove::Proof;
-use super::replaced::OtherModel;
 use crate::data::Unit;
+use crate::gap::candidates::{Candidate, Suspect};
+use crate::gap::experiment::Experiment;
+use crate::gap::fit::precision;
+use crate::gap::hold_out::Kind;
+use crate::gap::insight::{Insight, insight, withhold};
+use crate::gap::locate::Region;
+use crate::gap::name::{Found, Look, Options, Step, Verdict, Visible, verdict};
+use crate::gap::needless::Needless;
+use crate::gap::prove::Proof;
+use crate::gap::replaced::OtherModel;
 use crate::math::random::Stream;
 use crate::plugin::effect::On;
 
@@ -194,32 +195,6 @@ pub struct Spot {
     pub p: f64,
 }
 
-/// A curve with the noise of its replicates.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CurveAccount {
-    /// Its name: its labels in words.
-    pub name: String,
-    /// Its labels by axis, the scenario aside.
-    pub labels: Vec<(String, String)>,
-    /// The scenario.
-    pub scenario: Option<String>,
-    /// Its outputs.
-    pub outputs: Range<usize>,
-    /// The outputs that were measured, and where along the last axis.
-    pub measured: Vec<usize>,
-    /// See `measured`.
-    pub at: Vec<f64>,
-    /// The standard deviation of one replicate, root mean square along the curve.
-    pub sd: f64,
-    /// The coefficients of the noise's autoregression.
-    pub memory: Vec<f64>,
-    /// The standard deviations of what whole replicates differ by: offset in the response's unit, gain, and clock in the
-    /// last axis's unit; its own and shared with other curves.
-    pub wander: [f64; 3],
-    /// Where the noise is known from.
-    pub origin: Origin,
-}
-
 /// What the comparison with one kind of held-out data shows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HeldOut {
@@ -266,7 +241,7 @@ impl Account {
             visible: first.visible.clone(),
             sizes: sizes(experiment, candidates),
             parameters: shifts(experiment, looks),
-            curves: curves(found),
+            curves: curve::all(found),
             means: found.means.clone(),
             counts,
             sd: found.noise.sd(experiment, &found.last.fit.at.response),
@@ -379,28 +354,4 @@ fn shifts(experiment: &Experiment<'_>, looks: [&Look; 2]) -> Vec<Shift> {
         }
     };
     experiment.parameters.iter().enumerate().map(shift).collect()
-}
-
-fn curves(found: &Found<'_>) -> Vec<CurveAccount> {
-    let experiment = found.system.experiment;
-    let sd = found.noise.sd(experiment, &found.last.fit.at.response);
-    let account = |(s, curve): (usize, &super::experiment::Curve)| {
-        let noise = &found.noise.curves[s];
-        let squares: f64 = curve.measured.iter().map(|&i| sd[i] * sd[i]).sum();
-        let (own, shared) =
-            (noise.wander.variances(), found.noise.shared[curve.condition].variances());
-        CurveAccount {
-            name: curve.name(experiment.layouts),
-            labels: curve.labels.clone(),
-            scenario: experiment.conditions[curve.condition].scenario.clone(),
-            outputs: curve.outputs.clone(),
-            measured: curve.measured.clone(),
-            at: curve.at.clone(),
-            sd: (squares / curve.measured.len().max(1) as f64).sqrt(),
-            memory: noise.memory.coefficients().to_vec(),
-            wander: [0, 1, 2].map(|d| (own[d] + shared[d]).sqrt()),
-            origin: found.noise.origins[s],
-        }
-    };
-    experiment.curves.iter().enumerate().map(account).collect()
 }
