@@ -48,8 +48,8 @@ fn times() -> Vec<f64> {
 fn response(units: [&str; 2], body: &str, point: &[f64]) -> Vec<f64> {
     let text = HEAD.replace("SUPPLY", units[0]).replace("OBSERVED", units[1]) + body;
     let folder = tempfile::tempdir().unwrap();
-    let rows = times().into_iter().map(|t| format!("{t},1.0\n"));
-    let csv = format!("t [s],y [{}]\n", units[1]) + &rows.collect::<String>();
+    let rows = times().into_iter().map(|t| format!("1,{t},1.0\n"));
+    let csv = format!("replicate,t [s],y [{}]\n", units[1]) + &rows.collect::<String>();
     fs::write(folder.path().join("data.csv"), csv).unwrap();
     let study = loaded(&folder, &text);
     let pieces = Pieces::of(&study).unwrap().unwrap();
