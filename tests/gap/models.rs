@@ -169,7 +169,8 @@ fn a_model_and_an_effect_are_found_together() {
     let kinds: Vec<&str> = account.additions.iter().map(|a| a.kind.as_str()).collect();
     assert_eq!(kinds, ["model_swap", "offset"], "{:?} {:?}", account.verdict, account.models);
     assert_eq!(account.verdict.word, Word::Named, "{:?}", account.verdict);
-    assert!(account.held_out[0].proof.shrank, "{:?}", account.held_out);
+    // Two replicates are too few for an interval that is worth its name.
+    assert!(account.held_out[0].proof.all.closed > 0.9, "{:?}", account.held_out);
 }
 
 #[test]

@@ -48,8 +48,8 @@ fn times() -> Vec<f64> {
 fn response(units: [&str; 2], body: &str, point: &[f64]) -> Vec<f64> {
     let text = HEAD.replace("SUPPLY", units[0]).replace("OBSERVED", units[1]) + body;
     let folder = tempfile::tempdir().unwrap();
-    let rows = times().into_iter().map(|t| format!("{t},1.0\n"));
-    let csv = format!("t [s],y [{}]\n", units[1]) + &rows.collect::<String>();
+    let rows = times().into_iter().map(|t| format!("1,{t},1.0\n"));
+    let csv = format!("replicate,t [s],y [{}]\n", units[1]) + &rows.collect::<String>();
     fs::write(folder.path().join("data.csv"), csv).unwrap();
     let study = loaded(&folder, &text);
     let pieces = Pieces::of(&study).unwrap().unwrap();
@@ -216,7 +216,8 @@ fn one_lag_follows_exponentially() {
 }
 
 /// Many lags are a delay: `du/dt = s + c (u(t - d) - u)`, by the method of steps (Smith, An Introduction to Delay
-/// Differential Equations, section 1.1). What is left goes with the inverse of the number of lags.
+/// Differential Equations, section 1.1). The delays of a chain scatter by `d² / n`, which at the kink, where the start arrives,
+/// leaves `c s d² / 4 n`.
 #[test]
 fn many_lags_are_a_delay() {
     let exact = |t: f64| {
@@ -232,6 +233,6 @@ fn many_lags_are_a_delay() {
         away.fold(0.0, f64::max)
     };
     let (few, many) = (worst(20), worst(80));
-    assert!(many < 0.02, "{many}");
+    assert!(many < 1.2 * LATE * SUPPLY * DELAY * DELAY / 320.0, "{many}");
     assert!((0.15..0.5).contains(&(many / few)), "{few} {many}");
 }
