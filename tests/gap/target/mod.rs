@@ -14,7 +14,7 @@ use lacuna::gap::experiment::Experiment;
 use lacuna::gap::fit::fit_from;
 use lacuna::gap::locate::Projection;
 use lacuna::gap::name::{Named, Options, Verdict, Word, search, verdict};
-use lacuna::gap::noise::Noise;
+use lacuna::gap::noise::{Around, Noise};
 use lacuna::gap::system::System;
 use lacuna::gap::whitener::Whitener;
 use lacuna::gap::wide::{Freed, Switched, Wide};
@@ -85,7 +85,7 @@ fn experiment<T>(
     experiment.wide = wide;
     let start = [1.5e5, 13_000.0, 1300.0];
     let response = lab.base.mean(&Matrix::from_rows(3, [start])).into_vec();
-    let noise = Noise::of(&experiment, &response, None);
+    let noise = Noise::of(&experiment, &Around::fixed(&response), None);
     let mut samples = lab.errors.clone();
     samples.extend(wide.iter().flat_map(|wide| wide.common.clone()));
     let all = shared(&experiment, &noise, &response, &samples);
@@ -97,7 +97,7 @@ fn experiment<T>(
 fn energy(truth: &[f64], seed: u64) -> f64 {
     experiment(truth, seed, None, |experiment, start| {
         let system = System::new(experiment, Vec::new());
-        let noise = Noise::of(experiment, &system.response(start), None);
+        let noise = Noise::of(experiment, &Around::fixed(&system.response(start)), None);
         let whitener = Whitener::new(experiment, &noise, &system.response(start));
         let means = experiment.means().1;
         let fit = fit_from(&system, &whitener, &means, &[start.to_vec()]).unwrap();
@@ -141,7 +141,7 @@ fn ask(truth: Truth, wide: Option<&Wide<'_>>) -> Answer {
     let (seed, simulated) = (20 + truth as u64, truth.simulated());
     experiment(&simulated, seed, wide, |experiment, start| {
         let response = experiment.forward.mean(&Matrix::from_rows(3, [start])).into_vec();
-        let sd = Noise::of(experiment, &response, None).sd(experiment, &response);
+        let sd = Noise::of(experiment, &Around::fixed(&response), None).sd(experiment, &response);
         let situation = Situation { layouts: experiment.layouts, response: &response, noise: &sd };
         let candidates = candidates(&situation, wide);
         let options = Options { naming: 0.03, unlisted: 0.02, simulations: 99, most: 3 };

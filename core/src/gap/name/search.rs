@@ -34,7 +34,7 @@ const FURTHER: f64 = 3.0;
 const PAIRED: usize = 10;
 
 /// Rounds in which effects that have better rivals are exchanged for them.
-const EXCHANGES: usize = 3;
+const EXCHANGES: usize = 10;
 
 /// A search: what does not change on its path.
 struct Search<'a> {

@@ -14,6 +14,10 @@ pub(super) const MOST: usize = 3;
 /// Values for each unknown of the autoregression, at least.
 const EACH: usize = 8;
 
+/// Independent values that a record of noise is worth, at least: what goes together over a larger part of it is no noise but
+/// something that the record shows once.
+const INDEPENDENT: f64 = 8.0;
+
 /// The reflection coefficients are sought as `tanh z` with `z` up to this: 0.995.
 const FARTHEST: f64 = 3.0;
 
@@ -128,8 +132,20 @@ impl Restricted<'_> {
         self.at(&moved).map_or(f64::INFINITY, |judged| judged.restricted)
     }
 
+    /// Whether a record of these values, with this memory, is worth enough independent ones: for its variance `n` are worth
+    /// `n / sum of rho^2` (Bayley and Hammersley, Supplement to the Journal of the Royal Statistical Society 8 (1946) 184).
+    fn forgets(&self, memory: &Autoregression) -> bool {
+        let covariances = memory.autocovariances(self.values.len());
+        let squares: f64 = covariances.iter().map(|c| (c / covariances[0]).powi(2)).sum();
+        self.values.len() as f64 >= INDEPENDENT * (2.0 * squares - 1.0)
+    }
+
     fn at(&self, z: &[f64]) -> Option<Judged> {
-        let succession = memory(z).on(self.places);
+        let memory = memory(z);
+        if !self.forgets(&memory) {
+            return None;
+        }
+        let succession = memory.on(self.places);
         let white = |curve: &[f64]| {
             let mut curve = curve.to_vec();
             succession.whiten(&mut curve);
