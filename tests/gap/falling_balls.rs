@@ -173,8 +173,8 @@ fn the_drag_of_the_air_is_missing_in_free_fall() {
     assert!(proof.all.closed > 0.8, "{proof:?}");
 }
 
-/// One drop of each ball has no replicates: the noise is assumed from neighbouring frames, which a camera takes smoother than
-/// drops repeat. Then no law of drag is good enough, and none may be called the answer.
+/// One drop of each ball has no replicates: the noise is assumed from what a record leaves beside its slow part, which a camera
+/// takes smoother than drops repeat. Then no law of drag is good enough, and none may be called the answer.
 #[test]
 fn drops_without_replicates_name_no_law_with_confidence() {
     let Some((drops, balls)) = tables() else { return };

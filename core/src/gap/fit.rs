@@ -24,7 +24,10 @@ pub struct Fit {
     pub residual: Vec<f64>,
     /// The whitened derivatives, one unknown a row.
     pub slopes: Matrix,
-    /// The precision that each prior adds.
+    /// The curvature of minus the log density of each prior there.
+    pub prior_curvature: Vec<f64>,
+    /// The precision that each prior adds at least: that of its width, so that an unknown of which the data say nothing is not
+    /// wider than its prior.
     pub prior_precision: Vec<f64>,
     /// `-|residual|^2 / 2` plus the log prior density: the log posterior density up to what the noise alone decides.
     pub log_density: f64,
@@ -39,12 +42,22 @@ impl Fit {
     }
 
     /// The matrix of second derivatives of minus the log density, by Gauss and Newton.
-    pub fn precision(&self) -> Matrix {
+    fn hessian(&self) -> Matrix {
         let mut hessian = gram(&self.slopes.transposed());
-        for (j, p) in self.prior_precision.iter().enumerate() {
+        for (j, p) in self.prior_curvature.iter().enumerate() {
             hessian[(j, j)] += p;
         }
         hessian
+    }
+
+    /// The precision of the normal law that stands for the posterior density.
+    pub fn precision(&self) -> Matrix {
+        let mut precision = self.hessian();
+        let least = self.prior_precision.iter().zip(&self.prior_curvature);
+        for (j, (least, curvature)) in least.enumerate() {
+            precision[(j, j)] += (least - curvature).max(0.0);
+        }
+        precision
     }
 
     /// The standard deviation of each unknown by the normal approximation.
@@ -174,10 +187,11 @@ pub fn at(system: &System<'_>, whitener: &Whitener, means: &[f64], point: &[f64]
     let finite = at.response.iter().all(|y| y.is_finite());
     let log_density =
         if finite { log_prior - 0.5 * dot(&residual, &residual) } else { f64::NEG_INFINITY };
-    let prior_precision =
-        system.priors().iter().zip(point).map(|(p, &x)| curvature(p, x)).collect();
+    let priors = system.priors();
+    let prior_curvature = priors.iter().zip(point).map(|(p, &x)| curvature(p, x)).collect();
+    let prior_precision = priors.iter().map(precision).collect();
     let slopes = whitener.whiten_rows(&at.tangents);
-    Fit { at, residual, slopes, prior_precision, log_density, log_prior }
+    Fit { at, residual, slopes, prior_curvature, prior_precision, log_density, log_prior }
 }
 
 /// The next point: a damped step of Gauss and Newton in units of the priors' widths, along the free unknowns.
@@ -192,7 +206,7 @@ fn step(system: &System<'_>, here: &Fit, damping: f64, bounds: &[(f64, f64)]) ->
         (point[j] <= low && gradient[j] < 0.0) || (point[j] >= high && gradient[j] > 0.0)
     };
     let free: Vec<usize> = (0..point.len()).filter(|&j| !blocked(j)).collect();
-    let hessian = here.precision();
+    let hessian = here.hessian();
     let width: Vec<f64> = system.priors().iter().map(|p| 1.0 / precision(p).sqrt()).collect();
     let reduced = Matrix::from_fn(free.len(), free.len(), |a, b| {
         let (i, j) = (free[a], free[b]);

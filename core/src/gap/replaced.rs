@@ -86,7 +86,7 @@ fn kept(mut own: Account, probability: f64, shares: &[(String, f64)]) -> Account
 /// The account with another model in place of the study's.
 fn replaced(own: &Account, best: Contestant, probability: f64, class: Vec<String>) -> Account {
     let Contestant { swap, log_odds, account: mut other, closed, explains, foretold, idle } = best;
-    let swap = Addition { probability, class, ..swap };
+    let swap = Addition { class, probability, ..swap };
     let verdict = &mut other.verdict;
     verdict.closed = closed;
     verdict.effects.insert(0, named(&swap));

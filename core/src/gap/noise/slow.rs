@@ -84,7 +84,9 @@ fn off(mut curve: Vec<f64>, others: &[Vec<f64>], share: f64) -> Option<Vec<f64>>
         }
     }
     let left = dot(&curve, &curve);
-    curve.iter_mut().for_each(|x| *x /= left.sqrt());
+    for x in &mut curve {
+        *x /= left.sqrt();
+    }
     (left > share * size).then_some(curve)
 }
 
@@ -160,11 +162,13 @@ mod tests {
             memory.colour(&mut values);
             let at = (0..length).map(|t| t as f64 / length as f64);
             values.iter_mut().zip(at).for_each(|(y, x)| *y += slow(x));
-            let law = law(&values, &[level.clone()], &places).unwrap();
+            let law = law(&values, std::slice::from_ref(&level), &places).unwrap();
             [law.sd, law.memory.autocovariances(2)[1] / law.memory.variance()]
         };
         (0..records).map(record).collect()
     }
+
+    type Shape = fn(f64) -> f64;
 
     /// A curve ten times as large as the noise changes little of what is found: innovations of size one, a correlation of a
     /// half; the edges of a cycle's band pass for a slower noise. The standard errors of n values are `1 / sqrt(2 n)` and
@@ -172,7 +176,7 @@ mod tests {
     #[test]
     fn noise_is_found_about_what_is_slow() {
         let (length, a, records) = (300, 0.5, 12);
-        let shapes: [(fn(f64) -> f64, f64); 3] = [
+        let shapes: [(Shape, f64); 3] = [
             (|_| 0.0, 0.03),
             (|x| 40.0 * (x * x - x / 3.0), 0.1),
             (|x| 14.0 * (75.0 * x).sin(), 0.4),

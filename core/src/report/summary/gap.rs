@@ -114,21 +114,19 @@ fn effect(addition: &Addition, added: Option<&Added>) -> Value {
         let short = unknown.name.rsplit('.').next().unwrap_or_default();
         let posterior =
             added.and_then(|added| added.unknowns.iter().find(|p| p.name == unknown.name));
-        let value = match posterior {
-            Some(p) => json!({
+        let value = if let Some(p) = posterior {
+            json!({
                 "mean": p.mean,
                 "sd": p.sd,
                 "q025": p.interval[0],
                 "q975": p.interval[1],
                 "unit": p.unit.to_string(),
-            }),
-            None => {
-                let moved = added.iter().flat_map(|added| &added.parameters);
-                let shared = moved.filter(|_| addition.model).find(|p| p.name == unknown.name);
-                let (mean, sd) =
-                    shared.map_or((unknown.value, unknown.sd), |p| (p.mean[1], p.sd[1]));
-                json!({ "mean": mean, "sd": sd, "unit": unknown.unit.to_string() })
-            }
+            })
+        } else {
+            let moved = added.iter().flat_map(|added| &added.parameters);
+            let shared = moved.filter(|_| addition.model).find(|p| p.name == unknown.name);
+            let (mean, sd) = shared.map_or((unknown.value, unknown.sd), |p| (p.mean[1], p.sd[1]));
+            json!({ "mean": mean, "sd": sd, "unit": unknown.unit.to_string() })
         };
         (short.to_owned(), value)
     });

@@ -101,7 +101,7 @@ impl Models<'_> {
             let winner = Explanation { system: &found_with.system, fit: &found_with.last.fit };
             let second = Explanation { system: &found.system, fit: &found.last.fit };
             Ok(Some(Contestant {
-                swap: self.addition(rival, &found_with),
+                swap: addition(rival, &found_with),
                 log_odds: odds.log_odds + prior - log_prior(found, own.candidates),
                 account,
                 closed,
@@ -110,35 +110,6 @@ impl Models<'_> {
                 idle: self.idle(rival),
             }))
         })
-    }
-
-    /// The model as an addition, with the parameters that it shares with the study's.
-    fn addition(&self, rival: &Rival<'_>, found: &Found<'_>) -> Addition {
-        let mut options =
-            rival.edit.swapped.as_ref().map(|swap| swap.model.clone()).unwrap_or_default();
-        let plugin = options.remove("use").and_then(|used| Some(used.as_str()?.to_owned()));
-        let fit = &found.last.fit;
-        let estimates = rival.parameters.iter().zip(&fit.at.point).zip(fit.sd());
-        let unknowns = estimates.map(|((p, value), sd)| Estimate {
-            name: p.name.clone(),
-            unit: p.unit.clone(),
-            value: *value,
-            sd,
-        });
-        Addition {
-            name: rival.name.clone(),
-            kind: MODEL_SWAP.to_owned(),
-            plugin: plugin.clone().unwrap_or_default(),
-            title: format!("the model `{}` in place of the study's", rival.name),
-            formula: format!("[model] use = \"{}\"", plugin.unwrap_or_default()),
-            on: On::new(),
-            options,
-            switches: Vec::new(),
-            model: true,
-            unknowns: unknowns.collect(),
-            class: Vec::new(),
-            probability: 0.0,
-        }
     }
 
     /// The parameters that the other model lacks: the medians and the widths of their priors.
@@ -161,4 +132,33 @@ fn log_prior(found: &Found<'_>, candidates: &[Candidate]) -> f64 {
     };
     let types = (kinds(candidates) as f64).ln();
     found.chosen.iter().map(|suspect| desk.log_prior(suspect) - types).sum()
+}
+
+/// The model as an addition, with the parameters that it shares with the study's.
+fn addition(rival: &Rival<'_>, found: &Found<'_>) -> Addition {
+    let mut options =
+        rival.edit.swapped.as_ref().map(|swap| swap.model.clone()).unwrap_or_default();
+    let plugin = options.remove("use").and_then(|used| Some(used.as_str()?.to_owned()));
+    let fit = &found.last.fit;
+    let estimates = rival.parameters.iter().zip(&fit.at.point).zip(fit.sd());
+    let unknowns = estimates.map(|((p, value), sd)| Estimate {
+        name: p.name.clone(),
+        unit: p.unit.clone(),
+        value: *value,
+        sd,
+    });
+    Addition {
+        name: rival.name.clone(),
+        kind: MODEL_SWAP.to_owned(),
+        plugin: plugin.clone().unwrap_or_default(),
+        title: format!("the model `{}` in place of the study's", rival.name),
+        formula: format!("[model] use = \"{}\"", plugin.unwrap_or_default()),
+        on: On::new(),
+        options,
+        switches: Vec::new(),
+        model: true,
+        unknowns: unknowns.collect(),
+        class: Vec::new(),
+        probability: 0.0,
+    }
 }
