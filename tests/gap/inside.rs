@@ -360,6 +360,7 @@ fn the_study_with_the_drag_is_written_and_run() {
     assert!(account.held_out[0].proof.shrank, "{:?}", account.held_out);
     let begun = Begun { study: &study, path: &path, settings: &[], findings: &findings, gap };
     let (added, _) = add(&begun, &run, &Silent).unwrap();
+    assert!(added.held_out[0].proof.shrank, "{:?}", added.held_out);
     let unknown = &added.unknowns[0];
     assert_eq!(unknown.name, "quadratic_friction");
     let exact = g / (terminal * terminal);

@@ -49,6 +49,12 @@ fn a_hidden_effect_is_found_added_and_shown_to_close_the_gap() {
         assert_eq!(file(run.root()), file(&added.run), "{stage}");
     }
 
+    // The study with the effect, calibrated with the same data, says what the search said: its emulator is the same.
+    let [searched, shown] = [&gap.account.held_out[0], &added.held_out[0]];
+    assert_eq!(searched.names, shown.names);
+    let [searched, shown] = [searched, shown].map(|part| part.proof.all.closed);
+    assert!((searched - shown).abs() < 1e-3, "{searched} {shown}");
+
     // Without a new search the report tells what became of it, and a second run of the study keeps it.
     let again = stage::run(&study, &mut run, &Silent).unwrap();
     assert_eq!(again.gap.as_ref().unwrap().added.as_ref(), Some(&added));

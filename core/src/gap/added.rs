@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use super::account::HeldOut;
 use crate::data::Unit;
 
 /// What the study with the effects found.
@@ -21,6 +22,8 @@ pub struct Added {
     pub unknowns: Vec<Posterior>,
     /// The log evidence of both studies, where it is known.
     pub log_evidence: Option<[f64; 2]>,
+    /// How the study with the effects fares on what was set aside, when it is calibrated without it.
+    pub held_out: Vec<HeldOut>,
 }
 
 /// A parameter in the study without the effects and in that with them.

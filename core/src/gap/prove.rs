@@ -1,7 +1,7 @@
 //! Whether the gap shrank: misfit of replicates that nothing was fitted to, without and with the effects.
 //!
-//! The gap of a response is its whitened mean square misfit to new replicates less one, the share of the noise, and less what
-//! of it the known errors of emulator and numerics can explain, with the effects: the rest could be closed. The misfits of one
+//! The gap of a response is its whitened mean square misfit to new replicates less one, the share of the noise: what a perfect
+//! model could close. How much of the rest the known errors of emulator and numerics could make is told beside it. The misfits of one
 //! replicate without and with the effects share its noise, so that their difference is far more exact than either:
 //! intervals are those of Student's law for the mean of the differences, replicates being independent. Conditions differ in what
 //! closes, so that the scatter is that within them (stratified sampling; Cochran, Sampling Techniques, 3rd ed., section 5.6).
@@ -55,8 +55,8 @@ pub struct Comparison {
     pub lower: f64,
     /// The upper end.
     pub upper: f64,
-    /// The same with nothing explained by known errors: the misfit beyond the noise of replicates alone.
-    pub beyond_noise: Closing,
+    /// The same of the gap less what of it known errors of emulator and numerics could explain, with the effects.
+    pub beyond_known_errors: Closing,
     /// The number of replicates.
     pub replicates: usize,
 }
@@ -175,7 +175,7 @@ fn of_known_errors(held_out: &Experiment<'_>, whitener: &Whitener) -> f64 {
 }
 
 impl Comparison {
-    /// The gap beyond noise and known errors, and how much of it closed.
+    /// The gap beyond the noise of the replicates, and how much of it closed.
     pub fn closing(&self) -> Closing {
         let closed = [self.closed, self.lower, self.upper];
         Closing { before: self.before, after: self.after, closed }
@@ -217,9 +217,10 @@ impl Comparison {
                 closed: [mean_gain, mean_gain - half, mean_gain + half].map(|x| x / scale),
             }
         };
-        let Closing { before, after, closed: [closed, lower, upper] } = closing(explained);
-        let beyond_noise = closing(0.0);
-        Some(Self { before, after, closed, lower, upper, beyond_noise, replicates: all.len() })
+        let Closing { before, after, closed: [closed, lower, upper] } = closing(0.0);
+        let beyond_known_errors = closing(explained);
+        let replicates = all.len();
+        Some(Self { before, after, closed, lower, upper, beyond_known_errors, replicates })
     }
 }
 

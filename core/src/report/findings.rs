@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::data::{FailedRun, Layouts, Observations, Parameter, Unit};
-use crate::gap::account::Account;
+use crate::gap::account::{Account, HeldOut};
 use crate::gap::added::Added;
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
@@ -56,6 +56,16 @@ pub struct GapFindings {
     pub hash: String,
     /// What the study with the effects found, where it was run.
     pub added: Option<Added>,
+}
+
+impl GapFindings {
+    /// How the gap fares on what was set aside: by the study with the effects, where it was run, else by the search.
+    pub fn held_out(&self) -> &[HeldOut] {
+        match &self.added {
+            Some(added) if !added.held_out.is_empty() => &added.held_out,
+            _ => &self.account.held_out,
+        }
+    }
 }
 
 /// The simulation runs.

@@ -32,7 +32,7 @@ pub fn sentences(findings: &Findings, gap: &GapFindings) -> Vec<String> {
     }
     sentences.extend(account.additions.iter().map(|addition| addition_sentence(gap, addition)));
     sentences
-        .extend(account.held_out.iter().map(|part| held_out(part, !account.additions.is_empty())));
+        .extend(gap.held_out().iter().map(|part| held_out(part, !account.additions.is_empty())));
     sentences.extend(account.needless.iter().map(Needless::words));
     sentences.extend(account.models.iter().map(other_model));
     sentences

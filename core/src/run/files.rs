@@ -80,6 +80,19 @@ pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, Stop> {
         .map_err(|error| Stop::new(format!("cannot read {}: {error}", path.display())))
 }
 
+/// Writes a value as TOML, atomically; unlike JSON, it has words for numbers that are not finite.
+pub fn write_toml<T: Serialize>(path: &Path, value: &T) -> Result<(), Stop> {
+    let text = toml::to_string(value)
+        .map_err(|error| Stop::new(format!("cannot write {}: {error}", path.display())))?;
+    write_atomic(path, text.as_bytes())
+}
+
+/// Reads a value from TOML.
+pub fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, Stop> {
+    toml::from_slice(&read(path)?)
+        .map_err(|error| Stop::new(format!("cannot read {}: {error}", path.display())))
+}
+
 /// The SHA-256 of some bytes, in hexadecimal.
 pub fn hash(bytes: &[u8]) -> String {
     in_hexadecimal(Sha256::digest(bytes).as_slice())

@@ -22,7 +22,7 @@ use super::{Goal, Known, calibrate, read};
 /// Runs a study without a surrogate: calibration and validation call the model.
 pub(super) fn run(
     study: &Study,
-    goal: Goal,
+    goal: Goal<'_>,
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {

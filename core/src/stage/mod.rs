@@ -42,12 +42,14 @@ use refine::Refinement;
 use surrogate::Fitted;
 
 /// What a study is run for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Goal {
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Goal<'a> {
     /// Its posterior.
     Calibrate,
     /// What its model misses too.
     FindGap,
+    /// How it fares on what is set aside, against this response of a study without its effects.
+    Show(&'a [f64]),
 }
 
 /// Runs a study: what is kept and unchanged is taken, the rest is made.
@@ -74,9 +76,20 @@ pub fn find_gap(
     pursue(study, Goal::FindGap, run, observer)
 }
 
+/// Runs a study that had effects added, and compares it on what was set aside with the study without them: with its response
+/// `before`, calibrated with the rest.
+pub fn show(
+    study: &Study,
+    before: &[f64],
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Findings, Stop> {
+    pursue(study, Goal::Show(before), run, observer)
+}
+
 fn pursue(
     study: &Study,
-    goal: Goal,
+    goal: Goal<'_>,
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {
@@ -92,7 +105,7 @@ fn pursue(
 
 fn with_surrogate(
     study: &Study,
-    goal: Goal,
+    goal: Goal<'_>,
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {
@@ -120,7 +133,7 @@ pub fn learn(
 /// Evidence, validation, gap and report of a calibration.
 fn conclude(
     study: &Study,
-    goal: Goal,
+    goal: Goal<'_>,
     known: &Known<'_>,
     calibrated: Option<&Kept<Calibrated>>,
     run: &mut RunDirectory,
@@ -131,8 +144,11 @@ fn conclude(
     let gap = match goal {
         Goal::FindGap => gap::stage(study, known, run, observer)?,
         // What was found before is not lost in a report that is written again.
-        Goal::Calibrate => gap::kept(study, known, run, observer)?,
+        Goal::Calibrate | Goal::Show(_) => gap::kept(study, known, run, observer)?,
     };
+    if let Goal::Show(before) = goal {
+        gap::show::stage(study, known, calibrated, before, run, observer)?;
+    }
     let made = report::Artifacts {
         known: Some(known),
         calibrated,

@@ -19,8 +19,9 @@ pub fn value(gap: &GapFindings) -> Value {
         account.regions[k].iter().map(|spot| region(account, spot)).collect()
     };
     let is_replicates = |part: &&HeldOut| matches!(part.kind, Kind::Replicates | Kind::Blocks);
-    let first = account.held_out.iter().find(is_replicates).or(account.held_out.first());
-    let others = account.held_out.iter().filter(|part| Some(*part) != first);
+    let shown = gap.held_out();
+    let first = shown.iter().find(is_replicates).or(shown.first());
+    let others = shown.iter().filter(|part| Some(*part) != first);
     let mut value = json!({
         "verdict": account.verdict.word,
         "reasons": account.verdict.reasons,
@@ -186,7 +187,7 @@ fn held_out(part: &HeldOut) -> Value {
         "closed": all.closed,
         "lower": all.lower,
         "upper": all.upper,
-        "beyond_noise": beyond_noise(all),
+        "beyond_known_errors": beyond_known_errors(all),
         "shrank": proof.shrank,
         "rmse": { "before": proof.rmse[0], "after": proof.rmse[1] },
         "coverage": { "before": proof.coverage[0], "after": proof.coverage[1] },
@@ -196,9 +197,9 @@ fn held_out(part: &HeldOut) -> Value {
     })
 }
 
-/// The gap with nothing explained by known errors.
-fn beyond_noise(all: &Comparison) -> Value {
-    let Closing { before, after, closed: [closed, lower, upper] } = all.beyond_noise;
+/// The gap that known errors could not explain.
+fn beyond_known_errors(all: &Comparison) -> Value {
+    let Closing { before, after, closed: [closed, lower, upper] } = all.beyond_known_errors;
     json!({ "before": before, "after": after, "closed": closed, "lower": lower, "upper": upper })
 }
 

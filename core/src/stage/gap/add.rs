@@ -2,16 +2,17 @@
 
 use std::path::Path;
 
+use super::show::{self, Shown};
 use super::{FOLDER, study_file};
 use crate::gap::added::{Added, Moved, Posterior};
 use crate::plugin::effect::Placed;
 use crate::report::findings::{CalibrationFindings, Findings, GapFindings, Role};
-use crate::run::{Observer, RunDirectory, Stop, files};
+use crate::run::{Artifact as _, Observer, RunDirectory, Stop, files};
 use crate::stage;
 use crate::study::Study;
 use crate::study::resolve;
 
-const FILE: &str = "added.json";
+const FILE: &str = "added.toml";
 
 /// A study with its file, its run and what was set on the command line.
 pub struct Begun<'a> {
@@ -51,7 +52,8 @@ pub fn add(
     if !account.additions.iter().any(|addition| addition.model) {
         directory.adopt(run.root(), is_of_the_model)?;
     }
-    let with = stage::run(&augmented, &mut directory, observer)?;
+    let with = stage::show(&augmented, &account.response[0], &mut directory, observer)?;
+    let shown = Shown::load(&directory.stage_folder(show::FOLDER))?;
     let added = Added {
         search: gap.hash.clone(),
         study: file,
@@ -59,14 +61,15 @@ pub fn add(
         parameters: moved(findings, &with),
         unknowns: unknowns(study, &augmented, &with),
         log_evidence: evidence(findings).zip(evidence(&with)).map(|(a, b)| [a, b]),
+        held_out: shown.held_out,
     };
-    files::write_json(&run.stage_folder(FOLDER).join(FILE), &added)?;
+    files::write_toml(&run.stage_folder(FOLDER).join(FILE), &added)?;
     Ok((added, with))
 }
 
 /// What was added after this search, if it was.
 pub fn kept(run: &RunDirectory, search: &str) -> Option<Added> {
-    let added: Added = files::read_json(&run.stage_folder(FOLDER).join(FILE)).ok()?;
+    let added: Added = files::read_toml(&run.stage_folder(FOLDER).join(FILE)).ok()?;
     (added.search == search).then_some(added)
 }
 

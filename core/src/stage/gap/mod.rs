@@ -6,6 +6,7 @@ pub mod add;
 mod models;
 mod own;
 pub(super) mod search;
+pub mod show;
 mod study_file;
 
 use std::path::Path;
@@ -27,18 +28,12 @@ const FILE: &str = "gap.toml";
 
 impl Artifact for Account {
     fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
-        // Unlike JSON, TOML has words for numbers that are not finite.
-        let text = toml::to_string(self)
-            .map_err(|error| Stop::new(format!("what the search found: {error}")))?;
-        files::write_atomic(&folder.join(FILE), text.as_bytes())?;
+        files::write_toml(&folder.join(FILE), self)?;
         Ok(vec![FILE.to_owned()])
     }
 
     fn load(folder: &Path) -> Result<Self, Stop> {
-        let path = folder.join(FILE);
-        let text = String::from_utf8_lossy(&files::read(&path)?).into_owned();
-        toml::from_str(&text)
-            .map_err(|error| Stop::new(format!("cannot read {}: {error}", path.display())))
+        files::read_toml(&folder.join(FILE))
     }
 }
 

@@ -5,11 +5,12 @@ use crate::gap::account::{Account, HeldOut};
 use crate::gap::candidates::{Candidate, proposed};
 use crate::gap::common::shared;
 use crate::gap::experiment::Experiment;
-use crate::gap::fit::precision;
+use crate::gap::fit::{Fit, precision};
 use crate::gap::hold_out::{HeldOutData, Kind, Split, split};
 use crate::gap::name::{Found, Options, search};
 use crate::gap::noise::{Around, Noise};
 use crate::gap::prove::prove;
+use crate::gap::system::System;
 use crate::gap::wide::Wide;
 use crate::gap::with_effects::WithEffects;
 use crate::linalg::Matrix;
@@ -102,8 +103,7 @@ pub fn prepared<T>(
     let Some(measured) = &known.data.value.measured else {
         return Err(Stop::new("the study has no `[measurements]` to search for a gap"));
     };
-    let stream = stream(study, "gap").named("hold out");
-    let split = split(&measured.used, &study.gap.keys.hold_out, &stream);
+    let split = apart(study, &measured.used);
     let forward = WithEffects::new(beginning.forward, study.placed_effects());
     let parameters = forward.parameters(beginning.parameters);
     let wide = beginning.inside.wide.as_ref().map(|wide| wide.with_effects(study.placed_effects()));
@@ -150,11 +150,18 @@ impl<'a> Prepared<'a> {
         all: &Observations,
     ) -> Result<Account, Stop> {
         let mut account = Account::of(found, self.candidates, self.options, &self.random);
+        let fitted = Fitted { system: &found.system, fit: &found.last.fit, noise: &found.noise };
         for part in &self.split.held_out {
-            account.held_out.extend(self.base.proof(part, all, before, found)?);
+            account.held_out.extend(self.base.proof(part, all, before, &fitted)?);
         }
         Ok(account)
     }
+}
+
+/// The measurements of a study in two parts: what is looked at, and what proves.
+pub(super) fn apart(study: &Study, all: &Observations) -> Split {
+    let stream = stream(study, "gap").named("hold out");
+    split(all, &study.gap.keys.hold_out, &stream)
 }
 
 fn options(study: &Study) -> Options {
@@ -180,14 +187,14 @@ fn candidates(study: &Study, situation: &Situation<'_>) -> Result<Vec<Candidate>
     Ok(all)
 }
 
-/// The model as the search begins with it.
-struct Base<'a> {
-    study: &'a Study,
-    known: &'a Known<'a>,
-    beginning: &'a Beginning<'a>,
-    wide: Option<&'a Wide<'a>>,
-    forward: &'a WithEffects<'a>,
-    parameters: &'a [Parameter],
+/// A study's model with the study's effects, and all that is known of it.
+pub(super) struct Base<'a> {
+    pub study: &'a Study,
+    pub known: &'a Known<'a>,
+    pub beginning: &'a Beginning<'a>,
+    pub wide: Option<&'a Wide<'a>>,
+    pub forward: &'a WithEffects<'a>,
+    pub parameters: &'a [Parameter],
 }
 
 impl<'a> Base<'a> {
@@ -203,7 +210,7 @@ impl<'a> Base<'a> {
     }
 
     /// The response at a point with what the parameters can do to it.
-    fn around(&self, point: &[f64]) -> Around {
+    pub fn around(&self, point: &[f64]) -> Around {
         let (response, jacobian) = self.forward.mean_and_jacobian(point);
         let widths: Vec<f64> =
             self.parameters.iter().map(|p| 1.0 / precision(&p.prior).sqrt()).collect();
@@ -228,7 +235,7 @@ impl<'a> Base<'a> {
     }
 
     /// The measurements with the forward map and all errors that replicates share.
-    fn experiment(&self, data: &Observations, point: &[f64]) -> Result<Experiment<'a>, Stop> {
+    pub fn experiment(&self, data: &Observations, point: &[f64]) -> Result<Experiment<'a>, Stop> {
         let layouts = &self.study.layouts;
         let mut experiment = Experiment::new(layouts, self.parameters, self.forward, data);
         experiment.region = self.beginning.region.map(<[_]>::to_vec);
@@ -259,23 +266,24 @@ impl<'a> Base<'a> {
         Ok(all)
     }
 
-    /// How the two responses fare on what was set aside.
-    fn proof(
+    /// How a response and the fit of a system fare on what was set aside.
+    pub fn proof(
         &self,
         part: &HeldOutData,
         all: &Observations,
         before: &[f64],
-        found: &Found<'_>,
+        fitted: &Fitted<'_>,
     ) -> Result<Option<HeldOut>, Stop> {
-        let point = &found.last.fit.at.point[..self.parameters.len()];
+        let Fitted { system, fit, noise } = fitted;
+        let point = &fit.at.point[..self.parameters.len()];
         let held_out = self.experiment(&part.data, point)?;
-        let after = &found.last.fit.at.response;
+        let after = &fit.at.response;
         let noise = if part.kind == Kind::Replicates {
-            found.noise.restricted(found.system.experiment, &held_out)
+            noise.restricted(system.experiment, &held_out)
         } else {
             // What the training never measured has its noise from the replicates that were set aside.
             let whole = self.experiment(all, point)?;
-            let around = Around::fit(&found.system, &found.last.fit.at);
+            let around = Around::fit(system, &fit.at);
             Noise::of(&whole, &around, None).restricted(&whole, &held_out)
         };
         let proof = prove(&held_out, &noise, before, after);
@@ -284,6 +292,13 @@ impl<'a> Base<'a> {
         let names = part.names.clone();
         Ok(proof.map(|proof| HeldOut { kind: part.kind, names, proof, accuracy }))
     }
+}
+
+/// A system at its best fit to what was not set aside, with the noise found there.
+pub(super) struct Fitted<'a> {
+    pub system: &'a System<'a>,
+    pub fit: &'a Fit,
+    pub noise: &'a Noise,
 }
 
 /// The accuracy on the mean over the groups of sensors.

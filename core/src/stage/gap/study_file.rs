@@ -135,7 +135,7 @@ fn reasons(account: &Account) -> Vec<String> {
     for part in &account.held_out {
         let all = &part.proof.all;
         lines.push(format!(
-            "On data that were set aside ({} of {}): gap {:.3} before, {:.3} after, in standard deviations of the noise; {:.0} % closed ({:.0} to {:.0} %), {:.0} % of all misfit beyond the noise of replicates.",
+            "By the search, on data that were set aside ({} of {}): gap {:.3} before, {:.3} after, in standard deviations of the noise; {:.0} % closed ({:.0} to {:.0} %).",
             all.replicates,
             part.kind.words(),
             all.before,
@@ -143,7 +143,6 @@ fn reasons(account: &Account) -> Vec<String> {
             100.0 * all.closed,
             100.0 * all.lower,
             100.0 * all.upper,
-            100.0 * all.beyond_noise.closed[0],
         ));
     }
     lines.extend(account.verdict.reasons.iter().cloned());

@@ -23,9 +23,9 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
         @if !account.verdict.reasons.is_empty() {
             ul { @for reason in &account.verdict.reasons { li { (paragraph(reason)) } } }
         }
-        @if !account.held_out.is_empty() {
-            (tables::held_out(account, numbers))
-            (tables::scores(findings, account, numbers))
+        @if !gap.held_out().is_empty() {
+            (tables::held_out(gap, numbers))
+            (tables::scores(findings, gap, numbers))
         }
         (figures::maps(findings, account, numbers))
         (figures::curves(findings, account, numbers))

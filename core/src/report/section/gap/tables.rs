@@ -14,10 +14,10 @@ use crate::report::section::{axis_unit, response_unit};
 use crate::report::table::Table;
 
 /// How the gap fares on what was set aside.
-pub fn held_out(account: &Account, numbers: &mut Numbers) -> Markup {
+pub fn held_out(gap: &GapFindings, numbers: &mut Numbers) -> Markup {
     let columns = ["number", "gap without", "with", "closed", "95 % interval"];
     let mut table = Table::new(&["set aside"], &columns);
-    for part in &account.held_out {
+    for part in gap.held_out() {
         let proof = &part.proof;
         let mut row = |name: String, count: usize, c: Closing| {
             let [closed, lower, upper] = c.closed.map(percent);
@@ -27,10 +27,10 @@ pub fn held_out(account: &Account, numbers: &mut Numbers) -> Markup {
             cells.extend([closed, format!("{lower} to {upper}")]);
             table.row(cells);
         };
-        let (all, beyond) = (proof.all.closing(), proof.all.beyond_noise);
+        let (all, beyond) = (proof.all.closing(), proof.all.beyond_known_errors);
         row(part.kind.words().to_owned(), proof.all.replicates, all);
         if beyond != all {
-            row("· known errors explaining nothing".to_owned(), proof.all.replicates, beyond);
+            row("· beyond known errors".to_owned(), proof.all.replicates, beyond);
         }
         if proof.conditions.len() > 1 {
             for condition in &proof.conditions {
@@ -42,10 +42,10 @@ pub fn held_out(account: &Account, numbers: &mut Numbers) -> Markup {
     }
     let caption = Caption::new(
         "What was set aside before anything was looked at, against the calibrated response without and with what was \
-         found. The gap is the root of the whitened mean square misfit less what noise and the known errors of emulator \
-         and numerics make of it, in standard deviations of the noise; closed is the share of its square. What is known \
-         of those errors is how large they may be, not what they are: with them explaining nothing, all that is beyond the \
-         noise of replicates is gap. Intervals pair the misfits of each replicate.",
+         found. The gap is the root of the whitened mean square misfit less what the noise of replicates makes of it, in \
+         standard deviations of the noise; closed is the share of its square. Beyond known errors is the same less what \
+         emulator and numerics could make of it, with what was found: how large those errors may be is known, not what \
+         they are. Intervals pair the misfits of each replicate.",
         "sampling of the replicates (Student's law).",
         "an interval above zero in all, and below zero under no condition.",
     );
@@ -53,13 +53,13 @@ pub fn held_out(account: &Account, numbers: &mut Numbers) -> Markup {
 }
 
 /// What else can be said of what was set aside.
-pub fn scores(findings: &Findings, account: &Account, numbers: &mut Numbers) -> Markup {
+pub fn scores(findings: &Findings, gap: &GapFindings, numbers: &mut Numbers) -> Markup {
     let unit = response_unit(findings);
     let rmse = unit.label("RMSE without");
     let columns =
         [&rmse, "with", "inside 95 % without", "with", "accuracy without", "with", "log score"];
     let mut table = Table::new(&["set aside"], &columns);
-    for part in &account.held_out {
+    for part in gap.held_out() {
         let proof = &part.proof;
         let mut cells = vec![part.kind.words().to_owned()];
         cells.extend(proof.rmse.map(|x| significant(unit.show(x), 3)));
