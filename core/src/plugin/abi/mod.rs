@@ -12,6 +12,7 @@
 pub mod declared;
 mod guard;
 pub mod guest;
+pub mod header;
 pub mod host;
 pub mod library;
 mod linear;
