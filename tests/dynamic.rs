@@ -4,6 +4,9 @@
 
 #[path = "dynamic/contracts.rs"]
 mod contracts;
+#[cfg(unix)]
+#[path = "dynamic/hostile.rs"]
+mod hostile;
 #[path = "quick.rs"]
 #[allow(dead_code, reason = "other tests use the rest")]
 mod quick;

@@ -59,10 +59,25 @@ macro_rules! abi_version {
 /// What a study calls the kind of a trait.
 #[macro_export]
 macro_rules! kind_name {
+    (Design) => {
+        "design"
+    };
     (Discrepancy) => {
         "discrepancy"
     };
+    (Effect) => {
+        "effect"
+    };
+    (Model) => {
+        "model"
+    };
+    (Reader) => {
+        "reader"
+    };
     (Sampler) => {
         "sampler"
+    };
+    (Surrogate) => {
+        "surrogate"
     };
 }

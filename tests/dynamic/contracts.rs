@@ -1,8 +1,12 @@
 //! The suites of the kinds, put to plugins of a library.
 
-use lacuna::contract;
+use lacuna::contract::{self, Sample};
+use lacuna::data::{Axis, Layout, Parameter, Scenario, Unit};
+use lacuna::math::distribution::Distribution;
 use lacuna::plugin::registry::{self, Kind};
-use lacuna::plugin::{Component, Discrepancy, Sampler};
+use lacuna::plugin::{
+    Component, Context, Design, Discrepancy, Effect, Given, Model, Reader, Sampler, Surrogate,
+};
 
 use super::twin;
 
@@ -31,6 +35,72 @@ fn sound(plugin: &dyn Component, outcome: Result<(), Vec<String>>) -> Result<(),
     let fault = plugin.fault().unwrap();
     assert_eq!(fault.said(), None);
     outcome
+}
+
+#[test]
+fn designs() {
+    let table = [("twin_latin_hypercube", ""), ("twin_quadrature", "")];
+    all::<dyn Design>(&table, |name, plugin| sound(plugin, contract::design(name, plugin)));
+}
+
+#[test]
+fn effects() {
+    let table = [("twin_delay", "time = { normal = [0, 1e-5] }"), ("twin_gain", "")];
+    all::<dyn Effect>(&table, |name, plugin| sound(plugin, contract::effect(name, plugin)));
+}
+
+#[test]
+fn surrogates() {
+    let table = [
+        ("twin_gaussian_process", "nugget = 1e-8"),
+        ("twin_polynomial_chaos", "degree = { max = 8 }"),
+    ];
+    all::<dyn Surrogate>(&table, |name, plugin| sound(plugin, contract::surrogate(name, plugin)));
+}
+
+#[test]
+fn models() {
+    let table = [
+        ("twin_equations", "observe = \"a + sin(b * time / 1 {s}) + b\""),
+        ("twin_mercury_target", "numerics = { mesh = [6, 24] }"),
+    ];
+    let parameters =
+        ["a", "b"].map(|name| Parameter::plain(name, Distribution::Uniform([0.0, 2.0])));
+    let given =
+        parameters.clone().map(|p| Given { name: p.name.clone(), unit: Some(p.unit.clone()) });
+    let scenarios = [Scenario::default()];
+    let axes =
+        vec![Axis::grid("time", (1..=5).map(f64::from).collect(), Unit::parse("s").unwrap())];
+    let layout = Layout { name: "y".to_owned(), unit: Unit::dimensionless(), axes };
+    all::<dyn Model>(&table, |name, plugin| {
+        let scratch = tempfile::tempdir().unwrap();
+        let context = Context {
+            given: &given,
+            scenarios: &scenarios,
+            ..Context::new(scratch.path(), &parameters, &layout)
+        };
+        sound(plugin, contract::model(name, plugin, &context, scratch.path()))
+    });
+}
+
+#[test]
+fn readers() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("sound.csv");
+    let axes = vec![
+        Axis::labels("sensor", ["A", "B"]),
+        Axis::grid("time", vec![1.0, 2.0, 3.0], Unit::parse("s").unwrap()),
+    ];
+    let layout = Layout { name: "strain".to_owned(), unit: Unit::dimensionless(), axes };
+    let values = vec![0.5, -1.0, 2.0, 3.25, 4.0, 5.5];
+    let row = |i: usize| format!("{},{},{}\n", ["A", "B"][i / 3], 1 + i % 3, values[i]);
+    let rows: String = (0..6).map(row).collect();
+    std::fs::write(&file, format!("sensor,time,strain\n{rows}")).unwrap();
+    let sample = Sample { file, layout, values, tolerance: 0.0 };
+    all::<dyn Reader>(&[("twin_csv", "")], |name, plugin| {
+        let scratch = tempfile::tempdir().unwrap();
+        sound(plugin, contract::reader(name, plugin, &sample, scratch.path()))
+    });
 }
 
 #[test]

@@ -9,10 +9,11 @@ use lacuna::study::resolve::{Use, load_for};
 use super::quick;
 use super::twin_path;
 
-/// What a study of tables leaves behind with these settings.
-fn results(settings: &[&str], out: &Path) -> BTreeMap<String, String> {
-    let folder = quick::tables();
-    quick::run(&folder.path().join("study.toml"), settings, out).unwrap();
+/// What a study leaves behind with these settings.
+fn results(study: &Path, settings: &[&str]) -> BTreeMap<String, String> {
+    let out = tempfile::tempdir().unwrap();
+    let out = out.path();
+    quick::run(study, settings, out).unwrap();
     let mut results = quick::results(out);
     // The inputs name the plugins, and so does the summary.
     results.retain(|file, _| !file.ends_with("inputs.sha256"));
@@ -40,8 +41,7 @@ fn twins_give_the_same_bits() {
             "student_t" => "discrepancy.scale={ half_normal = 0.1 }",
             _ => "discrepancy.variance={ half_normal = 0.01 }",
         };
-        let outs = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
-        let [own, twins] = [("", 0), ("twin_", 1)].map(|(prefix, which)| {
+        let [own, twins] = ["", "twin_"].map(|prefix| {
             let uses = [
                 format!("discrepancy.use={prefix}{discrepancy}"),
                 format!("sampler.use={prefix}{sampler}"),
@@ -50,10 +50,44 @@ fn twins_give_the_same_bits() {
             let mut settings: Vec<&str> = uses.iter().map(String::as_str).collect();
             settings.push(common);
             settings.extend(options);
-            results(&settings, outs[which].path())
+            results(&quick::tables().path().join("study.toml"), &settings)
         });
         assert_eq!(own, twins, "{discrepancy} {sampler}");
     }
+}
+
+/// The same study with all its plugins from the library, and without.
+fn all_twins(study: &Path) {
+    let own = results(study, &[]);
+    let text = std::fs::read_to_string(study).unwrap();
+    // The reader of the simulator's own format stays, so that it reads what the twin of the model writes.
+    let twins = text.replace("use = \"", "use = \"twin_").replace("twin_sierra", "sierra");
+    std::fs::write(study, twins).unwrap();
+    assert_eq!(own, results(study, &[&load_twin()]));
+}
+
+#[test]
+fn a_study_that_simulates_gives_the_same_bits_from_end_to_end() {
+    let folder = quick::simulated();
+    all_twins(&folder.path().join("study.toml"));
+}
+
+#[test]
+fn a_study_with_effects_gives_the_same_bits() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = folder.path().join("study.toml");
+    std::fs::copy(quick::root().join("tests/effects/study.toml"), &study).unwrap();
+    quick::replace(&study, "steps = 600", "steps = 40");
+    quick::replace(&study, "warm_up = 200", "warm_up = 40");
+    let bump = |t: f64, centre: f64| (-2.0 * (t - centre).powi(2)).exp();
+    let row = |k: u32| {
+        let t = 0.1 * f64::from(k);
+        format!("1,near,{t},{}\n1,far,{t},{}\n", 2.0 * bump(t, 2.0), 2.1 * bump(t, 3.1))
+    };
+    let rows: String = (0..61).map(row).collect();
+    let text = format!("replicate,sensor,t,level\n{rows}");
+    std::fs::write(folder.path().join("level.csv"), text).unwrap();
+    all_twins(&study);
 }
 
 #[test]

@@ -2,19 +2,29 @@
 //!
 //! They take any options and complain of nothing, so that the rest of a study can be checked; used, they stop.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
+use toml::Table;
 
 use super::record::Record;
+use super::wire::SignatureAbout;
+use crate::data::Layout;
 use crate::linalg::Matrix;
 use crate::math::random::Stream;
 use crate::plugin::discrepancy::Known;
+use crate::plugin::effect::{Description, Situation};
+use crate::plugin::model::{Call, EvalError, Response, Signature};
+use crate::plugin::reader::{Contents, ReadError};
 use crate::plugin::registry::loaded::AnyEntry;
 use crate::plugin::registry::{Built, Entry, Kind, find};
 use crate::plugin::sampler::{Plan, State};
-use crate::plugin::{Component, Discrepancy, Likelihood, Sampler, Target};
-use crate::run::Stop;
+use crate::plugin::surrogate::Training;
+use crate::plugin::{
+    Component, Context, Design, Discrepancy, Effect, Emulator, Hyperparameter, Likelihood, Model,
+    Reader, Sampler, Surrogate, Target,
+};
+use crate::run::{Progress, Stop};
 use crate::study::{Node, Problems};
 
 /// A plugin of a library that was not loaded.
@@ -29,7 +39,12 @@ pub fn entries(path: &Path, record: &Record) -> Vec<AnyEntry> {
 
 fn of_kind(path: &Path, kind: &str, name: &str) -> Option<AnyEntry> {
     match kind {
+        "design" => entry::<dyn Design>(path, name, || Box::new(Absent)),
         "discrepancy" => entry::<dyn Discrepancy>(path, name, || Box::new(Absent)),
+        "effect" => entry::<dyn Effect>(path, name, || Box::new(Absent)),
+        "model" => entry::<dyn Model>(path, name, || Box::new(Absent)),
+        "reader" => entry::<dyn Reader>(path, name, || Box::new(Absent)),
+        "surrogate" => entry::<dyn Surrogate>(path, name, || Box::new(Absent)),
         "sampler" => entry::<dyn Sampler>(path, name, || Box::new(Absent)),
         _ => None,
     }
@@ -79,5 +94,81 @@ impl Sampler for Absent {
 
     fn step(&self, _: &dyn Target, _: &mut State, _: &Stream) -> Result<(), Stop> {
         Err(stop())
+    }
+}
+
+impl Design for Absent {
+    fn points(&self, _: usize, _: usize, _: &Stream) -> Result<Matrix, Stop> {
+        Err(stop())
+    }
+}
+
+impl Surrogate for Absent {
+    fn fit(
+        &self,
+        _: &Training<'_>,
+        _: &Stream,
+        _: &Progress<'_>,
+    ) -> Result<Box<dyn Emulator>, Stop> {
+        Err(stop())
+    }
+
+    fn load(&self, _: &[u8]) -> Result<Box<dyn Emulator>, Stop> {
+        Err(stop())
+    }
+}
+
+impl Model for Absent {
+    /// What it takes is not known, so that whatever the study gives is right.
+    fn signature(&self, context: &Context<'_>) -> Signature {
+        SignatureAbout::default().in_study(context)
+    }
+
+    fn predict(&self, _: &Call<'_>) -> Result<Response, EvalError> {
+        Err(EvalError::Fatal(stop().message))
+    }
+}
+
+impl Reader for Absent {
+    fn recognises(&self, _: &Path, _: &[u8]) -> bool {
+        false
+    }
+
+    fn inspect(&self, path: &Path) -> Result<Contents, ReadError> {
+        Err(ReadError::new(path, stop().message))
+    }
+
+    fn names_files(&self) -> bool {
+        true
+    }
+
+    fn files(&self, _: &Path, _: Option<&str>) -> Vec<PathBuf> {
+        Vec::new()
+    }
+}
+
+impl Effect for Absent {
+    fn describe(&self) -> Description {
+        Description { title: String::new(), formula: String::new(), source: String::new() }
+    }
+
+    fn parameters(&self, _: &Layout) -> Vec<Hyperparameter> {
+        Vec::new()
+    }
+
+    fn absent(&self, _: &Layout) -> Vec<f64> {
+        Vec::new()
+    }
+
+    fn apply(&self, _: &Layout, response: &[f64], _: &[f64]) -> Vec<f64> {
+        response.to_vec()
+    }
+
+    fn starts(&self, _: &Layout, _: &Situation<'_>) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
+
+    fn proposals(&self, _: &Situation<'_>) -> Vec<Table> {
+        Vec::new()
     }
 }

@@ -19,7 +19,10 @@ pub fn header() -> String {
     for shape in shapes() {
         structure(&shape, &mut text);
     }
-    let _ = write!(text, "#define LACUNA_RECORD_BEGIN \"lacuna-plugin-record:{MAJOR}.{MINOR}\\n\"\n\n{END}");
+    let _ = write!(
+        text,
+        "#define LACUNA_RECORD_BEGIN \"lacuna-plugin-record:{MAJOR}.{MINOR}\\n\"\n\n{END}"
+    );
     text
 }
 
@@ -129,7 +132,9 @@ fn member(field: &Field, text: &mut String) {
             writeln!(text, "{may}    {};", function(name, arguments, returns))
         }
         Type::Value(of) => match signature(of) {
-            Some((arguments, returns)) => writeln!(text, "    {};", function(name, arguments, returns)),
+            Some((arguments, returns)) => {
+                writeln!(text, "    {};", function(name, arguments, returns))
+            }
             None => writeln!(text, "    {};", declared(of, name)),
         },
     };

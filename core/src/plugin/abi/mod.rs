@@ -16,6 +16,7 @@ pub mod header;
 pub mod host;
 pub mod library;
 mod linear;
+mod memo;
 pub mod record;
 mod refusal;
 mod reply;
@@ -23,5 +24,6 @@ pub mod table;
 pub mod wire;
 
 pub use library::Library;
+use memo::Memo;
 pub use refusal::Refusal;
 pub use reply::Reply;

@@ -1,8 +1,13 @@
 //! The side of the library: tables of functions made from types that implement the traits.
 
 mod component;
+mod design;
 mod discrepancy;
+mod effect;
+mod model;
+mod reader;
 mod sampler;
+mod surrogate;
 mod target;
 
 pub use component::{Authored, Export};

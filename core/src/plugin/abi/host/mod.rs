@@ -3,12 +3,17 @@
 //! Every answer is checked for its size, and for numbers where the trait promises numbers. What is wrong is an error
 //! that names library and plugin where the trait has room for one, else the plugin has a fault.
 
+mod design;
 mod discrepancy;
+mod effect;
+mod model;
 mod object;
 mod offer;
 mod options;
 mod plugin;
+mod reader;
 mod sampler;
+mod surrogate;
 mod target;
 
 pub use object::{Object, copied};

@@ -10,13 +10,14 @@ use super::object::{Object, copied};
 use super::options::Options;
 use crate::plugin::abi::record::is_word;
 use crate::plugin::abi::table::{
-    ComponentFunctions, DiscrepancyFunctions, Entry as Raw, SamplerFunctions, Table, Text, status,
+    ComponentFunctions, DesignFunctions, DiscrepancyFunctions, EffectFunctions, Entry as Raw,
+    ModelFunctions, ReaderFunctions, SamplerFunctions, SurrogateFunctions, Table, Text, status,
 };
 use crate::plugin::abi::wire::{Complaint, json_of_node, table_of_json};
 use crate::plugin::abi::{Library, Refusal, Reply};
 use crate::plugin::registry::loaded::AnyEntry;
 use crate::plugin::registry::{Built, Entry, Kind, find};
-use crate::plugin::{Discrepancy, Fault, Sampler};
+use crate::plugin::{Design, Discrepancy, Effect, Fault, Model, Reader, Sampler, Surrogate};
 use crate::study::{Complaints, Node, Problems};
 
 /// Checks all plugins of a library and makes entries of them; none when one of them is wrong.
@@ -55,11 +56,18 @@ unsafe fn of_kind(
     // SAFETY: as the caller promises.
     unsafe {
         match kind {
+            "design" => offer::<dyn Design, DesignFunctions>(name, raw, library, |p| Box::new(p)),
             "discrepancy" => {
                 offer::<dyn Discrepancy, DiscrepancyFunctions>(name, raw, library, |p| Box::new(p))
             }
+            "effect" => offer::<dyn Effect, EffectFunctions>(name, raw, library, |p| Box::new(p)),
+            "model" => offer::<dyn Model, ModelFunctions>(name, raw, library, |p| Box::new(p)),
+            "reader" => offer::<dyn Reader, ReaderFunctions>(name, raw, library, |p| Box::new(p)),
             "sampler" => {
                 offer::<dyn Sampler, SamplerFunctions>(name, raw, library, |p| Box::new(p))
+            }
+            "surrogate" => {
+                offer::<dyn Surrogate, SurrogateFunctions>(name, raw, library, |p| Box::new(p))
             }
             _ => Err("is of a kind that libraries cannot hold".to_owned()),
         }

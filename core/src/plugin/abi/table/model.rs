@@ -35,6 +35,9 @@ functions! {
         may unused(plugin: *mut c_void, context: Text, answer: *const Answer) -> i32;
         /// Answers the user's files that the answers depend on, a JSON list of paths; relative ones start in `directory`.
         may files(plugin: *mut c_void, directory: Text, answer: *const Answer) -> i32;
+        /// Writes a finished run (one call, its response, and `{"valid", "facts"}` about it) in the simulator's own format
+        /// into `directory` and answers the file's name; `ABSENT` when it has no format of its own.
+        may write(plugin: *mut c_void, run: Text, calls: *const Calls, response: Numbers, about: Text, directory: Text, answer: *const Answer) -> i32;
         /// The derivatives of each value of the response (rows) by each input (columns), for one call.
         may jacobian(plugin: *mut c_void, calls: *const Calls, jacobian: *mut f64, answer: *const Answer) -> i32;
     }
