@@ -4,9 +4,13 @@
 
 #[path = "dynamic/contracts.rs"]
 mod contracts;
+#[path = "dynamic/examples.rs"]
+mod examples;
 #[cfg(unix)]
 #[path = "dynamic/hostile.rs"]
 mod hostile;
+#[path = "dynamic/panics.rs"]
+mod panics;
 #[path = "quick.rs"]
 #[allow(dead_code, reason = "other tests use the rest")]
 mod quick;

@@ -14,7 +14,7 @@ use lacuna::study::resolve::{Use, load_for};
 use super::quick;
 
 /// Compiles a library from C, with these definitions.
-fn compiled(folder: &Path, source: &Path, name: &str, defines: &[&str]) -> PathBuf {
+pub fn compiled(folder: &Path, source: &Path, name: &str, defines: &[&str]) -> PathBuf {
     let library = folder.join(format!("lib{name}.so"));
     let output = Command::new("cc")
         .args([

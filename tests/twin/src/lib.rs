@@ -1,4 +1,7 @@
-//! Built-in plugins once more, under other names, in a library that is loaded: they must give the same bits.
+//! Built-in plugins once more, under other names, in a library that is loaded: they must give the same bits. Beside them
+//! plugins that panic.
+
+mod panicking;
 
 use lacuna_plugins::designs::latin_hypercube::LatinHypercube;
 use lacuna_plugins::designs::quadrature::Quadrature;
@@ -17,6 +20,7 @@ use lacuna_plugins::samplers::nested::Nested;
 use lacuna_plugins::samplers::no_u_turn::NoUTurn;
 use lacuna_plugins::surrogates::gaussian_process::GaussianProcess as Kriging;
 use lacuna_plugins::surrogates::polynomial_chaos::PolynomialChaos;
+use panicking::Panicking;
 
 lacuna_plugin::export! {
     Design "twin_latin_hypercube" LatinHypercube,
@@ -36,4 +40,6 @@ lacuna_plugin::export! {
     Sampler "twin_no_u_turn" NoUTurn,
     Surrogate "twin_gaussian_process" Kriging,
     Surrogate "twin_polynomial_chaos" PolynomialChaos,
+    Discrepancy "panicking" Panicking,
+    Sampler "panicking" Panicking,
 }
