@@ -16,8 +16,11 @@ fn all<K: Kind + ?Sized>(
     suite: impl Fn(&str, &K) -> Result<(), Vec<String>>,
 ) {
     let held = &twin().plugins;
-    let names: Vec<&str> =
-        held.iter().filter(|(kind, name)| kind == K::NAME && name.starts_with("twin_")).map(|(_, name)| name.as_str()).collect();
+    let names: Vec<&str> = held
+        .iter()
+        .filter(|(kind, name)| kind == K::NAME && name.starts_with("twin_"))
+        .map(|(_, name)| name.as_str())
+        .collect();
     let mut tested: Vec<&str> = table.iter().map(|(name, _)| *name).collect();
     tested.dedup();
     assert_eq!(tested, names, "the plugins of kind {} that are tested here", K::NAME);

@@ -27,7 +27,8 @@ fn rust() -> &'static Path {
             build.arg("--release");
         }
         assert!(build.status().unwrap().success(), "the example in Rust is not built");
-        let name = format!("{}matern{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+        let name =
+            format!("{}matern{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
         profile.join(name)
     })
 }
@@ -36,7 +37,8 @@ fn rust() -> &'static Path {
 fn the_example_in_rust_keeps_the_contracts() {
     library::load(rust(), None).unwrap_or_else(|e| panic!("{e}"));
     let options = "sd = 0.3\nlength = 2e-4\nnoise = 0.2";
-    let built = registry::from_text::<dyn Discrepancy>("matern", options).unwrap_or_else(|e| panic!("{e}"));
+    let built =
+        registry::from_text::<dyn Discrepancy>("matern", options).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(contract::discrepancy("matern", &*built.plugin), Ok(()));
     assert_eq!(built.plugin.fault().unwrap().said(), None);
     let built = registry::from_text::<dyn Sampler>("difference_walk", "").unwrap();
@@ -57,7 +59,8 @@ fn run(example: &str, library: &Path) -> serde_json::Value {
     assert_eq!(checked.complaints(), "");
     assert!(checked.libraries[0].record.is_some());
     let out = tempfile::tempdir().unwrap();
-    quick::run(&study, &[&load, "sampler.steps=400"], out.path()).unwrap_or_else(|stop| panic!("{stop}"));
+    quick::run(&study, &[&load, "sampler.steps=400"], out.path())
+        .unwrap_or_else(|stop| panic!("{stop}"));
     quick::summary(out.path())
 }
 
@@ -83,7 +86,10 @@ fn the_study_of_the_example_in_c_gives_what_the_built_in_law_gives() {
     // The same study with the built-in law: the draws differ by round-off at first and then go their own ways.
     let study = quick::root().join("examples/plugin_c/study.toml");
     let text = std::fs::read_to_string(&study).unwrap();
-    let text = text.replace("use = \"plain_gaussian\"\nscale = 0.01", "use = \"gaussian\"\nvariance = { half_normal = 0.01 }");
+    let text = text.replace(
+        "use = \"plain_gaussian\"\nscale = 0.01",
+        "use = \"gaussian\"\nvariance = { half_normal = 0.01 }",
+    );
     let data = quick::root().join("configs/simple_machine/work_61.csv");
     let text = text.replace("../../configs/simple_machine/work_61.csv", data.to_str().unwrap());
     let own = folder.path().join("own.toml");

@@ -91,7 +91,7 @@ fn a_library_that_cannot_be_used_says_why() {
 fn a_file_that_is_no_library_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("libnothing.so");
-    assert_eq!(library::load(&file, None).unwrap_err(), "there is no such file");
+    assert_eq!(library::load(&file, None).unwrap_err(), "no such file or directory");
     std::fs::write(&file, "nothing").unwrap();
     let said = library::load(&file, None).unwrap_err();
     assert!(said.starts_with("it cannot be loaded: "), "{said}");
@@ -105,7 +105,7 @@ fn data() -> Measurements {
     let layout = Layout { name: "y".to_owned(), unit: Unit::dimensionless(), axes };
     let replicate = |r: usize| Replicate {
         name: format!("p{r}"),
-        values: (0..10).map(|i| Some((i as f64).sin() + 0.1 * r as f64)).collect(),
+        values: (0..10).map(|i| Some(f64::from(i).sin() + 0.1 * r as f64)).collect(),
     };
     Measurements { layout, replicates: (0..5).map(replicate).collect() }
 }
@@ -129,8 +129,8 @@ fn what_cannot_be_made_is_an_error_that_names_the_library() {
         ("odd_status", "ODD_STATUS", "answers with the status 77, which has no meaning"),
         ("makes_nothing", "LIKELIHOOD_MAKES_NOTHING", "its likelihood has no functions"),
         ("lacks", "LIKELIHOOD_LACKS", "its likelihood has no function `gradient`"),
-        ("not_json", "NOT_JSON", "the JSON of the answer cannot be read"),
-        ("not_text", "NOT_TEXT", "the JSON of the answer cannot be read"),
+        ("not_json", "NOT_JSON", "`hyperparameters` answers JSON that cannot be read"),
+        ("not_text", "NOT_TEXT", "`hyperparameters` answers JSON that cannot be read"),
         ("absent", "LIKELIHOOD_ABSENT", "`likelihood` is not there"),
     ] {
         let built = misbehaving(name, define);
@@ -218,7 +218,7 @@ fn a_study_says_at_which_line_a_library_is_broken() {
     let complaints = load_for(&study, &[], Use::Run).complaints();
     let old = "the library of plugins libold.so cannot be used: it is made for version 9.0 of the boundary";
     assert!(complaints.contains(old), "{complaints}");
-    let none = "the library of plugins libnone.so cannot be used: there is no such file";
+    let none = "the library of plugins libnone.so cannot be used: no such file or directory";
     assert!(complaints.contains(none), "{complaints}");
     assert!(complaints.contains("5 | load = [\"libold.so\", \"libnone.so\"]"), "{complaints}");
 }

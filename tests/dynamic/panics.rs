@@ -11,7 +11,8 @@ use super::twin;
 
 fn panicking(call: &str) -> Built<dyn Discrepancy> {
     twin();
-    registry::from_text("panicking", &format!("call = \"{call}\"")).unwrap_or_else(|e| panic!("{e}"))
+    registry::from_text("panicking", &format!("call = \"{call}\""))
+        .unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn likelihood(built: &Built<dyn Discrepancy>) -> Result<Box<dyn Likelihood>, String> {
@@ -25,14 +26,22 @@ fn library() -> String {
     twin().file()
 }
 
+/// One thing that is asked of a likelihood.
+type Ask<'a> = &'a dyn Fn(&dyn Likelihood);
+
 #[test]
 fn a_panic_of_a_discrepancy_is_an_error_or_a_fault() {
     let said = likelihood(&panicking("likelihood")).map(|_| ()).unwrap_err();
-    assert_eq!(said, format!("discrepancy `panicking` of {}: `likelihood` panicked: as I was told", library()));
+    assert_eq!(
+        said,
+        format!("discrepancy `panicking` of {}: `likelihood` panicked: as I was told", library())
+    );
     let stream = Stream::root(1);
-    type Ask<'a> = &'a dyn Fn(&dyn Likelihood);
     for (call, ask) in [
-        ("log_likelihood", &(|l: &dyn Likelihood| drop(l.log_likelihood(&[0.0], &[1.0]))) as Ask<'_>),
+        (
+            "log_likelihood",
+            &(|l: &dyn Likelihood| assert!(!l.log_likelihood(&[0.0], &[1.0]).is_nan())) as Ask<'_>,
+        ),
         ("gradient", &|l: &dyn Likelihood| drop(l.gradient(&[0.0], &[1.0]))),
         ("predictive", &|l: &dyn Likelihood| drop(l.predictive(&[0.0], &[1.0]))),
         ("simulate", &|l: &dyn Likelihood| drop(l.simulate(&[0.0], &[1.0], &stream))),
@@ -40,7 +49,10 @@ fn a_panic_of_a_discrepancy_is_an_error_or_a_fault() {
         let likelihood = likelihood(&panicking(call)).unwrap();
         ask(&*likelihood);
         let said = likelihood.failure().unwrap();
-        assert_eq!(said, format!("discrepancy `panicking` of {}: `{call}` panicked: as I was told", library()));
+        assert_eq!(
+            said,
+            format!("discrepancy `panicking` of {}: `{call}` panicked: as I was told", library())
+        );
     }
     // Even where nothing can be said.
     drop(likelihood(&panicking("drop")).unwrap());
@@ -80,7 +92,9 @@ fn a_panic_of_a_sampler_or_of_its_density_is_an_error() {
     twin();
     let of = |call: &str| {
         let options = format!("call = \"{call}\"");
-        registry::from_text::<dyn Sampler>("panicking", &options).unwrap_or_else(|e| panic!("{e}")).plugin
+        registry::from_text::<dyn Sampler>("panicking", &options)
+            .unwrap_or_else(|e| panic!("{e}"))
+            .plugin
     };
     let points = |x: f64| Matrix::from_vec(2, 1, vec![x; 2]);
     let begun = of("start").start(&Brittle, points(1.0)).unwrap_err();
@@ -94,7 +108,10 @@ fn a_panic_of_a_sampler_or_of_its_density_is_an_error() {
     assert_eq!(state, before);
     let planned = of("plan");
     planned.plan(1);
-    assert_eq!(planned.fault().unwrap().said(), Some(&*format!("{who}: `plan` panicked: as I was told")));
+    assert_eq!(
+        planned.fault().unwrap().said(),
+        Some(&*format!("{who}: `plan` panicked: as I was told"))
+    );
     // A panic of the program, asked by the library, crosses twice and ends as an error.
     let begun = of("").start(&Brittle, points(-1.0)).unwrap_err();
     assert_eq!(begun.message, format!("{who}: the program: below zero"));

@@ -34,7 +34,7 @@ fn load_twin() -> String {
 fn twins_give_the_same_bits() {
     for (discrepancy, sampler, options) in [
         ("gaussian", "affine_invariant_ensemble", &["sampler.walkers=20", "sampler.steps=300"][..]),
-        ("gaussian", "no_u_turn", &["sampler.steps=150", "sampler.warm_up=150"]),
+        ("gaussian", "no_u_turn", &["sampler.steps=300", "sampler.warm_up=150"]),
         ("student_t", "adaptive_metropolis", &["sampler.steps=1200", "sampler.warm_up=300"]),
     ] {
         let common = match discrepancy {
@@ -77,7 +77,7 @@ fn a_study_with_effects_gives_the_same_bits() {
     let folder = tempfile::tempdir().unwrap();
     let study = folder.path().join("study.toml");
     std::fs::copy(quick::root().join("tests/effects/study.toml"), &study).unwrap();
-    quick::replace(&study, "steps = 600", "steps = 40");
+    quick::replace(&study, "steps = 600", "steps = 80");
     quick::replace(&study, "warm_up = 200", "warm_up = 40");
     let bump = |t: f64, centre: f64| (-2.0 * (t - centre).powi(2)).exp();
     let row = |k: u32| {

@@ -34,7 +34,8 @@ fn main() -> Fallible<()> {
     let folder = Path::new("runs/bench-dynamic");
     let _ = fs::remove_dir_all(folder);
     let twins = ["discrepancy.use=twin_gaussian", "discrepancy.variance={ half_normal = 1e-6 }"];
-    let walkers = ["sampler.use=twin_affine_invariant_ensemble", "sampler.walkers=120", "sampler.steps=1200"];
+    let walkers =
+        ["sampler.use=twin_affine_invariant_ensemble", "sampler.walkers=120", "sampler.steps=1200"];
     let mut own = side(&[], &folder.join("own"))?;
     let mut loaded = side(&[&twins[..], &walkers[..]].concat(), &folder.join("loaded"))?;
     let (mut pairs, mut bits) = (Vec::new(), Vec::new());
@@ -66,7 +67,8 @@ fn sorted(mut values: Vec<f64>) -> Vec<f64> {
 /// The library, which was built with this program.
 fn twin() -> Fallible<PathBuf> {
     let program = std::env::current_exe()?;
-    let name = format!("{}lacuna_twin{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+    let name =
+        format!("{}lacuna_twin{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     Ok(program.with_file_name("deps").join(name))
 }
 

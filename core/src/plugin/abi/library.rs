@@ -105,7 +105,8 @@ fn bring(path: PathBuf, sha256: String) -> Result<&'static Library, String> {
 /// The declaration of a library, once it is sure that this program understands it; none of its functions was called.
 fn declaration(path: &Path) -> Result<&'static Declaration, String> {
     // SAFETY: initialisers of the library run here; loading somebody's library means to trust it.
-    let library = unsafe { open(path) }.map_err(|error| format!("it cannot be loaded: {error}"))?;
+    let library = unsafe { open(path) }
+        .map_err(|error| format!("it cannot be loaded: {}", reason(&error)))?;
     // SAFETY: the symbol's address alone is taken; what it is says its beginning.
     let symbol =
         unsafe { library.get::<*const c_void>(SYMBOL).map(|symbol| symbol.try_as_raw_ptr()) };
@@ -123,7 +124,7 @@ fn declaration(path: &Path) -> Result<&'static Declaration, String> {
     }
     // SAFETY: what begins like this has the versions next, whatever they are.
     let [major, minor] = unsafe {
-        let versions = address.cast::<u8>().add(size_of::<u64>()).cast::<u32>();
+        let versions = address.cast::<u64>().add(1).cast::<u32>();
         [versions.read_unaligned(), versions.add(1).read_unaligned()]
     };
     if major != MAJOR || minor > MINOR {
@@ -143,6 +144,12 @@ fn declaration(path: &Path) -> Result<&'static Declaration, String> {
                     with `panic = \"unwind\"`".to_owned());
     }
     Ok(declaration)
+}
+
+/// Why the system cannot load a file.
+fn reason(error: &libloading::Error) -> String {
+    let source = std::error::Error::source(error);
+    source.map_or_else(|| error.to_string(), ToString::to_string)
 }
 
 #[cfg(unix)]

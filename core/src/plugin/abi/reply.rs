@@ -16,6 +16,8 @@ pub struct Reply {
     pub text: Vec<u8>,
     /// Its matrices.
     pub matrices: Vec<Matrix>,
+    /// The function that was called, for messages.
+    pub what: &'static str,
 }
 
 unsafe extern "C" fn take_text(context: *mut c_void, text: Text) {
@@ -58,10 +60,16 @@ impl Reply {
         String::from_utf8_lossy(&self.text).into_owned()
     }
 
+    /// A complaint about the answer.
+    fn wrong(&self, message: String) -> Refusal {
+        let what = self.what;
+        Refusal::stop(if what.is_empty() { message } else { format!("`{what}` {message}") })
+    }
+
     /// The text read as JSON.
     pub fn json<T: DeserializeOwned>(&self) -> Result<T, Refusal> {
         serde_json::from_slice(&self.text)
-            .map_err(|error| Refusal::unreadable("the JSON of the answer", error))
+            .map_err(|error| self.wrong(format!("answers JSON that cannot be read: {error}")))
     }
 
     /// The text read as JSON; `None` where nothing was written.
@@ -70,18 +78,21 @@ impl Reply {
     }
 
     /// Its matrices, which must be so many.
-    pub fn matrices<const N: usize>(self) -> Result<[Matrix; N], Refusal> {
+    pub fn matrices<const N: usize>(mut self) -> Result<[Matrix; N], Refusal> {
         let count = self.matrices.len();
-        let wrong = |_| Refusal::stop(format!("answers {count} matrices where {N} belong"));
-        self.matrices.try_into().map_err(wrong)
+        std::mem::take(&mut self.matrices)
+            .try_into()
+            .map_err(|_| self.wrong(format!("answers {count} matrices where {N} belong")))
     }
 
     /// Its only row.
     pub fn row(self) -> Result<Vec<f64>, Refusal> {
+        let what = self.what;
         let [row] = self.matrices()?;
         match row.rows() {
             1 => Ok(row.into_vec()),
-            count => Err(Refusal::stop(format!("answers {count} rows where one belongs"))),
+            count => Err(Self { what, ..Self::default() }
+                .wrong(format!("answers {count} rows where one belongs"))),
         }
     }
 }

@@ -74,7 +74,9 @@ unsafe extern "C" fn inspect<T: Reader + Authored>(
         // SAFETY: as in `recognises`.
         let (plugin, path) = unsafe { (object::<T>(plugin), path.string()) };
         let (about, matrices) = ContentsAbout::take_apart(plugin.inspect(Path::new(&path))?);
-        matrices.iter().for_each(|matrix| out.numbers(matrix));
+        for matrix in &matrices {
+            out.numbers(matrix);
+        }
         out.json(&about)
     })
 }

@@ -79,7 +79,7 @@ fn handed(emulator: Box<dyn Emulator>) -> table::Emulator {
         size: size_of::<table::Emulator>(),
         dimension: emulator.dimension(),
         outputs: emulator.outputs(),
-        functions: &EMULATOR,
+        functions: &raw const EMULATOR,
         emulator: begin(Owned::new(emulator)),
     }
 }

@@ -16,6 +16,6 @@ mod sampler;
 mod surrogate;
 mod target;
 
-pub use object::{Object, copied};
+pub use object::Object;
 pub use offer::offers;
 pub use plugin::Plugin;

@@ -58,7 +58,7 @@ type Told = Option<unsafe extern "C" fn(*mut std::ffi::c_void, Text, *const Answ
 impl Plugin<ModelFunctions> {
     fn told<T: DeserializeOwned + Default>(
         &self,
-        what: &str,
+        what: &'static str,
         ask: Told,
         text: &str,
     ) -> Result<T, Refusal> {
@@ -138,7 +138,7 @@ impl Plugin<ModelFunctions> {
         };
         // SAFETY: the function belongs to the plugin; with no call it writes nothing.
         let call = |a| unsafe { ask(self.object.this, &raw const table, std::ptr::null_mut(), a) };
-        matches!(Reply::of(call), Ok(_))
+        Reply::of(call).is_ok()
     }
 }
 

@@ -4,7 +4,7 @@ use std::ffi::c_void;
 use std::sync::Arc;
 
 use crate::linalg::Matrix;
-use crate::plugin::abi::table::{Answer, Table, status};
+use crate::plugin::abi::table::{Answer, status};
 use crate::plugin::abi::{Refusal, Reply};
 use crate::plugin::fault::Fault;
 use crate::plugin::model::EvalError;
@@ -36,30 +36,6 @@ impl<F> Drop for Object<F> {
     }
 }
 
-/// A table of somebody else's as one's own: functions of later versions than its own are null.
-///
-/// # Safety
-/// The pointer is null or leads to a table that has the size that it says.
-pub unsafe fn copied<F: Table>(table: *const F) -> Result<F, Refusal> {
-    if table.is_null() {
-        return Err(Refusal::stop("has no functions"));
-    }
-    // SAFETY: every table begins with its size.
-    let size = unsafe { table.cast::<usize>().read() };
-    if size < size_of::<usize>() {
-        return Err(Refusal::stop(format!("has a table of {size} bytes")));
-    }
-    // SAFETY: a table is a number and functions that may be null, for which zeros are right.
-    let mut own: F = unsafe { std::mem::zeroed() };
-    let count = size.min(size_of::<F>());
-    // SAFETY: both have so many bytes.
-    unsafe { std::ptr::copy_nonoverlapping(table.cast::<u8>(), (&raw mut own).cast::<u8>(), count) }
-    match own.missing() {
-        None => Ok(own),
-        Some(name) => Err(Refusal::stop(format!("has no function `{name}`"))),
-    }
-}
-
 impl<F> Object<F> {
     /// An object that ends with this value.
     pub fn new(
@@ -79,11 +55,11 @@ impl<F> Object<F> {
     /// Makes a call; `None` where the object does not have what is asked for.
     pub fn ask(
         &self,
-        what: &str,
+        what: &'static str,
         call: impl FnOnce(*const Answer) -> i32,
     ) -> Result<Option<Reply>, Refusal> {
         match Reply::of(call) {
-            Ok(reply) => Ok(Some(reply)),
+            Ok(reply) => Ok(Some(Reply { what, ..reply })),
             Err(refusal) if refusal.status == status::ABSENT => Ok(None),
             Err(refusal) => Err(told(what, refusal)),
         }
@@ -92,32 +68,41 @@ impl<F> Object<F> {
     /// Makes a call that must be answered.
     pub fn demand(
         &self,
-        what: &str,
+        what: &'static str,
         call: impl FnOnce(*const Answer) -> i32,
     ) -> Result<Reply, Refusal> {
         self.ask(what, call)?.ok_or_else(|| Refusal::stop(format!("`{what}` is not there")))
     }
 
-    /// Makes a call that fills a buffer with numbers; `None` where the object does not have what is asked for.
-    pub fn ask_numbers(
+    /// Makes a call that fills a buffer, which holds NaN where nothing was written; `None` where the object does not
+    /// have what is asked for.
+    pub fn ask_filled(
         &self,
-        what: &str,
+        what: &'static str,
         count: usize,
         call: impl FnOnce(*mut f64, *const Answer) -> i32,
     ) -> Result<Option<Vec<f64>>, Refusal> {
-        let mut numbers = vec![f64::NAN; count];
-        let to = numbers.as_mut_ptr();
-        if self.ask(what, |answer| call(to, answer))?.is_none() {
-            return Ok(None);
-        }
-        numbers_only(what, &numbers)?;
-        Ok(Some(numbers))
+        let mut filled = vec![f64::NAN; count];
+        let to = filled.as_mut_ptr();
+        Ok(self.ask(what, |answer| call(to, answer))?.map(|_| filled))
+    }
+
+    /// The same with a buffer in which there must be numbers.
+    pub fn ask_numbers(
+        &self,
+        what: &'static str,
+        count: usize,
+        call: impl FnOnce(*mut f64, *const Answer) -> i32,
+    ) -> Result<Option<Vec<f64>>, Refusal> {
+        let numbers = self.ask_filled(what, count, call)?;
+        numbers.iter().try_for_each(|numbers| numbers_only(what, numbers))?;
+        Ok(numbers)
     }
 
     /// Makes a call that must fill a buffer with numbers.
     pub fn numbers(
         &self,
-        what: &str,
+        what: &'static str,
         count: usize,
         call: impl FnOnce(*mut f64, *const Answer) -> i32,
     ) -> Result<Vec<f64>, Refusal> {
@@ -174,7 +159,12 @@ pub fn numbers_only(what: &str, numbers: &[f64]) -> Result<(), Refusal> {
 }
 
 /// Complains of a matrix of another shape.
-pub fn shaped(what: &str, matrix: &Matrix, rows: usize, columns: usize) -> Result<(), Refusal> {
+pub fn shaped(
+    what: &'static str,
+    matrix: &Matrix,
+    rows: usize,
+    columns: usize,
+) -> Result<(), Refusal> {
     if matrix.rows() == rows && matrix.columns() == columns {
         return Ok(());
     }

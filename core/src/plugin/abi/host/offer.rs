@@ -6,12 +6,13 @@ use schemars::{Schema, SchemaGenerator};
 use serde_json::{Map, Value as Json};
 
 use super::Plugin;
-use super::object::{Object, copied};
+use super::object::Object;
 use super::options::Options;
 use crate::plugin::abi::record::is_word;
 use crate::plugin::abi::table::{
     ComponentFunctions, DesignFunctions, DiscrepancyFunctions, EffectFunctions, Entry as Raw,
-    ModelFunctions, ReaderFunctions, SamplerFunctions, SurrogateFunctions, Table, Text, status,
+    ModelFunctions, ReaderFunctions, SamplerFunctions, SurrogateFunctions, Table, Text, copied,
+    status,
 };
 use crate::plugin::abi::wire::{Complaint, json_of_node, table_of_json};
 use crate::plugin::abi::{Library, Refusal, Reply};
@@ -151,7 +152,9 @@ impl<K: Kind + ?Sized, F: Table> Offered<K, F> {
             }
             Err(refusal) if refusal.status == status::REJECTED => {
                 let complaints = &mut Complaints::new(node, problems);
-                Complaint::read(&refusal.message).into_iter().for_each(|c| c.report(complaints));
+                for complaint in Complaint::read(&refusal.message) {
+                    complaint.report(complaints);
+                }
                 None
             }
             Err(refusal) => {

@@ -33,7 +33,13 @@ impl<F> Plugin<F> {
         self.object.ask("options", |answer| unsafe { options(self.object.this, answer) })
     }
 
-    fn look(&self, what: &str, look: Look, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+    fn look(
+        &self,
+        what: &'static str,
+        look: Look,
+        context: &Context<'_>,
+        complaints: &mut Complaints<'_>,
+    ) {
         let Some(look) = look else { return };
         let asked = || -> Result<Vec<Complaint>, Refusal> {
             let context = serde_json::to_string(&OwnedContext::from(context))?;

@@ -17,7 +17,7 @@ use crate::plugin::reader::{
 type Told = Option<unsafe extern "C" fn(*mut std::ffi::c_void, Text, *const Answer) -> i32>;
 
 impl Plugin<ReaderFunctions> {
-    fn told(&self, what: &str, ask: Told, text: &str) -> Result<Reply, Refusal> {
+    fn told(&self, what: &'static str, ask: Told, text: &str) -> Result<Reply, Refusal> {
         let this = self.object.this;
         // SAFETY: the function belongs to the plugin, and the text is there until it returns.
         let call = |a| optional(ask, |f| unsafe { f(this, Text::of(text), a) });
@@ -25,7 +25,12 @@ impl Plugin<ReaderFunctions> {
         self.object.ask(what, call)?.ok_or_else(none)
     }
 
-    fn of_source(&self, what: &str, ask: Told, source: &OwnedSource) -> Result<Reply, Refusal> {
+    fn of_source(
+        &self,
+        what: &'static str,
+        ask: Told,
+        source: &OwnedSource,
+    ) -> Result<Reply, Refusal> {
         self.told(what, ask, &serde_json::to_string(source)?)
     }
 

@@ -51,7 +51,7 @@ impl Handed {
     /// The state that a call left; a memory that it did not write is that of `before`.
     fn taken(
         self,
-        what: &str,
+        what: &'static str,
         evaluations: u64,
         reply: &Reply,
         before: serde_json::Value,
@@ -148,7 +148,7 @@ impl Plugin<SamplerFunctions> {
     /// What is said of a run that ended in a state.
     fn said(
         &self,
-        what: &str,
+        what: &'static str,
         state: &State,
         ask: Option<
             unsafe extern "C" fn(

@@ -4,7 +4,7 @@ use std::ffi::c_void;
 use std::sync::{Arc, OnceLock};
 
 use super::Plugin;
-use super::object::{Object, copied};
+use super::object::Object;
 use super::plugin::{facts, optional};
 use crate::linalg::Matrix;
 use crate::math::random::Stream;
@@ -12,7 +12,7 @@ use crate::plugin::abi::Refusal;
 use crate::plugin::abi::guard::{guard_number, object};
 use crate::plugin::abi::linear::LinearView;
 use crate::plugin::abi::table::{
-    self, EmulatorFunctions, Key, Numbers, ProgressFunctions, SurrogateFunctions, Text,
+    self, EmulatorFunctions, Key, Numbers, ProgressFunctions, SurrogateFunctions, Text, copied,
 };
 use crate::plugin::abi::wire::TrainingAbout;
 use crate::plugin::forward::{Forward, Linear};
@@ -63,7 +63,7 @@ impl Plugin<SurrogateFunctions> {
         let told = table::Progress {
             size: size_of::<table::Progress>(),
             progress: std::ptr::from_ref(progress).cast_mut().cast(),
-            functions: &PROGRESS,
+            functions: &raw const PROGRESS,
         };
         let (mut made, key) = (nothing(), Key { words: stream.key() });
         let (ask, this, to) = (self.object.functions.fit, self.object.this, &raw mut made);

@@ -27,7 +27,7 @@ impl ServedTarget<'_> {
         table::Target {
             size: size_of::<table::Target>(),
             target: (&raw const *self).cast_mut().cast(),
-            functions: &FUNCTIONS,
+            functions: &raw const FUNCTIONS,
             dimension: self.0.dimension(),
         }
     }

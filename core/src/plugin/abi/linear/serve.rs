@@ -24,7 +24,7 @@ impl<'a> ServedLinear<'a> {
         Linear {
             size: size_of::<Linear>(),
             map: (&raw const *self).cast_mut().cast(),
-            functions: &LINEAR,
+            functions: &raw const LINEAR,
             coefficients: Numbers::of(self.0.coefficients()),
         }
     }
@@ -97,7 +97,7 @@ unsafe extern "C" fn sum_of_squares(
         let error = squares.error();
         let (size, squares) = (size_of::<Squares>(), begin(squares));
         // SAFETY: the caller gives a place for one form.
-        unsafe { *out = Squares { size, squares, functions: &SQUARES, error } };
+        unsafe { *out = Squares { size, squares, functions: &raw const SQUARES, error } };
         Ok(())
     })
 }

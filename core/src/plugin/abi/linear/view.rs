@@ -3,7 +3,9 @@
 use std::sync::{Arc, OnceLock};
 
 use crate::linalg::Matrix;
-use crate::plugin::abi::table::{Answer, Linear, Numbers, Squares, Table as _, status};
+use crate::plugin::abi::table::{
+    Answer, Linear, LinearFunctions, Numbers, Squares, SquaresFunctions, copied, status,
+};
 use crate::plugin::abi::{Refusal, Reply};
 use crate::plugin::fault::Fault;
 use crate::plugin::forward::{self, SumOfSquares};
@@ -11,6 +13,7 @@ use crate::plugin::forward::{self, SumOfSquares};
 /// A linear forward map that the other side evaluates. Without an answer it has a fault and says NaN.
 pub struct LinearView {
     linear: Linear,
+    functions: LinearFunctions,
     coefficients: OnceLock<Matrix>,
     fault: Arc<Fault>,
 }
@@ -27,17 +30,9 @@ impl LinearView {
     /// The struct and its functions are those of a map that outlives the view.
     pub unsafe fn new(linear: Linear, fault: Arc<Fault>) -> Result<Self, Refusal> {
         // SAFETY: the table belongs to the map.
-        let functions = unsafe { linear.functions.as_ref() };
-        match functions.map(|f| f.missing()) {
-            Some(None) => Ok(Self { linear, coefficients: OnceLock::new(), fault }),
-            Some(Some(name)) => Err(Refusal::stop(format!("a linear map lacks `{name}`"))),
-            None => Err(Refusal::stop("a linear map has no functions")),
-        }
-    }
-
-    fn functions(&self) -> &crate::plugin::abi::table::LinearFunctions {
-        // SAFETY: checked when the view was made, and there as long as the map.
-        unsafe { &*self.linear.functions }
+        let functions = unsafe { copied(linear.functions) }
+            .map_err(|refusal| Refusal::stop(format!("a linear map {}", refusal.message)))?;
+        Ok(Self { linear, functions, coefficients: OnceLock::new(), fault })
     }
 
     fn terms(&self) -> usize {
@@ -67,7 +62,7 @@ impl forward::Linear for LinearView {
     }
 
     fn basis(&self, points: &Matrix) -> Matrix {
-        let basis = self.functions().basis;
+        let basis = self.functions.basis;
         self.filled(points.rows(), self.terms(), |to, answer| {
             // SAFETY: the buffer has a row of basis functions a point.
             basis.map_or(status::ABSENT, |f| unsafe {
@@ -77,7 +72,7 @@ impl forward::Linear for LinearView {
     }
 
     fn basis_gradient(&self, point: &[f64]) -> Matrix {
-        let gradient = self.functions().basis_gradient;
+        let gradient = self.functions.basis_gradient;
         self.filled(self.terms(), point.len(), |to, answer| {
             // SAFETY: the buffer has `terms x parameters` numbers.
             gradient.map_or(status::ABSENT, |f| unsafe {
@@ -87,7 +82,7 @@ impl forward::Linear for LinearView {
     }
 
     fn sum_of_squares(&self, factor: &Matrix) -> Option<Box<dyn SumOfSquares>> {
-        let ask = self.functions().sum_of_squares?;
+        let ask = self.functions.sum_of_squares?;
         let mut squares = Squares {
             size: 0,
             squares: std::ptr::null_mut(),
@@ -99,7 +94,7 @@ impl forward::Linear for LinearView {
             ask(self.linear.map, Numbers::of(factor), &raw mut squares, a)
         });
         match reply {
-            Ok(_) => SquaresView::new(squares, self.fault.clone()),
+            Ok(_) => SquaresView::of(squares, self.fault.clone()),
             Err(refusal) if refusal.status == status::ABSENT => None,
             Err(refusal) => {
                 self.fault.report(format_args!("its linear map: {}", refusal.message));
@@ -112,6 +107,7 @@ impl forward::Linear for LinearView {
 /// A sum of squares that the other side evaluates.
 struct SquaresView {
     squares: Squares,
+    functions: SquaresFunctions,
     fault: Arc<Fault>,
 }
 
@@ -121,22 +117,21 @@ unsafe impl Send for SquaresView {}
 unsafe impl Sync for SquaresView {}
 
 impl SquaresView {
-    fn new(squares: Squares, fault: Arc<Fault>) -> Option<Box<dyn SumOfSquares>> {
+    fn of(squares: Squares, fault: Arc<Fault>) -> Option<Box<dyn SumOfSquares>> {
         // SAFETY: whoever made the form gave its functions, which are constants.
-        let sound = unsafe { squares.functions.as_ref() }.is_some_and(|f| f.missing().is_none());
-        if !sound {
-            fault.report("its sum of squares lacks functions");
-            return None;
+        match unsafe { copied(squares.functions) } {
+            Ok(functions) => Some(Box::new(Self { squares, functions, fault })),
+            Err(refusal) => {
+                fault.report(format_args!("its sum of squares {}", refusal.message));
+                None
+            }
         }
-        Some(Box::new(Self { squares, fault }))
     }
 
     fn ask(&self, points: &Matrix, columns: usize, gradient: bool) -> Matrix {
         let mut values = Matrix::from_fn(points.rows(), columns, |_, _| f64::NAN);
         let to = values.as_mut_slice().as_mut_ptr();
-        // SAFETY: checked when the view was made.
-        let functions = unsafe { &*self.squares.functions };
-        let function = if gradient { functions.gradient } else { functions.values };
+        let function = if gradient { self.functions.gradient } else { self.functions.values };
         let call = |a| {
             // SAFETY: the form is alive, and the buffer has `points x columns` numbers.
             function.map_or(status::ABSENT, |f| unsafe {
@@ -165,11 +160,9 @@ impl SumOfSquares for SquaresView {
     }
 
     fn covers_all(&self, points: &Matrix) -> bool {
-        // SAFETY: checked when the view was made; the form is alive.
-        unsafe {
-            let covers = (*self.squares.functions).covers;
-            covers.is_some_and(|f| f(self.squares.squares, Numbers::of(points)) == 1)
-        }
+        let covers = self.functions.covers;
+        // SAFETY: the form is alive.
+        covers.is_some_and(|f| unsafe { f(self.squares.squares, Numbers::of(points)) == 1 })
     }
 
     fn error(&self) -> f64 {
@@ -179,9 +172,8 @@ impl SumOfSquares for SquaresView {
 
 impl Drop for SquaresView {
     fn drop(&mut self) {
-        // SAFETY: the form is the view's own, and this is its last use.
-        if let Some(destroy) = unsafe { (*self.squares.functions).destroy } {
-            // SAFETY: as above.
+        if let Some(destroy) = self.functions.destroy {
+            // SAFETY: the form is the view's own, and this is its last use.
             unsafe { destroy(self.squares.squares) }
         }
     }

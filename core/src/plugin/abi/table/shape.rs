@@ -1,5 +1,7 @@
 //! Declares what crosses the boundary once: as Rust, and as data from which the C header is written.
 
+use crate::plugin::abi::Refusal;
+
 /// A struct of the boundary, as data.
 #[derive(Debug, Clone, Copy)]
 pub struct Shape {
@@ -45,6 +47,30 @@ pub trait Table: Copy {
 
     /// The first function that it must have and has not.
     fn missing(&self) -> Option<&'static str>;
+}
+
+/// A table of somebody else's as one's own: functions of later versions than its own are null.
+///
+/// # Safety
+/// The pointer is null or leads to a table that has the size that it says.
+pub unsafe fn copied<F: Table>(table: *const F) -> Result<F, Refusal> {
+    if table.is_null() {
+        return Err(Refusal::stop("has no functions"));
+    }
+    // SAFETY: every table begins with its size.
+    let size = unsafe { table.cast::<usize>().read() };
+    if size < size_of::<usize>() {
+        return Err(Refusal::stop(format!("has a table of {size} bytes")));
+    }
+    // SAFETY: a table is a number and functions that may be null, for which zeros are right.
+    let mut own: F = unsafe { std::mem::zeroed() };
+    let count = size.min(size_of::<F>());
+    // SAFETY: both have so many bytes.
+    unsafe { std::ptr::copy_nonoverlapping(table.cast::<u8>(), (&raw mut own).cast::<u8>(), count) }
+    match own.missing() {
+        None => Ok(own),
+        Some(name) => Err(Refusal::stop(format!("has no function `{name}`"))),
+    }
 }
 
 /// A plain struct of the boundary.

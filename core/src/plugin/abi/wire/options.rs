@@ -50,16 +50,16 @@ pub fn node_of_json(json: &Json, place: &Place) -> Option<Node> {
         Json::Array(elements) => {
             Value::Array(elements.iter().filter_map(|e| node_of_json(e, place)).collect())
         }
-        Json::Object(entries) => match float_of_json(entries) {
-            Some(x) => Value::Float(x),
-            None => {
+        Json::Object(entries) => float_of_json(entries).map_or_else(
+            || {
                 let entry = |(name, json): (&String, &Json)| {
                     let key = Key { name: name.clone(), place: place.clone() };
                     Some((key, node_of_json(json, place)?))
                 };
                 Value::Table(entries.iter().filter_map(entry).collect())
-            }
-        },
+            },
+            Value::Float,
+        ),
     };
     Some(Node { value, place: place.clone() })
 }

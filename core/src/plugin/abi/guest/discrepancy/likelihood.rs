@@ -155,7 +155,9 @@ unsafe extern "C" fn compress(
         let own = Guest::new(reduced.ok_or_else(Refusal::absent)?, this.fault.clone());
         let (size, compressed) = (size_of::<Compressed>(), begin(own));
         // SAFETY: the caller gives a place for one compressed likelihood.
-        unsafe { *made = Compressed { size, compressed, functions: &compressed::FUNCTIONS } };
+        unsafe {
+            *made = Compressed { size, compressed, functions: &raw const compressed::FUNCTIONS }
+        };
         Ok(())
     })
 }

@@ -70,7 +70,9 @@ unsafe extern "C" fn likelihood<T: Discrepancy + Authored>(
         let own = known.with(|known| plugin.likelihood(known))?;
         let (size, likelihood) = (size_of::<Likelihood>(), begin(Guest::new(own, fault())));
         // SAFETY: the caller gives a place for one likelihood.
-        unsafe { *made = Likelihood { size, likelihood, functions: &likelihood::FUNCTIONS } };
+        unsafe {
+            *made = Likelihood { size, likelihood, functions: &raw const likelihood::FUNCTIONS }
+        };
         Ok(())
     })
 }

@@ -1,8 +1,9 @@
 //! The compressed likelihoods of libraries' discrepancies.
 
+use super::{Slopes, slopes};
 use crate::linalg::{Matrix, transposed_multiply_vector};
 use crate::plugin::abi::Refusal;
-use crate::plugin::abi::host::object::{Object, numbers_only};
+use crate::plugin::abi::host::object::Object;
 use crate::plugin::abi::host::plugin::optional;
 use crate::plugin::abi::linear::ServedLinear;
 use crate::plugin::abi::table::{CompressedFunctions, Numbers};
@@ -14,25 +15,9 @@ pub(super) struct LoadedCompressed {
     object: Object<CompressedFunctions>,
 }
 
-/// Derivatives at one point: by its coordinates, and by the hyperparameters.
-type Slopes = (Vec<f64>, Vec<f64>);
-
 impl LoadedCompressed {
     pub fn new(object: Object<CompressedFunctions>) -> Self {
         Self { object }
-    }
-
-    /// The derivatives that `call` writes into two buffers.
-    fn slopes(
-        &self,
-        lengths: (usize, usize),
-        call: impl FnOnce(*mut f64, *mut f64, *const crate::plugin::abi::table::Answer) -> i32,
-    ) -> Result<Slopes, Refusal> {
-        let mut by_hyper = vec![f64::NAN; lengths.1];
-        let beside = by_hyper.as_mut_ptr();
-        let first = self.object.numbers("gradient", lengths.0, |to, a| call(to, beside, a))?;
-        numbers_only("gradient", &by_hyper)?;
-        Ok((first, by_hyper))
     }
 
     fn densities(&self, values: Result<Vec<f64>, Refusal>, count: usize) -> Vec<f64> {
@@ -69,11 +54,13 @@ impl Compressed for LoadedCompressed {
     fn gradient(&self, basis: &[f64], hyper: &[f64]) -> Slopes {
         let (ask, this) = (self.object.functions.gradient, self.object.this);
         let (at, given) = (Numbers::row(basis), Numbers::row(hyper));
-        let slopes = self.slopes((basis.len(), hyper.len()), |to, beside, a| {
+        let call = |to, beside, a| {
             // SAFETY: the function belongs to the likelihood; the buffers hold one number a term and an unknown.
             optional(ask, |f| unsafe { f(this, at, given, to, beside, a) })
-        });
-        self.object.or_fault(slopes, || (vec![0.0; basis.len()], vec![0.0; hyper.len()]))
+        };
+        let row = |x: &[f64]| Matrix::from_vec(1, x.len(), x.to_vec());
+        let density = || self.log_likelihood(&row(basis), &row(hyper))[0];
+        slopes(&self.object, (basis.len(), hyper.len()), call, density)
     }
 
     fn gradient_at(&self, linear: &dyn Linear, point: &[f64], hyper: &[f64]) -> Slopes {
@@ -88,10 +75,12 @@ impl Compressed for LoadedCompressed {
         let served = ServedLinear::new(linear);
         let (map, this) = (served.table(), self.object.this);
         let (at, given) = (Numbers::row(point), Numbers::row(hyper));
-        let slopes = self.slopes((point.len(), hyper.len()), |to, beside, a| {
+        let call = |to, beside, a| {
             // SAFETY: as in `log_likelihood_at`, with one number a parameter and an unknown.
             unsafe { ask(this, &raw const map, at, given, to, beside, a) }
-        });
-        self.object.or_fault(slopes, || (vec![0.0; point.len()], vec![0.0; hyper.len()]))
+        };
+        let row = |x: &[f64]| Matrix::from_vec(1, x.len(), x.to_vec());
+        let density = || self.log_likelihood_at(linear, &row(point), &row(hyper))[0];
+        slopes(&self.object, (point.len(), hyper.len()), call, density)
     }
 }

@@ -70,7 +70,7 @@ impl<'a> HandedKnown<'a> {
         let known = table::Known {
             size: size_of::<table::Known>(),
             known: (&raw const *self).cast_mut().cast(),
-            functions: &FUNCTIONS,
+            functions: &raw const FUNCTIONS,
             about: Text::of(&self.about),
             values: Numbers::of(&self.values),
             measured: self.measured.as_ptr(),

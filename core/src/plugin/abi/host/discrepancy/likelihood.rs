@@ -1,14 +1,15 @@
 //! The likelihoods of libraries' discrepancies.
 
 use super::compressed::LoadedCompressed;
+use super::slopes;
 use crate::data::{Measurements, Replicate};
 use crate::linalg::Matrix;
 use crate::math::random::Stream;
 use crate::plugin::abi::Refusal;
-use crate::plugin::abi::host::object::{Object, copied, numbers_only, shaped};
+use crate::plugin::abi::host::object::{Object, numbers_only, shaped};
 use crate::plugin::abi::host::plugin::{facts, optional};
 use crate::plugin::abi::linear::ServedLinear;
-use crate::plugin::abi::table::{self, Key, LikelihoodFunctions, Numbers};
+use crate::plugin::abi::table::{self, Key, LikelihoodFunctions, Numbers, copied};
 use crate::plugin::discrepancy::{Compressed, Likelihood, VariancePart};
 use crate::plugin::forward::Linear;
 use crate::plugin::{Fact, Hyperparameter};
@@ -37,19 +38,6 @@ impl LoadedLikelihood {
             optional(ask, |f| unsafe { f(this, responses, hyper, to, a) })
         });
         self.object.or_fault(values, || vec![f64::NEG_INFINITY; responses.rows])
-    }
-
-    fn slopes(&self, response: &[f64], hyper: &[f64]) -> Result<(Vec<f64>, Vec<f64>), Refusal> {
-        let (ask, this) = (self.object.functions.gradient, self.object.this);
-        let mut by_hyper = vec![f64::NAN; hyper.len()];
-        let (at, given, beside) =
-            (Numbers::row(response), Numbers::row(hyper), by_hyper.as_mut_ptr());
-        let by_response = self.object.numbers("gradient", response.len(), |to, a| {
-            // SAFETY: the function belongs to the likelihood; the buffers hold one number an output and an unknown.
-            optional(ask, |f| unsafe { f(this, at, given, to, beside, a) })
-        })?;
-        numbers_only("gradient", &by_hyper)?;
-        Ok((by_response, by_hyper))
     }
 
     fn parts(&self, response: &[f64], hyper: &[f64]) -> Result<Vec<VariancePart>, Refusal> {
@@ -152,8 +140,14 @@ impl Likelihood for LoadedLikelihood {
     }
 
     fn gradient(&self, response: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let nothing = || (vec![0.0; response.len()], vec![0.0; hyper.len()]);
-        self.object.or_fault(self.slopes(response, hyper), nothing)
+        let (ask, this) = (self.object.functions.gradient, self.object.this);
+        let (at, given) = (Numbers::row(response), Numbers::row(hyper));
+        let call = |to, beside, a| {
+            // SAFETY: the function belongs to the likelihood; the buffers hold one number an output and an unknown.
+            optional(ask, |f| unsafe { f(this, at, given, to, beside, a) })
+        };
+        let density = || self.log_likelihood(response, hyper);
+        slopes(&self.object, (response.len(), hyper.len()), call, density)
     }
 
     fn compress(&self, linear: &dyn Linear) -> Option<Box<dyn Compressed>> {

@@ -5,12 +5,12 @@ mod known;
 mod likelihood;
 
 use super::Plugin;
-use super::object::{Object, copied, numbers_only, shaped};
+use super::object::{Object, numbers_only, shaped};
 use super::plugin::optional;
 use crate::data::Layout;
 use crate::plugin::Likelihood;
 use crate::plugin::abi::Refusal;
-use crate::plugin::abi::table::{self, DiscrepancyFunctions, Numbers, Text};
+use crate::plugin::abi::table::{self, DiscrepancyFunctions, Numbers, Text, copied};
 use crate::plugin::discrepancy::{Discrepancy, Known, StatedNoise};
 use crate::run::Stop;
 use known::HandedKnown;
@@ -66,4 +66,34 @@ impl Discrepancy for Plugin<DiscrepancyFunctions> {
     fn stated_noise(&self, layout: &Layout, response: &[f64]) -> Option<StatedNoise> {
         self.object.or_fault(self.noise(layout, response), || None)
     }
+}
+
+/// Derivatives at one point: by its coordinates, and by the hyperparameters.
+type Slopes = (Vec<f64>, Vec<f64>);
+
+/// Asks for derivatives at one point. They must be numbers where the density is one; where it is zero, as `density` says
+/// when it is asked, there are none.
+fn slopes<F>(
+    object: &Object<F>,
+    (coordinates, unknowns): (usize, usize),
+    call: impl FnOnce(*mut f64, *mut f64, *const table::Answer) -> i32,
+    density: impl FnOnce() -> f64,
+) -> Slopes {
+    let nothing = || (vec![0.0; coordinates], vec![0.0; unknowns]);
+    let mut by_hyper = vec![f64::NAN; unknowns];
+    let beside = by_hyper.as_mut_ptr();
+    let absent = || Refusal::stop("`gradient` is not there");
+    let asked = object
+        .ask_filled("gradient", coordinates, |to, answer| call(to, beside, answer))
+        .and_then(|first| first.ok_or_else(absent));
+    let checked = asked.and_then(|first| {
+        let sound =
+            numbers_only("gradient", &first).and_then(|()| numbers_only("gradient", &by_hyper));
+        match sound {
+            Err(refusal) if density().is_finite() => Err(refusal),
+            Err(_) => Ok(nothing()),
+            Ok(()) => Ok((first, by_hyper)),
+        }
+    });
+    object.or_fault(checked, nothing)
 }
