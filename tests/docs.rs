@@ -78,6 +78,12 @@ fn reference() -> BTreeMap<String, String> {
 }
 
 #[test]
+fn the_header_for_c_is_as_generated() {
+    let header = lacuna::plugin::abi::header::header();
+    compare(&BTreeMap::from([("sdk/include/lacuna_plugin.h".to_owned(), header)]));
+}
+
+#[test]
 fn the_reference_is_as_generated() {
     let pages = reference();
     let folder = root().join("docs/reference");

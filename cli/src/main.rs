@@ -102,9 +102,14 @@ enum Verb {
         /// Print Markdown.
         #[arg(long)]
         markdown: bool,
+        #[command(flatten)]
+        libraries: study::Libraries,
     },
     /// Print the JSON Schema of the study language, for editors.
-    Schema,
+    Schema {
+        #[command(flatten)]
+        libraries: study::Libraries,
+    },
     /// Show what a reader sees in a file: variables, axes, units, steps.
     Inspect {
         /// The file.
@@ -156,8 +161,10 @@ fn main() -> ExitCode {
         Verb::Resume { run } => study::resume(&run),
         Verb::Report { run } => study::report(&run),
         Verb::Compare { runs, json } => study::compare(&runs, json),
-        Verb::Plugins { name, markdown } => plugins::list(name.as_deref(), markdown),
-        Verb::Schema => plugins::schema(),
+        Verb::Plugins { name, markdown, libraries } => {
+            plugins::list(name.as_deref(), markdown, &libraries)
+        }
+        Verb::Schema { libraries } => plugins::schema(&libraries),
         Verb::Inspect { file, variable, csv, reader } => {
             inspect::inspect(&file, reader.as_deref(), variable.as_deref(), csv.as_deref())
         }

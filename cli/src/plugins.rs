@@ -1,13 +1,17 @@
 //! `plugins` and `schema`.
 
+use lacuna::plugin::abi::library::{self, Library};
 use lacuna::plugin::registry::{self, KindEntry, Listing};
 use lacuna::study::language;
+use lacuna::study::libraries::Seen;
 use lacuna::study::nearest::{nearest, one_of};
 
+use crate::study::Libraries;
 use crate::{Failure, print};
 
 /// `lacuna plugins [KIND[.NAME]]`
-pub fn list(name: Option<&str>, markdown: bool) -> Result<(), Failure> {
+pub fn list(name: Option<&str>, markdown: bool, libraries: &Libraries) -> Result<(), Failure> {
+    load(libraries)?;
     if let Some(problem) = registry::audit().first() {
         return Err(Failure::wrong(format!("error: {}", problem.message)));
     }
@@ -50,9 +54,11 @@ fn overview(kind: &KindEntry) {
     for plugin in plugins {
         let title = plugin.manual().map(|manual| manual.title).unwrap_or_default();
         let lines = wrapped(&title, LINE - COLUMN);
-        let first = lines.first().map_or("", String::as_str);
+        let first = lines.first().cloned().unwrap_or_default();
         print(&format!("  {:<1$}{first}", plugin.name, COLUMN - 2));
-        for line in lines.iter().skip(1) {
+        let library = plugin.library.map(origin);
+        let origin = library.iter().flat_map(|origin| wrapped(origin, LINE - COLUMN));
+        for line in lines.into_iter().skip(1).chain(origin) {
             print(&format!("{:COLUMN$}{line}", ""));
         }
     }
@@ -81,11 +87,49 @@ fn manual(listing: &Listing, markdown: bool) {
     if let Some(manual) = listing.manual() {
         print(if markdown { manual.markdown() } else { manual.plain() }.trim_end());
     }
+    if let Some(library) = listing.library {
+        print(&format!("\n{}", origin(library)));
+    }
+}
+
+/// Where a plugin comes from that is no part of the program.
+fn origin(library: &Library) -> String {
+    let Library { path, sha256, name, version, abi: (major, minor), .. } = library;
+    format!("from {} ({name} {version}, abi {major}.{minor}, sha256 {sha256})", path.display())
+}
+
+/// Loads libraries that the command line names.
+fn load(libraries: &Libraries) -> Result<(), Failure> {
+    for path in &libraries.files {
+        library::load(path, None).map_err(|reason| {
+            let path = path.display();
+            Failure::wrong(format!("error: the library of plugins {path} cannot be used: {reason}"))
+        })?;
+    }
+    Ok(())
+}
+
+/// What a study would load, as its file shows it.
+pub fn would_load(seen: &Seen) -> String {
+    let path = seen.path.display();
+    let sha256 = &seen.sha256;
+    match &seen.record {
+        None => format!("would load {path}: it says nothing of itself; sha256 {sha256}"),
+        Some(record) => {
+            let (major, minor) = record.abi;
+            let plugins: Vec<String> =
+                record.plugins.iter().map(|(kind, name)| format!("{kind} `{name}`")).collect();
+            format!(
+                "would load {path}: {}, abi {major}.{minor}, sha256 {sha256}; options are checked when it is loaded",
+                plugins.join(", ")
+            )
+        }
+    }
 }
 
 /// `lacuna schema`
-#[expect(clippy::unnecessary_wraps, reason = "every verb has the same shape")]
-pub fn schema() -> Result<(), Failure> {
+pub fn schema(libraries: &Libraries) -> Result<(), Failure> {
+    load(libraries)?;
     print(&format!("{:#}", language::schema()));
     Ok(())
 }

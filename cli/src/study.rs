@@ -6,11 +6,11 @@ use lacuna::compare::{self, Finished};
 use lacuna::report::summary_text;
 use lacuna::run::{RunDirectory, Stop, files};
 use lacuna::stage;
-use lacuna::study::Study;
 use lacuna::study::resolve::{self, Use};
+use lacuna::study::{Checked, Study, emit};
 
 use crate::progress::Terminal;
-use crate::{Failure, print};
+use crate::{Failure, plugins, print};
 
 /// Keys set on the command line.
 #[derive(clap::Args)]
@@ -18,12 +18,26 @@ pub struct Settings {
     /// Set a key of the study, such as `sampler.steps=200`; may be given more than once.
     #[arg(long = "set", value_name = "PATH=VALUE")]
     set: Vec<String>,
+    #[command(flatten)]
+    libraries: Libraries,
+}
+
+/// Libraries of plugins named on the command line.
+#[derive(clap::Args)]
+pub struct Libraries {
+    /// Load a library of plugins beside those of the study: its code runs; may be given more than once.
+    #[arg(long = "plugin", value_name = "PATH")]
+    pub files: Vec<PathBuf>,
 }
 
 impl Settings {
-    /// What was set.
-    pub fn set(&self) -> &[String] {
-        &self.set
+    /// What was set, the libraries included: they are those of `[plugins]`.
+    pub fn set(&self) -> Vec<String> {
+        let absolute = |file: &PathBuf| std::path::absolute(file).unwrap_or_else(|_| file.clone());
+        let load = |file: &PathBuf| {
+            format!("plugins.load+={}", emit::string(&absolute(file).to_string_lossy()))
+        };
+        self.set.iter().cloned().chain(self.libraries.files.iter().map(load)).collect()
     }
 }
 
@@ -40,7 +54,11 @@ pub fn folder(study: &Study, out: Option<&Path>) -> PathBuf {
 
 /// `lacuna check STUDY`
 pub fn check(path: &Path, settings: &Settings) -> Result<(), Failure> {
-    let study = load(path, settings)?;
+    let checked = resolve::load_for(path, &settings.set(), Use::Check);
+    for library in &checked.libraries {
+        print(&plugins::would_load(library));
+    }
+    let study = sound(checked, path)?;
     let response = match &study.target {
         Some(_) => String::new(),
         None => format!(", {} values a response", study.layouts.len()),
@@ -88,7 +106,11 @@ pub fn load(path: &Path, settings: &Settings) -> Result<Study, Failure> {
 
 /// The same for some use.
 pub fn load_for(path: &Path, settings: &Settings, purpose: Use) -> Result<Study, Failure> {
-    let checked = resolve::load_for(path, &settings.set, purpose);
+    sound(resolve::load_for(path, &settings.set(), purpose), path)
+}
+
+/// The study, if nothing is wrong with it.
+fn sound(checked: Checked, path: &Path) -> Result<Study, Failure> {
     let complaints = checked.complaints();
     checked.study.ok_or_else(|| {
         let count = checked.problems.sorted().len();
@@ -106,7 +128,7 @@ fn kept_study(folder: &Path) -> Result<Study, Failure> {
         return Err(Failure::wrong(text));
     }
     let purpose = if is_finished(folder) { Use::Look } else { Use::Run };
-    let mut study = load_for(&resolved, &Settings { set: Vec::new() }, purpose)?;
+    let mut study = sound(resolve::load_for(&resolved, &[], purpose), &resolved)?;
     let written: PathBuf = folder.join("study.toml");
     study.text = String::from_utf8_lossy(&files::read(&written)?).into_owned();
     Ok(study)

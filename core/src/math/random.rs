@@ -19,6 +19,16 @@ impl Stream {
         Self { key: [seed, 0x6c61_6375_6e61_0001, 0x9e37_79b9_7f4a_7c15, 0xd1b5_4a32_d192_ed03] }
     }
 
+    /// The stream of a key, as [`Stream::key`] gives it.
+    pub fn from_key(key: [u64; 4]) -> Self {
+        Self { key }
+    }
+
+    /// What names the stream: one key, one sequence of numbers.
+    pub fn key(&self) -> [u64; 4] {
+        self.key
+    }
+
     /// The stream of a named part, such as a stage.
     pub fn named(&self, label: &str) -> Self {
         // FNV-1a over the label, then mixed into the key; labels are few and fixed in the source.

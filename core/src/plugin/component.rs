@@ -1,9 +1,11 @@
 //! What all kinds of plugins share.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use super::Fault;
 use crate::data::{Layout, Parameter, Scenario, Unit};
 use crate::study::problem::Complaints;
 
@@ -59,6 +61,11 @@ pub trait Component: Send + Sync {
 
     /// Third layer of checking: the options against the machine (files, commands). Nothing is changed.
     fn environment(&self, _context: &Context<'_>, _complaints: &mut Complaints<'_>) {}
+
+    /// Where it says that it can answer no more, for a plugin to which that may happen outside of any error.
+    fn fault(&self) -> Option<Arc<Fault>> {
+        None
+    }
 }
 
 /// One fact about a result, for people: a row of a table in the report.

@@ -90,6 +90,12 @@ pub trait Likelihood: Send + Sync {
     /// hyperparameters; minus infinity outside their support.
     fn log_likelihood(&self, response: &[f64], hyper: &[f64]) -> f64;
 
+    /// The log-likelihood for each row of the responses and of the hyperparameters: the same numbers as one by one.
+    fn log_likelihoods(&self, responses: &Matrix, hyper: &Matrix) -> Vec<f64> {
+        let rows = responses.iter_rows().zip(hyper.iter_rows());
+        rows.map(|(response, hyper)| self.log_likelihood(response, hyper)).collect()
+    }
+
     /// The log density of each measured value given all others, by replicate and output with gaps left out
     /// (Bürkner, Gabry and Vehtari, Computational Statistics 36 (2021) 1243, for values that are not
     /// independent); `None` when the discrepancy has no such form.
@@ -117,6 +123,11 @@ pub trait Likelihood: Send + Sync {
     /// What is worth telling.
     fn facts(&self) -> Vec<Fact> {
         Vec::new()
+    }
+
+    /// Why the likelihood can no longer be computed, once that has happened: its answers mean nothing then.
+    fn failure(&self) -> Option<String> {
+        None
     }
 }
 

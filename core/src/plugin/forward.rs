@@ -74,6 +74,11 @@ pub trait SumOfSquares: Send + Sync {
     /// Whether the form holds at a point to its [error](Self::error).
     fn covers(&self, point: &[f64]) -> bool;
 
+    /// Whether it holds at all of these points.
+    fn covers_all(&self, points: &Matrix) -> bool {
+        points.iter_rows().all(|point| self.covers(point))
+    }
+
     /// The largest difference from the product's own sum of squares that round-off makes.
     ///
     /// A sum of squares that is expanded carries the round-off of its largest parts into its

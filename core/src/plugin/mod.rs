@@ -3,6 +3,7 @@
 //! A plugin is a struct of options that deserialises from its section of the study and implements
 //! the trait of its kind; one `register!` line at the end of its file lists it.
 
+pub mod abi;
 pub mod amend;
 pub mod component;
 pub mod density;
@@ -10,6 +11,7 @@ pub mod design;
 pub mod discrepancy;
 pub mod effect;
 pub mod executor;
+pub mod fault;
 pub mod forward;
 mod kinds;
 pub mod manual;
@@ -27,6 +29,7 @@ pub use design::Design;
 pub use discrepancy::{Discrepancy, Hyperparameter, Likelihood};
 pub use effect::Effect;
 pub use executor::Executor;
+pub use fault::Fault;
 pub use forward::Forward;
 pub use model::{EvalError, Model};
 pub use reader::Reader;

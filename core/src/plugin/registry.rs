@@ -10,12 +10,18 @@ use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use super::abi::Library;
 use super::manual::{Manual, generator, resolve};
 use crate::study::decode::{decode, decode_beside, fields};
 use crate::study::emit;
 use crate::study::nearest::{nearest, one_of};
 use crate::study::read::read;
 use crate::study::{Node, Place, Problem, Problems, Sources, Value};
+
+mod listing;
+pub(crate) mod loaded;
+
+pub use listing::{KindEntry, Listing, audit, kinds};
 
 #[doc(hidden)]
 pub use inventory;
@@ -29,7 +35,7 @@ pub trait Kind: 'static {
     /// The sections of a study that choose a plugin of this kind.
     const SECTIONS: &'static [&'static str];
 
-    /// Every plugin of this kind, in no particular order.
+    /// Every plugin of this kind that is linked into the program, in no particular order.
     fn registered() -> Vec<&'static Entry<Self>>;
 }
 
@@ -38,14 +44,19 @@ pub struct Entry<K: ?Sized + 'static> {
     /// The name a study chooses it by.
     pub name: &'static str,
     /// The schema of its options.
-    pub schema: fn(&mut SchemaGenerator) -> Schema,
+    pub schema: &'static (dyn Fn(&mut SchemaGenerator) -> Schema + Send + Sync),
     /// Decodes its options, the given keys of the section being the engine's.
-    pub build: fn(&Node, &[&str], &mut Problems) -> Option<Built<K>>,
-    /// The module it is in.
+    pub build: &'static Build<K>,
+    /// The module it is in; for a plugin of a library that was loaded, the library's path.
     pub module_path: &'static str,
-    /// The version of the package it is in.
+    /// The version of the package or library it is in.
     pub version: &'static str,
+    /// The library it was loaded from, if it is not a part of the program.
+    pub library: Option<&'static Library>,
 }
+
+/// Decodes the options of a plugin, beside keys of the engine's.
+pub type Build<K> = dyn Fn(&Node, &[&str], &mut Problems) -> Option<Built<K>> + Send + Sync;
 
 /// A plugin with its options.
 pub struct Built<K: ?Sized> {
@@ -55,6 +66,29 @@ pub struct Built<K: ?Sized> {
     pub plugin: Box<K>,
     /// All its options, the defaults filled in.
     pub options: toml::Table,
+    /// The library it was loaded from, if it is not a part of the program.
+    pub library: Option<&'static Library>,
+}
+
+impl<K: ?Sized> Built<K> {
+    /// What its results depend on, for the hash of a stage's inputs: name, options, and the library where it has one.
+    pub fn identity(&self) -> Identity<'_> {
+        let library = self.library.map(|library| library.sha256.as_str());
+        match library {
+            None => Identity::BuiltIn(self.name, &self.options),
+            Some(sha256) => Identity::Loaded(self.name, &self.options, sha256),
+        }
+    }
+}
+
+/// See [`Built::identity`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Identity<'a> {
+    /// Name and options of a plugin that is a part of the program.
+    BuiltIn(&'a str, &'a toml::Table),
+    /// Name, options and the library's hash.
+    Loaded(&'a str, &'a toml::Table, &'a str),
 }
 
 impl<K: Kind + ?Sized> Entry<K> {
@@ -109,8 +143,8 @@ macro_rules! register {
         $crate::plugin::registry::inventory::submit! {
             $crate::plugin::registry::Entry::<dyn $kind> {
                 name: $name,
-                schema: <$options as $crate::plugin::registry::Documented>::json_schema,
-                build: |node, beside, problems| {
+                schema: &<$options as $crate::plugin::registry::Documented>::json_schema,
+                build: &|node, beside, problems| {
                     $crate::plugin::registry::build(node, beside, problems, $name, |options| {
                         let plugin: $options = options;
                         Box::new(plugin)
@@ -118,6 +152,7 @@ macro_rules! register {
                 },
                 module_path: module_path!(),
                 version: env!("CARGO_PKG_VERSION"),
+                library: None,
             }
         }
     };
@@ -146,7 +181,9 @@ pub fn build<K: ?Sized, O: DeserializeOwned + Serialize>(
 ) -> Option<Built<K>> {
     let options: O = decode_beside(node, beside, problems)?;
     match emit::to_table(&options) {
-        Ok(written) => Some(Built { name, plugin: into_plugin(options), options: written }),
+        Ok(written) => {
+            Some(Built { name, plugin: into_plugin(options), options: written, library: None })
+        }
         Err(error) => {
             let message = format!("the options of `{name}` {error}");
             problems.report(Some(node.place.clone()), message);
@@ -158,6 +195,7 @@ pub fn build<K: ?Sized, O: DeserializeOwned + Serialize>(
 /// Every plugin of a kind, sorted by name.
 pub fn entries<K: Kind + ?Sized>() -> Vec<&'static Entry<K>> {
     let mut entries = K::registered();
+    entries.extend(loaded::entries::<K>());
     entries.sort_by_key(|entry| (entry.name, entry.module_path));
     entries
 }
@@ -294,87 +332,6 @@ pub fn from_text<K: Kind + ?Sized>(name: &str, options: &str) -> Result<Built<K>
     let node = read(source, &sources, &mut problems);
     let built = entry.zip(node).and_then(|(entry, node)| (entry.build)(&node, &[], &mut problems));
     built.ok_or_else(|| problems.render(&sources))
-}
-
-/// One kind of plugin, as data.
-pub struct KindEntry {
-    /// What the kind is called.
-    pub name: &'static str,
-    /// The sections of a study that choose a plugin of this kind.
-    pub sections: &'static [&'static str],
-    list: fn() -> Vec<Listing>,
-}
-
-inventory::collect!(KindEntry);
-
-/// One plugin, as data.
-#[derive(Clone, Copy)]
-pub struct Listing {
-    /// What its kind is called.
-    pub kind: &'static str,
-    /// Its name in a study.
-    pub name: &'static str,
-    /// The module it is in.
-    pub module_path: &'static str,
-    /// The version of the package it is in.
-    pub version: &'static str,
-    /// Its page of the manual.
-    pub documentation: fn(&str) -> Option<Manual>,
-}
-
-impl Listing {
-    /// Its page of the manual.
-    pub fn manual(&self) -> Option<Manual> {
-        (self.documentation)(self.name)
-    }
-}
-
-impl KindEntry {
-    /// The kind of a trait object.
-    pub const fn of<K: Kind + ?Sized>() -> Self {
-        Self { name: K::NAME, sections: K::SECTIONS, list: list::<K> }
-    }
-
-    /// Every plugin of the kind, sorted by name.
-    pub fn plugins(&self) -> Vec<Listing> {
-        (self.list)()
-    }
-}
-
-fn list<K: Kind + ?Sized>() -> Vec<Listing> {
-    let listing = |entry: &'static Entry<K>| Listing {
-        kind: K::NAME,
-        name: entry.name,
-        module_path: entry.module_path,
-        version: entry.version,
-        documentation: |name| find::<K>(name).ok().map(Entry::documentation),
-    };
-    entries::<K>().into_iter().map(listing).collect()
-}
-
-/// Every kind of plugin, in the order of the names.
-pub fn kinds() -> Vec<&'static KindEntry> {
-    let mut kinds: Vec<&KindEntry> = inventory::iter::<KindEntry>.into_iter().collect();
-    kinds.sort_by_key(|kind| kind.name);
-    kinds
-}
-
-/// Complains of names that two plugins of a kind share.
-pub fn audit() -> Vec<Problem> {
-    kinds().into_iter().flat_map(|kind| duplicates(&kind.plugins())).collect()
-}
-
-/// Complaints about neighbours of the same name in a sorted list.
-fn duplicates(plugins: &[Listing]) -> Vec<Problem> {
-    let same = plugins.windows(2).filter(|pair| pair[0].name == pair[1].name);
-    same.map(|pair| {
-        let Listing { kind, name, .. } = pair[0];
-        let mut problem = Problem::new(format!("two plugins are called `{kind}.{name}`"));
-        problem.found(format!("`{}` and `{}`", pair[0].module_path, pair[1].module_path));
-        problem.help("give one of them another name");
-        problem
-    })
-    .collect()
 }
 
 #[cfg(test)]

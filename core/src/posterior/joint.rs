@@ -66,6 +66,23 @@ impl Likelihood for Joint {
         self.blocks.iter().map(one).sum()
     }
 
+    fn log_likelihoods(&self, responses: &Matrix, hyper: &Matrix) -> Vec<f64> {
+        // The sum begins as that of one point does.
+        let mut sums = vec![-0.0; responses.rows()];
+        for block in &self.blocks {
+            let outputs: Vec<usize> = block.outputs.clone().collect();
+            let (part, own) =
+                (responses.select_columns(&outputs), hyper.select_columns(&block.places));
+            let values = block.likelihood.log_likelihoods(&part, &own);
+            sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+        }
+        sums
+    }
+
+    fn failure(&self) -> Option<String> {
+        self.blocks.iter().find_map(|block| block.likelihood.failure())
+    }
+
     fn left_out(&self, response: &[f64], hyper: &[f64]) -> Option<Vec<f64>> {
         let one = |block: &Block| {
             block.likelihood.left_out(&response[block.outputs.clone()], &block.own(hyper))

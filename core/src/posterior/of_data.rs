@@ -57,16 +57,25 @@ impl<'a> OfData<'a> {
         self.effects.last().map_or(0, |(_, range)| range.end)
     }
 
-    /// The log-likelihood at a response of the forward map.
-    fn value(&self, mean: &[f64], hyper: &[f64]) -> f64 {
-        if mean.iter().any(|y| !y.is_finite()) {
-            return f64::NEG_INFINITY;
+    /// The log-likelihood at each row of responses of the forward map; those that are no numbers are not asked for.
+    fn batch(&self, means: Matrix, hyper: &Matrix) -> Vec<f64> {
+        let mut values = vec![f64::NEG_INFINITY; means.rows()];
+        let finite = |&i: &usize| means.row(i).iter().all(|y| y.is_finite());
+        let asked: Vec<usize> = (0..means.rows()).filter(finite).collect();
+        let own: Vec<usize> = (self.own()..hyper.columns()).collect();
+        let own = hyper.select_rows(&asked).select_columns(&own);
+        let responses = match (self.effects.is_empty(), asked.len() == means.rows()) {
+            (true, true) => means,
+            (true, false) => means.select_rows(&asked),
+            (false, _) => {
+                let with = |&i: &usize| self.with_effects(means.row(i).to_vec(), hyper.row(i));
+                Matrix::from_rows(means.columns(), asked.iter().map(with))
+            }
+        };
+        for (&i, value) in asked.iter().zip(self.likelihood.log_likelihoods(&responses, &own)) {
+            values[i] = value;
         }
-        let own = &hyper[self.own()..];
-        if self.effects.is_empty() {
-            return self.likelihood.log_likelihood(mean, own);
-        }
-        self.likelihood.log_likelihood(&self.with_effects(mean.to_vec(), hyper), own)
+        values
     }
 
     fn with_effects(&self, mut response: Vec<f64>, hyper: &[f64]) -> Vec<f64> {
@@ -77,7 +86,7 @@ impl<'a> OfData<'a> {
     }
 }
 
-impl LogLikelihood for OfData<'_> {
+impl<'a> LogLikelihood for OfData<'a> {
     fn hyperparameters(&self) -> &[Hyperparameter] {
         &self.hyper
     }
@@ -91,8 +100,7 @@ impl LogLikelihood for OfData<'_> {
         let batches = rows.chunks((BATCH / self.forward.outputs().max(1)).max(1));
         let batch = |rows: &[usize]| {
             let mean = self.forward.mean(&theta.select_rows(rows));
-            let each = mean.iter_rows().zip(rows);
-            each.map(|(mean, &row)| self.value(mean, hyper.row(row))).collect::<Vec<f64>>()
+            self.batch(mean, &hyper.select_rows(rows))
         };
         batches.flat_map(batch).collect()
     }
@@ -121,6 +129,10 @@ impl LogLikelihood for OfData<'_> {
     }
 
     fn failure(&self) -> Option<String> {
-        self.forward.failure()
+        let of_effect = |(effect, _): &(Placed<'a>, Range<usize>)| {
+            effect.effect.fault().and_then(|fault| fault.said().map(str::to_owned))
+        };
+        let own = self.forward.failure().or_else(|| self.likelihood.failure());
+        own.or_else(|| self.effects.iter().find_map(of_effect))
     }
 }

@@ -3,11 +3,13 @@
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 
 use super::{Observer, Stop, files};
+use crate::plugin::Fault;
 
 /// The result of a stage that can be kept in files.
 pub trait Artifact: Sized {
@@ -61,6 +63,7 @@ impl Record {
 pub struct RunDirectory {
     root: PathBuf,
     records: Vec<Record>,
+    watched: Vec<Arc<Fault>>,
     _lock: File,
 }
 
@@ -90,7 +93,7 @@ impl RunDirectory {
                 Stop::new(message).help("wait for it, or choose another folder with `--out DIR`")
             );
         }
-        Ok(Self { root: root.to_owned(), records: Vec::new(), _lock: lock })
+        Ok(Self { root: root.to_owned(), records: Vec::new(), watched: Vec::new(), _lock: lock })
     }
 
     /// The folder.
@@ -101,6 +104,11 @@ impl RunDirectory {
     /// The records of the stages that were kept or made, in order.
     pub fn records(&self) -> &[Record] {
         &self.records
+    }
+
+    /// Keeps no result of a stage during which one of these had a fault.
+    pub fn watch(&mut self, faults: Vec<Arc<Fault>>) {
+        self.watched = faults;
     }
 
     /// The folder of a stage.
@@ -138,7 +146,12 @@ impl RunDirectory {
             Finished::No => {}
         }
         let begun = Instant::now();
-        let value = make(&folder)?;
+        let made = make(&folder);
+        // What went wrong first explains more than what followed from it.
+        if let Some(said) = self.watched.iter().find_map(|fault| fault.said()) {
+            return Err(Stop::new(said));
+        }
+        let value = made?;
         let seconds = begun.elapsed().as_secs_f64() + spent_before(&folder);
         let mut outputs = BTreeMap::new();
         for name in value.save(&folder)? {

@@ -213,8 +213,7 @@ pub fn stage(
         return Ok(None);
     };
     let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.prior, p.reference)).collect();
-    let effects: Vec<_> =
-        study.effects.iter().map(|e| (e.built.name, &e.built.options, &e.common)).collect();
+    let effects: Vec<_> = study.effects.iter().map(|e| (e.built.identity(), &e.common)).collect();
     let inputs = json!([
         known.data.hash,
         known.origin,
@@ -222,9 +221,9 @@ pub fn stage(
         study.numerical_error.as_ref().map(|section| section.written.whole()),
         known.region,
         laws,
-        (discrepancy.built.name, &discrepancy.built.options, &discrepancy.common),
+        (discrepancy.built.identity(), &discrepancy.common),
         effects,
-        (section.built.name, &section.built.options, &section.common),
+        (section.built.identity(), &section.common),
         study.about.seed
     ]);
     let parts = Parts::of(study, measured, known)?;

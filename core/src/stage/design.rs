@@ -42,7 +42,7 @@ pub fn stage(
     let Some(section) = &study.design else { return Ok(None) };
     let runs = section.common.runs.get();
     let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.design)).collect();
-    let inputs = json!([section.built.name, section.built.options, runs, laws, study.about.seed]);
+    let inputs = json!([section.built.identity(), runs, laws, study.about.seed]);
     observer.begin("design", "run", 0);
     let kept = run.keep("1-design", &inputs, observer, |_| {
         let plugin = &section.built.plugin;

@@ -51,7 +51,7 @@ impl<'a> Prepared<'a> {
     ) -> Result<Self, Stop> {
         let data = read::stage(study, None, run, observer)?;
         let direct = Direct::of(study)?;
-        let model = study.model.as_ref().map(|m| (m.built.name, &m.built.options, &m.common));
+        let model = study.model.as_ref().map(|m| (m.built.identity(), &m.common));
         let sources = files::hash_sources(&direct.simulator.model.files(&study.directory))?;
         let origin = json!([model, study.scenarios, study.layouts, study.unknowns, sources]);
         Ok(Self { data, direct, origin: files::hash(origin.to_string().as_bytes()) })

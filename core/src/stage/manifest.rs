@@ -1,12 +1,14 @@
 //! What a run was made from: the study as written, the study as resolved, and the provenance of every stage.
 
-use serde_json::json;
+use serde_json::{Value, json};
 
+use crate::plugin::abi::Library;
 use crate::run::{RunDirectory, Stop, files};
 use crate::study::{Study, emit};
 
 /// Writes `study.toml` (byte for byte) and `resolved.toml` (which runs as it stands).
-pub fn begin(study: &Study, run: &RunDirectory) -> Result<(), Stop> {
+pub fn begin(study: &Study, run: &mut RunDirectory) -> Result<(), Stop> {
+    run.watch(study.faults());
     files::write_atomic(&run.root().join("study.toml"), study.text.as_bytes())?;
     let resolved = emit::to_toml(&study.resolved)
         .map_err(|error| Stop::new(format!("cannot write resolved.toml: {error}")))?;
@@ -25,7 +27,24 @@ pub fn end(study: &Study, run: &RunDirectory) -> Result<(), Stop> {
         "study_sha256": files::hash(study.text.as_bytes()),
         "lacuna": env!("CARGO_PKG_VERSION"),
         "seed": study.about.seed,
+        "plugins": study.libraries.loaded.iter().map(|library| described(library)).collect::<Vec<_>>(),
         "stages": run.records(),
     });
     files::write_json(&run.root().join("manifest.json"), &manifest)
+}
+
+/// A library of plugins, as the manifest records it.
+fn described(library: &Library) -> Value {
+    let (major, minor) = library.abi;
+    let plugins: Vec<String> =
+        library.plugins.iter().map(|(kind, name)| format!("{kind}.{name}")).collect();
+    json!({
+        "path": library.path,
+        "sha256": library.sha256,
+        "name": library.name,
+        "version": library.version,
+        "sdk": library.sdk,
+        "abi": format!("{major}.{minor}"),
+        "plugins": plugins,
+    })
 }

@@ -83,12 +83,12 @@ pub fn stage(
     }
     let names: Vec<String> = chosen.iter().map(|&i| ensemble.runs[i].clone()).collect();
     let points = ensemble.points.select_rows(&chosen);
-    let model = (section.model.built.name, &section.model.built.options, &section.model.common);
+    let model = (section.model.built.identity(), &section.model.common);
     observer.begin("finer", "run", names.len() as u64);
     let runs =
         simulate::kept(study, &simulator, runs_folder, &names, &points, &model, run, observer)?;
     let made = run.stage_folder(runs_folder);
-    let reader = study.simulations.as_ref().map(|s| (s.built.name, &s.built.options));
+    let reader = study.simulations.as_ref().map(|s| s.built.identity());
     let inputs = json!([runs.hash, data.hash, reader]);
     let kept = run.keep(folder, &inputs, observer, |_| {
         let runs = Runs { folder: &made, made: &runs.value };

@@ -45,6 +45,7 @@ pub fn power(
             "a study with `[target]` has no data in which anything could be planted",
         ));
     }
+    directory.watch(study.faults());
     let kept = if study.surrogate.is_some() {
         let (learned, _) = learn(study, directory, observer)?;
         with(study, amount, simulations, &learned.known(), directory, observer)?

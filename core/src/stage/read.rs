@@ -117,8 +117,8 @@ pub fn stage(
     let inputs = json!([
         simulated.map(|s| &s.hash),
         study.surrogate.is_some(),
-        study.simulations.as_ref().map(|s| (s.built.name, &s.built.options)),
-        study.measurements.as_ref().map(|s| (s.built.name, &s.built.options, &s.common)),
+        study.simulations.as_ref().map(|s| s.built.identity()),
+        study.measurements.as_ref().map(|s| (s.built.identity(), &s.common)),
         source_hash(study)?,
         study.layouts,
         study.parameters.iter().map(|p| (&p.name, &p.unit)).collect::<Vec<_>>(),

@@ -277,7 +277,7 @@ fn extended(
         .into_iter()
         .map(|name| format!("refined{round}-{name}"))
         .collect();
-    let model = (section.built.name, &section.built.options, &section.common);
+    let model = (section.built.identity(), &section.common);
     observer.begin("refine", "run", names.len() as u64);
     let made = simulate::kept(study, &simulator, &stage, &names, points, &model, run, observer)?;
     observer.end("refine", &format!("{} runs near the posterior", names.len()));

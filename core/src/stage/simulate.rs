@@ -187,7 +187,7 @@ pub fn stage(
     let Some(section) = &study.model else { return Ok(None) };
     let points = &design.value.points;
     let names = names(points.rows());
-    let model = (section.built.name, &section.built.options, &section.common);
+    let model = (section.built.identity(), &section.common);
     let count = points.rows() * simulator.settings.len();
     observer.begin("simulate", "run", count as u64);
     let kept = kept(study, &simulator, STAGE, &names, points, &model, run, observer)?;

@@ -123,8 +123,7 @@ pub fn stage(
     let laws: Vec<_> = parameters.iter().map(|p| (&p.name, &p.design)).collect();
     let inputs = json!([
         data.hash,
-        section.built.name,
-        section.built.options,
+        section.built.identity(),
         (&fitting.training, &fitting.validation),
         laws,
         study.about.seed

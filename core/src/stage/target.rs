@@ -48,9 +48,9 @@ fn stage(
     let section = study.sampler.as_ref().ok_or_else(|| Stop::new("the study has no sampler"))?;
     let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.prior, p.reference)).collect();
     let inputs = json!([
-        (target.built.name, &target.built.options),
+        target.built.identity(),
         laws,
-        (section.built.name, &section.built.options, &section.common),
+        (section.built.identity(), &section.common),
         study.about.seed
     ]);
     calibrate::draw(study, posterior, "5-calibrate", &inputs, run, observer)

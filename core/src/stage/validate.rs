@@ -64,7 +64,7 @@ pub fn stage(
         known.origin,
         calibrated.hash,
         study.validate,
-        study.model.as_ref().map(|m| (m.built.name, &m.built.options, &m.common)),
+        study.model.as_ref().map(|m| (m.built.identity(), &m.common)),
         study.parameters.iter().map(|p| p.reference).collect::<Vec<_>>(),
     ]);
     let simulator = Simulator::of(study)?;

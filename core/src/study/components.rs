@@ -1,12 +1,14 @@
 //! The plugins that a study chose.
 
+use std::sync::Arc;
+
 use super::file::EffectKeys;
 use super::resolve::Study;
 use super::{Complaints, Node, Problems};
 use crate::data::Layout;
 use crate::plugin::effect::Placed;
 use crate::plugin::registry::Section;
-use crate::plugin::{Component, Context, Effect};
+use crate::plugin::{Component, Context, Effect, Fault};
 
 /// A plugin that a study chose.
 pub struct Chosen<'a> {
@@ -61,6 +63,14 @@ impl Study {
             Chosen { section: "effect", name, plugin }
         }));
         all
+    }
+
+    /// Where plugins say that they can answer no more.
+    pub fn faults(&self) -> Vec<Arc<Fault>> {
+        let finer = self.numerical_error.as_ref().map(|error| error.model.built.plugin.fault());
+        let tried = self.gap.candidates.iter().map(|candidate| candidate.built.plugin.fault());
+        let chosen = self.components().into_iter().map(|chosen| chosen.plugin.fault());
+        chosen.chain(finer).chain(tried).flatten().collect()
     }
 
     /// The effects with their names and places.

@@ -10,6 +10,7 @@ use super::file::{
     StudySection, SurrogateKeys, ValidateSection,
 };
 use super::gap::{CandidateKeys, GapSection, SwapKeys, SwitchSection, TermKeys};
+use super::libraries::PluginsSection;
 use super::schema::Language;
 use crate::plugin::manual::{Manual, generator, resolve};
 use crate::plugin::registry::NoKeys;
@@ -23,6 +24,7 @@ pub fn schema() -> Value {
     language
         .table::<StudySection>("study")
         .required("study")
+        .table::<PluginsSection>("plugins")
         .tables::<ParameterSection>("parameter")
         .required("parameter")
         .tables::<DerivedSection>("derived")
@@ -52,6 +54,7 @@ pub fn schema() -> Value {
 pub fn manual() -> Vec<Manual> {
     vec![
         page::<StudySection>("[study]"),
+        page::<PluginsSection>("[plugins]"),
         page::<ParameterSection>("[[parameter]]"),
         page::<DerivedSection>("[[derived]]"),
         page::<ScenarioSection>("[[scenario]]"),

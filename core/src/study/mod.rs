@@ -10,6 +10,7 @@ pub mod gap;
 pub mod inherit;
 pub mod inputs;
 pub mod language;
+pub mod libraries;
 pub mod nearest;
 pub mod node;
 pub mod overrides;

@@ -1,4 +1,4 @@
-//! `--set sampler.steps=200`: keys of a study set on the command line.
+//! `--set sampler.steps=200`: keys of a study set on the command line; `key+=value` adds to a list.
 
 use super::inherit::{CommonKeys, Merge};
 use super::nearest::{nearest, one_of};
@@ -30,6 +30,8 @@ pub fn apply(
 struct Assignment {
     path: Vec<Key>,
     value: Node,
+    /// Whether the value is added to a list.
+    adds: bool,
 }
 
 impl Assignment {
@@ -42,7 +44,8 @@ impl Assignment {
                 .expected("`path=value`, such as `sampler.steps=200`");
             return None;
         };
-        let path = path(&text[..equals], source);
+        let adds = text[..equals].ends_with('+');
+        let path = path(&text[..equals - usize::from(adds)], source);
         if path.iter().any(|key| key.name.is_empty()) {
             let place = Place { source, span: 0..equals.max(1) };
             problems
@@ -51,7 +54,7 @@ impl Assignment {
             return None;
         }
         let value = value(text, equals + 1, source, problems)?;
-        Some(Self { path, value })
+        Some(Self { path, value, adds })
     }
 
     fn chooses_plugin(&self) -> bool {
@@ -60,7 +63,7 @@ impl Assignment {
 
     fn apply(self, study: &mut Node, merge: &Merge<'_>, problems: &mut Problems) {
         let chooses_plugin = self.chooses_plugin();
-        let Self { mut path, value } = self;
+        let Self { mut path, value, adds } = self;
         let Some(last) = path.pop() else { return };
         let mut node = study;
         for (i, key) in path.iter().enumerate() {
@@ -76,7 +79,23 @@ impl Assignment {
             let section = if path.len() == 1 { path[0].name.as_str() } else { "" };
             merge.drop_options(section, node);
         }
-        node.set(last, value);
+        if adds { append(node, last, value, problems) } else { node.set(last, value) }
+    }
+}
+
+/// Adds a value to the list under `key`; a list that is not there yet is made.
+fn append(table: &mut Node, key: Key, value: Node, problems: &mut Problems) {
+    match table.get_mut(&key.name) {
+        None => {
+            let list = Node { place: value.place.clone(), value: Value::Array(vec![value]) };
+            table.set(key, list);
+        }
+        Some(Node { value: Value::Array(elements), .. }) => elements.push(value),
+        Some(other) => {
+            let message = format!("`{}` is no list to which something could be added", key.name);
+            let found = other.describe();
+            problems.report(Some(key.place), message).found(found);
+        }
     }
 }
 

@@ -15,6 +15,7 @@ use super::file::{
     ValidateSection,
 };
 use super::gap::{Gap, gap};
+use super::libraries::{Libraries, Seen, libraries};
 use super::sections::{
     chosen, chosen_or, derived, effects, layouts, numerical_error, parameters, scenarios, table,
     unknown_sections,
@@ -22,6 +23,7 @@ use super::sections::{
 use super::unknowns::{Unknown, unknowns};
 use super::{Node, Problems, Sources, inherit, overrides, resolved};
 use crate::data::{Layout, Layouts, Parameter, Scenario};
+use crate::plugin::registry::loaded::declaring;
 use crate::plugin::registry::{NoKeys, Section};
 use crate::plugin::{
     Density, Design, Discrepancy, Effect, Executor, Given, Model, Reader, Sampler, Surrogate,
@@ -37,6 +39,8 @@ pub struct Study {
     pub text: String,
     /// `[study]`.
     pub about: StudySection,
+    /// `[plugins]`, with the libraries that were loaded.
+    pub libraries: Libraries,
     /// The unknowns of the model.
     pub parameters: Vec<Parameter>,
     /// The known conditions; one without a name where the study has no scenarios.
@@ -90,8 +94,9 @@ pub struct NumericalError {
 }
 
 /// The sections of the study language, in the order in which a study is written.
-pub const SECTIONS: [&str; 18] = [
+pub const SECTIONS: [&str; 19] = [
     "study",
+    "plugins",
     "parameter",
     "target",
     "derived",
@@ -118,6 +123,8 @@ pub struct Checked {
     pub sources: Sources,
     /// What is wrong.
     pub problems: Problems,
+    /// The libraries of plugins that the study loads.
+    pub libraries: Vec<Seen>,
     /// The study, when nothing is wrong.
     pub study: Option<Study>,
 }
@@ -139,6 +146,8 @@ pub fn load(path: &Path, arguments: &[String]) -> Checked {
 pub enum Use {
     /// To run it: its model must be there.
     Run,
+    /// To say what is wrong with it: no library of plugins is loaded, since that would run its code.
+    Check,
     /// To look at what a finished run has kept: the model, which is not asked, may be gone.
     Look,
 }
@@ -169,19 +178,32 @@ fn finish(
     mut sources: Sources,
     mut problems: Problems,
 ) -> Checked {
+    let mut seen = Vec::new();
     let study = root.and_then(|mut root| {
         overrides::apply(&mut root, arguments, &common_keys, &mut sources, &mut problems);
-        let study = structure(path, text, &root, &mut problems)?;
-        if problems.is_empty() {
-            context::check(&study, &root, &mut problems);
-        }
-        if problems.is_empty() {
-            environment(&study, purpose, &root, &mut problems);
-        }
-        Some(study)
+        let libraries = libraries(&root, &directory(path, &root), purpose, &mut problems)?;
+        seen.clone_from(&libraries.seen);
+        let declared = if purpose == Use::Check { libraries.declared() } else { Vec::new() };
+        declaring(declared, || {
+            let study = structure(path, text, &root, libraries, &mut problems)?;
+            if problems.is_empty() {
+                context::check(&study, &root, &mut problems);
+            }
+            if problems.is_empty() {
+                environment(&study, purpose, &root, &mut problems);
+            }
+            Some(study)
+        })
     });
     let study = study.filter(|_| problems.is_empty());
-    Checked { sources, problems, study }
+    Checked { sources, problems, libraries: seen, study }
+}
+
+/// Where the relative paths of a study start.
+fn directory(path: &Path, root: &Node) -> PathBuf {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let given = root.find("study.directory").and_then(Node::as_str);
+    given.map_or(folder.to_owned(), |given| folder.join(given))
 }
 
 /// The engine's own keys of a section, which stay when its plugin changes.
@@ -201,7 +223,13 @@ fn common_keys(section: &str) -> &'static [&'static str] {
 }
 
 /// First layer: the sections, their keys and types, the names of the plugins.
-fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) -> Option<Study> {
+fn structure(
+    path: &Path,
+    text: String,
+    root: &Node,
+    libraries: Libraries,
+    problems: &mut Problems,
+) -> Option<Study> {
     unknown_sections(root, problems);
     let about = table::<StudySection>(root, "study", problems);
     let parameters = parameters(root, problems);
@@ -210,9 +238,7 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
         None if root.get("target").is_some() => Some(None),
         _ => table::<ResponseSection>(root, "response", problems).map(Some),
     };
-    let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-    let given = about.as_ref().and_then(|about| about.directory.as_ref());
-    let directory = given.map_or(folder.clone(), |given| folder.join(given));
+    let directory = directory(path, root);
     let scenarios = scenarios(root, &directory, problems);
     let before = problems.len();
     let target = chosen(root, "target", None, problems);
@@ -254,6 +280,7 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
         directory,
         text,
         about,
+        libraries,
         parameters,
         scenarios,
         unknowns,
@@ -289,7 +316,7 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
 /// Third layer: what the plugins need of the machine.
 fn environment(study: &Study, purpose: Use, root: &Node, problems: &mut Problems) {
     study.each_plugin(root, problems, |section, component, context, complaints| {
-        if purpose == Use::Run || !["model", "numerical_error"].contains(&section) {
+        if purpose != Use::Look || !["model", "numerical_error"].contains(&section) {
             component.environment(context, complaints);
         }
     });

@@ -38,6 +38,9 @@ pub(super) fn table(
         .collect();
     let mut whole = Table::new();
     whole.insert("study".to_owned(), about.into());
+    if !study.libraries.section.load.is_empty() {
+        whole.insert("plugins".to_owned(), to_table(&study.libraries.section)?.into());
+    }
     whole.insert("parameter".to_owned(), parameters?.into());
     if !study.derived_sections.is_empty() {
         let derived: Result<Vec<Table>, _> = study.derived_sections.iter().map(to_table).collect();

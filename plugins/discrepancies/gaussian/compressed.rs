@@ -79,8 +79,7 @@ impl CompressedGroup {
 
     /// The polynomial of the squares, where it holds at all points.
     fn covering(&self, points: &Matrix) -> Option<&dyn SumOfSquares> {
-        let covering = |s: &&dyn SumOfSquares| points.iter_rows().all(|p| s.covers(p));
-        self.squares.as_deref().filter(covering)
+        self.squares.as_deref().filter(|squares| squares.covers_all(points))
     }
 
     /// What pulls along the directions contribute to the derivatives by the basis functions.

@@ -2,9 +2,11 @@
 
 mod curves;
 mod placed;
+mod steps;
 
 pub use curves::{Curve, curves, each_curve};
 pub use placed::{On, Placed, acts, with_tangents};
+pub use steps::{by_parameter_steps, push_forward_step};
 
 use toml::Table;
 
@@ -33,20 +35,7 @@ pub trait Effect: Component {
     /// The derivative of each value of [`Effect::apply`] (rows) by each of the effect's parameters (columns), by
     /// differences inside the priors' supports where the effect gives no formula.
     fn by_parameters(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Matrix {
-        let parameters = self.parameters(layout);
-        let mut jacobian = Matrix::zeros(layout.len(), values.len());
-        for (j, parameter) in parameters.iter().enumerate() {
-            let at = |x: f64| {
-                let mut moved = values.to_vec();
-                moved[j] = x;
-                self.apply(layout, response, &moved)
-            };
-            let prior = &parameter.prior;
-            let width = prior.quantile(0.975) - prior.quantile(0.025);
-            let slopes = slope_within(prior.support(), values[j], 1e-4 * width, at);
-            slopes.iter().enumerate().for_each(|(i, slope)| jacobian[(i, j)] = *slope);
-        }
-        jacobian
+        by_parameter_steps(self, layout, response, values)
     }
 
     /// The derivative of [`Effect::apply`] along a direction `tangent` of the response, by a central difference
@@ -58,18 +47,7 @@ pub trait Effect: Component {
         values: &[f64],
         tangent: &[f64],
     ) -> Vec<f64> {
-        let largest = |y: &[f64]| y.iter().fold(0.0, |most: f64, y| most.max(y.abs()));
-        let (size, length) = (largest(response), largest(tangent));
-        if length == 0.0 {
-            return vec![0.0; response.len()];
-        }
-        let step = 1e-5 * size.max(f64::MIN_POSITIVE) / length;
-        let moved = |h: f64| {
-            let moved: Vec<f64> = response.iter().zip(tangent).map(|(y, v)| y + h * v).collect();
-            self.apply(layout, &moved, values)
-        };
-        let (above, below) = (moved(step), moved(-step));
-        above.iter().zip(&below).map(|(a, b)| (a - b) / (2.0 * step)).collect()
+        push_forward_step(self, layout, response, values, tangent)
     }
 
     /// Values of the parameters from which a fit finds every mode of the effect: both signs of the size, and a grid
@@ -147,29 +125,5 @@ impl Situation<'_> {
             found = Some((longest.max(duration), shortest.min(step)));
         }
         found
-    }
-}
-
-/// The derivative of a function of one number by a central difference, or by a one-sided one of second
-/// order where the support ends.
-fn slope_within(
-    (low, high): (f64, f64),
-    x: f64,
-    step: f64,
-    at: impl Fn(f64) -> Vec<f64>,
-) -> Vec<f64> {
-    let step = step.max(1e-9 * x.abs()).max(f64::MIN_POSITIVE);
-    let sided = |h: f64| {
-        let (here, near, far) = (at(x), at(x + h), at(x + 2.0 * h));
-        let slope = |i: usize| (4.0 * near[i] - 3.0 * here[i] - far[i]) / (2.0 * h);
-        (0..here.len()).map(slope).collect()
-    };
-    if x - step < low {
-        sided(step)
-    } else if x + step > high {
-        sided(-step)
-    } else {
-        let (above, below) = (at(x + step), at(x - step));
-        above.iter().zip(&below).map(|(a, b)| (a - b) / (2.0 * step)).collect()
     }
 }

@@ -72,11 +72,9 @@ pub fn kept(
 /// Everything that the search depends on.
 pub(super) fn inputs(study: &Study, known: &Known<'_>) -> Value {
     let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.prior)).collect();
-    let effects: Vec<_> =
-        study.effects.iter().map(|e| (e.built.name, &e.built.options, &e.common)).collect();
+    let effects: Vec<_> = study.effects.iter().map(|e| (e.built.identity(), &e.common)).collect();
     let candidates = study.gap.candidates.iter();
-    let candidates: Vec<_> =
-        candidates.map(|c| (c.built.name, &c.built.options, &c.common)).collect();
+    let candidates: Vec<_> = candidates.map(|c| (c.built.identity(), &c.common)).collect();
     json!([
         known.data.hash,
         known.origin,
@@ -96,9 +94,8 @@ pub(super) fn inputs(study: &Study, known: &Known<'_>) -> Value {
 /// What the study says of pieces inside its model.
 fn pieces(study: &Study) -> Value {
     let inside = &study.gap.inside;
-    let terms = inside.terms.iter().map(|t| (t.built.name, &t.built.options, &t.common));
-    let models =
-        inside.models.iter().map(|m| (m.section.built.name, &m.section.built.options, &m.keys));
+    let terms = inside.terms.iter().map(|t| (t.built.identity(), &t.common));
+    let models = inside.models.iter().map(|m| (m.section.built.identity(), &m.keys));
     json!([inside.switches, terms.collect::<Vec<_>>(), models.collect::<Vec<_>>()])
 }
 

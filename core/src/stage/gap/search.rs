@@ -116,7 +116,7 @@ pub fn prepared<T>(
     let situation = Situation { layouts: &study.layouts, response: &response, noise: &noise };
     let mut candidates = candidates(study, &situation)?;
     candidates.extend(beginning.inside.candidates.iter().cloned());
-    use_it(&Prepared {
+    let made = use_it(&Prepared {
         base: &base,
         split: &split,
         starts,
@@ -124,7 +124,13 @@ pub fn prepared<T>(
         candidates: &candidates,
         options: options(study),
         random: random.clone(),
-    })
+    });
+    // An effect that could answer no more leaves nothing that could be trusted.
+    let faults: Vec<_> = candidates.iter().filter_map(|c| c.effect.fault()).collect();
+    match faults.iter().find_map(|fault| fault.said()) {
+        Some(said) => Err(Stop::new(said)),
+        None => made,
+    }
 }
 
 impl<'a> Prepared<'a> {

@@ -98,8 +98,8 @@ impl Lesson<'_> {
             .map(|&i| (&self.parameters[i].name, &self.parameters[i].design))
             .collect();
         let base = self.base.map(|(_, origin)| origin);
-        let (name, options) = (section.built.name, &section.built.options);
-        let inputs = json!([made.hash, base, name, options, laws, study.about.seed]);
+        let identity = section.built.identity();
+        let inputs = json!([made.hash, base, identity, laws, study.about.seed]);
         observer.begin("gap-surrogate", "output", study.layouts.len() as u64);
         let folder = run.stage_folder(&simulate);
         let kept = run.keep(&learn, &inputs, observer, |_| {

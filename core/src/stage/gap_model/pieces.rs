@@ -9,7 +9,7 @@ use crate::gap::candidates::Candidate;
 use crate::gap::wide::{Freed, Switched};
 use crate::plugin::amend::{Addition, changed};
 use crate::plugin::effect::Description;
-use crate::plugin::registry::{self, Section};
+use crate::plugin::registry::{self, Identity, Section};
 use crate::plugin::{Effect, Given, Model};
 use crate::run::Stop;
 use crate::stage::simulator::{Other, Simulator};
@@ -96,10 +96,10 @@ impl Pieces {
         Simulator::of_other(study, &Other { section: &wider.model, given: &wider.given, free })
     }
 
-    /// The name and the options of the wider model, for the hash of what is made with it.
-    pub(super) fn model(&self) -> (&'static str, &Table, &ModelKeys) {
+    /// What the wider model is, for the hash of what is made with it.
+    pub(super) fn model(&self) -> (Identity<'_>, &ModelKeys) {
         let model = &self.whole.model;
-        (model.built.name, &model.built.options, &model.common)
+        (model.built.identity(), &model.common)
     }
 
     /// The pieces as candidates of a search.

@@ -76,7 +76,7 @@ fn rival<'a>(
             parameters: study.parameters.clone(),
             used,
             base: None,
-            model: json!([section.built.name, &section.built.options, &section.common]),
+            model: json!([section.built.identity(), &section.common]),
         };
         let (emulator, common) = lesson.learn(study, run, observer)?;
         (Box::new(Emulated(emulator)), vec![common])

@@ -53,6 +53,15 @@ fn keys_are_set_by_path_and_name() {
 }
 
 #[test]
+fn values_are_added_to_lists() {
+    let set = applied(&["plugins.load+=\"./a.so\"", "plugins.load += ./b.so"]).unwrap();
+    assert_eq!(set["plugins"]["load"], json!(["./a.so", "./b.so"]));
+    let said = applied(&["sampler.walkers+=3"]).unwrap_err();
+    assert!(said.contains("`walkers` is no list to which something could be added"), "{said}");
+    assert!(said.contains("found 120"), "{said}");
+}
+
+#[test]
 fn a_new_plugin_drops_options_whatever_the_order() {
     let expected = json!({ "use": "nuts", "draws": 7, "depth": 5 });
     assert_eq!(applied(&["sampler.use=nuts", "sampler.depth=5"]).unwrap()["sampler"], expected);

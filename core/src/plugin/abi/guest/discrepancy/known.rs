@@ -1,0 +1,81 @@
+//! What a likelihood is made from, as the program hands it over.
+
+use crate::data::{Measurements, Replicate};
+use crate::linalg::Matrix;
+use crate::plugin::abi::table::{self, KnownFunctions, Table as _, status};
+use crate::plugin::abi::wire::DataAbout;
+use crate::plugin::abi::{Refusal, Reply};
+use crate::plugin::discrepancy::{CommonError, Known};
+use crate::run::Stop;
+
+/// Measurements and errors that were copied, and a way to ask for slopes.
+pub struct OwnedKnown<'a> {
+    data: Measurements,
+    common: Vec<CommonError>,
+    known: &'a table::Known,
+    functions: &'a KnownFunctions,
+}
+
+impl<'a> OwnedKnown<'a> {
+    /// Copies what is known.
+    ///
+    /// # Safety
+    /// All that the struct points to is there during `'a`.
+    pub unsafe fn read(known: &'a table::Known) -> Result<Self, Refusal> {
+        // SAFETY: as the caller promises.
+        let (about, values, functions) =
+            unsafe { (known.about.bytes(), known.values.matrix(), known.functions.as_ref()) };
+        let DataAbout { layout, replicates } = serde_json::from_slice(about)?;
+        let functions = functions.filter(|f| f.missing().is_none());
+        let functions = functions.ok_or_else(|| Refusal::stop("the slopes cannot be asked for"))?;
+        let count = values.as_slice().len();
+        let measured: &[u8] = if count == 0 || known.measured.is_null() {
+            &[]
+        } else {
+            // SAFETY: one mark a value.
+            unsafe { std::slice::from_raw_parts(known.measured, count) }
+        };
+        let row = |(i, name): (usize, String)| {
+            let marks = &measured[i * values.columns()..];
+            let value = |(&y, &mark): (&f64, &u8)| (mark != 0).then_some(y);
+            Replicate { name, values: values.row(i).iter().zip(marks).map(value).collect() }
+        };
+        if replicates.len() != values.rows() || measured.len() != count {
+            return Err(Refusal::stop("the replicates have not as many names as values"));
+        }
+        let replicates = replicates.into_iter().enumerate().map(row).collect();
+        // SAFETY: as the caller promises.
+        let common = unsafe { common(known) };
+        Ok(Self { data: Measurements { layout, replicates }, common, known, functions })
+    }
+
+    /// Looks at it as discrepancies do.
+    pub fn with<R>(&self, look: impl FnOnce(&Known<'_>) -> R) -> R {
+        let slopes = || self.slopes().map_err(|refusal| Stop::new(refusal.message));
+        look(&Known { data: &self.data, common: &self.common, slopes: &slopes })
+    }
+
+    fn slopes(&self) -> Result<Matrix, Refusal> {
+        let Some(ask) = self.functions.slopes else { return Err(Refusal::new(status::STOP, "")) };
+        // SAFETY: the function belongs to what is known, which is there.
+        let reply = Reply::of(|answer| unsafe { ask(self.known.known, answer) })?;
+        let [slopes] = reply.matrices()?;
+        Ok(slopes)
+    }
+}
+
+/// Copies the common errors.
+///
+/// # Safety
+/// All that the struct points to is there.
+unsafe fn common(known: &table::Known) -> Vec<CommonError> {
+    let mut all = Vec::with_capacity(known.common_count);
+    for i in 0..known.common_count {
+        // SAFETY: the pointer leads to so many.
+        let error = unsafe { &*known.common.add(i) };
+        // SAFETY: as the caller promises.
+        let (origin, factor) = unsafe { (error.origin.string(), error.factor.matrix()) };
+        all.push(CommonError { origin, factor, predictive: error.predictive != 0 });
+    }
+    all
+}

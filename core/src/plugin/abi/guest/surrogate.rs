@@ -1,0 +1,235 @@
+//! Surrogates of a library.
+
+use std::ffi::c_void;
+
+use super::component::{Authored, Components, Export};
+use crate::math::random::Stream;
+use crate::plugin::abi::Refusal;
+use crate::plugin::abi::guard::{begin, end, fill, guard, object};
+use crate::plugin::abi::linear::ServedLinear;
+use crate::plugin::abi::table::{
+    self, Answer, ComponentFunctions, EmulatorFunctions, Key, Linear, Numbers, ProgressFunctions,
+    SurrogateFunctions, Table as _, Text,
+};
+use crate::plugin::abi::wire::TrainingAbout;
+use crate::plugin::surrogate::{Emulator, Surrogate, Training};
+use crate::run::{Observer, Progress};
+
+impl<T: Surrogate + Authored> Export<T> for dyn Surrogate {
+    const FUNCTIONS: *const c_void = std::ptr::from_ref(Functions::<T>::TABLE).cast();
+    const COMPONENT: *const ComponentFunctions = Components::<T>::FUNCTIONS;
+}
+
+struct Functions<T>(std::marker::PhantomData<T>);
+
+impl<T: Surrogate + Authored> Functions<T> {
+    const TABLE: &'static SurrogateFunctions = &SurrogateFunctions {
+        size: size_of::<SurrogateFunctions>(),
+        fit: Some(fit::<T>),
+        load: Some(load::<T>),
+    };
+}
+
+static EMULATOR: EmulatorFunctions = EmulatorFunctions {
+    size: size_of::<EmulatorFunctions>(),
+    destroy: Some(end::<Owned>),
+    mean: Some(mean),
+    jacobian: Some(jacobian),
+    fit_error: Some(fit_error),
+    save: Some(save),
+    variance: Some(variance),
+    linear: Some(linear),
+    sensitivity: Some(sensitivity),
+    facts: Some(facts),
+};
+
+/// Tells the program how far a fit came; it counts units, not totals.
+struct Told {
+    progress: *mut c_void,
+    functions: ProgressFunctions,
+    said: std::sync::atomic::AtomicU64,
+}
+
+// SAFETY: the functions of a table may be called from any thread.
+unsafe impl Sync for Told {}
+
+impl Observer for Told {
+    fn begin(&self, _: &str, _: &str, _: u64) {}
+    fn advance(&self, done: u64) {
+        let before = self.said.fetch_max(done, std::sync::atomic::Ordering::Relaxed);
+        if let Some(add) = self.functions.add
+            && done > before
+        {
+            // SAFETY: the progress is there for the time of the fit.
+            unsafe { add(self.progress, done - before) }
+        }
+    }
+    fn end(&self, _: &str, _: &str) {}
+    fn warn(&self, text: &str) {
+        if let Some(warn) = self.functions.warn {
+            // SAFETY: as in `advance`.
+            unsafe { warn(self.progress, Text::of(text)) }
+        }
+    }
+}
+
+/// Hands an emulator over.
+fn handed(emulator: Box<dyn Emulator>) -> table::Emulator {
+    table::Emulator {
+        size: size_of::<table::Emulator>(),
+        dimension: emulator.dimension(),
+        outputs: emulator.outputs(),
+        functions: &raw const EMULATOR,
+        emulator: begin(Owned::new(emulator)),
+    }
+}
+
+/// An emulator with its linear form, which is handed over for as long as the emulator is there.
+struct Owned {
+    emulator: Box<dyn Emulator>,
+}
+
+impl Owned {
+    fn new(emulator: Box<dyn Emulator>) -> Self {
+        Self { emulator }
+    }
+}
+
+unsafe extern "C" fn fit<T: Surrogate + Authored>(
+    plugin: *mut c_void,
+    training: *const table::Training,
+    key: Key,
+    progress: *const table::Progress,
+    made: *mut table::Emulator,
+    answer: *const Answer,
+) -> i32 {
+    guard(answer, |_| {
+        // SAFETY: the plugin that `create` made; all else is there for the time of the call.
+        let (plugin, training, progress) = unsafe { (object::<T>(plugin), &*training, &*progress) };
+        // SAFETY: as above.
+        let (about, points, responses) = unsafe {
+            (training.about.bytes(), training.points.matrix(), training.responses.matrix())
+        };
+        let about: TrainingAbout = serde_json::from_slice(about)?;
+        // SAFETY: as above.
+        let functions = unsafe { progress.functions.as_ref() }.filter(|f| f.missing().is_none());
+        let functions = *functions.ok_or_else(|| Refusal::stop("progress cannot be told"))?;
+        let told = Told { progress: progress.progress, functions, said: 0.into() };
+        let TrainingAbout { parameters, layouts } = &about;
+        let runs = Training { parameters, layouts, points: &points, responses: &responses };
+        let emulator = plugin.fit(&runs, &Stream::from_key(key.words), &Progress::new(&told))?;
+        // SAFETY: the caller gives a place for one emulator.
+        unsafe { *made = handed(emulator) };
+        Ok(())
+    })
+}
+
+unsafe extern "C" fn load<T: Surrogate + Authored>(
+    plugin: *mut c_void,
+    bytes: Text,
+    made: *mut table::Emulator,
+    answer: *const Answer,
+) -> i32 {
+    guard(answer, |_| {
+        // SAFETY: as in `fit`.
+        let (plugin, bytes) = unsafe { (object::<T>(plugin), bytes.bytes()) };
+        let emulator = plugin.load(bytes)?;
+        // SAFETY: the caller gives a place for one emulator.
+        unsafe { *made = handed(emulator) };
+        Ok(())
+    })
+}
+
+/// The emulator behind the first argument.
+///
+/// # Safety
+/// It was made by [`handed`] and not ended.
+unsafe fn own<'a>(emulator: *mut c_void) -> &'a dyn Emulator {
+    // SAFETY: as the caller promises.
+    &*unsafe { object::<Owned>(emulator) }.emulator
+}
+
+unsafe extern "C" fn mean(
+    this: *mut c_void,
+    points: Numbers,
+    to: *mut f64,
+    answer: *const Answer,
+) -> i32 {
+    guard(answer, |_| {
+        // SAFETY: an emulator of ours, and numbers that are there for the time of the call.
+        let (emulator, points) = unsafe { (own(this), points.matrix()) };
+        // SAFETY: the buffer holds `points x outputs` numbers.
+        unsafe { fill(to, points.rows() * emulator.outputs(), emulator.mean(&points).as_slice()) }
+    })
+}
+
+unsafe extern "C" fn variance(
+    this: *mut c_void,
+    points: Numbers,
+    to: *mut f64,
+    answer: *const Answer,
+) -> i32 {
+    guard(answer, |_| {
+        // SAFETY: as in `mean`.
+        let (emulator, points) = unsafe { (own(this), points.matrix()) };
+        let variance = emulator.variance(&points).ok_or_else(Refusal::absent)?;
+        // SAFETY: the buffer holds `points x outputs` numbers.
+        unsafe { fill(to, points.rows() * emulator.outputs(), variance.as_slice()) }
+    })
+}
+
+unsafe extern "C" fn jacobian(
+    this: *mut c_void,
+    point: Numbers,
+    to: *mut f64,
+    answer: *const Answer,
+) -> i32 {
+    guard(answer, |_| {
+        // SAFETY: as in `mean`.
+        let (emulator, point) = unsafe { (own(this), point.slice()) };
+        // SAFETY: the buffer holds `outputs x parameters` numbers.
+        unsafe { fill(to, point.len() * emulator.outputs(), emulator.jacobian(point).as_slice()) }
+    })
+}
+
+unsafe extern "C" fn fit_error(this: *mut c_void, answer: *const Answer) -> i32 {
+    guard(answer, |out| {
+        // SAFETY: as in `mean`.
+        let error = unsafe { own(this) }.fit_error();
+        out.row(&error.relative);
+        out.numbers(&error.residuals);
+        Ok(())
+    })
+}
+
+unsafe extern "C" fn save(this: *mut c_void, answer: *const Answer) -> i32 {
+    guard(answer, |out| {
+        // SAFETY: as in `mean`.
+        out.bytes(&unsafe { own(this) }.save()?);
+        Ok(())
+    })
+}
+
+unsafe extern "C" fn linear(this: *mut c_void, made: *mut Linear, answer: *const Answer) -> i32 {
+    guard(answer, |_| {
+        // SAFETY: as in `mean`.
+        let linear = unsafe { own(this) }.linear().ok_or_else(Refusal::absent)?;
+        // It lives as long as the process: an emulator has one linear form, which is asked for once.
+        let served: &'static ServedLinear<'_> = Box::leak(Box::new(ServedLinear::new(linear)));
+        // SAFETY: the caller gives a place for one map.
+        unsafe { *made = served.table() };
+        Ok(())
+    })
+}
+
+unsafe extern "C" fn sensitivity(this: *mut c_void, answer: *const Answer) -> i32 {
+    guard(answer, |out| {
+        // SAFETY: as in `mean`.
+        out.json(&unsafe { own(this) }.sensitivity().ok_or_else(Refusal::absent)?)
+    })
+}
+
+unsafe extern "C" fn facts(this: *mut c_void, answer: *const Answer) -> i32 {
+    // SAFETY: as in `mean`.
+    guard(answer, |out| out.json(&unsafe { own(this) }.facts()))
+}

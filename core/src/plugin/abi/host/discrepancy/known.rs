@@ -1,0 +1,82 @@
+//! What a likelihood is made from, as it is handed to a library.
+
+use std::ffi::c_void;
+
+use crate::linalg::Matrix;
+use crate::plugin::abi::Refusal;
+use crate::plugin::abi::guard::{guard, object};
+use crate::plugin::abi::table::{self, Answer, CommonErrorView, KnownFunctions, Numbers, Text};
+use crate::plugin::abi::wire::DataAbout;
+use crate::plugin::discrepancy::Known;
+
+/// What is known, with what was copied of it.
+pub(super) struct HandedKnown<'a> {
+    known: &'a Known<'a>,
+    about: String,
+    values: Matrix,
+    measured: Vec<u8>,
+}
+
+static FUNCTIONS: KnownFunctions =
+    KnownFunctions { size: size_of::<KnownFunctions>(), slopes: Some(slopes) };
+
+unsafe extern "C" fn slopes(known: *mut c_void, answer: *const Answer) -> i32 {
+    guard(answer, |out| {
+        // SAFETY: what `HandedKnown::with` handed over, during that call.
+        let known = unsafe { object::<HandedKnown<'_>>(known) };
+        out.numbers(&(known.known.slopes)()?);
+        Ok(())
+    })
+}
+
+impl<'a> HandedKnown<'a> {
+    /// Copies the measurements; those of another shape than they say are refused here, since they have no place in
+    /// what crosses.
+    pub fn of(known: &'a Known<'a>) -> Result<Self, Refusal> {
+        let outputs = known.data.layout.len();
+        let replicates = &known.data.replicates;
+        if let Some(odd) = replicates.iter().find(|r| r.values.len() != outputs) {
+            let (name, found) = (&odd.name, odd.values.len());
+            return Err(Refusal::stop(format!(
+                "replicate `{name}` has {found} values, and the response {outputs}"
+            )));
+        }
+        let all = || replicates.iter().flat_map(|replicate| replicate.values.iter());
+        let values: Vec<f64> = all().map(|value| value.unwrap_or(0.0)).collect();
+        let about = DataAbout {
+            layout: known.data.layout.clone(),
+            replicates: replicates.iter().map(|replicate| replicate.name.clone()).collect(),
+        };
+        Ok(Self {
+            known,
+            about: serde_json::to_string(&about)?,
+            values: Matrix::from_vec(replicates.len(), outputs, values),
+            measured: all().map(|value| u8::from(value.is_some())).collect(),
+        })
+    }
+
+    /// Calls with what the other side is given.
+    pub fn with<R>(&self, call: impl FnOnce(*const table::Known) -> R) -> R {
+        let common: Vec<CommonErrorView> = self
+            .known
+            .common
+            .iter()
+            .map(|error| CommonErrorView {
+                origin: Text::of(&error.origin),
+                factor: Numbers::of(&error.factor),
+                predictive: u8::from(error.predictive),
+            })
+            .collect();
+        let known = table::Known {
+            size: size_of::<table::Known>(),
+            known: (&raw const *self).cast_mut().cast(),
+            functions: &raw const FUNCTIONS,
+            about: Text::of(&self.about),
+            values: Numbers::of(&self.values),
+            measured: self.measured.as_ptr(),
+            common: common.as_ptr(),
+            common_count: common.len(),
+        };
+        call(&raw const known)
+    }
+}

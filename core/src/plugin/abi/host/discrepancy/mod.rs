@@ -1,0 +1,99 @@
+//! Discrepancies of libraries.
+
+mod compressed;
+mod known;
+mod likelihood;
+
+use super::Plugin;
+use super::object::{Object, numbers_only, shaped};
+use super::plugin::optional;
+use crate::data::Layout;
+use crate::plugin::Likelihood;
+use crate::plugin::abi::Refusal;
+use crate::plugin::abi::table::{self, DiscrepancyFunctions, Numbers, Text, copied};
+use crate::plugin::discrepancy::{Discrepancy, Known, StatedNoise};
+use crate::run::Stop;
+use known::HandedKnown;
+use likelihood::LoadedLikelihood;
+
+impl Plugin<DiscrepancyFunctions> {
+    fn made(&self, known: &Known<'_>) -> Result<LoadedLikelihood, Refusal> {
+        let handed = HandedKnown::of(known)?;
+        let mut made = table::Likelihood {
+            size: 0,
+            likelihood: std::ptr::null_mut(),
+            functions: std::ptr::null(),
+        };
+        handed.with(|known| {
+            let (ask, this, to) =
+                (self.object.functions.likelihood, self.object.this, &raw mut made);
+            // SAFETY: the function belongs to the plugin; what is known and the place are there until it returns.
+            self.object
+                .demand("likelihood", |a| optional(ask, |f| unsafe { f(this, known, to, a) }))
+        })?;
+        // SAFETY: whoever made the likelihood gave its functions, which are constants.
+        let functions = unsafe { copied(made.functions) }
+            .map_err(|refusal| Refusal::stop(format!("its likelihood {}", refusal.message)))?;
+        let (destroy, fault) = (functions.destroy, self.object.fault().clone());
+        LoadedLikelihood::new(Object::new(made.likelihood, functions, destroy, fault), known.data)
+    }
+
+    fn noise(&self, layout: &Layout, response: &[f64]) -> Result<Option<StatedNoise>, Refusal> {
+        let (ask, this) = (self.object.functions.stated_noise, self.object.this);
+        if ask.is_none() {
+            return Ok(None);
+        }
+        let layout = serde_json::to_string(layout)?;
+        let (layout, row) = (Text::of(&layout), Numbers::row(response));
+        // SAFETY: the function belongs to the plugin; layout and response are there until it returns.
+        let call = |a| optional(ask, |f| unsafe { f(this, layout, row, a) });
+        let Some(reply) = self.object.ask("stated_noise", call)? else { return Ok(None) };
+        for matrix in &reply.matrices {
+            shaped("stated_noise", matrix, 1, response.len())?;
+            numbers_only("stated_noise", matrix.as_slice())?;
+        }
+        let mut rows = reply.matrices.into_iter().map(crate::linalg::Matrix::into_vec);
+        let sd = rows.next().ok_or_else(|| Refusal::stop("`stated_noise` answers nothing"))?;
+        Ok(Some(StatedNoise { sd, correlation_time: rows.next() }))
+    }
+}
+
+impl Discrepancy for Plugin<DiscrepancyFunctions> {
+    fn likelihood(&self, known: &Known<'_>) -> Result<Box<dyn Likelihood>, Stop> {
+        Ok(Box::new(self.object.or_stop(self.made(known))?))
+    }
+
+    fn stated_noise(&self, layout: &Layout, response: &[f64]) -> Option<StatedNoise> {
+        self.object.or_fault(self.noise(layout, response), || None)
+    }
+}
+
+/// Derivatives at one point: by its coordinates, and by the hyperparameters.
+type Slopes = (Vec<f64>, Vec<f64>);
+
+/// Asks for derivatives at one point. They must be numbers where the density is one; where it is zero, as `density` says
+/// when it is asked, there are none.
+fn slopes<F>(
+    object: &Object<F>,
+    (coordinates, unknowns): (usize, usize),
+    call: impl FnOnce(*mut f64, *mut f64, *const table::Answer) -> i32,
+    density: impl FnOnce() -> f64,
+) -> Slopes {
+    let nothing = || (vec![0.0; coordinates], vec![0.0; unknowns]);
+    let mut by_hyper = vec![f64::NAN; unknowns];
+    let beside = by_hyper.as_mut_ptr();
+    let absent = || Refusal::stop("`gradient` is not there");
+    let asked = object
+        .ask_filled("gradient", coordinates, |to, answer| call(to, beside, answer))
+        .and_then(|first| first.ok_or_else(absent));
+    let checked = asked.and_then(|first| {
+        let sound =
+            numbers_only("gradient", &first).and_then(|()| numbers_only("gradient", &by_hyper));
+        match sound {
+            Err(refusal) if density().is_finite() => Err(refusal),
+            Err(_) => Ok(nothing()),
+            Ok(()) => Ok((first, by_hyper)),
+        }
+    });
+    object.or_fault(checked, nothing)
+}

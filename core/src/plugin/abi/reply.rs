@@ -1,0 +1,98 @@
+//! The outside of a call to the other side: what it answers.
+
+use std::ffi::c_void;
+
+use serde::de::DeserializeOwned;
+
+use super::Refusal;
+use super::guard::guard_number;
+use super::table::{Answer, Numbers, Text, status};
+use crate::linalg::Matrix;
+
+/// What a call answered beside its status.
+#[derive(Debug, Default)]
+pub struct Reply {
+    /// Its text.
+    pub text: Vec<u8>,
+    /// Its matrices.
+    pub matrices: Vec<Matrix>,
+    /// The function that was called, for messages.
+    pub what: &'static str,
+}
+
+unsafe extern "C" fn take_text(context: *mut c_void, text: Text) {
+    guard_number((), || {
+        // SAFETY: the context is the reply of the call that is under way, and the text is there meanwhile.
+        let (reply, bytes) = unsafe { (&mut *context.cast::<Reply>(), text.bytes()) };
+        reply.text.extend_from_slice(bytes);
+    });
+}
+
+unsafe extern "C" fn take_numbers(context: *mut c_void, numbers: Numbers) {
+    guard_number((), || {
+        // SAFETY: as in `take_text`.
+        let (reply, matrix) = unsafe { (&mut *context.cast::<Reply>(), numbers.matrix()) };
+        reply.matrices.push(matrix);
+    });
+}
+
+impl Reply {
+    /// Makes a call and takes what it answers; a status that is not `OK` is a refusal.
+    pub fn of(call: impl FnOnce(*const Answer) -> i32) -> Result<Self, Refusal> {
+        let mut reply = Self::default();
+        let answer = Answer {
+            size: size_of::<Answer>(),
+            context: (&raw mut reply).cast(),
+            text: Some(take_text),
+            numbers: Some(take_numbers),
+        };
+        match call(&raw const answer) {
+            status::OK => Ok(reply),
+            known @ status::REJECTED..=status::ABSENT => Err(Refusal::new(known, reply.string())),
+            other => {
+                Err(Refusal::stop(format!("answers with the status {other}, which has no meaning")))
+            }
+        }
+    }
+
+    /// The text, with a mark where it is not UTF-8.
+    pub fn string(&self) -> String {
+        String::from_utf8_lossy(&self.text).into_owned()
+    }
+
+    /// A complaint about the answer.
+    fn wrong(&self, message: String) -> Refusal {
+        let what = self.what;
+        Refusal::stop(if what.is_empty() { message } else { format!("`{what}` {message}") })
+    }
+
+    /// The text read as JSON.
+    pub fn json<T: DeserializeOwned>(&self) -> Result<T, Refusal> {
+        serde_json::from_slice(&self.text)
+            .map_err(|error| self.wrong(format!("answers JSON that cannot be read: {error}")))
+    }
+
+    /// The text read as JSON; `None` where nothing was written.
+    pub fn json_if_any<T: DeserializeOwned>(&self) -> Result<Option<T>, Refusal> {
+        if self.text.is_empty() { Ok(None) } else { self.json().map(Some) }
+    }
+
+    /// Its matrices, which must be so many.
+    pub fn matrices<const N: usize>(mut self) -> Result<[Matrix; N], Refusal> {
+        let count = self.matrices.len();
+        std::mem::take(&mut self.matrices)
+            .try_into()
+            .map_err(|_| self.wrong(format!("answers {count} matrices where {N} belong")))
+    }
+
+    /// Its only row.
+    pub fn row(self) -> Result<Vec<f64>, Refusal> {
+        let what = self.what;
+        let [row] = self.matrices()?;
+        match row.rows() {
+            1 => Ok(row.into_vec()),
+            count => Err(Self { what, ..Self::default() }
+                .wrong(format!("answers {count} rows where one belongs"))),
+        }
+    }
+}

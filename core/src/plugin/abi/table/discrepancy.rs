@@ -1,0 +1,133 @@
+//! Discrepancies and their likelihoods.
+
+use std::ffi::c_void;
+
+use super::{Answer, Key, Linear, Numbers, Text};
+
+record! {
+    /// An error that all replicates share, a covariance `F F'`.
+    CommonErrorView {
+        /// Where it comes from: `emulator`, `numerics`, `replicates`.
+        origin: Text,
+        /// The factor `F`, `outputs x rank`, in the response's unit.
+        factor: Numbers,
+        /// 1 where a new replicate has it too, beside what the discrepancy adds to a replicate.
+        predictive: u8,
+    }
+}
+
+functions! {
+    /// What can be asked about the data.
+    KnownFunctions {
+        /// Answers the derivative of each output (rows) by each parameter (columns), in units of the prior's standard
+        /// deviation of that parameter, where the model fits the data best: one matrix. It costs an optimisation.
+        must slopes(known: *mut c_void, answer: *const Answer) -> i32;
+    }
+}
+
+record! {
+    /// What a likelihood is made from. It is there for the time of the call.
+    Known {
+        /// The size of this struct in bytes.
+        size: usize,
+        /// The first argument of the functions.
+        known: *mut c_void,
+        /// What can be asked.
+        functions: *const KnownFunctions,
+        /// The shape of a complete measurement as JSON, and the names of the replicates:
+        /// `{"layout": {…}, "replicates": ["…"]}`.
+        about: Text,
+        /// The measured values, `replicates x outputs`; zero where nothing was measured.
+        values: Numbers,
+        /// 1 where a value was measured, 0 where not, `replicates x outputs`.
+        measured: *const u8,
+        /// The errors that all replicates share: their covariances are added once to that of the mean curve, never
+        /// divided by the number of replicates.
+        common: *const CommonErrorView,
+        /// How many there are.
+        common_count: usize,
+    }
+}
+
+functions! {
+    /// A likelihood as a function of the basis functions of a linear emulator.
+    CompressedFunctions {
+        /// Ends it.
+        must destroy(compressed: *mut c_void);
+        /// The log-likelihood for each row of `basis` (`points x terms`) and of `hyper`.
+        must log_likelihood(compressed: *mut c_void, basis: Numbers, hyper: Numbers, values: *mut f64, answer: *const Answer) -> i32;
+        /// The derivatives at each row by the basis functions and by the hyperparameters.
+        must gradient(compressed: *mut c_void, basis: Numbers, hyper: Numbers, by_basis: *mut f64, by_hyper: *mut f64, answer: *const Answer) -> i32;
+        /// The same as `log_likelihood` at points in physical units, for those who can do with less than all basis
+        /// functions.
+        may log_likelihood_at(compressed: *mut c_void, linear: *const Linear, points: Numbers, hyper: Numbers, values: *mut f64, answer: *const Answer) -> i32;
+        /// The same as `gradient` by the parameters at points in physical units.
+        may gradient_at(compressed: *mut c_void, linear: *const Linear, points: Numbers, hyper: Numbers, by_points: *mut f64, by_hyper: *mut f64, answer: *const Answer) -> i32;
+    }
+}
+
+record! {
+    /// A likelihood reduced to a small form in the basis functions of a linear emulator.
+    Compressed {
+        /// The size of this struct in bytes.
+        size: usize,
+        /// The first argument of the functions.
+        compressed: *mut c_void,
+        /// What it does.
+        functions: *const CompressedFunctions,
+    }
+}
+
+functions! {
+    /// The likelihood of fixed measurements as a function of the response (one value an output) and of the
+    /// hyperparameters, always for several points at once: one a row.
+    LikelihoodFunctions {
+        /// Ends it.
+        must destroy(likelihood: *mut c_void);
+        /// Answers the unknowns beside the model's parameters, a JSON list of
+        /// `{"name", "symbol", "unit", "prior", "log", "start"}`.
+        must hyperparameters(likelihood: *mut c_void, answer: *const Answer) -> i32;
+        /// The log-likelihood for each row; minus infinity outside the support, never NaN.
+        must log_likelihood(likelihood: *mut c_void, responses: Numbers, hyper: Numbers, values: *mut f64, answer: *const Answer) -> i32;
+        /// The derivatives by the response and by the hyperparameters, one row a point.
+        must gradient(likelihood: *mut c_void, responses: Numbers, hyper: Numbers, by_response: *mut f64, by_hyper: *mut f64, answer: *const Answer) -> i32;
+        /// Answers the variance of a new replicate around the response, split by origin: the origins as a JSON list, and a
+        /// matrix `origins x outputs`.
+        must predictive(likelihood: *mut c_void, response: Numbers, hyper: Numbers, answer: *const Answer) -> i32;
+        /// Data as this discrepancy would have made them, `replicates x outputs`; what stands where nothing was
+        /// measured does not matter.
+        must simulate(likelihood: *mut c_void, response: Numbers, hyper: Numbers, key: Key, values: *mut f64, answer: *const Answer) -> i32;
+        /// Answers the log density of each measured value given all others, by replicate and output with gaps left
+        /// out: one row. `ABSENT` where there is no such form.
+        may left_out(likelihood: *mut c_void, response: Numbers, hyper: Numbers, answer: *const Answer) -> i32;
+        /// The same likelihood as a function of the basis functions of a linear emulator; `ABSENT` where there is no
+        /// such form.
+        may compress(likelihood: *mut c_void, linear: *const Linear, out: *mut Compressed, answer: *const Answer) -> i32;
+        /// Answers what is worth telling, a JSON list of `{"name", "value"}`.
+        may facts(likelihood: *mut c_void, answer: *const Answer) -> i32;
+    }
+}
+
+record! {
+    /// The likelihood of fixed measurements.
+    Likelihood {
+        /// The size of this struct in bytes.
+        size: usize,
+        /// The first argument of the functions.
+        likelihood: *mut c_void,
+        /// What it does.
+        functions: *const LikelihoodFunctions,
+    }
+}
+
+functions! {
+    /// A statistical model of the difference between model and data.
+    DiscrepancyFunctions {
+        /// The likelihood of what is known.
+        must likelihood(plugin: *mut c_void, known: *const Known, out: *mut Likelihood, answer: *const Answer) -> i32;
+        /// Answers the standard deviation of one replicate around a response, where the options say how large it is:
+        /// one row, and a second one with the times over which correlations along the last axis fall by a
+        /// factor e, where values are not independent. `ABSENT` where the noise is unknown.
+        may stated_noise(plugin: *mut c_void, layout: Text, response: Numbers, answer: *const Answer) -> i32;
+    }
+}

@@ -1,0 +1,29 @@
+//! Effects.
+
+use std::ffi::c_void;
+
+use super::{Answer, Numbers, Text};
+
+functions! {
+    /// One candidate piece of missing physics on the model's response. Its first parameter is its size. `layout` is the
+    /// shape of a response as JSON.
+    EffectFunctions {
+        /// Answers what it is, as JSON: `{"title", "formula", "source", "reach"}`; the reach is `any`, `single` or `whole`.
+        must describe(plugin: *mut c_void, answer: *const Answer) -> i32;
+        /// Answers its unknowns, a JSON list as that of a likelihood's hyperparameters.
+        must parameters(plugin: *mut c_void, layout: Text, answer: *const Answer) -> i32;
+        /// Answers the values at which it is absent: one row.
+        must absent(plugin: *mut c_void, layout: Text, answer: *const Answer) -> i32;
+        /// The responses with the effect, one a row, for the values of each row.
+        must apply(plugin: *mut c_void, layout: Text, responses: Numbers, values: Numbers, changed: *mut f64, answer: *const Answer) -> i32;
+        /// Answers values from which a fit finds every mode, one a row. `situation` is
+        /// `{"layouts", "response", "noise"}`.
+        must starts(plugin: *mut c_void, layout: Text, situation: Text, answer: *const Answer) -> i32;
+        /// The derivatives of each output (rows) by each parameter (columns), for one response and its values.
+        may by_parameters(plugin: *mut c_void, layout: Text, response: Numbers, values: Numbers, jacobian: *mut f64, answer: *const Answer) -> i32;
+        /// The derivatives of one response along each row of `tangents`.
+        may push_forward(plugin: *mut c_void, layout: Text, response: Numbers, values: Numbers, tangents: Numbers, changed: *mut f64, answer: *const Answer) -> i32;
+        /// Answers the versions of itself that a search for missing effects should try, a JSON list of options.
+        may proposals(plugin: *mut c_void, situation: Text, answer: *const Answer) -> i32;
+    }
+}

@@ -1,0 +1,98 @@
+//! Samplers, and the densities that they draw from.
+
+use std::ffi::c_void;
+
+use super::{Answer, Key, Numbers, Text};
+
+functions! {
+    /// What can be asked of a log density.
+    TargetFunctions {
+        /// The log density at each point; minus infinity outside the support, never NaN.
+        must log_density(target: *mut c_void, points: Numbers, values: *mut f64, answer: *const Answer) -> i32;
+        /// The log prior density at each point.
+        must log_prior(target: *mut c_void, points: Numbers, values: *mut f64, answer: *const Answer) -> i32;
+        /// The log density at one point and its gradient.
+        must gradient(target: *mut c_void, point: Numbers, value: *mut f64, gradient: *mut f64, answer: *const Answer) -> i32;
+        /// The closed interval of each coordinate, infinite where it has no bound.
+        must bounds(target: *mut c_void, low: *mut f64, high: *mut f64, answer: *const Answer) -> i32;
+        /// Independent draws from the prior, `count x dimension`.
+        must prior_draws(target: *mut c_void, count: usize, key: Key, points: *mut f64, answer: *const Answer) -> i32;
+        /// Answers why the density can no longer be computed; `ABSENT` while it can.
+        must failure(target: *mut c_void, answer: *const Answer) -> i32;
+    }
+}
+
+record! {
+    /// A log density to draw from. It is there for the time of the call.
+    Target {
+        /// The size of this struct in bytes.
+        size: usize,
+        /// The first argument of the functions.
+        target: *mut c_void,
+        /// What can be asked.
+        functions: *const TargetFunctions,
+        /// The number of coordinates.
+        dimension: usize,
+    }
+}
+
+record! {
+    /// The size of a run.
+    Plan {
+        /// The number of chains.
+        chains: usize,
+        /// The number of steps of each.
+        steps: usize,
+        /// The number of first steps in which the method adapts itself.
+        warm_up: usize,
+        /// 1 where the chains are walkers of one ensemble, and so not independent of each other.
+        ensemble: u8,
+    }
+}
+
+record! {
+    /// What a sampler needs for its next step. The buffers are the caller's.
+    State {
+        /// The size of this struct in bytes.
+        size: usize,
+        /// The number of chains.
+        chains: usize,
+        /// The number of coordinates.
+        dimension: usize,
+        /// The point of each chain, `chains x dimension`.
+        points: *mut f64,
+        /// The log density there.
+        log_density: *mut f64,
+        /// 1 for each chain that moved in the last step.
+        accepted: *mut u8,
+        /// Evaluations of the log density so far.
+        evaluations: u64,
+        /// Whatever else the sampler keeps, as JSON. What a call writes as text of its answer takes its place.
+        memory: Text,
+    }
+}
+
+functions! {
+    /// Draws from a log density step by step. All that a sampler remembers is in the state, so that a run that was
+    /// killed goes on with the same bits.
+    SamplerFunctions {
+        /// How many chains and steps a run has on a density of this dimension.
+        must plan(plugin: *mut c_void, dimension: usize, plan: *mut Plan, answer: *const Answer) -> i32;
+        /// The state before the first step: its points are the starting points already.
+        must start(plugin: *mut c_void, target: *const Target, state: *mut State, answer: *const Answer) -> i32;
+        /// One step of all chains; the key belongs to this step alone.
+        must step(plugin: *mut c_void, target: *const Target, state: *mut State, key: Key, answer: *const Answer) -> i32;
+        /// 1 where this state is the last one, however many steps the plan has.
+        may finished(plugin: *mut c_void, state: *const State) -> i32;
+        /// Answers the draws of a method whose steps are no draws themselves: a matrix of points, a row of log
+        /// densities, and the JSON object `{"effective_size", "evidence", "doubts", "facts"}`. `ABSENT` where
+        /// the points of each step are draws.
+        may harvest(plugin: *mut c_void, target: *const Target, state: *const State, key: Key, answer: *const Answer) -> i32;
+        /// Answers reasons not to trust the draws of a run that ended in this state, a JSON list of texts.
+        may doubts(plugin: *mut c_void, state: *const State, answer: *const Answer) -> i32;
+        /// Answers what a person should know of such a run, a JSON list of texts.
+        may notes(plugin: *mut c_void, state: *const State, answer: *const Answer) -> i32;
+        /// Answers what is worth telling of the method, a JSON list of `{"name", "value"}`.
+        may facts(plugin: *mut c_void, answer: *const Answer) -> i32;
+    }
+}

@@ -1,0 +1,155 @@
+//! Declares what crosses the boundary once: as Rust, and as data from which the C header is written.
+
+use crate::plugin::abi::Refusal;
+
+/// A struct of the boundary, as data.
+#[derive(Debug, Clone, Copy)]
+pub struct Shape {
+    /// Its name.
+    pub name: &'static str,
+    /// Its documentation, line by line.
+    pub docs: &'static [&'static str],
+    /// Its fields in order.
+    pub fields: &'static [Field],
+}
+
+/// A field of a struct.
+#[derive(Debug, Clone, Copy)]
+pub struct Field {
+    /// Its name.
+    pub name: &'static str,
+    /// Its documentation, line by line.
+    pub docs: &'static [&'static str],
+    /// Its type.
+    pub of: Type,
+}
+
+/// The type of a field.
+#[derive(Debug, Clone, Copy)]
+pub enum Type {
+    /// A value of this type, as Rust writes it.
+    Value(&'static str),
+    /// A function; one that is not needed may be null.
+    Function {
+        /// Whether it may be null.
+        optional: bool,
+        /// Names and types of its arguments.
+        arguments: &'static [(&'static str, &'static str)],
+        /// What it returns, as Rust writes it; empty for nothing.
+        returns: &'static str,
+    },
+}
+
+/// A table of functions that somebody else made.
+pub trait Table: Copy {
+    /// The size that it says it has.
+    fn size(&self) -> usize;
+
+    /// The first function that it must have and has not.
+    fn missing(&self) -> Option<&'static str>;
+}
+
+/// A table of somebody else's as one's own: functions of later versions than its own are null.
+///
+/// # Safety
+/// The pointer is null or leads to a table that has the size that it says.
+pub unsafe fn copied<F: Table>(table: *const F) -> Result<F, Refusal> {
+    if table.is_null() {
+        return Err(Refusal::stop("has no functions"));
+    }
+    // SAFETY: every table begins with its size.
+    let size = unsafe { table.cast::<usize>().read() };
+    if size < size_of::<usize>() {
+        return Err(Refusal::stop(format!("has a table of {size} bytes")));
+    }
+    // SAFETY: a table is a number and functions that may be null, for which zeros are right.
+    let mut own: F = unsafe { std::mem::zeroed() };
+    let count = size.min(size_of::<F>());
+    // SAFETY: both have so many bytes.
+    unsafe { std::ptr::copy_nonoverlapping(table.cast::<u8>(), (&raw mut own).cast::<u8>(), count) }
+    match own.missing() {
+        None => Ok(own),
+        Some(name) => Err(Refusal::stop(format!("has no function `{name}`"))),
+    }
+}
+
+/// A plain struct of the boundary.
+macro_rules! record {
+    ($(#[doc = $doc:literal])* $name:ident {
+        $( $(#[doc = $text:literal])* $field:ident: $of:ty, )*
+    }) => {
+        $(#[doc = $doc])*
+        #[repr(C)]
+        #[derive(Debug, Clone, Copy)]
+        pub struct $name {
+            $( $(#[doc = $text])* pub $field: $of, )*
+        }
+
+        impl $name {
+            pub(super) const SHAPE: $crate::plugin::abi::table::Shape = $crate::plugin::abi::table::Shape {
+                name: stringify!($name),
+                docs: &[$($doc),*],
+                fields: &[$( $crate::plugin::abi::table::Field {
+                    name: stringify!($field),
+                    docs: &[$($text),*],
+                    of: $crate::plugin::abi::table::Type::Value(stringify!($of)),
+                } ),*],
+            };
+        }
+    };
+}
+
+/// A table of functions: `must` be there, or `may` be null.
+macro_rules! functions {
+    ($(#[doc = $doc:literal])* $name:ident {
+        $( $(#[doc = $text:literal])* $need:ident $field:ident($($argument:ident: $of:ty),* $(,)?) $(-> $returns:ty)?; )*
+    }) => {
+        $(#[doc = $doc])*
+        #[repr(C)]
+        #[derive(Debug, Clone, Copy)]
+        pub struct $name {
+            /// The size of this table in bytes.
+            pub size: usize,
+            $( $(#[doc = $text])*
+            pub $field: Option<unsafe extern "C" fn($($argument: $of),*) $(-> $returns)?>, )*
+        }
+
+        impl $name {
+            pub(super) const SHAPE: $crate::plugin::abi::table::Shape = $crate::plugin::abi::table::Shape {
+                name: stringify!($name),
+                docs: &[$($doc),*],
+                fields: &[
+                    $crate::plugin::abi::table::Field {
+                        name: "size",
+                        docs: &[" The size of this table in bytes."],
+                        of: $crate::plugin::abi::table::Type::Value("usize"),
+                    },
+                    $( $crate::plugin::abi::table::Field {
+                        name: stringify!($field),
+                        docs: &[$($text),*],
+                        of: $crate::plugin::abi::table::Type::Function {
+                            optional: functions!(@optional $need),
+                            arguments: &[$((stringify!($argument), stringify!($of))),*],
+                            returns: concat!($(stringify!($returns))?),
+                        },
+                    } ),*
+                ],
+            };
+        }
+
+        impl $crate::plugin::abi::table::Table for $name {
+            fn size(&self) -> usize {
+                self.size
+            }
+
+            fn missing(&self) -> Option<&'static str> {
+                $( if !functions!(@optional $need) && self.$field.is_none() {
+                    return Some(stringify!($field));
+                } )*
+                None
+            }
+        }
+    };
+    (@optional must) => { false };
+    (@optional may) => { true };
+}

@@ -1,0 +1,93 @@
+//! Surrogates and their emulators.
+
+use std::ffi::c_void;
+
+use super::{Answer, Key, Linear, Numbers, Text};
+
+functions! {
+    /// How far a fit came.
+    ProgressFunctions {
+        /// So many more units of work (outputs) are done. Any thread may call it.
+        must add(progress: *mut c_void, units: u64);
+        /// Something a person should know.
+        must warn(progress: *mut c_void, text: Text);
+    }
+}
+
+record! {
+    /// Tells a person how far a fit came.
+    Progress {
+        /// The size of this struct in bytes.
+        size: usize,
+        /// The first argument of the functions.
+        progress: *mut c_void,
+        /// What can be told.
+        functions: *const ProgressFunctions,
+    }
+}
+
+record! {
+    /// The runs to which a surrogate is fitted.
+    Training {
+        /// The size of this struct in bytes.
+        size: usize,
+        /// Parameters and shapes of the responses, as JSON: `{"parameters", "layouts"}`.
+        about: Text,
+        /// The parameters of each run in physical units, `runs x parameters`.
+        points: Numbers,
+        /// The responses, `runs x outputs`.
+        responses: Numbers,
+    }
+}
+
+functions! {
+    /// A fitted surrogate. Points are in physical units, one a row.
+    EmulatorFunctions {
+        /// Ends it.
+        must destroy(emulator: *mut c_void);
+        /// The means, `points x outputs`.
+        must mean(emulator: *mut c_void, points: Numbers, values: *mut f64, answer: *const Answer) -> i32;
+        /// The derivative of each output (rows) by each parameter (columns) at one point.
+        must jacobian(emulator: *mut c_void, point: Numbers, jacobian: *mut f64, answer: *const Answer) -> i32;
+        /// Answers the leave-one-out error of each output relative to its variance, one row, and the leave-one-out
+        /// residuals, `runs x outputs`.
+        must fit_error(emulator: *mut c_void, answer: *const Answer) -> i32;
+        /// Answers the emulator as bytes, for `load`.
+        must save(emulator: *mut c_void, answer: *const Answer) -> i32;
+        /// The emulator's own variance, `points x outputs`; `ABSENT` where it knows none.
+        may variance(emulator: *mut c_void, points: Numbers, values: *mut f64, answer: *const Answer) -> i32;
+        /// The emulator as a linear combination of basis functions, which lives as long as the emulator; `ABSENT` where
+        /// it is none.
+        may linear(emulator: *mut c_void, out: *mut Linear, answer: *const Answer) -> i32;
+        /// Answers moments and Sobol' indices as JSON; `ABSENT` where the method does not know them exactly.
+        may sensitivity(emulator: *mut c_void, answer: *const Answer) -> i32;
+        /// Answers what is worth telling, a JSON list of `{"name", "value"}`.
+        may facts(emulator: *mut c_void, answer: *const Answer) -> i32;
+    }
+}
+
+record! {
+    /// A fitted surrogate.
+    Emulator {
+        /// The size of this struct in bytes.
+        size: usize,
+        /// The first argument of the functions.
+        emulator: *mut c_void,
+        /// What it does.
+        functions: *const EmulatorFunctions,
+        /// The number of parameters.
+        dimension: usize,
+        /// The number of outputs.
+        outputs: usize,
+    }
+}
+
+functions! {
+    /// Fits emulators to simulation runs.
+    SurrogateFunctions {
+        /// Fits an emulator to all outputs.
+        must fit(plugin: *mut c_void, training: *const Training, key: Key, progress: *const Progress, out: *mut Emulator, answer: *const Answer) -> i32;
+        /// An emulator from what `save` answered.
+        must load(plugin: *mut c_void, bytes: Text, out: *mut Emulator, answer: *const Answer) -> i32;
+    }
+}

@@ -1,0 +1,14 @@
+//! What measurements say beside their values.
+
+use serde::{Deserialize, Serialize};
+
+use crate::data::Layout;
+
+/// The shape of a complete measurement and the names of the replicates.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DataAbout {
+    /// The shape.
+    pub layout: Layout,
+    /// The names, in order.
+    pub replicates: Vec<String>,
+}

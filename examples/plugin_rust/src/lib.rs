@@ -1,0 +1,14 @@
+//! A library of plugins: a discrepancy and a sampler.
+//!
+//! Each is written as one inside the tree; the last lines export both.
+
+mod difference_walk;
+mod matern;
+
+use difference_walk::DifferenceWalk;
+use matern::Matern;
+
+lacuna_plugin::export! {
+    Discrepancy "matern" Matern,
+    Sampler "difference_walk" DifferenceWalk,
+}

@@ -1,0 +1,678 @@
+/* Plugins for Lacuna in C.
+ *
+ * Written from the program's own declarations; docs/abi.md tells what holds at this boundary. In short: who allocates
+ * frees; what a call is given belongs to the caller and is there until the call returns; results go into buffers of the
+ * caller or through its answer; nothing unwinds; objects may be used from several threads at once.
+ */
+#ifndef LACUNA_PLUGIN_H
+#define LACUNA_PLUGIN_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define LACUNA_MAGIC UINT64_C(0x6c6163756e61706c)
+#define LACUNA_MAJOR 1u
+#define LACUNA_MINOR 0u
+
+/* What a function returns. */
+enum {
+    /* All is well. */
+    LACUNA_OK = 0,
+    /* No answer for these arguments; others may do. The text says why. */
+    LACUNA_REJECTED = 1,
+    /* No answer for any arguments. The text says why. */
+    LACUNA_FATAL = 2,
+    /* The stage cannot go on. The text says why. */
+    LACUNA_STOP = 3,
+    /* The code panicked. The text is its message. */
+    LACUNA_PANIC = 4,
+    /* The plugin does not have this; all is well. */
+    LACUNA_ABSENT = 5,
+    LACUNA_STATUS_END
+};
+
+/* Text in UTF-8, or bytes, without a zero at the end. Structured data are JSON. */
+typedef struct LacunaText {
+    /* The first byte; may be null when there is none. */
+    const uint8_t *bytes;
+    /* The number of bytes. */
+    size_t length;
+} LacunaText;
+
+/* A matrix of numbers row by row: entry `(i, j)` is `values[i * columns + j]`. One point, one response a row. */
+typedef struct LacunaNumbers {
+    /* The first number; may be null when there is none. */
+    const double *values;
+    /* The number of rows. */
+    size_t rows;
+    /* The number of columns. */
+    size_t columns;
+} LacunaNumbers;
+
+/* The name of a stream of random numbers: one key, one sequence. What is drawn must depend on the key alone. */
+typedef struct LacunaKey {
+    /* The words of the key, any of which is a good seed. */
+    uint64_t words[4];
+} LacunaKey;
+
+/* Takes results of a length that the caller does not know, and the message of an error. What is given to it is
+ * copied before it returns. It is there for the time of one call and used by one thread. */
+typedef struct LacunaAnswer {
+    /* The size of this struct in bytes. */
+    size_t size;
+    /* Whatever the functions need. */
+    void *context;
+    /* Appends to the text of the answer. */
+    void (*text)(void *context, LacunaText text);
+    /* Adds a matrix to the answer. */
+    void (*numbers)(void *context, LacunaNumbers numbers);
+} LacunaAnswer;
+
+/* What plugins of all kinds do: they are made from options, and check themselves. */
+typedef struct LacunaComponentFunctions {
+    /* The size of this table in bytes. */
+    size_t size;
+    /* Answers the JSON Schema (2020-12) of the options: an object with `properties`, each with a `description`, and
+     * `required`. With `"additionalProperties": false` keys that it does not list are refused before `create`. */
+    int32_t (*schema)(const LacunaAnswer *answer);
+    /* Makes a plugin from its options, a JSON object, and puts it into `out`. Options that are wrong are
+     * `REJECTED`, with the reason as text, or with a JSON list of complaints `{"at": "degree.max", "message": "…",
+     * "expected": "…", "found": "…", "help": ["…"]}`. A number that is not finite is written `{"float": "inf"}`,
+     * `"-inf"` or `"nan"`. */
+    int32_t (*create)(LacunaText options, void **out, const LacunaAnswer *answer);
+    /* Ends a plugin. */
+    void (*destroy)(void *plugin);
+    /* Answers all options with the defaults filled in, a JSON object; as they were given where it is null. */
+    /* May be null. */
+    int32_t (*options)(void *plugin, const LacunaAnswer *answer);
+    /* Checks the options against the rest of the study and answers a JSON list of complaints; none when it writes
+     * nothing. `context` is described in `docs/abi.md`. No files are touched. */
+    /* May be null. */
+    int32_t (*check)(void *plugin, LacunaText context, const LacunaAnswer *answer);
+    /* The same against the machine: files, commands. Nothing is changed. */
+    /* May be null. */
+    int32_t (*environment)(void *plugin, LacunaText context, const LacunaAnswer *answer);
+} LacunaComponentFunctions;
+
+/* A sum of squares `|R (psi(x), 1)|^2` as a function of the point. */
+typedef struct LacunaSquaresFunctions {
+    /* The size of this table in bytes. */
+    size_t size;
+    /* Ends it. */
+    void (*destroy)(void *squares);
+    /* The sum at each point. */
+    int32_t (*values)(void *squares, LacunaNumbers points, double *values, const LacunaAnswer *answer);
+    /* The derivatives at each point, `points x parameters`. */
+    int32_t (*gradient)(void *squares, LacunaNumbers points, double *gradient, const LacunaAnswer *answer);
+    /* 1 where the form holds at all of these points to its error, else 0. */
+    int32_t (*covers)(void *squares, LacunaNumbers points);
+} LacunaSquaresFunctions;
+
+/* A sum of squares of linear combinations of basis functions. */
+typedef struct LacunaSquares {
+    /* The size of this struct in bytes. */
+    size_t size;
+    /* The first argument of the functions. */
+    void *squares;
+    /* What it does. */
+    const LacunaSquaresFunctions *functions;
+    /* The largest difference from the product's own sum of squares that round-off makes. */
+    double error;
+} LacunaSquares;
+
+/* A forward map `y(x) = C' psi(x)`. */
+typedef struct LacunaLinearFunctions {
+    /* The size of this table in bytes. */
+    size_t size;
+    /* The basis functions at each point, `points x terms`. */
+    int32_t (*basis)(void *map, LacunaNumbers points, double *basis, const LacunaAnswer *answer);
+    /* The derivative of each basis function (rows) by each parameter (columns) at one point. */
+    int32_t (*basis_gradient)(void *map, LacunaNumbers point, double *gradient, const LacunaAnswer *answer);
+    /* The form of `|R (psi(x), 1)|^2` for a factor `R` (any number of rows, `terms + 1` columns) that takes fewer
+     * operations than the product; `ABSENT` where there is none. The caller ends it. */
+    /* May be null. */
+    int32_t (*sum_of_squares)(void *map, LacunaNumbers factor, LacunaSquares *out, const LacunaAnswer *answer);
+} LacunaLinearFunctions;
+
+/* A forward map `y(x) = C' psi(x)` with coefficients `C` (`terms x outputs`). */
+typedef struct LacunaLinear {
+    /* The size of this struct in bytes. */
+    size_t size;
+    /* The first argument of the functions. */
+    void *map;
+    /* What it does. */
+    const LacunaLinearFunctions *functions;
+    /* The coefficients, `terms x outputs`. */
+    LacunaNumbers coefficients;
+} LacunaLinear;
+
+/* An error that all replicates share, a covariance `F F'`. */
+typedef struct LacunaCommonErrorView {
+    /* Where it comes from: `emulator`, `numerics`, `replicates`. */
+    LacunaText origin;
+    /* The factor `F`, `outputs x rank`, in the response's unit. */
+    LacunaNumbers factor;
+    /* 1 where a new replicate has it too, beside what the discrepancy adds to a replicate. */
+    uint8_t predictive;
+} LacunaCommonErrorView;
+
+/* What can be asked about the data. */
+typedef struct LacunaKnownFunctions {
+    /* The size of this table in bytes. */
+    size_t size;
+    /* Answers the derivative of each output (rows) by each parameter (columns), in units of the prior's standard
+     * deviation of that parameter, where the model fits the data best: one matrix. It costs an optimisation. */
+    int32_t (*slopes)(void *known, const LacunaAnswer *answer);
+} LacunaKnownFunctions;
+
+/* What a likelihood is made from. It is there for the time of the call. */
+typedef struct LacunaKnown {
+    /* The size of this struct in bytes. */
+    size_t size;
+    /* The first argument of the functions. */
+    void *known;
+    /* What can be asked. */
+    const LacunaKnownFunctions *functions;
+    /* The shape of a complete measurement as JSON, and the names of the replicates: `{"layout": {…}, "replicates":
+     * ["…"]}`. */
+    LacunaText about;
+    /* The measured values, `replicates x outputs`; zero where nothing was measured. */
+    LacunaNumbers values;
+    /* 1 where a value was measured, 0 where not, `replicates x outputs`. */
+    const uint8_t *measured;
+    /* The errors that all replicates share: their covariances are added once to that of the mean curve, never
+     * divided by the number of replicates. */
+    const LacunaCommonErrorView *common;
+    /* How many there are. */
+    size_t common_count;
+} LacunaKnown;
+
+/* A likelihood as a function of the basis functions of a linear emulator. */
+typedef struct LacunaCompressedFunctions {
+    /* The size of this table in bytes. */
+    size_t size;
+    /* Ends it. */
+    void (*destroy)(void *compressed);
+    /* The log-likelihood for each row of `basis` (`points x terms`) and of `hyper`. */
+    int32_t (*log_likelihood)(void *compressed, LacunaNumbers basis, LacunaNumbers hyper, double *values, const LacunaAnswer *answer);
+    /* The derivatives at each row by the basis functions and by the hyperparameters. */
+    int32_t (*gradient)(void *compressed, LacunaNumbers basis, LacunaNumbers hyper, double *by_basis, double *by_hyper, const LacunaAnswer *answer);
+    /* The same as `log_likelihood` at points in physical units, for those who can do with less than all basis
+     * functions. */
+    /* May be null. */
+    int32_t (*log_likelihood_at)(void *compressed, const LacunaLinear *linear, LacunaNumbers points, LacunaNumbers hyper, double *values, const LacunaAnswer *answer);
+    /* The same as `gradient` by the parameters at points in physical units. */
+    /* May be null. */
+    int32_t (*gradient_at)(void *compressed, const LacunaLinear *linear, LacunaNumbers points, LacunaNumbers hyper, double *by_points, double *by_hyper, const LacunaAnswer *answer);
+} LacunaCompressedFunctions;
+
+/* A likelihood reduced to a small form in the basis functions of a linear emulator. */
+typedef struct LacunaCompressed {
+    /* The size of this struct in bytes. */
+    size_t size;
+    /* The first argument of the functions. */
+    void *compressed;
+    /* What it does. */
+    const LacunaCompressedFunctions *functions;
+} LacunaCompressed;
+
+/* The likelihood of fixed measurements as a function of the response (one value an output) and of the
+ * hyperparameters, always for several points at once: one a row. */
+typedef struct LacunaLikelihoodFunctions {
+    /* The size of this table in bytes. */
+    size_t size;
+    /* Ends it. */
+    void (*destroy)(void *likelihood);
+    /* Answers the unknowns beside the model's parameters, a JSON list of `{"name", "symbol", "unit", "prior",
+     * "log", "start"}`. */
+    int32_t (*hyperparameters)(void *likelihood, const LacunaAnswer *answer);
+    /* The log-likelihood for each row; minus infinity outside the support, never NaN. */
+    int32_t (*log_likelihood)(void *likelihood, LacunaNumbers responses, LacunaNumbers hyper, double *values, const LacunaAnswer *answer);
+    /* The derivatives by the response and by the hyperparameters, one row a point. */
+    int32_t (*gradient)(void *likelihood, LacunaNumbers responses, LacunaNumbers hyper, double *by_response, double *by_hyper, const LacunaAnswer *answer);
+    /* Answers the variance of a new replicate around the response, split by origin: the origins as a JSON list, and
+     * a matrix `origins x outputs`. */
+    int32_t (*predictive)(void *likelihood, LacunaNumbers response, LacunaNumbers hyper, const LacunaAnswer *answer);
+    /* Data as this discrepancy would have made them, `replicates x outputs`; what stands where nothing was measured
+     * does not matter. */
+    int32_t (*simulate)(void *likelihood, LacunaNumbers response, LacunaNumbers hyper, LacunaKey key, double *values, const LacunaAnswer *answer);
+    /* Answers the log density of each measured value given all others, by replicate and output with gaps left out:
+     * one row. `ABSENT` where there is no such form. */
+    /* May be null. */
+    int32_t (*left_out)(void *likelihood, LacunaNumbers response, LacunaNumbers hyper, const LacunaAnswer *answer);
+    /* The same likelihood as a function of the basis functions of a linear emulator; `ABSENT` where there is no
+     * such form. */
+    /* May be null. */
+    int32_t (*compress)(void *likelihood, const LacunaLinear *linear, LacunaCompressed *out, const LacunaAnswer *answer);
+    /* Answers what is worth telling, a JSON list of `{"name", "value"}`. */
+    /* May be null. */
+    int32_t (*facts)(void *likelihood, const LacunaAnswer *answer);
+} LacunaLikelihoodFunctions;
+
+/* The likelihood of fixed measurements. */
+typedef struct LacunaLikelihood {
+    /* The size of this struct in bytes. */
+    size_t size;
+    /* The first argument of the functions. */
+    void *likelihood;
+    /* What it does. */
+    const LacunaLikelihoodFunctions *functions;
+} LacunaLikelihood;
+
+/* A statistical model of the difference between model and data. */
+typedef struct LacunaDiscrepancyFunctions {
+    /* The size of this table in bytes. */
+    size_t size;
+    /* The likelihood of what is known. */
+    int32_t (*likelihood)(void *plugin, const LacunaKnown *known, LacunaLikelihood *out, const LacunaAnswer *answer);
+    /* Answers the standard deviation of one replicate around a response, where the options say how large it is: one
+     * row, and a second one with the times over which correlations along the last axis fall by a factor e, where
+     * values are not independent. `ABSENT` where the noise is unknown. */
+    /* May be null. */
+    int32_t (*stated_noise)(void *plugin, LacunaText layout, LacunaNumbers response, const LacunaAnswer *answer);
+} LacunaDiscrepancyFunctions;
+
+/* What can be asked of a log density. */
+typedef struct LacunaTargetFunctions {
+    /* The size of this table in bytes. */
+    size_t size;
+    /* The log density at each point; minus infinity outside the support, never NaN. */
+    int32_t (*log_density)(void *target, LacunaNumbers points, double *values, const LacunaAnswer *answer);
+    /* The log prior density at each point. */
+    int32_t (*log_prior)(void *target, LacunaNumbers points, double *values, const LacunaAnswer *answer);
+    /* The log density at one point and its gradient. */
+    int32_t (*gradient)(void *target, LacunaNumbers point, double *value, double *gradient, const LacunaAnswer *answer);
+    /* The closed interval of each coordinate, infinite where it has no bound. */
+    int32_t (*bounds)(void *target, double *low, double *high, const LacunaAnswer *answer);
+    /* Independent draws from the prior, `count x dimension`. */
+    int32_t (*prior_draws)(void *target, size_t count, LacunaKey key, double *points, const LacunaAnswer *answer);
+    /* Answers why the density can no longer be computed; `ABSENT` while it can. */
+    int32_t (*failure)(void *target, const LacunaAnswer *answer);
+} LacunaTargetFunctions;
+
+/* A log density to draw from. It is there for the time of the call. */
+typedef struct LacunaTarget {
+    /* The size of this struct in bytes. */
+    size_t size;
+    /* The first argument of the functions. */
+    void *target;
+    /* What can be asked. */
+    const LacunaTargetFunctions *functions;
+    /* The number of coordinates. */
+    size_t dimension;
+} LacunaTarget;
+
+/* The size of a run. */
+typedef struct LacunaPlan {
+    /* The number of chains. */
+    size_t chains;
+    /* The number of steps of each. */
+    size_t steps;
+    /* The number of first steps in which the method adapts itself. */
+    size_t warm_up;
+    /* 1 where the chains are walkers of one ensemble, and so not independent of each other. */
+    uint8_t ensemble;
+} LacunaPlan;
+
+/* What a sampler needs for its next step. The buffers are the caller's. */
+typedef struct LacunaState {
+    /* The size of this struct in bytes. */
+    size_t size;
+    /* The number of chains. */
+    size_t chains;
+    /* The number of coordinates. */
+    size_t dimension;
+    /* The point of each chain, `chains x dimension`. */
+    double *points;
+    /* The log density there. */
+    double *log_density;
+    /* 1 for each chain that moved in the last step. */
+    uint8_t *accepted;
+    /* Evaluations of the log density so far. */
+    uint64_t evaluations;
+    /* Whatever else the sampler keeps, as JSON. What a call writes as text of its answer takes its place. */
+    LacunaText memory;
+} LacunaState;
+
+/* Draws from a log density step by step. All that a sampler remembers is in the state, so that a run that was
+ * killed goes on with the same bits. */
+typedef struct LacunaSamplerFunctions {
+    /* The size of this table in bytes. */
+    size_t size;
+    /* How many chains and steps a run has on a density of this dimension. */
+    int32_t (*plan)(void *plugin, size_t dimension, LacunaPlan *plan, const LacunaAnswer *answer);
+    /* The state before the first step: its points are the starting points already. */
+    int32_t (*start)(void *plugin, const LacunaTarget *target, LacunaState *state, const LacunaAnswer *answer);
+    /* One step of all chains; the key belongs to this step alone. */
+    int32_t (*step)(void *plugin, const LacunaTarget *target, LacunaState *state, LacunaKey key, const LacunaAnswer *answer);
+    /* 1 where this state is the last one, however many steps the plan has. */
+    /* May be null. */
+    int32_t (*finished)(void *plugin, const LacunaState *state);
+    /* Answers the draws of a method whose steps are no draws themselves: a matrix of points, a row of log
+     * densities, and the JSON object `{"effective_size", "evidence", "doubts", "facts"}`. `ABSENT` where the points
+     * of each step are draws. */
+    /* May be null. */
+    int32_t (*harvest)(void *plugin, const LacunaTarget *target, const LacunaState *state, LacunaKey key, const LacunaAnswer *answer);
+    /* Answers reasons not to trust the draws of a run that ended in this state, a JSON list of texts. */
+    /* May be null. */
+    int32_t (*doubts)(void *plugin, const LacunaState *state, const LacunaAnswer *answer);
+    /* Answers what a person should know of such a run, a JSON list of texts. */
+    /* May be null. */
+    int32_t (*notes)(void *plugin, const LacunaState *state, const LacunaAnswer *answer);
+    /* Answers what is worth telling of the method, a JSON list of `{"name", "value"}`. */
+    /* May be null. */
+    int32_t (*facts)(void *plugin, const LacunaAnswer *answer);
+} LacunaSamplerFunctions;
+
+/* Places points in the unit cube. */
+typedef struct LacunaDesignFunctions {
+    /* The size of this table in bytes. */
+    size_t size;
+    /* Points in the open unit cube, `count x dimension`. */
+    int32_t (*points)(void *plugin, size_t count, size_t dimension, LacunaKey key, double *points, const LacunaAnswer *answer);
+    /* Points for these parameters, a JSON list: for a design whose points depend on the laws that will map them. */
+    /* May be null. */
+    int32_t (*place)(void *plugin, LacunaText parameters, size_t count, size_t dimension, LacunaKey key, double *points, const LacunaAnswer *answer);
+} LacunaDesignFunctions;
+
+/* Evaluations that are asked of a model, which differ in their inputs and folders only. */
+typedef struct LacunaCalls {
+    /* The size of this struct in bytes. */
+    size_t size;
+    /* The inputs, one call a row, in the order and the units of the signature. */
+    LacunaNumbers inputs;
+    /* What all calls have in common, as JSON: `{"names", "units", "layout", "scenario", "study"}`. */
+    LacunaText about;
+    /* A folder of each call's own for files that are kept, a JSON list of paths or `null`. */
+    LacunaText folders;
+} LacunaCalls;
+
+/* A simulator. */
+typedef struct LacunaModelFunctions {
+    /* The size of this table in bytes. */
+    size_t size;
+    /* Answers what goes in and what comes out, as JSON: `{"inputs": [{"name", "unit", "default", "low", "high",
+     * "description"}], "layout", "resamples"}`. `low` and `high` are `null` where there is no bound; an answer
+     * without `inputs` or `layout` takes those of the study. */
+    int32_t (*signature)(void *plugin, LacunaText context, const LacunaAnswer *answer);
+    /* Runs the simulator: `calls x outputs` into `responses`. `statuses` has one status a call (`OK`, `REJECTED`,
+     * `FATAL`), `valid` is 1 where a run stayed inside the model's range of validity. The text is a JSON list with
+     * one `{"message", "facts"}` or `null` a call, or nothing. */
+    int32_t (*predict)(void *plugin, const LacunaCalls *calls, double *responses, int32_t *statuses, uint8_t *valid, const LacunaAnswer *answer);
+    /* How many evaluations are best asked for at once. */
+    /* May be null. */
+    size_t (*batch)(void *plugin);
+    /* Answers the inputs on which no response depends, a JSON list of names. */
+    /* May be null. */
+    int32_t (*unused)(void *plugin, LacunaText context, const LacunaAnswer *answer);
+    /* Answers the user's files that the answers depend on, a JSON list of paths; relative ones start in
+     * `directory`. */
+    /* May be null. */
+    int32_t (*files)(void *plugin, LacunaText directory, const LacunaAnswer *answer);
+    /* Writes a finished run (one call, its response, and `{"valid", "facts"}` about it) in the simulator's own
+     * format into `directory` and answers the file's name; `ABSENT` when it has no format of its own. */
+    /* May be null. */
+    int32_t (*write)(void *plugin, LacunaText run, const LacunaCalls *calls, LacunaNumbers response, LacunaText about, LacunaText directory, const LacunaAnswer *answer);
+    /* The derivatives of each value of the response (rows) by each input (columns), for one call. */
+    /* May be null. */
+    int32_t (*jacobian)(void *plugin, const LacunaCalls *calls, double *jacobian, const LacunaAnswer *answer);
+} LacunaModelFunctions;
+
+/* One candidate piece of missing physics on the model's response. Its first parameter is its size. `layout` is the
+ * shape of a response as JSON. */
+typedef struct LacunaEffectFunctions {
+    /* The size of this table in bytes. */
+    size_t size;
+    /* Answers what it is, as JSON: `{"title", "formula", "source", "reach"}`; the reach is `any`, `single` or
+     * `whole`. */
+    int32_t (*describe)(void *plugin, const LacunaAnswer *answer);
+    /* Answers its unknowns, a JSON list as that of a likelihood's hyperparameters. */
+    int32_t (*parameters)(void *plugin, LacunaText layout, const LacunaAnswer *answer);
+    /* Answers the values at which it is absent: one row. */
+    int32_t (*absent)(void *plugin, LacunaText layout, const LacunaAnswer *answer);
+    /* The responses with the effect, one a row, for the values of each row. */
+    int32_t (*apply)(void *plugin, LacunaText layout, LacunaNumbers responses, LacunaNumbers values, double *changed, const LacunaAnswer *answer);
+    /* Answers values from which a fit finds every mode, one a row. `situation` is `{"layouts", "response",
+     * "noise"}`. */
+    int32_t (*starts)(void *plugin, LacunaText layout, LacunaText situation, const LacunaAnswer *answer);
+    /* The derivatives of each output (rows) by each parameter (columns), for one response and its values. */
+    /* May be null. */
+    int32_t (*by_parameters)(void *plugin, LacunaText layout, LacunaNumbers response, LacunaNumbers values, double *jacobian, const LacunaAnswer *answer);
+    /* The derivatives of one response along each row of `tangents`. */
+    /* May be null. */
+    int32_t (*push_forward)(void *plugin, LacunaText layout, LacunaNumbers response, LacunaNumbers values, LacunaNumbers tangents, double *changed, const LacunaAnswer *answer);
+    /* Answers the versions of itself that a search for missing effects should try, a JSON list of options. */
+    /* May be null. */
+    int32_t (*proposals)(void *plugin, LacunaText situation, const LacunaAnswer *answer);
+} LacunaEffectFunctions;
+
+/* Reads files of one family of formats. Errors that are `REJECTED` may be the JSON object `{"path", "place",
+ * "message", "help"}`. */
+typedef struct LacunaReaderFunctions {
+    /* The size of this table in bytes. */
+    size_t size;
+    /* 1 where it understands a file, judged by its first bytes (at most 4096) and its name. */
+    int32_t (*recognises)(void *plugin, LacunaText path, LacunaText head);
+    /* Answers what is in a file, as JSON: `{"format", "facts": [["…", "…"]], "variables": [{"name", "on", "axes",
+     * "unit", "range", "not_finite", "columns": [{"name", "unit"}]}]}`, and for each variable a matrix with its
+     * columns. */
+    int32_t (*inspect)(void *plugin, LacunaText path, const LacunaAnswer *answer);
+    /* 1 where the options name files of the user's own. */
+    int32_t (*names_files)(void *plugin);
+    /* Answers the files that the options name, a JSON list of paths; `source` is `{"directory", "scenario"}`. */
+    int32_t (*files)(void *plugin, LacunaText source, const LacunaAnswer *answer);
+    /* Answers simulation runs: a matrix of parameters and one of responses, one run a row, and the JSON object
+     * `{"runs": ["…"], "valid": [true], "failed": [{"run", "reason"}]}`. `source` is `{"directory", "simulated",
+     * "parameters", "scenario", "layout"}`. */
+    /* May be null. */
+    int32_t (*ensemble)(void *plugin, LacunaText source, const LacunaAnswer *answer);
+    /* Answers measurements: a matrix `replicates x outputs` with NaN where nothing was measured, and the JSON list
+     * of the replicates' names. `source` is `{"directory", "scenario", "layout"}`. */
+    /* May be null. */
+    int32_t (*measurements)(void *plugin, LacunaText source, const LacunaAnswer *answer);
+    /* Answers the numbers of an axis at which a scenario was measured: one row. `source` is `{"directory",
+     * "scenario", "axis", "unit"}`. */
+    /* May be null. */
+    int32_t (*grid)(void *plugin, LacunaText source, const LacunaAnswer *answer);
+    /* One response from one file. */
+    /* May be null. */
+    int32_t (*response)(void *plugin, LacunaText path, LacunaText layout, size_t outputs, double *values, const LacunaAnswer *answer);
+} LacunaReaderFunctions;
+
+/* How far a fit came. */
+typedef struct LacunaProgressFunctions {
+    /* The size of this table in bytes. */
+    size_t size;
+    /* So many more units of work (outputs) are done. Any thread may call it. */
+    void (*add)(void *progress, uint64_t units);
+    /* Something a person should know. */
+    void (*warn)(void *progress, LacunaText text);
+} LacunaProgressFunctions;
+
+/* Tells a person how far a fit came. */
+typedef struct LacunaProgress {
+    /* The size of this struct in bytes. */
+    size_t size;
+    /* The first argument of the functions. */
+    void *progress;
+    /* What can be told. */
+    const LacunaProgressFunctions *functions;
+} LacunaProgress;
+
+/* The runs to which a surrogate is fitted. */
+typedef struct LacunaTraining {
+    /* The size of this struct in bytes. */
+    size_t size;
+    /* Parameters and shapes of the responses, as JSON: `{"parameters", "layouts"}`. */
+    LacunaText about;
+    /* The parameters of each run in physical units, `runs x parameters`. */
+    LacunaNumbers points;
+    /* The responses, `runs x outputs`. */
+    LacunaNumbers responses;
+} LacunaTraining;
+
+/* A fitted surrogate. Points are in physical units, one a row. */
+typedef struct LacunaEmulatorFunctions {
+    /* The size of this table in bytes. */
+    size_t size;
+    /* Ends it. */
+    void (*destroy)(void *emulator);
+    /* The means, `points x outputs`. */
+    int32_t (*mean)(void *emulator, LacunaNumbers points, double *values, const LacunaAnswer *answer);
+    /* The derivative of each output (rows) by each parameter (columns) at one point. */
+    int32_t (*jacobian)(void *emulator, LacunaNumbers point, double *jacobian, const LacunaAnswer *answer);
+    /* Answers the leave-one-out error of each output relative to its variance, one row, and the leave-one-out
+     * residuals, `runs x outputs`. */
+    int32_t (*fit_error)(void *emulator, const LacunaAnswer *answer);
+    /* Answers the emulator as bytes, for `load`. */
+    int32_t (*save)(void *emulator, const LacunaAnswer *answer);
+    /* The emulator's own variance, `points x outputs`; `ABSENT` where it knows none. */
+    /* May be null. */
+    int32_t (*variance)(void *emulator, LacunaNumbers points, double *values, const LacunaAnswer *answer);
+    /* The emulator as a linear combination of basis functions, which lives as long as the emulator; `ABSENT` where
+     * it is none. */
+    /* May be null. */
+    int32_t (*linear)(void *emulator, LacunaLinear *out, const LacunaAnswer *answer);
+    /* Answers moments and Sobol' indices as JSON; `ABSENT` where the method does not know them exactly. */
+    /* May be null. */
+    int32_t (*sensitivity)(void *emulator, const LacunaAnswer *answer);
+    /* Answers what is worth telling, a JSON list of `{"name", "value"}`. */
+    /* May be null. */
+    int32_t (*facts)(void *emulator, const LacunaAnswer *answer);
+} LacunaEmulatorFunctions;
+
+/* A fitted surrogate. */
+typedef struct LacunaEmulator {
+    /* The size of this struct in bytes. */
+    size_t size;
+    /* The first argument of the functions. */
+    void *emulator;
+    /* What it does. */
+    const LacunaEmulatorFunctions *functions;
+    /* The number of parameters. */
+    size_t dimension;
+    /* The number of outputs. */
+    size_t outputs;
+} LacunaEmulator;
+
+/* Fits emulators to simulation runs. */
+typedef struct LacunaSurrogateFunctions {
+    /* The size of this table in bytes. */
+    size_t size;
+    /* Fits an emulator to all outputs. */
+    int32_t (*fit)(void *plugin, const LacunaTraining *training, LacunaKey key, const LacunaProgress *progress, LacunaEmulator *out, const LacunaAnswer *answer);
+    /* An emulator from what `save` answered. */
+    int32_t (*load)(void *plugin, LacunaText bytes, LacunaEmulator *out, const LacunaAnswer *answer);
+} LacunaSurrogateFunctions;
+
+/* The program that loads a library. */
+typedef struct LacunaHost {
+    /* The size of this struct in bytes. */
+    size_t size;
+    /* The version of the boundary. */
+    uint32_t major;
+    /* What was appended since. */
+    uint32_t minor;
+    /* How many threads a library may use for work of its own. */
+    size_t threads;
+} LacunaHost;
+
+/* One plugin of a library. */
+typedef struct LacunaEntry {
+    /* The size of this struct in bytes. */
+    size_t size;
+    /* Its kind, such as `sampler`. */
+    LacunaText kind;
+    /* Its name in a study. */
+    LacunaText name;
+    /* What plugins of all kinds do. */
+    const LacunaComponentFunctions *component;
+    /* What its kind does: for a `sampler` a `SamplerFunctions`. */
+    const void *functions;
+} LacunaEntry;
+
+/* What a library says of itself: the symbol `lacuna_plugin` that it exports. It is read before any of its code is
+ * called. */
+typedef struct LacunaDeclaration {
+    /* `LACUNA_MAGIC`. */
+    uint64_t magic;
+    /* `LACUNA_MAJOR`. */
+    uint32_t major;
+    /* `LACUNA_MINOR`. */
+    uint32_t minor;
+    /* The size of this struct in bytes. */
+    size_t size;
+    /* 1 where an error cannot end the whole process (a panic unwinds), 0 where it would. */
+    uint32_t unwinds;
+    /* The number of entries. */
+    uint32_t count;
+    /* The name of the library. */
+    LacunaText name;
+    /* Its version. */
+    LacunaText version;
+    /* With what it was made, such as `lacuna-plugin 0.1.0`. */
+    LacunaText sdk;
+    /* Its plugins. */
+    const LacunaEntry *entries;
+    /* The plain text by which `lacuna check` knows the library without loading it. */
+    LacunaText record;
+    /* Called once when the library is loaded, before anything else; may be null. */
+    int32_t (*start)(const LacunaHost *host);
+} LacunaDeclaration;
+
+#define LACUNA_RECORD_BEGIN "lacuna-plugin-record:1.0\n"
+
+/* A text from a string literal. */
+#define LACUNA_TEXT(literal) { (const uint8_t *)(literal), sizeof(literal) - 1 }
+
+/* One plugin of a library: a line of its record. */
+#define LACUNA_PROVIDES(kind, name) kind "=" name "\n"
+
+/* One plugin of a library: an element of its entries. */
+#define LACUNA_ENTRY(kind, name, component, functions) \
+    { sizeof(LacunaEntry), LACUNA_TEXT(kind), LACUNA_TEXT(name), &(component), &(functions) }
+
+#if defined(_WIN32)
+#define LACUNA_EXPORT __declspec(dllexport)
+#elif defined(__GNUC__)
+#define LACUNA_EXPORT __attribute__((visibility("default")))
+#else
+#define LACUNA_EXPORT
+#endif
+
+/* The one symbol of a library: its name and version, a LACUNA_PROVIDES for each plugin, and an array of LacunaEntry. */
+#define LACUNA_DECLARE(name, version, provides, entries) \
+    LACUNA_EXPORT const LacunaDeclaration lacuna_plugin = { \
+        LACUNA_MAGIC, LACUNA_MAJOR, LACUNA_MINOR, sizeof(LacunaDeclaration), 1u, \
+        (uint32_t)(sizeof(entries) / sizeof((entries)[0])), LACUNA_TEXT(name), LACUNA_TEXT(version), \
+        LACUNA_TEXT("lacuna_plugin.h"), (entries), LACUNA_TEXT(LACUNA_RECORD_BEGIN provides "end\n"), NULL \
+    }
+
+/* Appends a text to an answer. */
+static inline void lacuna_say(const LacunaAnswer *answer, const char *bytes, size_t length)
+{
+    LacunaText text;
+    text.bytes = (const uint8_t *)bytes;
+    text.length = length;
+    answer->text(answer->context, text);
+}
+
+/* Adds a matrix to an answer. */
+static inline void lacuna_give(const LacunaAnswer *answer, const double *values, size_t rows, size_t columns)
+{
+    LacunaNumbers numbers;
+    numbers.values = values;
+    numbers.rows = rows;
+    numbers.columns = columns;
+    answer->numbers(answer->context, numbers);
+}
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,83 @@
+//! What a library of plugins for Lacuna is written with.
+//!
+//! A plugin outside the tree is written as one inside: a struct of options and the trait of its kind, from the crate
+//! `lacuna`, which this one re-exports. In the place of `register!` stands one [`export!`] for the whole library, a
+//! `cdylib`:
+//!
+//! ```ignore
+//! lacuna_plugin::export! {
+//!     Discrepancy "laplace" Laplace,
+//!     Sampler "difference_walk" DifferenceWalk,
+//! }
+//! ```
+//!
+//! A study loads it with `[plugins] load = ["./libmine.so"]`. `docs/abi.md` tells what holds at the boundary.
+
+pub use lacuna;
+pub use lacuna::{data, linalg, math, plugin, run, study};
+
+#[doc(hidden)]
+pub mod declaration;
+
+/// Exports plugins from a library: for each its kind, its name in a study and its options, which implement the kind.
+///
+/// It may stand once in a library. The kinds are those that [`kind_name!`](crate::kind_name) knows.
+#[macro_export]
+macro_rules! export {
+    ($($kind:ident $name:literal $options:ty),+ $(,)?) => {
+        #[doc(hidden)]
+        #[allow(unsafe_code, reason = "the one symbol that the program looks for")]
+        const _: () = {
+            const RECORD: &str = concat!(
+                "lacuna-plugin-record:", $crate::abi_version!(), "\n",
+                $($crate::kind_name!($kind), "=", $name, "\n",)+
+                "end\n"
+            );
+            static ENTRIES: &[$crate::declaration::Entry] = &[
+                $($crate::declaration::entry::<dyn $crate::plugin::$kind, $options>(
+                    $crate::kind_name!($kind), $name,
+                )),+
+            ];
+            #[used]
+            #[unsafe(no_mangle)]
+            static lacuna_plugin: $crate::declaration::Declaration = $crate::declaration::declaration(
+                env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"), RECORD, ENTRIES,
+            );
+        };
+    };
+}
+
+/// The version of the boundary, for the record in a library's file.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! abi_version {
+    () => {
+        "1.0"
+    };
+}
+
+/// What a study calls the kind of a trait.
+#[macro_export]
+macro_rules! kind_name {
+    (Design) => {
+        "design"
+    };
+    (Discrepancy) => {
+        "discrepancy"
+    };
+    (Effect) => {
+        "effect"
+    };
+    (Model) => {
+        "model"
+    };
+    (Reader) => {
+        "reader"
+    };
+    (Sampler) => {
+        "sampler"
+    };
+    (Surrogate) => {
+        "surrogate"
+    };
+}

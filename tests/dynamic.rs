@@ -1,0 +1,39 @@
+//! Plugins in libraries that are loaded: they do what those that are linked do, to the bit, and a library that is broken
+//! is an error that names it.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+#[path = "dynamic/contracts.rs"]
+mod contracts;
+#[path = "dynamic/examples.rs"]
+mod examples;
+#[cfg(unix)]
+#[path = "dynamic/hostile.rs"]
+mod hostile;
+#[path = "dynamic/panics.rs"]
+mod panics;
+#[path = "quick.rs"]
+#[allow(dead_code, reason = "other tests use the rest")]
+mod quick;
+#[path = "dynamic/studies.rs"]
+mod studies;
+
+use std::path::PathBuf;
+use std::sync::OnceLock;
+
+use lacuna::plugin::abi::library::{self, Library};
+// Without these lines the linker leaves the plugins out, and cargo the library.
+use lacuna_plugins as _;
+use lacuna_twin as _;
+
+/// The library of twins, which was built beside this test.
+fn twin_path() -> PathBuf {
+    let test = std::env::current_exe().unwrap();
+    let prefix = std::env::consts::DLL_PREFIX;
+    test.with_file_name(format!("{prefix}lacuna_twin{}", std::env::consts::DLL_SUFFIX))
+}
+
+/// The library of twins, loaded.
+fn twin() -> &'static Library {
+    static LOADED: OnceLock<&'static Library> = OnceLock::new();
+    LOADED.get_or_init(|| library::load(&twin_path(), None).unwrap_or_else(|e| panic!("{e}")))
+}

@@ -1,0 +1,262 @@
+/* A discrepancy that misbehaves in the one way that the compiler is told. */
+#include "lacuna_plugin.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#ifndef NO_SYMBOL
+
+static int32_t say(const LacunaAnswer *answer, int32_t status, const char *text)
+{
+    lacuna_say(answer, text, strlen(text));
+    return status;
+}
+
+static int object;
+
+static int32_t schema(const LacunaAnswer *answer)
+{
+#ifdef SCHEMA_IS_NONE
+    return say(answer, LACUNA_OK, "no schema");
+#else
+    return say(answer, LACUNA_OK, "{\"type\":\"object\",\"properties\":{}}");
+#endif
+}
+
+static int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
+{
+    (void)options;
+    (void)answer;
+    *out = &object;
+    return LACUNA_OK;
+}
+
+static void destroy(void *plugin)
+{
+    (void)plugin;
+}
+
+static int32_t hyperparameters(void *likelihood, const LacunaAnswer *answer)
+{
+    (void)likelihood;
+#if defined(NOT_JSON)
+    return say(answer, LACUNA_OK, "[{\"name\": ");
+#elif defined(NOT_TEXT)
+    lacuna_say(answer, "\xff\xfe\xfd", 3);
+    return LACUNA_OK;
+#else
+    return say(answer, LACUNA_OK,
+        "[{\"name\":\"v\",\"symbol\":\"v\",\"unit\":\"1\",\"prior\":{\"half_normal\":1.0},\"log\":true,\"start\":1.0}]");
+#endif
+}
+
+static int32_t log_likelihood(void *likelihood, LacunaNumbers responses, LacunaNumbers hyper, double *values,
+                              const LacunaAnswer *answer)
+{
+    size_t i;
+    (void)likelihood;
+    (void)hyper;
+#ifdef VALUES_REJECTED
+    return say(answer, LACUNA_REJECTED, "not today");
+#endif
+    for (i = 0; i < responses.rows; ++i) {
+#if defined(NAN_VALUES)
+        values[i] = NAN;
+#elif !defined(UNWRITTEN)
+        values[i] = -1.0;
+#endif
+    }
+    (void)answer;
+    (void)values;
+    return LACUNA_OK;
+}
+
+static int32_t gradient(void *likelihood, LacunaNumbers responses, LacunaNumbers hyper, double *by_response,
+                        double *by_hyper, const LacunaAnswer *answer)
+{
+    size_t i;
+    (void)likelihood;
+    (void)answer;
+    for (i = 0; i < responses.rows * responses.columns; ++i) {
+#ifdef NAN_SLOPES
+        by_response[i] = NAN;
+#else
+        by_response[i] = 0.0;
+#endif
+    }
+    for (i = 0; i < hyper.rows * hyper.columns; ++i) {
+        by_hyper[i] = 0.0;
+    }
+    return LACUNA_OK;
+}
+
+static int32_t predictive(void *likelihood, LacunaNumbers response, LacunaNumbers hyper, const LacunaAnswer *answer)
+{
+    static const double ones[] = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
+    (void)likelihood;
+    (void)response;
+    (void)hyper;
+#if defined(SHORT_PARTS)
+    lacuna_give(answer, ones, 1, 3);
+#elif !defined(NO_PARTS)
+    lacuna_give(answer, ones, 1, 10);
+#endif
+    (void)ones;
+    return say(answer, LACUNA_OK, "[\"discrepancy\"]");
+}
+
+static int32_t simulate(void *likelihood, LacunaNumbers response, LacunaNumbers hyper, LacunaKey key, double *values,
+                        const LacunaAnswer *answer)
+{
+    (void)likelihood;
+    (void)response;
+    (void)hyper;
+    (void)key;
+    (void)answer;
+#ifdef NAN_DATA
+    values[0] = NAN;
+#endif
+    (void)values;
+    return LACUNA_OK;
+}
+
+static int32_t left_out(void *likelihood, LacunaNumbers response, LacunaNumbers hyper, const LacunaAnswer *answer)
+{
+    static const double ones[] = {1, 1, 1};
+    (void)likelihood;
+    (void)response;
+    (void)hyper;
+#ifdef SHORT_LEFT_OUT
+    lacuna_give(answer, ones, 1, 3);
+    return LACUNA_OK;
+#else
+    (void)ones;
+    (void)answer;
+    return LACUNA_ABSENT;
+#endif
+}
+
+static const LacunaLikelihoodFunctions likelihood_functions = {
+    sizeof(LacunaLikelihoodFunctions), destroy, hyperparameters, log_likelihood,
+#ifdef LIKELIHOOD_LACKS
+    NULL,
+#else
+    gradient,
+#endif
+    predictive, simulate, left_out, NULL, NULL
+};
+
+static int32_t likelihood(void *plugin, const LacunaKnown *known, LacunaLikelihood *out, const LacunaAnswer *answer)
+{
+    (void)plugin;
+    (void)known;
+    (void)answer;
+#if defined(LIKELIHOOD_STOPS)
+    return say(answer, LACUNA_STOP, "there is nothing to do");
+#elif defined(LIKELIHOOD_FAILS_SILENTLY)
+    return LACUNA_STOP;
+#elif defined(LIKELIHOOD_ABSENT)
+    return LACUNA_ABSENT;
+#elif defined(ODD_STATUS)
+    return 77;
+#endif
+#ifndef LIKELIHOOD_MAKES_NOTHING
+    out->size = sizeof *out;
+    out->likelihood = &object;
+    out->functions = &likelihood_functions;
+#endif
+    (void)out;
+    (void)likelihood_functions;
+    return LACUNA_OK;
+}
+
+static const LacunaComponentFunctions component = {
+    sizeof(LacunaComponentFunctions), schema, create, destroy, NULL, NULL, NULL
+};
+
+static const LacunaDiscrepancyFunctions discrepancy = {
+    sizeof(LacunaDiscrepancyFunctions),
+#ifdef NO_FUNCTION
+    NULL,
+#else
+    likelihood,
+#endif
+    NULL
+};
+
+#ifdef WRONG_KIND
+#define KIND "oracle"
+#else
+#define KIND "discrepancy"
+#endif
+
+#if defined(NAME_TAKEN)
+#define CALLED "gaussian"
+#elif defined(BAD_NAME)
+#define CALLED "Bad name"
+#else
+#define CALLED NAME
+#endif
+
+static const LacunaEntry entries[] = {
+    LACUNA_ENTRY(KIND, CALLED, component, discrepancy)
+#ifdef TWICE
+    , LACUNA_ENTRY(KIND, CALLED, component, discrepancy)
+#endif
+};
+
+#ifdef DOES_NOT_START
+static int32_t start(const LacunaHost *host)
+{
+    (void)host;
+    return LACUNA_STOP;
+}
+#else
+#define start NULL
+#endif
+
+#ifdef WRONG_MAGIC
+#define MAGIC 7
+#else
+#define MAGIC LACUNA_MAGIC
+#endif
+
+#ifdef WRONG_MAJOR
+#define MAJOR 9u
+#else
+#define MAJOR LACUNA_MAJOR
+#endif
+
+#ifdef NEWER_MINOR
+#define MINOR 99u
+#else
+#define MINOR LACUNA_MINOR
+#endif
+
+#ifdef SMALL_DECLARATION
+#define SIZE 8
+#else
+#define SIZE sizeof(LacunaDeclaration)
+#endif
+
+#ifdef ABORTS
+#define UNWINDS 0u
+#else
+#define UNWINDS 1u
+#endif
+
+#ifdef NO_ENTRIES
+#define COUNT 0
+#else
+#define COUNT (sizeof entries / sizeof entries[0])
+#endif
+
+LACUNA_EXPORT const LacunaDeclaration lacuna_plugin = {
+    MAGIC, MAJOR, MINOR, SIZE, UNWINDS, COUNT, LACUNA_TEXT(NAME), LACUNA_TEXT("1"), LACUNA_TEXT("C"), entries,
+    LACUNA_TEXT(LACUNA_RECORD_BEGIN LACUNA_PROVIDES(KIND, CALLED) "end\n"), start
+};
+
+#else
+int nothing;
+#endif

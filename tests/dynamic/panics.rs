@@ -1,0 +1,118 @@
+//! Plugins of a library that panic: each panic is an error that names library and call, and the program goes on.
+
+use lacuna::data::{Layout, Measurements, Replicate};
+use lacuna::linalg::Matrix;
+use lacuna::math::random::Stream;
+use lacuna::plugin::discrepancy::Known;
+use lacuna::plugin::registry::{self, Built};
+use lacuna::plugin::{Discrepancy, Likelihood, Sampler, Target};
+
+use super::twin;
+
+fn panicking(call: &str) -> Built<dyn Discrepancy> {
+    twin();
+    registry::from_text("panicking", &format!("call = \"{call}\""))
+        .unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn likelihood(built: &Built<dyn Discrepancy>) -> Result<Box<dyn Likelihood>, String> {
+    let replicates = vec![Replicate { name: "1".to_owned(), values: vec![Some(1.0)] }];
+    let data = Measurements { layout: Layout::number("y"), replicates };
+    built.plugin.likelihood(&Known::without_slopes(&data, &[])).map_err(|stop| stop.to_string())
+}
+
+/// How the file of the library is called in messages.
+fn library() -> String {
+    twin().file()
+}
+
+/// One thing that is asked of a likelihood.
+type Ask<'a> = &'a dyn Fn(&dyn Likelihood);
+
+#[test]
+fn a_panic_of_a_discrepancy_is_an_error_or_a_fault() {
+    let said = likelihood(&panicking("likelihood")).map(|_| ()).unwrap_err();
+    assert_eq!(
+        said,
+        format!("discrepancy `panicking` of {}: `likelihood` panicked: as I was told", library())
+    );
+    let stream = Stream::root(1);
+    for (call, ask) in [
+        (
+            "log_likelihood",
+            &(|l: &dyn Likelihood| assert!(!l.log_likelihood(&[0.0], &[1.0]).is_nan())) as Ask<'_>,
+        ),
+        ("gradient", &|l: &dyn Likelihood| drop(l.gradient(&[0.0], &[1.0]))),
+        ("predictive", &|l: &dyn Likelihood| drop(l.predictive(&[0.0], &[1.0]))),
+        ("simulate", &|l: &dyn Likelihood| drop(l.simulate(&[0.0], &[1.0], &stream))),
+    ] {
+        let likelihood = likelihood(&panicking(call)).unwrap();
+        ask(&*likelihood);
+        let said = likelihood.failure().unwrap();
+        assert_eq!(
+            said,
+            format!("discrepancy `panicking` of {}: `{call}` panicked: as I was told", library())
+        );
+    }
+    // Even where nothing can be said.
+    drop(likelihood(&panicking("drop")).unwrap());
+    // And the next one is sound.
+    let sound = likelihood(&panicking("")).unwrap();
+    assert_eq!(sound.log_likelihood(&[0.0], &[1.0]), -1.0);
+    assert_eq!(sound.failure(), None);
+}
+
+/// A density that panics where the first coordinate is negative.
+struct Brittle;
+
+impl Target for Brittle {
+    fn dimension(&self) -> usize {
+        1
+    }
+    fn log_density(&self, points: &Matrix) -> Vec<f64> {
+        assert!(points[(0, 0)] >= 0.0, "below zero");
+        vec![0.0; points.rows()]
+    }
+    fn log_prior(&self, points: &Matrix) -> Vec<f64> {
+        vec![0.0; points.rows()]
+    }
+    fn gradient(&self, _: &[f64]) -> (f64, Vec<f64>) {
+        (0.0, vec![0.0])
+    }
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        vec![(f64::NEG_INFINITY, f64::INFINITY)]
+    }
+    fn prior_draws(&self, count: usize, _: &Stream) -> Matrix {
+        Matrix::zeros(count, 1)
+    }
+}
+
+#[test]
+fn a_panic_of_a_sampler_or_of_its_density_is_an_error() {
+    twin();
+    let of = |call: &str| {
+        let options = format!("call = \"{call}\"");
+        registry::from_text::<dyn Sampler>("panicking", &options)
+            .unwrap_or_else(|e| panic!("{e}"))
+            .plugin
+    };
+    let points = |x: f64| Matrix::from_vec(2, 1, vec![x; 2]);
+    let begun = of("start").start(&Brittle, points(1.0)).unwrap_err();
+    let who = format!("sampler `panicking` of {}", library());
+    assert_eq!(begun.message, format!("{who}: `start` panicked: as I was told"));
+    let mut state = of("").start(&Brittle, points(1.0)).unwrap();
+    assert_eq!(state.memory, 1);
+    let before = state.clone();
+    let stepped = of("step").step(&Brittle, &mut state, &Stream::root(1)).unwrap_err();
+    assert_eq!(stepped.message, format!("{who}: `step` panicked: as I was told"));
+    assert_eq!(state, before);
+    let planned = of("plan");
+    planned.plan(1);
+    assert_eq!(
+        planned.fault().unwrap().said(),
+        Some(&*format!("{who}: `plan` panicked: as I was told"))
+    );
+    // A panic of the program, asked by the library, crosses twice and ends as an error.
+    let begun = of("").start(&Brittle, points(-1.0)).unwrap_err();
+    assert_eq!(begun.message, format!("{who}: the program: below zero"));
+}
