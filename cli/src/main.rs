@@ -9,6 +9,7 @@ mod serve;
 mod study;
 #[cfg(test)]
 mod tests;
+mod work;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -131,6 +132,9 @@ enum Verb {
         #[command(flatten)]
         place: serve::Place,
     },
+    /// Make runs of an order: what executors start in other processes and on other machines.
+    #[command(hide = true)]
+    Work(work::Work),
     /// Write the skeleton of something new.
     New {
         #[command(subcommand)]
@@ -164,6 +168,7 @@ fn main() -> ExitCode {
         Verb::Serve { study, settings, out, place } => {
             serve::serve(&study, &settings, out.as_deref(), &place)
         }
+        Verb::Work(asked) => work::run(&asked),
         Verb::New { what } => new::write(&what),
     };
     match result {

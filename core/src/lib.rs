@@ -18,5 +18,6 @@ pub mod run;
 pub mod serve;
 pub mod stage;
 pub mod study;
+pub mod work;
 
 pub use lacuna_linalg as linalg;

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use crate::linalg::Matrix;
-use crate::plugin::executor::{Batch, Finished, Job};
+use crate::plugin::executor::{Batch, Finished, Job, Written};
 use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
 use crate::study::Study;
 
@@ -296,6 +296,7 @@ impl Work<'_> {
             .map_err(|error| files::cannot_write(&log_path, &error))?;
         let batch = Batch {
             model: self.simulator.model,
+            recipe: &self.simulator.recipe,
             names: &self.simulator.names,
             units: &self.simulator.units,
             jobs: &jobs,
@@ -343,16 +344,9 @@ fn record(run: &str, finished: Finished, folder: &Path) -> Result<RunRecord, Sto
     let run = run.to_owned();
     let seconds = finished.seconds;
     Ok(match finished.outcome {
-        Ok((response, file)) => {
+        Ok(Written { file, valid }) => {
             let sha256 = Some(files::hash_file(&folder.join(&file))?);
-            RunRecord {
-                run,
-                file: Some(file),
-                sha256,
-                valid: response.valid,
-                reason: None,
-                seconds,
-            }
+            RunRecord { run, file: Some(file), sha256, valid, reason: None, seconds }
         }
         Err(reason) => {
             // One line a run in the table.

@@ -139,7 +139,7 @@ pub fn load(path: &Path, arguments: &[String]) -> Checked {
 pub enum Use {
     /// To run it: its model must be there.
     Run,
-    /// To look at what a finished run has kept: the model, which is not asked, may be gone.
+    /// To look at what a run has kept: the model and the executor, which are not asked, may be gone.
     Look,
 }
 
@@ -289,7 +289,7 @@ fn structure(path: &Path, text: String, root: &Node, problems: &mut Problems) ->
 /// Third layer: what the plugins need of the machine.
 fn environment(study: &Study, purpose: Use, root: &Node, problems: &mut Problems) {
     study.each_plugin(root, problems, |section, component, context, complaints| {
-        if purpose == Use::Run || !["model", "numerical_error"].contains(&section) {
+        if purpose == Use::Run || !["model", "numerical_error", "executor"].contains(&section) {
             component.environment(context, complaints);
         }
     });
