@@ -99,13 +99,18 @@ pub fn load_for(path: &Path, settings: &Settings, purpose: Use) -> Result<Study,
 
 /// The study of a run directory: as it was resolved, so that `--set` arguments count.
 fn kept_study(folder: &Path) -> Result<Study, Failure> {
+    let purpose = if is_finished(folder) { Use::Look } else { Use::Run };
+    kept_study_for(folder, purpose)
+}
+
+/// The same for some use.
+pub fn kept_study_for(folder: &Path, purpose: Use) -> Result<Study, Failure> {
     let resolved = folder.join("resolved.toml");
     if !resolved.exists() {
         let text =
             format!("error: {} is no run directory: it has no resolved.toml", folder.display());
         return Err(Failure::wrong(text));
     }
-    let purpose = if is_finished(folder) { Use::Look } else { Use::Run };
     let mut study = load_for(&resolved, &Settings { set: Vec::new() }, purpose)?;
     let written: PathBuf = folder.join("study.toml");
     study.text = String::from_utf8_lossy(&files::read(&written)?).into_owned();

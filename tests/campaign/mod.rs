@@ -2,6 +2,7 @@
 
 mod jobs;
 mod processes;
+mod verbs;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,6 +14,7 @@ use crate::quick;
 /// A line of one value, whose model is a shell script; it is named `run` with the options of the executor.
 const STUDY: &str = r#"
 [study]
+title = "A line"
 seed = 3
 [[parameter]]
 name = "a"

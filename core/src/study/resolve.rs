@@ -154,10 +154,19 @@ pub fn load_for(path: &Path, arguments: &[String], purpose: Use) -> Checked {
 
 /// Checks a study given as text, as if it stood in a file at `path`.
 pub fn load_text(path: &Path, text: &str, arguments: &[String]) -> Checked {
+    text_for(path, text, arguments, Use::Run)
+}
+
+/// The same for some use, without arguments.
+pub fn load_text_for(path: &Path, text: &str, purpose: Use) -> Checked {
+    text_for(path, text, &[], purpose)
+}
+
+fn text_for(path: &Path, text: &str, arguments: &[String], purpose: Use) -> Checked {
     let mut sources = Sources::default();
     let mut problems = Problems::new();
     let root = inherit::load_text(path, text.to_owned(), &common_keys, &mut sources, &mut problems);
-    finish(path, text.to_owned(), root, arguments, Use::Run, sources, problems)
+    finish(path, text.to_owned(), root, arguments, purpose, sources, problems)
 }
 
 fn finish(

@@ -130,6 +130,11 @@ impl Marker {
         (sound && marker.asked == asked).then_some(marker)
     }
 
+    /// The marker of a run, whatever was asked.
+    pub fn look(runs: &Path, run: &str) -> Option<Self> {
+        files::read_json(&Self::path(runs, run)).ok()
+    }
+
     /// Takes the marker of a failure away, so that the run is made anew when it is asked for again; it is kept as
     /// `campaign/failed/RUN-NUMBER.json`.
     pub fn set_aside(runs: &Path, run: &str) -> Result<(), Stop> {
