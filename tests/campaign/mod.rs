@@ -45,6 +45,7 @@ walkers = 8
 steps = 20
 [validate]
 emulator_check = 0
+rerun_model = false
 "#;
 
 /// A folder with a study whose model is this script: `$1` is the run's name, `$2` its parameter, `$3` the folder of the
