@@ -114,6 +114,8 @@ fn terms() {
 #[test]
 fn executors() {
     let table: &Table = &[
+        // Where its server is started: `campaign/queue.rs`.
+        ("hyperqueue", &[]),
         (
             "local",
             &[

@@ -2,6 +2,8 @@
 
 mod amount;
 mod cluster;
+mod command;
+pub mod hyperqueue;
 pub mod local;
 mod program;
 pub mod slurm;

@@ -2,6 +2,7 @@
 
 mod jobs;
 mod processes;
+mod queue;
 mod verbs;
 
 use std::fs;

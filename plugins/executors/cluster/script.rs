@@ -15,6 +15,8 @@ pub struct Script<'a> {
     pub folder: &'a Path,
     /// The variable that holds the number of the task.
     pub task: &'a str,
+    /// Whether the script itself keeps what is printed, as `taskN.txt`.
+    pub log: bool,
     /// How many runs of the task are made at a time.
     pub parallel: usize,
 }
@@ -34,6 +36,9 @@ impl Script<'_> {
              mv \"$folder/task$task.exit.part\" \"$folder/task$task.exit\"; }}\n\
              trap 'note $?' EXIT\n\n"
         ));
+        if self.log {
+            text.push_str("exec > \"$folder/task$task.txt\" 2>&1\n");
+        }
         for line in self.setup {
             text.push_str(&format!("{line}\n"));
         }

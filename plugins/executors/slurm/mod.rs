@@ -1,6 +1,5 @@
 //! `slurm`: job arrays on a cluster.
 
-mod command;
 mod state;
 
 use std::collections::BTreeMap;
@@ -18,6 +17,7 @@ use super::amount::{Memory, Span, as_clock};
 use super::cluster::scheduler::Rules;
 use super::cluster::script::{Script, module_lines, quoted};
 use super::cluster::{self, Growth, Plan, Retry, Scheduler, Submission, TaskState};
+use super::command;
 use super::program;
 use crate::models::process;
 
@@ -208,6 +208,7 @@ impl Scheduler for Slurm {
             program: &program,
             folder: plan.folder,
             task: "SLURM_ARRAY_TASK_ID",
+            log: false,
             parallel: self.parallel.get(),
         };
         files::write_atomic(&plan.folder.join(SCRIPT), script.text().as_bytes())

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use lacuna::run::Stop;
 
-use super::command::said;
 use crate::executors::cluster::{Cause, Submission, TaskState};
+use crate::executors::command::said;
 
 type States = BTreeMap<(usize, usize), TaskState>;
 
