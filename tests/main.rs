@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 mod bad_input;
+mod campaign;
 mod commands;
 mod docs;
 mod effects;
@@ -11,6 +12,7 @@ mod kill;
 mod problems;
 mod python;
 mod quick;
+mod slurm;
 mod studies;
 mod tidy;
 mod um_bridge;

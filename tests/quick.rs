@@ -126,6 +126,10 @@ pub fn results(out: &Path) -> BTreeMap<String, String> {
         }
         for entry in fs::read_dir(&folder).unwrap() {
             let path = entry.unwrap().path();
+            // What executors note for themselves.
+            if path.file_name().is_some_and(|name| name == "campaign") {
+                continue;
+            }
             let file = path.file_name().unwrap().to_string_lossy().into_owned();
             // Checkpoints and records, not results.
             let skipped = ["stage.json", "seconds.csv", "seconds", "progress.jsonl", "state.json"];

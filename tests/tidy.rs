@@ -19,14 +19,14 @@ const MACHINE: [&str; 6] = ["/home/", "/Users/", "/root/", "/work/", "/tmp/", "C
 /// A study chooses plugins and plugins complain about their part of a study; both stop with what a run
 /// says, and expressions guess at names as a study does: these four are one layer.
 const LAYERS: [&[&str]; 11] = [
-    &["compare", "serve"],
+    &["compare", "serve", "campaign"],
     &["stage"],
     &["contract"],
     &["report"],
     &["diagnose"],
     &["gap"],
     &["posterior"],
-    &["plugin", "study", "run", "expression"],
+    &["plugin", "study", "run", "expression", "work"],
     &["data"],
     &["math"],
     &["linalg"],

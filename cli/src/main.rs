@@ -1,5 +1,6 @@
 //! The `lacuna` command: arguments and printing, no numerics.
 
+mod campaign;
 mod gap;
 mod inspect;
 mod new;
@@ -9,6 +10,7 @@ mod serve;
 mod study;
 #[cfg(test)]
 mod tests;
+mod work;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -136,6 +138,14 @@ enum Verb {
         #[command(flatten)]
         place: serve::Place,
     },
+    /// The simulation runs of a run directory: where they are, those that failed again, more of them.
+    Campaign {
+        #[command(subcommand)]
+        what: campaign::Campaign,
+    },
+    /// Make runs of an order: what executors start in other processes and on other machines.
+    #[command(hide = true)]
+    Work(work::Work),
     /// Write the skeleton of something new.
     New {
         #[command(subcommand)]
@@ -171,6 +181,8 @@ fn main() -> ExitCode {
         Verb::Serve { study, settings, out, place } => {
             serve::serve(&study, &settings, out.as_deref(), &place)
         }
+        Verb::Campaign { what } => campaign::campaign(&what),
+        Verb::Work(asked) => work::run(&asked),
         Verb::New { what } => new::write(&what),
     };
     match result {

@@ -121,13 +121,18 @@ fn sound(checked: Checked, path: &Path) -> Result<Study, Failure> {
 
 /// The study of a run directory: as it was resolved, so that `--set` arguments count.
 fn kept_study(folder: &Path) -> Result<Study, Failure> {
+    let purpose = if is_finished(folder) { Use::Look } else { Use::Run };
+    kept_study_for(folder, purpose)
+}
+
+/// The same for some use.
+pub fn kept_study_for(folder: &Path, purpose: Use) -> Result<Study, Failure> {
     let resolved = folder.join("resolved.toml");
     if !resolved.exists() {
         let text =
             format!("error: {} is no run directory: it has no resolved.toml", folder.display());
         return Err(Failure::wrong(text));
     }
-    let purpose = if is_finished(folder) { Use::Look } else { Use::Run };
     let mut study = sound(resolve::load_for(&resolved, &[], purpose), &resolved)?;
     let written: PathBuf = folder.join("study.toml");
     study.text = String::from_utf8_lossy(&files::read(&written)?).into_owned();

@@ -4,6 +4,7 @@
 //! plain data, keeps every artifact, and names no plugin. Plugins register themselves
 //! (see [`plugin::registry`]); the binary links the crate that holds them.
 
+pub mod campaign;
 pub mod compare;
 pub mod contract;
 pub mod data;
@@ -18,5 +19,6 @@ pub mod run;
 pub mod serve;
 pub mod stage;
 pub mod study;
+pub mod work;
 
 pub use lacuna_linalg as linalg;

@@ -1,5 +1,6 @@
 //! `latin_hypercube`: one point in each of N slices of every axis.
 
+use lacuna::data::Parameter;
 use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, below, permutation, uniform};
 use lacuna::plugin::{Component, Design};
@@ -14,6 +15,10 @@ use serde::{Deserialize, Serialize};
 /// `optimise = "maximin"` exchanges coordinates between runs so that the closest pair lies as far apart
 /// as possible; `optimise = "correlation"` exchanges them so that the columns are as
 /// uncorrelated as possible. Both keep the Latin property.
+///
+/// A design that is extended keeps its points: every axis is cut anew into as many slices as there are then runs, and the new
+/// runs take slices that are empty. With twice as many runs each slice holds exactly one again; with another number some
+/// slices may hold two old runs, and as many stay empty.
 ///
 /// References: M. D. `McKay`, Beckman, Conover, Technometrics 21 (1979) 239; Morris and Mitchell, J. Stat. Plan.
 /// Inference 43 (1995) 381 (the criterion `phi_p`); Iman and Conover, Commun. Stat. B 11 (1982) 311.
@@ -54,10 +59,30 @@ impl Design for LatinHypercube {
         let mut rng = stream.named("exchange").generator();
         match self.optimise {
             Optimise::None => {}
-            Optimise::Maximin => self.maximin(&mut points, &mut rng),
-            Optimise::Correlation => self.decorrelate(&mut points, &mut rng),
+            Optimise::Maximin => self.maximin(&mut points, 0, &mut rng),
+            Optimise::Correlation => self.decorrelate(&mut points, 0, &mut rng),
         }
         Ok(points)
+    }
+
+    fn extend(
+        &self,
+        _: &[Parameter],
+        known: &Matrix,
+        count: usize,
+        stream: &Stream,
+    ) -> Result<Matrix, Stop> {
+        let first = known.rows();
+        let stream = stream.named("extension").at(first as u64);
+        let mut points = known.clone();
+        self.fill(known, count, &stream).iter_rows().for_each(|row| points.push_row(row));
+        let mut rng = stream.named("exchange").generator();
+        match self.optimise {
+            Optimise::None => {}
+            Optimise::Maximin => self.maximin(&mut points, first, &mut rng),
+            Optimise::Correlation => self.decorrelate(&mut points, first, &mut rng),
+        }
+        Ok(points.select_rows(&(first..first + count).collect::<Vec<_>>()))
     }
 }
 
@@ -74,15 +99,37 @@ impl LatinHypercube {
         points
     }
 
+    /// Points in slices of the finer grid that no known point is in.
+    fn fill(&self, known: &Matrix, count: usize, stream: &Stream) -> Matrix {
+        let all = known.rows() + count;
+        let mut points = Matrix::zeros(count, known.columns());
+        for j in 0..known.columns() {
+            let mut rng = stream.named("axis").at(j as u64).generator();
+            let mut empty = vec![true; all];
+            for x in known.column(j) {
+                empty[((x * all as f64) as usize).min(all - 1)] = false;
+            }
+            let empty: Vec<usize> = (0..all).filter(|&slice| empty[slice]).collect();
+            // There are at least as many as new points; which are left empty is left to chance.
+            let order = permutation(&mut rng, empty.len());
+            for (i, place) in order.into_iter().take(count).enumerate() {
+                let inside = if self.centred { 0.5 } else { uniform(&mut rng) };
+                points[(i, j)] = (empty[place] as f64 + inside) / all as f64;
+            }
+        }
+        points
+    }
+
     /// Exchanges that lower Morris and Mitchell's criterion `phi_p = (sum d_ij^-p)^(1/p)`, p = 15, on
-    /// the sum of `d^-p` itself, which changes only in the terms of the two runs concerned.
-    fn maximin(&self, points: &mut Matrix, rng: &mut impl Rng) {
-        let (count, dimension) = (points.rows(), points.columns());
-        if count < 3 || dimension == 0 {
+    /// the sum of `d^-p` itself, which changes only in the terms of the two runs concerned. Runs before `first`
+    /// stay where they are.
+    fn maximin(&self, points: &mut Matrix, first: usize, rng: &mut impl Rng) {
+        let (count, dimension) = (points.rows() - first, points.columns());
+        if count < 2 || points.rows() < 3 || dimension == 0 {
             return;
         }
         for _ in 0..self.exchanges * count {
-            let (a, b) = pair(rng, count);
+            let (a, b) = pair(rng, first, count);
             let j = below(rng, dimension);
             let before = crowding(points, a, b);
             swap(points, a, b, j);
@@ -93,14 +140,14 @@ impl LatinHypercube {
     }
 
     /// Exchanges that lower the sum of squared correlations between the columns.
-    fn decorrelate(&self, points: &mut Matrix, rng: &mut impl Rng) {
-        let (count, dimension) = (points.rows(), points.columns());
-        if count < 3 || dimension < 2 {
+    fn decorrelate(&self, points: &mut Matrix, first: usize, rng: &mut impl Rng) {
+        let (count, dimension) = (points.rows() - first, points.columns());
+        if count < 2 || points.rows() < 3 || dimension < 2 {
             return;
         }
         let mut products = Products::of(points);
         for _ in 0..self.exchanges * count {
-            let (a, b) = pair(rng, count);
+            let (a, b) = pair(rng, first, count);
             let j = below(rng, dimension);
             let before = products.column_badness(j);
             products.exchange(points, a, b, j);
@@ -113,10 +160,11 @@ impl LatinHypercube {
     }
 }
 
-fn pair(rng: &mut impl Rng, count: usize) -> (usize, usize) {
+/// Two of the `count` runs from `first` on.
+fn pair(rng: &mut impl Rng, first: usize, count: usize) -> (usize, usize) {
     let a = below(rng, count);
     let b = (a + 1 + below(rng, count - 1)) % count;
-    (a, b)
+    (first + a, first + b)
 }
 
 fn swap(points: &mut Matrix, a: usize, b: usize, j: usize) {
@@ -230,6 +278,34 @@ mod tests {
         let fresh = Products::of(&points);
         for j in 0..3 {
             assert!((products.column_badness(j) - fresh.column_badness(j)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn an_extension_fills_empty_slices_and_moves_nothing() {
+        for optimise in [Optimise::None, Optimise::Maximin, Optimise::Correlation] {
+            let plugin = LatinHypercube { optimise, ..LatinHypercube::default() };
+            let stream = Stream::root(1);
+            let known = plugin.points(60, 3, &stream).unwrap();
+            let slices = |points: &Matrix, j: usize, all: f64| -> Vec<usize> {
+                let mut slices: Vec<usize> =
+                    points.column(j).iter().map(|x| (x * all) as usize).collect();
+                slices.sort_unstable();
+                slices
+            };
+            let doubled = plugin.extend(&[], &known, 60, &stream).unwrap();
+            let some = plugin.extend(&[], &known, 25, &stream).unwrap();
+            assert_eq!((doubled.rows(), some.rows()), (60, 25));
+            for j in 0..3 {
+                let both = [slices(&known, j, 120.0), slices(&doubled, j, 120.0)].concat();
+                let distinct: std::collections::BTreeSet<usize> = both.into_iter().collect();
+                assert_eq!(distinct.len(), 120, "a Latin hypercube again");
+                let old: std::collections::BTreeSet<usize> =
+                    slices(&known, j, 85.0).into_iter().collect();
+                let new = slices(&some, j, 85.0);
+                assert!(new.windows(2).all(|pair| pair[0] < pair[1]), "one run a slice");
+                assert!(new.iter().all(|slice| !old.contains(slice)), "in empty slices");
+            }
         }
     }
 }

@@ -1,5 +1,6 @@
 //! `random`: independent uniform points.
 
+use lacuna::data::Parameter;
 use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::{Component, Design};
@@ -27,6 +28,16 @@ impl Design for Random {
                 (0..dimension).map(|_| uniform(&mut rng)).collect::<Vec<f64>>()
             }),
         ))
+    }
+
+    fn extend(
+        &self,
+        _: &[Parameter],
+        known: &Matrix,
+        count: usize,
+        stream: &Stream,
+    ) -> Result<Matrix, Stop> {
+        super::next_of_sequence(self, known, count, stream)
     }
 }
 

@@ -1,5 +1,6 @@
 //! `sobol`: a low-discrepancy sequence.
 
+use lacuna::data::Parameter;
 use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, uniform};
 use lacuna::math::sobol::{self, LARGEST_DIMENSION};
@@ -80,6 +81,16 @@ impl Design for Sobol {
             }
         }
         Ok(points)
+    }
+
+    fn extend(
+        &self,
+        _: &[Parameter],
+        known: &Matrix,
+        count: usize,
+        stream: &Stream,
+    ) -> Result<Matrix, Stop> {
+        super::next_of_sequence(self, known, count, stream)
     }
 }
 

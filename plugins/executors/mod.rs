@@ -1,3 +1,9 @@
 //! Executors: where many model evaluations run.
 
+mod amount;
+mod cluster;
+mod command;
+pub mod hyperqueue;
 pub mod local;
+mod program;
+pub mod slurm;

@@ -1,7 +1,9 @@
 //! The contract of designs.
 
 use super::judge::{Check, calm, judge, same_on_threads};
+use crate::data::Parameter;
 use crate::linalg::Matrix;
+use crate::math::distribution::Distribution;
 use crate::math::random::Stream;
 use crate::plugin::Design;
 
@@ -10,12 +12,14 @@ use crate::plugin::Design;
 /// - it gives as many points as asked for, each of as many coordinates, inside the open unit cube;
 /// - the same stream gives the same points, on any number of threads;
 /// - no points and no coordinates give an empty matrix or an error;
+/// - if it can be extended, by points inside the cube, the same ones for the same stream;
 /// - no coordinate's mean is further from one half than that of independent points would be.
 pub fn design(name: &str, design: &dyn Design) -> Result<(), Vec<String>> {
-    let checks: [Check<'_>; 4] = [
+    let checks: [Check<'_>; 5] = [
         ("fills the unit cube", Box::new(|| fills_the_cube(design))),
         ("repeats itself", Box::new(|| repeats_itself(design))),
         ("bears empty designs", Box::new(|| bears_empty_designs(design))),
+        ("extends itself", Box::new(|| extends_itself(design))),
         ("is centred", Box::new(|| is_centred(design))),
     ];
     judge("design", name, &checks)
@@ -57,6 +61,30 @@ fn bears_empty_designs(design: &dyn Design) -> Result<(), String> {
         {
             return Err(format!("{what} has entries"));
         }
+    }
+    Ok(())
+}
+
+fn extends_itself(design: &dyn Design) -> Result<(), String> {
+    let stream = Stream::root(1).named("design");
+    let known = points(design, 20, 2)?;
+    let parameters =
+        ["x", "y"].map(|name| Parameter::plain(name, Distribution::Uniform([0.0, 1.0])));
+    let further = || design.extend(&parameters, &known, 7, &stream);
+    // A design that says that it cannot go on has done what it must.
+    let Ok(first) = further() else { return Ok(()) };
+    if (first.rows(), first.columns()) != (7, 2) {
+        return Err(format!(
+            "asked for 7 further points, got {} x {}",
+            first.rows(),
+            first.columns()
+        ));
+    }
+    if let Some(x) = first.as_slice().iter().find(|&&x| !(x > 0.0 && x < 1.0)) {
+        return Err(format!("a coordinate of a further point is {x}"));
+    }
+    if further() != Ok(first) {
+        return Err("the same stream extends it by other points".into());
     }
     Ok(())
 }

@@ -3,22 +3,28 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::judge::{Check, judge, layout, same_on_threads};
 use crate::data::Scenario;
-use crate::plugin::executor::{Batch, Executor, Finished, Job};
+use crate::plugin::executor::{Batch, Executor, Finished, Job, Recipe};
 use crate::plugin::model::{Call, EvalError, Input, Model, Response, Signature};
 use crate::plugin::{Component, Context};
 use crate::run::{Stop, arrays};
 
 /// Puts an executor through the contract; result files go to folders in `scratch`.
 ///
-/// - every job is handed over once, with the model's response and a file that holds it bit for bit, on any
-///   number of threads;
+/// - every job is handed over once, with a file that holds the model's response bit for bit, on any number of
+///   threads;
 /// - a run that the model refuses, that panics, or whose response is not a number is handed over as failed with a
 ///   reason, and costs no other run;
 /// - when the model gives up for good the executor stops with its reason;
 /// - when nobody can take the results any more it stops with that reason;
 /// - no jobs are no error.
+///
+/// The model is [`Line`]. An executor that starts other processes needs a program in which that is registered as
+/// [`LINE`] and which calls [`crate::work::work`].
 pub fn executor(name: &str, executor: &dyn Executor, scratch: &Path) -> Result<(), Vec<String>> {
     let checks: [Check<'_>; 5] = [
         ("hands over every job", Box::new(|| hands_over_every_job(executor, scratch))),
@@ -30,8 +36,13 @@ pub fn executor(name: &str, executor: &dyn Executor, scratch: &Path) -> Result<(
     judge("executor", name, &checks)
 }
 
+/// What [`Line`] is called where it is registered.
+pub const LINE: &str = "contract_line";
+
 /// A line through the places of the layout; its first input also says how it goes wrong.
-struct Line;
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Line {}
 
 const REFUSED: f64 = -1.0;
 const PANICS: f64 = -2.0;
@@ -79,9 +90,9 @@ fn jobs(first: &[f64]) -> Vec<Job> {
     first.iter().enumerate().map(job).collect()
 }
 
-type Handed = BTreeMap<usize, Result<(Vec<f64>, bool, Vec<f64>), String>>;
+type Handed = BTreeMap<usize, Result<(Vec<f64>, bool), String>>;
 
-/// What is handed over: the response with what its file holds, or the reason why there is none.
+/// What is handed over: what the file holds and whether it is valid, or the reason why there is none.
 fn run(
     executor: &dyn Executor,
     jobs: &[Job],
@@ -90,8 +101,10 @@ fn run(
 ) -> Result<(Handed, Result<(), Stop>), String> {
     std::fs::create_dir_all(folder).map_err(|error| error.to_string())?;
     let (layout, scenario) = (layout(), Scenario::default());
+    let recipe = Recipe { name: LINE.to_owned(), options: String::new(), libraries: Vec::new() };
     let batch = Batch {
-        model: &Line,
+        model: &Line {},
+        recipe: &recipe,
         names: &names(),
         units: &[],
         jobs,
@@ -107,10 +120,10 @@ fn run(
             return Err(Stop::new("nobody takes the results"));
         }
         most -= 1;
-        let outcome = end.outcome.and_then(|(response, file)| {
-            let stored = arrays::read(&folder.join(file), &layout.name);
+        let outcome = end.outcome.and_then(|made| {
+            let stored = arrays::read(&folder.join(made.file), &layout.name);
             let stored = stored.map_err(|stop| format!("no sound file: {stop}"))?.values;
-            Ok((response.values, response.valid, stored))
+            Ok((stored, made.valid))
         });
         if end.seconds.is_nan() || end.seconds < 0.0 {
             broken = Some(format!("job {} took {} s", end.index, end.seconds));
@@ -144,10 +157,10 @@ fn hands_over_every_job(executor: &dyn Executor, scratch: &Path) -> Result<(), S
             study: scratch,
             directory: None,
         };
-        let expected = Line.predict(&call).map_err(|error| error.to_string())?;
+        let expected = Line {}.predict(&call).map_err(|error| error.to_string())?;
         match handed.get(&i) {
-            Some(Ok((values, valid, stored))) => {
-                if values != &expected.values || stored != values || *valid != expected.valid {
+            Some(Ok((stored, valid))) => {
+                if stored != &expected.values || *valid != expected.valid {
                     return Err(format!("job {i} has another response than the model gives"));
                 }
             }

@@ -18,7 +18,7 @@ pub use density::density;
 pub use design::design;
 pub use discrepancy::discrepancy;
 pub use effect::effect;
-pub use executor::executor;
+pub use executor::{LINE, Line, executor};
 pub use model::model;
 pub use reader::{Sample, reader};
 pub use sampler::sampler;

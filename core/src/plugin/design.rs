@@ -21,4 +21,17 @@ pub trait Design: Component {
     ) -> Result<Matrix, Stop> {
         self.points(count, parameters.len(), stream)
     }
+
+    /// `count` further points beside those of `known`, which this design placed and which stay where they are;
+    /// `stream` is the one that placed them. A design that cannot go on refuses.
+    fn extend(
+        &self,
+        _parameters: &[Parameter],
+        _known: &Matrix,
+        _count: usize,
+        _stream: &Stream,
+    ) -> Result<Matrix, Stop> {
+        Err(Stop::new("this design cannot be extended without moving its points")
+            .help("take another design for further runs, or a greater number of `runs`"))
+    }
 }

@@ -2,10 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
+use serde::{Deserialize, Serialize};
+
 use super::Component;
-use super::model::{Call, Model, Response};
+use super::abi::{Library, library};
+use super::model::{Call, Model};
+use super::registry::{self, Built};
 use crate::data::{Layout, Scenario, Unit};
 use crate::run::Stop;
+use crate::study::emit;
 
 /// Runs many model evaluations somewhere.
 pub trait Executor: Component {
@@ -16,6 +21,34 @@ pub trait Executor: Component {
         batch: &Batch<'_>,
         finished: &mut dyn FnMut(Finished) -> Result<(), Stop>,
     ) -> Result<(), Stop>;
+
+    /// Whether [`Executor::submit`] only waits for jobs that run somewhere else, so that several batches may wait at
+    /// the same time.
+    fn waits(&self) -> bool {
+        false
+    }
+
+    /// What is known of the jobs in the folder of a batch that run or wait somewhere else, though no process of
+    /// this program waits for them; nothing where jobs end with the process that made them.
+    fn look(&self, _directory: &Path) -> Result<Vec<Seen>, Stop> {
+        Ok(Vec::new())
+    }
+
+    /// Ends the jobs of a batch's folder that run or wait somewhere else; returns how many runs that stops.
+    fn cancel(&self, _directory: &Path) -> Result<usize, Stop> {
+        Ok(0)
+    }
+}
+
+/// A job that is somewhere else.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Seen {
+    /// Its name.
+    pub run: String,
+    /// Whether it runs; else it waits.
+    pub running: bool,
+    /// Where it is and why, in words.
+    pub note: String,
 }
 
 /// Jobs that belong together.
@@ -23,6 +56,8 @@ pub trait Executor: Component {
 pub struct Batch<'a> {
     /// The model that all jobs evaluate.
     pub model: &'a dyn Model,
+    /// How another process builds that model.
+    pub recipe: &'a Recipe,
     /// The name of each of its inputs.
     pub names: &'a [String],
     /// The unit of each.
@@ -59,8 +94,57 @@ impl<'a> Batch<'a> {
     }
 }
 
+/// What a process needs to build a model.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Recipe {
+    /// The name of its plugin.
+    #[serde(rename = "use")]
+    pub name: String,
+    /// All its options as TOML, which keeps every number that JSON does not have.
+    pub options: String,
+    /// The libraries of plugins that are loaded first: the model, or a part of it, may be in one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub libraries: Vec<LibraryFile>,
+}
+
+/// A library of plugins as another process finds it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LibraryFile {
+    /// Its file.
+    pub path: PathBuf,
+    /// The SHA-256 that it must have.
+    pub sha256: String,
+}
+
+impl Recipe {
+    /// How a model was built, with the libraries of its study.
+    pub fn of(built: &Built<dyn Model>, libraries: &[&Library]) -> Result<Self, Stop> {
+        let options = emit::to_toml(&built.options).map_err(|error| {
+            Stop::new(format!("cannot write the options of `{}`: {error}", built.name))
+        })?;
+        let file =
+            |l: &&Library| LibraryFile { path: l.path.clone(), sha256: l.sha256.clone() };
+        let libraries = libraries.iter().map(file).collect();
+        Ok(Self { name: built.name.to_owned(), options, libraries })
+    }
+
+    /// The model.
+    pub fn build(&self) -> Result<Box<dyn Model>, Stop> {
+        for LibraryFile { path, sha256 } in &self.libraries {
+            library::load(path, Some(sha256))
+                .map_err(|error| Stop::new(format!("{}: {error}", path.display())))?;
+        }
+        let built = registry::from_text::<dyn Model>(&self.name, &self.options);
+        built.map(|built| built.plugin).map_err(|complaints| {
+            Stop::new(format!("the model `{}` cannot be built:\n{complaints}", self.name))
+        })
+    }
+}
+
 /// One evaluation.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Job {
     /// Its name, which is also the stem of its result file.
     pub name: String,
@@ -73,8 +157,17 @@ pub struct Job {
 pub struct Finished {
     /// Its index in the batch.
     pub index: usize,
-    /// The response with the name of the file that holds it, or why there is none.
-    pub outcome: Result<(Response, String), String>,
+    /// The response as it was written down, or why there is none.
+    pub outcome: Result<Written, String>,
     /// How long it took, in seconds.
     pub seconds: f64,
+}
+
+/// A response that was written down.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Written {
+    /// The file in the folder of the batch.
+    pub file: String,
+    /// Whether the run stayed inside the model's range of validity.
+    pub valid: bool,
 }

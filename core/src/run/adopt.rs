@@ -21,16 +21,18 @@ impl RunDirectory {
     }
 }
 
-/// A folder with links to all files of another.
-fn link(from: &Path, to: &Path) -> Result<(), Stop> {
+/// A folder with links to all files of another, and copies of those to which lines are added.
+pub(super) fn link(from: &Path, to: &Path) -> Result<(), Stop> {
     fs::create_dir_all(to).map_err(|error| files::cannot_write(to, &error))?;
     let entries = fs::read_dir(from).map_err(|error| files::cannot_read(from, &error))?;
     for entry in entries.flatten() {
         let (path, target) = (entry.path(), to.join(entry.file_name()));
         if path.is_dir() {
             link(&path, &target)?;
-        } else if fs::hard_link(&path, &target).is_err() {
-            // Another disk, or one without links.
+        } else if path.extension().is_some_and(|extension| extension == "jsonl")
+            || fs::hard_link(&path, &target).is_err()
+        {
+            // The last for another disk, or one without links.
             fs::copy(&path, &target).map_err(|error| files::cannot_write(&target, &error))?;
         }
     }

@@ -6,10 +6,14 @@ use serde_json::json;
 
 use crate::data::Parameter;
 use crate::linalg::Matrix;
+use crate::plugin::Design as Plugin;
+use crate::plugin::registry::Section;
 use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, RunDirectory, Stop};
 use crate::study::Study;
+use crate::study::file::DesignKeys;
 
+use super::imports::{self, Imported};
 use super::stream;
 
 /// The runs that are to be made.
@@ -33,24 +37,82 @@ impl Artifact for Design {
     }
 }
 
+/// The runs that are to be made and those that are imported, by name.
+#[derive(Debug, Clone)]
+pub struct Placed {
+    /// The design: all points.
+    pub design: Kept<Design>,
+    /// The name of each.
+    pub names: Vec<String>,
+    /// The finished runs that the last names stand for.
+    pub imported: Vec<Imported>,
+}
+
 /// Places the runs; `None` when the study has no design.
 pub fn stage(
     study: &Study,
     run: &mut RunDirectory,
     observer: &dyn Observer,
-) -> Result<Option<Kept<Design>>, Stop> {
+) -> Result<Option<Placed>, Stop> {
     let Some(section) = &study.design else { return Ok(None) };
+    let imported = imports::read(study)?;
     let runs = section.common.runs.get();
     let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.design)).collect();
-    let inputs = json!([section.built.identity(), runs, laws, study.about.seed]);
+    let mut inputs =
+        vec![json!([section.built.identity(), runs, laws, study.about.seed])];
+    if !section.common.extended.is_empty() {
+        inputs.push(json!({ "extended": section.common.extended }));
+    }
+    if !imported.is_empty() {
+        let hashes: Vec<&String> = imported.iter().map(|imported| &imported.hash).collect();
+        inputs.push(json!({ "imports": hashes }));
+    }
+    // A plain design keeps the hash that it had before there was anything to add to it.
+    let inputs = if inputs.len() == 1 { inputs.remove(0) } else { json!(inputs) };
     observer.begin("design", "run", 0);
-    let kept = run.keep("1-design", &inputs, observer, |_| {
-        let plugin = &section.built.plugin;
-        let cube = plugin.place(&study.parameters, runs, &stream(study, "design"))?;
-        Ok(Design { points: physical(&cube, &study.parameters) })
+    let design = run.keep("1-design", &inputs, observer, |_| {
+        let cube = cube(section, study)?;
+        let mut points = physical(&cube, &study.parameters);
+        for imported in &imported {
+            imported.points.iter_rows().for_each(|point| points.push_row(point));
+        }
+        Ok(Design { points })
     })?;
-    observer.end("design", &format!("{runs} runs by {}", section.built.name));
-    Ok(Some(kept))
+    let names = run_names(&section.common, &imported)?;
+    let brought = names.len() - section.common.total();
+    let note = if brought > 0 { format!(", {brought} imported") } else { String::new() };
+    observer
+        .end("design", &format!("{} runs by {}{note}", section.common.total(), section.built.name));
+    Ok(Some(Placed { design, names, imported }))
+}
+
+/// The points of the unit cube: the first runs, and behind them what was added, in its order.
+pub fn cube(section: &Section<dyn Plugin, DesignKeys>, study: &Study) -> Result<Matrix, Stop> {
+    let (plugin, stream) = (&section.built.plugin, stream(study, "design"));
+    let mut cube = plugin.place(&study.parameters, section.common.runs.get(), &stream)?;
+    for count in &section.common.extended {
+        let further = plugin.extend(&study.parameters, &cube, count.get(), &stream)?;
+        further.iter_rows().for_each(|point| cube.push_row(point));
+    }
+    Ok(cube)
+}
+
+/// The names of all runs: those of the first runs do not change when others are added.
+fn run_names(keys: &DesignKeys, imported: &[Imported]) -> Result<Vec<String>, Stop> {
+    let mut names = super::simulate::names(keys.runs.get());
+    let digits = names.last().map_or(0, |last| last.len() - "run".len());
+    names.extend((names.len() + 1..=keys.total()).map(|i| format!("run{i:0digits$}")));
+    for imported in imported {
+        if let Some(twice) = imported.names.iter().find(|name| names.contains(name)) {
+            return Err(Stop::new(format!(
+                "the run `{twice}` in {} has the name of another run",
+                imported.folder.display()
+            ))
+            .help("give it another name in the table from which it was imported"));
+        }
+        names.extend(imported.names.iter().cloned());
+    }
+    Ok(names)
 }
 
 /// Points of the unit cube through the quantile function of each parameter's design distribution.

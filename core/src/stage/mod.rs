@@ -10,6 +10,7 @@ pub mod evidence;
 pub mod gap;
 pub mod gap_model;
 mod idle;
+pub mod imports;
 pub mod inference_data;
 pub mod manifest;
 pub mod numerical_error;
@@ -119,8 +120,8 @@ pub fn learn(
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<(Learned, Option<Kept<Calibrated>>), Stop> {
-    let design = design::stage(study, run, observer)?;
-    let simulated = simulate::stage(study, design.as_ref(), run, observer)?;
+    let placed = design::stage(study, run, observer)?;
+    let simulated = simulate::stage(study, placed.as_ref(), run, observer)?;
     let data = read::stage(study, simulated.as_ref(), run, observer)?;
     let fitting = surrogate::Fitting::of(study, data.value.runs()?)?;
     let (fitted, emulator) = surrogate::stage(study, &data, &fitting, run, observer)?;

@@ -85,8 +85,15 @@ pub fn stage(
     let points = ensemble.points.select_rows(&chosen);
     let model = (section.model.built.identity(), &section.model.common);
     observer.begin("finer", "run", names.len() as u64);
-    let runs =
-        simulate::kept(study, &simulator, runs_folder, &names, &points, &model, run, observer)?;
+    let runs = simulate::kept(
+        study,
+        &simulator,
+        runs_folder,
+        simulate::Asked::new(&names, &points),
+        &model,
+        run,
+        observer,
+    )?;
     let made = run.stage_folder(runs_folder);
     let reader = study.simulations.as_ref().map(|s| s.built.identity());
     let inputs = json!([runs.hash, data.hash, reader]);

@@ -279,7 +279,8 @@ fn extended(
         .collect();
     let model = (section.built.identity(), &section.common);
     observer.begin("refine", "run", names.len() as u64);
-    let made = simulate::kept(study, &simulator, &stage, &names, points, &model, run, observer)?;
+    let asked = simulate::Asked::new(&names, points);
+    let made = simulate::kept(study, &simulator, &stage, asked, &model, run, observer)?;
     observer.end("refine", &format!("{} runs near the posterior", names.len()));
     let folder = run.stage_folder(&stage);
     let more = read::ensemble(study, Some(Runs { folder: &folder, made: &made.value }))?;

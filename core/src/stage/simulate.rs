@@ -3,21 +3,25 @@
 //! Every run's result file is written as it finishes and noted in `progress.jsonl`; a killed study goes
 //! on with the runs that are missing, and runs that failed are tried again.
 
-use std::collections::BTreeMap;
-use std::fs::{self, OpenOptions};
-use std::io::Write as _;
+mod log;
+
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::linalg::Matrix;
-use crate::plugin::executor::{Batch, Finished, Job};
+use crate::plugin::Executor;
+use crate::plugin::executor::{Batch, Finished, Job, Written};
 use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
 use crate::study::Study;
 
-use super::design::Design;
+use super::design::Placed;
+use super::imports::Imported;
 use super::simulator::{Setting, Simulator};
+use log::Log;
+pub use log::{Roll, earlier};
 
 /// The runs that were made.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,7 +63,6 @@ pub struct RunRecord {
 /// The table of the runs of a scenario.
 pub(super) const TABLE: &str = "runs.csv";
 const FOLDERS: &str = "scenarios.json";
-const LOG: &str = "progress.jsonl";
 
 impl Artifact for Simulated {
     fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
@@ -176,51 +179,122 @@ fn is_whole(record: &RunRecord, folder: &Path) -> bool {
     })
 }
 
+/// What is to be run.
+#[derive(Debug, Clone, Copy)]
+pub struct Asked<'a> {
+    /// The name of each run.
+    pub names: &'a [String],
+    /// The parameters of each.
+    pub points: &'a Matrix,
+    /// The finished runs among them that were made elsewhere, by folder.
+    pub imported: &'a [Imported],
+}
+
+impl<'a> Asked<'a> {
+    /// Runs at some points.
+    pub fn new(names: &'a [String], points: &'a Matrix) -> Self {
+        Self { names, points, imported: &[] }
+    }
+}
+
 /// Runs the simulator; `None` when the study has no design or no model.
 pub fn stage(
     study: &Study,
-    design: Option<&Kept<Design>>,
+    placed: Option<&Placed>,
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Option<Kept<Simulated>>, Stop> {
-    let (Some(design), Some(simulator)) = (design, Simulator::of(study)?) else { return Ok(None) };
+    let (Some(placed), Some(simulator)) = (placed, Simulator::of(study)?) else { return Ok(None) };
     let Some(section) = &study.model else { return Ok(None) };
-    let points = &design.value.points;
-    let names = names(points.rows());
+    let (names, points) = (&placed.names, &placed.design.value.points);
+    let asked = Asked { names, points, imported: &placed.imported };
     let model = (section.built.identity(), &section.common);
     let count = points.rows() * simulator.settings.len();
     observer.begin("simulate", "run", count as u64);
-    let kept = kept(study, &simulator, STAGE, &names, points, &model, run, observer)?;
+    let inputs = Inputs::of(&simulator, &model)?;
+    let smaller = smaller(study, placed);
+    let smaller: Vec<Value> = smaller
+        .iter()
+        .map(|(names, points, some)| {
+            inputs.value(Asked { names, points, imported: &placed.imported[..*some] })
+        })
+        .collect();
+    run.go_on_from(STAGE, &inputs.value(asked), &smaller)?;
+    let kept = kept(study, &simulator, STAGE, asked, &model, run, observer)?;
     observer.end("simulate", &summary(&kept.value));
     Ok(Some(kept))
 }
 
+/// The designs that this one may have grown from, the largest first: their results are kept. Each with the number of
+/// folders that it imported.
+fn smaller(study: &Study, placed: &Placed) -> Vec<(Vec<String>, Matrix, usize)> {
+    let Some(section) = &study.design else { return Vec::new() };
+    let keys = &section.common;
+    let steps = |n: usize| (0..=n).rev();
+    let mut all = Vec::new();
+    for extensions in steps(keys.extended.len()) {
+        let own: usize = keys.runs.get()
+            + keys.extended[..extensions].iter().map(|count| count.get()).sum::<usize>();
+        for folders in steps(placed.imported.len()) {
+            let brought: usize = placed.imported[..folders].iter().map(|i| i.names.len()).sum();
+            let rows: Vec<usize> = (0..own).chain(keys.total()..keys.total() + brought).collect();
+            if rows.len() < placed.names.len() {
+                let names = rows.iter().map(|&i| placed.names[i].clone()).collect();
+                all.push((names, placed.design.value.points.select_rows(&rows), folders));
+            }
+        }
+    }
+    all
+}
+
+/// What the runs depend on besides their points.
+struct Inputs {
+    model: Value,
+    asked: Value,
+    files: String,
+}
+
+impl Inputs {
+    fn of(simulator: &Simulator<'_>, model: &impl Serialize) -> Result<Self, Stop> {
+        // In a study without scenarios the conditions say nothing.
+        let asked: Vec<_> = simulator.settings.iter().map(|s| (&s.asked, s.scenario)).collect();
+        let model_files: Vec<PathBuf> = simulator.model.files(simulator.study);
+        let files = files::hash_sources(&model_files)?;
+        Ok(Self { model: json!(model), asked: json!(asked), files })
+    }
+
+    fn value(&self, asked: Asked<'_>) -> Value {
+        let Self { model, asked: shapes, files } = self;
+        let plain = json!([asked.names, asked.points, model, shapes, files]);
+        if asked.imported.is_empty() {
+            return plain;
+        }
+        let hashes: Vec<&String> = asked.imported.iter().map(|imported| &imported.hash).collect();
+        json!([plain, { "imports": hashes }])
+    }
+}
+
 /// The runs at some points as a stage of their own: taken when they are there, made when not, and
 /// those that failed or lost their files made again.
-#[expect(clippy::too_many_arguments, reason = "what runs, where, and what its hash is made of")]
 pub fn kept(
     study: &Study,
     simulator: &Simulator<'_>,
     stage: &str,
-    names: &[String],
-    points: &Matrix,
+    asked: Asked<'_>,
     model: &impl Serialize,
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Kept<Simulated>, Stop> {
-    // In a study without scenarios the conditions say nothing.
-    let asked: Vec<_> = simulator.settings.iter().map(|s| (&s.asked, s.scenario)).collect();
-    let model_files: Vec<PathBuf> = simulator.model.files(simulator.study);
-    let inputs = json!([names, points, model, asked, files::hash_sources(&model_files)?]);
+    let inputs = Inputs::of(simulator, model)?.value(asked);
     let folder = run.stage_folder(stage);
-    let make = |folder: &Path| simulate(study, simulator, names, points, folder, observer);
+    let make = |folder: &Path| simulate(study, simulator, asked, folder, observer);
     let kept = run.keep(stage, &inputs, observer, make)?;
     let damaged = if kept.fresh { 0 } else { kept.value.damaged(&folder) };
     if damaged > 0 {
         observer.warn(&format!(
             "result files in {} are missing or not as they were written ({damaged} of {}); making them again",
             folder.display(),
-            names.len()
+            asked.names.len()
         ));
     }
     if damaged > 0 || (!kept.fresh && kept.value.failures() > 0) {
@@ -247,55 +321,80 @@ fn summary(simulated: &Simulated) -> String {
 fn simulate(
     study: &Study,
     simulator: &Simulator<'_>,
-    names: &[String],
-    points: &Matrix,
+    asked: Asked<'_>,
     folder: &Path,
     observer: &dyn Observer,
 ) -> Result<Simulated, Stop> {
     let progress = Progress::new(observer);
-    let mut scenarios = Vec::new();
-    for setting in &simulator.settings {
+    let executor = study.executor.as_ref().ok_or_else(|| Stop::new("the study has no executor"))?;
+    Roll::of(asked, simulator).write(folder)?;
+    let work = |(place, setting): (usize, &Setting<'_>)| {
         let folder = inside(folder, &setting.folder);
         fs::create_dir_all(&folder).map_err(|error| files::cannot_write(&folder, &error))?;
-        let work = Work { study, simulator, setting, names, points, folder: &folder };
-        scenarios.push(Made { folder: setting.folder.clone(), runs: work.run(&progress)? });
-    }
+        let executor = &*executor.built.plugin;
+        let work = Work { study, executor, simulator, setting, place, asked, folder: &folder };
+        Ok(Made { folder: setting.folder.clone(), runs: work.run(&progress)? })
+    };
+    let settings = simulator.settings.iter().enumerate();
+    let scenarios: Result<Vec<Made>, Stop> = if executor.built.plugin.waits() {
+        // Jobs of one scenario need not wait for those of another.
+        std::thread::scope(|scope| {
+            let threads: Vec<_> =
+                settings.map(|setting| scope.spawn(move || work(setting))).collect();
+            let ended = threads.into_iter().map(|thread| {
+                thread.join().unwrap_or_else(|_| Err(Stop::new("the executor panicked")))
+            });
+            ended.collect()
+        })
+    } else {
+        settings.map(work).collect()
+    };
     let parameters = simulator.unknowns.clone();
-    Ok(Simulated { scenarios, parameters, points: points.clone() })
+    Ok(Simulated { scenarios: scenarios?, parameters, points: asked.points.clone() })
 }
 
 /// The runs of one scenario.
 struct Work<'a> {
     study: &'a Study,
+    executor: &'a dyn Executor,
     simulator: &'a Simulator<'a>,
     setting: &'a Setting<'a>,
-    names: &'a [String],
-    points: &'a Matrix,
+    /// The scenario's place among all.
+    place: usize,
+    asked: Asked<'a>,
     folder: &'a Path,
 }
 
 impl Work<'_> {
     /// Makes the runs that are missing.
     fn run(&self, progress: &Progress<'_>) -> Result<Vec<RunRecord>, Stop> {
-        let (names, folder) = (self.names, self.folder);
-        let executor =
-            self.study.executor.as_ref().ok_or_else(|| Stop::new("the study has no executor"))?;
+        let (names, folder) = (self.asked.names, self.folder);
         let mut ended = earlier(folder);
         ended.retain(|_, record| is_whole(record, folder));
+        let mut log = Log::open(folder)?;
+        for imported in self.asked.imported {
+            for name in imported
+                .names
+                .iter()
+                .filter(|name| !ended.contains_key(*name))
+                .cloned()
+                .collect::<Vec<_>>()
+            {
+                if let Some(record) = imported.bring(self.place, &name, folder)? {
+                    log.note(&record)?;
+                    ended.insert(name, record);
+                }
+            }
+        }
         let missing: Vec<usize> =
             (0..names.len()).filter(|&i| !ended.contains_key(&names[i])).collect();
         progress.add((names.len() - missing.len()) as u64);
-        let inputs = |i: usize| self.setting.inputs(self.points.row(i));
+        let inputs = |i: usize| self.setting.inputs(self.asked.points.row(i));
         let jobs: Vec<Job> =
             missing.iter().map(|&i| Job { name: names[i].clone(), inputs: inputs(i) }).collect();
-        let log_path = folder.join(LOG);
-        let mut log = OpenOptions::new()
-            .create(true)
-            .append(true)
-            .open(&log_path)
-            .map_err(|error| files::cannot_write(&log_path, &error))?;
         let batch = Batch {
             model: self.simulator.model,
+            recipe: &self.simulator.recipe,
             names: &self.simulator.names,
             units: &self.simulator.units,
             jobs: &jobs,
@@ -306,14 +405,12 @@ impl Work<'_> {
         };
         let mut note = |finished: Finished| {
             let record = record(&jobs[finished.index].name, finished, folder)?;
-            let line = serde_json::to_string(&record)
-                .map_err(|e| Stop::new(format!("cannot note a finished run: {e}")))?;
-            writeln!(log, "{line}").map_err(|error| files::cannot_write(&log_path, &error))?;
+            log.note(&record)?;
             ended.insert(record.run.clone(), record);
             progress.add(1);
             Ok(())
         };
-        let submitted = executor.built.plugin.submit(&batch, &mut note);
+        let submitted = self.executor.submit(&batch, &mut note);
         submitted.map_err(|stop| {
             let done = names.len() - missing.len()
                 + jobs.iter().filter(|j| ended.contains_key(&j.name)).count();
@@ -330,29 +427,13 @@ pub fn names(count: usize) -> Vec<String> {
     (1..=count).map(|i| format!("run{i:0digits$}")).collect()
 }
 
-/// What an earlier, interrupted attempt noted; the last word on each run counts.
-fn earlier(folder: &Path) -> BTreeMap<String, RunRecord> {
-    let text = fs::read_to_string(folder.join(LOG)).unwrap_or_default();
-    text.lines()
-        .filter_map(|line| serde_json::from_str::<RunRecord>(line).ok())
-        .map(|record| (record.run.clone(), record))
-        .collect()
-}
-
 fn record(run: &str, finished: Finished, folder: &Path) -> Result<RunRecord, Stop> {
     let run = run.to_owned();
     let seconds = finished.seconds;
     Ok(match finished.outcome {
-        Ok((response, file)) => {
+        Ok(Written { file, valid }) => {
             let sha256 = Some(files::hash_file(&folder.join(&file))?);
-            RunRecord {
-                run,
-                file: Some(file),
-                sha256,
-                valid: response.valid,
-                reason: None,
-                seconds,
-            }
+            RunRecord { run, file: Some(file), sha256, valid, reason: None, seconds }
         }
         Err(reason) => {
             // One line a run in the table.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::data::{Axis, Coordinates, Layout, Scenario, Unit};
 use crate::linalg::{Matrix, multiply};
+use crate::plugin::executor::Recipe;
 use crate::plugin::model::{Call, EvalError, Gradient, Input, Model, Response};
 use crate::plugin::registry::Section;
 use crate::plugin::{Context, Given};
@@ -17,6 +18,8 @@ use crate::study::inputs::Computed;
 pub struct Simulator<'a> {
     /// The model.
     pub model: &'a dyn Model,
+    /// How another process builds it.
+    pub recipe: Recipe,
     /// The folder of the study file.
     pub study: &'a Path,
     /// The name of each input of the model.
@@ -138,7 +141,8 @@ impl<'a> Simulator<'a> {
         }
         let free = other.free.iter().map(|(name, _)| (*name).to_owned());
         let unknowns = study.parameters.iter().map(|p| p.name.clone()).chain(free).collect();
-        Ok(Self { study: &study.directory, model, names, units, settings, unknowns })
+        let recipe = Recipe::of(&section.built, &study.libraries.loaded)?;
+        Ok(Self { study: &study.directory, model, recipe, names, units, settings, unknowns })
     }
 
     /// The responses to all scenarios at one point, in the study's unit.

@@ -29,7 +29,7 @@ impl Study {
     /// What a plugin sees of the study with a response of this shape: that of a block of scenarios, or for
     /// models and readers that to one scenario.
     pub fn context_of<'a>(&'a self, layout: &'a Layout) -> Context<'a> {
-        let made = self.design.as_ref().map(|design| design.common.runs.get());
+        let made = self.design.as_ref().map(|design| design.common.total());
         let kept = self.surrogate.as_ref().map_or(0, |s| s.common.validation);
         let training = self.surrogate.as_ref().and_then(|s| s.common.training).map(usize::from);
         let runs = training.or_else(|| made.map(|made| made.saturating_sub(kept)));

@@ -192,8 +192,9 @@ fn refinement(study: &Study, complaints: &mut Complaints<'_>) {
 
 fn runs(study: &Study, complaints: &mut Complaints<'_>) {
     let (Some(design), Some(surrogate)) = (&study.design, &study.surrogate) else { return };
-    let imported = study.simulations.as_ref().is_some_and(|s| s.built.plugin.names_files());
-    let (runs, kept) = (design.common.runs.get(), surrogate.common.validation);
+    let imported = study.simulations.as_ref().is_some_and(|s| s.built.plugin.names_files())
+        || !design.common.imports.is_empty();
+    let (runs, kept) = (design.common.total(), surrogate.common.validation);
     let training = surrogate.common.training.map_or(1, usize::from);
     if !imported && training + kept > runs {
         let key = if surrogate.common.training.is_some() { "training" } else { "validation" };

@@ -4,6 +4,7 @@
 //! the plugin's own options.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -81,6 +82,21 @@ pub struct ModelKeys {
 pub struct DesignKeys {
     /// The number of simulation runs.
     pub runs: Count,
+    /// Numbers of runs that were added later, one after the other: `[97]` adds 97 without moving the others, whose
+    /// results are kept. `lacuna campaign extend RUN` adds to the list of a run directory.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub extended: Vec<Count>,
+    /// Folders with finished runs that are used too, relative to the study file: those that `lacuna campaign import RUN`
+    /// makes of runs made by hand, or the folder `2-simulate` of another run directory.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub imports: Vec<PathBuf>,
+}
+
+impl DesignKeys {
+    /// The number of runs that the design places, those added later too.
+    pub fn total(&self) -> usize {
+        self.runs.get() + self.extended.iter().map(|count| count.get()).sum::<usize>()
+    }
 }
 
 /// The engine's keys of `[measurements]`.

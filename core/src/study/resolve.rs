@@ -148,7 +148,7 @@ pub enum Use {
     Run,
     /// To say what is wrong with it: no library of plugins is loaded, since that would run its code.
     Check,
-    /// To look at what a finished run has kept: the model, which is not asked, may be gone.
+    /// To look at what a run has kept: the model and the executor, which are not asked, may be gone.
     Look,
 }
 
@@ -163,10 +163,19 @@ pub fn load_for(path: &Path, arguments: &[String], purpose: Use) -> Checked {
 
 /// Checks a study given as text, as if it stood in a file at `path`.
 pub fn load_text(path: &Path, text: &str, arguments: &[String]) -> Checked {
+    text_for(path, text, arguments, Use::Run)
+}
+
+/// The same for some use, without arguments.
+pub fn load_text_for(path: &Path, text: &str, purpose: Use) -> Checked {
+    text_for(path, text, &[], purpose)
+}
+
+fn text_for(path: &Path, text: &str, arguments: &[String], purpose: Use) -> Checked {
     let mut sources = Sources::default();
     let mut problems = Problems::new();
     let root = inherit::load_text(path, text.to_owned(), &common_keys, &mut sources, &mut problems);
-    finish(path, text.to_owned(), root, arguments, Use::Run, sources, problems)
+    finish(path, text.to_owned(), root, arguments, purpose, sources, problems)
 }
 
 fn finish(
@@ -316,7 +325,7 @@ fn structure(
 /// Third layer: what the plugins need of the machine.
 fn environment(study: &Study, purpose: Use, root: &Node, problems: &mut Problems) {
     study.each_plugin(root, problems, |section, component, context, complaints| {
-        if purpose != Use::Look || !["model", "numerical_error"].contains(&section) {
+        if purpose != Use::Look || !["model", "numerical_error", "executor"].contains(&section) {
             component.environment(context, complaints);
         }
     });

@@ -142,6 +142,22 @@ impl Design for Quadrature {
         }
         Ok(points)
     }
+
+    /// The nodes stay; what is added are random points, as behind the nodes of any design of this kind.
+    fn extend(
+        &self,
+        parameters: &[Parameter],
+        known: &Matrix,
+        count: usize,
+        stream: &Stream,
+    ) -> Result<Matrix, Stop> {
+        let all = self.place(parameters, known.rows() + count, stream)?;
+        if all.as_slice()[..known.as_slice().len()] != *known.as_slice() {
+            return Err(Stop::new("with more runs the rule has other nodes")
+                .help("give the `level` of the rule: then further runs are random points"));
+        }
+        Ok(all.select_rows(&(known.rows()..all.rows()).collect::<Vec<_>>()))
+    }
 }
 
 lacuna::register!(Design, "quadrature", Quadrature);

@@ -77,7 +77,7 @@ impl UmBridge {
         let all: Vec<usize> = all.collect();
         let sizes = self.input_sizes().map_err(refused)?;
         if sizes.iter().sum::<usize>() != all.len() {
-            let (url, model, count) = (&self.url, &self.model, all.len());
+            let (url, model, count) = (self.place(), &self.model, all.len());
             return fatal(format!(
                 "`{model}` at {url} takes input vectors of the sizes {sizes:?}, the study has {count} inputs"
             ));
@@ -107,16 +107,32 @@ impl UmBridge {
         Ok(config)
     }
 
-    /// Complains of an address that is none.
+    /// Complains of addresses that are none, or of one too many.
     pub(super) fn check_address(&self, complaints: &mut Complaints<'_>) {
-        let host = self.url.strip_prefix("http://").map(|rest| rest.trim_end_matches('/'));
-        if host.is_none_or(|host| host.is_empty() || host.contains(char::is_whitespace)) {
+        if self.url.is_empty() == self.urls.is_empty() {
+            let found = if self.url.is_empty() { "neither" } else { "both" };
             complaints
                 .at("url")
-                .say("this is no address of an UM-Bridge server")
-                .expected("an address such as `http://localhost:4242`")
-                .found(format!("`{}`", self.url));
+                .say("a model is at one address or at several")
+                .expected("`url` or `urls`")
+                .found(found);
+            return;
         }
+        for url in self.addresses() {
+            let host = url.strip_prefix("http://").map(|rest| rest.trim_end_matches('/'));
+            if host.is_none_or(|host| host.is_empty() || host.contains(char::is_whitespace)) {
+                complaints
+                    .at(self.address_key())
+                    .say("this is no address of an UM-Bridge server")
+                    .expected("an address such as `http://localhost:4242`")
+                    .found(format!("`{url}`"));
+            }
+        }
+    }
+
+    /// The option that holds the addresses.
+    pub(super) fn address_key(&self) -> &'static str {
+        if self.urls.is_empty() { "url" } else { "urls" }
     }
 
     /// Complains of inputs that cannot stand where they stand.

@@ -4,16 +4,18 @@ use std::fmt;
 use std::sync::OnceLock;
 use std::time::Duration;
 
+use lacuna::study::values::Count;
 use lacuna_um_bridge::Client;
 use lacuna_um_bridge::client::Error;
 use lacuna_um_bridge::protocol::{About, Config, Support};
 
 use super::UmBridge;
+use super::pool::Pool;
 
 /// What is known of the server.
 #[derive(Default)]
 pub(super) struct Connection {
-    client: OnceLock<Client>,
+    pool: OnceLock<Pool>,
     support: OnceLock<Support>,
     input_sizes: OnceLock<Vec<usize>>,
     output_sizes: OnceLock<Vec<usize>>,
@@ -35,11 +37,31 @@ fn once<T>(cell: &OnceLock<T>, make: impl FnOnce() -> Result<T, Error>) -> Resul
 }
 
 impl UmBridge {
-    pub(super) fn client(&self) -> &Client {
-        self.connection.client.get_or_init(|| {
+    /// The answer of a server that is free.
+    pub(super) fn ask<T>(
+        &self,
+        question: impl Fn(&Client) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        let pool = self.connection.pool.get_or_init(|| {
             let timeout = Duration::try_from_secs_f64(self.timeout.get()).unwrap_or(Duration::MAX);
-            Client::new(&self.url, timeout, self.retries)
-        })
+            let alone = if self.urls.is_empty() { usize::MAX } else { 1 };
+            let most = self.parallel.map_or(alone, Count::get);
+            Pool::new(self.addresses(), timeout, self.retries, most)
+        });
+        pool.ask(question)
+    }
+
+    /// The addresses of the servers.
+    pub(super) fn addresses(&self) -> &[String] {
+        if self.urls.is_empty() { std::slice::from_ref(&self.url) } else { &self.urls }
+    }
+
+    /// Where the model is, in words.
+    pub(super) fn place(&self) -> String {
+        match self.addresses() {
+            [only] => only.clone(),
+            all => format!("{} and {} other addresses", all[0], all.len() - 1),
+        }
     }
 
     /// The model with these settings.
@@ -49,26 +71,31 @@ impl UmBridge {
 
     /// What the model can be asked for.
     pub(super) fn support(&self) -> Result<Support, Error> {
-        let ask = || self.client().support(&self.about(self.config.clone()));
+        let ask = || self.ask(|client| client.support(&self.about(self.config.clone())));
         once(&self.connection.support, ask).copied()
     }
 
     /// The same from a server that answers at once.
     pub(super) fn support_now(&self) -> Option<Support> {
-        let client = || Client::new(&self.url, Duration::from_secs(60), 0);
-        let ask = || client().support(&self.about(self.config.clone()));
+        let ask = || {
+            let about = self.about(self.config.clone());
+            let of = |url: &String| Client::new(url, Duration::from_secs(60), 0).support(&about);
+            let mut answers = self.addresses().iter().map(of);
+            let first = answers.next().unwrap_or_else(|| unreachable!("there is an address"));
+            first.or_else(|error| answers.find_map(Result::ok).ok_or(error))
+        };
         once(&self.connection.support, ask).ok().copied()
     }
 
     /// The length of each input vector, under the settings that the study writes.
     pub(super) fn input_sizes(&self) -> Result<&[usize], Error> {
-        let ask = || self.client().input_sizes(&self.about(self.config.clone()));
+        let ask = || self.ask(|client| client.input_sizes(&self.about(self.config.clone())));
         once(&self.connection.input_sizes, ask).map(Vec::as_slice)
     }
 
     /// The length of each output vector, under the settings that the study writes.
     pub(super) fn output_sizes(&self) -> Result<&[usize], Error> {
-        let ask = || self.client().output_sizes(&self.about(self.config.clone()));
+        let ask = || self.ask(|client| client.output_sizes(&self.about(self.config.clone())));
         once(&self.connection.output_sizes, ask).map(Vec::as_slice)
     }
 }

@@ -14,17 +14,23 @@ use super::UmBridge;
 /// How long the server may take to say who it is.
 const PATIENCE: f64 = 10.0;
 
-/// Complains of a server that is not there or does not have the model.
+/// Complains of servers that are not there or do not have the model.
 pub(super) fn check(model: &UmBridge, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+    for url in model.addresses() {
+        of_address(model, url, context, complaints);
+    }
+}
+
+fn of_address(model: &UmBridge, url: &str, context: &Context<'_>, complaints: &mut Complaints<'_>) {
     let patience = Duration::from_secs_f64(model.timeout.get().min(PATIENCE));
-    let client = Client::new(&model.url, patience, 0);
+    let client = Client::new(url, patience, 0);
     let about = model.about(model.config.clone());
-    if !knows_the_model(model, &client, complaints) {
+    if !knows_the_model(model, url, &client, complaints) {
         return;
     }
     match client.support(&about) {
         Ok(support) if !support.evaluate => {
-            let text = format!("`{}` at {} cannot be evaluated", model.model, model.url);
+            let text = format!("`{}` at {url} cannot be evaluated", model.model);
             complaints
                 .at("model")
                 .say(text)
@@ -32,36 +38,41 @@ pub(super) fn check(model: &UmBridge, context: &Context<'_>, complaints: &mut Co
                 .found("one that does not");
         }
         Ok(_) => sizes(model, &client, &about, context, complaints),
-        Err(error) => asked_in_vain(&error, complaints),
+        Err(error) => asked_in_vain(model, &error, complaints),
     }
 }
 
-fn asked_in_vain(error: &Error, complaints: &mut Complaints<'_>) {
-    let problem = complaints.at("url").say(error.to_string());
+fn asked_in_vain(model: &UmBridge, error: &Error, complaints: &mut Complaints<'_>) {
+    let problem = complaints.at(model.address_key()).say(error.to_string());
     if matches!(error, Error::Unreachable { .. }) {
         problem.help("start the server first, or correct the address");
     }
 }
 
-fn knows_the_model(model: &UmBridge, client: &Client, complaints: &mut Complaints<'_>) -> bool {
+fn knows_the_model(
+    model: &UmBridge,
+    url: &str,
+    client: &Client,
+    complaints: &mut Complaints<'_>,
+) -> bool {
     let info = match client.info() {
         Ok(info) => info,
         Err(error) => {
-            asked_in_vain(&error, complaints);
+            asked_in_vain(model, &error, complaints);
             return false;
         }
     };
     if info.protocol_version != VERSION {
         complaints
-            .at("url")
-            .say(format!("the server at {} speaks another version of UM-Bridge", model.url))
+            .at(model.address_key())
+            .say(format!("the server at {url} speaks another version of UM-Bridge"))
             .expected("version 1.0")
             .found(format!("version {:?}", info.protocol_version));
         return false;
     }
     if !info.models.contains(&model.model) {
         let names = || info.models.iter().map(String::as_str);
-        let text = format!("the server at {} has no model `{}`", model.url, model.model);
+        let text = format!("the server at {url} has no model `{}`", model.model);
         let problem = complaints.at("model").say(text).expected(one_of(names()));
         problem.found(format!("`{}`", model.model));
         if let Some(near) = nearest(&model.model, names()) {
@@ -84,7 +95,7 @@ fn sizes(
             inputs_fit(model, &inputs, context, complaints);
             outputs_fit(model, &outputs, context, complaints);
         }
-        (Err(error), _) | (_, Err(error)) => asked_in_vain(&error, complaints),
+        (Err(error), _) | (_, Err(error)) => asked_in_vain(model, &error, complaints),
     }
 }
 
@@ -94,7 +105,7 @@ fn inputs_fit(
     context: &Context<'_>,
     complaints: &mut Complaints<'_>,
 ) {
-    let takes = format!("`{}` at {} takes other inputs", model.model, model.url);
+    let takes = format!("`{}` at {} takes other inputs", model.model, model.place());
     if let Some(vectors) = &model.inputs {
         let ours: Vec<usize> = vectors.iter().map(Vec::len).collect();
         if ours != sizes {
@@ -136,7 +147,7 @@ fn outputs_fit(
     if let Some(&unknown) = chosen.iter().find(|&&i| i >= sizes.len()) {
         complaints
             .at("outputs")
-            .say(format!("`{}` at {} has no output vector {unknown}", model.model, model.url))
+            .say(format!("`{}` at {} has no output vector {unknown}", model.model, model.place()))
             .expected(format!("numbers below {}", sizes.len()))
             .found(unknown);
         return;
@@ -148,7 +159,8 @@ fn outputs_fit(
             .at(path)
             .say(format!(
                 "the outputs of `{}` at {} do not fill the response",
-                model.model, model.url
+                model.model,
+                model.place()
             ))
             .expected(format!("{expected} values, as `[response]` has them"))
             .found(format!("{found}, in vectors of the sizes {sizes:?}"));

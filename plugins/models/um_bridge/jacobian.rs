@@ -31,7 +31,8 @@ impl Gradient for UmBridge {
             (_, true) => asked.rows(call.layout.len()),
             _ => Err(EvalError::Fatal(format!(
                 "`{}` at {} offers no derivatives",
-                self.model, self.url
+                self.model,
+                self.place()
             ))),
         }
     }
@@ -51,7 +52,7 @@ impl UmBridge {
         outputs.filter(fits).ok_or_else(|| {
             EvalError::Fatal(format!(
                 "`{}` at {} has output vectors of the sizes {sizes:?}, the response has {total} values",
-                self.model, self.url
+                self.model, self.place()
             ))
         })
     }
@@ -77,12 +78,9 @@ impl Asked<'_> {
             let mut first = 0;
             for &(output, length) in &self.outputs {
                 let at = Place { output, input: v };
-                let answer = self.model.client().apply_jacobian(
-                    &self.about,
-                    at,
-                    &self.question.input,
-                    &direction,
-                );
+                let answer = self.model.ask(|client| {
+                    client.apply_jacobian(&self.about, at, &self.question.input, &direction)
+                });
                 let column = self.sized(answer.map_err(refused)?, length)?;
                 for (i, value) in column.into_iter().enumerate() {
                     jacobian.row_mut(first + i)[j] = value;
@@ -103,8 +101,9 @@ impl Asked<'_> {
         for (i, (output, weight)) in places.enumerate() {
             for v in self.vectors() {
                 let at = Place { output, input: v };
-                let answer =
-                    self.model.client().gradient(&self.about, at, &self.question.input, &weight);
+                let answer = self
+                    .model
+                    .ask(|client| client.gradient(&self.about, at, &self.question.input, &weight));
                 let row = self.sized(answer.map_err(refused)?, self.question.input[v].len())?;
                 for (j, _, k) in self.inputs().filter(|&(_, vector, _)| vector == v) {
                     jacobian.row_mut(i)[j] = row[k];
@@ -121,7 +120,7 @@ impl Asked<'_> {
         }
         Err(EvalError::Rejected(format!(
             "the server at {} answered {found} derivatives, expected {expected}",
-            self.model.url
+            self.model.place()
         )))
     }
 }

@@ -4,13 +4,14 @@ mod arrangement;
 mod connection;
 mod environment;
 mod jacobian;
+mod pool;
 #[cfg(test)]
 mod tests;
 
 use lacuna::plugin::model::{Call, EvalError, Gradient, Input, Response, Signature};
 use lacuna::plugin::{Component, Context, Model};
 use lacuna::study::problem::Complaints;
-use lacuna::study::values::Positive;
+use lacuna::study::values::{Count, Positive};
 use lacuna_um_bridge::client;
 use lacuna_um_bridge::protocol::Config;
 use schemars::JsonSchema;
@@ -21,7 +22,7 @@ use connection::Connection;
 /// A model behind a server that speaks UM-Bridge 1.0: any language, any machine.
 ///
 /// The server is asked over HTTP for one evaluation at a time; several are under way when the executor runs several
-/// (`threads` of `local`). The study's inputs fill the model's input vectors in the study's order, and the model's
+/// (`threads` of `local`; with `urls` give it as many as there are servers). The study's inputs fill the model's input vectors in the study's order, and the model's
 /// output vectors, one after the other, are the response: values in the order of the response's axes, the last axis
 /// fastest, in the study's units. In a study with scenarios the settings sent to the model also name the
 /// `scenario`.
@@ -38,8 +39,18 @@ use connection::Connection;
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct UmBridge {
-    /// The server's address, such as `http://localhost:4242`.
+    /// The server's address, such as `http://localhost:4242`, or that of a load balancer in front of many.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub url: String,
+    /// The addresses of several servers of the same model, in place of `url`. Each question goes to a server that is free;
+    /// one that is gone is left out with a warning and its question put to another. An input at which two servers end
+    /// counts as failed.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub urls: Vec<String>,
+    /// How many evaluations are under way at a time at each address; when left out 1 with `urls`, and with `url` as many
+    /// as the executor runs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parallel: Option<Count>,
     /// The model's name on the server; `forward` when left out.
     #[serde(default = "UmBridge::forward")]
     pub model: String,
@@ -86,7 +97,8 @@ impl UmBridge {
     fn answer(&self, call: &Call<'_>) -> Result<Vec<f64>, EvalError> {
         let question = self.arranged(call)?;
         let about = self.about(question.config);
-        let outputs = self.client().evaluate(&about, &question.input).map_err(refused)?;
+        let outputs = self.ask(|client| client.evaluate(&about, &question.input));
+        let outputs = outputs.map_err(refused)?;
         let values = match &self.outputs {
             None => outputs.concat(),
             Some(chosen) => {
@@ -96,7 +108,7 @@ impl UmBridge {
                     let found = outputs.len();
                     EvalError::Rejected(format!(
                         "the server at {} answered {found} output vectors, expected at least {}",
-                        self.url,
+                        self.place(),
                         chosen.iter().max().map_or(0, |last| last + 1)
                     ))
                 })?;
@@ -107,7 +119,7 @@ impl UmBridge {
         if found != expected {
             return Err(EvalError::Rejected(format!(
                 "the server at {} answered {found} values, expected {expected}",
-                self.url
+                self.place()
             )));
         }
         Ok(values)

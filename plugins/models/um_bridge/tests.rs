@@ -234,3 +234,50 @@ fn the_study_gives_names_and_units() {
     assert_eq!(inputs.collect::<Vec<_>>(), [("a", "m"), ("b", "kg"), ("level", "1")]);
     assert_eq!(signature.layout, case.layout);
 }
+
+/// Servers of one toy; those after the first are made to end, or were never there.
+#[test]
+fn questions_go_to_servers_that_are_there() {
+    let toy = Toy::new(false, false);
+    let case = Case::new(&["a", "b", "c"], 3);
+    let servers: Vec<Server> =
+        (0..3).map(|_| Server::bind(Ipv4Addr::LOCALHOST.into(), 0).unwrap()).collect();
+    let urls: Vec<String> = servers.iter().map(|s| format!("\"http://{}\"", s.address())).collect();
+    let options = format!("urls = [{}, \"http://127.0.0.1:1\"]\nretries = 0", urls.join(", "));
+    let model = from_text::<dyn Model>("um_bridge", &options).unwrap().plugin;
+    std::thread::scope(|scope| {
+        let stoppers: Vec<_> = servers.iter().map(Server::stopper).collect();
+        // A server that has ended is dropped: nobody listens there any more.
+        let toy = &toy;
+        let mut threads: Vec<_> = servers
+            .into_iter()
+            .map(|server| Some(scope.spawn(move || server.serve(&[toy], 1))))
+            .collect();
+        let ask = |count: usize| {
+            let threads: Vec<_> = (0..count)
+                .map(|i| {
+                    let (model, case) = (&model, &case);
+                    scope.spawn(move || values(model.predict(&case.call(&[i as f64, 3.0, 5.0]))))
+                })
+                .collect();
+            for (i, thread) in threads.into_iter().enumerate() {
+                let i = i as f64;
+                assert_eq!(thread.join().unwrap(), [3.0 * i, 5.0, i + 5.0]);
+            }
+        };
+        let asked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            ask(12);
+            stoppers[1].stop();
+            threads[1].take().unwrap().join().unwrap();
+            ask(12);
+            // What has no answer has none, and costs no server.
+            let outcome = model.predict(&case.call(&[-1.0, 3.0, 5.0]));
+            assert!(matches!(outcome, Err(EvalError::Rejected(_))), "{outcome:?}");
+            ask(3);
+        }));
+        stoppers.iter().for_each(|stopper| stopper.stop());
+        asked.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+    });
+    let outcome = model.predict(&case.call(&[1.0, 3.0, 5.0]));
+    assert!(matches!(outcome, Err(EvalError::Fatal(_))), "{outcome:?}");
+}

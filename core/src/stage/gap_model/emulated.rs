@@ -87,8 +87,15 @@ impl Lesson<'_> {
         let count = names.len() * self.simulator.settings.len();
         observer.begin("gap-simulate", "run", count as u64);
         let (simulator, model) = (self.simulator, &self.model);
-        let made =
-            simulate::kept(study, simulator, &simulate, &names, points, model, run, observer)?;
+        let made = simulate::kept(
+            study,
+            simulator,
+            &simulate,
+            simulate::Asked::new(&names, points),
+            model,
+            run,
+            observer,
+        )?;
         observer.end("gap-simulate", &format!("{count} runs of `{}`", self.name));
         let section =
             study.surrogate.as_ref().ok_or_else(|| Stop::new("the study has no surrogate"))?;
@@ -186,7 +193,7 @@ pub(super) fn designed(study: &Study, parameters: &[Parameter]) -> Result<Matrix
             "add `[design]`, or take `[[gap.switch]]`, `[[gap.term]]` and `[[gap.model]]` out",
         )
     })?;
-    let runs = section.common.runs.get();
+    let runs = section.common.total();
     let cube = section.built.plugin.place(parameters, runs, &stream(study, "gap-design"))?;
     Ok(design::physical(&cube, parameters))
 }

@@ -1,0 +1,89 @@
+//! The state of a campaign as text.
+
+use super::{Row, State, Status};
+
+/// How many characters of a note are shown.
+const WIDTH: usize = 150;
+
+/// Counts a stage and scenario, then one line for every run that is not done, or for all.
+pub fn text(status: &Status, all: bool) -> String {
+    let mut text = String::new();
+    for warning in &status.warnings {
+        text.push_str(&format!("warning: {warning}\n"));
+    }
+    let mut groups: Vec<(&str, &str)> = Vec::new();
+    for row in &status.runs {
+        let group = (row.stage.as_str(), row.scenario.as_str());
+        if !groups.contains(&group) {
+            groups.push(group);
+        }
+    }
+    for (stage, scenario) in groups {
+        let rows: Vec<&Row> = status
+            .runs
+            .iter()
+            .filter(|row| row.stage == stage && row.scenario == scenario)
+            .collect();
+        let name =
+            if scenario.is_empty() { stage.to_owned() } else { format!("{stage}, {scenario}") };
+        text.push_str(&format!("{name}: {} runs, {}\n", rows.len(), counts(&rows)));
+        for state in State::ALL {
+            for row in rows.iter().filter(|row| row.state == state) {
+                if all || state != State::Done {
+                    text.push_str(&line(row));
+                }
+            }
+        }
+    }
+    if text.is_empty() {
+        text.push_str("no runs were asked for yet\n");
+    }
+    text
+}
+
+fn counts(rows: &[&Row]) -> String {
+    let count = |state: State| rows.iter().filter(|row| row.state == state).count();
+    let some = State::ALL.into_iter().filter(|&state| count(state) > 0);
+    some.map(|state| format!("{} {}", count(state), state.name())).collect::<Vec<_>>().join(", ")
+}
+
+fn line(row: &Row) -> String {
+    let note: String = row.note.replace('\n', "; ");
+    let note = match note.char_indices().nth(WIDTH) {
+        Some((cut, _)) => format!("{}…", &note[..cut]),
+        None => note,
+    };
+    let seconds = row.seconds.map_or(String::new(), |s| format!("{s:.1} s"));
+    let text = format!("  {:<10} {:<8} {seconds:>10}  {note}", row.run, row.state.name());
+    text.trim_end().to_owned() + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_done_has_a_line() {
+        let row = |run: &str, state: State, note: &str| Row {
+            stage: "2-simulate".to_owned(),
+            scenario: String::new(),
+            run: run.to_owned(),
+            state,
+            note: note.to_owned(),
+            seconds: (state == State::Done).then_some(1.5),
+        };
+        let runs = vec![
+            row("run001", State::Done, ""),
+            row("run002", State::Failed, "exit code 7\nand more"),
+            row("run003", State::Waiting, "job 1, task 2: PENDING"),
+        ];
+        let status = Status { runs, warnings: Vec::new() };
+        let expected = "\
+2-simulate: 3 runs, 1 done, 1 waiting, 1 failed
+  run003     waiting              job 1, task 2: PENDING
+  run002     failed               exit code 7; and more
+";
+        assert_eq!(text(&status, false), expected);
+        assert!(text(&status, true).contains("  run001     done          1.5 s\n"));
+    }
+}

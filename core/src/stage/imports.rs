@@ -1,0 +1,95 @@
+//! Finished runs that the study did not make: by hand, or by another study.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::linalg::Matrix;
+use crate::run::{Artifact as _, Stop, files};
+use crate::study::Study;
+
+use super::simulate::{RunRecord, Simulated, inside};
+
+/// Finished runs of a folder that is laid out as the simulate stage's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Imported {
+    /// The folder.
+    pub folder: PathBuf,
+    /// The names of the runs.
+    pub names: Vec<String>,
+    /// The parameters of each, in the study's order and units.
+    pub points: Matrix,
+    /// For each scenario its folder and how the runs ended.
+    scenarios: Vec<(PathBuf, Vec<RunRecord>)>,
+    /// A hash of all.
+    pub hash: String,
+}
+
+/// The folders that a study imports, in its order.
+pub fn read(study: &Study) -> Result<Vec<Imported>, Stop> {
+    let Some(design) = &study.design else { return Ok(Vec::new()) };
+    design.common.imports.iter().map(|path| of_folder(study, &study.directory.join(path))).collect()
+}
+
+/// The runs of one folder that have a result in every scenario.
+pub fn of_folder(study: &Study, folder: &Path) -> Result<Imported, Stop> {
+    let wrong = |what: String| {
+        Stop::new(format!("the runs in {} cannot be imported: {what}", folder.display()))
+            .help("`imports` in `[design]` takes folders such as `2-simulate` of a run directory, or what `lacuna campaign import RUN TABLE` makes")
+    };
+    let made = Simulated::load(folder).map_err(|stop| wrong(stop.message))?;
+    let (found, expected) = (made.scenarios.len(), study.scenarios.len());
+    if found != expected {
+        return Err(wrong(format!("they have {found} scenarios, the study has {expected}")));
+    }
+    let column = |name: &String| {
+        let place = made.parameters.iter().position(|known| known == name);
+        place.ok_or_else(|| wrong(format!("{} has no column `{name}`", super::simulate::TABLE)))
+    };
+    let columns =
+        study.parameters.iter().map(|p| column(&p.name)).collect::<Result<Vec<_>, _>>()?;
+    let first = &made.scenarios[0].runs;
+    let is_done =
+        |i: &usize| made.scenarios.iter().all(|s| s.runs.get(*i).is_some_and(|r| r.file.is_some()));
+    let rows: Vec<usize> = (0..first.len()).filter(is_done).collect();
+    let names: Vec<String> = rows.iter().map(|&i| first[i].run.clone()).collect();
+    let point = |&i: &usize| columns.iter().map(|&j| made.points[(i, j)]).collect::<Vec<f64>>();
+    let points = Matrix::from_rows(columns.len(), rows.iter().map(point));
+    let mut scenarios = Vec::new();
+    let mut lines = String::new();
+    for scenario in &made.scenarios {
+        let runs: Vec<RunRecord> = rows.iter().map(|&i| scenario.runs[i].clone()).collect();
+        for run in &runs {
+            let (file, hash) = (run.file.as_deref(), run.sha256.as_deref());
+            lines.push_str(&format!("{} {file:?} {hash:?}\n", run.run));
+        }
+        scenarios.push((scenario.folder.clone(), runs));
+    }
+    let hash = files::hash(format!("{lines}{:?}", points.as_slice()).as_bytes());
+    Ok(Imported { folder: folder.to_owned(), names, points, scenarios, hash })
+}
+
+impl Imported {
+    /// Puts the result of a run of a scenario into a folder, as it was written.
+    pub(super) fn bring(
+        &self,
+        scenario: usize,
+        run: &str,
+        target: &Path,
+    ) -> Result<Option<RunRecord>, Stop> {
+        let Some((own, records)) = self.scenarios.get(scenario) else { return Ok(None) };
+        let Some(record) = records.iter().find(|record| record.run == run) else { return Ok(None) };
+        let Some(file) = &record.file else { return Ok(None) };
+        let from = inside(&self.folder, own).join(file);
+        let hash = files::hash_file(&from)?;
+        if record.sha256.as_ref() != Some(&hash) {
+            let message = format!("{} is not as it was imported", from.display());
+            return Err(Stop::new(message)
+                .help("import the run again, or take its folder out of `imports` in `[design]`"));
+        }
+        let to = target.join(file);
+        if fs::hard_link(&from, &to).is_err() {
+            files::write_atomic(&to, &files::read(&from)?)?;
+        }
+        Ok(Some(record.clone()))
+    }
+}

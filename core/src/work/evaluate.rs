@@ -1,0 +1,72 @@
+//! Jobs made in this process.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::time::Instant;
+
+use crate::plugin::executor::{Batch, Job, Written};
+use crate::plugin::model::{Call, EvalError, Response};
+use crate::run::write_response;
+
+/// How a job ended here.
+#[derive(Debug)]
+pub struct Ended {
+    /// The response as it was written down, or why there is none.
+    pub outcome: Result<Written, EvalError>,
+    /// How long it took, in seconds.
+    pub seconds: f64,
+}
+
+/// Runs some jobs in one go and writes their responses down; the time is shared equally between them.
+///
+/// A model that panics costs the run in which it did and no other.
+pub fn evaluate(batch: &Batch<'_>, jobs: &[&Job]) -> Vec<Ended> {
+    let begun = Instant::now();
+    let folders: Vec<PathBuf> = jobs.iter().map(|job| batch.folder(job)).collect();
+    let pairs = jobs.iter().zip(&folders);
+    let calls: Vec<Call<'_>> = pairs.map(|(job, folder)| batch.call(job, folder)).collect();
+    let responses = catch_unwind(AssertUnwindSafe(|| batch.model.predict_batch(&calls)));
+    let outcomes: Vec<_> = match responses {
+        Ok(responses) => responses
+            .into_iter()
+            .zip(jobs.iter().zip(&calls))
+            .map(|(response, (job, call))| {
+                let response = response?;
+                catch_unwind(AssertUnwindSafe(|| keep(batch, job, call, &response)))
+                    .unwrap_or_else(|_| Err(panicked()))
+            })
+            .collect(),
+        Err(_) if jobs.len() > 1 => {
+            return jobs.iter().flat_map(|job| evaluate(batch, &[job])).collect();
+        }
+        Err(_) => vec![Err(panicked())],
+    };
+    let seconds = begun.elapsed().as_secs_f64() / jobs.len() as f64;
+    outcomes.into_iter().map(|outcome| Ended { outcome, seconds }).collect()
+}
+
+fn panicked() -> EvalError {
+    EvalError::Rejected("the model panicked".to_owned())
+}
+
+/// Writes a response down.
+fn keep(
+    batch: &Batch<'_>,
+    job: &Job,
+    call: &Call<'_>,
+    response: &Response,
+) -> Result<Written, EvalError> {
+    if let Some(i) = response.values.iter().position(|y| !y.is_finite()) {
+        let place = batch.layout.describe(i);
+        return Err(EvalError::Rejected(format!(
+            "the response is {} at {place}",
+            response.values[i]
+        )));
+    }
+    let file = match batch.model.write(&job.name, call, response, batch.directory)? {
+        Some(file) => file,
+        None => write_response(batch.directory, &job.name, batch.layout, response)
+            .map_err(|stop| EvalError::Fatal(stop.to_string()))?,
+    };
+    Ok(Written { file, valid: response.valid })
+}

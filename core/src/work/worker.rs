@@ -1,0 +1,165 @@
+//! What `lacuna work` does: some runs of an order, on whatever machine it was started.
+
+use std::io::{BufRead, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use super::{Begun, Limits, Marker, Order, Outcome, evaluate, now};
+use crate::plugin::executor::{Batch, Job};
+use crate::run::{Stop, files};
+
+/// What a worker is to do.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Assignment {
+    /// The folder of the order.
+    pub order: PathBuf,
+    /// The task; `None` for runs that are named on standard input, those of one line in one go.
+    pub task: Option<usize>,
+    /// How many runs of a task are made at a time.
+    pub parallel: usize,
+    /// What it may use of its machine.
+    pub limits: Limits,
+}
+
+/// The name of this machine.
+pub fn hostname() -> String {
+    #[cfg(unix)]
+    return rustix::system::uname().nodename().to_string_lossy().into_owned();
+    #[cfg(not(unix))]
+    return std::env::var("COMPUTERNAME").unwrap_or_default();
+}
+
+/// A worker that knows its order.
+struct Worker<'a> {
+    batch: Batch<'a>,
+    asked: Vec<String>,
+    /// The name of the order's folder.
+    order: String,
+    host: String,
+}
+
+/// Makes the runs of an assignment; each leaves a marker. A run that has one is not made again.
+///
+/// Lines that are read and answered (`done run001 run002`) are for a caller that hands out runs one by one.
+pub fn work(
+    assignment: &Assignment,
+    input: &mut dyn BufRead,
+    output: &mut dyn Write,
+) -> Result<(), Stop> {
+    assignment.limits.apply()?;
+    let order = Order::read(&assignment.order)?;
+    let model = order.model.build()?;
+    let runs = runs_folder(&assignment.order, &order)?;
+    let worker = Worker {
+        batch: order.batch(&*model, &runs),
+        asked: order.fingerprints()?,
+        order: name_of(&assignment.order)?,
+        host: hostname(),
+    };
+    match assignment.task {
+        Some(task) => {
+            let jobs = order.tasks.get(task).ok_or_else(|| {
+                let (all, folder) = (order.tasks.len(), assignment.order.display());
+                Stop::new(format!(
+                    "the order in {folder} has no task {task}, only 0 to {}",
+                    all.saturating_sub(1)
+                ))
+            })?;
+            worker.task(jobs, assignment.parallel.max(1))
+        }
+        None => worker.lines(input, output),
+    }
+}
+
+fn name_of(folder: &Path) -> Result<String, Stop> {
+    let folder = folder.canonicalize().map_err(|error| files::cannot_read(folder, &error))?;
+    Ok(folder.file_name().unwrap_or_default().to_string_lossy().into_owned())
+}
+
+fn runs_folder(order_folder: &Path, order: &Order) -> Result<PathBuf, Stop> {
+    let folder = order_folder.join(&order.runs);
+    folder.canonicalize().map_err(|error| files::cannot_read(&folder, &error))
+}
+
+impl Worker<'_> {
+    /// Makes the runs of a task, some at a time.
+    fn task(&self, jobs: &[usize], parallel: usize) -> Result<(), Stop> {
+        let size = self.batch.model.batch().max(1);
+        let (next, halt) = (AtomicUsize::new(0), AtomicBool::new(false));
+        let stopped = Mutex::new(None);
+        std::thread::scope(|scope| {
+            for _ in 0..parallel.min(jobs.len()) {
+                scope.spawn(|| {
+                    while !halt.load(Ordering::Relaxed) {
+                        let first = next.fetch_add(size, Ordering::Relaxed);
+                        let some: Vec<usize> =
+                            jobs.iter().skip(first).take(size).copied().collect();
+                        if some.is_empty() {
+                            break;
+                        }
+                        if let Err(stop) = self.make(&some) {
+                            halt.store(true, Ordering::Relaxed);
+                            let mut first =
+                                stopped.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+                            first.get_or_insert(stop);
+                        }
+                    }
+                });
+            }
+        });
+        let stopped = stopped.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        stopped.map_or(Ok(()), Err)
+    }
+
+    /// Makes runs as they are named, until nobody names any more.
+    fn lines(&self, input: &mut dyn BufRead, output: &mut dyn Write) -> Result<(), Stop> {
+        let lost =
+            |error| Stop::new(format!("the process that hands out the runs is gone: {error}"));
+        let mut line = String::new();
+        while input.read_line(&mut line).map_err(lost)? > 0 {
+            let find = |name: &str| {
+                let job = self.batch.jobs.iter().position(|job| job.name == name);
+                job.ok_or_else(|| Stop::new(format!("the order has no run `{name}`")))
+            };
+            let jobs = line.split_whitespace().map(find).collect::<Result<Vec<_>, _>>()?;
+            self.make(&jobs)?;
+            writeln!(output, "done {}", line.trim()).map_err(lost)?;
+            output.flush().map_err(lost)?;
+            line.clear();
+        }
+        Ok(())
+    }
+
+    /// Makes some runs in one go.
+    fn make(&self, jobs: &[usize]) -> Result<(), Stop> {
+        let runs = self.batch.directory;
+        let name = |i: usize| &self.batch.jobs[i].name;
+        let is_missing = |&i: &usize| Marker::read(runs, name(i), &self.asked[i]).is_none();
+        let missing: Vec<usize> = jobs.iter().copied().filter(is_missing).collect();
+        for &i in &missing {
+            let begun = Begun {
+                asked: self.asked[i].clone(),
+                order: self.order.clone(),
+                host: self.host.clone(),
+                process: std::process::id(),
+                since: now(),
+            };
+            begun.write(runs, name(i))?;
+        }
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let some: Vec<&Job> = missing.iter().map(|&i| &self.batch.jobs[i]).collect();
+        let mut hopeless = None;
+        for (&i, ended) in missing.iter().zip(evaluate(&self.batch, &some)) {
+            let marker =
+                Marker::of(runs, &self.asked[i], ended.outcome, ended.seconds, &self.host)?;
+            marker.write(runs, name(i))?;
+            if let Outcome::Hopeless { reason } = marker.outcome {
+                hopeless.get_or_insert(reason);
+            }
+        }
+        hopeless.map_or(Ok(()), |reason| Err(Stop::new(reason)))
+    }
+}

@@ -1,0 +1,85 @@
+//! What a scheduler is asked.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use lacuna::run::Stop;
+
+use super::{Cause, Growth, Retry, Submission};
+
+/// A scheduler that runs arrays of tasks.
+pub trait Scheduler {
+    /// What it is called in a study.
+    fn name(&self) -> &'static str;
+
+    /// How runs are packed, followed and repeated.
+    fn rules(&self) -> Rules<'_>;
+
+    /// The greatest number of tasks of one submission.
+    fn most_tasks(&self) -> Result<usize, Stop>;
+
+    /// Writes the script of a submission into its folder.
+    fn write(&self, plan: &Plan<'_>) -> Result<(), Stop>;
+
+    /// Hands a submission over; returns the number by which the scheduler knows it.
+    fn submit(&self, plan: &Plan<'_>) -> Result<String, Stop>;
+
+    /// The number of a submission of this name, if the scheduler has one: after a process was killed between handing
+    /// over and writing down.
+    fn find(&self, name: &str) -> Result<Option<String>, Stop>;
+
+    /// The state of the tasks of some submissions, by the submission's number in the ledger and the task; what the
+    /// scheduler does not know is left out.
+    fn states(
+        &self,
+        submissions: &[&Submission],
+    ) -> Result<BTreeMap<(usize, usize), TaskState>, Stop>;
+
+    /// Ends all tasks of some submissions.
+    fn cancel(&self, submissions: &[&Submission]) -> Result<(), Stop>;
+}
+
+/// How runs are packed, followed and repeated.
+#[derive(Debug, Clone, Copy)]
+pub struct Rules<'a> {
+    /// Runs of a task.
+    pub pack: usize,
+    /// How often a run is submitted again.
+    pub retry: &'a Retry,
+    /// What it then gets more of.
+    pub grow: &'a Growth,
+    /// The longest pause between two questions to the scheduler, in seconds.
+    pub poll: f64,
+    /// How long files and accounts may lag behind the end of a job, in seconds.
+    pub patience: f64,
+}
+
+/// A submission that is about to be made.
+#[derive(Debug, Clone, Copy)]
+pub struct Plan<'a> {
+    /// Its folder, from the root.
+    pub folder: &'a Path,
+    /// The folder of the study.
+    pub study: &'a Path,
+    /// A name that no other submission has.
+    pub name: &'a str,
+    /// How many tasks it has.
+    pub tasks: usize,
+    /// The factor on the time limit.
+    pub time: f64,
+    /// The factor on the memory.
+    pub memory: f64,
+}
+
+/// Where a task is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum TaskState {
+    /// It waits, for this reason.
+    Waiting(String),
+    /// It runs, here.
+    Running(String),
+    /// It has ended as it should.
+    Ended,
+    /// It has ended for this cause; in the scheduler's words.
+    Failed(Cause, String),
+}

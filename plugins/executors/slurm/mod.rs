@@ -1,0 +1,294 @@
+//! `slurm`: job arrays on a cluster.
+
+mod state;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use lacuna::plugin::executor::{Batch, Finished, Seen};
+use lacuna::plugin::{Component, Context, Executor};
+use lacuna::run::{Stop, files};
+use lacuna::study::problem::Complaints;
+use lacuna::study::values::{Count, Positive};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::amount::{Memory, Span, as_clock};
+use super::cluster::scheduler::Rules;
+use super::cluster::script::{Script, module_lines, quoted};
+use super::cluster::{self, Growth, Plan, Retry, Scheduler, Submission, TaskState};
+use super::command;
+use super::program;
+use crate::models::process;
+
+/// Runs the model on a cluster with Slurm, as job arrays.
+///
+/// ```toml
+/// [executor]
+/// use = "slurm"
+/// partition = "batch"
+/// account = "abc123"
+/// time = "26 h"
+/// nodes = 1
+/// tasks = 96
+/// modules = ["sierra/5.8"]
+/// at_most = 40
+/// ```
+///
+/// `lacuna run STUDY` submits all runs as arrays (as many as the largest array of the cluster asks for), waits, and reads the
+/// results as they come. Stop it whenever you like: the jobs go on, and `lacuna resume RUN` finds them again, days later if
+/// need be; nothing is submitted twice. The job scripts are in the run directory, `2-simulate/campaign/NUMBER/job.sh`.
+///
+/// A job makes `pack` runs, one after the other or `parallel` at a time, by the same program that submitted it. Every
+/// run leaves a marker with its outcome: what counts is the marker; the scheduler is asked only why there is none. A wait in
+/// the queue is never a time-out. A job that ended without a marker is submitted again as `retry` says for the cause;
+/// runs of a pack that were not begun are always submitted again.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Slurm {
+    /// The partition (`--partition`).
+    pub partition: Option<String>,
+    /// The account that is charged (`--account`).
+    pub account: Option<String>,
+    /// The quality of service (`--qos`).
+    pub qos: Option<String>,
+    /// Features that the nodes must have (`--constraint`).
+    pub constraint: Option<String>,
+    /// The time limit of a job (`--time`), such as `26 h` or `1-02:00:00`: that of a whole pack.
+    pub time: Option<Span>,
+    /// Nodes of a job (`--nodes`).
+    pub nodes: Option<Count>,
+    /// Processes of a job (`--ntasks`), for a model that starts its own with `srun` or `mpirun`.
+    pub tasks: Option<Count>,
+    /// Cores of each process (`--cpus-per-task`).
+    pub cpus: Option<Count>,
+    /// Memory of a job on each node (`--mem`), such as `180 GB`.
+    pub memory: Option<Memory>,
+    /// Further options of `sbatch`, one line each, such as `--exclusive`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub extra: Vec<String>,
+    /// Environment modules that each job loads.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub modules: Vec<String>,
+    /// Lines of shell that each job runs before its first run, after the modules.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub setup: Vec<String>,
+    /// Runs of a job.
+    pub pack: Count,
+    /// How many runs of a job are made at a time.
+    pub parallel: Count,
+    /// The greatest number of jobs of one array that run at a time; no limit when left out.
+    pub at_most: Option<Count>,
+    /// How often a run is submitted again, by cause.
+    pub retry: Retry,
+    /// What it then gets more of.
+    pub grow: Growth,
+    /// The longest pause between two questions to the scheduler, in seconds. The first pauses are shorter.
+    pub poll: Positive,
+    /// How long files and accounting may lag behind the end of a job, in seconds.
+    pub patience: Positive,
+    /// `lacuna` as the nodes find it; the running program when left out.
+    pub program: Option<PathBuf>,
+}
+
+impl Default for Slurm {
+    fn default() -> Self {
+        Self {
+            partition: None,
+            account: None,
+            qos: None,
+            constraint: None,
+            time: None,
+            nodes: None,
+            tasks: None,
+            cpus: None,
+            memory: None,
+            extra: Vec::new(),
+            modules: Vec::new(),
+            setup: Vec::new(),
+            pack: cluster::count(1),
+            parallel: cluster::count(1),
+            at_most: None,
+            retry: Retry::default(),
+            grow: Growth::default(),
+            poll: cluster::positive(60.0),
+            patience: cluster::positive(30.0),
+            program: None,
+        }
+    }
+}
+
+impl Component for Slurm {
+    fn check(&self, _: &Context<'_>, complaints: &mut Complaints<'_>) {
+        let one_line = |text: &String| text.contains('\n');
+        for (key, lines) in [("extra", &self.extra), ("modules", &self.modules)] {
+            if lines.iter().any(one_line) {
+                complaints.at(key).say(format!("an element of `{key}` has more than one line"));
+            }
+        }
+        if let Some(line) = self.extra.iter().find(|line| !line.starts_with('-')) {
+            complaints
+                .at("extra")
+                .say("this is no option of `sbatch`")
+                .expected("an option such as `--exclusive`")
+                .found(format!("`{line}`"));
+        }
+        if self.grow.time.get() != 1.0 && self.time.is_none() {
+            complaints.at("grow.time").say("there is no `time` that could grow");
+        }
+        if self.grow.memory.get() != 1.0 && self.memory.is_none() {
+            complaints.at("grow.memory").say("there is no `memory` that could grow");
+        }
+    }
+
+    fn environment(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        program::check(self.program.as_deref(), context.directory, complaints);
+        for command in ["sbatch", "squeue", "scancel"] {
+            if process::find(command, Path::new("."), None).is_none() {
+                complaints.at("use").say(format!("there is no command `{command}` here")).help(
+                    "run the study where jobs are submitted, or with `--set executor.use=local`",
+                );
+                return;
+            }
+        }
+    }
+}
+
+impl Executor for Slurm {
+    fn submit(
+        &self,
+        batch: &Batch<'_>,
+        finished: &mut dyn FnMut(Finished) -> Result<(), Stop>,
+    ) -> Result<(), Stop> {
+        cluster::follow(self, batch, finished)
+    }
+
+    fn waits(&self) -> bool {
+        true
+    }
+
+    fn look(&self, directory: &Path) -> Result<Vec<Seen>, Stop> {
+        cluster::look(self, directory)
+    }
+
+    fn cancel(&self, directory: &Path) -> Result<usize, Stop> {
+        cluster::cancel(self, directory)
+    }
+}
+
+const SCRIPT: &str = "job.sh";
+
+impl Scheduler for Slurm {
+    fn name(&self) -> &'static str {
+        "slurm"
+    }
+
+    fn rules(&self) -> Rules<'_> {
+        Rules {
+            pack: self.pack.get(),
+            retry: &self.retry,
+            grow: &self.grow,
+            poll: self.poll.get(),
+            patience: self.patience.get(),
+        }
+    }
+
+    fn most_tasks(&self) -> Result<usize, Stop> {
+        let text = command::said("scontrol", &["show", "config"])?;
+        Ok(state::max_array_size(&text).unwrap_or(1001))
+    }
+
+    fn write(&self, plan: &Plan<'_>) -> Result<(), Stop> {
+        let program = program::program(self.program.as_deref(), plan.study)?;
+        let mut setup = module_lines(&self.modules);
+        setup.extend(self.setup.iter().cloned());
+        let script = Script {
+            directives: &self.directives(plan),
+            setup: &setup,
+            program: &program,
+            folder: plan.folder,
+            task: "SLURM_ARRAY_TASK_ID",
+            log: false,
+            parallel: self.parallel.get(),
+        };
+        files::write_atomic(&plan.folder.join(SCRIPT), script.text().as_bytes())
+    }
+
+    fn submit(&self, plan: &Plan<'_>) -> Result<String, Stop> {
+        let script = plan.folder.join(SCRIPT).display().to_string();
+        let said = command::said("sbatch", &["--parsable", &script])?;
+        let job = said.trim().split(';').next().unwrap_or_default().to_owned();
+        if job.is_empty() || !job.bytes().all(|b| b.is_ascii_digit()) {
+            return Err(Stop::new(format!(
+                "`sbatch` answered `{}` in place of a number",
+                said.trim()
+            )));
+        }
+        Ok(job)
+    }
+
+    fn find(&self, name: &str) -> Result<Option<String>, Stop> {
+        let queue = command::said("squeue", &["-h", "-t", "all", "--name", name, "-o", "%F"])?;
+        if let Some(job) = queue.split_whitespace().next() {
+            return Ok(Some(job.to_owned()));
+        }
+        // Without accounting there is nobody else to ask.
+        let of_accounts = command::said(
+            "sacct",
+            &["-X", "-n", "-P", "--name", name, "-S", "now-100days", "-o", "JobID"],
+        );
+        let job = of_accounts.ok().and_then(|text| {
+            let first = text.split_whitespace().next()?;
+            Some(first.split('_').next().unwrap_or(first).to_owned())
+        });
+        Ok(job)
+    }
+
+    fn states(
+        &self,
+        submissions: &[&Submission],
+    ) -> Result<BTreeMap<(usize, usize), TaskState>, Stop> {
+        state::states(submissions)
+    }
+
+    fn cancel(&self, submissions: &[&Submission]) -> Result<(), Stop> {
+        let jobs: Vec<&str> = submissions.iter().filter_map(|s| s.job.as_deref()).collect();
+        command::said("scancel", &jobs).map(drop)
+    }
+}
+
+impl Slurm {
+    /// The lines that `sbatch` reads.
+    fn directives(&self, plan: &Plan<'_>) -> Vec<String> {
+        let throttle = self.at_most.map_or(String::new(), |most| format!("%{most}"));
+        let log = plan.folder.join("task").display().to_string().replace('%', "%%");
+        let mut lines = vec![
+            format!("--job-name={}", plan.name),
+            format!("--array=0-{}{throttle}", plan.tasks.saturating_sub(1)),
+            format!("--output={}", quoted(Path::new(&format!("{log}%a.txt")))),
+            format!("--chdir={}", quoted(plan.study)),
+            // What is submitted again is decided by the study.
+            "--no-requeue".to_owned(),
+        ];
+        let mut add = |option: &str, value: Option<String>| {
+            lines.extend(value.map(|value| format!("--{option}={value}")));
+        };
+        add("partition", self.partition.clone());
+        add("account", self.account.clone());
+        add("qos", self.qos.clone());
+        add("constraint", self.constraint.as_ref().map(|c| quoted(Path::new(c))));
+        add("time", self.time.as_ref().map(|time| as_clock(time.seconds() * plan.time)));
+        add("nodes", self.nodes.map(|n| n.to_string()));
+        add("ntasks", self.tasks.map(|n| n.to_string()));
+        add("cpus-per-task", self.cpus.map(|n| n.to_string()));
+        let kilobytes = |m: &Memory| (m.bytes() as f64 * plan.memory / 1024.0).ceil() as u64;
+        add("mem", self.memory.as_ref().map(|m| format!("{}K", kilobytes(m))));
+        lines.extend(self.extra.iter().cloned());
+        lines.into_iter().map(|line| format!("#SBATCH {line}")).collect()
+    }
+}
+
+lacuna::register!(Executor, "slurm", Slurm);
+
+#[cfg(test)]
+mod tests;

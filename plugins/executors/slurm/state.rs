@@ -1,0 +1,132 @@
+//! What Slurm says of tasks, in texts of our own format: its JSON changes from version to version.
+
+use std::collections::BTreeMap;
+
+use lacuna::run::Stop;
+
+use crate::executors::cluster::{Cause, Submission, TaskState};
+use crate::executors::command::said;
+
+type States = BTreeMap<(usize, usize), TaskState>;
+
+/// The state of the tasks of some submissions.
+pub fn states(submissions: &[&Submission]) -> Result<States, Stop> {
+    let names: Vec<&str> = submissions.iter().map(|s| s.name.as_str()).collect();
+    // By name: asking for the number of a job that is forgotten is an error.
+    let queue = said(
+        "squeue",
+        &["-h", "-r", "-t", "all", "--name", &names.join(","), "-o", "%j|%i|%T|%N|%r"],
+    )?;
+    let mut states = of_queue(&queue, submissions);
+    let is_missing = |s: &&Submission| {
+        s.job.is_some() && s.open().any(|(task, _)| !states.contains_key(&(s.number, task)))
+    };
+    let missing: Vec<&Submission> = submissions.iter().copied().filter(is_missing).collect();
+    if !missing.is_empty() {
+        let jobs: Vec<&str> = missing.iter().filter_map(|s| s.job.as_deref()).collect();
+        // Without accounting this fails, and the exit codes on disk have to do.
+        let accounts = said(
+            "sacct",
+            &["-X", "-n", "-P", "-j", &jobs.join(","), "-o", "JobID,JobName,State,ExitCode"],
+        );
+        if let Ok(text) = accounts {
+            for (key, state) in of_accounts(&text, &missing) {
+                states.entry(key).or_insert(state);
+            }
+        }
+    }
+    explain(&mut states, submissions);
+    Ok(states)
+}
+
+/// Lines `name|job_task|STATE|node|reason`.
+pub fn of_queue(text: &str, submissions: &[&Submission]) -> States {
+    let mut states = States::new();
+    for line in text.lines() {
+        let cells: Vec<&str> = line.splitn(5, '|').collect();
+        let [name, id, state, node, reason] = cells[..] else { continue };
+        let Some(submission) = submissions.iter().find(|s| s.name == name) else { continue };
+        let Some(task) = task_of(id) else { continue };
+        states.insert((submission.number, task), state_of(state, node, reason));
+    }
+    states
+}
+
+/// Lines `job_task|name|STATE and more|code:signal`; what has not ended is left to the queue.
+pub fn of_accounts(text: &str, submissions: &[&Submission]) -> States {
+    let mut states = States::new();
+    for line in text.lines() {
+        let cells: Vec<&str> = line.splitn(4, '|').collect();
+        let [id, name, state, code] = cells[..] else { continue };
+        // Numbers of jobs come round again; names do not.
+        let Some(submission) = submissions.iter().find(|s| s.name == name) else { continue };
+        let Some(task) = task_of(id) else { continue };
+        let state = state_of(state, "", code);
+        if matches!(state, TaskState::Ended | TaskState::Failed(..)) {
+            states.insert((submission.number, task), state);
+        }
+    }
+    states
+}
+
+/// `12_4` is task 4; `12_[5-9%2]` stands for tasks that wait.
+fn task_of(id: &str) -> Option<usize> {
+    id.split_once('_')?.1.parse().ok()
+}
+
+fn state_of(state: &str, node: &str, reason: &str) -> TaskState {
+    // `CANCELLED by 0`
+    let word = state.split_whitespace().next().unwrap_or_default().trim_end_matches('+');
+    let words = || {
+        let reason = if reason == "None" { "" } else { reason };
+        format!("{word} {reason}").trim().to_owned()
+    };
+    let failed = |cause| TaskState::Failed(cause, words());
+    match word {
+        "COMPLETED" => TaskState::Ended,
+        "RUNNING" | "COMPLETING" | "CONFIGURING" | "SUSPENDED" | "STOPPED" | "SIGNALING"
+        | "STAGE_OUT" | "RESIZING" => TaskState::Running(node.to_owned()),
+        "TIMEOUT" | "DEADLINE" => failed(Cause::Timeout),
+        "OUT_OF_MEMORY" => failed(Cause::OutOfMemory),
+        "NODE_FAIL" | "BOOT_FAIL" => failed(Cause::NodeFailure),
+        "PREEMPTED" => failed(Cause::Preempted),
+        "CANCELLED" | "REVOKED" => failed(Cause::Cancelled),
+        "FAILED" => failed(Cause::Failure),
+        // Held, requeued, and states that later versions know: it has not ended.
+        _ => TaskState::Waiting(words()),
+    }
+}
+
+/// Adds the exit code or the signal to tasks that failed, as far as the scheduler still knows it.
+fn explain(states: &mut States, submissions: &[&Submission]) {
+    for submission in submissions {
+        let Some(job) = &submission.job else { continue };
+        let open: std::collections::BTreeSet<usize> = submission.open().map(|(t, _)| t).collect();
+        for task in open {
+            let state = states.get_mut(&(submission.number, task));
+            if let Some(TaskState::Failed(Cause::Failure, words)) = state
+                && let Ok(text) = said("scontrol", &["-o", "show", "job", &format!("{job}_{task}")])
+                && let Some(code) = exit_code(&text)
+            {
+                *words = format!("{words}, {code}");
+            }
+        }
+    }
+}
+
+/// `ExitCode=7:0` is an exit code, `ExitCode=0:9` a signal.
+pub fn exit_code(text: &str) -> Option<String> {
+    let value = text.split_whitespace().find_map(|word| word.strip_prefix("ExitCode="))?;
+    let (code, signal) = value.split_once(':')?;
+    match (code, signal) {
+        ("0", "0") => None,
+        ("0", signal) => Some(format!("ended by signal {signal}")),
+        (code, _) => Some(format!("exit code {code}")),
+    }
+}
+
+/// The number of tasks that an array may have.
+pub fn max_array_size(config: &str) -> Option<usize> {
+    let line = config.lines().find(|line| line.trim_start().starts_with("MaxArraySize"))?;
+    line.split_once('=')?.1.trim().parse().ok()
+}

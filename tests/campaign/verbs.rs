@@ -1,0 +1,135 @@
+//! `lacuna campaign`.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use super::{outcomes, run, study};
+use crate::quick;
+
+fn campaign(words: &[&str], out: &Path) -> Command {
+    let mut command = quick::command();
+    command.arg("campaign").arg(words[0]).arg(out).args(&words[1..]);
+    command
+}
+
+/// What a command prints when it goes well.
+fn printed(command: &mut Command) -> String {
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// How often each run was made.
+fn made(folder: &Path) -> Vec<String> {
+    let text = fs::read_to_string(folder.join("made")).unwrap_or_default();
+    let mut runs: Vec<String> = text.lines().map(str::to_owned).collect();
+    runs.sort();
+    runs
+}
+
+const COUNTED: &str = "echo $1 >> \"$3/made\"
+[ $1 = run002 ] && [ ! -e \"$3/mended\" ] && { echo 'no convergence' >&2; exit 3; }
+echo \"[$2]\"";
+
+#[test]
+fn only_what_failed_is_made_again() {
+    let (folder, path) = study(COUNTED, "use = \"local\"\nprocesses = 1");
+    let out = folder.path().join("run");
+    assert_eq!(quick::said(&mut run(&path, &out, &[])).0, Some(1));
+    let table = printed(&mut campaign(&["status"], &out));
+    assert!(
+        table.starts_with("2-simulate: 6 runs, 5 done, 1 failed\n  run002     failed"),
+        "{table}"
+    );
+    assert!(table.contains("no convergence"), "{table}");
+    let json = printed(&mut campaign(&["status", "--json"], &out));
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["runs"][1]["state"], "failed");
+    let (code, text) = quick::said(&mut campaign(&["retry"], &out));
+    assert_eq!(code, Some(1));
+    assert!(text.contains("1 run has failed again"), "{text}");
+    fs::write(folder.path().join("mended"), "").unwrap();
+    assert!(printed(&mut campaign(&["retry"], &out)).contains("all runs are done"));
+    let twice = ["run001", "run002", "run002", "run002", "run003", "run004", "run005", "run006"];
+    assert_eq!(made(folder.path()), twice);
+    assert_eq!(printed(&mut campaign(&["status"], &out)), "2-simulate: 6 runs, 6 done\n");
+}
+
+/// The points of the runs by name, as the table has them.
+fn points(out: &Path) -> Vec<(String, String)> {
+    let text = fs::read_to_string(out.join("2-simulate/runs.csv")).unwrap();
+    let cells = text.lines().skip(1).map(|line| {
+        (line.split(',').next().unwrap().to_owned(), line.rsplit(',').next().unwrap().to_owned())
+    });
+    cells.collect()
+}
+
+#[test]
+fn a_design_grows_and_no_run_is_made_twice() {
+    let (folder, path) = study(COUNTED, "use = \"local\"");
+    fs::write(folder.path().join("mended"), "").unwrap();
+    let out = folder.path().join("run");
+    let (code, text) = quick::said(&mut run(&path, &out, &[]));
+    assert_eq!(code, Some(0), "{text}");
+    let before = points(&out);
+    let said = printed(&mut campaign(&["extend", "--runs", "4"], &out));
+    assert!(said.contains("10 runs in all") && said.contains("extended = [4]"), "{said}");
+    let (code, text) = quick::said(quick::command().arg("resume").arg(&out));
+    assert_eq!(code, Some(0), "{text}");
+    let after = points(&out);
+    assert_eq!(after[..6], before);
+    assert_eq!(made(folder.path()).len(), 10, "{:?}", made(folder.path()));
+    // The same written in the study is the same run.
+    let (code, text) = quick::said(&mut run(&path, &out, &["design.extended=[4]"]));
+    assert_eq!((code, made(folder.path()).len()), (Some(0), 10), "{text}");
+    // And without it the first results are back.
+    let (code, text) = quick::said(&mut run(&path, &out, &[]));
+    assert_eq!((code, made(folder.path()).len()), (Some(0), 10), "{text}");
+    assert_eq!(points(&out), before);
+}
+
+#[test]
+fn runs_made_by_hand_are_taken_in() {
+    let (folder, path) = study(COUNTED, "use = \"local\"");
+    fs::write(folder.path().join("mended"), "").unwrap();
+    let out = folder.path().join("run");
+    assert_eq!(quick::said(&mut run(&path, &out, &[])).0, Some(0));
+    let hand = folder.path().join("hand");
+    fs::create_dir_all(&hand).unwrap();
+    fs::write(hand.join("first.csv"), "place,y\nhere,0.25\n").unwrap();
+    fs::write(hand.join("second.csv"), "place,y\nhere,0.75\n").unwrap();
+    let table = hand.join("runs.csv");
+    let import = |out: &Path| {
+        let table = table.display().to_string();
+        campaign(&["import", &table, "--reader", "csv"], out)
+    };
+    for (text, complaint) in [
+        ("run,file\nx,first.csv\n", "there is no column for the parameter `a`"),
+        ("run,a,file\nx,low,first.csv\n", "line 2: expected a number for `a`, found `low`"),
+        ("run,a,file\nx,0.25,third.csv\n", "third.csv"),
+        ("run,a [m],file\nx,0.25,first.csv\n", "`m` does not convert"),
+    ] {
+        fs::write(&table, text).unwrap();
+        let (code, said) = quick::said(&mut import(&out));
+        assert_eq!(code, Some(1), "{text}");
+        assert!(said.contains(complaint), "{said}");
+        assert!(!out.join("imports/1").exists());
+    }
+    fs::write(&table, "run,a,file\nby-hand-1,0.25,first.csv\nby-hand-2,0.75,second.csv\n").unwrap();
+    let said = printed(&mut import(&out));
+    assert!(said.starts_with("2 runs taken into"), "{said}");
+    let (code, text) = quick::said(quick::command().arg("resume").arg(&out));
+    assert_eq!(code, Some(0), "{text}");
+    assert_eq!(made(folder.path()).len(), 6, "no run is made again");
+    let all = outcomes(&out);
+    assert_eq!(all.len(), 8);
+    assert_eq!(all[6], ("by-hand-1".to_owned(), String::new()));
+    assert_eq!(quick::summary(&out)["runs"]["used"], 8);
+    // A file that was changed afterwards is not what was imported.
+    fs::remove_dir_all(out.join("2-simulate")).unwrap();
+    fs::write(out.join("imports/1/by-hand-2.nc"), "other").unwrap();
+    let (code, text) = quick::said(quick::command().arg("resume").arg(&out));
+    assert_eq!(code, Some(1));
+    assert!(text.contains("by-hand-2.nc is not as it was imported"), "{text}");
+}

@@ -1,0 +1,35 @@
+//! The program that executors start in the tests of their contract: it knows the model of the suite.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use lacuna::contract::Line;
+use lacuna::plugin::Model;
+use lacuna::work::{Assignment, Limits, work};
+// The other models.
+use lacuna_plugins as _;
+
+lacuna::register!(Model, "contract_line", Line);
+
+/// `worker work ORDER [--task K] [--parallel N]`
+fn main() -> ExitCode {
+    let words: Vec<String> = std::env::args().collect();
+    let after = |flag: &str| {
+        let at = words.iter().position(|word| word == flag)?;
+        words.get(at + 1)?.parse::<usize>().ok()
+    };
+    let Some(order) = words.get(2).map(PathBuf::from) else { return ExitCode::from(2) };
+    let assignment = Assignment {
+        order,
+        task: after("--task"),
+        parallel: after("--parallel").unwrap_or(1),
+        limits: Limits::default(),
+    };
+    match work(&assignment, &mut std::io::stdin().lock(), &mut std::io::stdout()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(stop) => {
+            eprintln!("{stop}");
+            ExitCode::FAILURE
+        }
+    }
+}
