@@ -2,6 +2,8 @@
 //! is an error that names it.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
+#[path = "dynamic/command.rs"]
+mod command;
 #[path = "dynamic/contracts.rs"]
 mod contracts;
 #[path = "dynamic/examples.rs"]

@@ -272,3 +272,40 @@ fn options_of_a_library_are_checked_by_its_schema() {
         }
     }
 }
+
+/// The header is one for C++ too: the same example, compiled as such.
+#[test]
+fn the_header_serves_another_language() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("plugin.cpp");
+    let text = "#include \"lacuna_plugin.h\"\n\
+                static int32_t schema(const LacunaAnswer *answer) { lacuna_say(answer, \"{}\", 2); return LACUNA_OK; }\n\
+                static int32_t create(LacunaText, void **out, const LacunaAnswer *) { *out = out; return LACUNA_OK; }\n\
+                static void destroy(void *) {}\n\
+                static int32_t points(void *, size_t count, size_t dimension, LacunaKey, double *to, const LacunaAnswer *)\n\
+                { for (size_t i = 0; i < count * dimension; ++i) to[i] = 0.5; return LACUNA_OK; }\n\
+                static const LacunaComponentFunctions component = { sizeof component, schema, create, destroy, 0, 0, 0 };\n\
+                static const LacunaDesignFunctions design = { sizeof design, points, 0 };\n\
+                static const LacunaEntry entries[] = { LACUNA_ENTRY(\"design\", \"middle\", component, design) };\n\
+                LACUNA_DECLARE(\"middle\", \"1\", LACUNA_PROVIDES(\"design\", \"middle\"), entries);\n";
+    std::fs::write(&source, text).unwrap();
+    let there = Command::new("c++").arg("--version").output().is_ok();
+    if !there {
+        println!("skipped: there is no `c++`");
+        return;
+    }
+    let library = folder.path().join("libmiddle.so");
+    let include = quick::root().join("sdk/include");
+    let output = Command::new("c++")
+        .args(["-std=c++11", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared", "-I"])
+        .args([&include, &source])
+        .arg("-o")
+        .arg(&library)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    library::load(&library, None).unwrap_or_else(|e| panic!("{e}"));
+    let built = registry::from_text::<dyn lacuna::plugin::Design>("middle", "").unwrap();
+    let points = built.plugin.points(3, 2, &lacuna::math::random::Stream::root(1)).unwrap();
+    assert_eq!(points.as_slice(), [0.5; 6]);
+}

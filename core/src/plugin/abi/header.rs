@@ -55,11 +55,17 @@ const END: &str = r#"/* A text from a string literal. */
     { sizeof(LacunaEntry), LACUNA_TEXT(kind), LACUNA_TEXT(name), &(component), &(functions) }
 
 #if defined(_WIN32)
-#define LACUNA_EXPORT __declspec(dllexport)
+#define LACUNA_VISIBLE __declspec(dllexport)
 #elif defined(__GNUC__)
-#define LACUNA_EXPORT __attribute__((visibility("default")))
+#define LACUNA_VISIBLE __attribute__((visibility("default")))
 #else
-#define LACUNA_EXPORT
+#define LACUNA_VISIBLE
+#endif
+
+#ifdef __cplusplus
+#define LACUNA_EXPORT extern "C" LACUNA_VISIBLE
+#else
+#define LACUNA_EXPORT LACUNA_VISIBLE
 #endif
 
 /* The one symbol of a library: its name and version, a LACUNA_PROVIDES for each plugin, and an array of LacunaEntry. */
