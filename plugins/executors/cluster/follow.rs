@@ -249,11 +249,7 @@ impl Campaign<'_> {
             if let Some(&index) = self.numbers.get(&run)
                 && !self.handed[index]
             {
-                let tail = if said.is_empty() {
-                    String::new()
-                } else {
-                    format!("; its output ends with: {said}")
-                };
+                let tail = if said.is_empty() { String::new() } else { format!(": {said}") };
                 let reason = format!("job {job}, task {task}: {cause} ({words}){tail}");
                 self.handed[index] = true;
                 finished(Finished { index, outcome: Err(reason), seconds: 0.0 })?;
@@ -289,7 +285,9 @@ fn left_traces(submission: &Submission, runs: &Path) -> bool {
 fn verdict(state: Option<&TaskState>, folder: &Path, task: usize) -> (Cause, String) {
     let code = script::exit_code(folder, task);
     match (state, code) {
-        (Some(TaskState::Failed(Cause::Failure, words)), Some(code)) => {
+        (Some(TaskState::Failed(Cause::Failure, words)), Some(code))
+            if !words.contains("exit code") =>
+        {
             (Cause::Failure, format!("{words}, exit code {code}"))
         }
         (Some(TaskState::Failed(cause, words)), _) => (*cause, words.clone()),
