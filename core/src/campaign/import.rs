@@ -40,8 +40,7 @@ pub fn import(
             .help("add the runs to the files that `[simulations]` names"));
     }
     let rows = rows(study, table)?;
-    let number = (1..).find(|n| !run.root().join(format!("imports/{n}")).exists()).unwrap_or(1);
-    let folder = run.root().join(format!("imports/{number}"));
+    let folder = free_folder(run);
     let taken = take(study, &rows, &folder, reader).and_then(|runs| {
         imports::of_folder(study, &folder)?;
         grow::add_import(run, &folder)?;
@@ -54,6 +53,18 @@ pub fn import(
             fs::remove_dir_all(&folder).map_err(|error| files::cannot_write(&folder, &error))?;
             Err(stop)
         }
+    }
+}
+
+/// The next folder that nobody uses.
+fn free_folder(run: &RunDirectory) -> PathBuf {
+    let mut number = 1;
+    loop {
+        let folder = run.root().join(format!("imports/{number}"));
+        if !folder.exists() {
+            return folder;
+        }
+        number += 1;
     }
 }
 

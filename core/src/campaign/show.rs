@@ -3,7 +3,7 @@
 use super::{Row, State, Status};
 
 /// How many characters of a note are shown.
-const WIDTH: usize = 150;
+const WIDTH: usize = 240;
 
 /// Counts a stage and scenario, then one line for every run that is not done, or for all.
 pub fn text(status: &Status, all: bool) -> String {
@@ -27,11 +27,11 @@ pub fn text(status: &Status, all: bool) -> String {
         let name =
             if scenario.is_empty() { stage.to_owned() } else { format!("{stage}, {scenario}") };
         text.push_str(&format!("{name}: {} runs, {}\n", rows.len(), counts(&rows)));
-        for state in State::ALL {
-            for row in rows.iter().filter(|row| row.state == state) {
-                if all || state != State::Done {
-                    text.push_str(&line(row));
-                }
+        for state in State::ALL.into_iter().filter(|&state| all || state != State::Done) {
+            let some: Vec<&Row> = rows.iter().copied().filter(|row| row.state == state).collect();
+            // One word from the cluster often stands for hundreds of runs.
+            for same in some.chunk_by(|a, b| !a.note.is_empty() && a.note == b.note) {
+                text.push_str(&line(same));
             }
         }
     }
@@ -47,14 +47,20 @@ fn counts(rows: &[&Row]) -> String {
     some.map(|state| format!("{} {}", count(state), state.name())).collect::<Vec<_>>().join(", ")
 }
 
-fn line(row: &Row) -> String {
+/// One line for runs of which the same is to be said.
+fn line(rows: &[&Row]) -> String {
+    let [row, others @ ..] = rows else { return String::new() };
+    let name = match others.last() {
+        Some(last) => format!("{} to {} ({})", row.run, last.run, rows.len()),
+        None => row.run.clone(),
+    };
     let note: String = row.note.replace('\n', "; ");
     let note = match note.char_indices().nth(WIDTH) {
         Some((cut, _)) => format!("{}…", &note[..cut]),
         None => note,
     };
     let seconds = row.seconds.map_or(String::new(), |s| format!("{s:.1} s"));
-    let text = format!("  {:<10} {:<8} {seconds:>10}  {note}", row.run, row.state.name());
+    let text = format!("  {name:<10} {:<8} {seconds:>10}  {note}", row.state.name());
     text.trim_end().to_owned() + "\n"
 }
 
@@ -76,12 +82,15 @@ mod tests {
             row("run001", State::Done, ""),
             row("run002", State::Failed, "exit code 7\nand more"),
             row("run003", State::Waiting, "job 1, task 2: PENDING"),
+            row("run004", State::Failed, "no such command"),
+            row("run005", State::Failed, "no such command"),
         ];
         let status = Status { runs, warnings: Vec::new() };
         let expected = "\
-2-simulate: 3 runs, 1 done, 1 waiting, 1 failed
+2-simulate: 5 runs, 1 done, 1 waiting, 3 failed
   run003     waiting              job 1, task 2: PENDING
   run002     failed               exit code 7; and more
+  run004 to run005 (2) failed               no such command
 ";
         assert_eq!(text(&status, false), expected);
         assert!(text(&status, true).contains("  run001     done          1.5 s\n"));

@@ -8,7 +8,6 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 
-use super::adopt::link;
 use super::{Observer, Stop, files};
 use crate::plugin::Fault;
 
@@ -79,7 +78,7 @@ fn locked(lock: &File) -> bool {
 }
 
 const RECORD: &str = "stage.json";
-const INPUTS: &str = "inputs.sha256";
+pub(super) const INPUTS: &str = "inputs.sha256";
 
 impl RunDirectory {
     /// Opens or makes the folder and locks it against other processes.
@@ -173,47 +172,6 @@ impl RunDirectory {
         Ok(self.kept(record, value, true))
     }
 
-    /// Lets a stage go on in a folder that was made for smaller inputs (fewer of the same runs), the first of `smaller` that
-    /// there is: the folder stays where it is, since others may be writing there, and what was finished for the
-    /// smaller inputs is kept beside it as links.
-    pub fn go_on_from(
-        &self,
-        stage: &str,
-        inputs: &impl Serialize,
-        smaller: &[impl Serialize],
-    ) -> Result<(), Stop> {
-        let inputs = hash_of(stage, inputs)?;
-        let folder = self.stage_folder(stage);
-        let marked = fs::read_to_string(folder.join(INPUTS)).unwrap_or_default();
-        let marked = marked.trim();
-        if marked == inputs || self.aside(stage, &inputs).exists() {
-            return Ok(());
-        }
-        for smaller in smaller {
-            let smaller = hash_of(stage, smaller)?;
-            let aside = self.aside(stage, &smaller);
-            if marked == smaller {
-                link_whole(&folder, &aside)?;
-                return self.relabel(stage, &inputs);
-            }
-            if aside.exists() {
-                if !marked.is_empty() {
-                    move_folder(&folder, &self.aside(stage, marked))?;
-                }
-                link_whole(&aside, &folder)?;
-                return self.relabel(stage, &inputs);
-            }
-        }
-        Ok(())
-    }
-
-    /// Makes a stage's folder one of other inputs, which is not finished.
-    fn relabel(&self, stage: &str, inputs: &str) -> Result<(), Stop> {
-        self.reopen(stage)?;
-        let path = self.stage_folder(stage).join(INPUTS);
-        files::write_atomic(&path, format!("{inputs}\n").as_bytes())
-    }
-
     /// Whether a stage is finished for these inputs.
     pub fn has(&self, stage: &str, inputs: &impl Serialize) -> Result<bool, Stop> {
         let inputs = hash_of(stage, inputs)?;
@@ -239,7 +197,7 @@ impl RunDirectory {
         kept
     }
 
-    fn aside(&self, stage: &str, inputs: &str) -> PathBuf {
+    pub(super) fn aside(&self, stage: &str, inputs: &str) -> PathBuf {
         self.root.join(".kept").join(format!("{stage}-{}", &inputs[..12]))
     }
 
@@ -261,22 +219,7 @@ impl RunDirectory {
     }
 }
 
-/// A folder of links that is there as a whole or not at all.
-fn link_whole(from: &Path, to: &Path) -> Result<(), Stop> {
-    if to.exists() {
-        return Ok(());
-    }
-    let mut part = to.as_os_str().to_owned();
-    part.push(".part");
-    let part = PathBuf::from(part);
-    if part.exists() {
-        fs::remove_dir_all(&part).map_err(|error| files::cannot_write(&part, &error))?;
-    }
-    link(from, &part)?;
-    move_folder(&part, to)
-}
-
-fn move_folder(from: &Path, to: &Path) -> Result<(), Stop> {
+pub(super) fn move_folder(from: &Path, to: &Path) -> Result<(), Stop> {
     let result = (|| {
         if let Some(parent) = to.parent() {
             fs::create_dir_all(parent)?;
@@ -319,7 +262,7 @@ fn spent_before(folder: &Path) -> f64 {
     text.trim().parse().unwrap_or(0.0)
 }
 
-fn hash_of(stage: &str, inputs: &impl Serialize) -> Result<String, Stop> {
+pub(super) fn hash_of(stage: &str, inputs: &impl Serialize) -> Result<String, Stop> {
     let text = serde_json::to_string(&(stage, inputs))
         .map_err(|error| Stop::new(format!("cannot hash the inputs of {stage}: {error}")))?;
     Ok(files::hash(text.as_bytes()))
@@ -381,31 +324,6 @@ mod tests {
             Ok(Number(files::read_json::<f64>(&folder.join("half.json"))? * 2.0))
         });
         assert_eq!(second.unwrap().value, Number(1.0));
-    }
-
-    #[test]
-    fn a_stage_that_grows_goes_on_and_keeps_what_it_was() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut run = RunDirectory::open(folder.path()).unwrap();
-        keep(&mut run, 1, 0.1);
-        let log = folder.path().join("1-test/runs.jsonl");
-        fs::write(&log, "first\n").unwrap();
-        run.go_on_from("1-test", &12, &[11, 1]).unwrap();
-        // It is not finished, and what was there is there.
-        let grown = run.keep("1-test", &12, &Silent, |folder| {
-            assert!(folder.join("number.json").exists());
-            fs::write(&log, "first\nsecond\n").unwrap();
-            Ok(Number(1.2))
-        });
-        assert_eq!(grown.unwrap().value, Number(1.2));
-        run.go_on_from("1-test", &12, &[11, 1]).unwrap();
-        assert_eq!(keep(&mut run, 12, 9.0), (1.2, false));
-        assert_eq!(keep(&mut run, 1, 9.0), (0.1, false));
-        assert_eq!(fs::read_to_string(&log).unwrap(), "first\n", "what is added to is a copy");
-        // From the other side again, and on.
-        run.go_on_from("1-test", &123, &[12]).unwrap();
-        assert_eq!(fs::read_to_string(&log).unwrap(), "first\nsecond\n");
-        assert_eq!(keep(&mut run, 123, 3.0), (3.0, true));
     }
 
     #[test]

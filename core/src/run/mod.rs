@@ -4,6 +4,7 @@ mod adopt;
 pub mod arrays;
 pub mod directory;
 pub mod files;
+mod growth;
 pub mod progress;
 pub mod stop;
 

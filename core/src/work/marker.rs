@@ -139,9 +139,12 @@ impl Marker {
     /// `campaign/failed/RUN-NUMBER.json`.
     pub fn set_aside(runs: &Path, run: &str) -> Result<(), Stop> {
         let failed = folder(runs).join("failed");
-        let free = |n: &u32| !failed.join(format!("{run}-{n}.json")).exists();
-        let number = (1..).find(free).unwrap_or(1);
-        let target = failed.join(format!("{run}-{number}.json"));
+        let place = |n: u32| failed.join(format!("{run}-{n}.json"));
+        let mut number = 1;
+        while place(number).exists() {
+            number += 1;
+        }
+        let target = place(number);
         let moved = std::fs::create_dir_all(&failed)
             .and_then(|()| std::fs::rename(Self::path(runs, run), &target));
         match moved {

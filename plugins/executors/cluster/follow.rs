@@ -174,7 +174,13 @@ impl Campaign<'_> {
         if free.is_empty() {
             return Ok(());
         }
-        pack::submit(self.scheduler, self.batch, &free, &mut self.submissions, &mut self.next)
+        let waits = self.submissions.iter().any(|submission| !submission.is_over());
+        let (batch, next) = (self.batch, &mut self.next);
+        match pack::submit(self.scheduler, batch, &free, &mut self.submissions, next) {
+            // A user may have no more than so many jobs: there is room when some have ended.
+            Err(_) if waits => Ok(()),
+            result => result,
+        }
     }
 
     /// Asks the scheduler and judges the tasks that have ended without a word of their runs.
@@ -229,7 +235,11 @@ impl Campaign<'_> {
         let job = submission.job.clone().unwrap_or_default();
         let said = tail_of_file(&folder.join(format!("task{task}.txt")));
         let begun: Vec<&String> = runs.iter().filter(|run| self.was_begun(run, number)).collect();
-        let charged: Vec<String> = if begun.is_empty() || cause.concerns_all() {
+        let others_ended = submission.tasks[task].len() > runs.len();
+        let charged: Vec<String> = if cause == Cause::Timeout && others_ended {
+            // The time went to other runs of the pack.
+            Vec::new()
+        } else if begun.is_empty() || cause.concerns_all() {
             runs.clone()
         } else {
             begun.into_iter().cloned().collect()
@@ -249,11 +259,7 @@ impl Campaign<'_> {
             if let Some(&index) = self.numbers.get(&run)
                 && !self.handed[index]
             {
-                let tail = if said.is_empty() {
-                    String::new()
-                } else {
-                    format!("; its output ends with: {said}")
-                };
+                let tail = if said.is_empty() { String::new() } else { format!(": {said}") };
                 let reason = format!("job {job}, task {task}: {cause} ({words}){tail}");
                 self.handed[index] = true;
                 finished(Finished { index, outcome: Err(reason), seconds: 0.0 })?;
@@ -289,7 +295,9 @@ fn left_traces(submission: &Submission, runs: &Path) -> bool {
 fn verdict(state: Option<&TaskState>, folder: &Path, task: usize) -> (Cause, String) {
     let code = script::exit_code(folder, task);
     match (state, code) {
-        (Some(TaskState::Failed(Cause::Failure, words)), Some(code)) => {
+        (Some(TaskState::Failed(Cause::Failure, words)), Some(code))
+            if !words.contains("exit code") =>
+        {
             (Cause::Failure, format!("{words}, exit code {code}"))
         }
         (Some(TaskState::Failed(cause, words)), _) => (*cause, words.clone()),

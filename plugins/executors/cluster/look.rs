@@ -1,5 +1,6 @@
 //! What can be said and done of a campaign from its folder alone.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use lacuna::plugin::executor::Seen;
@@ -13,7 +14,7 @@ pub fn look(scheduler: &dyn Scheduler, runs: &Path) -> Result<Vec<Seen>, Stop> {
     let (mut all, _) = ledger::read(runs, scheduler.name())?;
     all.retain(|submission| !submission.is_over());
     let open: Vec<&Submission> = all.iter().collect();
-    let states = if open.is_empty() { Default::default() } else { scheduler.states(&open)? };
+    let states = if open.is_empty() { BTreeMap::new() } else { scheduler.states(&open)? };
     let mut seen = Vec::new();
     for submission in &all {
         let job = submission.job.as_deref().unwrap_or("not known yet");

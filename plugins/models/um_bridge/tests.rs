@@ -275,7 +275,9 @@ fn questions_go_to_servers_that_are_there() {
             assert!(matches!(outcome, Err(EvalError::Rejected(_))), "{outcome:?}");
             ask(3);
         }));
-        stoppers.iter().for_each(|stopper| stopper.stop());
+        for stopper in &stoppers {
+            stopper.stop();
+        }
         asked.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
     });
     let outcome = model.predict(&case.call(&[1.0, 3.0, 5.0]));
