@@ -16,6 +16,8 @@ mod models;
 mod served;
 #[path = "contracts/skeletons.rs"]
 mod skeletons;
+#[path = "contracts/walk_through.rs"]
+mod walk_through;
 
 use std::path::{Path, PathBuf};
 
@@ -46,8 +48,13 @@ fn cases<K: Kind + ?Sized>(table: &Table) -> Vec<(&'static str, &'static [&'stat
     let registered: Vec<&str> = registry::entries::<K>().iter().map(|entry| entry.name).collect();
     let gone: Vec<&str> =
         table.iter().map(|(name, _)| *name).filter(|name| !registered.contains(name)).collect();
-    assert!(gone.is_empty(), "no plugin of kind {} is called {gone:?}: they are tested here", K::NAME);
-    let options = |name: &str| table.iter().find(|(listed, _)| *listed == name).map(|(_, all)| *all);
+    assert!(
+        gone.is_empty(),
+        "no plugin of kind {} is called {gone:?}: they are tested here",
+        K::NAME
+    );
+    let options =
+        |name: &str| table.iter().find(|(listed, _)| *listed == name).map(|(_, all)| *all);
     registered.into_iter().map(|name| (name, options(name).unwrap_or(&[""]))).collect()
 }
 
@@ -227,6 +234,8 @@ fn discrepancies() {
         ("gaussian", gaussian),
         ("gaussian_process", gaussian_process),
         ("multiplicative_gaussian", multiplicative_gaussian),
+        // Of the walk-through of CONTRIBUTING.md.
+        ("shot_noise", &["gain = { half_normal = 0.1 }"]),
         ("student_t", student_t),
     ];
     all::<dyn Discrepancy>(table, |case, plugin| contract::discrepancy(&case.label, plugin));

@@ -11,6 +11,7 @@ mod kill;
 mod problems;
 mod python;
 mod quick;
+mod skeletons;
 mod studies;
 mod tidy;
 mod um_bridge;

@@ -209,8 +209,11 @@ impl Likelihood for Noise {
     fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements> {
         let mut rng = stream.named("common").generator();
         let weights: Vec<f64> = (0..self.factor.columns()).map(|_| normal(&mut rng)).collect();
-        let centre: Vec<f64> =
-            response.iter().zip(self.factor.iter_rows()).map(|(y, f)| y + dot(f, &weights)).collect();
+        let centre: Vec<f64> = response
+            .iter()
+            .zip(self.factor.iter_rows())
+            .map(|(y, f)| y + dot(f, &weights))
+            .collect();
         let mut made = self.data.clone();
         for (r, replicate) in made.replicates.iter_mut().enumerate() {
             let mut rng = stream.named("replicate").at(r as u64).generator();

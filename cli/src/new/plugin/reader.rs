@@ -95,7 +95,11 @@ impl Sheet {
         })
     }
 
-    fn number(&self, (line, cells): &(usize, Vec<String>), column: usize) -> Result<f64, ReadError> {
+    fn number(
+        &self,
+        (line, cells): &(usize, Vec<String>),
+        column: usize,
+    ) -> Result<f64, ReadError> {
         let cell = &cells[column];
         cell.parse().map_err(|_| {
             let place = format!("line {line}, column {}", column + 1);
@@ -166,9 +170,7 @@ impl Reader for Skeleton {
                 unit: None,
                 range,
                 not_finite: values.len() - finite().count(),
-                signals: Table {
-                    columns: vec![Column { name: name.clone(), unit: None, values }],
-                },
+                signals: Table { columns: vec![Column { name: name.clone(), unit: None, values }] },
             }
         };
         let variables = sheet.names.iter().enumerate().map(variable).collect();

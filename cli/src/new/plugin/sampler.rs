@@ -175,7 +175,8 @@ mod tests {
             sampler.step(&Normal, &mut state, &Stream::root(2).at(step)).unwrap();
             taken += state.accepted.iter().filter(|taken| **taken).count();
         }
-        let (share, right) = (taken as f64 / 2e4, (2.0 / width).atan() / std::f64::consts::FRAC_PI_2);
+        let (share, right) =
+            (taken as f64 / 2e4, (2.0 / width).atan() / std::f64::consts::FRAC_PI_2);
         // Chains start in the law; neighbouring steps are correlated, by a factor of at most three in the variance.
         let error = (3.0 * right * (1.0 - right) / 2e4).sqrt();
         assert!((share - right).abs() < 4.0 * error, "{share} and {right}");

@@ -219,8 +219,7 @@ impl Linear for Polynomial {
     fn basis(&self, points: &Matrix) -> Matrix {
         let terms = |point: &[f64]| -> Vec<f64> {
             let u = self.scaled(point);
-            let term =
-                |powers: &Vec<i32>| powers.iter().zip(&u).map(|(n, u)| u.powi(*n)).product();
+            let term = |powers: &Vec<i32>| powers.iter().zip(&u).map(|(n, u)| u.powi(*n)).product();
             self.exponents.iter().map(term).collect()
         };
         Matrix::from_rows(self.exponents.len(), points.iter_rows().map(terms))
