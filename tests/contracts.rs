@@ -1,7 +1,7 @@
 //! Every registered plugin does what its kind demands: a listed plugin is a tested plugin.
 //!
-//! Plugins are built from their names and options as a study builds them. A plugin without an entry in the
-//! tables below fails here.
+//! Plugins are built from their names and options as a study builds them. A plugin that the tables below do not
+//! list is tested with its defaults; one that needs options, or deserves several, has an entry there.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 #[path = "contracts/effects.rs"]
@@ -14,8 +14,12 @@ mod gain;
 mod models;
 #[path = "contracts/served.rs"]
 mod served;
+#[path = "contracts/skeletons.rs"]
+mod skeletons;
 #[path = "slurm/mod.rs"]
 mod slurm;
+#[path = "contracts/walk_through.rs"]
+mod walk_through;
 
 use std::path::{Path, PathBuf};
 
@@ -29,7 +33,7 @@ use lacuna::run::write_response;
 // Without this line the linker leaves the plugins out.
 use lacuna_plugins as _;
 
-/// Plugins of a kind with the options, as TOML, under which each is tested.
+/// Plugins of a kind with the options, as TOML, under which each is tested; the others are tested with their defaults.
 type Table = [(&'static str, &'static [&'static str])];
 
 /// One plugin with one set of options.
@@ -41,22 +45,58 @@ struct Case<'a> {
     scratch: &'a Path,
 }
 
+/// The registered plugins of a kind, each with the options under which it is tested.
+fn cases<K: Kind + ?Sized>(table: &Table) -> Vec<(&'static str, &'static [&'static str])> {
+    let registered: Vec<&str> = registry::entries::<K>().iter().map(|entry| entry.name).collect();
+    let gone: Vec<&str> =
+        table.iter().map(|(name, _)| *name).filter(|name| !registered.contains(name)).collect();
+    assert!(
+        gone.is_empty(),
+        "no plugin of kind {} is called {gone:?}: they are tested here",
+        K::NAME
+    );
+    let options =
+        |name: &str| table.iter().find(|(listed, _)| *listed == name).map(|(_, all)| *all);
+    registered.into_iter().map(|name| (name, options(name).unwrap_or(&[""]))).collect()
+}
+
+/// A plugin from its name and options.
+fn built<K: Kind + ?Sized>(plugin: &str, options: &str) -> Box<K> {
+    let built = registry::from_text::<K>(plugin, options).unwrap_or_else(|error| {
+        let help = format!(
+            "{error}\n{0} `{plugin}` cannot be tested with the options `{options}`; give it others in the table of its \
+             kind, in tests/contracts.rs or tests/contracts/",
+            K::NAME
+        );
+        panic!("{help}")
+    });
+    built.plugin
+}
+
 /// Puts every plugin of a kind through its suite.
 fn all<K: Kind + ?Sized>(table: &Table, suite: impl Fn(&Case<'_>, &K) -> Result<(), Vec<String>>) {
-    let registered: Vec<&str> = registry::entries::<K>().iter().map(|entry| entry.name).collect();
-    let tested: Vec<&str> = table.iter().map(|(name, _)| *name).collect();
-    assert_eq!(tested, registered, "the plugins of kind {} that are tested here", K::NAME);
     let mut breaches = Vec::new();
-    for &(plugin, all_options) in table {
+    for (plugin, all_options) in cases::<K>(table) {
         for options in all_options {
             let scratch = tempfile::tempdir().unwrap();
-            let built = registry::from_text::<K>(plugin, options).unwrap_or_else(|e| panic!("{e}"));
             let label = format!("{plugin} {}", options.replace('\n', ", "));
             let case = Case { plugin, label: label.trim().to_owned(), scratch: scratch.path() };
-            breaches.extend(suite(&case, &*built.plugin).err().unwrap_or_default());
+            breaches.extend(suite(&case, &*built::<K>(plugin, options)).err().unwrap_or_default());
         }
     }
     assert!(breaches.is_empty(), "{}", breaches.join("\n"));
+}
+
+#[test]
+#[should_panic(expected = "no plugin of kind design is called [\"gone\"]")]
+fn a_tested_plugin_that_is_gone_is_missed() {
+    cases::<dyn Design>(&[("random", &[""]), ("gone", &[""])]);
+}
+
+#[test]
+#[should_panic(expected = "give it others in the table of its kind")]
+fn a_plugin_that_needs_options_says_where_it_gets_them() {
+    built::<dyn Term>("relaxation", "");
 }
 
 #[test]
@@ -229,6 +269,8 @@ fn discrepancies() {
         ("gaussian", gaussian),
         ("gaussian_process", gaussian_process),
         ("multiplicative_gaussian", multiplicative_gaussian),
+        // Of the walk-through of CONTRIBUTING.md.
+        ("shot_noise", &["gain = { half_normal = 0.1 }"]),
         ("student_t", student_t),
     ];
     all::<dyn Discrepancy>(table, |case, plugin| contract::discrepancy(&case.label, plugin));
@@ -330,16 +372,6 @@ fn sound_files(reader: &str, folder: &Path) -> Vec<Sample> {
         tolerance,
     };
     match reader {
-        "csv" => {
-            let row = |(i, y): (usize, &f64)| {
-                let place = layout.place(i);
-                format!("{},{},{y}\n", layout.axes[0].text(place[0]), layout.axes[1].text(place[1]))
-            };
-            let rows: String = values.iter().enumerate().map(row).collect();
-            let path = folder.join("sound.csv");
-            std::fs::write(&path, format!("sensor,time,strain\n{rows}")).unwrap();
-            vec![sample(path, 0.0)]
-        }
         "netcdf" => {
             let response = Response { values: values.clone(), valid: true, facts: Vec::new() };
             let file = write_response(folder, "sound", &layout, &response).unwrap();
@@ -349,7 +381,17 @@ fn sound_files(reader: &str, folder: &Path) -> Vec<Sample> {
         "sierra" => ["hist_cdf2.h", "hist_cdf5.h", "hist_nc4.h", "hb_spyhis.txt"]
             .map(|file| sample(samples().join(file), 1e-5))
             .to_vec(),
-        other => panic!("no file for the reader `{other}`"),
+        // A long table, which readers that are not listed have to read too.
+        _ => {
+            let row = |(i, y): (usize, &f64)| {
+                let place = layout.place(i);
+                format!("{},{},{y}\n", layout.axes[0].text(place[0]), layout.axes[1].text(place[1]))
+            };
+            let rows: String = values.iter().enumerate().map(row).collect();
+            let path = folder.join("sound.csv");
+            std::fs::write(&path, format!("sensor,time,strain\n{rows}")).unwrap();
+            vec![sample(path, 0.0)]
+        }
     }
 }
 

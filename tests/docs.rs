@@ -119,13 +119,18 @@ fn the_keys_of_the_summary_are_those_of_the_program() {
 }
 
 #[test]
-fn the_plugin_of_the_guide_is_the_one_that_is_compiled() {
-    let source = fs::read_to_string(root().join("examples/difference_walk.rs")).unwrap();
+fn the_plugins_of_the_guide_are_the_ones_that_are_compiled() {
     let guide = fs::read_to_string(root().join("CONTRIBUTING.md")).unwrap();
-    let (before, rest) = guide.split_once("```rust\n").expect("a block of Rust");
-    let (_, after) = rest.split_once("```\n").expect("the end of the block");
-    let whole = format!("{before}```rust\n{source}```\n{after}");
-    compare(&BTreeMap::from([("CONTRIBUTING.md".to_owned(), whole)]));
+    let (mut whole, mut rest) = (String::new(), &guide[..]);
+    for file in ["shot_noise", "difference_walk"] {
+        let source = fs::read_to_string(root().join(format!("examples/{file}.rs"))).unwrap();
+        let (before, block) = rest.split_once("```rust\n").expect("a block of Rust");
+        let (_, after) = block.split_once("```\n").expect("the end of the block");
+        write!(whole, "{before}```rust\n{source}```\n").unwrap();
+        rest = after;
+    }
+    assert!(!rest.contains("```rust\n"), "a block of Rust that is no file of examples");
+    compare(&BTreeMap::from([("CONTRIBUTING.md".to_owned(), whole + rest)]));
 }
 
 #[test]

@@ -1,11 +1,16 @@
 //! `new`: skeletons.
 
-use std::path::{Path, PathBuf};
+mod library;
+mod plugin;
+mod skeleton;
+mod study;
+#[cfg(test)]
+mod tests;
+mod tree;
 
-use lacuna::run::{Stop, files};
-use lacuna::study::emit;
+use std::path::PathBuf;
 
-use crate::{Failure, print};
+use crate::Failure;
 
 /// What can be made new.
 #[derive(clap::Subcommand)]
@@ -15,38 +20,22 @@ pub enum What {
         /// The folder to make.
         name: PathBuf,
     },
+    /// A plugin that works as it stands: one file in Lacuna's source, or a library of its own.
+    Plugin {
+        /// The kind, such as `sampler`.
+        kind: String,
+        /// The name by which a study will choose it, such as `random_walk`.
+        name: String,
+        /// Make a library in this folder, outside Lacuna's source; a study loads it with `[plugins]`.
+        #[arg(long, value_name = "FOLDER")]
+        library: Option<PathBuf>,
+    },
 }
 
 /// `lacuna new …`
 pub fn write(what: &What) -> Result<(), Failure> {
     match what {
-        What::Study { name } => study(name),
+        What::Study { name } => study::write(name),
+        What::Plugin { kind, name, library } => plugin::write(kind, name, library.as_deref()),
     }
-}
-
-const STUDY: &str = include_str!("new/study.toml");
-/// What the skeleton calls itself; the folder's name takes its place.
-const NAME: &str = "\"oscillator\"";
-const RUNS: &str = include_str!("new/runs.csv");
-const RESPONSES: &str = include_str!("new/responses.csv");
-const MEASURED: &str = include_str!("new/measured.csv");
-
-fn study(folder: &Path) -> Result<(), Failure> {
-    if folder.exists() {
-        let stop = Stop::new(format!("{} is there already", folder.display()));
-        return Err(stop.help("choose another name").into());
-    }
-    let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let named = STUDY.replace(NAME, &emit::string(&name));
-    let all = [
-        ("study.toml", named.as_str()),
-        ("runs.csv", RUNS),
-        ("responses.csv", RESPONSES),
-        ("measured.csv", MEASURED),
-    ];
-    for (file, text) in all {
-        files::write_atomic(&folder.join(file), text.as_bytes())?;
-    }
-    print(&format!("wrote {0}; run it with `lacuna run {0}/study.toml`", folder.display()));
-    Ok(())
 }

@@ -1,0 +1,162 @@
+//! `skeleton`: one run after the other.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Instant;
+
+use lacuna::plugin::executor::{Batch, Finished, Job};
+use lacuna::plugin::model::{EvalError, Response};
+use lacuna::plugin::{Component, Context, Executor};
+use lacuna::run::{Stop, write_response};
+use lacuna::study::Complaints;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Runs the model on this machine, one run after the other.
+///
+/// For models that use all cores themselves, or of which a licence allows one at a time; `local` runs several at once. A run
+/// that the model rejects can be tried again, where chance or a network decides.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Skeleton {
+    /// How often a run is tried at most.
+    pub attempts: usize,
+}
+
+impl Default for Skeleton {
+    fn default() -> Self {
+        Self { attempts: 1 }
+    }
+}
+
+impl Component for Skeleton {
+    fn check(&self, _context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        if self.attempts == 0 {
+            complaints.at("attempts").say("no run is made").expected("at least 1").found(0);
+        }
+    }
+}
+
+impl Executor for Skeleton {
+    fn submit(
+        &self,
+        batch: &Batch<'_>,
+        finished: &mut dyn FnMut(Finished) -> Result<(), Stop>,
+    ) -> Result<(), Stop> {
+        for (index, job) in batch.jobs.iter().enumerate() {
+            let begun = Instant::now();
+            let mut outcome = run(batch, job);
+            for _ in 1..self.attempts {
+                if matches!(outcome, Err(EvalError::Rejected(_))) {
+                    outcome = run(batch, job);
+                }
+            }
+            let seconds = begun.elapsed().as_secs_f64();
+            let outcome = match outcome {
+                Ok(done) => Ok(done),
+                Err(EvalError::Rejected(reason)) => Err(reason),
+                Err(EvalError::Fatal(reason)) => return Err(Stop::new(reason)),
+            };
+            finished(Finished { index, outcome, seconds })?;
+        }
+        Ok(())
+    }
+}
+
+/// Runs a job and writes its result down; a model that panics costs its own run and no other.
+fn run(batch: &Batch<'_>, job: &Job) -> Result<(Response, String), EvalError> {
+    let folder = batch.folder(job);
+    let evaluate = || {
+        let call = batch.call(job, &folder);
+        let response = batch.model.predict(&call)?;
+        if let Some(i) = response.values.iter().position(|y| !y.is_finite()) {
+            let (y, place) = (response.values[i], batch.layout.describe(i));
+            return Err(EvalError::Rejected(format!("the response is {y} at {place}")));
+        }
+        let file = match batch.model.write(&job.name, &call, &response, batch.directory)? {
+            Some(file) => file,
+            None => write_response(batch.directory, &job.name, batch.layout, &response)
+                .map_err(|stop| EvalError::Fatal(stop.to_string()))?,
+        };
+        Ok((response, file))
+    };
+    let panicked = |_| Err(EvalError::Rejected("the model panicked".to_owned()));
+    catch_unwind(AssertUnwindSafe(evaluate)).unwrap_or_else(panicked)
+}
+
+lacuna::register!(Executor, "skeleton", Skeleton);
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+    use lacuna::data::{Layout, Scenario};
+    use lacuna::plugin::Model;
+    use lacuna::plugin::model::{Call, Signature};
+
+    /// A folder of this test alone.
+    fn folder(name: &str) -> PathBuf {
+        let folder = std::env::temp_dir().join(format!("skeleton-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        folder
+    }
+
+    #[test]
+    fn it_keeps_the_contract() {
+        let folder = folder("contract");
+        let judged = lacuna::contract::executor("skeleton", &Skeleton::default(), &folder);
+        assert_eq!(judged, Ok(()));
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// A model that answers at every third call.
+    #[derive(Default)]
+    struct Moody(AtomicUsize);
+
+    impl Component for Moody {}
+
+    impl Model for Moody {
+        fn signature(&self, _context: &Context<'_>) -> Signature {
+            Signature { inputs: Vec::new(), layout: Layout::number("y"), resamples: false }
+        }
+
+        fn predict(&self, _call: &Call<'_>) -> Result<Response, EvalError> {
+            let calls = self.0.fetch_add(1, Ordering::Relaxed) + 1;
+            if !calls.is_multiple_of(3) {
+                return Err(EvalError::Rejected("not now".to_owned()));
+            }
+            Ok(Response { values: vec![calls as f64], valid: true, facts: Vec::new() })
+        }
+    }
+
+    #[test]
+    fn runs_are_tried_as_often_as_it_says_and_end_in_order() {
+        let folder = folder("attempts");
+        let (layout, scenario) = (Layout::number("y"), Scenario::default());
+        let jobs = ["a", "b"].map(|name| Job { name: name.to_owned(), inputs: Vec::new() });
+        let ends = |attempts: usize| {
+            let batch = Batch {
+                model: &Moody::default(),
+                names: &[],
+                units: &[],
+                jobs: &jobs,
+                layout: &layout,
+                scenario: &scenario,
+                study: &folder,
+                directory: &folder,
+            };
+            let mut ends = Vec::new();
+            let mut finished = |end: Finished| {
+                ends.push((end.index, end.outcome.map(|(response, _)| response.values[0])));
+                Ok(())
+            };
+            Skeleton { attempts }.submit(&batch, &mut finished).unwrap();
+            ends
+        };
+        let failed = || Err("not now".to_owned());
+        assert_eq!(ends(2), [(0, failed()), (1, Ok(3.0))]);
+        assert_eq!(ends(3), [(0, Ok(3.0)), (1, Ok(6.0))]);
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+}

@@ -1,0 +1,115 @@
+//! The skeletons of plugins, one a kind: whole plugins whose names are replaced.
+//!
+//! They are compiled and tested where the contracts are (`tests/contracts/skeletons.rs`).
+
+/// A skeleton.
+pub struct Skeleton {
+    /// The kind, as a study calls it.
+    pub kind: &'static str,
+    /// The trait of the kind, as `register!` calls it.
+    pub kind_trait: &'static str,
+    /// The folder in `plugins/`.
+    pub folder: &'static str,
+    /// Whether a library can bring plugins of this kind.
+    pub in_libraries: bool,
+    text: &'static str,
+}
+
+macro_rules! skeletons {
+    ($($kind:literal $kind_trait:literal $folder:literal $in_libraries:literal),+ $(,)?) => {
+        [$(Skeleton {
+            kind: $kind,
+            kind_trait: $kind_trait,
+            folder: $folder,
+            in_libraries: $in_libraries,
+            text: include_str!(concat!("plugin/", $kind, ".rs")),
+        }),+]
+    };
+}
+
+/// All of them, by kind.
+pub const ALL: [Skeleton; 10] = skeletons![
+    "design" "Design" "designs" true,
+    "discrepancy" "Discrepancy" "discrepancies" true,
+    "effect" "Effect" "effects" true,
+    "executor" "Executor" "executors" false,
+    "model" "Model" "models" true,
+    "reader" "Reader" "readers" true,
+    "sampler" "Sampler" "samplers" true,
+    "surrogate" "Surrogate" "surrogates" true,
+    "target" "Density" "targets" false,
+    "term" "Term" "terms" false,
+];
+
+/// The kinds that there are skeletons of.
+pub fn kinds() -> Vec<&'static str> {
+    ALL.iter().map(|skeleton| skeleton.kind).collect()
+}
+
+/// The names that the skeletons have, as a type and as a plugin.
+const NAMES: [&str; 2] = ["Skeleton", "skeleton"];
+
+/// Names that no module can have.
+const KEYWORDS: [&str; 52] = [
+    "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate",
+    "do", "dyn", "else", "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl",
+    "in", "let", "loop", "macro", "match", "mod", "move", "mut", "override", "priv", "pub", "ref",
+    "return", "self", "static", "struct", "super", "trait", "true", "try", "type", "typeof",
+    "unsafe", "unsized", "use", "virtual", "where", "while", "yield", "union",
+];
+
+/// Types that the code means without saying where they come from.
+const PRELUDE: [&str; 13] = [
+    "Box", "Clone", "Debug", "Default", "Err", "Iterator", "None", "Ok", "Option", "Result",
+    "Some", "String", "Vec",
+];
+
+impl Skeleton {
+    /// The skeleton of a kind.
+    pub fn of(kind: &str) -> Option<&'static Self> {
+        ALL.iter().find(|skeleton| skeleton.kind == kind)
+    }
+
+    /// The plugin under a name.
+    pub fn named(&self, name: &str) -> String {
+        self.text.replace(NAMES[0], &type_name(name)).replace(NAMES[1], name)
+    }
+
+    /// What is wrong with a name of a plugin that is written from this skeleton, and what would be right.
+    pub fn fault(&self, name: &str) -> Option<(String, &'static str)> {
+        let words = || name.split('_');
+        let sound = |word: &str| {
+            !word.is_empty() && word.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit())
+        };
+        if !words().all(sound) || name.starts_with(|c: char| c.is_ascii_digit()) {
+            let help =
+                "names are small letters, digits and single underscores, such as `random_walk`";
+            return Some((format!("`{name}` is no name of a plugin"), help));
+        }
+        if KEYWORDS.contains(&name) {
+            let text = format!("`{name}` is a word of Rust, and no file can be called so");
+            return Some((text, "choose another name"));
+        }
+        let of_code = type_name(name);
+        let is_word = |c: char| c.is_alphanumeric() || c == '_';
+        let used = self.text.split(|c| !is_word(c)).any(|word| word == of_code && word != NAMES[0]);
+        if used || PRELUDE.contains(&of_code.as_str()) {
+            let text = format!(
+                "the type of `{name}` would be called `{of_code}`, which the code uses already"
+            );
+            return Some((text, "choose another name, such as one of two words"));
+        }
+        None
+    }
+}
+
+/// The name of the options' type: `random_walk` gives `RandomWalk`.
+pub fn type_name(name: &str) -> String {
+    let word = |word: &str| {
+        let mut letters = word.chars();
+        letters
+            .next()
+            .map_or(String::new(), |c| c.to_ascii_uppercase().to_string() + letters.as_str())
+    };
+    name.split('_').map(word).collect()
+}

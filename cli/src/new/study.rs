@@ -1,0 +1,36 @@
+//! A study that runs as it stands.
+
+use std::path::Path;
+
+use lacuna::run::{Stop, files};
+use lacuna::study::emit;
+
+use crate::{Failure, print};
+
+const STUDY: &str = include_str!("study.toml");
+/// What the skeleton calls itself; the folder's name takes its place.
+const NAME: &str = "\"oscillator\"";
+const RUNS: &str = include_str!("runs.csv");
+const RESPONSES: &str = include_str!("responses.csv");
+const MEASURED: &str = include_str!("measured.csv");
+
+/// Makes the folder.
+pub fn write(folder: &Path) -> Result<(), Failure> {
+    if folder.exists() {
+        let stop = Stop::new(format!("{} is there already", folder.display()));
+        return Err(stop.help("choose another name").into());
+    }
+    let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let named = STUDY.replace(NAME, &emit::string(&name));
+    let all = [
+        ("study.toml", named.as_str()),
+        ("runs.csv", RUNS),
+        ("responses.csv", RESPONSES),
+        ("measured.csv", MEASURED),
+    ];
+    for (file, text) in all {
+        files::write_atomic(&folder.join(file), text.as_bytes())?;
+    }
+    print(&format!("wrote {0}; run it with `lacuna run {0}/study.toml`", folder.display()));
+    Ok(())
+}

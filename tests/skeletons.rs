@@ -1,0 +1,203 @@
+//! `lacuna new plugin`: what it writes is what is compiled and tested, in its place, with another name.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use lacuna::plugin::registry;
+use tempfile::TempDir;
+
+use crate::quick::{command, root, said};
+
+/// Each kind with its folder.
+const KINDS: [(&str, &str); 10] = [
+    ("design", "designs"),
+    ("discrepancy", "discrepancies"),
+    ("effect", "effects"),
+    ("executor", "executors"),
+    ("model", "models"),
+    ("reader", "readers"),
+    ("sampler", "samplers"),
+    ("surrogate", "surrogates"),
+    ("target", "targets"),
+    ("term", "terms"),
+];
+
+/// The skeleton of a kind as `trial_KIND`.
+fn trial(kind: &str) -> (String, String) {
+    let template = root().join(format!("cli/src/new/plugin/{kind}.rs"));
+    let of_code = format!("Trial{}{}", kind[..1].to_uppercase(), &kind[1..]);
+    let name = format!("trial_{kind}");
+    let text = fs::read_to_string(template).unwrap();
+    (text.replace("Skeleton", &of_code).replace("skeleton", &name), name)
+}
+
+/// A folder with as much of the source as the command looks at.
+fn source() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let copy = |file: &str| {
+        let to = folder.path().join(file);
+        fs::create_dir_all(to.parent().unwrap()).unwrap();
+        fs::copy(root().join(file), to).unwrap();
+    };
+    ["plugins/Cargo.toml", "plugins/lib.rs"].into_iter().for_each(copy);
+    KINDS.iter().for_each(|(_, kinds)| copy(&format!("plugins/{kinds}/mod.rs")));
+    folder
+}
+
+/// Asks for a plugin in a folder; the exit code, and what is said.
+fn ask(folder: &Path, words: &[&str]) -> (Option<i32>, String) {
+    let mut lacuna = command();
+    said(lacuna.args(["new", "plugin"]).args(words).current_dir(folder))
+}
+
+#[test]
+fn a_skeleton_of_each_kind_is_the_one_that_is_tested_under_another_name() {
+    let kinds: Vec<&str> = registry::kinds().iter().map(|kind| kind.name).collect();
+    assert_eq!(kinds, KINDS.map(|(kind, _)| kind));
+    let tree = source();
+    for (kind, kinds) in KINDS {
+        let (text, name) = trial(kind);
+        // Anywhere in the tree will do.
+        let output = command()
+            .args(["new", "plugin", kind, &name])
+            .current_dir(tree.path().join("plugins").join(kinds))
+            .output()
+            .unwrap();
+        let told = String::from_utf8(output.stdout).unwrap();
+        assert!(output.status.success(), "{kind}: {}", String::from_utf8_lossy(&output.stderr));
+        assert!(told.contains(&format!("docs/reference/{kind}.{name}.md")), "{told}");
+        let folder = tree.path().join("plugins").join(kinds);
+        assert_eq!(fs::read_to_string(folder.join(format!("{name}.rs"))).unwrap(), text);
+
+        let before = fs::read_to_string(root().join("plugins").join(kinds).join("mod.rs")).unwrap();
+        let after = fs::read_to_string(folder.join("mod.rs")).unwrap();
+        let line = format!("pub mod {name};\n");
+        assert_eq!(after.replacen(&line, "", 1), before, "{kind}");
+        let block = after.split("\n\n").find(|block| block.contains(&line)).unwrap();
+        let modules = block.lines().filter_map(|line| line.rsplit_once("mod "));
+        let names: Vec<&str> = modules.map(|(_, name)| name).collect();
+        assert!(names.is_sorted(), "{kind}: {names:?}");
+    }
+}
+
+#[test]
+fn what_cannot_be_written_is_refused_and_nothing_is_changed() {
+    let tree = source();
+    let list = tree.path().join("plugins/samplers/mod.rs");
+    let before = fs::read_to_string(&list).unwrap();
+    for (words, expected) in [
+        (
+            &["sampler", "Walk"][..],
+            "error: `Walk` is no name of a plugin\nhelp: names are small letters",
+        ),
+        (&["sampler", "loop"], "error: `loop` is a word of Rust"),
+        (&["sampler", "state"], "error: the type of `state` would be called `State`"),
+        (&["sampler", "metropolis"], "error: there is a sampler `metropolis` already"),
+        (&["sampler", "moves"], "has no place for the module `moves`"),
+        (
+            &["simulator", "walk"],
+            "error: there is no kind `simulator` of plugins\nhelp: the kinds are `design`",
+        ),
+        (
+            &["term", "loss", "--library", "loss"],
+            "a library cannot bring plugins of the kind `term`",
+        ),
+        (&["design", "even", "--library", "plugins"], "error: plugins is there already"),
+    ] {
+        let (code, told) = ask(tree.path(), words);
+        assert!(code == Some(2) && told.contains(expected), "{words:?}: {told}");
+    }
+    assert_eq!(fs::read_to_string(&list).unwrap(), before);
+
+    let elsewhere = tempfile::tempdir().unwrap();
+    let (code, told) = ask(elsewhere.path(), &["sampler", "walk"]);
+    assert!(code == Some(2) && told.contains("is not in Lacuna's source"), "{told}");
+    assert!(told.contains("`lacuna new plugin sampler walk --library walk`"), "{told}");
+    assert_eq!(fs::read_dir(elsewhere.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn a_library_is_the_same_plugin_with_the_crates_that_it_needs() {
+    let folder = tempfile::tempdir().unwrap();
+    let (text, name) = trial("sampler");
+    let (code, told) = ask(folder.path(), &["sampler", &name, "--library", "walk"]);
+    assert_eq!(code, Some(0), "{told}");
+    let written = fs::read_to_string(folder.path().join("walk/src/lib.rs")).unwrap();
+    let inside = written.replace("use lacuna_plugin::lacuna;\n", "").replace(
+        "lacuna_plugin::export! {\n    Sampler \"trial_sampler\" TrialSampler,\n}",
+        "lacuna::register!(Sampler, \"trial_sampler\", TrialSampler);",
+    );
+    assert!(inside == text && written != text);
+    let manifest = fs::read_to_string(folder.path().join("walk/Cargo.toml")).unwrap();
+    let manifest: toml::Table = manifest.parse().unwrap();
+    assert_eq!(manifest["lib"]["crate-type"][0].as_str(), Some("cdylib"));
+    let crates: Vec<&String> = manifest["dependencies"].as_table().unwrap().keys().collect();
+    assert_eq!(crates, ["lacuna-plugin", "schemars", "serde", "serde_json"]);
+}
+
+/// Copies the source without what is built or hidden.
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap().map(Result::unwrap) {
+        let name = entry.file_name().into_string().unwrap();
+        let target = to.join(&name);
+        if name.starts_with('.') || ["target", "runs"].contains(&&*name) {
+            continue;
+        }
+        if entry.path().is_dir() {
+            copy(&entry.path(), &target);
+        } else {
+            fs::copy(entry.path(), target).unwrap();
+        }
+    }
+}
+
+/// With `LACUNA_SKELETONS=1`: the whole way in a copy of the source. Nothing but the command touches it; then the
+/// plugins' own tests, the contracts, the generated pages and the rules of the source have to hold.
+///
+/// It builds in `target/skeletons`, from nothing the first time.
+#[test]
+fn a_source_with_a_new_plugin_of_each_kind_passes_its_tests() {
+    if std::env::var_os("LACUNA_SKELETONS").is_none_or(|value| value != "1") {
+        println!("skipped: LACUNA_SKELETONS is not 1");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let tree = folder.path().join("source");
+    copy(&root(), &tree);
+    for (kind, _) in KINDS {
+        let (code, told) = ask(&tree, &[kind, &trial(kind).1]);
+        assert_eq!(code, Some(0), "{kind}: {told}");
+    }
+    let built = root().canonicalize().unwrap().join("target/skeletons");
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let run = |words: &[&str], bless: &str| {
+        let begun = std::time::Instant::now();
+        let mut cargo = Command::new(&cargo);
+        cargo.args(words).current_dir(&tree).env_remove("LACUNA_SKELETONS");
+        cargo.env("CARGO_TARGET_DIR", &built).env("LACUNA_BLESS", bless);
+        let output = cargo.output().unwrap();
+        println!("cargo {} took {} s", words.join(" "), begun.elapsed().as_secs());
+        let [out, error] =
+            [output.stdout, output.stderr].map(|b| String::from_utf8_lossy(&b).into_owned());
+        assert!(output.status.success(), "cargo {}\n{out}\n{error}", words.join(" "));
+        out
+    };
+    run(&["fmt", "--all"], "0");
+    let test = |which: &[&str], filter: &[&str], bless: &str| {
+        let packages = ["test", "-p", "lacuna-plugins", "-p", "lacuna-tests"];
+        run(&[&packages, which, &["--"], filter].concat(), bless)
+    };
+    test(&["--test", "all"], &["docs::"], "1");
+    test(&["--test", "all"], &["docs::", "tidy::"], "0");
+    test(&["--test", "contracts"], &[], "0");
+    let told = test(&["--lib"], &["::trial_"], "0");
+    for (kind, kinds) in KINDS {
+        let name = trial(kind).1;
+        let page = format!("docs/reference/{kind}.{name}.md");
+        assert!(tree.join(&page).is_file(), "{page}");
+        let passed = format!("test {kinds}::{name}::tests::it_keeps_the_contract ... ok");
+        assert!(told.contains(&passed), "{passed}\n{told}");
+    }
+}
