@@ -124,8 +124,7 @@ impl Recipe {
         let options = emit::to_toml(&built.options).map_err(|error| {
             Stop::new(format!("cannot write the options of `{}`: {error}", built.name))
         })?;
-        let file =
-            |l: &&Library| LibraryFile { path: l.path.clone(), sha256: l.sha256.clone() };
+        let file = |l: &&Library| LibraryFile { path: l.path.clone(), sha256: l.sha256.clone() };
         let libraries = libraries.iter().map(file).collect();
         Ok(Self { name: built.name.to_owned(), options, libraries })
     }

@@ -58,8 +58,7 @@ pub fn stage(
     let imported = imports::read(study)?;
     let runs = section.common.runs.get();
     let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.design)).collect();
-    let mut inputs =
-        vec![json!([section.built.identity(), runs, laws, study.about.seed])];
+    let mut inputs = vec![json!([section.built.identity(), runs, laws, study.about.seed])];
     if !section.common.extended.is_empty() {
         inputs.push(json!({ "extended": section.common.extended }));
     }

@@ -1,13 +1,11 @@
 //! `skeleton`: one run after the other.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::time::Instant;
-
 use lacuna::plugin::executor::{Batch, Finished, Job};
-use lacuna::plugin::model::{EvalError, Response};
+use lacuna::plugin::model::EvalError;
 use lacuna::plugin::{Component, Context, Executor};
-use lacuna::run::{Stop, write_response};
+use lacuna::run::Stop;
 use lacuna::study::Complaints;
+use lacuna::work::{Ended, evaluate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -43,16 +41,15 @@ impl Executor for Skeleton {
         finished: &mut dyn FnMut(Finished) -> Result<(), Stop>,
     ) -> Result<(), Stop> {
         for (index, job) in batch.jobs.iter().enumerate() {
-            let begun = Instant::now();
-            let mut outcome = run(batch, job);
+            let mut last = run(batch, job)?;
             for _ in 1..self.attempts {
-                if matches!(outcome, Err(EvalError::Rejected(_))) {
-                    outcome = run(batch, job);
+                if matches!(last.outcome, Err(EvalError::Rejected(_))) {
+                    last = run(batch, job)?;
                 }
             }
-            let seconds = begun.elapsed().as_secs_f64();
+            let Ended { outcome, seconds } = last;
             let outcome = match outcome {
-                Ok(done) => Ok(done),
+                Ok(written) => Ok(written),
                 Err(EvalError::Rejected(reason)) => Err(reason),
                 Err(EvalError::Fatal(reason)) => return Err(Stop::new(reason)),
             };
@@ -62,25 +59,10 @@ impl Executor for Skeleton {
     }
 }
 
-/// Runs a job and writes its result down; a model that panics costs its own run and no other.
-fn run(batch: &Batch<'_>, job: &Job) -> Result<(Response, String), EvalError> {
-    let folder = batch.folder(job);
-    let evaluate = || {
-        let call = batch.call(job, &folder);
-        let response = batch.model.predict(&call)?;
-        if let Some(i) = response.values.iter().position(|y| !y.is_finite()) {
-            let (y, place) = (response.values[i], batch.layout.describe(i));
-            return Err(EvalError::Rejected(format!("the response is {y} at {place}")));
-        }
-        let file = match batch.model.write(&job.name, &call, &response, batch.directory)? {
-            Some(file) => file,
-            None => write_response(batch.directory, &job.name, batch.layout, &response)
-                .map_err(|stop| EvalError::Fatal(stop.to_string()))?,
-        };
-        Ok((response, file))
-    };
-    let panicked = |_| Err(EvalError::Rejected("the model panicked".to_owned()));
-    catch_unwind(AssertUnwindSafe(evaluate)).unwrap_or_else(panicked)
+/// Runs a job in this process and writes its response down; a model that panics costs its own run and no other.
+fn run(batch: &Batch<'_>, job: &Job) -> Result<Ended, Stop> {
+    let ended = evaluate(batch, &[job]).pop();
+    ended.ok_or_else(|| Stop::new(format!("the run `{}` has no end", job.name)))
 }
 
 lacuna::register!(Executor, "skeleton", Skeleton);
@@ -93,7 +75,8 @@ mod tests {
     use super::*;
     use lacuna::data::{Layout, Scenario};
     use lacuna::plugin::Model;
-    use lacuna::plugin::model::{Call, Signature};
+    use lacuna::plugin::executor::Recipe;
+    use lacuna::plugin::model::{Call, Response, Signature};
 
     /// A folder of this test alone.
     fn folder(name: &str) -> PathBuf {
@@ -135,9 +118,12 @@ mod tests {
         let folder = folder("attempts");
         let (layout, scenario) = (Layout::number("y"), Scenario::default());
         let jobs = ["a", "b"].map(|name| Job { name: name.to_owned(), inputs: Vec::new() });
+        let recipe =
+            Recipe { name: "moody".to_owned(), options: String::new(), libraries: Vec::new() };
         let ends = |attempts: usize| {
             let batch = Batch {
                 model: &Moody::default(),
+                recipe: &recipe,
                 names: &[],
                 units: &[],
                 jobs: &jobs,
@@ -148,15 +134,15 @@ mod tests {
             };
             let mut ends = Vec::new();
             let mut finished = |end: Finished| {
-                ends.push((end.index, end.outcome.map(|(response, _)| response.values[0])));
+                ends.push((end.index, end.outcome.map(|written| written.valid)));
                 Ok(())
             };
             Skeleton { attempts }.submit(&batch, &mut finished).unwrap();
             ends
         };
         let failed = || Err("not now".to_owned());
-        assert_eq!(ends(2), [(0, failed()), (1, Ok(3.0))]);
-        assert_eq!(ends(3), [(0, Ok(3.0)), (1, Ok(6.0))]);
+        assert_eq!(ends(2), [(0, failed()), (1, Ok(true))]);
+        assert_eq!(ends(3), [(0, Ok(true)), (1, Ok(true))]);
         std::fs::remove_dir_all(folder).unwrap();
     }
 }
