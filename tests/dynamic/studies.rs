@@ -121,6 +121,8 @@ fn a_run_keeps_what_it_loaded_and_goes_on_with_it() {
     assert_eq!(again.made, Vec::<String>::new());
 
     // Another file of that name is refused, since the study pins the one that it means.
+    // A file that is loaded must not change under the program: another one takes its place.
+    std::fs::remove_file(&library).unwrap();
     std::fs::write(&library, "no library").unwrap();
     let complaints = load_for(&resolved, &[], Use::Look).complaints();
     assert!(complaints.contains("it is not the pinned file: expected sha256"), "{complaints}");
