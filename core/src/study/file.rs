@@ -83,10 +83,10 @@ pub struct DesignKeys {
     /// The number of simulation runs.
     pub runs: Count,
     /// Numbers of runs that were added later, one after the other: `[97]` adds 97 without moving the others, whose
-    /// results are kept. `lacuna campaign extend RUN` adds to the list of a run directory.
+    /// results are kept. `lacuna campaign extend RUN --runs 97` adds to the list of a run directory.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub extended: Vec<Count>,
-    /// Folders with finished runs that are used too, relative to the study file: those that `lacuna campaign import RUN`
+    /// Folders with finished runs that are used too, relative to the study file: those that `lacuna campaign import RUN TABLE`
     /// makes of runs made by hand, or the folder `2-simulate` of another run directory.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub imports: Vec<PathBuf>,

@@ -51,19 +51,19 @@ impl fmt::Display for Cause {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Retry {
-    /// After a failure of the node: 3 when left out.
+    /// After a failure of the node.
     pub node_failure: usize,
-    /// When the scheduler took the node for something else: 10 when left out.
+    /// When the scheduler took the node for something else.
     pub preempted: usize,
-    /// When the time limit was reached: 0 when left out.
+    /// When the time limit was reached.
     pub timeout: usize,
-    /// When memory ran out: 0 when left out.
+    /// When memory ran out.
     pub out_of_memory: usize,
-    /// When somebody cancelled the job: 0 when left out.
+    /// When somebody cancelled the job.
     pub cancelled: usize,
-    /// When the job ended without a word of the run, by an exit code or a signal: 0 when left out.
+    /// When the job ended without a word of the run, by an exit code or a signal.
     pub failure: usize,
-    /// When the scheduler does not know of the job any more: 1 when left out.
+    /// When the scheduler does not know of the job any more.
     pub lost: usize,
 }
 
@@ -100,9 +100,9 @@ impl Retry {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Growth {
-    /// The factor on the time limit after each time limit that was reached: 1 when left out.
+    /// The factor on the time limit after each time limit that was reached.
     pub time: Positive,
-    /// The factor on the memory after each time that it ran out: 1 when left out.
+    /// The factor on the memory after each time that it ran out.
     pub memory: Positive,
 }
 

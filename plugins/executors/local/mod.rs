@@ -22,7 +22,7 @@ use super::program;
 /// Each run's result file is written as the run finishes, so a killed study loses at most the
 /// runs under way. The number of threads or processes changes the time and nothing else.
 ///
-/// With `processes` every run is made in a process of its own kind (`lacuna work`): one that crashes or takes more
+/// With `processes` every run is made in a process of its own kind (`lacuna work ORDER`): one that crashes or takes more
 /// memory than it may costs its own run and no other, and processes can be pinned to processors.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]

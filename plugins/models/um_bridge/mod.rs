@@ -43,8 +43,8 @@ pub struct UmBridge {
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub url: String,
     /// The addresses of several servers of the same model, in place of `url`. Each question goes to a server that is free;
-    /// one that is gone is left out with a warning and its question put to another. An input at which two servers end
-    /// counts as failed.
+    /// one that is gone is left out with a warning and its question put to another. An input over which two servers break the
+    /// connection counts as failed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub urls: Vec<String>,
     /// How many evaluations are under way at a time at each address; when left out 1 with `urls`, and with `url` as many

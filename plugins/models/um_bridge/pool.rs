@@ -9,7 +9,10 @@ use lacuna_um_bridge::client::Error;
 
 /// Servers with what is under way at each.
 pub struct Pool {
+    /// They ask once where there are several servers: a question that one does not answer goes to another.
     clients: Vec<Client>,
+    /// They ask as often as the study says, whether a server is there at all.
+    callers: Vec<Client>,
     /// How many questions are under way at a time at each.
     most: usize,
     seats: Mutex<Vec<Seat>>,
@@ -19,21 +22,27 @@ pub struct Pool {
 #[derive(Default)]
 struct Seat {
     busy: usize,
-    /// Whether it has ever answered.
-    answered: bool,
     /// Why it is left out.
     gone: Option<Error>,
 }
 
-/// An input at which so many servers ended is not sent to another.
+/// An input over which so many servers broke the connection is not sent to another.
 const MOST_DEATHS: usize = 2;
 
 impl Pool {
     /// Servers at these addresses, with so many questions at a time at each.
     pub fn new(urls: &[String], timeout: Duration, retries: u32, most: usize) -> Self {
-        let clients = urls.iter().map(|url| Client::new(url, timeout, retries)).collect();
+        let client =
+            |retries: u32| move |url: &String| -> Client { Client::new(url, timeout, retries) };
+        let once = if urls.len() == 1 { retries } else { 0 };
         let seats = urls.iter().map(|_| Seat::default()).collect();
-        Self { clients, most, seats: Mutex::new(seats), freed: Condvar::new() }
+        Self {
+            clients: urls.iter().map(client(once)).collect(),
+            callers: urls.iter().map(client(retries)).collect(),
+            most,
+            seats: Mutex::new(seats),
+            freed: Condvar::new(),
+        }
     }
 
     /// The answer of a server that is free. One that is gone is left out, and its question put to another.
@@ -42,20 +51,32 @@ impl Pool {
         loop {
             let place = self.take()?;
             let outcome = question(&self.clients[place]);
-            let unreachable = matches!(outcome, Err(Error::Unreachable { .. }));
-            let worked_before = self.give_back(place, outcome.as_ref().err());
-            let Err(error) = outcome else { return outcome };
-            if !unreachable || self.clients.len() == 1 {
-                return Err(error);
+            if self.clients.len() == 1 {
+                self.give_back(place, None);
+                return outcome;
             }
-            eprintln!("warning: {error}; it is left out");
-            deaths += usize::from(worked_before);
-            if deaths == MOST_DEATHS {
-                // What ends every server is the input, not the server.
-                let Error::Unreachable { url, reason } = error else { return Err(error) };
-                let reason =
-                    format!("{reason}, the second server that ended while it worked on this");
-                return Err(Error::Broken { url, reason });
+            match outcome {
+                Err(Error::Unreachable { .. }) => {
+                    let gone = self.callers[place].info().err();
+                    if let Some(error) = &gone {
+                        eprintln!("warning: {error}; it is left out");
+                    }
+                    self.give_back(place, gone);
+                }
+                Err(Error::Broken { url, reason }) => {
+                    self.give_back(place, None);
+                    deaths += 1;
+                    if deaths == MOST_DEATHS {
+                        // What ends every server is the input, not the server.
+                        let reason =
+                            format!("{reason}, the second server to do so over this input");
+                        return Err(Error::Broken { url, reason });
+                    }
+                }
+                outcome => {
+                    self.give_back(place, None);
+                    return outcome;
+                }
             }
         }
     }
@@ -75,31 +96,23 @@ impl Pool {
                 return Ok(place);
             }
             if here().next().is_none() {
-                let last = seats.iter().find_map(|seat| seat.gone.clone());
                 let reason = format!("all {} servers are gone", seats.len());
-                let none = Error::Unreachable { url: "any address".to_owned(), reason };
-                return Err(last.filter(|_| seats.len() == 1).unwrap_or(none));
+                return Err(Error::Unreachable { url: "any address".to_owned(), reason });
             }
             seats = self.freed.wait(seats).unwrap_or_else(PoisonError::into_inner);
         }
     }
 
-    /// Notes how a question ended; returns whether the server had answered before.
-    fn give_back(&self, place: usize, error: Option<&Error>) -> bool {
+    /// Frees a server, or leaves it out.
+    fn give_back(&self, place: usize, gone: Option<Error>) {
         let mut seats = self.seats();
-        let alone = seats.len() == 1;
-        let seat = &mut seats[place];
-        seat.busy -= 1;
-        let before = seat.answered;
-        match error {
-            // A server that is the only one is asked again: there is nobody else.
-            Some(error @ Error::Unreachable { .. }) if !alone => seat.gone = Some(error.clone()),
-            Some(Error::Unreachable { .. }) => {}
-            _ => seat.answered = true,
+        seats[place].busy -= 1;
+        // Another question may have found it gone before.
+        if gone.is_some() {
+            seats[place].gone = gone;
         }
         drop(seats);
         self.freed.notify_all();
-        before
     }
 }
 

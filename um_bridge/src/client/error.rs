@@ -106,6 +106,10 @@ impl Error {
                 | ErrorKind::BrokenPipe => {
                     Self::Broken { url, reason: "it closed it without an answer".to_owned() }
                 }
+                // The kind of a name that nobody knows has no name of its own.
+                _ if io.to_string().contains("lookup address") => {
+                    unreachable(url, "there is no such host")
+                }
                 _ => Self::Broken { url, reason: io.to_string() },
             },
             ureq::Error::BodyExceedsLimit(limit) => {
