@@ -74,7 +74,7 @@ fn a_skeleton_of_each_kind_is_the_one_that_is_tested_under_another_name() {
         let after = fs::read_to_string(folder.join("mod.rs")).unwrap();
         let line = format!("pub mod {name};\n");
         assert_eq!(after.replacen(&line, "", 1), before, "{kind}");
-        let block = after.split("\n\n").find(|block| block.contains(&line)).unwrap();
+        let block = after.split("\n\n").find(|block| block.contains(line.trim_end())).unwrap();
         let modules = block.lines().filter_map(|line| line.rsplit_once("mod "));
         let names: Vec<&str> = modules.map(|(_, name)| name).collect();
         assert!(names.is_sorted(), "{kind}: {names:?}");
