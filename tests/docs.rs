@@ -125,7 +125,7 @@ fn the_plugins_of_the_guide_are_the_ones_that_are_compiled() {
     for file in ["shot_noise", "difference_walk"] {
         let source = fs::read_to_string(root().join(format!("examples/{file}.rs"))).unwrap();
         let (before, block) = rest.split_once("```rust\n").expect("a block of Rust");
-        let (_, after) = block.split_once("```\n").expect("the end of the block");
+        let (_, after) = block.split_once("\n```\n").expect("the end of the block");
         write!(whole, "{before}```rust\n{source}```\n").unwrap();
         rest = after;
     }

@@ -49,14 +49,8 @@ pub fn kinds() -> Vec<&'static str> {
 /// The names that the skeletons have, as a type and as a plugin.
 const NAMES: [&str; 2] = ["Skeleton", "skeleton"];
 
-/// Names that no module can have.
-const KEYWORDS: [&str; 52] = [
-    "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate",
-    "do", "dyn", "else", "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl",
-    "in", "let", "loop", "macro", "match", "mod", "move", "mut", "override", "priv", "pub", "ref",
-    "return", "self", "static", "struct", "super", "trait", "true", "try", "type", "typeof",
-    "unsafe", "unsized", "use", "virtual", "where", "while", "yield", "union",
-];
+/// Names that no module can have: the words that Rust uses or reserves.
+const KEYWORDS: &str = include_str!("keywords.txt");
 
 /// Types that the code means without saying where they come from.
 const PRELUDE: [&str; 13] = [
@@ -86,20 +80,26 @@ impl Skeleton {
                 "names are small letters, digits and single underscores, such as `random_walk`";
             return Some((format!("`{name}` is no name of a plugin"), help));
         }
-        if KEYWORDS.contains(&name) {
+        if KEYWORDS.split_whitespace().any(|word| word == name) {
             let text = format!("`{name}` is a word of Rust, and no file can be called so");
             return Some((text, "choose another name"));
         }
         let of_code = type_name(name);
-        let is_word = |c: char| c.is_alphanumeric() || c == '_';
-        let used = self.text.split(|c| !is_word(c)).any(|word| word == of_code && word != NAMES[0]);
-        if used || PRELUDE.contains(&of_code.as_str()) {
+        if self.uses(&of_code) || PRELUDE.contains(&of_code.as_str()) {
             let text = format!(
                 "the type of `{name}` would be called `{of_code}`, which the code uses already"
             );
             return Some((text, "choose another name, such as one of two words"));
         }
         None
+    }
+
+    /// Whether a word of the code, comments left out, is this one.
+    fn uses(&self, word: &str) -> bool {
+        let code = self.text.lines().filter(|line| !line.trim_start().starts_with("//"));
+        let is_word = |c: char| c.is_alphanumeric() || c == '_';
+        word != NAMES[0]
+            && code.flat_map(|line| line.split(|c| !is_word(c))).any(|other| other == word)
     }
 }
 
