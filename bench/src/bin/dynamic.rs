@@ -32,7 +32,6 @@ fn main() -> Fallible<()> {
     let repeats: usize = std::env::args().nth(1).map_or(Ok(15), |text| text.parse())?;
     library::load(&twin()?, None)?;
     let folder = Path::new("runs/bench-dynamic");
-    let _ = fs::remove_dir_all(folder);
     let twins = ["discrepancy.use=twin_gaussian", "discrepancy.variance={ half_normal = 1e-6 }"];
     let walkers =
         ["sampler.use=twin_affine_invariant_ensemble", "sampler.walkers=120", "sampler.steps=1200"];
@@ -83,12 +82,15 @@ fn side(settings: &[&str], out: &Path) -> Fallible<Side> {
 }
 
 /// The processor seconds of one calibration, and the hash of its draws.
-fn calibrated(side: &mut Side, repeat: usize) -> Fallible<(f64, Option<String>)> {
+fn calibrated(side: &mut Side, repeat: usize) -> Fallible<(f64, String)> {
     let Side { study, run, learned } = side;
     let folder = format!("5-calibrate-{repeat}");
     let (made, seconds) =
         timed(|| calibrate::stage(study, &learned.known(), &folder, run, &Silent))?;
     made?;
-    let draws = run.stage_folder(&folder).join("draws.nc");
-    Ok((seconds, lacuna::run::files::hash_file(&draws).ok()))
+    let folder = run.stage_folder(&folder);
+    let hash = lacuna::run::files::hash_file(&folder.join("draws.nc"))?;
+    // What is kept would be taken the next time.
+    fs::remove_dir_all(&folder)?;
+    Ok((seconds, hash))
 }
