@@ -41,7 +41,9 @@ fn source() -> TempDir {
         fs::copy(root().join(file), to).unwrap();
     };
     ["plugins/Cargo.toml", "plugins/lib.rs"].into_iter().for_each(copy);
-    KINDS.iter().for_each(|(_, kinds)| copy(&format!("plugins/{kinds}/mod.rs")));
+    for (_, kinds) in KINDS {
+        copy(&format!("plugins/{kinds}/mod.rs"));
+    }
     folder
 }
 
