@@ -41,7 +41,9 @@ fn source() -> TempDir {
         fs::copy(root().join(file), to).unwrap();
     };
     ["plugins/Cargo.toml", "plugins/lib.rs"].into_iter().for_each(copy);
-    KINDS.iter().for_each(|(_, kinds)| copy(&format!("plugins/{kinds}/mod.rs")));
+    for (_, kinds) in KINDS {
+        copy(&format!("plugins/{kinds}/mod.rs"));
+    }
     folder
 }
 
@@ -136,19 +138,19 @@ fn a_library_is_the_same_plugin_with_the_crates_that_it_needs() {
     assert_eq!(crates, ["lacuna-plugin", "schemars", "serde", "serde_json"]);
 }
 
-/// Copies the source without what is built.
+/// Copies a folder without what is built there, and without the results of runs.
 fn copy(from: &Path, to: &Path) {
     fs::create_dir_all(to).unwrap();
+    let built = from.join("Cargo.lock").exists();
     for entry in fs::read_dir(from).unwrap().map(Result::unwrap) {
-        let name = entry.file_name().into_string().unwrap();
-        if [".git", "target", "runs"].contains(&&*name) {
+        let (path, name) = (entry.path(), entry.file_name());
+        if name == "runs" || (built && [".git", "target"].iter().any(|skipped| name == *skipped)) {
             continue;
         }
-        let target = to.join(&name);
-        if entry.path().is_dir() {
-            copy(&entry.path(), &target);
+        if path.is_dir() {
+            copy(&path, &to.join(name));
         } else {
-            fs::copy(entry.path(), target).unwrap();
+            fs::copy(&path, to.join(name)).unwrap();
         }
     }
 }

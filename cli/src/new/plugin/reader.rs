@@ -80,7 +80,7 @@ impl Sheet {
             .map(|(number, line)| (number, cells(line)));
         let (_, names) = lines.next().ok_or_else(|| ReadError::new(path, "there is no line"))?;
         let lines: Vec<_> = lines.collect();
-        for (number, cells) in lines.iter().filter(|(_, cells)| cells.len() != names.len()) {
+        if let Some((number, cells)) = lines.iter().find(|(_, cells)| cells.len() != names.len()) {
             let text = format!("expected {} columns, found {}", names.len(), cells.len());
             return Err(ReadError::new(path, text).at(format!("line {number}")));
         }
