@@ -6,6 +6,8 @@
 
 #[path = "contracts/effects.rs"]
 mod effects;
+#[path = "contracts/executors.rs"]
+mod executors;
 #[path = "contracts/faults.rs"]
 mod faults;
 #[path = "contracts/gain.rs"]
@@ -28,7 +30,7 @@ use lacuna::data::{Axis, Layout, Parameter, Unit};
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::model::Response;
 use lacuna::plugin::registry::{self, Kind};
-use lacuna::plugin::{Density, Design, Discrepancy, Executor, Reader, Sampler, Surrogate, Term};
+use lacuna::plugin::{Density, Design, Discrepancy, Reader, Sampler, Surrogate, Term};
 use lacuna::run::write_response;
 // Without this line the linker leaves the plugins out.
 use lacuna_plugins as _;
@@ -149,47 +151,6 @@ fn terms() {
         ("relaxation", &["toward = \"1\""]),
     ];
     all::<dyn Term>(table, |case, term| contract::term(&case.label, term));
-}
-
-#[test]
-fn executors() {
-    let table: &Table = &[
-        // Where its server is started: `campaign/queue.rs`.
-        ("hyperqueue", &[]),
-        (
-            "local",
-            &[
-                "",
-                "threads = 1",
-                concat!("processes = 2\nprogram = '", env!("CARGO_BIN_EXE_contract_worker"), "'"),
-            ],
-        ),
-        (
-            "slurm",
-            &[concat!(
-                "pack = 2\npoll = 1\npatience = 1\nprogram = '",
-                env!("CARGO_BIN_EXE_contract_worker"),
-                "'"
-            )],
-        ),
-    ];
-    // A scheduler is found through the environment, which is that of the process started below.
-    let there_is_slurm = std::env::var_os("SLURM_CONF").is_some();
-    all::<dyn Executor>(table, |case, plugin| match case.plugin {
-        "slurm" if !there_is_slurm => Ok(()),
-        _ => contract::executor(&case.label, plugin, case.scratch),
-    });
-}
-
-#[test]
-fn executors_of_a_scheduler() {
-    let Some(slurm) = slurm::started(slurm::Kind::Plain) else { return };
-    let mut inside = std::process::Command::new(std::env::current_exe().unwrap());
-    inside.args(["--exact", "executors"]).env("SLURM_CONF", slurm.conf());
-    let output = inside.output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
-    // Nothing is left behind when the model or the caller has given up.
-    assert!(slurm.ask("squeue", &["-h", "-t", "all"]).contains("CD"), "no job was run");
 }
 
 #[test]
