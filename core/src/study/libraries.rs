@@ -17,7 +17,7 @@ use crate::plugin::registry::loaded::AnyEntry;
 use crate::run::files;
 
 /// Libraries of plugins by others. Their code runs with all rights of the program: load only what you trust.
-/// `lacuna check` tells what would be loaded and loads nothing.
+/// `lacuna check STUDY` tells what would be loaded and loads nothing.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PluginsSection {
