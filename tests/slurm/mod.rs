@@ -4,6 +4,7 @@ use std::fs::{self, File};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicU16, Ordering};
 
 use tempfile::TempDir;
 
@@ -75,9 +76,11 @@ fn start(folder: &Path, kind: Kind) -> Result<(), String> {
     }
 }
 
-/// The first of four ports that nobody uses.
+/// The first of four ports that nobody uses. Tests of one process that ask at the same time get different ones.
 fn free_ports() -> u16 {
-    let first = 20_000 + (std::process::id() % 2_000) as u16 * 8;
+    static ASKED: AtomicU16 = AtomicU16::new(0);
+    let own = 20_000 + (std::process::id() % 500) as u16 * 40;
+    let first = own + 4 * ASKED.fetch_add(1, Ordering::Relaxed);
     let is_free = |port: &u16| (0..4).all(|i| TcpListener::bind(("127.0.0.1", port + i)).is_ok());
     (first..60_000).step_by(4).find(is_free).unwrap()
 }
