@@ -106,6 +106,10 @@ fn what_cannot_be_written_is_refused_and_nothing_is_changed() {
             "a library cannot bring plugins of the kind `term`",
         ),
         (&["design", "even", "--library", "plugins"], "error: plugins is there already"),
+        (
+            &["design", "even", "--library", "even", "--source", "/"],
+            "error: / is not in Lacuna's source\nhelp: name a clone of it with `--source FOLDER`",
+        ),
     ] {
         let (code, told) = ask(tree.path(), words);
         assert!(code == Some(2) && told.contains(expected), "{words:?}: {told}");
@@ -136,6 +140,9 @@ fn a_library_is_the_same_plugin_with_the_crates_that_it_needs() {
     assert_eq!(manifest["lib"]["crate-type"][0].as_str(), Some("cdylib"));
     let crates: Vec<&String> = manifest["dependencies"].as_table().unwrap().keys().collect();
     assert_eq!(crates, ["lacuna-plugin", "schemars", "serde", "serde_json"]);
+    // The folder is in no source: the SDK is that of the source from which the command was built.
+    let sdk = manifest["dependencies"]["lacuna-plugin"]["path"].as_str().unwrap();
+    assert_eq!(Path::new(sdk), root().join("sdk").canonicalize().unwrap());
 }
 
 /// Copies a folder without what is built there, and without the results of runs.

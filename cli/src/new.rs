@@ -29,6 +29,10 @@ pub enum What {
         /// Make a library in this folder, outside Lacuna's source; a study loads it with `[plugins]`.
         #[arg(long, value_name = "FOLDER")]
         library: Option<PathBuf>,
+        /// Lacuna's source, which holds the SDK of the library; when left out, that around the current folder or the one
+        /// that this program was built from.
+        #[arg(long, value_name = "FOLDER", requires = "library")]
+        source: Option<PathBuf>,
     },
 }
 
@@ -36,6 +40,8 @@ pub enum What {
 pub fn write(what: &What) -> Result<(), Failure> {
     match what {
         What::Study { name } => study::write(name),
-        What::Plugin { kind, name, library } => plugin::write(kind, name, library.as_deref()),
+        What::Plugin { kind, name, library, source } => {
+            plugin::write(kind, name, library.as_deref(), source.as_deref())
+        }
     }
 }

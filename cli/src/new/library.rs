@@ -14,14 +14,9 @@ pub const CRATES: [(&str, &str); 4] = [
     ("toml", "\"1.2\""),
 ];
 
-/// The manifest of a library with this source; the SDK comes from the tree, or is that of this program's version.
-pub fn manifest(name: &str, source: &str, tree: Option<&Path>) -> String {
-    let sdk = match tree {
-        Some(tree) => {
-            format!("{{ path = {} }}", emit::string(&tree.join("sdk").display().to_string()))
-        }
-        None => format!("\"{}\"", env!("CARGO_PKG_VERSION")),
-    };
+/// The manifest of a library with this source, which uses the SDK in that folder.
+pub fn manifest(name: &str, source: &str, sdk: &Path) -> String {
+    let sdk = emit::string(&sdk.display().to_string());
     let used = CRATES.iter().filter(|(name, _)| source.contains(&format!("{name}::")));
     let crates: String = used.map(|(name, version)| format!("{name} = {version}\n")).collect();
     format!(
@@ -39,7 +34,7 @@ publish = false
 crate-type = [\"cdylib\"]
 
 [dependencies]
-lacuna-plugin = {sdk}
+lacuna-plugin = {{ path = {sdk} }}
 {crates}
 # As in Lacuna's own workspace: without optimisation its numerical parts are slow.
 [profile.dev]

@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used)]
 
+use std::path::Path;
+
 use lacuna::plugin::registry;
 
 use super::skeleton::{ALL, Skeleton, kinds, type_name};
@@ -75,9 +77,8 @@ fn a_library_has_the_plugin_the_sdk_and_the_crates_of_the_workspace() {
         let end = format!("lacuna_plugin::export! {{\n    {kind} \"long_name\" LongName,\n}}\n");
         assert!(text.contains(&end) && !text.contains("register!"), "{text}");
         assert!(text.contains("use lacuna_plugin::lacuna;\n"), "{text}");
-        let manifest = library::manifest("long_name", &text, None);
-        let sdk = format!("lacuna-plugin = \"{}\"", env!("CARGO_PKG_VERSION"));
-        assert!(manifest.contains(&sdk), "{manifest}");
+        let manifest = library::manifest("long_name", &text, Path::new("/source/sdk"));
+        assert!(manifest.contains("lacuna-plugin = { path = \"/source/sdk\" }"), "{manifest}");
         assert_eq!(manifest.contains("\nserde_json"), text.contains("serde_json::"));
     }
     let workspace = concat!(env!("CARGO_MANIFEST_DIR"), "/../Cargo.toml");
