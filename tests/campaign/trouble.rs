@@ -68,11 +68,13 @@ fn with_a_deaf_sbatch(folder: &Path) -> std::ffi::OsString {
 }
 
 fn memory_that_runs_out_is_told_and_more_is_given(slurm: &Slurm) {
-    // `tail` keeps a line until it ends, and this one does not.
+    // `tail` keeps a line until it ends, and this one does not. Where memory is watched and not limited, that takes a moment.
     let script = "case $1 in
-    run001) echo $1 >> \"$3/made\"; (head -c 300000000 /dev/zero; sleep 4) | tail -n 1 | wc -c >&2;;
-    run002) (head -c 900000000 /dev/zero; sleep 30) | tail -n 1 | wc -c >&2;;
+    run001) echo $1 >> \"$3/made\"; bytes=300000000;;
+    run002) bytes=900000000;;
+    *) bytes=1;;
 esac
+(head -c $bytes /dev/zero; [ $bytes = 1 ] || sleep 2) | tail -n 1 > /dev/null || exit 5
 echo \"[$2]\"";
     let executor = format!(
         "{QUICKLY}memory = \"200 MiB\"\nretry = {{ out_of_memory = 1 }}\ngrow = {{ memory = 2 }}"
@@ -116,6 +118,7 @@ fn a_campaign_is_cancelled_and_goes_on(slurm: &Slurm) {
     let mut command = run(&path, &out, &[]);
     command.env("SLURM_CONF", slurm.conf()).stdout(Stdio::null()).stderr(Stdio::null());
     let mut child = command.spawn().unwrap();
+    wait_for("the runs", || out.join("2-simulate/campaign/1/submission.json").exists());
     wait_for("two runs", || state().contains("2 running, 4 waiting"));
     child.kill().unwrap();
     child.wait().unwrap();
