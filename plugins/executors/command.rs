@@ -1,18 +1,31 @@
 //! Commands of the scheduler.
 
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 
 use lacuna::run::{Stop, files};
 
 /// What a command prints; an error with its own words when it fails.
 pub fn said(program: &str, arguments: &[&str]) -> Result<String, Stop> {
+    said_without(program, arguments, |_| false)
+}
+
+/// The same, when some variables of the environment are hidden from it.
+pub fn said_without(
+    program: &str,
+    arguments: &[&str],
+    is_hidden: impl Fn(&str) -> bool,
+) -> Result<String, Stop> {
     let mut command = Command::new(program);
     command.args(arguments).stdin(Stdio::null());
-    // Formats of the user's own would change the columns.
-    for variable in
-        ["SQUEUE_FORMAT", "SQUEUE_FORMAT2", "SACCT_FORMAT", "SQUEUE_STATES", "SLURM_TIME_FORMAT"]
-    {
-        command.env_remove(variable);
+    // Formats and filters of the user's own would change the answers.
+    let changes_answers = |name: &str| {
+        ["SQUEUE_", "SACCT_", "SCANCEL_"].iter().any(|start| name.starts_with(start))
+            || name == "SLURM_TIME_FORMAT"
+    };
+    for (name, _) in std::env::vars_os() {
+        if name.to_str().is_some_and(|name| changes_answers(name) || is_hidden(name)) {
+            command.env_remove(name);
+        }
     }
     let shown = || format!("{program} {}", arguments.join(" "));
     let output = command.output().map_err(|error| {
@@ -22,6 +35,13 @@ pub fn said(program: &str, arguments: &[&str]) -> Result<String, Stop> {
         return Ok(String::from_utf8_lossy(&output.stdout).into_owned());
     }
     let words = String::from_utf8_lossy(&output.stderr);
-    let code = output.status.code().map_or(String::new(), |code| format!(" (exit code {code})"));
-    Err(Stop::new(format!("`{}` failed{code}: {}", shown(), words.trim())))
+    Err(Stop::new(format!("`{}` failed{}: {}", shown(), ending(output.status), words.trim())))
+}
+
+fn ending(status: ExitStatus) -> String {
+    #[cfg(unix)]
+    if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
+        return format!(" (ended by signal {signal})");
+    }
+    status.code().map_or(String::new(), |code| format!(" (exit code {code})"))
 }

@@ -21,9 +21,17 @@ pub fn program(given: Option<&Path>, study: &Path) -> Result<PathBuf, Stop> {
     })
 }
 
+/// The same for other machines: they may have a path from the root that this one has not.
+pub fn on_nodes(given: Option<&Path>, study: &Path) -> Result<PathBuf, Stop> {
+    match given {
+        Some(path) if path.is_absolute() => Ok(path.to_owned()),
+        _ => program(given, study),
+    }
+}
+
 /// Complains of a program that is not there.
-pub fn check(given: Option<&Path>, study: &Path, complaints: &mut Complaints<'_>) {
-    if let Err(stop) = program(given, study) {
+pub fn check(found: Result<PathBuf, Stop>, complaints: &mut Complaints<'_>) {
+    if let Err(stop) = found {
         complaints
             .at("program")
             .say(stop.message)

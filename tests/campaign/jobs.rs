@@ -9,19 +9,19 @@ use super::{failures, outcomes, run, study};
 use crate::quick;
 use crate::slurm::{Kind, Slurm, started};
 
-const QUICKLY: &str = "use = \"slurm\"\npoll = 1\npatience = 1\n";
+pub(super) const QUICKLY: &str = "use = \"slurm\"\npoll = 1\npatience = 1\n";
 
-fn on(slurm: &Slurm, command: &mut Command) -> (Option<i32>, String) {
+pub(super) fn on(slurm: &Slurm, command: &mut Command) -> (Option<i32>, String) {
     quick::said(command.env("SLURM_CONF", slurm.conf()))
 }
 
-fn resume(out: &Path) -> Command {
+pub(super) fn resume(out: &Path) -> Command {
     let mut command = quick::command();
     command.arg("resume").arg(out);
     command
 }
 
-fn wait_for(what: &str, mut is_so: impl FnMut() -> bool) {
+pub(super) fn wait_for(what: &str, mut is_so: impl FnMut() -> bool) {
     let begun = Instant::now();
     while !is_so() {
         assert!(begun.elapsed() < Duration::from_secs(60), "{what} does not come");
@@ -30,7 +30,7 @@ fn wait_for(what: &str, mut is_so: impl FnMut() -> bool) {
 }
 
 /// How many jobs were ever handed over: an array counts once.
-fn submissions(out: &Path) -> usize {
+pub(super) fn submissions(out: &Path) -> usize {
     let campaign = out.join("2-simulate/campaign");
     let entries = fs::read_dir(campaign).unwrap().flatten();
     entries.filter(|entry| entry.path().join("submission.json").exists()).count()

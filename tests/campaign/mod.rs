@@ -1,8 +1,11 @@
 //! Ensembles made by other processes, here and on a cluster.
 
+mod import;
 mod jobs;
+mod nodes;
 mod processes;
 mod queue;
+mod trouble;
 mod verbs;
 
 use std::fs;

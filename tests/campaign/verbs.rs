@@ -7,21 +7,21 @@ use std::process::Command;
 use super::{outcomes, run, study};
 use crate::quick;
 
-fn campaign(words: &[&str], out: &Path) -> Command {
+pub(super) fn campaign(words: &[&str], out: &Path) -> Command {
     let mut command = quick::command();
     command.arg("campaign").arg(words[0]).arg(out).args(&words[1..]);
     command
 }
 
 /// What a command prints when it goes well.
-fn printed(command: &mut Command) -> String {
+pub(super) fn printed(command: &mut Command) -> String {
     let output = command.output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()
 }
 
 /// How often each run was made.
-fn made(folder: &Path) -> Vec<String> {
+pub(super) fn made(folder: &Path) -> Vec<String> {
     let text = fs::read_to_string(folder.join("made")).unwrap_or_default();
     let mut runs: Vec<String> = text.lines().map(str::to_owned).collect();
     runs.sort();

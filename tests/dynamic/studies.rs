@@ -152,3 +152,19 @@ fn a_check_loads_nothing() {
     let complaints = load_for(&study, &[], Use::Check).complaints();
     assert!(complaints.contains("there is no discrepancy `unheard_of`"), "{complaints}");
 }
+
+#[test]
+fn a_design_that_cannot_grow_says_so_and_nothing_is_changed() {
+    let folder = quick::simulated();
+    let (study, out) = (folder.path().join("study.toml"), folder.path().join("run"));
+    quick::replace(&study, "use = \"latin_hypercube\"", "use = \"twin_latin_hypercube\"");
+    quick::run(&study, &[&load_twin()], &out).unwrap();
+    let resolved = || std::fs::read_to_string(out.join("resolved.toml")).unwrap();
+    let before = resolved();
+    let run = lacuna::run::RunDirectory::open(&out).unwrap();
+    let stop = lacuna::campaign::extend(&run, 4).unwrap_err();
+    assert_eq!(stop.message, "this design cannot be extended without moving its points");
+    assert!(stop.help.unwrap().contains("a greater number of `runs`"));
+    assert_eq!(resolved(), before);
+    assert!(out.join("manifest.json").exists());
+}

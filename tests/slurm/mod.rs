@@ -1,4 +1,4 @@
-//! A Slurm of one node for tests; `start` beside this file has the steps.
+//! A Slurm for tests; `start` beside this file has the steps.
 
 use std::fs::{self, File};
 use std::net::TcpListener;
@@ -18,6 +18,18 @@ pub struct Slurm {
 pub enum Kind {
     Plain,
     Accounting,
+    /// Two nodes, limits of memory, jobs that take the place of others.
+    Nodes,
+}
+
+impl Kind {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Plain => "plain",
+            Self::Accounting => "accounting",
+            Self::Nodes => "nodes",
+        }
+    }
 }
 
 fn scripts() -> PathBuf {
@@ -49,6 +61,9 @@ fn missing(kind: Kind) -> Option<String> {
     if kind == Kind::Accounting {
         programs.extend(["slurmdbd", "sacct", "mariadbd", "mariadb-install-db"]);
     }
+    if kind == Kind::Nodes {
+        programs.push("srun");
+    }
     let folders = ["/usr/sbin", "/usr/bin", "/usr/local/sbin", "/usr/local/bin", "/sbin", "/bin"];
     let is_there = |program: &&str| folders.iter().any(|f| Path::new(f).join(program).exists());
     let first = programs.into_iter().find(|program| !is_there(program))?;
@@ -57,11 +72,10 @@ fn missing(kind: Kind) -> Option<String> {
 
 fn start(folder: &Path, kind: Kind) -> Result<(), String> {
     let port = free_ports();
-    let kind = if kind == Kind::Plain { "plain" } else { "accounting" };
     let log = File::create(folder.join("start.log")).unwrap();
     let status = Command::new(scripts().join("start"))
         .arg(folder)
-        .args([kind, &port.to_string()])
+        .args([kind.name(), &port.to_string()])
         .stdin(Stdio::null())
         .stdout(log.try_clone().unwrap())
         .stderr(log)

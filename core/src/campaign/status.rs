@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::plugin::Executor;
-use crate::plugin::executor::Seen;
+use crate::plugin::executor::{Phase, Seen};
 use crate::run::{Stop, files};
 use crate::stage::simulate::{Roll, RunRecord, earlier};
 use crate::work::{Begun, Marker, Outcome, now};
@@ -154,9 +154,12 @@ impl Place {
             format!("begun {minutes} min ago on {}", begun.host)
         });
         if let Some(seen) = self.seen.get(run) {
-            return match (seen.running, since) {
-                (true, Some(since)) => (State::Running, format!("{since}, {}", seen.note), None),
-                // Its job runs, and makes another run of the pack.
+            return match (seen.phase, since, self.busy) {
+                (Phase::Runs, Some(since), _) => {
+                    (State::Running, format!("{since}, {}", seen.note), None)
+                }
+                (Phase::Ended, _, false) => (State::Missing, seen.note.clone(), None),
+                // Its job makes another run of the pack, or whoever waits for it will soon see that it has ended.
                 _ => (State::Waiting, seen.note.clone(), None),
             };
         }

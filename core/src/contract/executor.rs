@@ -112,6 +112,7 @@ fn run(
         scenario: &scenario,
         study: folder,
         directory: folder,
+        warn: &|_| {},
     };
     let mut handed = Handed::new();
     let mut broken = None;

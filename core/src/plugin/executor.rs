@@ -45,10 +45,21 @@ pub trait Executor: Component {
 pub struct Seen {
     /// Its name.
     pub run: String,
-    /// Whether it runs; else it waits.
-    pub running: bool,
+    /// How far it is.
+    pub phase: Phase,
     /// Where it is and why, in words.
     pub note: String,
+}
+
+/// How far a job is that is somewhere else.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// It waits in a queue.
+    Waits,
+    /// It runs.
+    Runs,
+    /// It has ended, or nobody knows of it any more.
+    Ended,
 }
 
 /// Jobs that belong together.
@@ -72,6 +83,8 @@ pub struct Batch<'a> {
     pub study: &'a Path,
     /// The folder into which result files are written.
     pub directory: &'a Path,
+    /// Tells whoever watches something that a person should know while the jobs are made.
+    pub warn: &'a (dyn Fn(&str) + Sync),
 }
 
 impl<'a> Batch<'a> {

@@ -1,7 +1,7 @@
 //! The run directory and its word [`RunDirectory::keep`]: cache, resume and provenance in one.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
@@ -73,8 +73,14 @@ fn locked(lock: &File) -> bool {
         if attempt > 0 {
             std::thread::sleep(std::time::Duration::from_millis(50));
         }
-        lock.try_lock().is_ok()
+        !is_taken(&lock.try_lock())
     })
+}
+
+/// Whether another process has a lock. A file system without locks, such as Lustre mounted without `flock`, cannot tell:
+/// that is no reason to refuse work there.
+fn is_taken(tried: &Result<(), TryLockError>) -> bool {
+    matches!(tried, Err(TryLockError::WouldBlock))
 }
 
 const RECORD: &str = "stage.json";
@@ -99,7 +105,7 @@ impl RunDirectory {
     /// Whether a process works in a folder.
     pub fn is_busy(root: &Path) -> bool {
         let lock = File::options().write(true).open(root.join(".lock"));
-        lock.is_ok_and(|lock| lock.try_lock().is_err())
+        lock.is_ok_and(|lock| is_taken(&lock.try_lock()))
     }
 
     /// The folder.
@@ -332,5 +338,7 @@ mod tests {
         let _first = RunDirectory::open(folder.path()).unwrap();
         let second = RunDirectory::open(folder.path()).unwrap_err();
         assert!(second.message.starts_with("another process is working in"));
+        let without_locks = std::io::Error::from(std::io::ErrorKind::Unsupported);
+        assert!(!is_taken(&Err(TryLockError::Error(without_locks))));
     }
 }

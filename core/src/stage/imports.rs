@@ -7,7 +7,7 @@ use crate::linalg::Matrix;
 use crate::run::{Artifact as _, Stop, files};
 use crate::study::Study;
 
-use super::simulate::{RunRecord, Simulated, inside};
+use super::simulate::{Made, Roll, RunRecord, Simulated, inside};
 
 /// Finished runs of a folder that is laid out as the simulate stage's.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,26 +37,23 @@ pub fn of_folder(study: &Study, folder: &Path) -> Result<Imported, Stop> {
             .help("`imports` in `[design]` takes folders such as `2-simulate` of a run directory, or what `lacuna campaign import RUN TABLE` makes")
     };
     let made = Simulated::load(folder).map_err(|stop| wrong(stop.message))?;
-    let (found, expected) = (made.scenarios.len(), study.scenarios.len());
-    if found != expected {
-        return Err(wrong(format!("they have {found} scenarios, the study has {expected}")));
-    }
+    let places = scenarios(study, folder, &made).map_err(wrong)?;
     let column = |name: &String| {
         let place = made.parameters.iter().position(|known| known == name);
         place.ok_or_else(|| wrong(format!("{} has no column `{name}`", super::simulate::TABLE)))
     };
     let columns =
         study.parameters.iter().map(|p| column(&p.name)).collect::<Result<Vec<_>, _>>()?;
-    let first = &made.scenarios[0].runs;
-    let is_done =
-        |i: &usize| made.scenarios.iter().all(|s| s.runs.get(*i).is_some_and(|r| r.file.is_some()));
+    let ours: Vec<&Made> = places.iter().map(|&place| &made.scenarios[place]).collect();
+    let first = &ours[0].runs;
+    let is_done = |i: &usize| ours.iter().all(|s| s.runs.get(*i).is_some_and(|r| r.file.is_some()));
     let rows: Vec<usize> = (0..first.len()).filter(is_done).collect();
     let names: Vec<String> = rows.iter().map(|&i| first[i].run.clone()).collect();
     let point = |&i: &usize| columns.iter().map(|&j| made.points[(i, j)]).collect::<Vec<f64>>();
     let points = Matrix::from_rows(columns.len(), rows.iter().map(point));
     let mut scenarios = Vec::new();
     let mut lines = String::new();
-    for scenario in &made.scenarios {
+    for scenario in ours {
         let runs: Vec<RunRecord> = rows.iter().map(|&i| scenario.runs[i].clone()).collect();
         for run in &runs {
             let (file, hash) = (run.file.as_deref(), run.sha256.as_deref());
@@ -66,6 +63,34 @@ pub fn of_folder(study: &Study, folder: &Path) -> Result<Imported, Stop> {
     }
     let hash = files::hash(format!("{lines}{:?}", points.as_slice()).as_bytes());
     Ok(Imported { folder: folder.to_owned(), names, points, scenarios, hash })
+}
+
+/// The place of each scenario of the study among those of the runs: by name where the folder knows their names.
+fn scenarios(study: &Study, folder: &Path, made: &Simulated) -> Result<Vec<usize>, String> {
+    let roll = Roll::read(folder).map_err(|stop| stop.message)?;
+    let roll = roll.filter(|roll| roll.scenarios.len() == made.scenarios.len());
+    let Some(roll) = roll else {
+        let (found, expected) = (made.scenarios.len(), study.scenarios.len());
+        let all = (0..expected).collect();
+        let plural = if found == 1 { "" } else { "s" };
+        return (found == expected).then_some(all).ok_or_else(|| {
+            format!("they are of {found} scenario{plural}, and the study has {expected}")
+        });
+    };
+    let place = |name: &String| {
+        let found = roll.scenarios.iter().position(|(known, _)| known == name);
+        found.ok_or_else(|| {
+            let known: Vec<String> =
+                roll.scenarios.iter().map(|(known, _)| format!("`{known}`")).collect();
+            let scenario = if name.is_empty() {
+                "a study without scenarios".to_owned()
+            } else {
+                format!("the scenario `{name}`")
+            };
+            format!("they are not of {scenario}, but of {}", known.join(", "))
+        })
+    };
+    study.scenarios.iter().map(|scenario| place(&scenario.name)).collect()
 }
 
 impl Imported {

@@ -276,6 +276,7 @@ impl Work<'_> {
         let inputs = |i: usize| self.setting.inputs(self.asked.points.row(i));
         let jobs: Vec<Job> =
             missing.iter().map(|&i| Job { name: names[i].clone(), inputs: inputs(i) }).collect();
+        let warn = |text: &str| progress.warn(text);
         let batch = Batch {
             model: self.simulator.model,
             recipe: &self.simulator.recipe,
@@ -286,6 +287,7 @@ impl Work<'_> {
             scenario: self.setting.scenario,
             study: &self.study.directory,
             directory: folder,
+            warn: &warn,
         };
         let mut note = |finished: Finished| {
             let record = record(&jobs[finished.index].name, finished, folder)?;

@@ -1,5 +1,6 @@
 //! What a run leaves behind: that it was begun, and how it ended.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -50,6 +51,9 @@ pub struct Marker {
     pub outcome: Outcome,
     /// 0 where there is a response, else 1.
     pub exit_code: i32,
+    /// Whether the system killed processes for want of memory while it was made, and it has no response.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub out_of_memory: bool,
     /// How long it took, in seconds.
     pub seconds: f64,
     /// The machine.
@@ -103,6 +107,7 @@ impl Marker {
             asked: asked.to_owned(),
             exit_code: i32::from(!matches!(outcome, Outcome::Done { .. })),
             outcome,
+            out_of_memory: false,
             seconds,
             host: host.to_owned(),
             finished: super::now(),
@@ -133,6 +138,23 @@ impl Marker {
     /// The marker of a run, whatever was asked.
     pub fn look(runs: &Path, run: &str) -> Option<Self> {
         files::read_json(&Self::path(runs, run)).ok()
+    }
+
+    /// The runs that have a marker. The folder is listed anew, which also tells a file system that is seen from several
+    /// machines to look again for names that were not there.
+    pub fn names(runs: &Path) -> BTreeSet<String> {
+        let entries = std::fs::read_dir(folder(runs).join("done"));
+        let names = entries.into_iter().flatten().flatten().map(|entry| entry.file_name());
+        names.filter_map(|name| Some(name.to_str()?.strip_suffix(".json")?.to_owned())).collect()
+    }
+
+    /// Takes the marker of a run away that says that no run can have a result, once it is known: a model that was mended
+    /// is asked again.
+    pub fn clear_hopeless(runs: &Path, run: &str) -> Result<(), Stop> {
+        match Self::look(runs, run) {
+            Some(Self { outcome: Outcome::Hopeless { .. }, .. }) => Self::set_aside(runs, run),
+            _ => Ok(()),
+        }
     }
 
     /// Takes the marker of a failure away, so that the run is made anew when it is asked for again; it is kept as

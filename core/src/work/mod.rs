@@ -8,6 +8,7 @@
 mod evaluate;
 mod limits;
 mod marker;
+mod memory;
 mod order;
 mod worker;
 

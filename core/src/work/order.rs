@@ -89,6 +89,8 @@ impl Order {
             scenario: &self.scenario,
             study: &self.study,
             directory,
+            // What goes wrong is in the markers and on standard error.
+            warn: &|_| {},
         }
     }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use super::{Begun, Limits, Marker, Order, Outcome, evaluate, now};
+use super::{Begun, Limits, Marker, Order, Outcome, evaluate, memory, now};
 use crate::plugin::executor::{Batch, Job};
 use crate::run::{Stop, files};
 
@@ -152,9 +152,14 @@ impl Worker<'_> {
         }
         let some: Vec<&Job> = missing.iter().map(|&i| &self.batch.jobs[i]).collect();
         let mut hopeless = None;
-        for (&i, ended) in missing.iter().zip(evaluate(&self.batch, &some)) {
-            let marker =
+        let killed = memory::killed();
+        let ended = evaluate(&self.batch, &some);
+        let memory_ran_out = memory::killed() > killed;
+        for (&i, ended) in missing.iter().zip(ended) {
+            let mut marker =
                 Marker::of(runs, &self.asked[i], ended.outcome, ended.seconds, &self.host)?;
+            marker.out_of_memory =
+                memory_ran_out && matches!(marker.outcome, Outcome::Failed { .. });
             marker.write(runs, name(i))?;
             if let Outcome::Hopeless { reason } = marker.outcome {
                 hopeless.get_or_insert(reason);

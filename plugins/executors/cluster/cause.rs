@@ -20,6 +20,8 @@ pub enum Cause {
     OutOfMemory,
     /// Somebody cancelled it.
     Cancelled,
+    /// It ended before it had begun a run.
+    Start,
     /// It ended by itself: with an exit code, or by a signal.
     Failure,
     /// The scheduler does not know of it any more, and it left no word.
@@ -41,6 +43,7 @@ impl fmt::Display for Cause {
             Self::Timeout => "it reached its time limit",
             Self::OutOfMemory => "it ran out of memory",
             Self::Cancelled => "it was cancelled",
+            Self::Start => "it ended before it began a run",
             Self::Failure => "it failed",
             Self::Lost => "the scheduler does not know of it any more",
         })
@@ -61,6 +64,9 @@ pub struct Retry {
     pub out_of_memory: usize,
     /// When somebody cancelled the job.
     pub cancelled: usize,
+    /// When a job ended by itself before it began a run, though others began theirs: a node that lacks something. After that the
+    /// study stops, and no run is charged.
+    pub start: usize,
     /// When the job ended without a word of the run, by an exit code or a signal.
     pub failure: usize,
     /// When the scheduler does not know of the job any more.
@@ -75,6 +81,7 @@ impl Default for Retry {
             timeout: 0,
             out_of_memory: 0,
             cancelled: 0,
+            start: 2,
             failure: 0,
             lost: 1,
         }
@@ -90,6 +97,7 @@ impl Retry {
             Cause::Timeout => self.timeout,
             Cause::OutOfMemory => self.out_of_memory,
             Cause::Cancelled => self.cancelled,
+            Cause::Start => self.start,
             Cause::Failure => self.failure,
             Cause::Lost => self.lost,
         }

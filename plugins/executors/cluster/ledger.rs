@@ -19,6 +19,9 @@ pub struct Submission {
     pub number: usize,
     /// The name by which it can be found in the scheduler.
     pub name: String,
+    /// The folder as the jobs have it; empty in one that an older version made.
+    #[serde(default)]
+    pub place: PathBuf,
     /// The scheduler's number; `None` until it is known.
     pub job: Option<String>,
     /// When it was made, in seconds since 1970 (UTC).
@@ -47,7 +50,19 @@ pub enum Settled {
     GivenUp(Cause),
 }
 
+/// Whether jobs find the folder that they were given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Whereabouts {
+    /// They do.
+    Same,
+    /// The run directory has another path now.
+    Moved,
+    /// This is a copy; the jobs belong to the other one.
+    Copied,
+}
+
 const FILE: &str = "submission.json";
+const WITHDRAWN: &str = "withdrawn";
 
 impl Submission {
     /// Its folder in that of the runs.
@@ -65,6 +80,42 @@ impl Submission {
         let tasks = self.tasks.iter().enumerate();
         let runs = tasks.flat_map(|(task, runs)| runs.iter().map(move |run| (task, run)));
         runs.filter(|(_, run)| !self.settled.contains_key(*run))
+    }
+
+    /// Notes that its jobs are being ended, so that whoever goes on submits its runs again and calls none of them failed.
+    pub fn withdraw(&self, runs: &Path) -> Result<(), Stop> {
+        files::write_atomic(&self.folder(runs).join(WITHDRAWN), b"")
+    }
+
+    /// Whether its jobs were being ended, by `lacuna campaign cancel` or because no run could have a result.
+    pub fn is_withdrawn(&self, runs: &Path) -> bool {
+        self.folder(runs).join(WITHDRAWN).exists()
+    }
+
+    /// Takes it back: the scheduler has nothing of it.
+    pub fn forget(&self, runs: &Path) -> Result<(), Stop> {
+        let path = self.folder(runs).join(FILE);
+        fs::remove_file(&path).map_err(|error| files::cannot_write(&path, &error))
+    }
+
+    /// Where its folder is, seen from its jobs.
+    pub fn whereabouts(&self, runs: &Path) -> Whereabouts {
+        let here = self.folder(runs).canonicalize().unwrap_or_default();
+        let there = self.place.canonicalize().unwrap_or_default();
+        if self.place.as_os_str().is_empty() || here == there {
+            return Whereabouts::Same;
+        }
+        match files::read_json::<Self>(&there.join(FILE)) {
+            Ok(other) if other.name == self.name => Whereabouts::Copied,
+            _ => Whereabouts::Moved,
+        }
+    }
+
+    /// Takes open runs out, without a word on how they ended.
+    pub fn close(&mut self, which: impl Fn(&str) -> bool) {
+        let open = self.open().map(|(_, run)| run.clone());
+        let runs: Vec<String> = open.filter(|run| which(run)).collect();
+        self.settled.extend(runs.into_iter().map(|run| (run, Settled::NotBegun)));
     }
 
     /// Whether all its runs have ended.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use lacuna::plugin::executor::Seen;
+use lacuna::plugin::executor::{Phase, Seen};
 use lacuna::run::Stop;
 
 use super::ledger::{self, Submission};
@@ -17,25 +17,24 @@ pub fn look(scheduler: &dyn Scheduler, runs: &Path) -> Result<Vec<Seen>, Stop> {
     let states = if open.is_empty() { BTreeMap::new() } else { scheduler.states(&open)? };
     let mut seen = Vec::new();
     for submission in &all {
-        let job = submission.job.as_deref().unwrap_or("not known yet");
         for (task, run) in submission.open() {
-            let (running, note) = match states.get(&(submission.number, task)) {
-                Some(TaskState::Waiting(why)) => (false, format!("job {job}, task {task}: {why}")),
-                Some(TaskState::Running(place)) => {
-                    (true, format!("job {job}, task {task} on {place}"))
-                }
-                Some(TaskState::Failed(cause, _)) => {
-                    (false, format!("job {job}, task {task} has ended: {cause}"))
-                }
-                Some(TaskState::Ended) => (false, format!("job {job}, task {task} has ended")),
-                None => {
-                    (false, format!("job {job}, task {task}: the scheduler does not know of it"))
-                }
-            };
-            seen.push(Seen { run: run.clone(), running, note });
+            let job = submission.job.as_deref().unwrap_or("not known yet");
+            let (phase, words) = sight(states.get(&(submission.number, task)));
+            let note = format!("job {job}, task {task}{words}");
+            seen.push(Seen { run: run.clone(), phase, note });
         }
     }
     Ok(seen)
+}
+
+fn sight(state: Option<&TaskState>) -> (Phase, String) {
+    match state {
+        Some(TaskState::Waiting(why) | TaskState::Held(why)) => (Phase::Waits, format!(": {why}")),
+        Some(TaskState::Running(place)) => (Phase::Runs, format!(" on {place}")),
+        Some(TaskState::Failed(cause, _)) => (Phase::Ended, format!(" has ended: {cause}")),
+        Some(TaskState::Ended) => (Phase::Ended, " has ended".to_owned()),
+        None => (Phase::Ended, ": the scheduler does not know of it".to_owned()),
+    }
 }
 
 /// Ends all that the scheduler has.
@@ -46,8 +45,20 @@ pub fn cancel(scheduler: &dyn Scheduler, runs: &Path) -> Result<usize, Stop> {
         submission.job = scheduler.find(&submission.name)?;
     }
     let open: Vec<&Submission> = all.iter().filter(|s| s.job.is_some()).collect();
-    if !open.is_empty() {
-        scheduler.cancel(&open)?;
-    }
+    end(scheduler, &open, runs)?;
     Ok(open.iter().map(|submission| submission.open().count()).sum())
+}
+
+/// Ends the jobs of some submissions and notes that they were ended.
+pub fn end(
+    scheduler: &dyn Scheduler,
+    submissions: &[&Submission],
+    runs: &Path,
+) -> Result<(), Stop> {
+    let jobs: Vec<&str> = submissions.iter().filter_map(|s| s.job.as_deref()).collect();
+    if jobs.is_empty() {
+        return Ok(());
+    }
+    scheduler.cancel(&jobs)?;
+    submissions.iter().try_for_each(|submission| submission.withdraw(runs))
 }

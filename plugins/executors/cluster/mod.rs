@@ -16,6 +16,7 @@ pub use follow::follow;
 pub use ledger::Submission;
 pub use look::{cancel, look};
 pub use scheduler::{Plan, Scheduler, TaskState};
+pub use script::{Frame, Worker};
 
 use lacuna::study::values::{Count, Positive};
 

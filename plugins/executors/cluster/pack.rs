@@ -1,15 +1,18 @@
 //! Runs into tasks, tasks into submissions.
 
 use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::{Duration, Instant};
 
 use lacuna::plugin::executor::{Batch, Job};
 use lacuna::run::{Stop, files};
 use lacuna::work::{self, Order};
 
 use super::ledger::{self, Submission};
-use super::{Cause, Plan, Scheduler};
+use super::{Cause, Plan, Scheduler, script};
 
-/// Hands runs to the scheduler: those that need the same limits together. `next` is a free number, and is moved on.
+/// Hands runs to the scheduler: those that need the same limits together. `next` is a free number, and is moved on. When it
+/// fails, what was handed over before, or may have been, is among `earlier`.
 pub fn submit(
     scheduler: &dyn Scheduler,
     batch: &Batch<'_>,
@@ -30,67 +33,122 @@ pub fn submit(
         let memory = rules.grow.memory.get().powi(shortages as i32);
         for some in runs.chunks(most) {
             let jobs: Vec<Job> = some.iter().map(|&i| batch.jobs[i].clone()).collect();
-            let submission = one(scheduler, batch, jobs, *next, (time, memory))?;
-            earlier.push(submission);
-            *next += 1;
+            let (submission, outcome) = one(scheduler, batch, jobs, *next, (time, memory))?;
+            if let Some(submission) = submission {
+                earlier.push(submission);
+                *next += 1;
+            }
+            outcome?;
         }
     }
     Ok(())
 }
 
-/// Makes one submission. It is on disk under a name of its own before the scheduler hears of it, so that it is found
-/// again whenever this process is killed.
+/// Makes one submission; `None` with the reason when the scheduler refuses it. It is on disk under a name of its own before
+/// the scheduler hears of it, so that it is found again whenever this process is killed.
 fn one(
     scheduler: &dyn Scheduler,
     batch: &Batch<'_>,
     jobs: Vec<Job>,
     number: usize,
-    (time, memory): (f64, f64),
-) -> Result<Submission, Stop> {
+    factors: (f64, f64),
+) -> Result<(Option<Submission>, Result<(), Stop>), Stop> {
     let all: Vec<usize> = (0..jobs.len()).collect();
     let tasks: Vec<Vec<usize>> =
         all.chunks(scheduler.rules().pack).map(<[usize]>::to_vec).collect();
     let order = Order::new(batch, jobs, tasks);
     let folder = ledger::folder(batch.directory, number);
     order.write(&folder)?;
-    let folder = folder
-        .canonicalize()
-        .map_err(|error| files::cannot_read(&ledger::folder(batch.directory, number), &error))?;
-    let submitted = work::now();
-    // Two campaigns of one user must not take each other's jobs for their own.
-    let mark =
-        files::hash(format!("{}{submitted}{}", folder.display(), std::process::id()).as_bytes());
-    let mut submission = Submission {
-        executor: scheduler.name().to_owned(),
-        number,
-        name: format!("lacuna-{number}-{}", &mark[..10]),
-        job: None,
-        submitted,
-        time,
-        memory,
-        tasks: ledger::tasks_of(&order),
-        settled: BTreeMap::new(),
-    };
+    let folder = folder.canonicalize().map_err(|error| files::cannot_read(&folder, &error))?;
+    let mut submission = noted(scheduler, &order, &folder, number, factors);
     let name = submission.name.clone();
     let plan = Plan {
         folder: &folder,
         study: &order.study,
         name: &name,
         tasks: order.tasks.len(),
-        time,
-        memory,
+        time: submission.time,
+        memory: submission.memory,
     };
-    scheduler.write(&plan)?;
+    let script = script::write(&scheduler.frame(&plan), &scheduler.worker(), &plan)?;
     submission.write(batch.directory)?;
-    match scheduler.submit(&plan) {
+    match scheduler.submit(&plan, &script) {
         Ok(job) => submission.job = Some(job),
-        Err(stop) => {
-            // It refused: nothing of it is anywhere.
-            let path = folder.join("submission.json");
-            std::fs::remove_file(&path).map_err(|error| files::cannot_write(&path, &error))?;
-            return Err(stop);
-        }
+        Err(stop) => match heard(scheduler, &name, &stop) {
+            Ok(Some(job)) => submission.job = Some(job),
+            Ok(None) => {
+                submission.forget(batch.directory)?;
+                return Ok((None, Err(stop)));
+            }
+            Err(silent) => return Ok((Some(submission), Err(unsure(&stop, &silent)))),
+        },
     }
     submission.write(batch.directory)?;
-    Ok(submission)
+    Ok((Some(submission), Ok(())))
+}
+
+fn noted(
+    scheduler: &dyn Scheduler,
+    order: &Order,
+    folder: &Path,
+    number: usize,
+    (time, memory): (f64, f64),
+) -> Submission {
+    let submitted = work::now();
+    // Two campaigns of one user must not take each other's jobs for their own.
+    let mark =
+        files::hash(format!("{}{submitted}{}", folder.display(), std::process::id()).as_bytes());
+    Submission {
+        executor: scheduler.name().to_owned(),
+        number,
+        name: format!("lacuna-{number}-{}", &mark[..10]),
+        place: folder.to_owned(),
+        job: None,
+        submitted,
+        time,
+        memory,
+        tasks: ledger::tasks_of(order),
+        settled: BTreeMap::new(),
+    }
+}
+
+/// The number of a submission whose command failed, if the scheduler has it all the same. Where the answer was lost on its
+/// way, the scheduler may still be at it: it is asked until its patience is over.
+fn heard(scheduler: &dyn Scheduler, name: &str, failure: &Stop) -> Result<Option<String>, Stop> {
+    let patience = Duration::from_secs_f64(scheduler.rules().patience);
+    let begun = Instant::now();
+    loop {
+        let found = scheduler.find(name)?;
+        if found.is_some() || !was_lost(&failure.message) || begun.elapsed() >= patience {
+            return Ok(found);
+        }
+        std::thread::sleep(Duration::from_secs(1).min(patience));
+    }
+}
+
+/// Whether a command failed on its way to the scheduler or back, and not by the scheduler's word.
+fn was_lost(words: &str) -> bool {
+    // What stands before it are the words of the command, with paths.
+    let words = words.rsplit_once("` failed").map_or(words, |(_, said)| said).to_lowercase();
+    let of_the_way = [
+        "timed out",
+        "timeout",
+        "socket",
+        "connect",
+        "communication",
+        "zero bytes",
+        "transport",
+        "message receive",
+        "ended by signal",
+        "in place of a number",
+    ];
+    of_the_way.iter().any(|sign| words.contains(sign))
+}
+
+fn unsure(failure: &Stop, silent: &Stop) -> Stop {
+    Stop::new(format!(
+        "the scheduler may have the jobs or not: {}; and then: {}",
+        failure.message, silent.message
+    ))
+    .help("when it answers again, run the same command: jobs that it has are found, and nothing is submitted twice")
 }

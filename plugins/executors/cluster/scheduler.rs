@@ -5,6 +5,7 @@ use std::path::Path;
 
 use lacuna::run::Stop;
 
+use super::script::{Frame, Worker};
 use super::{Cause, Growth, Retry, Submission};
 
 /// A scheduler that runs arrays of tasks.
@@ -15,14 +16,18 @@ pub trait Scheduler {
     /// How runs are packed, followed and repeated.
     fn rules(&self) -> Rules<'_>;
 
+    /// How a task starts the program that makes its runs.
+    fn worker(&self) -> Worker<'_>;
+
     /// The greatest number of tasks of one submission.
     fn most_tasks(&self) -> Result<usize, Stop>;
 
-    /// Writes the script of a submission into its folder.
-    fn write(&self, plan: &Plan<'_>) -> Result<(), Stop>;
+    /// What the script of a submission has that is the scheduler's own.
+    fn frame(&self, plan: &Plan<'_>) -> Frame;
 
-    /// Hands a submission over; returns the number by which the scheduler knows it.
-    fn submit(&self, plan: &Plan<'_>) -> Result<String, Stop>;
+    /// Hands a submission over, whose script is this; returns the number by which the scheduler knows it. An error does
+    /// not say that the scheduler has it not: the answer may have been lost.
+    fn submit(&self, plan: &Plan<'_>, script: &Path) -> Result<String, Stop>;
 
     /// The number of a submission of this name, if the scheduler has one: after a process was killed between handing
     /// over and writing down.
@@ -35,8 +40,8 @@ pub trait Scheduler {
         submissions: &[&Submission],
     ) -> Result<BTreeMap<(usize, usize), TaskState>, Stop>;
 
-    /// Ends all tasks of some submissions.
-    fn cancel(&self, submissions: &[&Submission]) -> Result<(), Stop>;
+    /// Ends all tasks of the submissions with these numbers, of which some may have ended.
+    fn cancel(&self, jobs: &[&str]) -> Result<(), Stop>;
 }
 
 /// How runs are packed, followed and repeated.
@@ -74,12 +79,21 @@ pub struct Plan<'a> {
 /// Where a task is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TaskState {
-    /// It waits, for this reason.
+    /// It waits for its turn; in the scheduler's words.
     Waiting(String),
+    /// It waits for something that time alone may not bring: for this reason.
+    Held(String),
     /// It runs, here.
     Running(String),
     /// It has ended as it should.
     Ended,
     /// It has ended for this cause; in the scheduler's words.
     Failed(Cause, String),
+}
+
+impl TaskState {
+    /// Whether it may still make runs.
+    pub fn is_open(&self) -> bool {
+        matches!(self, Self::Waiting(_) | Self::Held(_) | Self::Running(_))
+    }
 }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use lacuna::plugin::executor::{Batch, Finished, Seen};
 use lacuna::plugin::{Component, Context, Executor};
-use lacuna::run::{Stop, files};
+use lacuna::run::Stop;
 use lacuna::study::problem::Complaints;
 use lacuna::study::values::{Count, Positive};
 use schemars::JsonSchema;
@@ -16,8 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::amount::Span;
 use super::cluster::scheduler::Rules;
-use super::cluster::script::{Script, module_lines};
-use super::cluster::{self, Growth, Plan, Retry, Scheduler, Submission, TaskState};
+use super::cluster::{self, Frame, Growth, Plan, Retry, Scheduler, Submission, TaskState, Worker};
 use super::command::said;
 use super::program;
 use crate::models::process;
@@ -68,7 +67,8 @@ pub struct HyperQueue {
     /// Environment modules that each task loads.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub modules: Vec<String>,
-    /// Lines of shell that each task runs before its first run, after the modules.
+    /// Lines of shell that each task runs before its first run, after the modules. Each is a whole command; one that fails ends
+    /// the task, and with `|| true` behind it may fail.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub setup: Vec<String>,
     /// Runs of a task.
@@ -84,7 +84,7 @@ pub struct HyperQueue {
     pub poll: Positive,
     /// How long files may lag behind the end of a task, in seconds.
     pub patience: Positive,
-    /// `lacuna` as the nodes find it; the running program when left out.
+    /// `lacuna` as the nodes find it: a path from the root is theirs alone; the running program when left out.
     pub program: Option<PathBuf>,
     /// Nodes that the server takes from a cluster by itself; none when left out.
     pub allocation: Option<Allocation>,
@@ -131,7 +131,8 @@ impl Component for HyperQueue {
     }
 
     fn environment(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        program::check(self.program.as_deref(), context.directory, complaints);
+        let program = program::on_nodes(self.program.as_deref(), context.directory);
+        program::check(program, complaints);
         if process::find(&self.command, context.directory, None).is_none() {
             complaints
                 .at("command")
@@ -166,8 +167,6 @@ impl Executor for HyperQueue {
     }
 }
 
-const SCRIPT: &str = "task.sh";
-
 impl Scheduler for HyperQueue {
     fn name(&self) -> &'static str {
         "hyperqueue"
@@ -188,24 +187,21 @@ impl Scheduler for HyperQueue {
         Ok(100_000)
     }
 
-    fn write(&self, plan: &Plan<'_>) -> Result<(), Stop> {
-        let program = program::program(self.program.as_deref(), plan.study)?;
-        let mut setup = module_lines(&self.modules);
-        setup.extend(self.setup.iter().cloned());
-        let script = Script {
-            directives: &[],
-            setup: &setup,
-            program: &program,
-            folder: plan.folder,
-            task: "HQ_TASK_ID",
-            log: true,
+    fn worker(&self) -> Worker<'_> {
+        Worker {
+            modules: &self.modules,
+            setup: &self.setup,
+            program: self.program.as_deref(),
             parallel: self.parallel.get(),
-        };
-        files::write_atomic(&plan.folder.join(SCRIPT), script.text().as_bytes())
+        }
     }
 
-    fn submit(&self, plan: &Plan<'_>) -> Result<String, Stop> {
-        let said = self.ask(&self.words(plan))?;
+    fn frame(&self, _plan: &Plan<'_>) -> Frame {
+        Frame { file: "task.sh", directives: Vec::new(), task: "HQ_TASK_ID", log: true }
+    }
+
+    fn submit(&self, plan: &Plan<'_>, script: &Path) -> Result<String, Stop> {
+        let said = self.ask(&self.words(plan, script))?;
         state::submitted(&said).ok_or_else(|| {
             Stop::new(format!("`hq submit` answered `{}` in place of a number", said.trim()))
         })
@@ -229,11 +225,8 @@ impl Scheduler for HyperQueue {
         Ok(states)
     }
 
-    fn cancel(&self, submissions: &[&Submission]) -> Result<(), Stop> {
-        for job in submissions.iter().filter_map(|s| s.job.as_deref()) {
-            self.ask(&["job", "cancel", job].map(str::to_owned))?;
-        }
-        Ok(())
+    fn cancel(&self, jobs: &[&str]) -> Result<(), Stop> {
+        self.ask(&["job".to_owned(), "cancel".to_owned(), jobs.join(",")]).map(drop)
     }
 }
 
@@ -249,7 +242,7 @@ impl HyperQueue {
     }
 
     /// The words after `hq`.
-    fn words(&self, plan: &Plan<'_>) -> Vec<String> {
+    fn words(&self, plan: &Plan<'_>, script: &Path) -> Vec<String> {
         let mut words = vec!["submit".to_owned()];
         let mut add = |option: &str, value: String| words.push(format!("--{option}={value}"));
         add("name", plan.name.to_owned());
@@ -278,8 +271,7 @@ impl HyperQueue {
             add("priority", self.priority.to_string());
         }
         words.extend(self.extra.iter().cloned());
-        let script = plan.folder.join(SCRIPT).display().to_string();
-        words.extend(["--", "bash", &script].map(str::to_owned));
+        words.extend(["--", "bash", &script.display().to_string()].map(str::to_owned));
         words
     }
 }

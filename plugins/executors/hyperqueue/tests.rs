@@ -31,6 +31,7 @@ fn submission(name: &str) -> Submission {
         executor: "hyperqueue".to_owned(),
         number: 1,
         name: name.to_owned(),
+        place: PathBuf::new(),
         job: Some("2".to_owned()),
         submitted: 0,
         time: 1.0,
@@ -86,7 +87,7 @@ fn words_are_those_of_the_study() {
     let expected = "submit --name=lacuna-1-ab --array=0-6 --cwd=/study --stdout=none --stderr=none --cpus=8 \
                     --resource=mem=16000 --time-limit=10800s --time-request=10800s --pin=taskset \
                     -- bash /run/campaign/1/task.sh";
-    assert_eq!(queue.words(&plan).join(" "), expected);
+    assert_eq!(queue.words(&plan, Path::new("/run/campaign/1/task.sh")).join(" "), expected);
     let words = queue.allocation.unwrap().words("lacuna-x").join(" ");
     assert_eq!(words, "alloc add pbs --name=lacuna-x --time-limit=43200s --backlog=2 -- -qqprod");
 }

@@ -71,7 +71,7 @@ impl Component for Local {
         if self.processes.is_none() {
             return;
         }
-        program::check(self.program.as_deref(), context.directory, complaints);
+        program::check(program::program(self.program.as_deref(), context.directory), complaints);
         for (key, given) in [("pin", self.pin), ("memory", self.memory.is_some())] {
             if given && !Limits::are_known() {
                 complaints.at(key).say(format!("`{key}` is not known on this system"));

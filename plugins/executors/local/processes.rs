@@ -28,6 +28,8 @@ pub fn submit(
     let order_folder = folder(batch.directory).join("local");
     let order = Order::new(batch, batch.jobs.to_vec(), Vec::new());
     order.write(&order_folder)?;
+    // An earlier attempt may have ended because no run could have a result; that may have been mended since.
+    batch.jobs.iter().try_for_each(|job| Marker::clear_hopeless(batch.directory, &job.name))?;
     let processes = processes.min(batch.jobs.len());
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let office = Office {

@@ -1,5 +1,7 @@
 //! `slurm`: job arrays on a cluster.
 
+mod environment;
+mod reasons;
 mod state;
 
 use std::collections::BTreeMap;
@@ -7,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use lacuna::plugin::executor::{Batch, Finished, Seen};
 use lacuna::plugin::{Component, Context, Executor};
-use lacuna::run::{Stop, files};
+use lacuna::run::Stop;
 use lacuna::study::problem::Complaints;
 use lacuna::study::values::{Count, Positive};
 use schemars::JsonSchema;
@@ -15,8 +17,8 @@ use serde::{Deserialize, Serialize};
 
 use super::amount::{Memory, Span, as_clock};
 use super::cluster::scheduler::Rules;
-use super::cluster::script::{Script, module_lines, quoted};
-use super::cluster::{self, Growth, Plan, Retry, Scheduler, Submission, TaskState};
+use super::cluster::script::{quoted, word};
+use super::cluster::{self, Frame, Growth, Plan, Retry, Scheduler, Submission, TaskState, Worker};
 use super::command;
 use super::program;
 use crate::models::process;
@@ -70,7 +72,8 @@ pub struct Slurm {
     /// Environment modules that each job loads.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub modules: Vec<String>,
-    /// Lines of shell that each job runs before its first run, after the modules.
+    /// Lines of shell that each job runs before its first run, after the modules. Each is a whole command; one that fails ends
+    /// the job, and with `|| true` behind it may fail.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub setup: Vec<String>,
     /// Runs of a job.
@@ -79,6 +82,9 @@ pub struct Slurm {
     pub parallel: Count,
     /// The greatest number of jobs of one array that run at a time; no limit when left out.
     pub at_most: Option<Count>,
+    /// The greatest number of jobs of one array, for whoever may have only so many at a time; that of the cluster when left
+    /// out. What is more becomes further arrays, which are submitted as soon as the cluster takes them.
+    pub array: Option<Count>,
     /// How often a run is submitted again, by cause.
     pub retry: Retry,
     /// What it then gets more of.
@@ -87,7 +93,7 @@ pub struct Slurm {
     pub poll: Positive,
     /// How long files and accounting may lag behind the end of a job, in seconds.
     pub patience: Positive,
-    /// `lacuna` as the nodes find it; the running program when left out.
+    /// `lacuna` as the nodes find it: a path from the root is theirs alone; the running program when left out.
     pub program: Option<PathBuf>,
 }
 
@@ -109,6 +115,7 @@ impl Default for Slurm {
             pack: cluster::count(1),
             parallel: cluster::count(1),
             at_most: None,
+            array: None,
             retry: Retry::default(),
             grow: Growth::default(),
             poll: cluster::positive(60.0),
@@ -126,13 +133,7 @@ impl Component for Slurm {
                 complaints.at(key).say(format!("an element of `{key}` has more than one line"));
             }
         }
-        if let Some(line) = self.extra.iter().find(|line| !line.starts_with('-')) {
-            complaints
-                .at("extra")
-                .say("this is no option of `sbatch`")
-                .expected("an option such as `--exclusive`")
-                .found(format!("`{line}`"));
-        }
+        self.check_extra(complaints);
         if self.grow.time.get() != 1.0 && self.time.is_none() {
             complaints.at("grow.time").say("there is no `time` that could grow");
         }
@@ -142,7 +143,8 @@ impl Component for Slurm {
     }
 
     fn environment(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        program::check(self.program.as_deref(), context.directory, complaints);
+        let program = program::on_nodes(self.program.as_deref(), context.directory);
+        program::check(program, complaints);
         for command in ["sbatch", "squeue", "scancel"] {
             if process::find(command, Path::new("."), None).is_none() {
                 complaints.at("use").say(format!("there is no command `{command}` here")).help(
@@ -176,8 +178,6 @@ impl Executor for Slurm {
     }
 }
 
-const SCRIPT: &str = "job.sh";
-
 impl Scheduler for Slurm {
     fn name(&self) -> &'static str {
         "slurm"
@@ -195,36 +195,36 @@ impl Scheduler for Slurm {
 
     fn most_tasks(&self) -> Result<usize, Stop> {
         let text = command::said("scontrol", &["show", "config"])?;
-        Ok(state::max_array_size(&text).unwrap_or(1001))
+        let most = state::max_array_size(&text).unwrap_or(1001);
+        Ok(self.array.map_or(most, |own| own.get().min(most)))
     }
 
-    fn write(&self, plan: &Plan<'_>) -> Result<(), Stop> {
-        let program = program::program(self.program.as_deref(), plan.study)?;
-        let mut setup = module_lines(&self.modules);
-        setup.extend(self.setup.iter().cloned());
-        let script = Script {
-            directives: &self.directives(plan),
-            setup: &setup,
-            program: &program,
-            folder: plan.folder,
+    fn worker(&self) -> Worker<'_> {
+        Worker {
+            modules: &self.modules,
+            setup: &self.setup,
+            program: self.program.as_deref(),
+            parallel: self.parallel.get(),
+        }
+    }
+
+    fn frame(&self, plan: &Plan<'_>) -> Frame {
+        Frame {
+            file: "job.sh",
+            directives: self.directives(plan),
             task: "SLURM_ARRAY_TASK_ID",
             log: false,
-            parallel: self.parallel.get(),
-        };
-        files::write_atomic(&plan.folder.join(SCRIPT), script.text().as_bytes())
+        }
     }
 
-    fn submit(&self, plan: &Plan<'_>) -> Result<String, Stop> {
-        let script = plan.folder.join(SCRIPT).display().to_string();
-        let said = command::said("sbatch", &["--parsable", &script])?;
-        let job = said.trim().split(';').next().unwrap_or_default().to_owned();
-        if job.is_empty() || !job.bytes().all(|b| b.is_ascii_digit()) {
-            return Err(Stop::new(format!(
-                "`sbatch` answered `{}` in place of a number",
-                said.trim()
-            )));
-        }
-        Ok(job)
+    fn submit(&self, _plan: &Plan<'_>, script: &Path) -> Result<String, Stop> {
+        let script = script.display().to_string();
+        let inside = std::env::var_os("SLURM_JOB_ID").is_some();
+        let hidden = |name: &str| environment::is_hidden(name, self, inside);
+        let said = command::said_without("sbatch", &["--parsable", &script], hidden)?;
+        state::submitted(&said).ok_or_else(|| {
+            Stop::new(format!("`sbatch` answered `{}` in place of a number", said.trim()))
+        })
     }
 
     fn find(&self, name: &str) -> Result<Option<String>, Stop> {
@@ -251,13 +251,54 @@ impl Scheduler for Slurm {
         state::states(submissions)
     }
 
-    fn cancel(&self, submissions: &[&Submission]) -> Result<(), Stop> {
-        let jobs: Vec<&str> = submissions.iter().filter_map(|s| s.job.as_deref()).collect();
-        command::said("scancel", &jobs).map(drop)
+    fn cancel(&self, jobs: &[&str]) -> Result<(), Stop> {
+        // Quietly: a job that has ended meanwhile is none to complain of.
+        let words: Vec<&str> = std::iter::once("--quiet").chain(jobs.iter().copied()).collect();
+        command::said("scancel", &words).map(drop)
     }
 }
 
+/// Options of `sbatch` by which jobs would not be found again, with their short forms.
+const OWN: [(&str, &str); 9] = [
+    ("--array", "-a"),
+    ("--job-name", "-J"),
+    ("--output", "-o"),
+    ("--clusters", "-M"),
+    ("--wait", "-W"),
+    ("--chdir", "-D"),
+    ("--requeue", ""),
+    ("--parsable", ""),
+    ("--test-only", ""),
+];
+
+/// The option among [`OWN`] that a line of `extra` has.
+fn own_option(line: &str) -> Option<&'static str> {
+    let is = |(long, short): &&(&str, &str)| {
+        line.split(['=', ' ']).next() == Some(long)
+            || short.len() == 2 && line.starts_with(short) && !line.starts_with("--")
+    };
+    OWN.iter().find(is).map(|(long, _)| *long)
+}
+
 impl Slurm {
+    fn check_extra(&self, complaints: &mut Complaints<'_>) {
+        if let Some(line) = self.extra.iter().find(|line| !line.starts_with('-')) {
+            complaints
+                .at("extra")
+                .say("this is no option of `sbatch`")
+                .expected("an option such as `--exclusive`")
+                .found(format!("`{line}`"));
+        }
+        if let Some(option) = self.extra.iter().find_map(|line| own_option(line)) {
+            complaints
+                .at("extra")
+                .say(format!("with `{option}` the jobs of a study would not be found again"))
+                .help(
+                    "leave it out; another cluster is named by the variable `SLURM_CLUSTERS`, which all commands of Slurm obey",
+                );
+        }
+    }
+
     /// The lines that `sbatch` reads.
     fn directives(&self, plan: &Plan<'_>) -> Vec<String> {
         let throttle = self.at_most.map_or(String::new(), |most| format!("%{most}"));
@@ -265,7 +306,7 @@ impl Slurm {
         let mut lines = vec![
             format!("--job-name={}", plan.name),
             format!("--array=0-{}{throttle}", plan.tasks.saturating_sub(1)),
-            format!("--output={}", quoted(Path::new(&format!("{log}%a.txt")))),
+            format!("--output={}", word(&format!("{log}%a.txt"))),
             format!("--chdir={}", quoted(plan.study)),
             // What is submitted again is decided by the study.
             "--no-requeue".to_owned(),
@@ -276,7 +317,7 @@ impl Slurm {
         add("partition", self.partition.clone());
         add("account", self.account.clone());
         add("qos", self.qos.clone());
-        add("constraint", self.constraint.as_ref().map(|c| quoted(Path::new(c))));
+        add("constraint", self.constraint.as_ref().map(|c| word(c)));
         add("time", self.time.as_ref().map(|time| as_clock(time.seconds() * plan.time)));
         add("nodes", self.nodes.map(|n| n.to_string()));
         add("ntasks", self.tasks.map(|n| n.to_string()));

@@ -1,13 +1,23 @@
 //! What Slurm says of tasks, in texts of our own format: its JSON changes from version to version.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use lacuna::run::Stop;
 
+use super::reasons;
 use crate::executors::cluster::{Cause, Submission, TaskState};
 use crate::executors::command::said;
 
 type States = BTreeMap<(usize, usize), TaskState>;
+
+/// The number in what `sbatch --parsable` prints: the last line, `12` or `12;cluster`. Plugins and wrappers of a site may print
+/// before it.
+pub fn submitted(text: &str) -> Option<String> {
+    let last = text.lines().map(str::trim).rfind(|line| !line.is_empty())?;
+    let number = last.split(';').next()?;
+    let is_number = !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
+    is_number.then(|| number.to_owned())
+}
 
 /// The state of the tasks of some submissions.
 pub fn states(submissions: &[&Submission]) -> Result<States, Stop> {
@@ -90,9 +100,15 @@ fn state_of(state: &str, node: &str, reason: &str) -> TaskState {
         "OUT_OF_MEMORY" => failed(Cause::OutOfMemory),
         "NODE_FAIL" | "BOOT_FAIL" => failed(Cause::NodeFailure),
         "PREEMPTED" => failed(Cause::Preempted),
-        "CANCELLED" | "REVOKED" => failed(Cause::Cancelled),
+        "CANCELLED" => failed(Cause::Cancelled),
         "FAILED" => failed(Cause::Failure),
-        // Held, requeued, and states that later versions know: it has not ended.
+        "PENDING" | "REQUEUED" if reasons::is_passing(reason) => TaskState::Waiting(words()),
+        "PENDING" | "REQUEUED" => TaskState::Held(format!("{word} {}", reasons::explained(reason))),
+        "REQUEUE_HOLD" | "SPECIAL_EXIT" | "RESV_DEL_HOLD" => TaskState::Held(words()),
+        "REVOKED" => {
+            TaskState::Held("REVOKED: another cluster of the federation has it".to_owned())
+        }
+        // States that later versions know: it has not ended.
         _ => TaskState::Waiting(words()),
     }
 }
@@ -101,12 +117,18 @@ fn state_of(state: &str, node: &str, reason: &str) -> TaskState {
 fn explain(states: &mut States, submissions: &[&Submission]) {
     for submission in submissions {
         let Some(job) = &submission.job else { continue };
-        let open: std::collections::BTreeSet<usize> = submission.open().map(|(t, _)| t).collect();
-        for task in open {
-            let state = states.get_mut(&(submission.number, task));
-            if let Some(TaskState::Failed(Cause::Failure, words)) = state
-                && let Ok(text) = said("scontrol", &["-o", "show", "job", &format!("{job}_{task}")])
-                && let Some(code) = exit_code(&text)
+        let open: BTreeSet<usize> = submission.open().map(|(task, _)| task).collect();
+        let number = submission.number;
+        let failed = |task: &usize| {
+            matches!(states.get(&(number, *task)), Some(TaskState::Failed(Cause::Failure, _)))
+        };
+        if !open.iter().any(failed) {
+            continue;
+        }
+        // One question for the whole array.
+        let Ok(text) = said("scontrol", &["-o", "show", "job", job]) else { continue };
+        for (task, code) in exit_codes(&text) {
+            if let Some(TaskState::Failed(Cause::Failure, words)) = states.get_mut(&(number, task))
             {
                 *words = format!("{words}, {code}");
             }
@@ -114,8 +136,17 @@ fn explain(states: &mut States, submissions: &[&Submission]) {
     }
 }
 
+/// How the tasks of an array ended, from one line for each.
+pub fn exit_codes(text: &str) -> BTreeMap<usize, String> {
+    let task = |line: &str| {
+        let mut words = line.split_whitespace();
+        words.find_map(|word| word.strip_prefix("ArrayTaskId="))?.parse().ok()
+    };
+    text.lines().filter_map(|line| Some((task(line)?, exit_code(line)?))).collect()
+}
+
 /// `ExitCode=7:0` is an exit code, `ExitCode=0:9` a signal.
-pub fn exit_code(text: &str) -> Option<String> {
+fn exit_code(text: &str) -> Option<String> {
     let value = text.split_whitespace().find_map(|word| word.strip_prefix("ExitCode="))?;
     let (code, signal) = value.split_once(':')?;
     match (code, signal) {

@@ -7,7 +7,7 @@ use std::path::Path;
 use lacuna::plugin::Executor;
 use lacuna::plugin::registry::from_text;
 
-use super::state::{exit_code, max_array_size, of_accounts, of_queue};
+use super::state::{exit_codes, max_array_size, of_accounts, of_queue, submitted};
 use super::*;
 use crate::executors::cluster::Cause;
 
@@ -17,6 +17,7 @@ fn submission(number: usize, name: &str, job: &str) -> Submission {
         executor: "slurm".to_owned(),
         number,
         name: name.to_owned(),
+        place: PathBuf::new(),
         job: Some(job.to_owned()),
         submitted: 0,
         time: 1.0,
@@ -71,8 +72,12 @@ fn accounts_are_understood_and_of_other_jobs_not_believed() {
 
 #[test]
 fn details_are_understood() {
-    assert_eq!(exit_code("Reboot=0 ExitCode=7:0 RunTime=1").unwrap(), "exit code 7");
-    assert_eq!(exit_code("Reboot=0 ExitCode=0:9 RunTime=1").unwrap(), "ended by signal 9");
+    let text = "JobId=9 ArrayJobId=8 ArrayTaskId=0 Reboot=0 ExitCode=7:0 RunTime=1\n\
+                JobId=10 ArrayJobId=8 ArrayTaskId=1 Reboot=0 ExitCode=0:9 RunTime=1\n\
+                JobId=8 ArrayJobId=8 ArrayTaskId=2 Reboot=0 ExitCode=0:0 RunTime=1\n";
+    let codes = exit_codes(text);
+    assert_eq!(codes.len(), 2);
+    assert_eq!((&*codes[&0], &*codes[&1]), ("exit code 7", "ended by signal 9"));
     assert_eq!(max_array_size("A = 1\nMaxArraySize            = 1001\n"), Some(1001));
 }
 
@@ -104,4 +109,72 @@ fn directives_are_those_of_the_study() {
         "#SBATCH --exclusive",
     ];
     assert_eq!(slurm.directives(&plan), expected);
+}
+
+#[test]
+fn a_number_is_found_behind_what_a_site_prints() {
+    let number = Some("12".to_owned());
+    for text in ["12\n", "12;cluster\n", "Welcome to the cluster.\n\n12\n", "12\r\n"] {
+        assert_eq!(submitted(text), number, "{text}");
+    }
+    for text in ["", "\n", ";cluster", "Submitted batch job", "12 jobs left"] {
+        assert_eq!(submitted(text), None, "{text}");
+    }
+}
+
+#[test]
+fn states_that_are_seldom_seen_are_understood() {
+    let ours = submission(1, "lacuna-1-ab", "2");
+    let state = |word: &str, reason: &str| {
+        let states = of_queue(&format!("lacuna-1-ab|2_0|{word}|n1|{reason}\n"), &[&ours]);
+        states[&(1, 0)].clone()
+    };
+    let cause = |word: &str| match state(word, "None") {
+        TaskState::Failed(cause, _) => cause,
+        other => panic!("{word}: {other:?}"),
+    };
+    for (word, expected) in [
+        ("CANCELLED+", Cause::Cancelled),
+        ("NODE_FAIL", Cause::NodeFailure),
+        ("BOOT_FAIL", Cause::NodeFailure),
+        ("PREEMPTED", Cause::Preempted),
+        ("DEADLINE", Cause::Timeout),
+    ] {
+        assert_eq!(cause(word), expected, "{word}");
+    }
+    for word in ["COMPLETING", "SUSPENDED", "CONFIGURING"] {
+        assert_eq!(state(word, "None"), TaskState::Running("n1".to_owned()));
+    }
+    // A requeued job will run again, and one that was revoked runs in another cluster.
+    for (word, reason) in [("REQUEUED", "BeginTime"), ("PENDING", "Priority")] {
+        assert!(matches!(state(word, reason), TaskState::Waiting(_)), "{word}");
+    }
+    for (word, reason) in
+        [("REVOKED", "None"), ("REQUEUE_HOLD", "None"), ("PENDING", "JobHeldAdmin")]
+    {
+        assert!(matches!(state(word, reason), TaskState::Held(_)), "{word}");
+    }
+    let held = TaskState::Held(
+        "PENDING PartitionTimeLimit: `time` is more than the partition allows".to_owned(),
+    );
+    assert_eq!(state("PENDING", "PartitionTimeLimit"), held);
+    // The number of a task in all the ways in which it is written.
+    let text = "lacuna-1-ab|2_[3-5%2]|PENDING||None\nlacuna-1-ab|2|PENDING||None\n";
+    assert_eq!(of_queue(text, &[&ours]), BTreeMap::new());
+}
+
+#[test]
+fn options_by_which_jobs_would_be_lost_are_refused() {
+    for (line, is_refused) in [
+        ("--array=0-3", true),
+        ("-J other", true),
+        ("-Jother", true),
+        ("--clusters=far", true),
+        ("--exclusive", false),
+        ("--array-like", false),
+        ("-C fast", false),
+    ] {
+        let found = super::own_option(line).is_some();
+        assert_eq!(found, is_refused, "{line}");
+    }
 }

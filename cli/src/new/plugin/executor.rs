@@ -131,6 +131,7 @@ mod tests {
                 scenario: &scenario,
                 study: &folder,
                 directory: &folder,
+                warn: &|_| {},
             };
             let mut ends = Vec::new();
             let mut finished = |end: Finished| {

@@ -30,7 +30,8 @@ impl Roll {
         Self { scenarios, runs: asked.names.to_vec() }
     }
 
-    pub(super) fn write(&self, folder: &Path) -> Result<(), Stop> {
+    /// Writes it into the folder of a stage.
+    pub fn write(&self, folder: &Path) -> Result<(), Stop> {
         files::write_json(&folder.join(ROLL), self)
     }
 
@@ -51,7 +52,11 @@ impl Log {
     pub(super) fn open(folder: &Path) -> Result<Self, Stop> {
         let path = folder.join(LOG);
         let file = OpenOptions::new().create(true).append(true).open(&path);
-        let file = file.map_err(|error| files::cannot_write(&path, &error))?;
+        let mut file = file.map_err(|error| files::cannot_write(&path, &error))?;
+        // A process that was killed while it wrote left half a line, which must not spoil the next.
+        if !fs::read(&path).is_ok_and(|bytes| bytes.is_empty() || bytes.ends_with(b"\n")) {
+            writeln!(file).map_err(|error| files::cannot_write(&path, &error))?;
+        }
         Ok(Self { path, file })
     }
 
@@ -64,9 +69,36 @@ impl Log {
 
 /// What earlier attempts noted; the last word on each run counts.
 pub fn earlier(folder: &Path) -> BTreeMap<String, RunRecord> {
-    let text = fs::read_to_string(folder.join(LOG)).unwrap_or_default();
-    text.lines()
-        .filter_map(|line| serde_json::from_str::<RunRecord>(line).ok())
+    let text = fs::read(folder.join(LOG)).unwrap_or_default();
+    text.split(|byte| *byte == b'\n')
+        .filter_map(|line| serde_json::from_slice::<RunRecord>(line).ok())
         .map(|record| (record.run.clone(), record))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_a_line_costs_no_other() {
+        let folder = tempfile::tempdir().unwrap();
+        let record = |run: &str| RunRecord {
+            run: run.to_owned(),
+            file: None,
+            sha256: None,
+            valid: false,
+            reason: Some("größer".to_owned()),
+            seconds: 1.0,
+        };
+        Log::open(folder.path()).unwrap().note(&record("run001")).unwrap();
+        let path = folder.path().join(LOG);
+        let whole = fs::read(&path).unwrap();
+        // Cut within a letter of two bytes.
+        let cut = whole.iter().position(|byte| *byte > 127).unwrap() + 1;
+        fs::write(&path, [&whole[..], &whole[..cut]].concat()).unwrap();
+        Log::open(folder.path()).unwrap().note(&record("run002")).unwrap();
+        let names: Vec<String> = earlier(folder.path()).into_keys().collect();
+        assert_eq!(names, ["run001", "run002"]);
+    }
 }

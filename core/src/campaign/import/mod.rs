@@ -1,18 +1,20 @@
 //! Finished runs made by hand, from a table of the user's.
 
-use std::collections::BTreeMap;
+mod table;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use table::{Row, rows};
+
 use super::grow;
-use crate::data::Unit;
 use crate::linalg::Matrix;
 use crate::plugin::Reader;
 use crate::plugin::model::Response;
 use crate::run::{Artifact as _, RunDirectory, Stop, files, write_response};
 use crate::stage::imports;
 use crate::stage::read::{self, Runs};
-use crate::stage::simulate::{Made, RunRecord, Simulated};
+use crate::stage::simulate::{Made, Roll, RunRecord, Simulated};
 use crate::study::Study;
 
 /// What was imported.
@@ -68,14 +70,6 @@ fn free_folder(run: &RunDirectory) -> PathBuf {
     }
 }
 
-/// A run of the table.
-struct Row {
-    run: String,
-    point: Vec<f64>,
-    /// The file of each scenario.
-    files: Vec<Option<PathBuf>>,
-}
-
 /// Copies the files of the runs, writes their table, and reads them as the study will.
 fn take(
     study: &Study,
@@ -92,10 +86,9 @@ fn take(
         let mut runs = Vec::new();
         for row in rows {
             let from = row.files[i].as_ref().ok_or_else(|| {
-                Stop::new(format!(
-                    "run `{}` has no file for the scenario `{}`",
-                    row.run, scenario.name
-                ))
+                let (run, scenario) = (&row.run, &scenario.name);
+                Stop::new(format!("run `{run}` has no file for the scenario `{scenario}`"))
+                    .help("a run has one line for each scenario of the study, all with its name and parameters")
             })?;
             let file = match reader {
                 Some(reader) => converted(study, &scenario.name, reader, from, &row.run, &place)?,
@@ -116,6 +109,10 @@ fn take(
     let parameters = study.parameters.iter().map(|p| p.name.clone()).collect();
     let made = Simulated { scenarios, parameters, points };
     made.save(folder)?;
+    let names = study.scenarios.iter().map(|scenario| scenario.name.clone());
+    let folders = made.scenarios.iter().map(|made| made.folder.clone());
+    let runs = rows.iter().map(|row| row.run.clone()).collect();
+    Roll { scenarios: names.zip(folders).collect(), runs }.write(folder)?;
     read::ensemble_of(study, &study.parameters, Some(Runs { folder, made: &made }))?;
     Ok(rows.iter().map(|row| row.run.clone()).collect())
 }
@@ -145,89 +142,4 @@ fn converted(
     let values = reader.response(from, &layout)?;
     let response = Response { values, valid: true, facts: Vec::new() };
     write_response(place, run, &layout, &response)
-}
-
-/// The runs of the table, each with all its scenarios.
-fn rows(study: &Study, table: &Path) -> Result<Vec<Row>, Stop> {
-    let bytes = files::read(table)?;
-    let wrong = |place: &str, what: String| {
-        Stop::new(format!("{}{place}: {what}", table.display()))
-            .help("the columns are `run`, `file`, `scenario` in a study with scenarios, and one for each parameter, such as `density [kg/m3]`")
-    };
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(&bytes[..]);
-    let header = reader.headers().map_err(|e| wrong("", e.to_string()))?.clone();
-    let column = |name: &str| header.iter().position(|h| h == name);
-    let file = column("file").ok_or_else(|| wrong("", "there is no column `file`".to_owned()))?;
-    let mut parameters = Vec::new();
-    for parameter in &study.parameters {
-        let found = header.iter().enumerate().find_map(|(i, heading)| {
-            let (name, unit) = heading.split_once('[').unwrap_or((heading, ""));
-            (name.trim() == parameter.name).then(|| (i, unit.trim_end_matches(']').trim()))
-        });
-        let (i, unit) = found.ok_or_else(|| {
-            wrong("", format!("there is no column for the parameter `{}`", parameter.name))
-        })?;
-        let unit = if unit.is_empty() {
-            parameter.unit.clone()
-        } else {
-            Unit::parse(unit).map_err(|error| wrong(", line 1", error.to_string()))?
-        };
-        let factor = unit.factor_to(&parameter.unit).ok_or_else(|| {
-            wrong(
-                ", line 1",
-                format!(
-                    "`{unit}` does not convert to `{}`, the unit of `{}`",
-                    parameter.unit, parameter.name
-                ),
-            )
-        })?;
-        parameters.push((i, factor, &parameter.name));
-    }
-    let (named, of_scenario) = (column("run"), column("scenario"));
-    let folder = table.parent().unwrap_or(Path::new(""));
-    let mut found: BTreeMap<usize, Row> = BTreeMap::new();
-    let mut order: BTreeMap<String, usize> = BTreeMap::new();
-    for (number, record) in reader.records().enumerate() {
-        let line = format!(", line {}", number + 2);
-        let record = record.map_err(|e| wrong(&line, e.to_string()))?;
-        let run = named.map_or_else(|| format!("hand{:03}", number + 1), |i| record[i].to_owned());
-        let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
-        if run.is_empty() || !run.chars().all(is_plain) {
-            return Err(wrong(
-                &line,
-                format!("`{run}` is no name of a run: expected letters, digits, `-` and `_`"),
-            ));
-        }
-        let number_in = |&(i, factor, name): &(usize, f64, &String)| {
-            let value = record[i].parse::<f64>().ok().filter(|x| x.is_finite());
-            value.map(|x| x * factor).ok_or_else(|| {
-                wrong(&line, format!("expected a number for `{name}`, found `{}`", &record[i]))
-            })
-        };
-        let point = parameters.iter().map(number_in).collect::<Result<Vec<f64>, Stop>>()?;
-        let scenario = of_scenario.map_or("", |i| &record[i]);
-        let place = study
-            .scenarios
-            .iter()
-            .position(|s| s.name == scenario)
-            .ok_or_else(|| wrong(&line, format!("the study has no scenario `{scenario}`")))?;
-        let next = order.len();
-        let key = *order.entry(run.clone()).or_insert(next);
-        let row = found.entry(key).or_insert_with(|| Row {
-            run: run.clone(),
-            point: point.clone(),
-            files: vec![None; study.scenarios.len()],
-        });
-        if row.point != point {
-            return Err(wrong(&line, format!("run `{run}` has other parameters in another line")));
-        }
-        if row.files[place].is_some() {
-            return Err(wrong(&line, format!("there are two files for run `{run}`")));
-        }
-        row.files[place] = Some(folder.join(&record[file]));
-    }
-    if found.is_empty() {
-        return Err(wrong("", "there is no run in it".to_owned()));
-    }
-    Ok(found.into_values().collect())
 }
