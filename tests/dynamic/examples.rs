@@ -191,7 +191,7 @@ fn the_simulator_in_c_says_which_responses_it_cannot_give() {
     let load = format!("plugins.load=[{}]", emit::string(rod().path.to_str().unwrap()));
     let study = quick::root().join("examples/plugin_c/rod.toml");
     for (setting, expected) in [
-        ("response.unit=\"degF\"", "expected a response in K"),
+        ("response.unit=\"mK\"", "expected a response in K"),
         ("response.axes.position.values=[0.1, 0.25, 1.5]", "expected positions on the rod"),
         ("response.axes.position.unit=\"cm\"", "expected the axes `position` in m and `time` in s"),
     ] {
