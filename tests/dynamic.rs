@@ -6,6 +6,8 @@
 mod command;
 #[path = "dynamic/contracts.rs"]
 mod contracts;
+#[path = "dynamic/elsewhere.rs"]
+mod elsewhere;
 #[path = "dynamic/examples.rs"]
 mod examples;
 #[cfg(unix)]
@@ -16,8 +18,16 @@ mod panics;
 #[path = "quick.rs"]
 #[allow(dead_code, reason = "other tests use the rest")]
 mod quick;
+#[path = "slurm/mod.rs"]
+#[allow(dead_code, reason = "other tests use the rest")]
+mod slurm;
 #[path = "dynamic/studies.rs"]
 mod studies;
+#[cfg(unix)]
+#[path = "dynamic/unruly.rs"]
+mod unruly;
+#[path = "dynamic/written.rs"]
+mod written;
 
 use std::path::PathBuf;
 use std::sync::OnceLock;

@@ -11,7 +11,8 @@ use lacuna::plugin::registry;
 use lacuna::run::{Stop, files};
 use lacuna::study::nearest::nearest;
 
-use crate::{Failure, print};
+use crate::study::Libraries;
+use crate::{Failure, plugins, print};
 
 /// `lacuna inspect FILE`
 pub fn inspect(
@@ -19,7 +20,9 @@ pub fn inspect(
     reader: Option<&str>,
     variable: Option<&str>,
     csv: Option<&Path>,
+    libraries: &Libraries,
 ) -> Result<(), Failure> {
+    plugins::load(libraries)?;
     let (name, reader) = choose(path, reader)?;
     let contents = reader.inspect(path).map_err(Stop::from)?;
     let Some(variable) = variable else {
@@ -53,7 +56,8 @@ fn choose(path: &Path, wanted: Option<&str>) -> Result<(&'static str, Box<dyn Re
     let read = File::open(path).and_then(|file| file.take(4096).read_to_end(&mut head));
     read.map_err(|error| files::cannot_read(path, &error))?;
     for entry in registry::entries::<dyn Reader>() {
-        let reader = build(entry.name)?;
+        // A reader that has to be told something knows no file by itself.
+        let Ok(reader) = build(entry.name) else { continue };
         if reader.recognises(path, &head) {
             return Ok((entry.name, reader));
         }

@@ -125,6 +125,8 @@ enum Verb {
         /// The reader to use; the first that recognises the file when left out.
         #[arg(long, value_name = "NAME")]
         reader: Option<String>,
+        #[command(flatten)]
+        libraries: study::Libraries,
     },
     /// Serve a study's model, emulator and posterior over UM-Bridge, until Ctrl-C.
     Serve {
@@ -175,8 +177,9 @@ fn main() -> ExitCode {
             plugins::list(name.as_deref(), markdown, &libraries)
         }
         Verb::Schema { libraries } => plugins::schema(&libraries),
-        Verb::Inspect { file, variable, csv, reader } => {
-            inspect::inspect(&file, reader.as_deref(), variable.as_deref(), csv.as_deref())
+        Verb::Inspect { file, variable, csv, reader, libraries } => {
+            let (reader, variable) = (reader.as_deref(), variable.as_deref());
+            inspect::inspect(&file, reader, variable, csv.as_deref(), &libraries)
         }
         Verb::Serve { study, settings, out, place } => {
             serve::serve(&study, &settings, out.as_deref(), &place)

@@ -99,7 +99,8 @@ fn origin(library: &Library) -> String {
 }
 
 /// Loads libraries that the command line names.
-fn load(libraries: &Libraries) -> Result<(), Failure> {
+/// Loads the libraries that the command line names.
+pub fn load(libraries: &Libraries) -> Result<(), Failure> {
     for path in &libraries.files {
         library::load(path, None).map_err(|reason| {
             let path = path.display();

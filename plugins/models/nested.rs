@@ -2,8 +2,11 @@
 //! output.
 
 use std::fmt;
+use std::sync::Arc;
 
+use lacuna::plugin::abi::Library;
 use lacuna::plugin::registry::{Kind, Section, section};
+use lacuna::plugin::{Component, Fault};
 use lacuna::study::problem::{Complaints, Problem, Problems};
 use lacuna::study::read::read;
 use lacuna::study::{Node, Place, Sources, emit};
@@ -30,6 +33,18 @@ impl<K: ?Sized, C> Nested<K, C> {
     /// The plugin and the keys beside it, or what is wrong with them.
     pub fn section(&self) -> Result<&Section<K, C>, &[Problem]> {
         self.section.as_ref().map_err(Vec::as_slice)
+    }
+}
+
+impl<K: Component + ?Sized, C> Nested<K, C> {
+    /// Where the plugin says that it can answer no more.
+    pub fn faults(&self) -> Vec<Arc<Fault>> {
+        self.section().map_or_else(|_| Vec::new(), |section| section.built.plugin.faults())
+    }
+
+    /// The libraries that the plugin needs.
+    pub fn libraries(&self) -> Vec<&'static Library> {
+        self.section().map_or_else(|_| Vec::new(), |section| section.built.libraries())
     }
 }
 

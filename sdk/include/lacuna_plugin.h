@@ -417,7 +417,9 @@ typedef struct LacunaModelFunctions {
      * format into `directory` and answers the file's name; `ABSENT` when it has no format of its own. */
     /* May be null. */
     int32_t (*write)(void *plugin, LacunaText run, const LacunaCalls *calls, LacunaNumbers response, LacunaText about, LacunaText directory, const LacunaAnswer *answer);
-    /* The derivatives of each value of the response (rows) by each input (columns), for one call. */
+    /* The derivatives of each value of the response (rows) by each input (columns), for one call. `ABSENT` where
+     * they are not known. Without a call (no row of inputs, `jacobian` null) nothing is written: whether there are
+     * derivatives is the question. */
     /* May be null. */
     int32_t (*jacobian)(void *plugin, const LacunaCalls *calls, double *jacobian, const LacunaAnswer *answer);
 } LacunaModelFunctions;

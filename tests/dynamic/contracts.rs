@@ -34,8 +34,8 @@ fn all<K: Kind + ?Sized>(
 }
 
 /// A suite passed, and nothing went wrong that the suite did not see.
-fn sound(plugin: &dyn Component, outcome: Result<(), Vec<String>>) -> Result<(), Vec<String>> {
-    let fault = plugin.fault().unwrap();
+pub fn sound(plugin: &dyn Component, outcome: Result<(), Vec<String>>) -> Result<(), Vec<String>> {
+    let [fault] = &plugin.faults()[..] else { panic!("a plugin of a library may have a fault") };
     assert_eq!(fault.said(), None);
     outcome
 }
@@ -61,12 +61,8 @@ fn surrogates() {
     all::<dyn Surrogate>(&table, |name, plugin| sound(plugin, contract::surrogate(name, plugin)));
 }
 
-#[test]
-fn models() {
-    let table = [
-        ("twin_equations", "observe = \"a + sin(b * time / 1 {s}) + b\""),
-        ("twin_mercury_target", "numerics = { mesh = [6, 24] }"),
-    ];
+/// The suite of models, in a study of two parameters and five times.
+pub fn model(name: &str, plugin: &dyn Model) -> Result<(), Vec<String>> {
     let parameters =
         ["a", "b"].map(|name| Parameter::plain(name, Distribution::Uniform([0.0, 2.0])));
     let given =
@@ -75,21 +71,28 @@ fn models() {
     let axes =
         vec![Axis::grid("time", (1..=5).map(f64::from).collect(), Unit::parse("s").unwrap())];
     let layout = Layout { name: "y".to_owned(), unit: Unit::dimensionless(), axes };
-    all::<dyn Model>(&table, |name, plugin| {
-        let scratch = tempfile::tempdir().unwrap();
-        let context = Context {
-            given: &given,
-            scenarios: &scenarios,
-            ..Context::new(scratch.path(), &parameters, &layout)
-        };
-        sound(plugin, contract::model(name, plugin, &context, scratch.path()))
-    });
+    let scratch = tempfile::tempdir().unwrap();
+    let context = Context {
+        given: &given,
+        scenarios: &scenarios,
+        ..Context::new(scratch.path(), &parameters, &layout)
+    };
+    sound(plugin, contract::model(name, plugin, &context, scratch.path()))
 }
 
 #[test]
-fn readers() {
+fn models() {
+    let table = [
+        ("twin_equations", "observe = \"a + sin(b * time / 1 {s}) + b\""),
+        ("twin_mercury_target", "numerics = { mesh = [6, 24] }"),
+    ];
+    all::<dyn Model>(&table, |name, plugin| model(name, plugin));
+}
+
+/// The suite of readers, with a table whose name ends in `ending`.
+pub fn reader(name: &str, plugin: &dyn Reader, ending: &str) -> Result<(), Vec<String>> {
     let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("sound.csv");
+    let file = folder.path().join(format!("sound.{ending}"));
     let axes = vec![
         Axis::labels("sensor", ["A", "B"]),
         Axis::grid("time", vec![1.0, 2.0, 3.0], Unit::parse("s").unwrap()),
@@ -100,10 +103,13 @@ fn readers() {
     let rows: String = (0..6).map(row).collect();
     std::fs::write(&file, format!("sensor,time,strain\n{rows}")).unwrap();
     let sample = Sample { file, layout, values, tolerance: 0.0 };
-    all::<dyn Reader>(&[("twin_csv", "")], |name, plugin| {
-        let scratch = tempfile::tempdir().unwrap();
-        sound(plugin, contract::reader(name, plugin, &sample, scratch.path()))
-    });
+    let scratch = tempfile::tempdir().unwrap();
+    sound(plugin, contract::reader(name, plugin, &sample, scratch.path()))
+}
+
+#[test]
+fn readers() {
+    all::<dyn Reader>(&[("twin_csv", "")], |name, plugin| reader(name, plugin, "csv"));
 }
 
 #[test]

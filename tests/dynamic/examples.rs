@@ -5,9 +5,11 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 use lacuna::contract;
+use lacuna::data::{Axis, Layout, Scenario, Unit};
 use lacuna::plugin::abi::library;
+use lacuna::plugin::model::{Call, EvalError};
 use lacuna::plugin::registry;
-use lacuna::plugin::{Discrepancy, Sampler};
+use lacuna::plugin::{Context, Discrepancy, Model, Sampler};
 use lacuna::study::emit;
 use lacuna::study::resolve::{Use, load_for};
 
@@ -40,10 +42,10 @@ fn the_example_in_rust_keeps_the_contracts() {
     let built =
         registry::from_text::<dyn Discrepancy>("matern", options).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(contract::discrepancy("matern", &*built.plugin), Ok(()));
-    assert_eq!(built.plugin.fault().unwrap().said(), None);
+    assert_eq!(built.plugin.faults()[0].said(), None);
     let built = registry::from_text::<dyn Sampler>("difference_walk", "").unwrap();
     assert_eq!(contract::sampler("difference_walk", &*built.plugin), Ok(()));
-    assert_eq!(built.plugin.fault().unwrap().said(), None);
+    assert_eq!(built.plugin.faults()[0].said(), None);
     // Its documentation is the manual's.
     let manual = registry::find::<dyn Discrepancy>("matern").unwrap().documentation();
     assert_eq!(manual.title, "A smooth bias of known size beside known noise.");
@@ -52,8 +54,8 @@ fn the_example_in_rust_keeps_the_contracts() {
 }
 
 /// Runs the study of an example with a library in the place of the one that it names.
-fn run(example: &str, library: &Path) -> serde_json::Value {
-    let study = quick::root().join("examples").join(example).join("study.toml");
+fn run(study: &str, library: &Path) -> serde_json::Value {
+    let study = quick::root().join("examples").join(study);
     let load = format!("plugins.load=[{}]", emit::string(library.to_str().unwrap()));
     let checked = load_for(&study, std::slice::from_ref(&load), Use::Check);
     assert_eq!(checked.complaints(), "");
@@ -66,7 +68,7 @@ fn run(example: &str, library: &Path) -> serde_json::Value {
 
 #[test]
 fn the_study_of_the_example_in_rust_allows_for_the_model_to_be_wrong() {
-    let summary = run("plugin_rust", rust());
+    let summary = run("plugin_rust/study.toml", rust());
     let of = |key: &str| summary["parameters"]["efficiency"][key].as_f64().unwrap();
     // The truth is 0.65. Without a bias the posterior lies many standard deviations below.
     assert!((of("mean") - 0.65).abs() < 3.0 * of("sd"), "{} ± {}", of("mean"), of("sd"));
@@ -82,7 +84,7 @@ fn the_study_of_the_example_in_c_gives_what_the_built_in_law_gives() {
     let of = |summary: &serde_json::Value, name: &str, key: &str| {
         summary["parameters"][name][key].as_f64().unwrap()
     };
-    let c = run("plugin_c", &library);
+    let c = run("plugin_c/study.toml", &library);
     // The same study with the built-in law: the draws differ by round-off at first and then go their own ways.
     let study = quick::root().join("examples/plugin_c/study.toml");
     let text = std::fs::read_to_string(&study).unwrap();
@@ -101,5 +103,111 @@ fn the_study_of_the_example_in_c_gives_what_the_built_in_law_gives() {
         let (a, b) = (of(&c, name, "mean"), of(&rust, name, "mean"));
         let error = of(&c, name, "mcse_mean").hypot(of(&rust, name, "mcse_mean"));
         assert!((a - b).abs() < 4.0 * error, "{name}: {a} {b} ± {error}");
+    }
+}
+
+/// The library of the simulator in C, loaded.
+#[cfg(unix)]
+fn rod() -> &'static library::Library {
+    static BUILT: OnceLock<&'static library::Library> = OnceLock::new();
+    BUILT.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap().keep();
+        let source = quick::root().join("examples/plugin_c/rod.c");
+        let library = super::hostile::compiled(&folder, &source, "rod", &[]);
+        library::load(&library, None).unwrap_or_else(|e| panic!("{e}"))
+    })
+}
+
+#[cfg(unix)]
+#[test]
+fn the_simulator_in_c_keeps_the_contract_and_comes_near_the_exact_answer() {
+    rod();
+    let layout = rod_layout([0.1, 0.25, 0.5], "K");
+    let parameters = [];
+    let scratch = tempfile::tempdir().unwrap();
+    let context = Context::new(scratch.path(), &parameters, &layout);
+    let of = |options: &str| registry::from_text::<dyn Model>("rod", options).unwrap().plugin;
+    let usual = of("");
+    assert_eq!(contract::model("rod", &*usual, &context, scratch.path()), Ok(()));
+    assert_eq!(usual.faults()[0].said(), None);
+
+    // A batch in one call: all but the one whose steps are not stable.
+    let inputs = [[1.1e-4, 1e-3], [9e-3, 1e-3], [2.5e-4, 0.0], [f64::NAN, 0.0]];
+    let scenario = Scenario::default();
+    let calls = inputs.each_ref().map(|inputs| Call::new(inputs, &[], &layout, &scenario));
+    let worst = |model: &dyn Model| {
+        let answers = model.predict_batch(&calls);
+        let [Ok(first), Err(EvalError::Rejected(fast)), Ok(third), Err(EvalError::Rejected(none))] =
+            &answers[..]
+        else {
+            panic!("{answers:?}");
+        };
+        assert!(fast.contains("are not stable at a diffusivity of 0.009 m2/s"), "{fast}");
+        assert!(none.contains("found nan and 0"), "{none}");
+        let exact = [0, 2].map(|i| exact(inputs[i]));
+        let off = |(y, exact): (&f64, &f64)| (y - exact).abs();
+        let pairs = first.values.iter().chain(&third.values).zip(exact.iter().flatten());
+        pairs.map(off).fold(0.0, f64::max)
+    };
+    // Of second order in the cells, of first in the steps.
+    let coarse = worst(&*of("cells = 20\nstep = 4.0"));
+    let fine = worst(&*usual);
+    assert!(fine < 0.2 && (3.0..5.0).contains(&(coarse / fine)), "{coarse} {fine}");
+}
+
+/// Temperatures at these places of the rod, ten times each.
+#[cfg(unix)]
+fn rod_layout(places: [f64; 3], unit: &str) -> Layout {
+    let unit_of = |text: &str| Unit::parse(text).unwrap();
+    let times = (1..=10).map(|k| 100.0 * f64::from(k)).collect();
+    let axes = vec![
+        Axis::grid("position", places.to_vec(), unit_of("m")),
+        Axis::grid("time", times, unit_of("s")),
+    ];
+    Layout { name: "temperature".to_owned(), unit: unit_of(unit), axes }
+}
+
+/// The two half-waves, each with its own decay.
+#[cfg(unix)]
+fn exact([diffusivity, loss]: [f64; 2]) -> Vec<f64> {
+    use std::f64::consts::PI;
+    let wave = |k: f64, height: f64, x: f64, t: f64| {
+        height * (k * PI * x).sin() * (-(diffusivity * (k * PI).powi(2) + loss) * t).exp()
+    };
+    let at = |x: f64, t: f64| wave(1.0, 80.0, x, t) + wave(3.0, 40.0, x, t);
+    let times = || (1..=10).map(|k| 100.0 * f64::from(k));
+    [0.1, 0.25, 0.5].into_iter().flat_map(|x| times().map(move |t| at(x, t))).collect()
+}
+
+#[cfg(unix)]
+#[test]
+fn the_simulator_in_c_says_which_responses_it_cannot_give() {
+    rod();
+    let said =
+        |options: &str| registry::from_text::<dyn Model>("rod", options).map(|_| ()).unwrap_err();
+    assert!(said("cells = 2").contains("expected a whole number from 4 to 10000"));
+    assert!(said("step = -1.0").contains("wrong value for `step`"));
+    assert!(said("stp = 1.0").contains("did you mean `step`?"));
+    let load = format!("plugins.load=[{}]", emit::string(rod().path.to_str().unwrap()));
+    let study = quick::root().join("examples/plugin_c/rod.toml");
+    for (setting, expected) in [
+        ("response.unit=\"mK\"", "expected a response in K"),
+        ("response.axes.position.values=[0.1, 0.25, 1.5]", "expected positions on the rod"),
+        ("response.axes.position.unit=\"cm\"", "expected the axes `position` in m and `time` in s"),
+    ] {
+        let settings = [load.clone(), setting.to_owned()];
+        let complaints = load_for(&study, &settings, Use::Run).complaints();
+        assert!(complaints.contains(expected), "{setting}: {complaints}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn the_study_of_the_simulator_in_c_finds_what_its_data_were_made_with() {
+    let summary = run("plugin_c/rod.toml", &rod().path);
+    for (name, truth) in [("diffusivity", 117.0), ("loss", 8e-4)] {
+        let of = |key: &str| summary["parameters"][name][key].as_f64().unwrap();
+        let (mean, sd) = (of("mean"), of("sd"));
+        assert!((mean - truth).abs() < 3.0 * sd && sd < 0.05 * truth, "{name}: {mean} ± {sd}");
     }
 }

@@ -2,6 +2,8 @@
 #include "lacuna_plugin.h"
 
 #include <math.h>
+#include <stdio.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -32,9 +34,28 @@ static int32_t create(LacunaText options, void **out, const LacunaAnswer *answer
     return LACUNA_OK;
 }
 
+/* Writes down what was ended, a letter a time. */
+static void ended(int letter)
+{
+#ifdef ENDED
+    FILE *file = fopen(ENDED, "a");
+    fputc(letter, file);
+    fclose(file);
+#else
+    (void)letter;
+#endif
+}
+
 static void destroy(void *plugin)
 {
     (void)plugin;
+    ended('p');
+}
+
+static void destroy_likelihood(void *likelihood)
+{
+    (void)likelihood;
+    ended('l');
 }
 
 static int32_t hyperparameters(void *likelihood, const LacunaAnswer *answer)
@@ -45,6 +66,21 @@ static int32_t hyperparameters(void *likelihood, const LacunaAnswer *answer)
 #elif defined(NOT_TEXT)
     lacuna_say(answer, "\xff\xfe\xfd", 3);
     return LACUNA_OK;
+#elif defined(DEEP_JSON)
+    int i;
+    for (i = 0; i < 100000; ++i) {
+        lacuna_say(answer, "[", 1);
+    }
+    return LACUNA_OK;
+#elif defined(ENDLESS_TEXT)
+    lacuna_say(answer, "[]", (size_t)-1);
+    return LACUNA_OK;
+#elif defined(NO_TEXT)
+    lacuna_say(answer, NULL, 2);
+    return LACUNA_OK;
+#elif defined(ONE_NAME)
+#define UNKNOWN "{\"name\":\"v\",\"symbol\":\"v\",\"unit\":\"1\",\"prior\":{\"half_normal\":1.0},\"log\":true,\"start\":1.0}"
+    return say(answer, LACUNA_OK, "[" UNKNOWN "," UNKNOWN "]");
 #else
     return say(answer, LACUNA_OK,
         "[{\"name\":\"v\",\"symbol\":\"v\",\"unit\":\"1\",\"prior\":{\"half_normal\":1.0},\"log\":true,\"start\":1.0}]");
@@ -63,6 +99,8 @@ static int32_t log_likelihood(void *likelihood, LacunaNumbers responses, LacunaN
     for (i = 0; i < responses.rows; ++i) {
 #if defined(NAN_VALUES)
         values[i] = NAN;
+#elif defined(ENDLESS_VALUES)
+        values[i] = INFINITY;
 #elif !defined(UNWRITTEN)
         values[i] = -1.0;
 #endif
@@ -93,12 +131,21 @@ static int32_t gradient(void *likelihood, LacunaNumbers responses, LacunaNumbers
 
 static int32_t predictive(void *likelihood, LacunaNumbers response, LacunaNumbers hyper, const LacunaAnswer *answer)
 {
-    static const double ones[] = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
+    static const double ones[] = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1}, below[] = {1, 1, 1, 1, -1, 1, 1, 1, 1, 1};
+    (void)below;
     (void)likelihood;
     (void)response;
     (void)hyper;
 #if defined(SHORT_PARTS)
     lacuna_give(answer, ones, 1, 3);
+#elif defined(ENDLESS_PARTS)
+    lacuna_give(answer, ones, (size_t)-1 / 4, 10);
+#elif defined(PARTS_NOWHERE)
+    lacuna_give(answer, NULL, 1, 10);
+#elif defined(PARTS_ASKEW)
+    lacuna_give(answer, (const double *)(const void *)((const char *)ones + 1), 1, 9);
+#elif defined(PARTS_BELOW_ZERO)
+    lacuna_give(answer, below, 1, 10);
 #elif !defined(NO_PARTS)
     lacuna_give(answer, ones, 1, 10);
 #endif
@@ -137,15 +184,29 @@ static int32_t left_out(void *likelihood, LacunaNumbers response, LacunaNumbers 
 #endif
 }
 
-static const LacunaLikelihoodFunctions likelihood_functions = {
-    sizeof(LacunaLikelihoodFunctions), destroy, hyperparameters, log_likelihood,
+/* A table may be that of an earlier version, without the functions that came later, or of a later one. */
+#if defined(EARLIER_TABLE)
+#define TABLE_SIZE offsetof(LacunaLikelihoodFunctions, left_out)
+#elif defined(LATER_TABLE)
+#define TABLE_SIZE (sizeof(LacunaLikelihoodFunctions) + sizeof(size_t))
+#elif defined(HALF_A_TABLE)
+#define TABLE_SIZE (offsetof(LacunaLikelihoodFunctions, gradient) + 4)
+#else
+#define TABLE_SIZE sizeof(LacunaLikelihoodFunctions)
+#endif
+
+static const struct {
+    LacunaLikelihoodFunctions known;
+    size_t later;
+} likelihood_table = {{
+    TABLE_SIZE, destroy_likelihood, hyperparameters, log_likelihood,
 #ifdef LIKELIHOOD_LACKS
     NULL,
 #else
     gradient,
 #endif
     predictive, simulate, left_out, NULL, NULL
-};
+}, (size_t)-1};
 
 static int32_t likelihood(void *plugin, const LacunaKnown *known, LacunaLikelihood *out, const LacunaAnswer *answer)
 {
@@ -163,11 +224,15 @@ static int32_t likelihood(void *plugin, const LacunaKnown *known, LacunaLikeliho
 #endif
 #ifndef LIKELIHOOD_MAKES_NOTHING
     out->size = sizeof *out;
+#ifdef NO_LIKELIHOOD
+    out->likelihood = NULL;
+#else
     out->likelihood = &object;
-    out->functions = &likelihood_functions;
+#endif
+    out->functions = &likelihood_table.known;
 #endif
     (void)out;
-    (void)likelihood_functions;
+    (void)likelihood_table;
     return LACUNA_OK;
 }
 

@@ -13,23 +13,13 @@ use lacuna::study::resolve::{Use, load_for};
 
 use super::quick;
 
-/// Compiles a library from C, with these definitions.
-pub fn compiled(folder: &Path, source: &Path, name: &str, defines: &[&str]) -> PathBuf {
+/// Compiles a library from C, with these flags beside those that let no warning pass.
+pub fn compiled(folder: &Path, source: &Path, name: &str, flags: &[String]) -> PathBuf {
     let library = folder.join(format!("lib{name}.so"));
     let output = Command::new("cc")
-        .args([
-            "-std=c99",
-            "-Wall",
-            "-Wextra",
-            "-Wno-unused",
-            "-Werror",
-            "-pedantic",
-            "-O1",
-            "-fPIC",
-            "-shared",
-        ])
+        .args(["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O1", "-fPIC", "-shared"])
         .args(["-I", quick::root().join("sdk/include").to_str().unwrap()])
-        .args(defines.iter().map(|define| format!("-D{define}")))
+        .args(flags)
         .arg(source)
         .arg("-o")
         .arg(&library)
@@ -40,10 +30,21 @@ pub fn compiled(folder: &Path, source: &Path, name: &str, defines: &[&str]) -> P
     library
 }
 
+/// Compiles a library that misbehaves as the definitions say. What it ends it writes into the file `ended`, a letter
+/// each.
+pub fn misguided(folder: &Path, source: &str, name: &str, defines: &[&str]) -> PathBuf {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("dynamic").join(source);
+    let ended = folder.join("ended").display().to_string();
+    let own = [format!("NAME=\"{name}\""), format!("ENDED=\"{ended}\"")];
+    let defines = defines.iter().map(ToString::to_string).chain(own);
+    let mut flags: Vec<String> = defines.map(|define| format!("-D{define}")).collect();
+    // Each way to misbehave leaves something unused.
+    flags.push("-Wno-unused".to_owned());
+    compiled(folder, &source, name, &flags)
+}
+
 fn broken(folder: &Path, name: &str, defines: &[&str]) -> PathBuf {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("dynamic/hostile.c");
-    let named = format!("NAME=\"{name}\"");
-    compiled(folder, &source, name, &[defines, &[named.as_str()]].concat())
+    misguided(folder, "hostile.c", name, defines)
 }
 
 /// What loading such a library says.
@@ -132,6 +133,20 @@ fn what_cannot_be_made_is_an_error_that_names_the_library() {
         ("not_json", "NOT_JSON", "`hyperparameters` answers JSON that cannot be read"),
         ("not_text", "NOT_TEXT", "`hyperparameters` answers JSON that cannot be read"),
         ("absent", "LIKELIHOOD_ABSENT", "`likelihood` is not there"),
+        ("no_object", "NO_LIKELIHOOD", "its likelihood is not there"),
+        ("half_a_table", "HALF_A_TABLE", "its likelihood has a table of"),
+        (
+            "deep",
+            "DEEP_JSON",
+            "`hyperparameters` answers JSON that cannot be read: recursion limit",
+        ),
+        (
+            "endless_text",
+            "ENDLESS_TEXT",
+            "`hyperparameters` gives a text of 18446744073709551615 bytes, which cannot be",
+        ),
+        ("no_text", "NO_TEXT", "`hyperparameters` gives a text of 2 bytes, which cannot be"),
+        ("one_name", "ONE_NAME", "unknown 2 is called `v`, expected a name of its own"),
     ] {
         let built = misbehaving(name, define);
         let said = likelihood(&built).map(|_| ()).unwrap_err();
@@ -157,6 +172,7 @@ fn what_has_no_room_for_an_error_is_a_fault_that_names_the_library() {
         ("nan", "NAN_VALUES", value, "`log_likelihood` gives no number as value 1 of 1"),
         ("unwritten", "UNWRITTEN", value, "`log_likelihood` gives no number as value 1 of 1"),
         ("rejects", "VALUES_REJECTED", value, "not today"),
+        ("endless", "ENDLESS_VALUES", value, "`log_likelihood` gives inf as value 1 of 1"),
         ("nan_slopes", "NAN_SLOPES", slopes, "`gradient` gives no number as value 1 of 10"),
         (
             "short_parts",
@@ -165,6 +181,20 @@ fn what_has_no_room_for_an_error_is_a_fault_that_names_the_library() {
             "`predictive` answers 1 rows of 3 numbers where 1 of 10 belong",
         ),
         ("no_parts", "NO_PARTS", parts, "`predictive` answers 0 matrices where 1 belong"),
+        ("endless_parts", "ENDLESS_PARTS", parts, "10 numbers, more than there can be"),
+        (
+            "nowhere",
+            "PARTS_NOWHERE",
+            parts,
+            "`predictive` gives 1 rows of 10 numbers, and none is there",
+        ),
+        (
+            "askew",
+            "PARTS_ASKEW",
+            parts,
+            "`predictive` gives 1 rows of 9 numbers, where no number can be",
+        ),
+        ("below_zero", "PARTS_BELOW_ZERO", parts, "`predictive` gives the variance -1"),
         ("nan_data", "NAN_DATA", made, "`simulate` gives no number as value 1 of 50"),
         (
             "short_left",
@@ -182,6 +212,36 @@ fn what_has_no_room_for_an_error_is_a_fault_that_names_the_library() {
             said.contains(expected) && said.contains(&format!("lib{name}.so")),
             "{name}: {said}"
         );
+    }
+}
+
+#[test]
+fn tables_of_other_versions_are_read_as_far_as_both_sides_know_them() {
+    for (name, define) in [("earlier", "EARLIER_TABLE"), ("later", "LATER_TABLE")] {
+        let built = misbehaving(name, define);
+        let likelihood = likelihood(&built).unwrap();
+        assert_eq!(likelihood.log_likelihood(&[0.0; 10], &[1.0]), -1.0);
+        assert_eq!(likelihood.left_out(&[0.0; 10], &[1.0]), None);
+        assert_eq!(likelihood.failure(), None, "{name}");
+    }
+}
+
+#[test]
+fn what_was_made_is_ended_once() {
+    for (name, define, expected) in [
+        ("ends", "SOUND", "lp"),
+        ("ends_lacking", "LIKELIHOOD_LACKS", "lp"),
+        ("ends_unread", "NOT_JSON", "lp"),
+        ("ends_nothing", "LIKELIHOOD_STOPS", "p"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let library = broken(folder.path(), name, &[define]);
+        library::load(&library, None).unwrap_or_else(|e| panic!("{e}"));
+        let built = registry::from_text::<dyn Discrepancy>(name, "").unwrap();
+        drop(likelihood(&built));
+        drop(built);
+        let ended = std::fs::read_to_string(folder.path().join("ended")).unwrap();
+        assert_eq!(ended, expected, "{name}");
     }
 }
 
@@ -243,7 +303,7 @@ fn options_of_a_library_are_checked_by_its_schema() {
 
     let built = registry::from_text::<dyn Discrepancy>("plain_gaussian", "scale = 1.0").unwrap();
     assert_eq!(contract::discrepancy("plain_gaussian", &*built.plugin), Ok(()));
-    assert_eq!(built.plugin.fault().unwrap().said(), None);
+    assert_eq!(built.plugin.faults()[0].said(), None);
     // Written by another hand in another language, it is the same law as the built-in one.
     let own =
         registry::from_text::<dyn Discrepancy>("gaussian", "variance = { half_normal = 1.0 }")

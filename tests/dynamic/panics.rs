@@ -109,7 +109,7 @@ fn a_panic_of_a_sampler_or_of_its_density_is_an_error() {
     let planned = of("plan");
     planned.plan(1);
     assert_eq!(
-        planned.fault().unwrap().said(),
+        planned.faults()[0].said(),
         Some(&*format!("{who}: `plan` panicked: as I was told"))
     );
     // A panic of the program, asked by the library, crosses twice and ends as an error.

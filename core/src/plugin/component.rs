@@ -6,6 +6,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::Fault;
+use super::abi::Library;
 use crate::data::{Layout, Parameter, Scenario, Unit};
 use crate::study::problem::Complaints;
 
@@ -62,9 +63,15 @@ pub trait Component: Send + Sync {
     /// Third layer of checking: the options against the machine (files, commands). Nothing is changed.
     fn environment(&self, _context: &Context<'_>, _complaints: &mut Complaints<'_>) {}
 
-    /// Where it says that it can answer no more, for a plugin to which that may happen outside of any error.
-    fn fault(&self) -> Option<Arc<Fault>> {
-        None
+    /// Where it says that it can answer no more, for a plugin to which that may happen outside of any error; of one
+    /// that asks others, where those say so.
+    fn faults(&self) -> Vec<Arc<Fault>> {
+        Vec::new()
+    }
+
+    /// The libraries of the plugins that it asks, where its options choose some; its own is not its business.
+    fn libraries(&self) -> Vec<&'static Library> {
+        Vec::new()
     }
 }
 

@@ -116,7 +116,7 @@ pub struct Recipe {
     pub name: String,
     /// All its options as TOML, which keeps every number that JSON does not have.
     pub options: String,
-    /// The libraries of plugins that are loaded first: the model, or a part of it, may be in one.
+    /// The libraries of plugins that are loaded first: that of the model, and those of its parts.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub libraries: Vec<LibraryFile>,
 }
@@ -132,27 +132,31 @@ pub struct LibraryFile {
 }
 
 impl Recipe {
-    /// How a model was built, with the libraries of its study.
-    pub fn of(built: &Built<dyn Model>, libraries: &[&Library]) -> Result<Self, Stop> {
+    /// How a model was built, with the libraries that it needs.
+    pub fn of(built: &Built<dyn Model>) -> Result<Self, Stop> {
         let options = emit::to_toml(&built.options).map_err(|error| {
             Stop::new(format!("cannot write the options of `{}`: {error}", built.name))
         })?;
-        let file = |l: &&Library| LibraryFile { path: l.path.clone(), sha256: l.sha256.clone() };
-        let libraries = libraries.iter().map(file).collect();
+        let file = |l: &Library| LibraryFile { path: l.path.clone(), sha256: l.sha256.clone() };
+        let libraries = built.libraries().into_iter().map(file).collect();
         Ok(Self { name: built.name.to_owned(), options, libraries })
     }
 
     /// The model.
     pub fn build(&self) -> Result<Box<dyn Model>, Stop> {
         for LibraryFile { path, sha256 } in &self.libraries {
-            library::load(path, Some(sha256))
-                .map_err(|error| Stop::new(format!("{}: {error}", path.display())))?;
+            library::load(path, Some(sha256)).map_err(|error| Stop::new(unusable(path, &error)))?;
         }
         let built = registry::from_text::<dyn Model>(&self.name, &self.options);
         built.map(|built| built.plugin).map_err(|complaints| {
             Stop::new(format!("the model `{}` cannot be built:\n{complaints}", self.name))
         })
     }
+}
+
+/// That a library cannot be used, and why.
+fn unusable(path: &Path, reason: &str) -> String {
+    format!("the library of plugins {} cannot be used: {reason}", path.display())
 }
 
 /// One evaluation.

@@ -61,12 +61,23 @@ pub(crate) fn resolve(schema: &Schema, generator: &SchemaGenerator) -> Map<Strin
     schema.as_object().map(|object| follow(object, generator)).unwrap_or_default()
 }
 
+/// How many references lead one to another; more of them go round in a circle.
+const LONGEST: usize = 32;
+
 /// Follows a reference; what stands beside it (description, default) is kept.
 fn follow(object: &Map<String, Value>, generator: &SchemaGenerator) -> Map<String, Value> {
+    follow_on(object, generator, LONGEST)
+}
+
+fn follow_on(
+    object: &Map<String, Value>,
+    generator: &SchemaGenerator,
+    left: usize,
+) -> Map<String, Value> {
     let Some(reference) = object.get("$ref").and_then(Value::as_str) else { return object.clone() };
     let name = reference.rsplit('/').next().unwrap_or(reference);
     let mut whole = match generator.definitions().get(name) {
-        Some(Value::Object(definition)) => follow(definition, generator),
+        Some(Value::Object(definition)) if left > 0 => follow_on(definition, generator, left - 1),
         _ => Map::new(),
     };
     let beside = object.iter().filter(|(key, _)| key.as_str() != "$ref");

@@ -10,6 +10,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use super::Component;
 use super::abi::Library;
 use super::manual::{Manual, generator, resolve};
 use crate::study::decode::{decode, decode_beside, fields};
@@ -70,25 +71,37 @@ pub struct Built<K: ?Sized> {
     pub library: Option<&'static Library>,
 }
 
-impl<K: ?Sized> Built<K> {
-    /// What its results depend on, for the hash of a stage's inputs: name, options, and the library where it has one.
-    pub fn identity(&self) -> Identity<'_> {
-        let library = self.library.map(|library| library.sha256.as_str());
-        match library {
-            None => Identity::BuiltIn(self.name, &self.options),
-            Some(sha256) => Identity::Loaded(self.name, &self.options, sha256),
+impl<K: Component + ?Sized> Built<K> {
+    /// The libraries that it needs, its own first: each once.
+    pub fn libraries(&self) -> Vec<&'static Library> {
+        let mut all: Vec<&'static Library> = Vec::new();
+        for library in self.library.into_iter().chain(self.plugin.libraries()) {
+            if !all.contains(&library) {
+                all.push(library);
+            }
         }
+        all
+    }
+
+    /// What its results depend on, for the hash of a stage's inputs: name, options, and the libraries that it needs.
+    pub fn identity(&self) -> Identity<'_> {
+        let libraries = self.libraries();
+        if libraries.is_empty() {
+            return Identity::BuiltIn(self.name, &self.options);
+        }
+        let hashes = libraries.into_iter().map(|library| library.sha256.as_str()).collect();
+        Identity::Loaded(self.name, &self.options, hashes)
     }
 }
 
 /// See [`Built::identity`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Identity<'a> {
     /// Name and options of a plugin that is a part of the program.
     BuiltIn(&'a str, &'a toml::Table),
-    /// Name, options and the library's hash.
-    Loaded(&'a str, &'a toml::Table, &'a str),
+    /// Name, options and the hashes of the libraries.
+    Loaded(&'a str, &'a toml::Table, Vec<&'a str>),
 }
 
 impl<K: Kind + ?Sized> Entry<K> {

@@ -130,7 +130,7 @@ impl<'a> LogLikelihood for OfData<'a> {
 
     fn failure(&self) -> Option<String> {
         let of_effect = |(effect, _): &(Placed<'a>, Range<usize>)| {
-            effect.effect.fault().and_then(|fault| fault.said().map(str::to_owned))
+            effect.effect.faults().iter().find_map(|fault| fault.said().map(str::to_owned))
         };
         let own = self.forward.failure().or_else(|| self.likelihood.failure());
         own.or_else(|| self.effects.iter().find_map(of_effect))

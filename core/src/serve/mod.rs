@@ -14,6 +14,7 @@ mod posterior;
 mod simulated;
 #[cfg(test)]
 mod tests;
+mod watched;
 
 use std::ops::Range;
 
@@ -35,6 +36,7 @@ pub use finished::finished;
 use emulated::Emulated;
 use posterior::LogPosterior;
 use simulated::Simulated;
+use watched::Watched;
 
 /// A function of a study's unknowns.
 pub trait Function: Sync {
@@ -89,8 +91,24 @@ pub struct Variable {
     pub unit: Unit,
 }
 
-/// Hands over the functions that there are: those of the study, and those of its finished run, if there is one.
+/// Hands over the functions that there are: those of the study, and those of its finished run, if there is one. Each
+/// answers nothing any more once a plugin of the study has a fault.
 pub fn functions<R>(
+    study: &Study,
+    run: Option<RunDirectory>,
+    observer: &dyn Observer,
+    act: impl FnOnce(&[&dyn Function]) -> R,
+) -> Result<R, Stop> {
+    let faults = study.faults();
+    unwatched(study, run, observer, |all| {
+        let watched: Vec<Watched<'_>> =
+            all.iter().map(|function| Watched::new(*function, &faults)).collect();
+        let all: Vec<&dyn Function> = watched.iter().map(|function| function as _).collect();
+        act(&all)
+    })
+}
+
+fn unwatched<R>(
     study: &Study,
     run: Option<RunDirectory>,
     observer: &dyn Observer,

@@ -105,3 +105,37 @@ fn the_posterior_is_that_of_natural_values() {
         assert!(posterior.derivatives().unwrap().jacobian(&outside, None).is_err());
     }
 }
+
+/// A function that has an answer everywhere, as a plugin with a fault has.
+struct One;
+
+impl Function for One {
+    fn name(&self) -> &'static str {
+        "model"
+    }
+    fn variables(&self) -> Vec<Variable> {
+        Vec::new()
+    }
+    fn outputs(&self) -> usize {
+        1
+    }
+    fn values(&self, _: &[f64], _: Option<usize>) -> Result<Vec<f64>, EvalError> {
+        Ok(vec![1.0])
+    }
+    fn derivatives(&self) -> Option<&dyn Derivatives> {
+        Some(&Powers)
+    }
+}
+
+#[test]
+fn a_function_answers_no_more_once_a_plugin_has_a_fault() {
+    let faults = ["one", "other"].map(|who| std::sync::Arc::new(crate::plugin::Fault::new(who)));
+    let watched = Watched::new(&One, &faults);
+    assert_eq!(watched.values(&[], None), Ok(vec![1.0]));
+    assert!(watched.derivatives().unwrap().jacobian(&[1.0, 0.5], None).is_ok());
+    faults[1].report("gives no number");
+    let said = Err(EvalError::Fatal("other: gives no number".to_owned()));
+    assert_eq!(watched.values(&[], None), said);
+    let jacobian = watched.derivatives().unwrap().jacobian(&[1.0, 0.5], None);
+    assert_eq!(jacobian.map(|_| vec![]), said);
+}

@@ -141,7 +141,7 @@ impl<'a> Simulator<'a> {
         }
         let free = other.free.iter().map(|(name, _)| (*name).to_owned());
         let unknowns = study.parameters.iter().map(|p| p.name.clone()).chain(free).collect();
-        let recipe = Recipe::of(&section.built, &study.libraries.loaded)?;
+        let recipe = Recipe::of(&section.built)?;
         Ok(Self { study: &study.directory, model, recipe, names, units, settings, unknowns })
     }
 

@@ -67,9 +67,9 @@ impl Study {
 
     /// Where plugins say that they can answer no more.
     pub fn faults(&self) -> Vec<Arc<Fault>> {
-        let finer = self.numerical_error.as_ref().map(|error| error.model.built.plugin.fault());
-        let tried = self.gap.candidates.iter().map(|candidate| candidate.built.plugin.fault());
-        let chosen = self.components().into_iter().map(|chosen| chosen.plugin.fault());
+        let finer = self.numerical_error.as_ref().map(|error| error.model.built.plugin.faults());
+        let tried = self.gap.candidates.iter().map(|candidate| candidate.built.plugin.faults());
+        let chosen = self.components().into_iter().map(|chosen| chosen.plugin.faults());
         chosen.chain(finer).chain(tried).flatten().collect()
     }
 

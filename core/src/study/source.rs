@@ -97,7 +97,8 @@ impl Sources {
         if !text.starts_with(['"', '\'']) {
             return place.clone();
         }
-        let at = |byte: usize| place.span.start + raw_offset(text, byte).min(text.len());
+        let at =
+            |byte: usize| place.span.start + raw_offset(text, byte.min(text.len())).min(text.len());
         Place { source: place.source, span: at(part.start)..at(part.end) }
     }
 

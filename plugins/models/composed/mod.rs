@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use lacuna::data::{Condition, Coordinates, Function, Layout, Scenario, Unit};
+use lacuna::plugin::abi::Library;
 use lacuna::plugin::model::{Call, EvalError, Input, Response, Signature};
-use lacuna::plugin::{Component, Context, Fact, Given, Model};
+use lacuna::plugin::{Component, Context, Fact, Fault, Given, Model};
 use lacuna::study::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -268,6 +269,14 @@ impl Component for Composed {
         each(&links, context, |i, link, own| {
             pass_on(i, &nested::complaints(|said| link.model.environment(own, said)), complaints);
         });
+    }
+
+    fn faults(&self) -> Vec<Arc<Fault>> {
+        self.parts.iter().flat_map(Part::faults).collect()
+    }
+
+    fn libraries(&self) -> Vec<&'static Library> {
+        self.parts.iter().flat_map(Part::libraries).collect()
     }
 }
 

@@ -10,10 +10,12 @@ mod template;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use lacuna::data::Unit;
+use lacuna::plugin::abi::Library;
 use lacuna::plugin::model::{Call, EvalError, Response, Signature};
-use lacuna::plugin::{Component, Context, Fact, Model};
+use lacuna::plugin::{Component, Context, Fact, Fault, Model};
 use lacuna::study::problem::Complaints;
 use lacuna::study::values::Positive;
 use schemars::JsonSchema;
@@ -158,6 +160,14 @@ impl Component for External {
 
     fn environment(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
         check::files(self, context, complaints);
+    }
+
+    fn faults(&self) -> Vec<Arc<Fault>> {
+        self.output.file().map_or_else(Vec::new, output::File::faults)
+    }
+
+    fn libraries(&self) -> Vec<&'static Library> {
+        self.output.file().map_or_else(Vec::new, output::File::libraries)
     }
 }
 

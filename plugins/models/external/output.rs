@@ -36,6 +36,16 @@ pub struct FileKeys {
     pub path: PathBuf,
 }
 
+impl Output {
+    /// The file, if it is one.
+    pub fn file(&self) -> Option<&File> {
+        match self {
+            Self::Json => None,
+            Self::File(file) => Some(file),
+        }
+    }
+}
+
 impl File {
     /// The file, relative to the run's folder.
     pub fn path(&self) -> &Path {

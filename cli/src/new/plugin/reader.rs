@@ -150,7 +150,7 @@ impl Reader for Skeleton {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
         let text = std::str::from_utf8(head).unwrap_or_default();
         let mut lines = text.lines().filter(|line| !line.trim_start().starts_with(&self.comment));
-        ["csv", "dat", "txt"].contains(&extension)
+        extension.eq_ignore_ascii_case("columns")
             && lines.next().is_some_and(|line| cells(line).len() > 1)
     }
 
@@ -253,9 +253,9 @@ mod tests {
     #[test]
     fn it_keeps_the_contract() {
         let text = "# made by hand\nsensor time y\nA 0.5 1.25\nA 1 2.5\nB 0.5 -3e-4\nB 1 1234.5\n";
-        let folder = folder("contract", "sound.txt", text);
+        let folder = folder("contract", "sound.columns", text);
         let values = vec![1.25, 2.5, -3e-4, 1234.5];
-        let file = folder.join("sound.txt");
+        let file = folder.join("sound.columns");
         let sample = Sample { file, layout: layout(), values, tolerance: 0.0 };
         let judged = lacuna::contract::reader("skeleton", &Skeleton::default(), &sample, &folder);
         assert_eq!(judged, Ok(()));
@@ -265,8 +265,8 @@ mod tests {
     #[test]
     fn replicates_may_lack_values() {
         let text = "replicate,sensor,time,y\np1,A,0.5,1\np1,B,1,nan\np2,B,1,4\np2,C,1,9\n";
-        let folder = folder("replicates", "y.csv", text);
-        let reader = Skeleton { path: Some("y.csv".into()), ..Skeleton::default() };
+        let folder = folder("replicates", "y.columns", text);
+        let reader = Skeleton { path: Some("y.columns".into()), ..Skeleton::default() };
         let source = MeasurementSource { directory: &folder, scenario: None, layout: &layout() };
         let found = reader.measurements(&source).unwrap();
         let values: Vec<_> = found.replicates.iter().map(|r| (&*r.name, &r.values[..])).collect();

@@ -68,6 +68,7 @@ pub fn guard(answer: *const Answer, body: impl FnOnce(&Out) -> Result<(), Refusa
         }
         Err(payload) => {
             out.text(message(&*payload));
+            left(payload);
             status::PANIC
         }
     }
@@ -75,7 +76,15 @@ pub fn guard(answer: *const Answer, body: impl FnOnce(&Out) -> Result<(), Refusa
 
 /// Runs a body that can only say a number; a panic says `otherwise`.
 pub fn guard_number<T>(otherwise: T, body: impl FnOnce() -> T) -> T {
-    catch_unwind(AssertUnwindSafe(body)).unwrap_or(otherwise)
+    catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|payload| {
+        left(payload);
+        otherwise
+    })
+}
+
+/// Lets what a panic carried be: its end might panic too, outside of any guard.
+fn left(payload: Box<dyn Any + Send>) {
+    std::mem::forget(payload);
 }
 
 /// What a panic says.

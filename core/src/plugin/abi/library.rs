@@ -114,8 +114,11 @@ fn declaration(path: &Path) -> Result<&'static Declaration, String> {
     std::mem::forget(library);
     let no_symbol = "it is no library of plugins: it has no symbol `lacuna_plugin`";
     let address = symbol.ok().flatten().filter(|address| !address.is_null()).ok_or(no_symbol)?;
+    if !address.cast::<Declaration>().is_aligned() {
+        return Err("its `lacuna_plugin` stands where no declaration can".to_owned());
+    }
     // SAFETY: a symbol has at least the eight bytes of a number.
-    let magic = unsafe { address.cast::<u64>().read_unaligned() };
+    let magic = unsafe { address.cast::<u64>().read() };
     if magic != MAGIC {
         return Err(
             "it is no library of plugins: its `lacuna_plugin` does not begin as a declaration does"
@@ -125,7 +128,7 @@ fn declaration(path: &Path) -> Result<&'static Declaration, String> {
     // SAFETY: what begins like this has the versions next, whatever they are.
     let [major, minor] = unsafe {
         let versions = address.cast::<u64>().add(1).cast::<u32>();
-        [versions.read_unaligned(), versions.add(1).read_unaligned()]
+        [versions.read(), versions.add(1).read()]
     };
     if major != MAJOR || minor > MINOR {
         return Err(format!(
@@ -133,12 +136,16 @@ fn declaration(path: &Path) -> Result<&'static Declaration, String> {
              anew with the SDK of this program"
         ));
     }
-    // SAFETY: a declaration of this major version, which is a constant of a library that stays.
-    let declaration = unsafe { &*address.cast::<Declaration>() };
-    if declaration.size < size_of::<Declaration>() {
-        let (found, least) = (declaration.size, size_of::<Declaration>());
+    let declaration = address.cast::<Declaration>();
+    // SAFETY: declarations of this major version have their size next.
+    let (found, least) =
+        unsafe { ((&raw const (*declaration).size).read(), size_of::<Declaration>()) };
+    if found < least {
         return Err(format!("its declaration has {found} bytes, expected at least {least}"));
     }
+    // SAFETY: it is aligned, has all bytes of a declaration, and is a constant of a library that stays. Its fields are
+    // numbers and pointers, for which any bytes will do.
+    let declaration = unsafe { &*declaration };
     if declaration.unwinds != 1 {
         return Err("it is built with `panic = \"abort\"`, so that a panic in it would end the whole program; build it \
                     with `panic = \"unwind\"`".to_owned());
@@ -174,6 +181,9 @@ unsafe fn entries(declaration: &Declaration) -> Result<&'static [Entry], String>
     let count = declaration.count;
     if declaration.entries.is_null() || count == 0 || count > MOST {
         return Err(format!("its declaration has {count} entries"));
+    }
+    if !declaration.entries.is_aligned() {
+        return Err("the entries of its declaration stand where none can".to_owned());
     }
     // SAFETY: as the caller promises.
     let entries = unsafe { std::slice::from_raw_parts(declaration.entries, count as usize) };

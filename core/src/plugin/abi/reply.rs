@@ -18,12 +18,17 @@ pub struct Reply {
     pub matrices: Vec<Matrix>,
     /// The function that was called, for messages.
     pub what: &'static str,
+    /// What cannot be an answer at all.
+    broken: Option<String>,
 }
 
 unsafe extern "C" fn take_text(context: *mut c_void, text: Text) {
     guard_number((), || {
         // SAFETY: the context is the reply of the call that is under way, and the text is there meanwhile.
         let (reply, bytes) = unsafe { (&mut *context.cast::<Reply>(), text.bytes()) };
+        if !text.is_sound() {
+            reply.broken = Some(format!("gives a text of {} bytes, which cannot be", text.length));
+        }
         reply.text.extend_from_slice(bytes);
     });
 }
@@ -32,25 +37,35 @@ unsafe extern "C" fn take_numbers(context: *mut c_void, numbers: Numbers) {
     guard_number((), || {
         // SAFETY: as in `take_text`.
         let (reply, matrix) = unsafe { (&mut *context.cast::<Reply>(), numbers.matrix()) };
-        reply.matrices.push(matrix);
+        match matrix {
+            Ok(matrix) => reply.matrices.push(matrix),
+            Err(refusal) => reply.broken = Some(refusal.message),
+        }
     });
 }
 
 impl Reply {
-    /// Makes a call and takes what it answers; a status that is not `OK` is a refusal.
-    pub fn of(call: impl FnOnce(*const Answer) -> i32) -> Result<Self, Refusal> {
-        let mut reply = Self::default();
+    /// Calls the function `what` and takes what it answers; a status that is not `OK` is a refusal.
+    pub fn of(
+        what: &'static str,
+        call: impl FnOnce(*const Answer) -> i32,
+    ) -> Result<Self, Refusal> {
+        let mut reply = Self { what, ..Self::default() };
         let answer = Answer {
             size: size_of::<Answer>(),
             context: (&raw mut reply).cast(),
             text: Some(take_text),
             numbers: Some(take_numbers),
         };
-        match call(&raw const answer) {
+        let status = call(&raw const answer);
+        if let Some(broken) = reply.broken.take() {
+            return Err(reply.wrong(broken));
+        }
+        match status {
             status::OK => Ok(reply),
             known @ status::REJECTED..=status::ABSENT => Err(Refusal::new(known, reply.string())),
             other => {
-                Err(Refusal::stop(format!("answers with the status {other}, which has no meaning")))
+                Err(reply.wrong(format!("answers with the status {other}, which has no meaning")))
             }
         }
     }

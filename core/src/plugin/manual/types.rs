@@ -93,11 +93,17 @@ pub(super) fn choices(schema: &Map<String, Value>, generator: &SchemaGenerator) 
     choices
 }
 
+/// More numbers than anybody would look at.
+const MANY: u64 = 16;
+
+/// How deep lists of lists are described: a type may hold itself.
+const DEEPEST: usize = 8;
+
 /// What a value looks like, its numbers and strings left open.
 fn shape(schema: &Map<String, Value>) -> String {
     let count = |key: &str| schema.get(key).and_then(Value::as_u64);
     match (text(schema, "type"), count("minItems"), count("maxItems")) {
-        ("array", Some(low), Some(high)) if low == high => {
+        ("array", Some(low), Some(high)) if low == high && low <= MANY => {
             format!("[{}]", vec!["…"; low as usize].join(", "))
         }
         ("array", ..) => "[…]".to_owned(),
@@ -123,6 +129,13 @@ fn names(schema: &Map<String, Value>, description: &str) -> Vec<Choice> {
 
 /// What a value is, in words.
 pub(super) fn kind(schema: &Map<String, Value>, generator: &SchemaGenerator) -> String {
+    kind_at(schema, generator, 0)
+}
+
+fn kind_at(schema: &Map<String, Value>, generator: &SchemaGenerator, depth: usize) -> String {
+    if depth > DEEPEST {
+        return "a value".to_owned();
+    }
     let schema = without_null(&follow(schema, generator), generator);
     if schema.contains_key("oneOf") || schema.contains_key("anyOf") || schema.contains_key("enum") {
         return "a choice".to_owned();
@@ -138,7 +151,7 @@ pub(super) fn kind(schema: &Map<String, Value>, generator: &SchemaGenerator) -> 
         "number" => range("a number", &schema),
         "string" => "a string".to_owned(),
         "boolean" => "`true` or `false`".to_owned(),
-        "array" => array(&schema, generator),
+        "array" => array(&schema, generator, depth + 1),
         "object" => "a table".to_owned(),
         _ => "a value".to_owned(),
     }
@@ -166,14 +179,14 @@ fn plain(x: f64) -> String {
     if x.fract() == 0.0 { format!("{x:.0}") } else { emit::float(x) }
 }
 
-fn array(schema: &Map<String, Value>, generator: &SchemaGenerator) -> String {
+fn array(schema: &Map<String, Value>, generator: &SchemaGenerator, depth: usize) -> String {
     let count = |key: &str| schema.get(key).and_then(Value::as_u64);
     let size = match (count("minItems"), count("maxItems")) {
         (Some(low), Some(high)) if low == high => format!(" of {low}"),
         _ => String::new(),
     };
     let items = schema.get("items").and_then(Value::as_object);
-    match items.map(|items| kind(items, generator)) {
+    match items.map(|items| kind_at(items, generator, depth)) {
         Some(items) => format!("an array{size}, each {items}"),
         None => format!("an array{size}"),
     }

@@ -126,7 +126,7 @@ pub fn prepared<T>(
         random: random.clone(),
     });
     // An effect that could answer no more leaves nothing that could be trusted.
-    let faults: Vec<_> = candidates.iter().filter_map(|c| c.effect.fault()).collect();
+    let faults: Vec<_> = candidates.iter().flat_map(|c| c.effect.faults()).collect();
     match faults.iter().find_map(|fault| fault.said()) {
         Some(said) => Err(Stop::new(said)),
         None => made,

@@ -96,7 +96,7 @@ unsafe extern "C" fn apply<T: Effect + Authored>(
         // SAFETY: as in `parameters`; the numbers are there for the time of the call.
         let (plugin, layout) = unsafe { (object::<T>(plugin), layout(text)?) };
         // SAFETY: as above.
-        let (responses, values) = unsafe { (responses.matrix(), values.matrix()) };
+        let (responses, values) = unsafe { (responses.matrix()?, values.matrix()?) };
         let rows = responses.iter_rows().zip(values.iter_rows());
         let all: Vec<f64> = rows.flat_map(|(y, values)| plugin.apply(&layout, y, values)).collect();
         // SAFETY: the buffer is as large as the responses.
@@ -116,7 +116,7 @@ unsafe extern "C" fn by_parameters<T: Effect + Authored>(
         // SAFETY: as in `apply`.
         let (plugin, layout) = unsafe { (object::<T>(plugin), layout(text)?) };
         // SAFETY: as above.
-        let (response, values) = unsafe { (response.slice(), values.slice()) };
+        let (response, values) = unsafe { (response.slice()?, values.slice()?) };
         let slopes = plugin.by_parameters(&layout, response, values);
         // SAFETY: the buffer holds `outputs x parameters` numbers.
         unsafe { fill(jacobian, response.len() * values.len(), slopes.as_slice()) }
@@ -137,7 +137,7 @@ unsafe extern "C" fn push_forward<T: Effect + Authored>(
         let (plugin, layout) = unsafe { (object::<T>(plugin), layout(text)?) };
         // SAFETY: as above.
         let (response, values, tangents) =
-            unsafe { (response.slice(), values.slice(), tangents.matrix()) };
+            unsafe { (response.slice()?, values.slice()?, tangents.matrix()?) };
         let one = |tangent| plugin.push_forward(&layout, response, values, tangent);
         let all: Vec<f64> = tangents.iter_rows().flat_map(one).collect();
         // SAFETY: the buffer is as large as the tangents.

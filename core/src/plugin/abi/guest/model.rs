@@ -3,9 +3,10 @@
 use std::ffi::c_void;
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
+
 use super::component::{Authored, Components, Export};
 use crate::linalg::Matrix;
-use crate::plugin::Model;
 use crate::plugin::abi::Refusal;
 use crate::plugin::abi::guard::{fill, guard, guard_number, object};
 use crate::plugin::abi::table::{
@@ -13,6 +14,7 @@ use crate::plugin::abi::table::{
 };
 use crate::plugin::abi::wire::{CallSaid, CallsAbout, OwnedContext, ResponseAbout, SignatureAbout};
 use crate::plugin::model::{Call, EvalError, Response};
+use crate::plugin::{Context, Model};
 
 impl<T: Model + Authored> Export<T> for dyn Model {
     const FUNCTIONS: *const c_void = std::ptr::from_ref(Functions::<T>::TABLE).cast();
@@ -49,7 +51,7 @@ impl OwnedCalls {
     unsafe fn read(calls: &Calls) -> Result<Self, Refusal> {
         // SAFETY: as the caller promises.
         let (inputs, about, folders) =
-            unsafe { (calls.inputs.matrix(), calls.about.bytes(), calls.folders.bytes()) };
+            unsafe { (calls.inputs.matrix()?, calls.about.bytes(), calls.folders.bytes()) };
         let folders = match folders {
             [] => vec![None; inputs.rows()],
             folders => serde_json::from_slice(folders)?,
@@ -75,17 +77,32 @@ impl OwnedCalls {
     }
 }
 
+/// Answers what a model says of a study.
+///
+/// # Safety
+/// The plugin is one that `create` made, and the text is there.
+unsafe fn of_context<T: Model + Authored, S: Serialize>(
+    plugin: *mut c_void,
+    context: Text,
+    answer: *const Answer,
+    tell: fn(&T, &Context<'_>) -> S,
+) -> i32 {
+    guard(answer, |out| {
+        // SAFETY: as the caller promises.
+        let (plugin, context) = unsafe { (object::<T>(plugin), context.bytes()) };
+        let context: OwnedContext = serde_json::from_slice(context)?;
+        out.json(&context.with(|context| tell(plugin, context)))
+    })
+}
+
 unsafe extern "C" fn signature<T: Model + Authored>(
     plugin: *mut c_void,
     context: Text,
     answer: *const Answer,
 ) -> i32 {
-    guard(answer, |out| {
-        // SAFETY: the plugin that `create` made, and a text that is there for the time of the call.
-        let (plugin, context) = unsafe { (object::<T>(plugin), context.bytes()) };
-        let context: OwnedContext = serde_json::from_slice(context)?;
-        out.json(&SignatureAbout::from(context.with(|context| plugin.signature(context))))
-    })
+    let tell = |plugin: &T, context: &Context<'_>| SignatureAbout::from(plugin.signature(context));
+    // SAFETY: as this function's caller promises.
+    unsafe { of_context::<T, _>(plugin, context, answer, tell) }
 }
 
 unsafe extern "C" fn unused<T: Model + Authored>(
@@ -93,12 +110,8 @@ unsafe extern "C" fn unused<T: Model + Authored>(
     context: Text,
     answer: *const Answer,
 ) -> i32 {
-    guard(answer, |out| {
-        // SAFETY: as in `signature`.
-        let (plugin, context) = unsafe { (object::<T>(plugin), context.bytes()) };
-        let context: OwnedContext = serde_json::from_slice(context)?;
-        out.json(&context.with(|context| plugin.unused(context)))
-    })
+    // SAFETY: as this function's caller promises.
+    unsafe { of_context::<T, _>(plugin, context, answer, Model::unused) }
 }
 
 unsafe extern "C" fn files<T: Model + Authored>(
@@ -107,7 +120,7 @@ unsafe extern "C" fn files<T: Model + Authored>(
     answer: *const Answer,
 ) -> i32 {
     guard(answer, |out| {
-        // SAFETY: as in `signature`.
+        // SAFETY: the plugin that `create` made, and a text that is there for the time of the call.
         let (plugin, directory) = unsafe { (object::<T>(plugin), directory.string()) };
         out.json(&plugin.files(Path::new(&directory)))
     })
@@ -183,8 +196,9 @@ unsafe extern "C" fn write<T: Model + Authored>(
         // SAFETY: as in `predict`.
         let (plugin, calls) = unsafe { (object::<T>(plugin), OwnedCalls::read(&*calls)?) };
         // SAFETY: as above.
-        let (run, values, about, directory) =
-            unsafe { (run.string(), response.slice().to_vec(), about.bytes(), directory.string()) };
+        let (run, values, about, directory) = unsafe {
+            (run.string(), response.slice()?.to_vec(), about.bytes(), directory.string())
+        };
         let ResponseAbout { valid, facts } = serde_json::from_slice(about)?;
         let response = Response { values, valid, facts };
         let Some(call) = calls.calls().into_iter().next() else { return Err(Refusal::absent()) };

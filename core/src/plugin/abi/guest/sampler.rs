@@ -178,16 +178,30 @@ unsafe extern "C" fn harvest<T: Sampler + Authored>(
     })
 }
 
+/// Answers what a sampler says of a state.
+///
+/// # Safety
+/// The plugin is one that `create` made, and the state is there.
+unsafe fn of_state<T: Sampler + Authored>(
+    plugin: *mut c_void,
+    state: *const Table,
+    answer: *const Answer,
+    tell: fn(&T, &State) -> Vec<String>,
+) -> i32 {
+    guard(answer, |out| {
+        // SAFETY: as the caller promises.
+        let (plugin, state) = unsafe { (object::<T>(plugin), read(&*state)?) };
+        out.json(&tell(plugin, &state))
+    })
+}
+
 unsafe extern "C" fn doubts<T: Sampler + Authored>(
     plugin: *mut c_void,
     state: *const Table,
     answer: *const Answer,
 ) -> i32 {
-    guard(answer, |out| {
-        // SAFETY: as in `start`.
-        let (plugin, state) = unsafe { (object::<T>(plugin), read(&*state)?) };
-        out.json(&plugin.doubts(&state))
-    })
+    // SAFETY: as this function's caller promises.
+    unsafe { of_state::<T>(plugin, state, answer, Sampler::doubts) }
 }
 
 unsafe extern "C" fn notes<T: Sampler + Authored>(
@@ -195,11 +209,8 @@ unsafe extern "C" fn notes<T: Sampler + Authored>(
     state: *const Table,
     answer: *const Answer,
 ) -> i32 {
-    guard(answer, |out| {
-        // SAFETY: as in `start`.
-        let (plugin, state) = unsafe { (object::<T>(plugin), read(&*state)?) };
-        out.json(&plugin.notes(&state))
-    })
+    // SAFETY: as this function's caller promises.
+    unsafe { of_state::<T>(plugin, state, answer, Sampler::notes) }
 }
 
 unsafe extern "C" fn facts<T: Sampler + Authored>(

@@ -1,6 +1,7 @@
 //! Surrogates of a library.
 
 use std::ffi::c_void;
+use std::sync::OnceLock;
 
 use super::component::{Authored, Components, Export};
 use crate::math::random::Stream;
@@ -12,6 +13,7 @@ use crate::plugin::abi::table::{
     SurrogateFunctions, Table as _, Text,
 };
 use crate::plugin::abi::wire::TrainingAbout;
+use crate::plugin::forward;
 use crate::plugin::surrogate::{Emulator, Surrogate, Training};
 use crate::run::{Observer, Progress};
 
@@ -86,12 +88,27 @@ fn handed(emulator: Box<dyn Emulator>) -> table::Emulator {
 
 /// An emulator with its linear form, which is handed over for as long as the emulator is there.
 struct Owned {
+    /// Looks at the emulator, and so ends before it.
+    linear: OnceLock<ServedLinear<'static>>,
     emulator: Box<dyn Emulator>,
 }
 
 impl Owned {
     fn new(emulator: Box<dyn Emulator>) -> Self {
-        Self { emulator }
+        Self { linear: OnceLock::new(), emulator }
+    }
+
+    /// The linear form, if it has one; whoever gets it may use it until this value ends.
+    fn linear(&self) -> Option<Linear> {
+        let linear = self.emulator.linear()?;
+        let served = self.linear.get_or_init(|| {
+            // SAFETY: what is referred to belongs to the emulator, which stays where it is in its box, is never changed, and
+            // ends after this field. The reference leaves this value only inside a table, which is used no longer.
+            ServedLinear::new(unsafe {
+                std::mem::transmute::<&dyn forward::Linear, &'static dyn forward::Linear>(linear)
+            })
+        });
+        Some(served.table())
     }
 }
 
@@ -108,7 +125,7 @@ unsafe extern "C" fn fit<T: Surrogate + Authored>(
         let (plugin, training, progress) = unsafe { (object::<T>(plugin), &*training, &*progress) };
         // SAFETY: as above.
         let (about, points, responses) = unsafe {
-            (training.about.bytes(), training.points.matrix(), training.responses.matrix())
+            (training.about.bytes(), training.points.matrix()?, training.responses.matrix()?)
         };
         let about: TrainingAbout = serde_json::from_slice(about)?;
         // SAFETY: as above.
@@ -157,7 +174,7 @@ unsafe extern "C" fn mean(
 ) -> i32 {
     guard(answer, |_| {
         // SAFETY: an emulator of ours, and numbers that are there for the time of the call.
-        let (emulator, points) = unsafe { (own(this), points.matrix()) };
+        let (emulator, points) = unsafe { (own(this), points.matrix()?) };
         // SAFETY: the buffer holds `points x outputs` numbers.
         unsafe { fill(to, points.rows() * emulator.outputs(), emulator.mean(&points).as_slice()) }
     })
@@ -171,7 +188,7 @@ unsafe extern "C" fn variance(
 ) -> i32 {
     guard(answer, |_| {
         // SAFETY: as in `mean`.
-        let (emulator, points) = unsafe { (own(this), points.matrix()) };
+        let (emulator, points) = unsafe { (own(this), points.matrix()?) };
         let variance = emulator.variance(&points).ok_or_else(Refusal::absent)?;
         // SAFETY: the buffer holds `points x outputs` numbers.
         unsafe { fill(to, points.rows() * emulator.outputs(), variance.as_slice()) }
@@ -186,7 +203,7 @@ unsafe extern "C" fn jacobian(
 ) -> i32 {
     guard(answer, |_| {
         // SAFETY: as in `mean`.
-        let (emulator, point) = unsafe { (own(this), point.slice()) };
+        let (emulator, point) = unsafe { (own(this), point.slice()?) };
         // SAFETY: the buffer holds `outputs x parameters` numbers.
         unsafe { fill(to, point.len() * emulator.outputs(), emulator.jacobian(point).as_slice()) }
     })
@@ -213,11 +230,9 @@ unsafe extern "C" fn save(this: *mut c_void, answer: *const Answer) -> i32 {
 unsafe extern "C" fn linear(this: *mut c_void, made: *mut Linear, answer: *const Answer) -> i32 {
     guard(answer, |_| {
         // SAFETY: as in `mean`.
-        let linear = unsafe { own(this) }.linear().ok_or_else(Refusal::absent)?;
-        // It lives as long as the process: an emulator has one linear form, which is asked for once.
-        let served: &'static ServedLinear<'_> = Box::leak(Box::new(ServedLinear::new(linear)));
+        let linear = unsafe { object::<Owned>(this) }.linear().ok_or_else(Refusal::absent)?;
         // SAFETY: the caller gives a place for one map.
-        unsafe { *made = served.table() };
+        unsafe { *made = linear };
         Ok(())
     })
 }

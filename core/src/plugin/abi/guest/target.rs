@@ -37,8 +37,8 @@ impl<'a> TargetView<'a> {
         self.fault.said().map_or(Ok(()), |said| Err(Refusal::stop(said)))
     }
 
-    fn ask(&self, call: impl FnOnce(*const Answer) -> i32) {
-        if let Err(refusal) = Reply::of(call) {
+    fn ask(&self, what: &'static str, call: impl FnOnce(*const Answer) -> i32) {
+        if let Err(refusal) = Reply::of(what, call) {
             self.fault.report(refusal.message);
         }
     }
@@ -52,7 +52,7 @@ impl Target for TargetView<'_> {
     fn log_density(&self, points: &Matrix) -> Vec<f64> {
         let mut values = vec![f64::NEG_INFINITY; points.rows()];
         let (ask, to) = (self.functions.log_density, values.as_mut_ptr());
-        self.ask(|answer| {
+        self.ask("log_density", |answer| {
             // SAFETY: the buffer holds one number a point.
             ask.map_or(status::ABSENT, |f| unsafe {
                 f(self.target.target, Numbers::of(points), to, answer)
@@ -64,7 +64,7 @@ impl Target for TargetView<'_> {
     fn log_prior(&self, points: &Matrix) -> Vec<f64> {
         let mut values = vec![f64::NEG_INFINITY; points.rows()];
         let (ask, to) = (self.functions.log_prior, values.as_mut_ptr());
-        self.ask(|answer| {
+        self.ask("log_prior", |answer| {
             // SAFETY: the buffer holds one number a point.
             ask.map_or(status::ABSENT, |f| unsafe {
                 f(self.target.target, Numbers::of(points), to, answer)
@@ -77,7 +77,7 @@ impl Target for TargetView<'_> {
         let (mut value, mut gradient) = (f64::NEG_INFINITY, vec![0.0; point.len()]);
         let ask = self.functions.gradient;
         let (to, slopes) = (&raw mut value, gradient.as_mut_ptr());
-        self.ask(|answer| {
+        self.ask("gradient", |answer| {
             // SAFETY: the buffers hold one number, and one a coordinate.
             ask.map_or(status::ABSENT, |f| unsafe {
                 f(self.target.target, Numbers::row(point), to, slopes, answer)
@@ -90,7 +90,7 @@ impl Target for TargetView<'_> {
         let (mut low, mut high) =
             (vec![f64::NEG_INFINITY; self.dimension()], vec![f64::INFINITY; self.dimension()]);
         let (ask, from, to) = (self.functions.bounds, low.as_mut_ptr(), high.as_mut_ptr());
-        self.ask(|answer| {
+        self.ask("bounds", |answer| {
             // SAFETY: the buffers hold one number a coordinate.
             ask.map_or(status::ABSENT, |f| unsafe { f(self.target.target, from, to, answer) })
         });
@@ -101,7 +101,7 @@ impl Target for TargetView<'_> {
         let mut points = Matrix::zeros(count, self.dimension());
         let (ask, to) = (self.functions.prior_draws, points.as_mut_slice().as_mut_ptr());
         let key = Key { words: stream.key() };
-        self.ask(|answer| {
+        self.ask("prior_draws", |answer| {
             // SAFETY: the buffer holds `count x dimension` numbers.
             ask.map_or(status::ABSENT, |f| unsafe { f(self.target.target, count, key, to, answer) })
         });
@@ -113,7 +113,7 @@ impl Target for TargetView<'_> {
         // SAFETY: the function belongs to the target.
         let call =
             |answer| ask.map_or(status::ABSENT, |f| unsafe { f(self.target.target, answer) });
-        match Reply::of(call) {
+        match Reply::of("failure", call) {
             Ok(reply) => Some(reply.string()),
             Err(refusal) if refusal.status == status::ABSENT => None,
             Err(refusal) => Some(refusal.message),

@@ -6,8 +6,8 @@ use serde_json::{Map, Value as Json};
 use toml::Table;
 
 use super::Plugin;
-use super::object::{numbers_only, shaped};
-use super::plugin::optional;
+use super::object::{finite_only, shaped};
+use super::plugin::{optional, unknowns};
 use crate::data::Layout;
 use crate::linalg::Matrix;
 use crate::plugin::Hyperparameter;
@@ -38,7 +38,7 @@ impl Plugin<EffectFunctions> {
             (self.object.functions.parameters, self.object.this, written(layout)?);
         // SAFETY: the function belongs to the plugin, and the text is there until it returns.
         let call = |a| optional(ask, |f| unsafe { f(this, Text::of(&text), a) });
-        self.object.demand("parameters", call)?.json()
+        unknowns(self.object.demand("parameters", call)?)
     }
 
     fn nothing(&self, layout: &Layout) -> Result<Vec<f64>, Refusal> {
@@ -46,7 +46,7 @@ impl Plugin<EffectFunctions> {
         // SAFETY: as in `unknowns`.
         let call = |a| optional(ask, |f| unsafe { f(this, Text::of(&text), a) });
         let row = self.object.demand("absent", call)?.row()?;
-        numbers_only("absent", &row)?;
+        finite_only("absent", &row)?;
         Ok(row)
     }
 
@@ -106,7 +106,7 @@ impl Plugin<EffectFunctions> {
             |a| optional(ask, |f| unsafe { f(this, Text::of(&text), Text::of(&situation), a) });
         let [starts] = self.object.demand("starts", call)?.matrices()?;
         shaped("starts", &starts, starts.rows(), self.unknowns(layout)?.len())?;
-        numbers_only("starts", starts.as_slice())?;
+        finite_only("starts", starts.as_slice())?;
         Ok(starts.iter_rows().map(<[f64]>::to_vec).collect())
     }
 
@@ -127,7 +127,16 @@ impl Effect for Plugin<EffectFunctions> {
     }
 
     fn parameters(&self, layout: &Layout) -> Vec<Hyperparameter> {
-        self.object.or_fault(self.unknowns(layout), Vec::new)
+        let known = || {
+            let (unknowns, absent) = (self.unknowns(layout)?, self.nothing(layout)?);
+            if unknowns.len() != absent.len() {
+                let (all, found) = (unknowns.len(), absent.len());
+                let message = format!("`absent` answers {found} values for {all} unknowns");
+                return Err(Refusal::stop(message));
+            }
+            Ok(unknowns)
+        };
+        self.object.or_fault(known(), Vec::new)
     }
 
     fn absent(&self, layout: &Layout) -> Vec<f64> {

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::de::DeserializeOwned;
 
 use super::Plugin;
+use super::object::{UNMARKED, marks};
 use super::plugin::optional;
 use crate::linalg::Matrix;
 use crate::plugin::Context;
@@ -73,16 +74,17 @@ impl Plugin<ModelFunctions> {
         let (table, outputs) = (handed.table(), handed.outputs);
         let mut values = Matrix::from_fn(calls.len(), outputs, |_, _| f64::NAN);
         let mut statuses = vec![status::FATAL; calls.len()];
-        let mut valid = vec![0_u8; calls.len()];
+        let mut valid = vec![UNMARKED; calls.len()];
         let (ask, this) = (self.object.functions.predict, self.object.this);
-        let (to, codes, marks) =
+        let (to, codes, valid_to) =
             (values.as_mut_slice().as_mut_ptr(), statuses.as_mut_ptr(), valid.as_mut_ptr());
         // SAFETY: the function belongs to the plugin; the buffers have a place for each call.
-        let call = |a| optional(ask, |f| unsafe { f(this, &raw const table, to, codes, marks, a) });
+        let call =
+            |a| optional(ask, |f| unsafe { f(this, &raw const table, to, codes, valid_to, a) });
         let said = said(&self.object.demand("predict", call)?, calls.len())?;
         let each = said.into_iter().enumerate().map(|(i, said)| {
             let answer =
-                Answered { code: statuses[i], valid: valid[i] != 0, values: values.row(i), said };
+                Answered { code: statuses[i], valid: valid[i], values: values.row(i), said };
             self.object.or_error(answer.response())
         });
         Ok(each.collect())
@@ -138,7 +140,7 @@ impl Plugin<ModelFunctions> {
         };
         // SAFETY: the function belongs to the plugin; with no call it writes nothing.
         let call = |a| unsafe { ask(self.object.this, &raw const table, std::ptr::null_mut(), a) };
-        Reply::of(call).is_ok()
+        Reply::of("jacobian", call).is_ok()
     }
 }
 
@@ -158,7 +160,8 @@ fn said(reply: &Reply, count: usize) -> Result<Vec<CallSaid>, Refusal> {
 /// The answer to one call.
 struct Answered<'a> {
     code: i32,
-    valid: bool,
+    /// Its mark: 1 where the run stayed inside the model's range of validity.
+    valid: u8,
     values: &'a [f64],
     said: CallSaid,
 }
@@ -166,10 +169,19 @@ struct Answered<'a> {
 impl Answered<'_> {
     fn response(self) -> Result<Response, Refusal> {
         let Self { code, valid, values, said: CallSaid { message, facts } } = self;
-        if code != status::OK {
-            let message = if message.is_empty() { "gives no reason".to_owned() } else { message };
-            return Err(Refusal::new(code, message));
+        match code {
+            status::OK => {}
+            status::REJECTED..=status::ABSENT if message.is_empty() => {
+                return Err(Refusal::new(code, "`predict` has no answer and gives no reason"));
+            }
+            status::REJECTED..=status::ABSENT => return Err(Refusal::new(code, message)),
+            other => {
+                let message =
+                    format!("`predict` gives a run the status {other}, which has no meaning");
+                return Err(Refusal::stop(message));
+            }
         }
+        let valid = marks("predict", &[valid])?[0];
         match values.iter().position(|value| !value.is_finite()) {
             None => Ok(Response { values: values.to_vec(), valid, facts }),
             Some(i) => {

@@ -4,7 +4,7 @@ use std::ffi::c_void;
 use std::sync::Arc;
 
 use crate::linalg::Matrix;
-use crate::plugin::abi::table::{Answer, status};
+use crate::plugin::abi::table::{Answer, Table, read, status, whole};
 use crate::plugin::abi::{Refusal, Reply};
 use crate::plugin::fault::Fault;
 use crate::plugin::model::EvalError;
@@ -16,9 +16,12 @@ pub struct Object<F> {
     pub this: *mut c_void,
     /// What it does.
     pub functions: F,
-    destroy: Option<unsafe extern "C" fn(*mut c_void)>,
+    destroy: Destroy,
     fault: Arc<Fault>,
 }
+
+/// The function that ends an object.
+pub type Destroy = Option<unsafe extern "C" fn(*mut c_void)>;
 
 // SAFETY: the rules of the boundary demand that objects can be used from any thread, and the library is never unloaded.
 unsafe impl<F: Send> Send for Object<F> {}
@@ -38,13 +41,33 @@ impl<F> Drop for Object<F> {
 
 impl<F> Object<F> {
     /// An object that ends with this value.
-    pub fn new(
-        this: *mut c_void,
-        functions: F,
-        destroy: Option<unsafe extern "C" fn(*mut c_void)>,
-        fault: Arc<Fault>,
-    ) -> Self {
+    pub fn new(this: *mut c_void, functions: F, destroy: Destroy, fault: Arc<Fault>) -> Self {
         Self { this, functions, destroy, fault }
+    }
+
+    /// An object that a call made, with its table. One that cannot be used is ended here, if it can be.
+    ///
+    /// # Safety
+    /// The table is null or has the size that it says; the object belongs to the caller.
+    pub unsafe fn made(
+        what: &str,
+        this: *mut c_void,
+        table: *const F,
+        destroy: fn(&F) -> Destroy,
+        fault: Arc<Fault>,
+    ) -> Result<Self, Refusal>
+    where
+        F: Table,
+    {
+        let of = |refusal: Refusal| Refusal::stop(format!("its {what} {}", refusal.message));
+        // SAFETY: as the caller promises.
+        let functions = unsafe { read(table) }.map_err(of)?;
+        if this.is_null() {
+            return Err(Refusal::stop(format!("its {what} is not there")));
+        }
+        let object = Self::new(this, functions, destroy(&functions), fault);
+        whole(&object.functions).map_err(of)?;
+        Ok(object)
     }
 
     /// Where it says that it can answer no more.
@@ -58,8 +81,8 @@ impl<F> Object<F> {
         what: &'static str,
         call: impl FnOnce(*const Answer) -> i32,
     ) -> Result<Option<Reply>, Refusal> {
-        match Reply::of(call) {
-            Ok(reply) => Ok(Some(Reply { what, ..reply })),
+        match Reply::of(what, call) {
+            Ok(reply) => Ok(Some(reply)),
             Err(refusal) if refusal.status == status::ABSENT => Ok(None),
             Err(refusal) => Err(told(what, refusal)),
         }
@@ -97,6 +120,18 @@ impl<F> Object<F> {
         let numbers = self.ask_filled(what, count, call)?;
         numbers.iter().try_for_each(|numbers| numbers_only(what, numbers))?;
         Ok(numbers)
+    }
+
+    /// Makes a call that must fill a buffer with log densities.
+    pub fn densities(
+        &self,
+        what: &'static str,
+        count: usize,
+        call: impl FnOnce(*mut f64, *const Answer) -> i32,
+    ) -> Result<Vec<f64>, Refusal> {
+        let densities = self.numbers(what, count, call)?;
+        densities_only(what, &densities)?;
+        Ok(densities)
     }
 
     /// Makes a call that must fill a buffer with numbers.
@@ -157,6 +192,43 @@ pub fn numbers_only(what: &str, numbers: &[f64]) -> Result<(), Refusal> {
         }
     }
 }
+
+/// Complains of what is no log density: those are finite or minus infinity.
+pub fn densities_only(what: &str, densities: &[f64]) -> Result<(), Refusal> {
+    numbers_only(what, densities)?;
+    let endless = densities.iter().position(|x| *x == f64::INFINITY);
+    endless.map_or(Ok(()), |i| Err(odd(what, densities, i)))
+}
+
+/// Complains of what is not finite.
+pub fn finite_only(what: &str, numbers: &[f64]) -> Result<(), Refusal> {
+    numbers_only(what, numbers)?;
+    let infinite = numbers.iter().position(|x| x.is_infinite());
+    infinite.map_or(Ok(()), |i| Err(odd(what, numbers, i)))
+}
+
+/// A number that is out of place.
+fn odd(what: &str, numbers: &[f64], i: usize) -> Refusal {
+    let (x, count) = (numbers[i], numbers.len());
+    Refusal::stop(format!("`{what}` gives {x} as value {} of {count}", i + 1))
+}
+
+/// Marks, each of which must be 0 or 1; a buffer that was not written holds [`UNMARKED`].
+pub fn marks(what: &str, marks: &[u8]) -> Result<Vec<bool>, Refusal> {
+    let mark = |(i, mark): (usize, &u8)| match mark {
+        0 => Ok(false),
+        1 => Ok(true),
+        other => Err(Refusal::stop(format!(
+            "`{what}` gives {other} as mark {} of {}, expected 0 or 1",
+            i + 1,
+            marks.len()
+        ))),
+    };
+    marks.iter().enumerate().map(mark).collect()
+}
+
+/// What stands in a buffer of marks before it is written.
+pub const UNMARKED: u8 = 255;
 
 /// Complains of a matrix of another shape.
 pub fn shaped(

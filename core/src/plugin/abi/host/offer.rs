@@ -121,7 +121,7 @@ unsafe fn offer<K: Kind + ?Sized, F: Table + Send + Sync + 'static>(
 fn schema(component: &ComponentFunctions) -> Result<Map<String, Json>, Refusal> {
     let Some(ask) = component.schema else { return Ok(Map::new()) };
     // SAFETY: the function belongs to a library that stays.
-    let reply = Reply::of(|answer| unsafe { ask(answer) }).map_err(|refusal| {
+    let reply = Reply::of("schema", |answer| unsafe { ask(answer) }).map_err(|refusal| {
         Refusal::stop(format!("does not tell its options: {}", refusal.message))
     })?;
     reply.json().map_err(|refusal| {
@@ -178,7 +178,7 @@ impl<K: Kind + ?Sized, F: Table> Offered<K, F> {
         let mut this = std::ptr::null_mut();
         let to = &raw mut this;
         // SAFETY: the function belongs to a library that stays; text and place are there until it returns.
-        Reply::of(|answer| unsafe { create(Text::of(&options), to, answer) })?;
+        Reply::of("create", |answer| unsafe { create(Text::of(&options), to, answer) })?;
         if this.is_null() {
             return Err(Refusal::stop("`create` makes nothing"));
         }

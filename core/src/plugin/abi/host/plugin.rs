@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::Object;
-use crate::plugin::abi::table::{ComponentFunctions, Text, status};
+use crate::plugin::abi::table::{Answer, ComponentFunctions, Text, status};
 use crate::plugin::abi::wire::{Complaint, OwnedContext};
 use crate::plugin::abi::{Refusal, Reply};
-use crate::plugin::{Component, Context, Fact, Fault};
+use crate::plugin::{Component, Context, Fact, Fault, Hyperparameter};
 use crate::study::Complaints;
 
 /// A plugin of a library: the functions of its kind, and those of all kinds.
@@ -16,9 +16,7 @@ pub struct Plugin<F> {
 }
 
 /// One of the checks in a table.
-type Look = Option<
-    unsafe extern "C" fn(*mut std::ffi::c_void, Text, *const super::super::table::Answer) -> i32,
->;
+type Look = Option<unsafe extern "C" fn(*mut std::ffi::c_void, Text, *const Answer) -> i32>;
 
 impl<F> Plugin<F> {
     /// The plugin that an object is.
@@ -67,8 +65,8 @@ impl<F: Send + Sync> Component for Plugin<F> {
         self.look("environment", self.component.environment, context, complaints);
     }
 
-    fn fault(&self) -> Option<Arc<Fault>> {
-        Some(self.object.fault().clone())
+    fn faults(&self) -> Vec<Arc<Fault>> {
+        vec![self.object.fault().clone()]
     }
 }
 
@@ -80,6 +78,24 @@ pub(super) fn texts(reply: Option<Reply>) -> Result<Vec<String>, Refusal> {
 /// Facts that a call may answer.
 pub(super) fn facts(reply: Option<Reply>) -> Result<Vec<Fact>, Refusal> {
     Ok(reply.unwrap_or_default().json_if_any()?.unwrap_or_default())
+}
+
+/// Unknowns that a call answers, each with a name of its own and a start that it can have.
+pub(super) fn unknowns(reply: Reply) -> Result<Vec<Hyperparameter>, Refusal> {
+    let all: Vec<Hyperparameter> = reply.json()?;
+    for (i, own) in all.iter().enumerate() {
+        let (name, start) = (&own.name, own.start);
+        if name.is_empty() || all[..i].iter().any(|other| other.name == *name) {
+            let message =
+                format!("unknown {} is called `{name}`, expected a name of its own", i + 1);
+            return Err(Refusal::stop(message));
+        }
+        if own.log && start <= 0.0 {
+            let message = format!("`{name}` starts at {start}, and its logarithm is sampled");
+            return Err(Refusal::stop(message));
+        }
+    }
+    Ok(all)
 }
 
 /// Calls a function that may be null.

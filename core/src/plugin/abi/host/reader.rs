@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::Plugin;
-use super::object::{numbers_only, shaped};
+use super::object::{finite_only, shaped};
 use super::plugin::optional;
 use crate::data::{Ensemble, Layout, Measurements, Replicate};
 use crate::plugin::abi::table::{Answer, ReaderFunctions, Text};
@@ -77,6 +77,9 @@ impl Plugin<ReaderFunctions> {
         let names: Vec<String> = reply.json()?;
         let [values] = reply.matrices()?;
         shaped("measurements", &values, names.len(), source.layout.len())?;
+        if let Some(x) = values.as_slice().iter().find(|x| x.is_infinite()) {
+            return Err(Refusal::stop(format!("`measurements` answers the value {x}")));
+        }
         let replicate = |(name, row): (String, &[f64])| Replicate {
             name,
             values: row.iter().map(|y| (!y.is_nan()).then_some(*y)).collect(),
@@ -93,7 +96,10 @@ impl Plugin<ReaderFunctions> {
             // SAFETY: the function belongs to the plugin; the buffer holds one number an output.
             optional(ask, |f| unsafe { f(this, file, shape, layout.len(), to, a) })
         })?;
-        values.ok_or_else(|| Refusal::stop("this reader does not read a single response"))
+        let none = || Refusal::stop("this reader does not read a single response");
+        let values = values.ok_or_else(none)?;
+        finite_only("response", &values)?;
+        Ok(values)
     }
 }
 
@@ -143,7 +149,7 @@ impl Reader for Plugin<ReaderFunctions> {
                 &source.into(),
             )?;
             let row = reply.row()?;
-            numbers_only("grid", &row)?;
+            finite_only("grid", &row)?;
             Ok(row)
         };
         self.or_unread(read(), source.directory)

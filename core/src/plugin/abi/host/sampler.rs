@@ -1,7 +1,7 @@
 //! Samplers of libraries.
 
 use super::Plugin;
-use super::object::{numbers_only, shaped};
+use super::object::{densities_only, finite_only, marks, shaped};
 use super::plugin::{facts, optional, texts};
 use super::target::ServedTarget;
 use crate::linalg::Matrix;
@@ -56,12 +56,12 @@ impl Handed {
         reply: &Reply,
         before: serde_json::Value,
     ) -> Result<State, Refusal> {
-        numbers_only(what, &self.log_density)?;
-        numbers_only(what, self.points.as_slice())?;
+        densities_only(what, &self.log_density)?;
+        finite_only(what, self.points.as_slice())?;
         Ok(State {
             points: self.points,
             log_density: self.log_density,
-            accepted: self.accepted.iter().map(|&a| a != 0).collect(),
+            accepted: marks(what, &self.accepted)?,
             evaluations,
             memory: reply.json_if_any()?.unwrap_or(before),
         })
@@ -75,10 +75,18 @@ impl Plugin<SamplerFunctions> {
         // SAFETY: the function belongs to the plugin, and the place for the plan is ours.
         self.object.demand("plan", |a| optional(ask, |f| unsafe { f(this, dimension, to, a) }))?;
         let table::Plan { chains, steps, warm_up, ensemble } = plan;
-        if chains == 0 {
-            return Err(Refusal::stop("`plan` plans no chain"));
+        if chains == 0 || steps == 0 {
+            let message = format!("`plan` plans {chains} chains of {steps} steps");
+            return Err(Refusal::stop(message));
         }
-        Ok(Plan { chains, steps, warm_up, ensemble: ensemble != 0 })
+        // What no memory holds is no number of draws.
+        let draws = chains.checked_mul(steps).and_then(|draws| draws.checked_mul(dimension.max(1)));
+        if draws.is_none_or(|numbers| numbers > isize::MAX as usize / size_of::<f64>()) {
+            let message =
+                format!("`plan` plans {chains} chains of {steps} steps, more than there can be");
+            return Err(Refusal::stop(message));
+        }
+        Ok(Plan { chains, steps, warm_up, ensemble: marks("plan", &[ensemble])?[0] })
     }
 
     fn begun(&self, target: &dyn Target, points: Matrix) -> Result<State, Refusal> {
@@ -133,8 +141,8 @@ impl Plugin<SamplerFunctions> {
         let [points, log_density] = reply.matrices()?;
         shaped("harvest", &log_density, 1, points.rows())?;
         shaped("harvest", &points, points.rows(), served.0.dimension())?;
-        numbers_only("harvest", points.as_slice())?;
-        numbers_only("harvest", log_density.as_slice())?;
+        finite_only("harvest", points.as_slice())?;
+        densities_only("harvest", log_density.as_slice())?;
         Ok(Some(Harvest {
             points,
             log_density: log_density.into_vec(),

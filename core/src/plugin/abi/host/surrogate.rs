@@ -4,7 +4,7 @@ use std::ffi::c_void;
 use std::sync::{Arc, OnceLock};
 
 use super::Plugin;
-use super::object::Object;
+use super::object::{Object, finite_only, shaped};
 use super::plugin::{facts, optional};
 use crate::linalg::Matrix;
 use crate::math::random::Stream;
@@ -12,7 +12,7 @@ use crate::plugin::abi::Refusal;
 use crate::plugin::abi::guard::{guard_number, object};
 use crate::plugin::abi::linear::LinearView;
 use crate::plugin::abi::table::{
-    self, EmulatorFunctions, Key, Numbers, ProgressFunctions, SurrogateFunctions, Text, copied,
+    self, EmulatorFunctions, Key, Numbers, ProgressFunctions, SurrogateFunctions, Text,
 };
 use crate::plugin::abi::wire::TrainingAbout;
 use crate::plugin::forward::{Forward, Linear};
@@ -73,14 +73,13 @@ impl Plugin<SurrogateFunctions> {
         };
         self.object.demand("fit", call)?;
         let emulator = LoadedEmulator::new(made, self.object.fault().clone())?;
-        if (emulator.dimension, emulator.outputs)
-            != (runs.points.columns(), runs.responses.columns())
-        {
-            let (dimension, outputs) = (emulator.dimension, emulator.outputs);
+        let (dimension, outputs) = (emulator.dimension, emulator.outputs);
+        if (dimension, outputs) != (runs.points.columns(), runs.responses.columns()) {
             return Err(Refusal::stop(format!(
                 "`fit` gives an emulator of {dimension} parameters and {outputs} outputs"
             )));
         }
+        shaped("fit_error", &emulator.fit_error.residuals, runs.points.rows(), outputs)?;
         Ok(emulator)
     }
 
@@ -122,16 +121,18 @@ struct LoadedEmulator {
 
 impl LoadedEmulator {
     fn new(made: table::Emulator, fault: Arc<Fault>) -> Result<Self, Refusal> {
-        // SAFETY: whoever made the emulator gave its functions, which are constants.
-        let functions = unsafe { copied(made.functions) }
-            .map_err(|refusal| Refusal::stop(format!("its emulator {}", refusal.message)))?;
-        let object = Object::new(made.emulator, functions, functions.destroy, fault);
-        let (ask, this) = (functions.fit_error, made.emulator);
+        // SAFETY: whoever made the emulator gave it over with its table, a constant.
+        let object = unsafe {
+            Object::made("emulator", made.emulator, made.functions, |table| table.destroy, fault)?
+        };
+        let (ask, this) = (object.functions.fit_error, object.this);
         // SAFETY: the function belongs to the emulator.
         let reply = object.demand("fit_error", |a| optional(ask, |f| unsafe { f(this, a) }))?;
         let [relative, residuals] = reply.matrices()?;
-        let fit_error = FitError { relative: relative.into_vec(), residuals };
         let (dimension, outputs) = (made.dimension, made.outputs);
+        shaped("fit_error", &relative, 1, outputs)?;
+        shaped("fit_error", &residuals, residuals.rows(), outputs)?;
+        let fit_error = FitError { relative: relative.into_vec(), residuals };
         Ok(Self { linear: OnceLock::new(), object, dimension, outputs, fit_error })
     }
 
@@ -149,8 +150,12 @@ impl LoadedEmulator {
         if self.object.ask("linear", |a| unsafe { ask(self.object.this, to, a) })?.is_none() {
             return Ok(None);
         }
-        // SAFETY: the map lives as long as the emulator, which this value outlives.
-        unsafe { LinearView::new(map, self.object.fault().clone()) }.map(Some)
+        // SAFETY: the map lives as long as the emulator, which ends after its view.
+        let view = unsafe { LinearView::new(map, self.object.fault().clone())? };
+        let coefficients = view.coefficients();
+        shaped("linear", coefficients, coefficients.rows(), self.outputs)?;
+        finite_only("linear", coefficients.as_slice())?;
+        Ok(Some(view))
     }
 
     fn nowhere(&self, rows: usize) -> Matrix {

@@ -2,6 +2,7 @@
 
 use std::ffi::c_void;
 
+use crate::linalg::Matrix;
 use crate::math::random::Stream;
 use crate::plugin::Target;
 use crate::plugin::abi::Refusal;
@@ -46,7 +47,7 @@ unsafe fn target<'a>(target: *mut c_void) -> &'a dyn Target {
 ///
 /// # Safety
 /// The numbers are there.
-unsafe fn points(target: &dyn Target, points: Numbers) -> Result<crate::linalg::Matrix, Refusal> {
+unsafe fn points(target: &dyn Target, points: Numbers) -> Result<Matrix, Refusal> {
     let dimension = target.dimension();
     if points.columns != dimension {
         let found = points.columns;
@@ -55,7 +56,26 @@ unsafe fn points(target: &dyn Target, points: Numbers) -> Result<crate::linalg::
         )));
     }
     // SAFETY: as the caller promises.
-    Ok(unsafe { points.matrix() })
+    unsafe { points.matrix() }
+}
+
+/// Fills a buffer with something at each point.
+///
+/// # Safety
+/// It is the density of the table; points and buffer, which holds one number a point, are there.
+unsafe fn at_points(
+    this: *mut c_void,
+    at: Numbers,
+    values: *mut f64,
+    answer: *const Answer,
+    ask: fn(&dyn Target, &Matrix) -> Vec<f64>,
+) -> i32 {
+    guard(answer, |_| {
+        // SAFETY: as the caller promises.
+        let (target, points) = unsafe { (target(this), points(target(this), at)?) };
+        // SAFETY: as the caller promises.
+        unsafe { fill(values, points.rows(), &ask(target, &points)) }
+    })
 }
 
 unsafe extern "C" fn log_density(
@@ -64,12 +84,8 @@ unsafe extern "C" fn log_density(
     values: *mut f64,
     answer: *const Answer,
 ) -> i32 {
-    guard(answer, |_| {
-        // SAFETY: the density of the table, and numbers that are there for the time of the call.
-        let (target, points) = unsafe { (target(this), points(target(this), at)?) };
-        // SAFETY: the buffer holds one number a point.
-        unsafe { fill(values, points.rows(), &target.log_density(&points)) }
-    })
+    // SAFETY: as this function's caller promises.
+    unsafe { at_points(this, at, values, answer, |target, points| target.log_density(points)) }
 }
 
 unsafe extern "C" fn log_prior(
@@ -78,12 +94,8 @@ unsafe extern "C" fn log_prior(
     values: *mut f64,
     answer: *const Answer,
 ) -> i32 {
-    guard(answer, |_| {
-        // SAFETY: as in `log_density`.
-        let (target, points) = unsafe { (target(this), points(target(this), at)?) };
-        // SAFETY: the buffer holds one number a point.
-        unsafe { fill(values, points.rows(), &target.log_prior(&points)) }
-    })
+    // SAFETY: as this function's caller promises.
+    unsafe { at_points(this, at, values, answer, |target, points| target.log_prior(points)) }
 }
 
 unsafe extern "C" fn gradient(
@@ -94,8 +106,12 @@ unsafe extern "C" fn gradient(
     answer: *const Answer,
 ) -> i32 {
     guard(answer, |_| {
-        // SAFETY: as in `log_density`.
+        // SAFETY: the density of the table, and numbers that are there for the time of the call.
         let (target, points) = unsafe { (target(this), points(target(this), at)?) };
+        if points.rows() != 1 {
+            let found = points.rows();
+            return Err(Refusal::stop(format!("was asked for the gradient at {found} points")));
+        }
         let (density, gradient) = target.gradient(points.as_slice());
         // SAFETY: the buffers hold one number, and one a coordinate.
         unsafe {
@@ -112,7 +128,7 @@ unsafe extern "C" fn bounds(
     answer: *const Answer,
 ) -> i32 {
     guard(answer, |_| {
-        // SAFETY: as in `log_density`.
+        // SAFETY: as in `gradient`.
         let target = unsafe { target(this) };
         let (from, to): (Vec<f64>, Vec<f64>) = target.bounds().into_iter().unzip();
         // SAFETY: the buffers hold one number a coordinate.
@@ -131,17 +147,21 @@ unsafe extern "C" fn prior_draws(
     answer: *const Answer,
 ) -> i32 {
     guard(answer, |_| {
-        // SAFETY: as in `log_density`.
+        // SAFETY: as in `gradient`.
         let target = unsafe { target(this) };
+        let size = count.checked_mul(target.dimension());
+        let size = size.filter(|size| *size <= isize::MAX as usize / size_of::<f64>());
+        let too_many = || Refusal::stop(format!("was asked for {count} draws"));
+        let size = size.ok_or_else(too_many)?;
         let draws = target.prior_draws(count, &Stream::from_key(key.words));
         // SAFETY: the buffer holds `count x dimension` numbers.
-        unsafe { fill(to, count * target.dimension(), draws.as_slice()) }
+        unsafe { fill(to, size, draws.as_slice()) }
     })
 }
 
 unsafe extern "C" fn failure(this: *mut c_void, answer: *const Answer) -> i32 {
     guard(answer, |out| {
-        // SAFETY: as in `log_density`.
+        // SAFETY: as in `gradient`.
         out.text(&unsafe { target(this) }.failure().ok_or_else(Refusal::absent)?);
         Ok(())
     })

@@ -62,7 +62,7 @@ unsafe extern "C" fn basis(
 ) -> i32 {
     guard(answer, |_| {
         // SAFETY: the map of the table, and numbers that are there for the time of the call.
-        let (map, points) = unsafe { (map(this), points.matrix()) };
+        let (map, points) = unsafe { (map(this), points.matrix()?) };
         let count = points.rows() * map.coefficients().rows();
         // SAFETY: the buffer holds one row of basis functions a point.
         unsafe { fill(basis, count, map.basis(&points).as_slice()) }
@@ -77,7 +77,7 @@ unsafe extern "C" fn basis_gradient(
 ) -> i32 {
     guard(answer, |_| {
         // SAFETY: as in `basis`.
-        let (map, point) = unsafe { (map(this), point.slice()) };
+        let (map, point) = unsafe { (map(this), point.slice()?) };
         let count = point.len() * map.coefficients().rows();
         // SAFETY: the buffer holds `terms x parameters` numbers.
         unsafe { fill(gradient, count, map.basis_gradient(point).as_slice()) }
@@ -92,7 +92,7 @@ unsafe extern "C" fn sum_of_squares(
 ) -> i32 {
     guard(answer, |_| {
         // SAFETY: as in `basis`.
-        let (map, factor) = unsafe { (map(this), factor.matrix()) };
+        let (map, factor) = unsafe { (map(this), factor.matrix()?) };
         let squares = map.sum_of_squares(&factor).ok_or_else(Refusal::absent)?;
         let error = squares.error();
         let (size, squares) = (size_of::<Squares>(), begin(squares));
@@ -119,7 +119,7 @@ unsafe extern "C" fn squares_values(
 ) -> i32 {
     guard(answer, |_| {
         // SAFETY: a form of ours, and numbers that are there for the time of the call.
-        let (form, points) = unsafe { (form(squares), points.matrix()) };
+        let (form, points) = unsafe { (form(squares), points.matrix()?) };
         // SAFETY: the buffer holds one number a point.
         unsafe { fill(values, points.rows(), &form.values(&points)) }
     })
@@ -133,7 +133,7 @@ unsafe extern "C" fn squares_gradient(
 ) -> i32 {
     guard(answer, |_| {
         // SAFETY: as in `squares_values`.
-        let (form, points) = unsafe { (form(squares), points.matrix()) };
+        let (form, points) = unsafe { (form(squares), points.matrix()?) };
         let all = Matrix::from_rows(points.columns(), points.iter_rows().map(|p| form.gradient(p)));
         // SAFETY: the buffer holds one row of derivatives a point.
         unsafe { fill(gradient, points.as_slice().len(), all.as_slice()) }
@@ -144,6 +144,6 @@ unsafe extern "C" fn squares_covers(squares: *mut c_void, points: Numbers) -> i3
     guard_number(0, || {
         // SAFETY: as in `squares_values`.
         let (form, points) = unsafe { (form(squares), points.matrix()) };
-        i32::from(form.covers_all(&points))
+        points.map_or(0, |points| i32::from(form.covers_all(&points)))
     })
 }

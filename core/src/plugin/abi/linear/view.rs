@@ -4,7 +4,8 @@ use std::sync::{Arc, OnceLock};
 
 use crate::linalg::Matrix;
 use crate::plugin::abi::table::{
-    Answer, Linear, LinearFunctions, Numbers, Squares, SquaresFunctions, copied, status,
+    Answer, Linear, LinearFunctions, Numbers, Squares, SquaresFunctions, copied, read, status,
+    whole,
 };
 use crate::plugin::abi::{Refusal, Reply};
 use crate::plugin::fault::Fault;
@@ -24,7 +25,8 @@ unsafe impl Send for LinearView {}
 unsafe impl Sync for LinearView {}
 
 impl LinearView {
-    /// A view of a map that is there for as long as the view is used.
+    /// A view of a map that is there for as long as the view is used. That there are coefficients is checked here,
+    /// and nothing else about them.
     ///
     /// # Safety
     /// The struct and its functions are those of a map that outlives the view.
@@ -32,6 +34,8 @@ impl LinearView {
         // SAFETY: the table belongs to the map.
         let functions = unsafe { copied(linear.functions) }
             .map_err(|refusal| Refusal::stop(format!("a linear map {}", refusal.message)))?;
+        // SAFETY: the coefficients are there as long as the map.
+        unsafe { linear.coefficients.slice()? };
         Ok(Self { linear, functions, coefficients: OnceLock::new(), fault })
     }
 
@@ -39,31 +43,41 @@ impl LinearView {
         self.linear.coefficients.rows
     }
 
-    /// A matrix that the map fills.
+    /// What was answered; without that the map has a fault.
+    fn sound<T>(&self, answered: Result<T, Refusal>) -> Option<T> {
+        let complain = |refusal: Refusal| {
+            self.fault.report(format_args!("its linear map: {}", refusal.message))
+        };
+        answered.map_err(complain).ok()
+    }
+
+    /// A matrix that the map fills. Far away from where it was fitted a map may well give NaN.
     fn filled(
         &self,
+        what: &'static str,
         rows: usize,
         columns: usize,
         fill: impl FnOnce(*mut f64, *const Answer) -> i32,
     ) -> Matrix {
         let mut matrix = Matrix::from_fn(rows, columns, |_, _| f64::NAN);
         let to = matrix.as_mut_slice().as_mut_ptr();
-        if let Err(refusal) = Reply::of(|answer| fill(to, answer)) {
-            self.fault.report(format_args!("its linear map: {}", refusal.message));
-        }
+        self.sound(Reply::of(what, |answer| fill(to, answer)));
         matrix
     }
 }
 
 impl forward::Linear for LinearView {
     fn coefficients(&self) -> &Matrix {
-        // SAFETY: the coefficients are there as long as the map.
-        self.coefficients.get_or_init(|| unsafe { self.linear.coefficients.matrix() })
+        self.coefficients.get_or_init(|| {
+            // SAFETY: the coefficients are there as long as the map.
+            let own = unsafe { self.linear.coefficients.matrix() };
+            self.sound(own).unwrap_or_default()
+        })
     }
 
     fn basis(&self, points: &Matrix) -> Matrix {
         let basis = self.functions.basis;
-        self.filled(points.rows(), self.terms(), |to, answer| {
+        self.filled("basis", points.rows(), self.terms(), |to, answer| {
             // SAFETY: the buffer has a row of basis functions a point.
             basis.map_or(status::ABSENT, |f| unsafe {
                 f(self.linear.map, Numbers::of(points), to, answer)
@@ -73,7 +87,7 @@ impl forward::Linear for LinearView {
 
     fn basis_gradient(&self, point: &[f64]) -> Matrix {
         let gradient = self.functions.basis_gradient;
-        self.filled(self.terms(), point.len(), |to, answer| {
+        self.filled("basis_gradient", self.terms(), point.len(), |to, answer| {
             // SAFETY: the buffer has `terms x parameters` numbers.
             gradient.map_or(status::ABSENT, |f| unsafe {
                 f(self.linear.map, Numbers::row(point), to, answer)
@@ -90,17 +104,16 @@ impl forward::Linear for LinearView {
             error: f64::NAN,
         };
         // SAFETY: the place for the form is ours.
-        let reply = Reply::of(|a| unsafe {
+        let reply = Reply::of("sum_of_squares", |a| unsafe {
             ask(self.linear.map, Numbers::of(factor), &raw mut squares, a)
         });
-        match reply {
-            Ok(_) => SquaresView::of(squares, self.fault.clone()),
-            Err(refusal) if refusal.status == status::ABSENT => None,
-            Err(refusal) => {
-                self.fault.report(format_args!("its linear map: {}", refusal.message));
-                None
-            }
-        }
+        let form = match reply {
+            Ok(_) => SquaresView::of(squares, self.fault.clone()).map(Some),
+            Err(refusal) if refusal.status == status::ABSENT => Ok(None),
+            Err(refusal) => Err(refusal),
+        };
+        let form = self.sound(form)??;
+        Some(Box::new(form))
     }
 }
 
@@ -117,28 +130,36 @@ unsafe impl Send for SquaresView {}
 unsafe impl Sync for SquaresView {}
 
 impl SquaresView {
-    fn of(squares: Squares, fault: Arc<Fault>) -> Option<Box<dyn SumOfSquares>> {
+    /// A form that was handed over; one that cannot be used is ended, if it can be.
+    fn of(squares: Squares, fault: Arc<Fault>) -> Result<Self, Refusal> {
+        let wrong = |what: &str| Refusal::stop(format!("its sum of squares {what}"));
         // SAFETY: whoever made the form gave its functions, which are constants.
-        match unsafe { copied(squares.functions) } {
-            Ok(functions) => Some(Box::new(Self { squares, functions, fault })),
-            Err(refusal) => {
-                fault.report(format_args!("its sum of squares {}", refusal.message));
-                None
-            }
+        let functions = unsafe { read(squares.functions) }.map_err(|e| wrong(&e.message))?;
+        let form = Self { squares, functions, fault };
+        if squares.squares.is_null() {
+            return Err(wrong("is not there"));
         }
+        whole(&form.functions).map_err(|e| wrong(&e.message))?;
+        if !(squares.error >= 0.0 && squares.error.is_finite()) {
+            return Err(wrong(&format!("has the error {}", squares.error)));
+        }
+        Ok(form)
     }
 
     fn ask(&self, points: &Matrix, columns: usize, gradient: bool) -> Matrix {
         let mut values = Matrix::from_fn(points.rows(), columns, |_, _| f64::NAN);
         let to = values.as_mut_slice().as_mut_ptr();
-        let function = if gradient { self.functions.gradient } else { self.functions.values };
+        let (what, function) = match gradient {
+            true => ("gradient", self.functions.gradient),
+            false => ("values", self.functions.values),
+        };
         let call = |a| {
             // SAFETY: the form is alive, and the buffer has `points x columns` numbers.
             function.map_or(status::ABSENT, |f| unsafe {
                 f(self.squares.squares, Numbers::of(points), to, a)
             })
         };
-        if let Err(refusal) = Reply::of(call) {
+        if let Err(refusal) = Reply::of(what, call) {
             self.fault.report(format_args!("its sum of squares: {}", refusal.message));
         }
         values
@@ -172,7 +193,9 @@ impl SumOfSquares for SquaresView {
 
 impl Drop for SquaresView {
     fn drop(&mut self) {
-        if let Some(destroy) = self.functions.destroy {
+        if let Some(destroy) = self.functions.destroy
+            && !self.squares.squares.is_null()
+        {
             // SAFETY: the form is the view's own, and this is its last use.
             unsafe { destroy(self.squares.squares) }
         }

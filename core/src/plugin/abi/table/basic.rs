@@ -2,6 +2,9 @@
 
 use std::ffi::c_void;
 
+use crate::linalg::Matrix;
+use crate::plugin::abi::Refusal;
+
 record! {
     /// Text in UTF-8, or bytes, without a zero at the end. Structured data are JSON.
     Text {
@@ -84,15 +87,20 @@ impl Text {
         Self { bytes: bytes.as_ptr(), length: bytes.len() }
     }
 
-    /// The bytes.
+    /// Whether it can be a text: there are bytes where it says so, and not more than memory has addresses.
+    pub fn is_sound(self) -> bool {
+        self.length == 0 || (!self.bytes.is_null() && self.length <= isize::MAX as usize)
+    }
+
+    /// The bytes; none where it cannot be a text.
     ///
     /// # Safety
     /// The pointer is null or leads to `length` bytes that nobody changes during `'a`.
     pub unsafe fn bytes<'a>(self) -> &'a [u8] {
-        if self.bytes.is_null() || self.length == 0 {
+        if self.length == 0 || !self.is_sound() {
             return &[];
         }
-        // SAFETY: the caller promises the length and the time.
+        // SAFETY: the caller promises the bytes and the time; there are not too many for a slice.
         unsafe { std::slice::from_raw_parts(self.bytes, self.length) }
     }
 
@@ -108,7 +116,7 @@ impl Text {
 
 impl Numbers {
     /// A view of a matrix.
-    pub fn of(matrix: &crate::linalg::Matrix) -> Self {
+    pub fn of(matrix: &Matrix) -> Self {
         let values = matrix.as_slice().as_ptr();
         Self { values, rows: matrix.rows(), columns: matrix.columns() }
     }
@@ -118,27 +126,42 @@ impl Numbers {
         Self { values: row.as_ptr(), rows: 1, columns: row.len() }
     }
 
-    /// The numbers row by row.
+    /// How many numbers there are, or why it cannot be a matrix.
+    fn count(self) -> Result<usize, Refusal> {
+        const MOST: usize = isize::MAX as usize / size_of::<f64>();
+        let Self { values, rows, columns } = self;
+        let wrong = |what: &str| {
+            Err(Refusal::stop(format!("gives {rows} rows of {columns} numbers, {what}")))
+        };
+        match rows.checked_mul(columns) {
+            None => wrong("more than there can be"),
+            Some(count) if count > MOST => wrong("more than there can be"),
+            Some(0) => Ok(0),
+            Some(_) if values.is_null() => wrong("and none is there"),
+            Some(_) if !values.is_aligned() => wrong("where no number can be"),
+            Some(count) => Ok(count),
+        }
+    }
+
+    /// The numbers row by row, unless it cannot be a matrix.
     ///
     /// # Safety
     /// The pointer is null or leads to `rows x columns` numbers that nobody changes during `'a`.
-    pub unsafe fn slice<'a>(self) -> &'a [f64] {
-        let count = self.rows.saturating_mul(self.columns);
-        if self.values.is_null() || count == 0 {
-            return &[];
+    pub unsafe fn slice<'a>(self) -> Result<&'a [f64], Refusal> {
+        match self.count()? {
+            0 => Ok(&[]),
+            // SAFETY: the caller promises the numbers and the time; they are aligned and not too many for a slice.
+            count => Ok(unsafe { std::slice::from_raw_parts(self.values, count) }),
         }
-        // SAFETY: the caller promises the number and the time.
-        unsafe { std::slice::from_raw_parts(self.values, count) }
     }
 
-    /// The numbers as a matrix of one's own.
+    /// The numbers as a matrix of one's own, unless it cannot be one.
     ///
     /// # Safety
     /// As for [`Numbers::slice`].
-    pub unsafe fn matrix(self) -> crate::linalg::Matrix {
+    pub unsafe fn matrix(self) -> Result<Matrix, Refusal> {
         // SAFETY: as the caller promises.
-        let values = unsafe { self.slice() };
-        let rows = if self.columns == 0 || !values.is_empty() { self.rows } else { 0 };
-        crate::linalg::Matrix::from_vec(rows, self.columns, values.to_vec())
+        let values = unsafe { self.slice()? };
+        Ok(Matrix::from_vec(self.rows, self.columns, values.to_vec()))
     }
 }

@@ -36,7 +36,7 @@ pub use linear::{Linear, LinearFunctions, Squares, SquaresFunctions};
 pub use model::{Calls, ModelFunctions};
 pub use reader::ReaderFunctions;
 pub use sampler::{Plan, SamplerFunctions, State, Target, TargetFunctions};
-pub use shape::{Field, Shape, Table, Type, copied};
+pub use shape::{Field, Shape, Table, Type, copied, read, whole};
 pub use surrogate::{
     Emulator, EmulatorFunctions, Progress, ProgressFunctions, SurrogateFunctions, Training,
 };

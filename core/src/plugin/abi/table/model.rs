@@ -38,7 +38,9 @@ functions! {
         /// Writes a finished run (one call, its response, and `{"valid", "facts"}` about it) in the simulator's own format
         /// into `directory` and answers the file's name; `ABSENT` when it has no format of its own.
         may write(plugin: *mut c_void, run: Text, calls: *const Calls, response: Numbers, about: Text, directory: Text, answer: *const Answer) -> i32;
-        /// The derivatives of each value of the response (rows) by each input (columns), for one call.
+        /// The derivatives of each value of the response (rows) by each input (columns), for one call. `ABSENT` where
+        /// they are not known. Without a call (no row of inputs, `jacobian` null) nothing is written: whether there are
+        /// derivatives is the question.
         may jacobian(plugin: *mut c_void, calls: *const Calls, jacobian: *mut f64, answer: *const Answer) -> i32;
     }
 }

@@ -49,28 +49,42 @@ pub trait Table: Copy {
     fn missing(&self) -> Option<&'static str>;
 }
 
-/// A table of somebody else's as one's own: functions of later versions than its own are null.
+/// A table of somebody else's as one's own, with all functions that it must have.
+///
+/// # Safety
+/// As for [`read`].
+pub unsafe fn copied<F: Table>(table: *const F) -> Result<F, Refusal> {
+    // SAFETY: as the caller promises.
+    let own = unsafe { read(table)? };
+    whole(&own).map(|()| own)
+}
+
+/// A table of somebody else's as one's own, as far as it goes: functions of later versions than its own are null.
 ///
 /// # Safety
 /// The pointer is null or leads to a table that has the size that it says.
-pub unsafe fn copied<F: Table>(table: *const F) -> Result<F, Refusal> {
+pub unsafe fn read<F: Table>(table: *const F) -> Result<F, Refusal> {
     if table.is_null() {
         return Err(Refusal::stop("has no functions"));
     }
     // SAFETY: every table begins with its size.
-    let size = unsafe { table.cast::<usize>().read() };
-    if size < size_of::<usize>() {
+    let size = unsafe { table.cast::<usize>().read_unaligned() };
+    // Half of a function would be an address that nobody gave.
+    if size < size_of::<usize>() || size % size_of::<usize>() != 0 {
         return Err(Refusal::stop(format!("has a table of {size} bytes")));
     }
     // SAFETY: a table is a number and functions that may be null, for which zeros are right.
     let mut own: F = unsafe { std::mem::zeroed() };
     let count = size.min(size_of::<F>());
-    // SAFETY: both have so many bytes.
+    // SAFETY: both have so many bytes, and what is copied is whole functions.
     unsafe { std::ptr::copy_nonoverlapping(table.cast::<u8>(), (&raw mut own).cast::<u8>(), count) }
-    match own.missing() {
-        None => Ok(own),
-        Some(name) => Err(Refusal::stop(format!("has no function `{name}`"))),
-    }
+    Ok(own)
+}
+
+/// Complains of the first function that a table must have and has not.
+pub fn whole<F: Table>(table: &F) -> Result<(), Refusal> {
+    let lacks = |name| Err(Refusal::stop(format!("has no function `{name}`")));
+    table.missing().map_or(Ok(()), lacks)
 }
 
 /// A plain struct of the boundary.

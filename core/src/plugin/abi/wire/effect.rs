@@ -12,19 +12,29 @@ pub struct EffectAbout {
     title: String,
     formula: String,
     source: String,
-    reach: String,
+    reach: ReachAbout,
+}
+
+/// Where it may act; anywhere when nothing is said.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum ReachAbout {
+    #[default]
+    Any,
+    Single,
+    Whole,
 }
 
 impl EffectAbout {
     /// What an effect says of itself.
     pub fn new(description: Description, reach: Reach) -> Self {
         let reach = match reach {
-            Reach::Any => "any",
-            Reach::Single => "single",
-            Reach::Whole => "whole",
+            Reach::Any => ReachAbout::Any,
+            Reach::Single => ReachAbout::Single,
+            Reach::Whole => ReachAbout::Whole,
         };
         let Description { title, formula, source } = description;
-        Self { title, formula, source, reach: reach.to_owned() }
+        Self { title, formula, source, reach }
     }
 
     /// The words.
@@ -32,12 +42,12 @@ impl EffectAbout {
         Description { title: self.title, formula: self.formula, source: self.source }
     }
 
-    /// Where it may act; anywhere when nothing is said.
+    /// Where it may act.
     pub fn reach(&self) -> Reach {
-        match self.reach.as_str() {
-            "single" => Reach::Single,
-            "whole" => Reach::Whole,
-            _ => Reach::Any,
+        match self.reach {
+            ReachAbout::Any => Reach::Any,
+            ReachAbout::Single => Reach::Single,
+            ReachAbout::Whole => Reach::Whole,
         }
     }
 }

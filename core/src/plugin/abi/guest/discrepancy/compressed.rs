@@ -29,7 +29,8 @@ unsafe extern "C" fn log_likelihood(
 ) -> i32 {
     guard(answer, |_| {
         // SAFETY: a likelihood of ours, and numbers that are there for the time of the call.
-        let (this, basis, hyper) = unsafe { (object::<Own>(this), basis.matrix(), hyper.matrix()) };
+        let (this, basis, hyper) =
+            unsafe { (object::<Own>(this), basis.matrix()?, hyper.matrix()?) };
         let all: Vec<f64> =
             this.own.log_likelihood(&basis, &hyper).into_iter().map(density).collect();
         this.sound()?;
@@ -49,7 +50,7 @@ unsafe extern "C" fn log_likelihood_at(
     guard(answer, |_| {
         // SAFETY: as in `log_likelihood`; the map is there for the time of the call.
         let (this, points, hyper) =
-            unsafe { (object::<Own>(this), points.matrix(), hyper.matrix()) };
+            unsafe { (object::<Own>(this), points.matrix()?, hyper.matrix()?) };
         // SAFETY: as above.
         let view = unsafe { LinearView::new(*linear, this.fault.clone())? };
         let all = this.own.log_likelihood_at(&view, &points, &hyper);
@@ -70,7 +71,8 @@ unsafe extern "C" fn gradient(
 ) -> i32 {
     guard(answer, |_| {
         // SAFETY: as in `log_likelihood`.
-        let (this, basis, hyper) = unsafe { (object::<Own>(this), basis.matrix(), hyper.matrix()) };
+        let (this, basis, hyper) =
+            unsafe { (object::<Own>(this), basis.matrix()?, hyper.matrix()?) };
         let (a, b) = row_by_row(&basis, &hyper, |basis, hyper| this.own.gradient(basis, hyper));
         this.sound()?;
         // SAFETY: the buffers hold one row a point.
@@ -93,7 +95,7 @@ unsafe extern "C" fn gradient_at(
     guard(answer, |_| {
         // SAFETY: as in `log_likelihood_at`.
         let (this, points, hyper) =
-            unsafe { (object::<Own>(this), points.matrix(), hyper.matrix()) };
+            unsafe { (object::<Own>(this), points.matrix()?, hyper.matrix()?) };
         // SAFETY: as above.
         let view = unsafe { LinearView::new(*linear, this.fault.clone())? };
         let one = |point: &[f64], hyper: &[f64]| this.own.gradient_at(&view, point, hyper);

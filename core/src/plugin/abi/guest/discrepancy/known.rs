@@ -24,7 +24,7 @@ impl<'a> OwnedKnown<'a> {
     pub unsafe fn read(known: &'a table::Known) -> Result<Self, Refusal> {
         // SAFETY: as the caller promises.
         let (about, values, functions) =
-            unsafe { (known.about.bytes(), known.values.matrix(), known.functions.as_ref()) };
+            unsafe { (known.about.bytes(), known.values.matrix()?, known.functions.as_ref()) };
         let DataAbout { layout, replicates } = serde_json::from_slice(about)?;
         let functions = functions.filter(|f| f.missing().is_none());
         let functions = functions.ok_or_else(|| Refusal::stop("the slopes cannot be asked for"))?;
@@ -45,7 +45,7 @@ impl<'a> OwnedKnown<'a> {
         }
         let replicates = replicates.into_iter().enumerate().map(row).collect();
         // SAFETY: as the caller promises.
-        let common = unsafe { common(known) };
+        let common = unsafe { common(known)? };
         Ok(Self { data: Measurements { layout, replicates }, common, known, functions })
     }
 
@@ -58,7 +58,7 @@ impl<'a> OwnedKnown<'a> {
     fn slopes(&self) -> Result<Matrix, Refusal> {
         let Some(ask) = self.functions.slopes else { return Err(Refusal::new(status::STOP, "")) };
         // SAFETY: the function belongs to what is known, which is there.
-        let reply = Reply::of(|answer| unsafe { ask(self.known.known, answer) })?;
+        let reply = Reply::of("slopes", |answer| unsafe { ask(self.known.known, answer) })?;
         let [slopes] = reply.matrices()?;
         Ok(slopes)
     }
@@ -68,14 +68,14 @@ impl<'a> OwnedKnown<'a> {
 ///
 /// # Safety
 /// All that the struct points to is there.
-unsafe fn common(known: &table::Known) -> Vec<CommonError> {
+unsafe fn common(known: &table::Known) -> Result<Vec<CommonError>, Refusal> {
     let mut all = Vec::with_capacity(known.common_count);
     for i in 0..known.common_count {
         // SAFETY: the pointer leads to so many.
         let error = unsafe { &*known.common.add(i) };
         // SAFETY: as the caller promises.
-        let (origin, factor) = unsafe { (error.origin.string(), error.factor.matrix()) };
+        let (origin, factor) = unsafe { (error.origin.string(), error.factor.matrix()?) };
         all.push(CommonError { origin, factor, predictive: error.predictive != 0 });
     }
-    all
+    Ok(all)
 }

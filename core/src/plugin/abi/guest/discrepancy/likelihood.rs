@@ -54,7 +54,7 @@ unsafe extern "C" fn log_likelihood(
 ) -> i32 {
     guard(answer, |_| {
         // SAFETY: a likelihood of ours, and numbers that are there for the time of the call.
-        let (this, responses, hyper) = unsafe { (own(this), responses.matrix(), hyper.matrix()) };
+        let (this, responses, hyper) = unsafe { (own(this), responses.matrix()?, hyper.matrix()?) };
         let all = this.own.log_likelihoods(&responses, &hyper);
         let all: Vec<f64> = all.into_iter().map(density).collect();
         // SAFETY: the buffer holds one number a response.
@@ -72,7 +72,7 @@ unsafe extern "C" fn gradient(
 ) -> i32 {
     guard(answer, |_| {
         // SAFETY: as in `log_likelihood`.
-        let (this, responses, hyper) = unsafe { (own(this), responses.matrix(), hyper.matrix()) };
+        let (this, responses, hyper) = unsafe { (own(this), responses.matrix()?, hyper.matrix()?) };
         let one = |response: &[f64], hyper: &[f64]| this.own.gradient(response, hyper);
         let (a, b) = row_by_row(&responses, &hyper, one);
         // SAFETY: the buffers hold one row a response.
@@ -91,7 +91,7 @@ unsafe extern "C" fn predictive(
 ) -> i32 {
     guard(answer, |out| {
         // SAFETY: as in `log_likelihood`.
-        let (this, response, hyper) = unsafe { (own(this), response.slice(), hyper.slice()) };
+        let (this, response, hyper) = unsafe { (own(this), response.slice()?, hyper.slice()?) };
         let parts: Vec<VariancePart> = this.own.predictive(response, hyper);
         out.json(&parts.iter().map(|part| &part.origin).collect::<Vec<_>>())?;
         out.numbers(&Matrix::from_rows(response.len(), parts.iter().map(|part| &part.variance)));
@@ -109,7 +109,7 @@ unsafe extern "C" fn simulate(
 ) -> i32 {
     guard(answer, |_| {
         // SAFETY: as in `log_likelihood`.
-        let (this, response, hyper) = unsafe { (own(this), response.slice(), hyper.slice()) };
+        let (this, response, hyper) = unsafe { (own(this), response.slice()?, hyper.slice()?) };
         let made = this.own.simulate(response, hyper, &Stream::from_key(key.words));
         let [data] = &made[..] else {
             return Err(Refusal::stop(format!(
@@ -132,7 +132,7 @@ unsafe extern "C" fn left_out(
 ) -> i32 {
     guard(answer, |out| {
         // SAFETY: as in `log_likelihood`.
-        let (this, response, hyper) = unsafe { (own(this), response.slice(), hyper.slice()) };
+        let (this, response, hyper) = unsafe { (own(this), response.slice()?, hyper.slice()?) };
         out.row(&this.own.left_out(response, hyper).ok_or_else(Refusal::absent)?);
         Ok(())
     })

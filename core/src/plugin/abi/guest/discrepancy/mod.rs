@@ -86,7 +86,7 @@ unsafe extern "C" fn stated_noise<T: Discrepancy + Authored>(
     guard(answer, |out| {
         // SAFETY: as in `likelihood`.
         let (plugin, layout, response) =
-            unsafe { (object::<T>(plugin), layout.bytes(), response.slice()) };
+            unsafe { (object::<T>(plugin), layout.bytes(), response.slice()?) };
         let layout = serde_json::from_slice(layout)?;
         let noise = plugin.stated_noise(&layout, response).ok_or_else(Refusal::absent)?;
         out.row(&noise.sd);

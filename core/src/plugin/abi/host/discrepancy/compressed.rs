@@ -29,7 +29,7 @@ impl Compressed for LoadedCompressed {
     fn log_likelihood(&self, basis: &Matrix, hyper: &Matrix) -> Vec<f64> {
         let (ask, this) = (self.object.functions.log_likelihood, self.object.this);
         let (at, given) = (Numbers::of(basis), Numbers::of(hyper));
-        let values = self.object.numbers("log_likelihood", basis.rows(), |to, a| {
+        let values = self.object.densities("log_likelihood", basis.rows(), |to, a| {
             // SAFETY: the function belongs to the likelihood; the buffer holds one number a point.
             optional(ask, |f| unsafe { f(this, at, given, to, a) })
         });
@@ -43,7 +43,7 @@ impl Compressed for LoadedCompressed {
         let served = ServedLinear::new(linear);
         let (map, this) = (served.table(), self.object.this);
         let (at, given) = (Numbers::of(points), Numbers::of(hyper));
-        let values = self.object.numbers("log_likelihood_at", points.rows(), |to, a| {
+        let values = self.object.densities("log_likelihood_at", points.rows(), |to, a| {
             // SAFETY: the function belongs to the likelihood; the buffer holds one number a point, and the map is there
             // until it returns.
             unsafe { ask(this, &raw const map, at, given, to, a) }

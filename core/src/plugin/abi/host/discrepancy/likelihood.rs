@@ -7,9 +7,9 @@ use crate::linalg::Matrix;
 use crate::math::random::Stream;
 use crate::plugin::abi::Refusal;
 use crate::plugin::abi::host::object::{Object, numbers_only, shaped};
-use crate::plugin::abi::host::plugin::{facts, optional};
+use crate::plugin::abi::host::plugin::{facts, optional, unknowns};
 use crate::plugin::abi::linear::ServedLinear;
-use crate::plugin::abi::table::{self, Key, LikelihoodFunctions, Numbers, copied};
+use crate::plugin::abi::table::{self, Key, LikelihoodFunctions, Numbers};
 use crate::plugin::discrepancy::{Compressed, Likelihood, VariancePart};
 use crate::plugin::forward::Linear;
 use crate::plugin::{Fact, Hyperparameter};
@@ -28,12 +28,12 @@ impl LoadedLikelihood {
         // SAFETY: the function belongs to the likelihood.
         let reply =
             object.demand("hyperparameters", |a| optional(ask, |f| unsafe { f(this, a) }))?;
-        Ok(Self { hyper: reply.json()?, object, data: data.clone() })
+        Ok(Self { hyper: unknowns(reply)?, object, data: data.clone() })
     }
 
     fn values(&self, responses: Numbers, hyper: Numbers) -> Vec<f64> {
         let (ask, this) = (self.object.functions.log_likelihood, self.object.this);
-        let values = self.object.numbers("log_likelihood", responses.rows, |to, a| {
+        let values = self.object.densities("log_likelihood", responses.rows, |to, a| {
             // SAFETY: the function belongs to the likelihood; the buffer holds one number a response.
             optional(ask, |f| unsafe { f(this, responses, hyper, to, a) })
         });
@@ -50,6 +50,9 @@ impl LoadedLikelihood {
         let [variances] = reply.matrices()?;
         shaped("predictive", &variances, origins.len(), response.len())?;
         numbers_only("predictive", variances.as_slice())?;
+        if let Some(x) = variances.as_slice().iter().find(|x| **x < 0.0) {
+            return Err(Refusal::stop(format!("`predictive` gives the variance {x}")));
+        }
         let rows = variances.iter_rows().map(<[f64]>::to_vec);
         let part = |(origin, variance)| VariancePart { origin, variance };
         Ok(origins.into_iter().zip(rows).map(part).collect())
@@ -65,10 +68,8 @@ impl LoadedLikelihood {
         let (at, given, key) =
             (Numbers::row(response), Numbers::row(hyper), Key { words: stream.key() });
         let outputs = self.data.layout.len();
-        let count = self.data.replicates.len() * outputs;
         let mut values = Matrix::from_fn(self.data.replicates.len(), outputs, |_, _| f64::NAN);
         let to = values.as_mut_slice().as_mut_ptr();
-        debug_assert_eq!(values.as_slice().len(), count);
         // SAFETY: the function belongs to the likelihood; the buffer holds `replicates x outputs` numbers.
         self.object
             .demand("simulate", |a| optional(ask, |f| unsafe { f(this, at, given, key, to, a) }))?;
@@ -113,12 +114,12 @@ impl LoadedLikelihood {
         if self.object.ask("compress", call)?.is_none() {
             return Ok(None);
         }
-        // SAFETY: whoever made the compressed likelihood gave its functions, which are constants.
-        let functions = unsafe { copied(made.functions) }.map_err(|refusal| {
-            Refusal::stop(format!("its compressed likelihood {}", refusal.message))
-        })?;
-        let (destroy, fault) = (functions.destroy, self.object.fault().clone());
-        Ok(Some(LoadedCompressed::new(Object::new(made.compressed, functions, destroy, fault))))
+        let (what, fault) = ("compressed likelihood", self.object.fault().clone());
+        // SAFETY: whoever made the compressed likelihood gave it over with its table, a constant.
+        let object = unsafe {
+            Object::made(what, made.compressed, made.functions, |table| table.destroy, fault)?
+        };
+        Ok(Some(LoadedCompressed::new(object)))
     }
 }
 

@@ -5,12 +5,12 @@ mod known;
 mod likelihood;
 
 use super::Plugin;
-use super::object::{Object, numbers_only, shaped};
+use super::object::{Object, finite_only, numbers_only, shaped};
 use super::plugin::optional;
 use crate::data::Layout;
 use crate::plugin::Likelihood;
 use crate::plugin::abi::Refusal;
-use crate::plugin::abi::table::{self, DiscrepancyFunctions, Numbers, Text, copied};
+use crate::plugin::abi::table::{self, DiscrepancyFunctions, Numbers, Text};
 use crate::plugin::discrepancy::{Discrepancy, Known, StatedNoise};
 use crate::run::Stop;
 use known::HandedKnown;
@@ -31,11 +31,12 @@ impl Plugin<DiscrepancyFunctions> {
             self.object
                 .demand("likelihood", |a| optional(ask, |f| unsafe { f(this, known, to, a) }))
         })?;
-        // SAFETY: whoever made the likelihood gave its functions, which are constants.
-        let functions = unsafe { copied(made.functions) }
-            .map_err(|refusal| Refusal::stop(format!("its likelihood {}", refusal.message)))?;
-        let (destroy, fault) = (functions.destroy, self.object.fault().clone());
-        LoadedLikelihood::new(Object::new(made.likelihood, functions, destroy, fault), known.data)
+        let (what, fault) = ("likelihood", self.object.fault().clone());
+        // SAFETY: whoever made the likelihood gave it over with its table, a constant.
+        let object = unsafe {
+            Object::made(what, made.likelihood, made.functions, |table| table.destroy, fault)?
+        };
+        LoadedLikelihood::new(object, known.data)
     }
 
     fn noise(&self, layout: &Layout, response: &[f64]) -> Result<Option<StatedNoise>, Refusal> {
@@ -48,9 +49,14 @@ impl Plugin<DiscrepancyFunctions> {
         // SAFETY: the function belongs to the plugin; layout and response are there until it returns.
         let call = |a| optional(ask, |f| unsafe { f(this, layout, row, a) });
         let Some(reply) = self.object.ask("stated_noise", call)? else { return Ok(None) };
+        let count = reply.matrices.len();
+        if count == 0 || count > 2 {
+            let message = format!("`stated_noise` answers {count} rows, expected one or two");
+            return Err(Refusal::stop(message));
+        }
         for matrix in &reply.matrices {
             shaped("stated_noise", matrix, 1, response.len())?;
-            numbers_only("stated_noise", matrix.as_slice())?;
+            finite_only("stated_noise", matrix.as_slice())?;
         }
         let mut rows = reply.matrices.into_iter().map(crate::linalg::Matrix::into_vec);
         let sd = rows.next().ok_or_else(|| Refusal::stop("`stated_noise` answers nothing"))?;

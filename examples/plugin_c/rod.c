@@ -1,0 +1,342 @@
+/* A simulator in C: the temperature of a thin rod whose ends are kept in melting ice.
+ *
+ * Heat spreads along the rod and leaks through its insulation to surroundings that are as cold as the ends. With the
+ * diffusivity a, the loss b and u the temperature above that of the ends,
+ *
+ *     du/dt = a d2u/dx2 - b u,    u(0, t) = u(L, t) = 0,    u(x, 0) = T sin(pi x / L) + T/2 sin(3 pi x / L)
+ *
+ * on cells of equal length, step by step forward in time. Such steps are stable while 4 a dt / dx^2 + b dt <= 2: else the
+ * simulator refuses the run, as codes of this kind do. The exact answer is the sum of the two sines, the one with k
+ * half-waves having fallen by exp(-(a (k pi / L)^2 + b) t).
+ */
+#include "lacuna_plugin.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define PI 3.141592653589793
+#define MOST_STEPS 1e9
+
+/* ---- texts ---- */
+
+static int32_t say(const LacunaAnswer *answer, int32_t status, const char *text)
+{
+    lacuna_say(answer, text, strlen(text));
+    return status;
+}
+
+static char *copy_of(LacunaText text)
+{
+    char *copy = malloc(text.length + 1);
+    if (copy != NULL) {
+        if (text.length > 0) {
+            memcpy(copy, text.bytes, text.length);
+        }
+        copy[text.length] = '\0';
+    }
+    return copy;
+}
+
+/* What follows a piece of JSON that a program wrote; NULL when it is not there. */
+static const char *after(const char *json, const char *piece)
+{
+    const char *at = json == NULL ? NULL : strstr(json, piece);
+    return at == NULL ? NULL : at + strlen(piece);
+}
+
+/* ---- the options ---- */
+
+typedef struct {
+    double length;  /* m */
+    double height;  /* T, K */
+    double step;    /* s */
+    size_t cells;
+} Rod;
+
+static int32_t schema(const LacunaAnswer *answer)
+{
+    return say(answer, LACUNA_OK,
+        "{\"type\":\"object\",\"description\":\"The temperature of a rod whose ends are kept in melting ice. The example of "
+        "a simulator in C.\",\"additionalProperties\":false,\"properties\":{"
+        "\"length\":{\"type\":\"number\",\"exclusiveMinimum\":0,\"default\":1.0,\"description\":\"The length in m.\"},"
+        "\"height\":{\"type\":\"number\",\"exclusiveMinimum\":0,\"default\":80.0,\"description\":\"The temperature of the "
+        "first half-wave at the beginning, in K above the ends.\"},"
+        "\"step\":{\"type\":\"number\",\"exclusiveMinimum\":0,\"default\":1.0,\"description\":\"The longest step in s.\"},"
+        "\"cells\":{\"type\":\"integer\",\"minimum\":4,\"maximum\":10000,\"default\":40,\"description\":\"The number of "
+        "cells.\"}}}");
+}
+
+/* Reads a number above zero where the options have the key; 0 when it is something else. */
+static int number(const char *options, const char *key, double *value)
+{
+    char quoted[32], *end;
+    const char *at;
+    snprintf(quoted, sizeof quoted, "\"%s\":", key);
+    at = after(options, quoted);
+    if (at == NULL) {
+        return 1;
+    }
+    *value = strtod(at, &end);
+    return end != at && *value > 0.0 && !isinf(*value);
+}
+
+static int32_t wrong_option(const LacunaAnswer *answer, const char *key, const char *expected)
+{
+    char text[200];
+    snprintf(text, sizeof text, "[{\"at\":\"%s\",\"message\":\"wrong value for `%s`\",\"expected\":\"%s\"}]", key, key,
+             expected);
+    return say(answer, LACUNA_REJECTED, text);
+}
+
+static int32_t create(LacunaText options, void **out, const LacunaAnswer *answer)
+{
+    const Rod usual = {1.0, 80.0, 1.0, 40};
+    double cells = 40.0;
+    const char *wrong = NULL;
+    char *text = copy_of(options);
+    Rod *rod = malloc(sizeof *rod);
+    if (text == NULL || rod == NULL) {
+        free(text);
+        free(rod);
+        return say(answer, LACUNA_STOP, "there is no memory left");
+    }
+    *rod = usual;
+    if (!number(text, "length", &rod->length)) {
+        wrong = "length";
+    } else if (!number(text, "height", &rod->height)) {
+        wrong = "height";
+    } else if (!number(text, "step", &rod->step)) {
+        wrong = "step";
+    } else if (!number(text, "cells", &cells) || cells < 4.0 || cells > 1e4 || floor(cells) != cells) {
+        wrong = "cells";
+    }
+    free(text);
+    if (wrong != NULL) {
+        free(rod);
+        return wrong_option(answer, wrong, strcmp(wrong, "cells") == 0 ? "a whole number from 4 to 10000"
+                                                                       : "a number above 0");
+    }
+    rod->cells = (size_t)cells;
+    *out = rod;
+    return LACUNA_OK;
+}
+
+static int32_t options(void *plugin, const LacunaAnswer *answer)
+{
+    const Rod *rod = plugin;
+    char text[200];
+    snprintf(text, sizeof text, "{\"length\":%.17g,\"height\":%.17g,\"step\":%.17g,\"cells\":%lu}", rod->length,
+             rod->height, rod->step, (unsigned long)rod->cells);
+    return say(answer, LACUNA_OK, text);
+}
+
+/* ---- where and when ---- */
+
+/* The numbers of an axis in a layout; they are in `unit`. NULL where there is no such axis. */
+static double *axis(const char *layout, const char *name, const char *unit, size_t *count)
+{
+    char piece[64];
+    const char *at;
+    char *end;
+    double *values;
+    size_t i;
+    snprintf(piece, sizeof piece, "{\"name\":\"%s\",\"coordinates\":{\"grid\":{\"values\":[", name);
+    at = after(layout, piece);
+    if (at == NULL) {
+        return NULL;
+    }
+    *count = 1;
+    for (i = 0; at[i] != '\0' && at[i] != ']'; ++i) {
+        *count += at[i] == ',';
+    }
+    snprintf(piece, sizeof piece, "],\"unit\":\"%s\"}}}", unit);
+    values = strncmp(at + i, piece, strlen(piece)) == 0 ? malloc(*count * sizeof *values) : NULL;
+    for (i = 0; values != NULL && i < *count; ++i) {
+        values[i] = strtod(at, &end);
+        at = end + 1;
+    }
+    return values;
+}
+
+typedef struct {
+    double *x, *t;
+    size_t positions, times;
+} Asked;
+
+static void end_asked(Asked *asked)
+{
+    free(asked->x);
+    free(asked->t);
+}
+
+/* What is asked for: positions, and at each of them times that go up. Else the reason why that cannot be answered. */
+static const char *begin_asked(const char *json, const Rod *rod, Asked *asked)
+{
+    const char *layout = after(json, "\"layout\":");
+    const char *axes = after(layout, "\"axes\":[");
+    size_t i;
+    asked->x = axis(layout, "position", "m", &asked->positions);
+    asked->t = axis(layout, "time", "s", &asked->times);
+    if (layout == NULL || after(layout, "\"unit\":\"K\"") == NULL || after(layout, "\"unit\":\"K\"") > axes) {
+        return "expected a response in K";
+    }
+    if (asked->x == NULL || asked->t == NULL || strncmp(axes, "{\"name\":\"position\"", 18) != 0) {
+        return "expected the axes `position` in m and `time` in s, in this order";
+    }
+    for (i = 0; i < asked->positions; ++i) {
+        if (!(asked->x[i] >= 0.0 && asked->x[i] <= rod->length)) {
+            return "expected positions on the rod";
+        }
+    }
+    for (i = 0; i < asked->times; ++i) {
+        if (!(asked->t[i] >= (i == 0 ? 0.0 : asked->t[i - 1]) && asked->t[i] <= MOST_STEPS * rod->step)) {
+            return "expected times that go up from 0, of at most 1e9 steps";
+        }
+    }
+    return NULL;
+}
+
+static int32_t check(void *plugin, LacunaText context, const LacunaAnswer *answer)
+{
+    Asked asked = {NULL, NULL, 0, 0};
+    char *text = copy_of(context);
+    const char *reason = text == NULL ? "there is no memory left" : begin_asked(text, plugin, &asked);
+    if (reason != NULL) {
+        char complaint[200];
+        snprintf(complaint, sizeof complaint, "[{\"message\":\"the rod cannot give this response: %s\"}]", reason);
+        say(answer, LACUNA_OK, complaint);
+    }
+    end_asked(&asked);
+    free(text);
+    return LACUNA_OK;
+}
+
+/* ---- the simulation ---- */
+
+static int32_t signature(void *plugin, LacunaText context, const LacunaAnswer *answer)
+{
+    (void)plugin;
+    (void)context;
+    return say(answer, LACUNA_OK,
+        "{\"inputs\":[{\"name\":\"diffusivity\",\"unit\":\"m2/s\",\"default\":1.1e-4,\"low\":0,\"high\":null,"
+        "\"description\":\"how fast heat spreads along the rod\"},"
+        "{\"name\":\"loss\",\"unit\":\"1/s\",\"default\":1e-3,\"low\":0,\"high\":null,"
+        "\"description\":\"how fast heat leaks out of it\"}],\"resamples\":true}");
+}
+
+/* Goes on by a time in steps of equal length, none longer than the option says. */
+static void go_on(const Rod *rod, double a, double b, double time, double *u, double *next)
+{
+    const double dx = rod->length / (double)rod->cells;
+    const size_t steps = (size_t)ceil(time / rod->step);
+    const double dt = steps == 0 ? 0.0 : time / (double)steps;
+    size_t step, i;
+    for (step = 0; step < steps; ++step) {
+        for (i = 1; i < rod->cells; ++i) {
+            next[i] = u[i] + dt * (a * (u[i - 1] - 2.0 * u[i] + u[i + 1]) / (dx * dx) - b * u[i]);
+        }
+        memcpy(u + 1, next + 1, (rod->cells - 1) * sizeof *u);
+    }
+}
+
+/* One run; `u` and `next` have a place for each end of a cell. The response goes position by position. */
+static void simulate(const Rod *rod, const Asked *asked, double a, double b, double *u, double *next, double *response)
+{
+    double now = 0.0;
+    size_t i, k;
+    for (i = 0; i <= rod->cells; ++i) {
+        const double x = PI * (double)i / (double)rod->cells;
+        u[i] = rod->height * (sin(x) + 0.5 * sin(3.0 * x));
+    }
+    u[0] = u[rod->cells] = 0.0;
+    for (k = 0; k < asked->times; ++k) {
+        go_on(rod, a, b, asked->t[k] - now, u, next);
+        now = asked->t[k];
+        for (i = 0; i < asked->positions; ++i) {
+            const double place = asked->x[i] / rod->length * (double)rod->cells;
+            const size_t left = place < (double)rod->cells ? (size_t)place : rod->cells - 1;
+            const double share = place - (double)left;
+            response[i * asked->times + k] = (1.0 - share) * u[left] + share * u[left + 1];
+        }
+    }
+}
+
+/* Why there is no run with these inputs; empty where there is one. */
+static void refusal(const Rod *rod, double a, double b, char *reason, size_t size)
+{
+    const double dx = rod->length / (double)rod->cells;
+    reason[0] = '\0';
+    if (!(a >= 0.0 && b >= 0.0) || isinf(a) || isinf(b)) {
+        snprintf(reason, size, "expected a diffusivity and a loss of 0 or more, found %g and %g", a, b);
+    } else if ((4.0 * a / (dx * dx) + b) * rod->step > 2.0) {
+        snprintf(reason, size, "steps of %g s are not stable at a diffusivity of %g m2/s and a loss of %g 1/s, on cells of %g m",
+                 rod->step, a, b, dx);
+    }
+}
+
+/* All runs of a batch; what is said of them is a list with `null` for each that went well. */
+static int32_t predict(void *plugin, const LacunaCalls *calls, double *responses, int32_t *statuses, uint8_t *valid,
+                       const LacunaAnswer *answer)
+{
+    const Rod *rod = plugin;
+    Asked asked = {NULL, NULL, 0, 0};
+    char *about = copy_of(calls->about);
+    double *u = malloc((rod->cells + 1) * sizeof *u), *next = malloc((rod->cells + 1) * sizeof *next);
+    const char *wrong = about == NULL || u == NULL || next == NULL ? "there is no memory left"
+                                                                   : begin_asked(about, rod, &asked);
+    int32_t status = LACUNA_OK;
+    size_t i;
+    if (wrong == NULL && calls->inputs.columns != 2) {
+        wrong = "expected two inputs, the diffusivity and the loss";
+    }
+    if (wrong != NULL) {
+        status = say(answer, LACUNA_FATAL, wrong);
+    }
+    for (i = 0; wrong == NULL && i < calls->inputs.rows; ++i) {
+        const double *input = calls->inputs.values + 2 * i;
+        char reason[200], said[256];
+        refusal(rod, input[0], input[1], reason, sizeof reason);
+        valid[i] = 1;
+        statuses[i] = reason[0] == '\0' ? LACUNA_OK : LACUNA_REJECTED;
+        if (statuses[i] == LACUNA_OK) {
+            simulate(rod, &asked, input[0], input[1], u, next, responses + i * asked.positions * asked.times);
+            snprintf(said, sizeof said, "%snull", i == 0 ? "[" : ",");
+        } else {
+            snprintf(said, sizeof said, "%s{\"message\":\"%s\"}", i == 0 ? "[" : ",", reason);
+        }
+        say(answer, LACUNA_OK, said);
+    }
+    if (wrong == NULL && calls->inputs.rows > 0) {
+        say(answer, LACUNA_OK, "]");
+    }
+    end_asked(&asked);
+    free(about);
+    free(u);
+    free(next);
+    return status;
+}
+
+/* Texts are read once a batch, not once a run. */
+static size_t batch(void *plugin)
+{
+    (void)plugin;
+    return 16;
+}
+
+/* ---- the library ---- */
+
+static const LacunaComponentFunctions component = {
+    sizeof(LacunaComponentFunctions), schema, create, free, options, check, NULL
+};
+
+static const LacunaModelFunctions model = {
+    sizeof(LacunaModelFunctions), signature, predict, batch, NULL, NULL, NULL, NULL
+};
+
+static const LacunaEntry entries[] = {
+    LACUNA_ENTRY("model", "rod", component, model)
+};
+
+LACUNA_DECLARE("rod", "1.0.0", LACUNA_PROVIDES("model", "rod"), entries);

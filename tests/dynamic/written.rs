@@ -1,0 +1,184 @@
+//! Libraries as `lacuna new plugin KIND NAME --library FOLDER` writes them: built, tested by the tests that they bring, put
+//! through the suites of their kinds, and used together in one study.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+use std::time::Instant;
+
+use lacuna::contract;
+use lacuna::plugin::abi::library;
+use lacuna::plugin::registry::{self, Kind};
+use lacuna::plugin::{Design, Discrepancy, Effect, Model, Reader, Sampler, Surrogate};
+
+use super::contracts::{model, reader, sound};
+use super::quick;
+
+/// The kinds that libraries can bring.
+const KINDS: [&str; 7] =
+    ["design", "discrepancy", "effect", "model", "reader", "sampler", "surrogate"];
+
+/// The rest of this workspace's profile, beside what a written manifest says: with it the crates share what the example in
+/// Rust has compiled, and build nothing but themselves.
+const PROFILE: [&str; 3] = [
+    "profile.dev.debug=\"line-tables-only\"",
+    "profile.dev.package.lacuna-linalg.opt-level=3",
+    "profile.dev.package.lacuna-core.opt-level=2",
+];
+
+/// The folder of this test's profile, such as `target/debug`.
+fn profile() -> PathBuf {
+    std::env::current_exe().unwrap().parent().unwrap().parent().unwrap().to_owned()
+}
+
+fn cargo(verb: &str, folder: &Path) -> String {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let mut cargo = Command::new(cargo);
+    cargo.arg(verb).args(PROFILE.iter().flat_map(|setting| ["--config", setting]));
+    cargo.arg("--target-dir").arg(profile().parent().unwrap()).current_dir(folder);
+    if profile().ends_with("release") {
+        cargo.arg("--release");
+    }
+    let output = cargo.output().unwrap();
+    let [out, error] =
+        [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    assert!(output.status.success(), "cargo {verb} in {}\n{out}\n{error}", folder.display());
+    out
+}
+
+/// The libraries, by kind. Each is a crate in a folder of its own that is part of no workspace.
+fn written() -> &'static [PathBuf; 7] {
+    static BUILT: OnceLock<[PathBuf; 7]> = OnceLock::new();
+    BUILT.get_or_init(|| {
+        let begun = Instant::now();
+        // Always the same place, so that what is built there takes the place of what was.
+        let all = profile().with_file_name("written");
+        if all.exists() {
+            fs::remove_dir_all(&all).unwrap();
+        }
+        let libraries = KINDS.map(|kind| {
+            let (folder, name) = (all.join(kind), format!("trial_{kind}"));
+            let mut lacuna = quick::command();
+            lacuna.args(["new", "plugin", kind, &name, "--library"]).arg(&folder);
+            let (code, said) = quick::said(lacuna.current_dir(quick::root()));
+            assert_eq!(code, Some(0), "{said}");
+            // The versions that are compiled already.
+            fs::copy(quick::root().join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
+            cargo("build", &folder);
+            let told = cargo("test", &folder);
+            assert!(told.contains("it_keeps_the_contract ... ok"), "{told}");
+            let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+            profile().join(format!("{prefix}{name}{suffix}"))
+        });
+        println!("{} libraries written, built and tested in {:?}", KINDS.len(), begun.elapsed());
+        libraries
+    })
+}
+
+/// Puts the plugin of a kind through a suite.
+fn kept<K: Kind + ?Sized>(suite: impl Fn(&str, &K) -> Result<(), Vec<String>>) {
+    let name = format!("trial_{}", K::NAME);
+    let built = registry::from_text::<K>(&name, "").unwrap_or_else(|e| panic!("{e}"));
+    assert!(built.library.is_some());
+    assert_eq!(suite(&name, &*built.plugin), Ok(()));
+}
+
+#[test]
+fn a_library_of_each_kind_keeps_its_contract_and_serves_one_study() {
+    let libraries = written();
+    for library in libraries {
+        library::load(library, None).unwrap_or_else(|e| panic!("{}: {e}", library.display()));
+    }
+    kept::<dyn Design>(|name, plugin| sound(plugin, contract::design(name, plugin)));
+    kept::<dyn Discrepancy>(|name, plugin| sound(plugin, contract::discrepancy(name, plugin)));
+    kept::<dyn Effect>(|name, plugin| sound(plugin, contract::effect(name, plugin)));
+    kept::<dyn Model>(|name, plugin| model(name, plugin));
+    kept::<dyn Reader>(|name, plugin| reader(name, plugin, "columns"));
+    kept::<dyn Sampler>(|name, plugin| sound(plugin, contract::sampler(name, plugin)));
+    kept::<dyn Surrogate>(|name, plugin| sound(plugin, contract::surrogate(name, plugin)));
+    one_study(libraries);
+}
+
+/// A capacitor that is discharged, every part of whose study is in one of the libraries.
+const STUDY: &str = r#"
+[study]
+name = "written"
+title = "The rate of a discharge"
+seed = 11
+[[parameter]]
+name = "amplitude"
+unit = "V"
+prior = { uniform = [1, 3] }
+[[parameter]]
+name = "rate"
+unit = "1/s"
+prior = { uniform = [0.5, 1.5] }
+[response]
+name = "voltage"
+unit = "V"
+axes = { time = { first = 0.2, last = 2.0, count = 10, unit = "s" } }
+[model]
+use = "trial_model"
+background = 0.1
+[[effect]]
+use = "trial_effect"
+slope = { normal = [0, 0.02] }
+[design]
+use = "trial_design"
+runs = 40
+[measurements]
+use = "trial_reader"
+path = "measured.columns"
+[surrogate]
+use = "trial_surrogate"
+validation = 8
+[discrepancy]
+use = "trial_discrepancy"
+deviation = { half_normal = 0.1 }
+[sampler]
+use = "trial_sampler"
+steps = 6000
+width = 0.05
+[validate]
+emulator_check = 2
+"#;
+
+fn one_study(libraries: &[PathBuf]) {
+    let folder = tempfile::tempdir().unwrap();
+    let (study, out) = (folder.path().join("study.toml"), folder.path().join("out"));
+    fs::write(&study, STUDY).unwrap();
+    let file = folder.path().join("measured.columns");
+    // An amplitude of 2 V that falls at a rate of 1/s; what scatters is as good as noise of 0.01 V.
+    let row = |(r, i): (u32, u32)| {
+        let t = 0.2 * f64::from(i + 1);
+        let noise = 0.014 * f64::from(7 * i + 11 * r + i * i * r).sin();
+        format!("{} {t} {}\n", r + 1, 2.0 * (-t).exp() + 0.1 + noise)
+    };
+    let rows: String = (0..4).flat_map(|r| (0..10).map(move |i| (r, i))).map(row).collect();
+    fs::write(&file, format!("# by hand\nreplicate time voltage\n{rows}")).unwrap();
+    let plugins: Vec<&str> =
+        libraries.iter().flat_map(|path| ["--plugin", path.to_str().unwrap()]).collect();
+    let mut run = quick::command();
+    let (code, said) =
+        quick::said(run.arg("run").arg(&study).arg("--out").arg(&out).args(&plugins));
+    assert_eq!(code, Some(0), "{said}");
+    let summary = quick::summary(&out);
+    for (name, truth) in [("amplitude", 2.0), ("rate", 1.0)] {
+        let of = |key: &str| summary["parameters"][name][key].as_f64().unwrap();
+        let (mean, sd) = (of("mean"), of("sd"));
+        assert!((mean - truth).abs() < 3.0 * sd && sd < 0.1, "{name}: {mean} ± {sd}");
+    }
+    let manifest: serde_json::Value =
+        lacuna::run::files::read_json(&out.join("manifest.json")).unwrap();
+    assert_eq!(manifest["plugins"].as_array().unwrap().len(), KINDS.len());
+
+    // The reader of a library knows its files, and no built-in one claims them.
+    let mut inspect = quick::command();
+    let output = inspect.arg("inspect").arg(&file).args(&plugins).output().unwrap();
+    let seen = String::from_utf8(output.stdout).unwrap();
+    assert!(seen.contains("(reader `trial_reader`)") && seen.contains("voltage"), "{seen}");
+    let output = quick::command().arg("inspect").arg(&file).output().unwrap();
+    let seen = String::from_utf8(output.stderr).unwrap();
+    assert!(seen.contains("no reader recognises"), "{seen}");
+}
