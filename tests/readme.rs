@@ -87,6 +87,12 @@ impl Walk {
         text
     }
 
+    /// Ends one of the programs that were left running, counted from 0.
+    pub fn end(&mut self, number: usize) {
+        self.started[number].kill().unwrap();
+        self.started[number].wait().unwrap();
+    }
+
     /// Follows the part of the page below a heading.
     pub fn follow(&mut self, heading: &str) {
         let part = Page::read(&self.page).section(heading);

@@ -81,8 +81,7 @@ fn what_a_cluster_needs_is_one_section() {
     for name in ["processes", "slurm", "hyperqueue"] {
         let path = quick::root().join(FOLDER).join(name).with_extension("toml");
         let study: toml::Table = fs::read_to_string(path).unwrap().parse().unwrap();
-        let keys: Vec<&String> = study.keys().collect();
-        assert_eq!(keys, ["executor", "extends"], "{name}");
+        assert!(study.len() == 2 && study["executor"].is_table(), "{name}");
         assert_eq!(study["extends"].as_str(), Some("study.toml"), "{name}");
     }
 }

@@ -42,4 +42,9 @@ fn the_study_on_three_servers_goes_as_its_readme_says() {
     }
     walk.follow("The study");
     agrees_with_least_squares(&quick::summary(&walk.path("runs/pool")));
+    // Each of them is asked who it is.
+    walk.end(1);
+    let said = walk.give(&format!("lacuna check {FOLDER}/study.toml"), 2);
+    assert!(said.contains(&format!("no server at http://localhost:{}", ports[1])), "{said}");
+    assert!(said.contains("1 problem in"), "{said}");
 }
