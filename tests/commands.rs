@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use crate::quick::{self, replace};
 
 /// Whether there is Python; `LACUNA_REQUIRE_PYTHON=1` makes its absence a failure.
-fn there_is_python() -> bool {
+pub fn there_is_python() -> bool {
     let there = std::process::Command::new("python3").arg("--version").output().is_ok();
     let required = std::env::var_os("LACUNA_REQUIRE_PYTHON").is_some_and(|value| value == "1");
     assert!(there || !required, "LACUNA_REQUIRE_PYTHON is set, and there is no `python3`");

@@ -5,7 +5,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-mod markdown;
+pub mod markdown;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -12,6 +12,7 @@ mod kill;
 mod problems;
 mod python;
 mod quick;
+mod readme;
 mod skeletons;
 mod slurm;
 mod studies;

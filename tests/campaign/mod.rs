@@ -1,5 +1,6 @@
 //! Ensembles made by other processes, here and on a cluster.
 
+mod example;
 mod import;
 mod jobs;
 mod nodes;

@@ -13,7 +13,7 @@ use super::{failures, run, study};
 use crate::quick;
 
 /// A server with one worker; it ends with its input.
-struct Server {
+pub struct Server {
     folder: TempDir,
     python: PathBuf,
     process: Child,
@@ -25,7 +25,7 @@ fn scripts() -> PathBuf {
 }
 
 /// Starts one where there is the package; `LACUNA_REQUIRE_PYTHON=1` makes its absence a failure.
-fn started() -> Option<Server> {
+pub fn started() -> Option<Server> {
     let python = std::env::var_os("LACUNA_PYTHON").unwrap_or_else(|| "python3".into());
     let there = Command::new(&python).args(["-c", "import hyperqueue"]).output();
     let there = there.is_ok_and(|output| output.status.success());
@@ -51,8 +51,8 @@ fn started() -> Option<Server> {
 }
 
 impl Server {
-    /// A command `hq`, and the options that name it and the server.
-    fn options(&self) -> String {
+    /// Its folder, into which the command `hq` is put.
+    pub fn folder(&self) -> &Path {
         let command = self.folder.path().join("hq");
         let text = format!(
             "#!/bin/sh\nexec '{}' '{}' \"$@\"\n",
@@ -62,10 +62,16 @@ impl Server {
         fs::write(&command, text).unwrap();
         let executable = Command::new("chmod").arg("+x").arg(&command).status().unwrap();
         assert!(executable.success());
+        self.folder.path()
+    }
+
+    /// The options that name the command and the server.
+    fn options(&self) -> String {
+        let folder = self.folder();
         format!(
             "command = \"{}\"\nserver = \"{}\"\npoll = 1\npatience = 1\n",
-            command.display(),
-            self.folder.path().display()
+            folder.join("hq").display(),
+            folder.display()
         )
     }
 }

@@ -43,6 +43,14 @@ impl Page {
         pages
     }
 
+    /// The part below a heading of the second level.
+    pub fn section(&self, heading: &str) -> Self {
+        let lines = self.text.lines().skip_while(|line| line.strip_prefix("## ") != Some(heading));
+        let part = lines.enumerate().take_while(|(i, line)| *i == 0 || !line.starts_with("## "));
+        let text = part.map(|(_, line)| format!("{line}\n")).collect();
+        Self { path: self.path.clone(), text }
+    }
+
     /// The fenced blocks with this text behind their first fence.
     pub fn blocks(&self, info: &str) -> Vec<Block> {
         let (mut blocks, mut open) = (Vec::new(), None::<Block>);

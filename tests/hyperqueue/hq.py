@@ -21,7 +21,7 @@ def main(words):
     while words and words[0].startswith("--"):
         key, _, value = words.pop(0)[2:].partition("=")
         options[key] = value
-    folder = options["server-dir"]
+    folder = options.get("server-dir") or os.environ["HQ_SERVER_DIR"]
     assert options["output-mode"] == "json", options
     if words[0] == "wait":
         return wait(folder, int(words[1]))

@@ -1,5 +1,6 @@
 //! Models behind UM-Bridge servers, and studies as such servers.
 
+mod pool;
 mod python;
 pub mod rod;
 mod served;

@@ -208,9 +208,10 @@ fn finish(
     Checked { sources, problems, libraries: seen, study }
 }
 
-/// Where the relative paths of a study start.
+/// Where the relative paths of a study start. It is never empty: an empty path has no absolute one.
 fn directory(path: &Path, root: &Node) -> PathBuf {
-    let folder = path.parent().unwrap_or(Path::new(""));
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new("."));
     let given = root.find("study.directory").and_then(Node::as_str);
     given.map_or(folder.to_owned(), |given| folder.join(given))
 }

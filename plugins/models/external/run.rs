@@ -208,7 +208,7 @@ fn rejected(folder: &Path, reason: String) -> EvalError {
     let tail = printed.into_iter().find(|tail| !tail.is_empty());
     EvalError::Rejected(match tail {
         None => reason,
-        Some(tail) => format!("{reason}; it said:\n{}", inside(folder, &tail)),
+        Some(tail) => format!("{reason}; it said: {}", inside(folder, &tail)),
     })
 }
 

@@ -155,7 +155,7 @@ impl Worker {
         };
         match self.printed.tail() {
             said if said.is_empty() => how,
-            said => format!("{how}; it said:\n{said}"),
+            said => format!("{how}; it said: {said}"),
         }
     }
 }

@@ -11,7 +11,7 @@ fn a_command_that_hangs_is_stopped_with_all_it_started() {
     let script = "echo 'step 1' >&2; (sleep 30; touch {{ study }}/later) & sleep 30";
     let case = Case::shell(script, "timeout = 0.5");
     let begun = Instant::now();
-    assert_eq!(case.reason(), "`sh` was stopped after 0.5 s; it said:\nstep 1");
+    assert_eq!(case.reason(), "`sh` was stopped after 0.5 s; it said: step 1");
     assert!(begun.elapsed() < Duration::from_secs(10));
     let processes = std::fs::read_dir("/proc").unwrap().flatten();
     let study = case.study.path().display().to_string();
@@ -26,10 +26,10 @@ fn a_command_that_hangs_is_stopped_with_all_it_started() {
 fn exit_codes_and_signals_are_told_with_the_end_of_the_errors() {
     let script = "echo out; for i in 1 2 3 4 5 6 7; do echo \"error $i\" >&2; done; exit 3";
     let reason =
-        "`sh` ended with exit code 3; it said:\nerror 3\nerror 4\nerror 5\nerror 6\nerror 7";
+        "`sh` ended with exit code 3; it said: error 3\nerror 4\nerror 5\nerror 6\nerror 7";
     assert_eq!(Case::shell(script, "").reason(), reason);
     let quiet = Case::shell("echo what is wrong; exit 1", "");
-    assert_eq!(quiet.reason(), "`sh` ended with exit code 1; it said:\nwhat is wrong");
+    assert_eq!(quiet.reason(), "`sh` ended with exit code 1; it said: what is wrong");
     assert_eq!(Case::shell("kill -s SEGV $$", "").reason(), "`sh` was ended by signal 11");
     let allowed = Case::shell(&format!("{LINE}; exit 2"), "success = { exit_codes = [0, 2] }");
     assert_eq!(allowed.run().unwrap(), [2.5, 4.5, 6.5]);
@@ -55,7 +55,7 @@ fn a_run_must_say_that_it_converged() {
 fn output_that_is_missing_garbage_or_cut_off_is_refused() {
     let mut different = Vec::new();
     for (script, reason) in [
-        ("echo all is well", "`sh` wrote no file `y.csv`; it said:\nall is well"),
+        ("echo all is well", "`sh` wrote no file `y.csv`; it said: all is well"),
         ("head -c 100 /dev/zero > y.csv", "y.csv: has no column `time`"),
         (
             "printf 'time,y\\n1,1\\n2,2\\n' > y.csv",
@@ -110,7 +110,7 @@ fn json_that_is_no_response_is_refused() {
         Case::new(&command).reason()
     };
     let found = reason("echo '[1, 2]'");
-    assert_eq!(found, "the response has 2 values, expected 3; it said:\n[1, 2]");
+    assert_eq!(found, "the response has 2 values, expected 3; it said: [1, 2]");
     let found = reason("echo '[1, 2, 1e999]'");
     assert!(found.starts_with("expected the response as JSON in the last line printed"), "{found}");
 }

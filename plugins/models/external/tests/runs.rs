@@ -90,7 +90,7 @@ fn a_run_that_failed_is_tried_again_in_a_fresh_folder() {
     let hopeless = Case::shell("echo x >> {{ study }}/tries; echo no >&2; exit 4", "retries = 1");
     assert_eq!(
         hopeless.reason(),
-        "`sh` ended with exit code 4; it said:\nno (the last of 2 attempts)"
+        "`sh` ended with exit code 4; it said: no (the last of 2 attempts)"
     );
     assert_eq!(hopeless.read("tries").lines().count(), 2);
 }

@@ -24,7 +24,7 @@ fn what_goes_wrong_costs_one_run() {
         ("sys.exit(3)", "SystemExit: 3, in line 4: `sys.exit(3)`"),
         (
             "print('bye'); sys.stdout.flush(); os._exit(7)",
-            "the worker ended with exit code 7; it said:\nbye",
+            "the worker ended with exit code 7; it said: bye",
         ),
         ("os.abort()", "the worker was ended by a signal"),
         ("os.close(1); os.close(2); return None", "expected values along `sensor`, found None"),

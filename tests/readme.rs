@@ -1,0 +1,144 @@
+//! READMEs of examples as a newcomer follows them: in a copy of the folder, command by command.
+//!
+//! A block `sh` is done line by line. A block `text` behind it is what its last command prints, `…` for what differs from
+//! machine to machine; when it begins with `error` the command ends with code 1, as no other does.
+
+use std::ffi::OsString;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+use tempfile::TempDir;
+
+use crate::docs::markdown::Page;
+use crate::quick;
+
+/// Folders of the project, copied to a place outside of it, and the page that is followed there.
+pub struct Walk {
+    copy: TempDir,
+    page: PathBuf,
+    /// The folder in which the commands are given, from that of the copy.
+    place: PathBuf,
+    /// Folders in which programs are looked for before those of `PATH`.
+    pub programs: Vec<PathBuf>,
+    pub variables: Vec<(&'static str, OsString)>,
+    /// Programs that the page leaves running.
+    started: Vec<Child>,
+}
+
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let (path, name) = entry.map(|entry| (entry.path(), entry.file_name())).unwrap();
+        // What somebody's own walk has left there.
+        if ["runs", "__pycache__"].iter().any(|own| name == *own) {
+            continue;
+        }
+        if path.is_dir() {
+            copy(&path, &to.join(name));
+        } else {
+            fs::copy(&path, to.join(name)).unwrap();
+        }
+    }
+}
+
+impl Walk {
+    /// Copies folders; the first has the page, `place` is where its commands are given. Programs are those of the tests.
+    pub fn begin(folders: &[&str], place: &str) -> Self {
+        let to = tempfile::tempdir().unwrap();
+        for folder in folders {
+            copy(&quick::root().join(folder), &to.path().join(folder));
+        }
+        let page = to.path().join(folders[0]).join("README.md");
+        let lacuna = PathBuf::from(quick::command().get_program());
+        let mut programs = vec![lacuna.parent().unwrap().to_owned()];
+        if let Some(python) = std::env::var_os("LACUNA_PYTHON") {
+            programs.push(Path::new(&python).parent().unwrap().to_owned());
+        }
+        let (variables, started) = (Vec::new(), Vec::new());
+        Self { copy: to, page, place: place.into(), programs, variables, started }
+    }
+
+    /// A path as the commands have it.
+    pub fn path(&self, path: &str) -> PathBuf {
+        self.copy.path().join(&self.place).join(path)
+    }
+
+    fn command(&self, line: &str) -> Command {
+        let old = std::env::var_os("PATH").unwrap_or_default();
+        let folders = self.programs.iter().cloned().chain(std::env::split_paths(&old));
+        let mut command = Command::new("sh");
+        command.args(["-c", line]).current_dir(self.path(""));
+        command.env("PATH", std::env::join_paths(folders).unwrap()).stdin(Stdio::null());
+        command.envs(self.variables.iter().map(|(name, value)| (name, value)));
+        command
+    }
+
+    /// Gives a command, and returns what it prints; it must end with this code.
+    pub fn give(&mut self, line: &str, code: i32) -> String {
+        if let Some(line) = line.strip_suffix(" &") {
+            let mut command = self.command(&format!("exec {line}"));
+            self.started.push(command.stdout(Stdio::null()).spawn().unwrap());
+            return String::new();
+        }
+        let output = self.command(&format!("{{ {line}\n}} 2>&1")).output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{line}\n{text}");
+        text
+    }
+
+    /// Ends one of the programs that were left running, counted from 0.
+    pub fn end(&mut self, number: usize) {
+        self.started[number].kill().unwrap();
+        self.started[number].wait().unwrap();
+    }
+
+    /// Follows the part of the page below a heading.
+    pub fn follow(&mut self, heading: &str) {
+        let part = Page::read(&self.page).section(heading);
+        let (commands, texts) = (part.blocks("sh"), part.blocks("text"));
+        assert!(!commands.is_empty(), "nothing is done below `{heading}`");
+        for (i, block) in commands.iter().enumerate() {
+            let next = commands.get(i + 1).map_or(usize::MAX, |block| block.line);
+            let shown = texts.iter().find(|text| (block.line..next).contains(&text.line));
+            let shown = shown.map_or("", |text| text.text.as_str());
+            let fails = shown.starts_with("error");
+            let lines: Vec<&str> = block.text.lines().collect();
+            let mut said = String::new();
+            for (k, line) in lines.iter().enumerate() {
+                said = self.give(line, i32::from(fails && k + 1 == lines.len()));
+            }
+            for wanted in shown.lines() {
+                let there = said.lines().any(|line| like(line.trim_end(), wanted.trim_end()));
+                assert!(there, "{}\nprints no line `{wanted}`, but\n{said}", block.text);
+            }
+        }
+    }
+}
+
+/// Whether two lines are the same but for what `…` stands for.
+fn like(line: &str, wanted: &str) -> bool {
+    let Some((first, rest)) = wanted.split_once('…') else { return line == wanted };
+    let Some(after) = line.strip_prefix(first) else { return false };
+    (0..=after.len()).any(|i| after.get(i..).is_some_and(|after| like(after, rest)))
+}
+
+impl Drop for Walk {
+    fn drop(&mut self) {
+        for child in &mut self.started {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+#[test]
+fn a_line_is_like_another_where_it_may_be_anything() {
+    let line = "  run007     failed  0.1 s  exit code 3";
+    for wanted in [line, "  run007     failed … s  exit code 3", "  run007…", "…3", "…"] {
+        assert!(like(line, wanted), "{wanted}");
+    }
+    for wanted in ["  run007", "run007…", "  run007     failed … s", "…s … s …"] {
+        assert!(!like(line, wanted), "{wanted}");
+    }
+}
