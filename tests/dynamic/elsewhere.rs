@@ -75,6 +75,7 @@ fn a_library_that_was_exchanged_meanwhile_is_refused_by_the_worker() {
     );
     let out = folder.path().join("out");
     let (code, text) = quick::said(&mut run(&path, &out, &executor));
+    // Of what a worker said the end is shown, up to a length; the hash that it found comes last.
     let after = lacuna::run::files::hash_file(&library).unwrap();
     assert_eq!(code, Some(1), "{text}");
     let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -84,7 +85,10 @@ fn a_library_that_was_exchanged_meanwhile_is_refused_by_the_worker() {
         )),
         "{text}"
     );
-    assert!(words.contains(&format!("expected sha256 `{before}`, found `{after}`")), "{text}");
+    assert!(
+        words.contains(&format!("expected sha256 `{before}`, found `{}", &after[..8])),
+        "{text}"
+    );
     assert!(!out.join("2-simulate/stage.json").exists());
 }
 

@@ -81,6 +81,11 @@ fn a_library_that_cannot_be_used_says_why() {
             "its discrepancy `no_function` has no function `likelihood`",
         ),
         ("no_schema", "SCHEMA_IS_NONE", "gives a schema of its options that is none"),
+        (
+            "deep_schema",
+            "SCHEMA_IS_DEEP",
+            "that is none: `schema` answers JSON that cannot be read: recursion limit",
+        ),
         ("no_start", "DOES_NOT_START", "it does not start: status 3"),
     ] {
         let said = refused(name, &[define]);
@@ -135,11 +140,6 @@ fn what_cannot_be_made_is_an_error_that_names_the_library() {
         ("absent", "LIKELIHOOD_ABSENT", "`likelihood` is not there"),
         ("no_object", "NO_LIKELIHOOD", "its likelihood is not there"),
         ("half_a_table", "HALF_A_TABLE", "its likelihood has a table of"),
-        (
-            "deep",
-            "DEEP_JSON",
-            "`hyperparameters` answers JSON that cannot be read: recursion limit",
-        ),
         (
             "endless_text",
             "ENDLESS_TEXT",

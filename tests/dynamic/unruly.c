@@ -19,8 +19,11 @@ static void ended(int letter)
 {
 #ifdef ENDED
     FILE *file = fopen(ENDED, "a");
-    fputc(letter, file);
-    fclose(file);
+    /* The folder may be gone by now. */
+    if (file != NULL) {
+        fputc(letter, file);
+        fclose(file);
+    }
 #else
     (void)letter;
 #endif

@@ -93,8 +93,8 @@ fn a_library_of_each_kind_keeps_its_contract_and_serves_one_study() {
     kept::<dyn Design>(|name, plugin| sound(plugin, contract::design(name, plugin)));
     kept::<dyn Discrepancy>(|name, plugin| sound(plugin, contract::discrepancy(name, plugin)));
     kept::<dyn Effect>(|name, plugin| sound(plugin, contract::effect(name, plugin)));
-    kept::<dyn Model>(|name, plugin| model(name, plugin));
-    kept::<dyn Reader>(|name, plugin| reader(name, plugin, "columns"));
+    kept::<dyn Model>(|name, plugin| sound(plugin, model(name, plugin)));
+    kept::<dyn Reader>(|name, plugin| sound(plugin, reader(name, plugin, "columns")));
     kept::<dyn Sampler>(|name, plugin| sound(plugin, contract::sampler(name, plugin)));
     kept::<dyn Surrogate>(|name, plugin| sound(plugin, contract::surrogate(name, plugin)));
     one_study(libraries);

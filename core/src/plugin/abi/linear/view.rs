@@ -46,7 +46,7 @@ impl LinearView {
     /// What was answered; without that the map has a fault.
     fn sound<T>(&self, answered: Result<T, Refusal>) -> Option<T> {
         let complain = |refusal: Refusal| {
-            self.fault.report(format_args!("its linear map: {}", refusal.message))
+            self.fault.report(format_args!("its linear map: {}", refusal.message));
         };
         answered.map_err(complain).ok()
     }
@@ -149,9 +149,10 @@ impl SquaresView {
     fn ask(&self, points: &Matrix, columns: usize, gradient: bool) -> Matrix {
         let mut values = Matrix::from_fn(points.rows(), columns, |_, _| f64::NAN);
         let to = values.as_mut_slice().as_mut_ptr();
-        let (what, function) = match gradient {
-            true => ("gradient", self.functions.gradient),
-            false => ("values", self.functions.values),
+        let (what, function) = if gradient {
+            ("gradient", self.functions.gradient)
+        } else {
+            ("values", self.functions.values)
         };
         let call = |a| {
             // SAFETY: the form is alive, and the buffer has `points x columns` numbers.

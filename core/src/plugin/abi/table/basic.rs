@@ -89,7 +89,7 @@ impl Text {
 
     /// Whether it can be a text: there are bytes where it says so, and not more than memory has addresses.
     pub fn is_sound(self) -> bool {
-        self.length == 0 || (!self.bytes.is_null() && self.length <= isize::MAX as usize)
+        self.length == 0 || (!self.bytes.is_null() && isize::try_from(self.length).is_ok())
     }
 
     /// The bytes; none where it cannot be a text.
