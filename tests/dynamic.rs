@@ -37,6 +37,17 @@ use lacuna::plugin::abi::library::{self, Library};
 use lacuna_plugins as _;
 use lacuna_twin as _;
 
+/// How libraries are built outside of this workspace: all in one way, so that they share what is compiled; the engine in
+/// them with less optimisation than in the program, because the boundary has to hold between such builds.
+fn with_profile() -> impl Iterator<Item = &'static str> {
+    let settings = [
+        "profile.dev.debug=\"line-tables-only\"",
+        "profile.dev.package.lacuna-linalg.opt-level=3",
+        "profile.dev.package.lacuna-core.opt-level=0",
+    ];
+    settings.into_iter().flat_map(|setting| ["--config", setting])
+}
+
 /// The library of twins, which was built beside this test.
 fn twin_path() -> PathBuf {
     let test = std::env::current_exe().unwrap();

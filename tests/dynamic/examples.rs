@@ -13,7 +13,7 @@ use lacuna::plugin::{Context, Discrepancy, Model, Sampler};
 use lacuna::study::emit;
 use lacuna::study::resolve::{Use, load_for};
 
-use super::quick;
+use super::{quick, with_profile};
 
 /// The Rust example as a library: a workspace of its own, which shares what is compiled with this one.
 fn rust() -> &'static Path {
@@ -23,7 +23,8 @@ fn rust() -> &'static Path {
         let profile = test.parent().unwrap().parent().unwrap();
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let mut build = Command::new(cargo);
-        build.args(["build", "--quiet", "--target-dir"]).arg(profile.parent().unwrap());
+        build.args(["build", "--quiet"]).args(with_profile());
+        build.arg("--target-dir").arg(profile.parent().unwrap());
         build.current_dir(quick::root().join("examples/plugin_rust"));
         if profile.ends_with("release") {
             build.arg("--release");

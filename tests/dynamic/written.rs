@@ -13,19 +13,11 @@ use lacuna::plugin::registry::{self, Kind};
 use lacuna::plugin::{Design, Discrepancy, Effect, Model, Reader, Sampler, Surrogate};
 
 use super::contracts::{model, reader, sound};
-use super::quick;
+use super::{quick, with_profile};
 
 /// The kinds that libraries can bring.
 const KINDS: [&str; 7] =
     ["design", "discrepancy", "effect", "model", "reader", "sampler", "surrogate"];
-
-/// The rest of this workspace's profile, beside what a written manifest says: with it the crates share what the example in
-/// Rust has compiled, and build nothing but themselves.
-const PROFILE: [&str; 3] = [
-    "profile.dev.debug=\"line-tables-only\"",
-    "profile.dev.package.lacuna-linalg.opt-level=3",
-    "profile.dev.package.lacuna-core.opt-level=2",
-];
 
 /// The folder of this test's profile, such as `target/debug`.
 fn profile() -> PathBuf {
@@ -35,7 +27,7 @@ fn profile() -> PathBuf {
 fn cargo(verb: &str, folder: &Path) -> String {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut cargo = Command::new(cargo);
-    cargo.arg(verb).args(PROFILE.iter().flat_map(|setting| ["--config", setting]));
+    cargo.arg(verb).args(with_profile());
     cargo.arg("--target-dir").arg(profile().parent().unwrap()).current_dir(folder);
     if profile().ends_with("release") {
         cargo.arg("--release");
