@@ -15,7 +15,7 @@ pub use cause::{Cause, Growth, Retry};
 pub use follow::follow;
 pub use ledger::Submission;
 pub use look::{cancel, look};
-pub use scheduler::{Plan, Scheduler, TaskState};
+pub use scheduler::{Plan, Scheduler, States, TaskState};
 pub use script::{Frame, Worker};
 
 use lacuna::study::values::{Count, Positive};

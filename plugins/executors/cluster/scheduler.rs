@@ -33,12 +33,8 @@ pub trait Scheduler {
     /// over and writing down.
     fn find(&self, name: &str) -> Result<Option<String>, Stop>;
 
-    /// The state of the tasks of some submissions, by the submission's number in the ledger and the task; what the
-    /// scheduler does not know is left out.
-    fn states(
-        &self,
-        submissions: &[&Submission],
-    ) -> Result<BTreeMap<(usize, usize), TaskState>, Stop>;
+    /// The state of the tasks of some submissions; what the scheduler does not know is left out.
+    fn states(&self, submissions: &[&Submission]) -> Result<States, Stop>;
 
     /// Ends all tasks of the submissions with these numbers, of which some may have ended.
     fn cancel(&self, jobs: &[&str]) -> Result<(), Stop>;
@@ -75,6 +71,9 @@ pub struct Plan<'a> {
     /// The factor on the memory.
     pub memory: f64,
 }
+
+/// Where tasks are, by the submission's number in the ledger and the task.
+pub type States = BTreeMap<(usize, usize), TaskState>;
 
 /// Where a task is.
 #[derive(Debug, Clone, PartialEq, Eq)]

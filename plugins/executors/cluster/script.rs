@@ -37,8 +37,11 @@ pub struct Worker<'a> {
 pub fn write(frame: &Frame, worker: &Worker<'_>, plan: &Plan<'_>) -> Result<PathBuf, Stop> {
     for (what, path) in [("run directory", plan.folder), ("study", plan.study)] {
         if path.to_str().is_none_or(|text| text.contains(['\n', '\r'])) {
-            return Err(Stop::new(format!("the path of the {what} is {path:?}"))
-                .help("job scripts take UTF-8 without line breaks: move it"));
+            let path = path.to_string_lossy().replace(['\n', '\r'], "\u{23ce}");
+            return Err(Stop::new(format!(
+                "no job script can have the path of the {what}: {path}"
+            ))
+            .help("let it be UTF-8 without line breaks"));
         }
     }
     let program = program::on_nodes(worker.program, plan.study)?;
@@ -146,10 +149,13 @@ mod tests {
         let (said, code) = ran("/bin/echo", &["export A='a b'", "test \"$A\" = 'a b'"]);
         assert!(said.starts_with("work ") && said.contains("100% \"fine\" --task 3"), "{said}");
         assert_eq!(code, 0);
-        let (said, code) = ran("/bin/echo", &["source /nowhere/it's.sh 2>/dev/null"]);
+        let (said, code) = ran("/bin/echo", &["source \"/nowhere/it's.sh\" 2>/dev/null"]);
         assert_eq!(code, 1);
         assert!(!said.contains("work "), "{said}");
-        assert!(said.contains("`source /nowhere/it's.sh 2>/dev/null` of `setup` ended"), "{said}");
+        assert!(
+            said.contains("`source \"/nowhere/it's.sh\" 2>/dev/null` of `setup` ended"),
+            "{said}"
+        );
         assert_eq!(ran("/bin/echo", &["false || true"]).1, 0);
         assert_eq!(ran("/bin/echo", &["if true\nthen exit 9\nfi"]).1, 9);
     }
@@ -173,6 +179,6 @@ mod tests {
         let (folder, study) = (Path::new("/a\nb"), Path::new("/study"));
         let plan = Plan { folder, study, name: "x", tasks: 1, time: 1.0, memory: 1.0 };
         let stop = write(&frame, &worker, &plan).unwrap_err();
-        assert!(stop.message.contains("the path of the run directory is"), "{stop}");
+        assert!(stop.message.contains("the path of the run directory: /a"), "{stop}");
     }
 }

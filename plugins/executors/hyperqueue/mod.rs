@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::amount::Span;
 use super::cluster::scheduler::Rules;
-use super::cluster::{self, Frame, Growth, Plan, Retry, Scheduler, Submission, TaskState, Worker};
+use super::cluster::{self, Frame, Growth, Plan, Retry, Scheduler, States, Submission, Worker};
 use super::command::said;
 use super::program;
 use crate::models::process;
@@ -212,11 +212,8 @@ impl Scheduler for HyperQueue {
         state::find(&self.ask(&words)?, name)
     }
 
-    fn states(
-        &self,
-        submissions: &[&Submission],
-    ) -> Result<BTreeMap<(usize, usize), TaskState>, Stop> {
-        let mut states = BTreeMap::new();
+    fn states(&self, submissions: &[&Submission]) -> Result<States, Stop> {
+        let mut states = States::new();
         for submission in submissions {
             let Some(job) = &submission.job else { continue };
             let words = ["job", "info", job].map(str::to_owned);

@@ -1,11 +1,9 @@
 //! What `hq` answers in JSON.
 
-use std::collections::BTreeMap;
-
 use lacuna::run::Stop;
 use serde_json::Value;
 
-use crate::executors::cluster::{Cause, Submission, TaskState};
+use crate::executors::cluster::{Cause, States, Submission, TaskState};
 
 fn json(text: &str) -> Result<Value, Stop> {
     serde_json::from_str(text).map_err(|error| {
@@ -28,11 +26,7 @@ pub fn find(text: &str, name: &str) -> Result<Option<String>, Stop> {
 }
 
 /// The tasks of a submission from the information on its job.
-pub fn read(
-    text: &str,
-    submission: &Submission,
-    states: &mut BTreeMap<(usize, usize), TaskState>,
-) -> Result<(), Stop> {
+pub fn read(text: &str, submission: &Submission, states: &mut States) -> Result<(), Stop> {
     let jobs = json(text)?;
     // A server that was started anew counts from one again: another job may have our number.
     let mut jobs = jobs.as_array().into_iter().flatten();

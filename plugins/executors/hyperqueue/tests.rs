@@ -8,7 +8,7 @@ use lacuna::plugin::Executor;
 use lacuna::plugin::registry::from_text;
 
 use super::*;
-use crate::executors::cluster::Cause;
+use crate::executors::cluster::{Cause, TaskState};
 
 fn options(text: &str) -> HyperQueue {
     let built = from_text::<dyn Executor>("hyperqueue", text).unwrap();

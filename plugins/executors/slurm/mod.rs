@@ -4,7 +4,6 @@ mod environment;
 mod reasons;
 mod state;
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use lacuna::plugin::executor::{Batch, Finished, Seen};
@@ -18,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use super::amount::{Memory, Span, as_clock};
 use super::cluster::scheduler::Rules;
 use super::cluster::script::{quoted, word};
-use super::cluster::{self, Frame, Growth, Plan, Retry, Scheduler, Submission, TaskState, Worker};
+use super::cluster::{self, Frame, Growth, Plan, Retry, Scheduler, States, Submission, Worker};
 use super::command;
 use super::program;
 use crate::models::process;
@@ -244,10 +243,7 @@ impl Scheduler for Slurm {
         Ok(job)
     }
 
-    fn states(
-        &self,
-        submissions: &[&Submission],
-    ) -> Result<BTreeMap<(usize, usize), TaskState>, Stop> {
+    fn states(&self, submissions: &[&Submission]) -> Result<States, Stop> {
         state::states(submissions)
     }
 

@@ -5,10 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use lacuna::run::Stop;
 
 use super::reasons;
-use crate::executors::cluster::{Cause, Submission, TaskState};
+use crate::executors::cluster::{Cause, States, Submission, TaskState};
 use crate::executors::command::said;
-
-type States = BTreeMap<(usize, usize), TaskState>;
 
 /// The number in what `sbatch --parsable` prints: the last line, `12` or `12;cluster`. Plugins and wrappers of a site may print
 /// before it.

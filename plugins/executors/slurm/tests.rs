@@ -9,7 +9,7 @@ use lacuna::plugin::registry::from_text;
 
 use super::state::{exit_codes, max_array_size, of_accounts, of_queue, submitted};
 use super::*;
-use crate::executors::cluster::Cause;
+use crate::executors::cluster::{Cause, TaskState};
 
 fn submission(number: usize, name: &str, job: &str) -> Submission {
     let run = |i: usize| vec![format!("run00{i}")];

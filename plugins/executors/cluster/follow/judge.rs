@@ -10,7 +10,7 @@ use lacuna::work::Begun;
 
 use super::{Campaign, Hand};
 use crate::executors::cluster::ledger::{self, Settled, Submission};
-use crate::executors::cluster::{Cause, TaskState, script};
+use crate::executors::cluster::{Cause, States, TaskState, script};
 use crate::models::process::tail_of_file;
 
 /// How many answers in a row a scheduler may owe.
@@ -55,7 +55,7 @@ impl Campaign<'_> {
     }
 
     /// What the scheduler says of all that is open; `None` when it does not answer, or nothing is.
-    fn states(&mut self) -> Result<Option<BTreeMap<(usize, usize), TaskState>>, Stop> {
+    fn states(&mut self) -> Result<Option<States>, Stop> {
         let asked = self.find_numbers().and_then(|()| {
             let open: Vec<&Submission> = self.submissions.iter().filter(|s| !s.is_over()).collect();
             if open.is_empty() { Ok(None) } else { self.scheduler.states(&open).map(Some) }
@@ -74,7 +74,7 @@ impl Campaign<'_> {
     }
 
     /// Tells each new reason for which jobs wait for more than their turn.
-    fn tell_reasons(&mut self, states: &BTreeMap<(usize, usize), TaskState>) {
+    fn tell_reasons(&mut self, states: &States) {
         let mut waiting: BTreeMap<&String, usize> = BTreeMap::new();
         for state in states.values() {
             if let TaskState::Held(why) = state {

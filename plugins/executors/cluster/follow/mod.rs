@@ -158,8 +158,8 @@ impl<'a> Campaign<'a> {
 
     /// Sets aside the word of some runs that all runs are in vain: it has been told, or nobody waited for it.
     fn clear_hopeless(&self, which: impl Fn(&str) -> bool) -> Result<(), Stop> {
-        let of_ours = self.batch.jobs.iter().map(|job| &job.name).filter(|name| which(name));
-        of_ours.map(|name| Marker::clear_hopeless(self.runs(), name)).collect()
+        let mut of_ours = self.batch.jobs.iter().map(|job| &job.name).filter(|name| which(name));
+        of_ours.try_for_each(|name| Marker::clear_hopeless(self.runs(), name))
     }
 
     /// Notes how a run ended in the submission in which it is open.

@@ -12,7 +12,7 @@ use lacuna::work::evaluate;
 
 use super::*;
 use crate::executors::cluster::scheduler::Rules;
-use crate::executors::cluster::{Cause, Frame, Growth, Plan, Retry, TaskState, Worker};
+use crate::executors::cluster::{Cause, Frame, Growth, Plan, Retry, States, TaskState, Worker};
 
 type Answer<T> = Box<dyn Fn() -> Result<T, Stop>>;
 
@@ -84,7 +84,7 @@ impl Scheduler for Stub {
         (self.finds)()
     }
 
-    fn states(&self, all: &[&Submission]) -> Result<BTreeMap<(usize, usize), TaskState>, Stop> {
+    fn states(&self, all: &[&Submission]) -> Result<States, Stop> {
         let tasks = all.iter().flat_map(|s| s.open().map(|(task, _)| (s.number, task)));
         let state = self.state.as_ref();
         Ok(tasks.filter_map(|key| Some((key, state?.clone()))).collect())
