@@ -104,6 +104,10 @@ fn cancel(folder: &Path) -> Result<(), Failure> {
     let study = kept_study_for(folder, Use::Look)?;
     let executor = study.executor.as_ref().ok_or_else(|| Stop::new("the study has no executor"))?;
     let stopped = campaign::cancel(folder, &*executor.built.plugin)?;
+    if stopped == 0 {
+        print("no job of this campaign runs or waits");
+        return Ok(());
+    }
     let help = if RunDirectory::is_busy(folder) {
         "the process that waits for them will say that they were cancelled".to_owned()
     } else {

@@ -28,9 +28,10 @@ pub fn text(status: &Status, all: bool) -> String {
             if scenario.is_empty() { stage.to_owned() } else { format!("{stage}, {scenario}") };
         text.push_str(&format!("{name}: {} runs, {}\n", rows.len(), counts(&rows)));
         for state in State::ALL.into_iter().filter(|&state| all || state != State::Done) {
-            let some: Vec<&Row> = rows.iter().copied().filter(|row| row.state == state).collect();
+            let some: Vec<(usize, &Row)> =
+                rows.iter().copied().enumerate().filter(|(_, row)| row.state == state).collect();
             // One word from the cluster often stands for hundreds of runs.
-            for same in some.chunk_by(|a, b| !a.note.is_empty() && a.note == b.note) {
+            for same in some.chunk_by(|(_, a), (_, b)| !a.note.is_empty() && a.note == b.note) {
                 text.push_str(&line(same));
             }
         }
@@ -47,11 +48,15 @@ fn counts(rows: &[&Row]) -> String {
     some.map(|state| format!("{} {}", count(state), state.name())).collect::<Vec<_>>().join(", ")
 }
 
-/// One line for runs of which the same is to be said.
-fn line(rows: &[&Row]) -> String {
-    let [row, others @ ..] = rows else { return String::new() };
+/// One line for runs of which the same is to be said, each with its place among all.
+fn line(rows: &[(usize, &Row)]) -> String {
+    let [(first, row), others @ ..] = rows else { return String::new() };
     let name = match others.last() {
-        Some(last) => format!("{} to {} ({})", row.run, last.run, rows.len()),
+        Some((place, last)) if place - first + 1 == rows.len() => {
+            format!("{} to {} ({})", row.run, last.run, rows.len())
+        }
+        // Others that are well stand between them.
+        Some(_) => format!("{} and {} more", row.run, others.len()),
         None => row.run.clone(),
     };
     let note: String = row.note.replace('\n', "; ");
@@ -84,13 +89,17 @@ mod tests {
             row("run003", State::Waiting, "job 1, task 2: PENDING"),
             row("run004", State::Failed, "no such command"),
             row("run005", State::Failed, "no such command"),
+            row("run006", State::Failed, "no memory"),
+            row("run007", State::Done, ""),
+            row("run008", State::Failed, "no memory"),
         ];
         let status = Status { runs, warnings: Vec::new() };
         let expected = "\
-2-simulate: 5 runs, 1 done, 1 waiting, 3 failed
+2-simulate: 8 runs, 2 done, 1 waiting, 5 failed
   run003     waiting              job 1, task 2: PENDING
   run002     failed               exit code 7; and more
   run004 to run005 (2) failed               no such command
+  run006 and 1 more failed               no memory
 ";
         assert_eq!(text(&status, false), expected);
         assert!(text(&status, true).contains("  run001     done          1.5 s\n"));

@@ -44,7 +44,7 @@ pub fn ensemble(source: &EnsembleSource<'_>) -> Result<Ensemble, Stop> {
             format!("{count} of {all} runs failed, first `{}`: {}", first.run, first.reason);
         return Err(Stop::new(message)
             .saved(format!("the other runs in {}", folder.display()))
-            .help("run the study again to retry them, or name a reader in `[simulations]` and say there how many may be left out (`allow_failed`)"));
+            .help("`lacuna campaign status RUN` says why each has failed, `lacuna campaign retry RUN` makes them again; or name a reader in `[simulations]` and say there how many may be left out (`allow_failed`)"));
     }
     Ok(Ensemble {
         parameters,
