@@ -13,8 +13,10 @@ use crate::Arguments;
 fn pages() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let mut folders = vec![root.clone(), root.join("docs"), root.join("docs/reference")];
-    let cases = fs::read_dir(root.join("configs")).unwrap();
-    folders.extend(cases.map(|case| case.unwrap().path()).filter(|path| path.is_dir()));
+    for cases in ["configs", "examples"] {
+        let cases = fs::read_dir(root.join(cases)).unwrap();
+        folders.extend(cases.map(|case| case.unwrap().path()).filter(|path| path.is_dir()));
+    }
     let files = folders.iter().flat_map(|folder| fs::read_dir(folder).unwrap());
     let mut pages: Vec<PathBuf> = files.map(|file| file.unwrap().path()).collect();
     pages.retain(|path| path.extension().is_some_and(|extension| extension == "md"));
@@ -34,14 +36,29 @@ fn commands(line: &str) -> Vec<String> {
     all.filter_map(|text| text.strip_prefix("lacuna ")).map(str::to_owned).collect()
 }
 
+/// The words of a command, as a shell takes them apart.
+fn words(command: &str) -> Vec<String> {
+    let (mut words, mut quote) = (vec![String::new()], None);
+    for c in command.chars() {
+        match (quote, c) {
+            (None, '\'' | '"') => quote = Some(c),
+            (Some(open), c) if c == open => quote = None,
+            (None, c) if c.is_whitespace() => words.push(String::new()),
+            (_, c) => words.last_mut().unwrap().push(c),
+        }
+    }
+    words.retain(|word| !word.is_empty());
+    words
+}
+
 #[test]
 fn quoted_commands_are_understood() {
     let (mut found, mut refused) = (0, Vec::new());
     for page in pages() {
         let text = fs::read_to_string(&page).unwrap().replace("\\\n", " ");
         for command in text.lines().flat_map(commands) {
-            let words = command.split_whitespace().map(|word| word.trim_matches(['\'', '"']));
-            let parsed = Arguments::try_parse_from(std::iter::once("lacuna").chain(words));
+            let words = std::iter::once("lacuna".to_owned()).chain(words(&command));
+            let parsed = Arguments::try_parse_from(words);
             if let Err(error) = parsed {
                 refused.push(format!("{}: `lacuna {command}`: {error}", page.display()));
             }

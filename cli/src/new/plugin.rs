@@ -29,7 +29,7 @@ pub fn write(
     let here = std::env::current_dir().map_err(|error| wrong(&error.to_string(), ""))?;
     let tree = tree::around(&here);
     match (folder, &tree) {
-        (Some(folder), _) => as_library(skeleton, name, folder, &sdk(source, tree)?),
+        (Some(folder), _) => as_library(skeleton, name, folder, source.or(tree.as_deref())),
         (None, Some(tree)) => in_tree(skeleton, name, tree),
         (None, None) => {
             let text = format!("{} is not in Lacuna's source", here.display());
@@ -45,18 +45,13 @@ pub fn write(
     }
 }
 
-/// The folder of the SDK, from the root: in the source that is given, in that around the current folder, or in that from
-/// which this program was built.
-fn sdk(source: Option<&Path>, around: Option<PathBuf>) -> Result<PathBuf, Failure> {
-    let (found, text) = match source {
-        Some(source) => {
-            (tree::around(source), format!("{} is not in Lacuna's source", source.display()))
-        }
-        None => (
-            around.or_else(|| tree::around(Path::new(env!("CARGO_MANIFEST_DIR")))),
-            "Lacuna's source, which holds the SDK, is not found".to_owned(),
-        ),
+/// The folder of the SDK, from the root: in the source that is given, or in that from which this program was built.
+fn sdk(source: Option<&Path>) -> Result<PathBuf, Failure> {
+    let text = match source {
+        Some(source) => format!("{} is not in Lacuna's source", source.display()),
+        None => "Lacuna's source, which holds the SDK, is not found".to_owned(),
     };
+    let found = tree::around(source.unwrap_or(Path::new(env!("CARGO_MANIFEST_DIR"))));
     let help = "name a clone of it with `--source FOLDER`";
     let sdk = found.ok_or_else(|| wrong(&text, help))?.join("sdk");
     Ok(sdk.canonicalize().map_err(|error| files::cannot_read(&sdk, &error))?)
@@ -124,7 +119,12 @@ fn section(kind: &str) -> String {
     known.and_then(|kind| kind.sections.last()).copied().unwrap_or(kind).to_owned()
 }
 
-fn as_library(skeleton: &Skeleton, name: &str, folder: &Path, sdk: &Path) -> Result<(), Failure> {
+fn as_library(
+    skeleton: &Skeleton,
+    name: &str,
+    folder: &Path,
+    tree: Option<&Path>,
+) -> Result<(), Failure> {
     let kind = skeleton.kind;
     if !skeleton.in_libraries {
         let kinds = ALL.iter().filter(|other| other.in_libraries).map(|other| other.kind);
@@ -141,7 +141,7 @@ fn as_library(skeleton: &Skeleton, name: &str, folder: &Path, sdk: &Path) -> Res
         ));
     }
     let source = library::source(skeleton, name);
-    let manifest = library::manifest(name, &source, sdk);
+    let manifest = library::manifest(name, &source, &sdk(tree)?);
     files::write_atomic(&folder.join("Cargo.toml"), manifest.as_bytes())?;
     files::write_atomic(&folder.join("src/lib.rs"), source.as_bytes())?;
     let built = PathBuf::from("target/release").join(format!("{DLL_PREFIX}{name}{DLL_SUFFIX}"));
