@@ -98,7 +98,6 @@ fn origin(library: &Library) -> String {
     format!("from {} ({name} {version}, abi {major}.{minor}, sha256 {sha256})", path.display())
 }
 
-/// Loads libraries that the command line names.
 /// Loads the libraries that the command line names.
 pub fn load(libraries: &Libraries) -> Result<(), Failure> {
     for path in &libraries.files {
