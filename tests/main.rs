@@ -13,6 +13,7 @@ mod problems;
 mod python;
 mod quick;
 mod readme;
+mod refused;
 mod skeletons;
 mod slurm;
 mod studies;

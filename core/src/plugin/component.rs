@@ -29,6 +29,8 @@ pub struct Context<'a> {
     /// Whether the likelihood will have errors that all replicates share: of the emulator or of the
     /// model's numerics. Those of the replicates' mean are known only with the data.
     pub common_errors: bool,
+    /// Whether a plugin may start programs that the study names to look at them; `lacuna check` starts none.
+    pub starts_programs: bool,
 }
 
 impl<'a> Context<'a> {
@@ -42,6 +44,7 @@ impl<'a> Context<'a> {
             layout,
             runs: None,
             common_errors: false,
+            starts_programs: true,
         }
     }
 }
@@ -60,7 +63,8 @@ pub trait Component: Send + Sync {
     /// Second layer of checking: the options against the rest of the study. No files are touched.
     fn check(&self, _context: &Context<'_>, _complaints: &mut Complaints<'_>) {}
 
-    /// Third layer of checking: the options against the machine (files, commands). Nothing is changed.
+    /// Third layer of checking: the options against the machine (files, commands). Nothing is changed, and no program of the
+    /// study's is started unless the context allows it.
     fn environment(&self, _context: &Context<'_>, _complaints: &mut Complaints<'_>) {}
 
     /// Where it says that it can answer no more, for a plugin to which that may happen outside of any error; of one

@@ -296,6 +296,7 @@ fn each(
         let own = Context {
             given: &given,
             scenarios: &scenarios,
+            starts_programs: context.starts_programs,
             ..Context::new(context.directory, context.parameters, &link.asked)
         };
         look(i, link, &own);
