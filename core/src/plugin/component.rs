@@ -1,5 +1,6 @@
 //! What all kinds of plugins share.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -76,6 +77,12 @@ pub trait Component: Send + Sync {
     /// The libraries of the plugins that it asks, where its options choose some; its own is not its business.
     fn libraries(&self) -> Vec<&'static Library> {
         Vec::new()
+    }
+
+    /// The revisions of the plugins that it asks, where its options choose some, by kind and name; its own is not its
+    /// business.
+    fn revisions(&self) -> BTreeMap<String, u32> {
+        BTreeMap::new()
     }
 }
 

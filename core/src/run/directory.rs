@@ -8,6 +8,7 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 
+use super::made_by::{Asked, MadeBy};
 use super::{Observer, Stop, files};
 use crate::plugin::Fault;
 
@@ -38,8 +39,14 @@ pub struct Kept<T> {
 pub struct Record {
     /// The stage's folder.
     pub stage: String,
-    /// The hash of everything that went in.
+    /// The hash of everything that went in, and of what made it.
     pub inputs: String,
+    /// The hash of everything that went in alone; the same as `inputs` where no code has a part in it.
+    #[serde(default)]
+    pub asked: Option<String>,
+    /// What made it, as far as it depends on that.
+    #[serde(default)]
+    pub made_by: MadeBy,
     /// The SHA-256 of each file that came out.
     pub outputs: BTreeMap<String, String>,
     /// How long it took, in seconds.
@@ -64,6 +71,9 @@ pub struct RunDirectory {
     root: PathBuf,
     records: Vec<Record>,
     watched: Vec<Arc<Fault>>,
+    version: String,
+    /// Whether a stage was made again because another version had made it.
+    remade: bool,
     _lock: File,
 }
 
@@ -86,6 +96,11 @@ fn is_taken(tried: &Result<(), TryLockError>) -> bool {
 const RECORD: &str = "stage.json";
 pub(super) const INPUTS: &str = "inputs.sha256";
 
+/// The hash that the folder of a stage is for: of the stage's inputs and of what makes it; empty where there is none.
+pub fn inputs_of(folder: &Path) -> String {
+    fs::read_to_string(folder.join(INPUTS)).unwrap_or_default().trim().to_owned()
+}
+
 impl RunDirectory {
     /// Opens or makes the folder and locks it against other processes.
     pub fn open(root: &Path) -> Result<Self, Stop> {
@@ -99,7 +114,14 @@ impl RunDirectory {
                 Stop::new(message).help("wait for it, or choose another folder with `--out DIR`")
             );
         }
-        Ok(Self { root: root.to_owned(), records: Vec::new(), watched: Vec::new(), _lock: lock })
+        Ok(Self {
+            root: root.to_owned(),
+            records: Vec::new(),
+            watched: Vec::new(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            remade: false,
+            _lock: lock,
+        })
     }
 
     /// Whether a process works in a folder.
@@ -123,12 +145,19 @@ impl RunDirectory {
         self.watched = faults;
     }
 
+    /// Works as another version of the program, for tests of what that changes.
+    #[doc(hidden)]
+    pub fn pretend(&mut self, version: &str) {
+        version.clone_into(&mut self.version);
+    }
+
     /// The folder of a stage.
     pub fn stage_folder(&self, stage: &str) -> PathBuf {
         self.root.join(stage)
     }
 
-    /// Returns the stage's saved result when the hash of its `inputs` is unchanged; else makes and saves it.
+    /// Returns the stage's saved result when the hash of its `inputs` and of [what makes it](MadeBy) is unchanged; else
+    /// makes and saves it. What another version made is told: what is taken of it, and what is made again and why.
     ///
     /// `make` gets the stage's folder; what it wrote there in an earlier, interrupted attempt with the same
     /// inputs is still there, so that it can go on. A folder made from other inputs is set aside, not deleted,
@@ -140,12 +169,19 @@ impl RunDirectory {
         observer: &dyn Observer,
         make: impl FnOnce(&Path) -> Result<T, Stop>,
     ) -> Result<Kept<T>, Stop> {
-        let inputs = hash_of(stage, inputs)?;
+        let Asked { alone, whole: inputs, made_by } = Asked::of(stage, inputs, &self.version)?;
         let folder = self.stage_folder(stage);
+        let before = self.made_otherwise(stage, &alone, &inputs, &made_by);
         self.bring_folder(stage, &inputs)?;
         match finished(&folder, &inputs) {
             Finished::Whole(record) => match T::load(&folder) {
-                Ok(value) => return Ok(self.kept(record, value, false)),
+                Ok(value) => {
+                    if record.lacuna != self.version {
+                        let made = &record.lacuna;
+                        observer.note(&format!("`{stage}` is taken as lacuna {made} made it"));
+                    }
+                    return Ok(self.kept(record, value, false));
+                }
                 Err(_) => observer.warn(&format!(
                     "the files in {} do not read back; making them again",
                     folder.display()
@@ -155,7 +191,12 @@ impl RunDirectory {
                 "{} is missing or not as it was written; making it again",
                 folder.join(file).display()
             )),
-            Finished::No => {}
+            Finished::No => {
+                if let Some(why) = before {
+                    self.remade = true;
+                    observer.note(&format!("`{stage}` is made again: {why}"));
+                }
+            }
         }
         let begun = Instant::now();
         let made = make(&folder);
@@ -172,15 +213,80 @@ impl RunDirectory {
         }
         let finished =
             SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |elapsed| elapsed.as_secs());
-        let lacuna = env!("CARGO_PKG_VERSION").to_owned();
-        let record = Record { stage: stage.to_owned(), inputs, outputs, seconds, lacuna, finished };
+        let record = Record {
+            stage: stage.to_owned(),
+            inputs,
+            asked: Some(alone),
+            made_by,
+            outputs,
+            seconds,
+            lacuna: self.version.clone(),
+            finished,
+        };
         files::write_json(&folder.join(RECORD), &record)?;
         Ok(self.kept(record, value, true))
     }
 
+    /// Why a stage that was finished is not taken although the study asks for the same, if that is so.
+    fn made_otherwise(
+        &self,
+        stage: &str,
+        alone: &str,
+        inputs: &str,
+        made_by: &MadeBy,
+    ) -> Option<String> {
+        let all = self.finished_before(stage);
+        if all.iter().any(|(_, record)| record.inputs == inputs) {
+            return None;
+        }
+        // A record from before this was written down has the hash of the inputs alone.
+        let same = |record: &Record| record.asked.as_ref().unwrap_or(&record.inputs) == alone;
+        if let Some((folder, record)) = all.iter().find(|(_, record)| same(record)) {
+            let difference = made_by.difference(&record.made_by, &record.lacuna);
+            // Set aside where it is not already.
+            let place = if *folder == self.stage_folder(stage) {
+                self.aside(stage, &record.inputs)
+            } else {
+                folder.clone()
+            };
+            let kept = place.strip_prefix(&self.root).unwrap_or(&place).display();
+            return Some(format!("it was made by {difference}; what was made is kept in {kept}"));
+        }
+        let here = all.iter().find(|(folder, _)| *folder == self.stage_folder(stage));
+        here.filter(|(_, record)| self.remade && record.lacuna != self.version).map(
+            |(_, record)| {
+                format!("lacuna {} made it from results that are made again now", record.lacuna)
+            },
+        )
+    }
+
+    /// The records of a stage in this run directory, set aside or not, each with its folder.
+    fn finished_before(&self, stage: &str) -> Vec<(PathBuf, Record)> {
+        let aside = fs::read_dir(self.root.join(".kept")).into_iter().flatten().flatten();
+        let mut folders: Vec<PathBuf> = aside
+            .filter(|entry| {
+                let name = entry.file_name().to_string_lossy().into_owned();
+                name.rsplit_once('-').is_some_and(|(own, _)| own == stage)
+            })
+            .map(|entry| entry.path())
+            .collect();
+        folders.sort();
+        folders.insert(0, self.stage_folder(stage));
+        let record = |folder: PathBuf| {
+            let record = files::read_json::<Record>(&folder.join(RECORD)).ok()?;
+            Some((folder, record))
+        };
+        folders.into_iter().filter_map(record).collect()
+    }
+
+    /// The hash of a stage's inputs and of what makes it.
+    pub(super) fn hash_of(&self, stage: &str, inputs: &impl Serialize) -> Result<String, Stop> {
+        Ok(Asked::of(stage, inputs, &self.version)?.whole)
+    }
+
     /// Whether a stage is finished for these inputs.
     pub fn has(&self, stage: &str, inputs: &impl Serialize) -> Result<bool, Stop> {
-        let inputs = hash_of(stage, inputs)?;
+        let inputs = self.hash_of(stage, inputs)?;
         let folder = self.stage_folder(stage);
         let aside = self.aside(stage, &inputs);
         Ok([folder, aside].iter().any(|f| matches!(finished(f, &inputs), Finished::Whole(_))))
@@ -268,12 +374,6 @@ fn spent_before(folder: &Path) -> f64 {
     text.trim().parse().unwrap_or(0.0)
 }
 
-pub(super) fn hash_of(stage: &str, inputs: &impl Serialize) -> Result<String, Stop> {
-    let text = serde_json::to_string(&(stage, inputs))
-        .map_err(|error| Stop::new(format!("cannot hash the inputs of {stage}: {error}")))?;
-    Ok(files::hash(text.as_bytes()))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -306,6 +406,54 @@ mod tests {
         assert_eq!(keep(&mut run, 2, 0.2), (0.2, true));
         assert_eq!(keep(&mut run, 1, 9.0), (0.1, false));
         assert_eq!(keep(&mut run, 2, 9.0), (0.2, false));
+    }
+
+    /// Notes what is said.
+    #[derive(Default)]
+    struct Said(std::sync::Mutex<Vec<String>>);
+
+    impl Observer for Said {
+        fn begin(&self, _: &str, _: &str, _: u64) {}
+        fn advance(&self, _: u64) {}
+        fn end(&self, _: &str, _: &str) {}
+        fn warn(&self, _: &str) {}
+        fn note(&self, text: &str) {
+            self.0.lock().unwrap().push(text.to_owned());
+        }
+    }
+
+    #[test]
+    fn what_another_version_made_is_made_again_and_kept_but_runs_are_taken() {
+        let folder = tempfile::tempdir().unwrap();
+        let all = |version: &str, value: f64| {
+            let mut run = RunDirectory::open(folder.path()).unwrap();
+            run.pretend(version);
+            let said = Said::default();
+            let runs = run.keep("2-simulate", &1, &said, |_| Ok(Number(value))).unwrap();
+            let inputs = (2, runs.hash);
+            let fitted = run.keep("4-surrogate", &inputs, &said, |_| Ok(Number(value))).unwrap();
+            let inputs = (3, fitted.hash);
+            let drawn = run.keep("5-calibrate", &inputs, &said, |_| Ok(Number(value))).unwrap();
+            let values = [runs.value.0, fitted.value.0, drawn.value.0];
+            (values, said.0.into_inner().unwrap())
+        };
+        assert_eq!(all("0.1.0", 0.1), ([0.1; 3], Vec::new()));
+        assert_eq!(all("0.1.0", 0.9), ([0.1; 3], Vec::new()));
+        let (values, said) = all("0.2.0", 0.2);
+        assert_eq!(values, [0.1, 0.2, 0.2]);
+        assert_eq!(said.len(), 3, "{said:?}");
+        assert_eq!(said[0], "`2-simulate` is taken as lacuna 0.1.0 made it");
+        let fitted = "`4-surrogate` is made again: it was made by lacuna 0.1.0, and this is lacuna \
+                      0.2.0; what was made is kept in .kept/4-surrogate-";
+        assert!(said[1].starts_with(fitted), "{}", said[1]);
+        let kept = said[1].rsplit(' ').next().unwrap();
+        assert!(folder.path().join(kept).join(RECORD).exists(), "{kept}");
+        let drawn = "`5-calibrate` is made again: lacuna 0.1.0 made it from results that are made \
+                     again now";
+        assert_eq!(said[2], drawn);
+        // Back, and forth: nothing is lost.
+        assert_eq!(all("0.1.0", 0.9).0, [0.1; 3]);
+        assert_eq!(all("0.2.0", 0.9).0, [0.1, 0.2, 0.2]);
     }
 
     #[test]

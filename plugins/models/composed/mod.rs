@@ -278,6 +278,10 @@ impl Component for Composed {
     fn libraries(&self) -> Vec<&'static Library> {
         self.parts.iter().flat_map(Part::libraries).collect()
     }
+
+    fn revisions(&self) -> BTreeMap<String, u32> {
+        self.parts.iter().flat_map(Part::revisions).collect()
+    }
 }
 
 /// Looks at each part in the context that it sees: what the parts before it hand on is given.
