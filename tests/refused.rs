@@ -21,7 +21,7 @@ fn said(old: &str, new: &str) -> String {
 
 #[test]
 fn names_that_become_files_are_no_paths() {
-    for name in ["../../evil", "/tmp/evil", "a/b", "..", ".", "", ".hidden", "a\\\\b", "x\\ny"] {
+    for name in ["../../evil", "/evil", "a/b", "..", ".", "", ".hidden", "a\\\\b", "x\\ny"] {
         let text = said("name = \"oscillator\"", &format!("name = \"{name}\""));
         assert!(text.contains("wrong value for `name`"), "{name}: {text}");
         assert!(text.contains("expected a plain name for files"), "{name}: {text}");

@@ -58,6 +58,12 @@ pub struct Record {
 }
 
 impl Record {
+    /// Whether it was made from inputs of this hash, whatever made it. A record from before this was written down has
+    /// that hash as its only one.
+    pub(super) fn is_of(&self, alone: &str) -> bool {
+        self.asked.as_ref().unwrap_or(&self.inputs) == alone
+    }
+
     fn hash(&self) -> String {
         let lines: String =
             self.outputs.iter().map(|(file, hash)| format!("{hash} {file}\n")).collect();
@@ -68,12 +74,14 @@ impl Record {
 /// A folder that holds all artifacts of a study's run.
 #[derive(Debug)]
 pub struct RunDirectory {
-    root: PathBuf,
+    pub(super) root: PathBuf,
     records: Vec<Record>,
     watched: Vec<Arc<Fault>>,
-    version: String,
+    pub(super) version: String,
     /// Whether a stage was made again because another version had made it.
-    remade: bool,
+    pub(super) remade: bool,
+    /// Whether results are taken whatever made them.
+    pub(super) looking: bool,
     _lock: File,
 }
 
@@ -93,7 +101,7 @@ fn is_taken(tried: &Result<(), TryLockError>) -> bool {
     matches!(tried, Err(TryLockError::WouldBlock))
 }
 
-const RECORD: &str = "stage.json";
+pub(super) const RECORD: &str = "stage.json";
 pub(super) const INPUTS: &str = "inputs.sha256";
 
 /// The hash that the folder of a stage is for: of the stage's inputs and of what makes it; empty where there is none.
@@ -120,6 +128,7 @@ impl RunDirectory {
             watched: Vec::new(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             remade: false,
+            looking: false,
             _lock: lock,
         })
     }
@@ -143,6 +152,11 @@ impl RunDirectory {
     /// Keeps no result of a stage during which one of these had a fault.
     pub fn watch(&mut self, faults: Vec<Arc<Fault>>) {
         self.watched = faults;
+    }
+
+    /// Takes what is finished whatever version made it: to look at a finished run is no reason to make it again.
+    pub fn look(&mut self) {
+        self.looking = true;
     }
 
     /// Works as another version of the program, for tests of what that changes.
@@ -171,6 +185,7 @@ impl RunDirectory {
     ) -> Result<Kept<T>, Stop> {
         let Asked { alone, whole: inputs, made_by } = Asked::of(stage, inputs, &self.version)?;
         let folder = self.stage_folder(stage);
+        let inputs = self.looked_at(stage, &alone).unwrap_or(inputs);
         let before = self.made_otherwise(stage, &alone, &inputs, &made_by);
         self.bring_folder(stage, &inputs)?;
         match finished(&folder, &inputs) {
@@ -227,58 +242,6 @@ impl RunDirectory {
         Ok(self.kept(record, value, true))
     }
 
-    /// Why a stage that was finished is not taken although the study asks for the same, if that is so.
-    fn made_otherwise(
-        &self,
-        stage: &str,
-        alone: &str,
-        inputs: &str,
-        made_by: &MadeBy,
-    ) -> Option<String> {
-        let all = self.finished_before(stage);
-        if all.iter().any(|(_, record)| record.inputs == inputs) {
-            return None;
-        }
-        // A record from before this was written down has the hash of the inputs alone.
-        let same = |record: &Record| record.asked.as_ref().unwrap_or(&record.inputs) == alone;
-        if let Some((folder, record)) = all.iter().find(|(_, record)| same(record)) {
-            let difference = made_by.difference(&record.made_by, &record.lacuna);
-            // Set aside where it is not already.
-            let place = if *folder == self.stage_folder(stage) {
-                self.aside(stage, &record.inputs)
-            } else {
-                folder.clone()
-            };
-            let kept = place.strip_prefix(&self.root).unwrap_or(&place).display();
-            return Some(format!("it was made by {difference}; what was made is kept in {kept}"));
-        }
-        let here = all.iter().find(|(folder, _)| *folder == self.stage_folder(stage));
-        here.filter(|(_, record)| self.remade && record.lacuna != self.version).map(
-            |(_, record)| {
-                format!("lacuna {} made it from results that are made again now", record.lacuna)
-            },
-        )
-    }
-
-    /// The records of a stage in this run directory, set aside or not, each with its folder.
-    fn finished_before(&self, stage: &str) -> Vec<(PathBuf, Record)> {
-        let aside = fs::read_dir(self.root.join(".kept")).into_iter().flatten().flatten();
-        let mut folders: Vec<PathBuf> = aside
-            .filter(|entry| {
-                let name = entry.file_name().to_string_lossy().into_owned();
-                name.rsplit_once('-').is_some_and(|(own, _)| own == stage)
-            })
-            .map(|entry| entry.path())
-            .collect();
-        folders.sort();
-        folders.insert(0, self.stage_folder(stage));
-        let record = |folder: PathBuf| {
-            let record = files::read_json::<Record>(&folder.join(RECORD)).ok()?;
-            Some((folder, record))
-        };
-        folders.into_iter().filter_map(record).collect()
-    }
-
     /// The hash of a stage's inputs and of what makes it.
     pub(super) fn hash_of(&self, stage: &str, inputs: &impl Serialize) -> Result<String, Stop> {
         Ok(Asked::of(stage, inputs, &self.version)?.whole)
@@ -286,7 +249,8 @@ impl RunDirectory {
 
     /// Whether a stage is finished for these inputs.
     pub fn has(&self, stage: &str, inputs: &impl Serialize) -> Result<bool, Stop> {
-        let inputs = self.hash_of(stage, inputs)?;
+        let Asked { alone, whole, .. } = Asked::of(stage, inputs, &self.version)?;
+        let inputs = self.looked_at(stage, &alone).unwrap_or(whole);
         let folder = self.stage_folder(stage);
         let aside = self.aside(stage, &inputs);
         Ok([folder, aside].iter().any(|f| matches!(finished(f, &inputs), Finished::Whole(_))))
@@ -345,7 +309,7 @@ pub(super) fn move_folder(from: &Path, to: &Path) -> Result<(), Stop> {
 }
 
 /// Whether a folder holds a finished stage.
-enum Finished {
+pub(super) enum Finished {
     /// It does, and its files are as they were written.
     Whole(Record),
     /// It did: this file is missing or another one.
@@ -354,7 +318,7 @@ enum Finished {
     No,
 }
 
-fn finished(folder: &Path, inputs: &str) -> Finished {
+pub(super) fn finished(folder: &Path, inputs: &str) -> Finished {
     let record = files::read_json::<Record>(&folder.join(RECORD)).ok();
     let Some(record) = record.filter(|record| record.inputs == inputs) else {
         return Finished::No;
@@ -375,118 +339,4 @@ fn spent_before(folder: &Path) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::run::Silent;
-
-    #[derive(Debug, PartialEq)]
-    struct Number(f64);
-
-    impl Artifact for Number {
-        fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
-            files::write_json(&folder.join("number.json"), &self.0)?;
-            Ok(vec!["number.json".to_owned()])
-        }
-        fn load(folder: &Path) -> Result<Self, Stop> {
-            Ok(Self(files::read_json(&folder.join("number.json"))?))
-        }
-    }
-
-    fn keep(run: &mut RunDirectory, input: u32, value: f64) -> (f64, bool) {
-        let kept = run.keep("1-test", &input, &Silent, |_| Ok(Number(value))).unwrap();
-        (kept.value.0, kept.fresh)
-    }
-
-    #[test]
-    fn a_stage_is_made_once_for_each_input_and_never_lost() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut run = RunDirectory::open(folder.path()).unwrap();
-        assert_eq!(keep(&mut run, 1, 0.1), (0.1, true));
-        assert_eq!(keep(&mut run, 1, 9.0), (0.1, false));
-        assert_eq!(keep(&mut run, 2, 0.2), (0.2, true));
-        assert_eq!(keep(&mut run, 1, 9.0), (0.1, false));
-        assert_eq!(keep(&mut run, 2, 9.0), (0.2, false));
-    }
-
-    /// Notes what is said.
-    #[derive(Default)]
-    struct Said(std::sync::Mutex<Vec<String>>);
-
-    impl Observer for Said {
-        fn begin(&self, _: &str, _: &str, _: u64) {}
-        fn advance(&self, _: u64) {}
-        fn end(&self, _: &str, _: &str) {}
-        fn warn(&self, _: &str) {}
-        fn note(&self, text: &str) {
-            self.0.lock().unwrap().push(text.to_owned());
-        }
-    }
-
-    #[test]
-    fn what_another_version_made_is_made_again_and_kept_but_runs_are_taken() {
-        let folder = tempfile::tempdir().unwrap();
-        let all = |version: &str, value: f64| {
-            let mut run = RunDirectory::open(folder.path()).unwrap();
-            run.pretend(version);
-            let said = Said::default();
-            let runs = run.keep("2-simulate", &1, &said, |_| Ok(Number(value))).unwrap();
-            let inputs = (2, runs.hash);
-            let fitted = run.keep("4-surrogate", &inputs, &said, |_| Ok(Number(value))).unwrap();
-            let inputs = (3, fitted.hash);
-            let drawn = run.keep("5-calibrate", &inputs, &said, |_| Ok(Number(value))).unwrap();
-            let values = [runs.value.0, fitted.value.0, drawn.value.0];
-            (values, said.0.into_inner().unwrap())
-        };
-        assert_eq!(all("0.1.0", 0.1), ([0.1; 3], Vec::new()));
-        assert_eq!(all("0.1.0", 0.9), ([0.1; 3], Vec::new()));
-        let (values, said) = all("0.2.0", 0.2);
-        assert_eq!(values, [0.1, 0.2, 0.2]);
-        assert_eq!(said.len(), 3, "{said:?}");
-        assert_eq!(said[0], "`2-simulate` is taken as lacuna 0.1.0 made it");
-        let fitted = "`4-surrogate` is made again: it was made by lacuna 0.1.0, and this is lacuna \
-                      0.2.0; what was made is kept in .kept/4-surrogate-";
-        assert!(said[1].starts_with(fitted), "{}", said[1]);
-        let kept = said[1].rsplit(' ').next().unwrap();
-        assert!(folder.path().join(kept).join(RECORD).exists(), "{kept}");
-        let drawn = "`5-calibrate` is made again: lacuna 0.1.0 made it from results that are made \
-                     again now";
-        assert_eq!(said[2], drawn);
-        // Back, and forth: nothing is lost.
-        assert_eq!(all("0.1.0", 0.9).0, [0.1; 3]);
-        assert_eq!(all("0.2.0", 0.9).0, [0.1, 0.2, 0.2]);
-    }
-
-    #[test]
-    fn a_damaged_artifact_is_made_again() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut run = RunDirectory::open(folder.path()).unwrap();
-        keep(&mut run, 1, 0.1);
-        fs::write(folder.path().join("1-test/number.json"), "0.3").unwrap();
-        assert_eq!(keep(&mut run, 1, 0.2), (0.2, true));
-    }
-
-    #[test]
-    fn an_interrupted_stage_finds_what_it_wrote() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut run = RunDirectory::open(folder.path()).unwrap();
-        let first = run.keep("1-test", &1, &Silent, |folder| {
-            files::write_json(&folder.join("half.json"), &0.5)?;
-            Err::<Number, _>(Stop::new("killed"))
-        });
-        assert_eq!(first.unwrap_err().message, "killed");
-        let second = run.keep("1-test", &1, &Silent, |folder| {
-            Ok(Number(files::read_json::<f64>(&folder.join("half.json"))? * 2.0))
-        });
-        assert_eq!(second.unwrap().value, Number(1.0));
-    }
-
-    #[test]
-    fn two_processes_do_not_share_a_run() {
-        let folder = tempfile::tempdir().unwrap();
-        let _first = RunDirectory::open(folder.path()).unwrap();
-        let second = RunDirectory::open(folder.path()).unwrap_err();
-        assert!(second.message.starts_with("another process is working in"));
-        let without_locks = std::io::Error::from(std::io::ErrorKind::Unsupported);
-        assert!(!is_taken(&Err(TryLockError::Error(without_locks))));
-    }
-}
+mod tests;

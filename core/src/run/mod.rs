@@ -7,6 +7,7 @@ pub mod files;
 mod growth;
 pub mod made_by;
 pub mod progress;
+mod provenance;
 pub mod stop;
 
 pub use arrays::write_response;

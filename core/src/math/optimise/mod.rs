@@ -188,4 +188,6 @@ fn gradient_norm(x: &[f64], gradient: &[f64], bounds: &[(f64, f64)], scales: &[f
 }
 
 #[cfg(test)]
+mod corners;
+#[cfg(test)]
 mod tests;

@@ -17,6 +17,7 @@ pub struct OwnedContext {
     layout: Layout,
     runs: Option<usize>,
     common_errors: bool,
+    #[serde(default)]
     starts_programs: bool,
 }
 
