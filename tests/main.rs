@@ -9,6 +9,7 @@ mod effects;
 mod falling_balls;
 mod forced_oscillator;
 mod kill;
+mod left_out;
 mod problems;
 mod python;
 mod quick;
