@@ -9,6 +9,7 @@ mod effects;
 mod falling_balls;
 mod forced_oscillator;
 mod kill;
+mod left_out;
 mod made_by;
 mod problems;
 mod python;

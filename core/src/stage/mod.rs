@@ -3,6 +3,7 @@
 pub mod best_fit;
 pub mod calibrate;
 pub mod common_error;
+pub mod curves;
 pub mod derived;
 pub mod design;
 pub mod direct;
@@ -16,6 +17,7 @@ pub mod manifest;
 pub mod numerical_error;
 pub mod power;
 pub mod predict;
+pub mod predictions;
 pub mod read;
 pub mod refine;
 pub mod report;
@@ -36,8 +38,9 @@ use crate::run::{Kept, Observer, RunDirectory, Stop};
 use crate::study::Study;
 
 use calibrate::Calibrated;
-use evidence::{Predicting, Weighed};
+use evidence::Weighed;
 use numerical_error::NumericalError;
+use predictions::Predicting;
 use read::Data;
 use refine::Refinement;
 use surrogate::Fitted;
@@ -150,6 +153,11 @@ fn conclude(
     if let Goal::Show(before) = goal {
         gap::show::stage(study, known, calibrated, before, run, observer)?;
     }
+    if let Some(calibrated) = calibrated {
+        let (weighed, validated) = (weighed.as_ref(), validated.as_ref());
+        let finished = inference_data::Finished { calibrated, weighed, validated };
+        inference_data::stage(study, known, &finished, run)?;
+    }
     let made = report::Artifacts {
         known: Some(known),
         calibrated,
@@ -176,7 +184,8 @@ fn weigh(
     let predicting = Predicting {
         forward: known.forward,
         likelihood: parts.likelihood(),
-        data: measured.likelihood.count(),
+        law: calibrate::Law::of(study, measured, known)?,
+        data: &measured.likelihood,
     };
     evidence::stage(study, &posterior, calibrated, Some(predicting), run, observer).map(Some)
 }

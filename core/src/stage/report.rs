@@ -1,4 +1,4 @@
-//! Stage 8: what was found, for people (`report.html`) and for scripts (`summary.json`, `posterior.nc`).
+//! Stage 8: what was found, for people (`report.html`) and for scripts (`summary.json`).
 
 use crate::data::{Draws, Ensemble, Observations};
 use crate::diagnose::Diagnosis;
@@ -7,8 +7,8 @@ use crate::linalg::Matrix;
 use crate::math::fit;
 use crate::math::moments::{self, Moments};
 use crate::report::findings::{
-    CalibrationFindings, CoordinateFindings, EnsembleFindings, Findings, FittedDistribution,
-    GapFindings, LeftOutFindings, MeasuredFindings, Role, SurrogateFindings,
+    CalibrationFindings, CoordinateFindings, CurvesLeftOutFindings, EnsembleFindings, Findings,
+    FittedDistribution, GapFindings, LeftOutFindings, MeasuredFindings, Role, SurrogateFindings,
 };
 use crate::report::{render, summary_json};
 use crate::run::directory::Record;
@@ -19,9 +19,9 @@ use super::calibrate::Calibrated;
 use super::evidence::Weighed;
 use super::read::Measured;
 use super::validate::Validated;
-use super::{Known, derived, gap, idle, inference_data};
+use super::{Known, derived, gap, idle};
 
-/// Writes report, summary and posterior file; returns the findings.
+/// Writes report and summary; returns the findings.
 pub fn stage(study: &Study, all: &Artifacts<'_>, run: &RunDirectory) -> Result<Findings, Stop> {
     let calibrated = all.calibrated.map(|kept| derived::extended(study, &kept.value));
     let calibrated = calibrated.as_ref();
@@ -31,12 +31,6 @@ pub fn stage(study: &Study, all: &Artifacts<'_>, run: &RunDirectory) -> Result<F
     let page = render(&findings);
     files::write_atomic(&run.stage_folder("8-report").join("report.html"), page.as_bytes())?;
     files::write_atomic(&root.join("report.html"), page.as_bytes())?;
-    if let Some(calibrated) = calibrated {
-        let measured = all.measured();
-        let bytes = inference_data::encode(study, calibrated, measured, all.validated)
-            .map_err(|error| Stop::new(format!("cannot write posterior.nc: {error}")))?;
-        files::write_atomic(&root.join("posterior.nc"), &bytes)?;
-    }
     Ok(findings)
 }
 
@@ -192,9 +186,20 @@ fn calibration(
         left_out: weighed.and_then(|w| w.left_out.as_ref()).map(|loo| LeftOutFindings {
             elpd: loo.elpd,
             error: loo.error,
+            error_by_curve: loo.error_by_curve,
             parameters: loo.parameters,
             unreliable: loo.unreliable,
+            limit: loo.limit,
             count: loo.data.len(),
+            curves: weighed.and_then(|w| w.curves_left_out.as_ref()).map(|curves| {
+                CurvesLeftOutFindings {
+                    elpd: curves.elpd,
+                    error: curves.error,
+                    parameters: curves.parameters,
+                    unreliable: curves.unreliable,
+                    count: curves.data.len(),
+                }
+            }),
         }),
     }
 }

@@ -254,9 +254,18 @@ fn calibration() -> CalibrationFindings {
         left_out: Some(crate::report::findings::LeftOutFindings {
             elpd: -1200.0,
             error: 20.0,
+            error_by_curve: Some(31.0),
             parameters: 3.9,
             unreliable: 0,
+            limit: 0.67,
             count: 500,
+            curves: Some(crate::report::findings::CurvesLeftOutFindings {
+                elpd: -1190.0,
+                error: 33.0,
+                parameters: 4.2,
+                unreliable: 1,
+                count: 5,
+            }),
         }),
         coordinates: coordinates(),
         best_draw: MEAN.to_vec(),
