@@ -48,6 +48,9 @@ pub struct Record {
     pub lacuna: String,
     /// When it was finished, in seconds since 1970 (UTC).
     pub finished: u64,
+    /// What was told while it was made.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
 }
 
 impl Record {
@@ -145,19 +148,23 @@ impl RunDirectory {
         self.bring_folder(stage, &inputs)?;
         match finished(&folder, &inputs) {
             Finished::Whole(record) => match T::load(&folder) {
-                Ok(value) => return Ok(self.kept(record, value, false)),
-                Err(_) => observer.warn(&format!(
+                Ok(value) => {
+                    record.warnings.iter().for_each(|text| observer.recall(text));
+                    return Ok(self.kept(record, value, false));
+                }
+                Err(_) => observer.remark(&format!(
                     "the files in {} do not read back; making them again",
                     folder.display()
                 )),
             },
-            Finished::Changed(file) => observer.warn(&format!(
+            Finished::Changed(file) => observer.remark(&format!(
                 "{} is missing or not as it was written; making it again",
                 folder.join(file).display()
             )),
             Finished::No => {}
         }
         let begun = Instant::now();
+        let before = observer.heard().len();
         let made = make(&folder);
         // What went wrong first explains more than what followed from it.
         if let Some(said) = self.watched.iter().find_map(|fault| fault.said()) {
@@ -173,7 +180,9 @@ impl RunDirectory {
         let finished =
             SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |elapsed| elapsed.as_secs());
         let lacuna = env!("CARGO_PKG_VERSION").to_owned();
-        let record = Record { stage: stage.to_owned(), inputs, outputs, seconds, lacuna, finished };
+        let warnings = observer.heard().split_off(before);
+        let stage = stage.to_owned();
+        let record = Record { stage, inputs, outputs, seconds, lacuna, finished, warnings };
         files::write_json(&folder.join(RECORD), &record)?;
         Ok(self.kept(record, value, true))
     }

@@ -46,6 +46,7 @@ pub fn findings() -> Findings {
         validation: Some(validation(&layout)),
         layouts: layout.into(),
         gap: None,
+        assessment: crate::assess::Assessment::default(),
         seconds: [
             ("design", 0.004),
             ("simulate", 1834.0),
