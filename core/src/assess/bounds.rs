@@ -25,7 +25,8 @@ pub fn rules() -> Vec<Rule> {
         ),
         threshold: format!(
             "{}: reservation; {}: failure, unless the bound is a physical limit (0 and 1); at least {} \
-             parameters and {} of all at bounds: failure",
+             parameters and {} of all at bounds: failure; the end of a law that reaches to infinity on the other side, such as \
+             that of a scale: note",
             percent(SHARE.0),
             percent(SHARE.1),
             MANY.0,
@@ -48,6 +49,8 @@ pub struct AtBound {
     pub whose: String,
     /// The share of draws within [`NEAR`] standard deviations of it.
     pub share: f64,
+    /// Whether the law reaches to infinity on the other side, as that of a scale: then nobody chose this bound.
+    pub natural: bool,
 }
 
 impl AtBound {
@@ -59,12 +62,17 @@ impl AtBound {
 /// The parameters that are piled on a bound, out of so many.
 pub fn at_bound(all: &[AtBound], parameters: usize) -> Vec<Finding> {
     let piled: Vec<&AtBound> = all.iter().filter(|at| at.share >= SHARE.0).collect();
-    let many = piled.len() >= MANY.0 && piled.len() as f64 >= MANY.1 * parameters as f64;
+    let chosen = piled.iter().filter(|at| !at.natural).count();
+    let many = chosen >= MANY.0 && chosen as f64 >= MANY.1 * parameters as f64;
     let one = |at: &&AtBound| {
         let far = at.share >= SHARE.1 && !at.is_physical();
-        let severity = if far || many { Severity::Failure } else { Severity::Reservation };
+        let severity = match at.natural {
+            true => Severity::Note,
+            false if far || many => Severity::Failure,
+            false => Severity::Reservation,
+        };
         let together = if many {
-            format!("; {} of {parameters} parameters are at bounds", piled.len())
+            format!("; {chosen} of {parameters} parameters are at bounds")
         } else {
             String::new()
         };

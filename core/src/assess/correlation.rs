@@ -73,15 +73,15 @@ pub fn correlated(names: &[String], covariance: &Matrix) -> Option<Finding> {
     Some(Finding::new((CODE, &place), figures, severity, message, REPARAMETRISE))
 }
 
-/// A combination of parameters with weights, the largest of them one.
+/// A combination of parameters with weights, the largest of them of size one and the first one positive.
 fn combination(names: &[&str], weights: &[f64]) -> String {
-    let largest = weights.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(1.0);
-    let scaled = names.iter().zip(weights).map(|(name, w)| (name, w / largest));
+    let largest = weights.iter().map(|w| w.abs()).fold(0.0, f64::max);
+    let first = weights.iter().find(|w| w.abs() >= SMALL * largest).map_or(1.0, |w| w.signum());
+    let scaled = names.iter().zip(weights).map(|(name, w)| (name, first * w / largest));
     let mut text = String::new();
     for (name, weight) in scaled.filter(|(_, w)| w.abs() >= SMALL) {
         let sign = match (text.is_empty(), weight < 0.0) {
-            (true, true) => "-",
-            (true, false) => "",
+            (true, _) => "",
             (false, true) => " - ",
             (false, false) => " + ",
         };

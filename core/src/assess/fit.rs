@@ -17,6 +17,8 @@ const COVERED: (f64, f64) = (0.9, 0.8);
 const ACCURATE: (f64, f64) = (0.7, 0.4);
 /// The posterior predictive p-value that is a reservation.
 const P: f64 = 0.01;
+/// How many standard errors above one the mean square misfit over that of the replicates' mean may be.
+const ERRORS: f64 = 5.0;
 /// How many times larger than expected the misfit must be to be a failure: twice in standard deviations.
 const MISFIT: f64 = 4.0;
 
@@ -49,11 +51,12 @@ pub fn rules() -> Vec<Rule> {
             code: PREDICTIVE,
             looks_at: "measured values inside the 95 % band of a new replicate; points of the calibrated model inside \
                        the replicates' 95 % interval; the misfit of the replicates' mean against data simulated \
-                       at posterior draws (posterior predictive p-value)"
+                       at posterior draws (posterior predictive p-value), and against the scatter of the replicates (F)"
                 .to_owned(),
             threshold: format!(
                 "band: below {}: reservation, {}: failure; interval: below {}: reservation, {}: failure; p below \
-                 {P}: reservation, with a misfit {MISFIT} times as large as expected: failure",
+                 {P}: reservation, with a misfit {MISFIT} times as large as expected: failure; F more than {ERRORS} standard errors above 1, and above \
+                 that of all simulated data: reservation",
                 percent(COVERED.0),
                 percent(COVERED.1),
                 percent(ACCURATE.0),
@@ -163,4 +166,24 @@ pub fn misfit(observed: f64, simulated: &[f64]) -> Option<Finding> {
         short(p)
     );
     Some(Finding::new((PREDICTIVE, "misfit"), (p, P), severity, message, GAP))
+}
+
+/// The mean square of the replicates' mean about the calibrated model over its variance by the replicates' scatter, `f`,
+/// and the same in simulated data. `effective` is the number of independent values of a curve by the replicates'
+/// own correlation, of all curves together.
+pub fn scatter(f: f64, simulated: &[f64], effective: f64, replicates: f64) -> Option<Finding> {
+    let most = simulated.iter().copied().fold(1.0, f64::max);
+    // The variance of F for so many values above and (replicates - 1) times as many below.
+    let error = (2.0 / effective * (1.0 + 1.0 / (replicates - 1.0))).sqrt();
+    let limit = 1.0 + ERRORS * error;
+    if !f.is_finite() || !limit.is_finite() || f <= limit || f <= most {
+        return None;
+    }
+    let message = format!(
+        "the calibrated model misses the replicates' mean by {} times what their scatter lets expect (mean square): \
+         a part of that is no noise, and the parameters make up for some of it",
+        short(f)
+    );
+    let figures = (f, limit);
+    Some(Finding::new((PREDICTIVE, "replicates"), figures, Severity::Reservation, message, GAP))
 }

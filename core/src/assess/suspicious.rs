@@ -167,12 +167,11 @@ impl Fit {
         let sizes = sizes(responses);
         let mut best: Option<(f64, Self)> = None;
         for degree in 0..=DEGREE {
-            let terms = basis(points, degree);
-            if degree > 1 && PER_TERM * terms.columns() > points.rows()
-                || terms.columns() + 2 > points.rows()
-            {
+            let terms = count(points.columns(), degree);
+            if degree > 1 && PER_TERM * terms > points.rows() || terms + 2 > points.rows() {
                 break;
             }
+            let terms = basis(points, degree);
             let fit = Self::of(&terms, responses, degree)?;
             let press = fit.press(&sizes);
             if best.as_ref().is_none_or(|(least, _)| press < *least) {
@@ -210,6 +209,11 @@ impl Fit {
     }
 }
 
+/// The number of monomials of `d` variables up to a total degree.
+fn count(d: usize, degree: usize) -> usize {
+    (1..=degree).fold(1, |terms, k| terms * (d + k) / k)
+}
+
 /// All monomials up to a total degree, in Legendre-like coordinates from -1 to 1.
 fn basis(points: &Matrix, degree: usize) -> Matrix {
     let d = points.columns();
@@ -227,16 +231,17 @@ fn basis(points: &Matrix, degree: usize) -> Matrix {
         }
         exponents.extend(next.iter().cloned());
         last = next;
-        // More terms than runs are never used.
-        if exponents.len() > points.rows() {
-            break;
-        }
     }
     Matrix::from_fn(points.rows(), exponents.len(), |i, t| {
         let x = points.row(i).iter().zip(&exponents[t]);
         x.map(|(x, &e)| (2.0 * x - 1.0).powi(e as i32)).product()
     })
 }
+
+/// How far off, in residuals of the other runs, a response counts as explained.
+const EXPLAINED: f64 = 4.0;
+/// Into how many steps a parameter's range is cut in search of the value that fits.
+const STEPS: usize = 60;
 
 /// What would explain a run, from a fit to the other runs: one factor on its response, or another value of one parameter.
 fn explain(
@@ -273,12 +278,10 @@ fn explain(
     }
     let factor = both / square;
     let multiplied: Vec<f64> = expected.iter().map(|y| factor * y).collect();
-    const EXPLAINED: f64 = 4.0;
     // With one output a factor explains anything: only one of ten or two is that of a typing error.
     let round = |f: f64| [10.0, 100.0, 1000.0, -1.0].iter().any(|r| (f / r - 1.0).abs() < 0.1);
     let explains = off(&multiplied) < EXPLAINED * factor.abs().max(1.0);
     let factor = (explains && (round(factor) || round(1.0 / factor))).then_some(factor);
-    const STEPS: usize = 60;
     let mut best: Option<(f64, (usize, f64))> = None;
     for k in 0..points.columns() {
         let moved = Matrix::from_fn(STEPS + 1, points.columns(), |i, l| {

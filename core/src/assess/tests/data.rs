@@ -141,6 +141,21 @@ fn data_on_which_the_posterior_hangs() {
     has(influence::influential(30, 100).as_ref(), "influential_data", Severity::Reservation);
 }
 
+/// Twenty replicates of 200 independent values: F has a standard deviation of 0.10 about one.
+#[test]
+fn a_mean_that_the_scatter_of_the_replicates_does_not_explain() {
+    let simulated = [0.9, 1.0, 1.1];
+    assert_eq!(fit::scatter(1.2, &simulated, 200.0, 20.0), None);
+    has(
+        fit::scatter(6.0, &simulated, 200.0, 20.0).as_ref(),
+        "predictive_check",
+        Severity::Reservation,
+    );
+    // A discrepancy that makes such data itself allows for them; few independent values prove nothing.
+    assert_eq!(fit::scatter(6.0, &[5.0, 7.0], 200.0, 20.0), None);
+    assert_eq!(fit::scatter(6.0, &simulated, 1.0, 20.0), None);
+}
+
 #[test]
 fn residuals_that_stay_alike() {
     let simulated: Vec<f64> = (0..40).map(|i| 0.9 + 0.005 * f64::from(i)).collect();

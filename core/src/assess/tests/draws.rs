@@ -14,7 +14,7 @@ fn share(seed: u64, law: impl Fn(f64, f64) -> f64) -> f64 {
 }
 
 fn at(name: &str, bound: f64, share: f64) -> AtBound {
-    AtBound { name: name.to_owned(), bound, whose: "prior".to_owned(), share }
+    AtBound { name: name.to_owned(), bound, whose: "prior".to_owned(), share, natural: false }
 }
 
 /// The shares stand in the documentation: 14 % of a flat density, 24 % of half a normal law, 39 % of an exponential law.
@@ -35,6 +35,9 @@ fn a_pile_at_a_bound_is_more_than_a_flat_density_has_there() {
     has(found.first(), "posterior_at_bound", Severity::Reservation);
     let found = bounds::at_bound(&[at("x", 2.0, half)], 3);
     has(found.first(), "posterior_at_bound", Severity::Reservation);
+    // A scale has no negative values to want.
+    let scale = AtBound { natural: true, ..at("scale", 0.0, pile) };
+    has(bounds::at_bound(&[scale], 3).first(), "posterior_at_bound", Severity::Note);
 }
 
 #[test]

@@ -115,15 +115,27 @@ fn simulated(judged: &Judged<'_>) -> Vec<Finding> {
         let data = judged.likelihood.simulate(response, judged.hyper(points.row(i)), &random);
         let data = Observations { blocks: data };
         let time = (i < CORRELATED).then(|| look.time(&data, response)).flatten();
-        (look.misfit(&data, response), time)
+        (look.misfit(&data, response), time, look.against_scatter(&data, response))
     };
-    let made: Vec<(f64, Option<f64>)> = (0..count).into_par_iter().map(one).collect();
+    let made: Vec<(f64, Option<f64>, f64)> = (0..count).into_par_iter().map(one).collect();
     let data = &judged.measured.likelihood;
     let misfits: Vec<f64> = made.iter().map(|m| m.0).filter(|m| m.is_finite()).collect();
     let times: Vec<f64> = made.iter().filter_map(|m| m.1).collect();
-    let time = look.time(data, &judged.response);
+    let ratios: Vec<f64> = made.iter().map(|m| m.2).filter(|f| f.is_finite()).collect();
+    // What the points of a replicate share is then in the covariance of the mean curve.
+    let allowed = judged.study.discrepancy.as_ref().is_some_and(|d| d.common.replicate_error);
+    let replicated = judged.measured.used.blocks.iter().all(|b| b.replicates.len() >= REPLICATES);
+    let time = look.time(data, &judged.response).filter(|_| !(allowed && replicated));
+    let used = &judged.measured.used;
+    let (effective, replicates) = look.independent(used);
     some([
         check::misfit(look.misfit(data, &judged.response), &misfits),
+        check::scatter(
+            look.against_scatter(used, &judged.response),
+            &ratios,
+            effective,
+            replicates,
+        ),
         time.and_then(|time| residuals::correlated(time, &times, data.count())),
     ])
 }
@@ -145,6 +157,33 @@ impl Look<'_> {
         let squares: Vec<f64> =
             each.filter(|((s, _), v)| s.count > 0 && **v > 0.0).map(term).collect();
         squares.iter().sum::<f64>() / squares.len().max(1) as f64
+    }
+
+    /// The mean square of the replicates' mean about the response over its variance by the replicates' scatter; NaN
+    /// without replicates.
+    fn against_scatter(&self, data: &Observations, response: &[f64]) -> f64 {
+        let summaries = data.summaries();
+        let each = summaries.iter().zip(response).zip(self.variance);
+        let (mut above, mut below, mut count) = (0.0, 0.0, 0.0);
+        for ((s, r), v) in each.filter(|((s, _), v)| s.count >= REPLICATES && **v > 0.0) {
+            let n = s.count as f64;
+            above += n * (s.mean - r).powi(2) / v;
+            below += s.scatter / (n - 1.0) / v;
+            count += 1.0;
+        }
+        if count > 0.0 { above / below } else { f64::NAN }
+    }
+
+    /// How many independent values the curves have by the correlation of the replicates about their mean, and the mean number
+    /// of replicates.
+    fn independent(&self, data: &Observations) -> (f64, f64) {
+        let summaries = data.summaries();
+        let replicated: Vec<f64> =
+            summaries.iter().filter(|s| s.count >= REPLICATES).map(|s| s.count as f64).collect();
+        let means: Vec<f64> = summaries.iter().map(|s| s.mean).collect();
+        let time = self.time(data, &means).unwrap_or(1.0).max(1.0);
+        let outputs = replicated.len() as f64;
+        (outputs / time, replicated.iter().sum::<f64>() / outputs)
     }
 
     /// The autocorrelation time of residuals along the last axis, in steps: of all curves together, about zero.

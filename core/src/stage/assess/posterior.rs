@@ -119,6 +119,7 @@ fn of_law(name: &str, law: &Distribution, values: &[f64]) -> Vec<AtBound> {
         bound,
         whose: "prior".to_owned(),
         share,
+        natural: low.is_infinite() || high.is_infinite(),
     };
     let mut found = Vec::new();
     if low.is_finite() && sd > 0.0 {

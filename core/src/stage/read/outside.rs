@@ -29,7 +29,8 @@ pub fn runs(parameters: &[Parameter], ensemble: &Ensemble) -> Vec<Outside> {
         .enumerate()
         .map(|(j, parameter)| {
             let (low, high) = limits(parameter);
-            let last = 0.5 * last_digit(&ensemble.points.column(j));
+            // A little more than half, because decimal numbers are rounded in memory.
+            let last = 0.500_001 * last_digit(&ensemble.points.column(j));
             let width = if (high - low).is_finite() { 1e-9 * (high - low) } else { 0.0 };
             let slack = last.max(width);
             (low - slack, high + slack)
