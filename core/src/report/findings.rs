@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::assess::Assessment;
 use crate::data::{FailedRun, Layouts, Observations, Parameter, Unit};
 use crate::gap::account::{Account, HeldOut};
 use crate::gap::added::Added;
@@ -43,7 +44,9 @@ pub struct Findings {
     pub made_by: Vec<(String, String)>,
     /// The time each stage took when it was made, in seconds.
     pub seconds: Vec<(String, f64)>,
-    /// Things a reader must know first: not converged, stranded walkers, runs left out.
+    /// Whether all this can be trusted, and what speaks against it.
+    pub assessment: Assessment,
+    /// What was told on the way beside these findings: runs left out, evaluations without an answer.
     pub warnings: Vec<String>,
     /// What the stand-in or the data are not, as the study's `note` says.
     pub note: Option<String>,

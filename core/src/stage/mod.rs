@@ -1,5 +1,6 @@
 //! The whole program: stages in order, each one function from plain data to plain data.
 
+pub mod assess;
 pub mod best_fit;
 pub mod calibrate;
 pub mod common_error;
@@ -34,7 +35,7 @@ pub mod validate;
 use crate::math::random::Stream;
 use crate::plugin::{Emulator, Forward};
 use crate::report::findings::Findings;
-use crate::run::{Kept, Observer, RunDirectory, Stop};
+use crate::run::{Kept, Listener, Observer, RunDirectory, Stop};
 use crate::study::Study;
 
 use calibrate::Calibrated;
@@ -98,6 +99,7 @@ fn pursue(
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {
     manifest::begin(study, run)?;
+    let observer = &Listener::new(observer);
     let findings = match (&study.target, &study.surrogate) {
         (Some(given), _) => target::run(study, given, run, observer)?,
         (None, Some(_)) => with_surrogate(study, goal, run, observer)?,
@@ -145,6 +147,16 @@ fn conclude(
 ) -> Result<Findings, Stop> {
     let weighed = weigh(study, known, calibrated, run, observer)?;
     let validated = validate::stage(study, known, calibrated, run, observer)?;
+    let made = report::Artifacts {
+        known: Some(known),
+        calibrated,
+        weighed: weighed.as_ref(),
+        validated: validated.as_ref(),
+        assessed: None,
+        gap: None,
+    };
+    let assessed = assess::stage(study, &made, run, observer)?;
+    let made = report::Artifacts { assessed: Some(&assessed), ..made };
     let gap = match goal {
         Goal::FindGap => gap::stage(study, known, run, observer)?,
         // What was found before is not lost in a report that is written again.
@@ -158,14 +170,7 @@ fn conclude(
         let finished = inference_data::Finished { calibrated, weighed, validated };
         inference_data::stage(study, known, &finished, run)?;
     }
-    let made = report::Artifacts {
-        known: Some(known),
-        calibrated,
-        weighed: weighed.as_ref(),
-        validated: validated.as_ref(),
-        gap: gap.as_ref(),
-    };
-    report::stage(study, &made, run)
+    report::stage(study, &report::Artifacts { gap: gap.as_ref(), ..made }, run, observer)
 }
 
 /// The evidence of a calibration, where there is one.

@@ -10,7 +10,7 @@ use crate::run::{Kept, Observer, RunDirectory, Stop};
 use crate::study::Study;
 
 use super::calibrate::{self, Calibrated};
-use super::{evidence, inference_data, report};
+use super::{assess, evidence, inference_data, report};
 
 /// Samples the target and reports.
 pub fn run(
@@ -39,9 +39,12 @@ pub fn run(
         calibrated: Some(&calibrated),
         weighed: Some(&weighed),
         validated: None,
+        assessed: None,
         gap: None,
     };
-    report::stage(study, &made, run)
+    let assessed = assess::stage(study, &made, run, observer)?;
+    let made = report::Artifacts { assessed: Some(&assessed), ..made };
+    report::stage(study, &made, run, observer)
 }
 
 fn stage(

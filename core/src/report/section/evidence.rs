@@ -5,11 +5,12 @@ use maud::html;
 use crate::report::findings::{CalibrationFindings, Findings};
 use crate::report::number::{count, decimals, fixed, typeset};
 use crate::report::page::{Section, paragraph};
+use crate::report::qualified;
 
 /// The evidence and the prediction of left-out data, where they are known.
 pub fn section(findings: &Findings) -> Option<Section> {
     let calibration = findings.calibration.as_ref()?;
-    let sentences = sentences(calibration);
+    let sentences = sentences(findings, calibration);
     if sentences.is_empty() {
         return None;
     }
@@ -37,7 +38,7 @@ fn trusted(unreliable: usize, limit: f64) -> String {
 }
 
 /// The same in words.
-pub fn sentences(calibration: &CalibrationFindings) -> Vec<String> {
+pub fn sentences(findings: &Findings, calibration: &CalibrationFindings) -> Vec<String> {
     let number = |value: f64, error: f64| {
         let places = decimals(error, f64::NAN).min(4);
         format!("{} ± {}", typeset(&fixed(value, places)), fixed(error, places))
@@ -45,7 +46,8 @@ pub fn sentences(calibration: &CalibrationFindings) -> Vec<String> {
     let mut sentences = Vec::new();
     if let Some(evidence) = &calibration.evidence {
         let value = number(evidence.log, evidence.error);
-        sentences.push(format!("Log evidence {value} ({}).", evidence.method));
+        let limit = qualified::evidence(findings).map_or(String::new(), |why| format!(", {why}"));
+        sentences.push(format!("Log evidence {value} ({}){limit}.", evidence.method));
     }
     if let Some(left) = &calibration.left_out {
         let value = number(left.elpd, left.error_by_curve.unwrap_or(left.error));

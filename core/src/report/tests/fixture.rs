@@ -47,6 +47,7 @@ pub fn findings() -> Findings {
         layouts: layout.into(),
         gap: None,
         made_by: vec![("calibrate".to_owned(), "0.0.9".to_owned())],
+        assessment: crate::assess::Assessment::default(),
         seconds: [
             ("design", 0.004),
             ("simulate", 1834.0),
