@@ -25,7 +25,7 @@ use crate::study::file::Start;
 use super::read::Measured;
 use super::sampling::{self, Length, Sampled};
 use super::start::{inside, maxima, sobol};
-use super::{Known, best_fit, common_error, stream};
+use super::{Known, Trial, best_fit, common_error};
 
 /// The posterior as draws, with its maximum.
 #[derive(Debug, Clone, PartialEq)]
@@ -136,14 +136,7 @@ impl Parts {
         if let (Some(kept), Some(section)) = (known.numerics, &study.numerical_error) {
             common.push(kept.value.common_error(section.written.whole()));
         }
-        let slopes = OnceLock::new();
-        let slopes = || {
-            let made = || best_fit::slopes(study, &measured.likelihood, known.forward);
-            slopes.get_or_init(made).clone()
-        };
-        let layouts = &study.layouts;
-        let mut likelihoods = Vec::new();
-        for (i, range) in layouts.ranges().enumerate() {
+        Self::with(study, &measured.likelihood, known.forward, |i, range| {
             let part = |error: &CommonError| CommonError {
                 factor: rows(&error.factor, range.clone()),
                 ..error.clone()
@@ -154,8 +147,35 @@ impl Parts {
                 let after = usize::from(own.first().is_some_and(|e| e.origin == "emulator"));
                 own.splice(after..after, of_replicates);
             }
+            own
+        })
+    }
+
+    /// The likelihood of data without any common error: what the discrepancy alone says of them.
+    pub fn bare(study: &Study, data: &Observations, forward: &dyn Forward) -> Result<Self, Stop> {
+        Self::with(study, data, forward, |_, _| Vec::new())
+    }
+
+    /// The likelihood of data with the common errors of each block.
+    fn with(
+        study: &Study,
+        data: &Observations,
+        forward: &dyn Forward,
+        common: impl Fn(usize, &Range<usize>) -> Vec<CommonError>,
+    ) -> Result<Self, Stop> {
+        let section =
+            study.discrepancy.as_ref().ok_or_else(|| Stop::new("the study has no discrepancy"))?;
+        let slopes = OnceLock::new();
+        let slopes = || {
+            let made = || best_fit::slopes(study, data, forward);
+            slopes.get_or_init(made).clone()
+        };
+        let layouts = &study.layouts;
+        let mut likelihoods = Vec::new();
+        for (i, range) in layouts.ranges().enumerate() {
+            let own = common(i, &range);
             likelihoods.push(section.built.plugin.likelihood(&discrepancy::Known {
-                data: &measured.likelihood.blocks[i],
+                data: &data.blocks[i],
                 common: &own,
                 slopes: &|| Ok(rows(&slopes()?, range.clone())),
             })?);
@@ -228,13 +248,14 @@ pub fn stage(
     ]);
     let parts = Parts::of(study, measured, known)?;
     let posterior = parts.posterior(study, known);
-    draw(study, &posterior, folder, &inputs, run, observer).map(Some)
+    draw(study, &posterior, known.trial, folder, &inputs, run, observer).map(Some)
 }
 
 /// Draws from any posterior, kept in a folder.
 pub fn draw(
     study: &Study,
     posterior: &Posterior<'_>,
+    trial: Option<Trial>,
     folder: &str,
     inputs: &impl Serialize,
     run: &mut RunDirectory,
@@ -243,8 +264,9 @@ pub fn draw(
     let section = study.sampler.as_ref().ok_or_else(|| Stop::new("the study has no sampler"))?;
     let plan = section.built.plugin.plan(posterior.dimension());
     observer.begin("calibrate", "step", plan.steps as u64);
-    let kept =
-        run.keep(folder, inputs, observer, |folder| calibrate(study, posterior, folder, observer))?;
+    let kept = run.keep(folder, inputs, observer, |folder| {
+        calibrate(study, posterior, trial, folder, observer)
+    })?;
     observer.end("calibrate", &summary(&kept.value));
     Ok(kept)
 }
@@ -258,11 +280,12 @@ fn summary(calibrated: &Calibrated) -> String {
 fn calibrate(
     study: &Study,
     posterior: &Posterior<'_>,
+    trial: Option<Trial>,
     folder: &Path,
     observer: &dyn Observer,
 ) -> Result<Calibrated, Stop> {
     let section = study.sampler.as_ref().ok_or_else(|| Stop::new("the study has no sampler"))?;
-    let random = stream(study, "calibrate");
+    let random = Trial::stream(trial, study, "calibrate");
     let maxima = maxima(posterior, &random.named("optimise"));
     sampling::broken(posterior)?;
     let maxima = maxima?;
@@ -282,8 +305,11 @@ fn calibrate(
     };
     let coordinates = coordinates(study, posterior);
     let progress = Progress::new(observer);
-    let length =
-        Length { burn_in: section.common.burn_in.get(), stop: section.common.stop.as_ref() };
+    let length = Length {
+        burn_in: section.common.burn_in.get(),
+        stop: section.common.stop.as_ref(),
+        half: trial.is_some_and(|trial| trial.quick),
+    };
     let mut sampled = sampling::sample(
         &*section.built.plugin,
         posterior,
