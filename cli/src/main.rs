@@ -1,6 +1,7 @@
 //! The `lacuna` command: arguments and printing, no numerics.
 
 mod campaign;
+mod coverage;
 mod gap;
 mod inspect;
 mod new;
@@ -81,6 +82,18 @@ enum Verb {
         /// Fewer cases and simulations, for a first look.
         #[arg(long)]
         quick: bool,
+    },
+    /// Count how often a study's intervals hold the truth: truths from the prior, data made of them, each calibrated.
+    Coverage {
+        /// The study file.
+        study: PathBuf,
+        #[command(flatten)]
+        settings: study::Settings,
+        /// The run directory; `runs/<study name>` when left out.
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        #[command(flatten)]
+        manner: coverage::Manner,
     },
     /// Go on with a run that was interrupted, from its directory.
     Resume {
@@ -179,6 +192,9 @@ fn main() -> ExitCode {
         }
         Verb::Power { study, settings, out, quick } => {
             gap::power(&study, &settings, out.as_deref(), quick)
+        }
+        Verb::Coverage { study, settings, out, manner } => {
+            coverage::coverage(&study, &settings, out.as_deref(), &manner)
         }
         Verb::Resume { run, trust } => study::resume(&run, trust),
         Verb::Report { run, trust } => study::report(&run, trust),

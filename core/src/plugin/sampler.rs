@@ -66,6 +66,11 @@ pub trait Sampler: Component {
         false
     }
 
+    /// Whether the points of each step are draws, so that a run may end after any number of steps past the warm-up.
+    fn steps_are_draws(&self) -> bool {
+        false
+    }
+
     /// The draws of a method whose steps are not draws themselves (populations that are cooled, live points,
     /// fits), from its last state; `None` where the points of each step are draws.
     fn harvest(

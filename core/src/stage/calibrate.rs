@@ -26,7 +26,7 @@ pub use law::Law;
 use super::read::Measured;
 use super::sampling::{self, Length, Sampled};
 use super::start::{inside, maxima, sobol};
-use super::{Known, best_fit, stream};
+use super::{Known, Trial, best_fit};
 
 /// The posterior as draws, with its maximum.
 #[derive(Debug, Clone, PartialEq)]
@@ -89,7 +89,15 @@ pub struct Parts {
 impl Parts {
     /// The likelihood of the study's measurements, with the common errors that the study wants.
     pub fn of(study: &Study, measured: &Measured, known: &Known<'_>) -> Result<Self, Stop> {
-        let law = Law::of(study, measured, known)?;
+        Self::with(study, &Law::of(study, measured, known)?)
+    }
+
+    /// The likelihood of data without any common error: what the discrepancy alone says of them.
+    pub fn bare(study: &Study, data: &Observations, forward: &dyn Forward) -> Result<Self, Stop> {
+        Self::with(study, &Law::bare(study, data, forward)?)
+    }
+
+    fn with(study: &Study, law: &Law<'_>) -> Result<Self, Stop> {
         let layouts = &study.layouts;
         let mut likelihoods: Vec<Box<dyn Likelihood>> =
             (0..layouts.blocks.len()).map(|i| law.block(i)).collect::<Result<_, _>>()?;
@@ -156,13 +164,14 @@ pub fn stage(
     ]);
     let parts = Parts::of(study, measured, known)?;
     let posterior = parts.posterior(study, known);
-    draw(study, &posterior, folder, &inputs, run, observer).map(Some)
+    draw(study, &posterior, known.trial, folder, &inputs, run, observer).map(Some)
 }
 
 /// Draws from any posterior, kept in a folder.
 pub fn draw(
     study: &Study,
     posterior: &Posterior<'_>,
+    trial: Option<Trial>,
     folder: &str,
     inputs: &impl Serialize,
     run: &mut RunDirectory,
@@ -171,8 +180,9 @@ pub fn draw(
     let section = study.sampler.as_ref().ok_or_else(|| Stop::new("the study has no sampler"))?;
     let plan = section.built.plugin.plan(posterior.dimension());
     observer.begin("calibrate", "step", plan.steps as u64);
-    let kept =
-        run.keep(folder, inputs, observer, |folder| calibrate(study, posterior, folder, observer))?;
+    let kept = run.keep(folder, inputs, observer, |folder| {
+        calibrate(study, posterior, trial, folder, observer)
+    })?;
     observer.end("calibrate", &summary(&kept.value));
     Ok(kept)
 }
@@ -186,11 +196,12 @@ fn summary(calibrated: &Calibrated) -> String {
 fn calibrate(
     study: &Study,
     posterior: &Posterior<'_>,
+    trial: Option<Trial>,
     folder: &Path,
     observer: &dyn Observer,
 ) -> Result<Calibrated, Stop> {
     let section = study.sampler.as_ref().ok_or_else(|| Stop::new("the study has no sampler"))?;
-    let random = stream(study, "calibrate");
+    let random = Trial::stream(trial, study, "calibrate");
     let maxima = maxima(posterior, &random.named("optimise"));
     sampling::broken(posterior)?;
     let maxima = maxima?;
@@ -200,8 +211,11 @@ fn calibrate(
     let start = || starts(posterior, sampler, section.common.start, &best.point, &random);
     let coordinates = coordinates(study, posterior);
     let progress = Progress::new(observer);
-    let length =
-        Length { burn_in: section.common.burn_in.get(), stop: section.common.stop.as_ref() };
+    let length = Length {
+        burn_in: section.common.burn_in.get(),
+        stop: section.common.stop.as_ref(),
+        half: trial.is_some_and(|trial| trial.quick),
+    };
     let mut sampled = sampling::sample(
         &*section.built.plugin,
         posterior,

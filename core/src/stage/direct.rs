@@ -69,6 +69,7 @@ impl<'a> Prepared<'a> {
             numerics: None,
             region: None,
             refinement: None,
+            trial: None,
         }
     }
 }

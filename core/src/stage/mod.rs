@@ -4,6 +4,7 @@ pub mod assess;
 pub mod best_fit;
 pub mod calibrate;
 pub mod common_error;
+pub mod coverage;
 pub mod curves;
 pub mod derived;
 pub mod design;
@@ -125,6 +126,16 @@ pub fn learn(
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<(Learned, Option<Kept<Calibrated>>), Stop> {
+    let first = prepare(study, run, observer)?;
+    refine::stage(study, first, run, observer)
+}
+
+/// All stages of a study with a surrogate up to its emulator and what is known of its errors.
+pub fn prepare(
+    study: &Study,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Learned, Stop> {
     let placed = design::stage(study, run, observer)?;
     let simulated = simulate::stage(study, placed.as_ref(), run, observer)?;
     let data = read::stage(study, simulated.as_ref(), run, observer)?;
@@ -132,8 +143,8 @@ pub fn learn(
     let (fitted, emulator) = surrogate::stage(study, &data, &fitting, run, observer)?;
     let folders = numerical_error::FOLDERS;
     let numerics = numerical_error::stage(study, &data, None, folders, run, observer)?;
-    let first = Learned { data, fitted, numerics, emulator, region: None, refinement: None };
-    refine::stage(study, first, run, observer)
+    let (region, refinement, trial) = (None, None, None);
+    Ok(Learned { data, fitted, numerics, emulator, region, refinement, trial })
 }
 
 /// Evidence, validation, gap and report of a calibration.
@@ -213,6 +224,27 @@ pub struct Known<'a> {
     pub region: Option<&'a [(f64, f64)]>,
     /// How far a refinement came.
     pub refinement: Option<&'a Refinement>,
+    /// Which trial the data are of, where they were made and not measured.
+    pub trial: Option<Trial>,
+}
+
+/// One of many calibrations of data that were made: it has random numbers of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Trial {
+    /// Its number.
+    pub number: u64,
+    /// Whether the chains have half of their steps, where the steps of the sampler are draws.
+    pub quick: bool,
+}
+
+impl Trial {
+    /// The random stream of a stage: the study's own where nothing is tried.
+    fn stream(trial: Option<Self>, study: &Study, stage: &str) -> Stream {
+        match trial {
+            None => stream(study, stage),
+            Some(trial) => stream(study, "trial").at(trial.number).named(stage),
+        }
+    }
 }
 
 /// What runs and measurements have taught.
@@ -229,6 +261,8 @@ pub struct Learned {
     pub region: Option<Vec<(f64, f64)>>,
     /// How far a refinement came, where the study asks for one.
     pub refinement: Option<Refinement>,
+    /// See [`Known::trial`].
+    pub trial: Option<Trial>,
 }
 
 impl Learned {
@@ -243,6 +277,7 @@ impl Learned {
             numerics: self.numerics.as_ref(),
             region: self.region.as_deref(),
             refinement: self.refinement.as_ref(),
+            trial: self.trial,
         }
     }
 }

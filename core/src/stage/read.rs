@@ -16,6 +16,7 @@ use crate::report::findings::FlaggedCurve;
 use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, RunDirectory, Stop, files};
 use crate::study::Study;
+use crate::study::file::MeasurementKeys;
 
 use self::outside::refuse;
 use super::screen;
@@ -190,11 +191,34 @@ pub fn ensemble(study: &Study, runs: Option<Runs<'_>>) -> Result<Ensemble, Stop>
     ensemble_of(study, &study.parameters, runs)
 }
 
+/// The same of runs that the study's model made, some of which may have failed, as far as a reader allows it. A reader of
+/// tables that were made before is not asked: it does not know these runs.
+pub fn ensemble_with_failed(study: &Study, runs: Runs<'_>) -> Result<Ensemble, Stop> {
+    let reader = study.simulations.as_ref().filter(|_| study.design.is_some());
+    let reader = reader.map(|section| &*section.built.plugin);
+    read_with(study, &study.parameters, Some(runs), |source| match reader {
+        Some(reader) => Ok(reader.ensemble(source)?),
+        None => super::results::with_failed(source),
+    })
+}
+
 /// The same of runs of other parameters.
 pub fn ensemble_of(
     study: &Study,
     parameters: &[Parameter],
     runs: Option<Runs<'_>>,
+) -> Result<Ensemble, Stop> {
+    read_with(study, parameters, runs, |source| match &study.simulations {
+        Some(section) => Ok(section.built.plugin.ensemble(source)?),
+        None => super::results::ensemble(source),
+    })
+}
+
+fn read_with(
+    study: &Study,
+    parameters: &[Parameter],
+    runs: Option<Runs<'_>>,
+    read: impl Fn(&EnsembleSource<'_>) -> Result<Ensemble, Stop>,
 ) -> Result<Ensemble, Stop> {
     let mut parts = Vec::new();
     for (i, scenario) in study.scenarios.iter().enumerate() {
@@ -210,10 +234,7 @@ pub fn ensemble_of(
             scenario: scenario.label(),
             layout: &layout,
         };
-        let ensemble = match &study.simulations {
-            Some(section) => section.built.plugin.ensemble(&source)?,
-            None => super::results::ensemble(&source)?,
-        };
+        let ensemble = read(&source)?;
         parts.push((ensemble, outputs));
     }
     let joined = joined(study, parts)?;
@@ -285,7 +306,12 @@ fn measured(study: &Study) -> Result<Option<Measured>, Stop> {
     if read.count() == 0 {
         return Err(Stop::new("the measurements hold no value"));
     }
-    let flagged = match &section.common.screen {
+    Ok(Some(screened(&section.common, read)))
+}
+
+/// Measurements as the calibration uses them: screened, and with the curves that the study adds.
+pub(super) fn screened(keys: &MeasurementKeys, read: Observations) -> Measured {
+    let flagged = match &keys.screen {
         Some(options) => {
             let (threshold, leave_out) = (options.threshold.get(), options.leave_out);
             read.blocks.iter().flat_map(|data| screen::flag(data, threshold, leave_out)).collect()
@@ -293,9 +319,9 @@ fn measured(study: &Study) -> Result<Option<Measured>, Stop> {
         None => Vec::new(),
     };
     let used = read.map(|data| screen::without(data, &flagged));
-    let added = &section.common.added_curves;
+    let added = &keys.added_curves;
     let likelihood = used.map(|data| screen::with_added_curves(data, added));
-    Ok(Some(Measured { read, used, likelihood, flagged }))
+    Measured { read, used, likelihood, flagged }
 }
 
 /// The measurements of all scenarios: a replicate belongs to one scenario and has gaps in the others of its block.

@@ -23,7 +23,7 @@ use super::numerical_error;
 use super::read::{self, Data, Runs};
 use super::simulator::Simulator;
 use super::surrogate::{self, Fitting};
-use super::{Learned, simulate, stream};
+use super::{Learned, Trial, simulate};
 
 /// An interval of each parameter.
 type Intervals = Vec<(f64, f64)>;
@@ -184,7 +184,8 @@ fn next(
     observer: &dyn Observer,
 ) -> Result<(Learned, f64), Stop> {
     let draws = kept(calibrated);
-    let random = stream(study, "refine").at(round as u64);
+    let trial = learned.trial;
+    let random = Trial::stream(trial, study, "refine").at(round as u64);
     let points = choose::points(&learned, &draws, &place, refine.runs.get(), &random)?;
     let before = learned.data.value.runs()?.runs.len();
     let data = extended(study, round, learned.data, &points, run, observer)?;
@@ -220,7 +221,8 @@ fn next(
         learned.numerics
     };
     let region = (refine.region == Region::Posterior).then_some(place);
-    Ok((Learned { data, fitted, numerics, emulator, region, refinement: None }, error))
+    let refinement = None;
+    Ok((Learned { data, fitted, numerics, emulator, region, refinement, trial }, error))
 }
 
 /// The root mean square error of an emulator at the runs from `first` on that lie where it was fitted; infinite when

@@ -44,6 +44,9 @@ pub struct Length<'a> {
     pub burn_in: f64,
     /// What must be reached.
     pub stop: Option<&'a StopRule>,
+    /// Whether half of the planned steps after the warm-up are enough, where the steps are draws; then nothing must be
+    /// reached.
+    pub half: bool,
 }
 
 /// How soon the state is written first; each further time takes twice as long, up to [`INTERVAL`].
@@ -82,7 +85,9 @@ pub fn sample(
     };
     progress.add(step as u64);
     let (mut written, mut interval) = (Instant::now(), FIRST);
-    let mut limit = plan.steps;
+    let half = length.half && sampler.steps_are_draws();
+    let mut limit = if half { plan.steps - draws_of(plan) / 2 } else { plan.steps };
+    let rule = length.stop.filter(|_| !half);
     loop {
         while step < limit && !sampler.finished(&state) {
             sampler.step(target, &mut state, &stream.at(step as u64))?;
@@ -96,7 +101,7 @@ pub fn sample(
             }
         }
         log.checkpoint(step, &state)?;
-        match length.stop {
+        match rule {
             Some(rule) if !sampler.finished(&state) => {
                 let read = log.read(limit)?;
                 match next_limit(&read.draws, plan, length.burn_in, rule) {
@@ -119,6 +124,11 @@ pub fn sample(
         }
         None => Sampled { draws, acceptance, statistics, burn_in, harvest: None, state },
     })
+}
+
+/// The steps of a plan that can be draws.
+fn draws_of(plan: Plan) -> usize {
+    plan.steps.saturating_sub(plan.warm_up)
 }
 
 /// The steps that are left out of this many.

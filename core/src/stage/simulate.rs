@@ -188,6 +188,26 @@ pub fn kept(
     Ok(kept)
 }
 
+/// The same of runs of which a run directory may hold the first ones already: those are not made again.
+pub fn grown(
+    study: &Study,
+    simulator: &Simulator<'_>,
+    stage: &str,
+    asked: Asked<'_>,
+    model: &impl Serialize,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Kept<Simulated>, Stop> {
+    let inputs = Inputs::of(simulator, model)?;
+    let first = |count: usize| {
+        let points = asked.points.select_rows(&(0..count).collect::<Vec<_>>());
+        inputs.value(Asked { names: &asked.names[..count], points: &points, imported: &[] })
+    };
+    let smaller: Vec<Value> = (1..asked.names.len()).rev().map(first).collect();
+    run.go_on_from(stage, &inputs.value(asked), &smaller)?;
+    kept(study, simulator, stage, asked, model, run, observer)
+}
+
 const STAGE: &str = "2-simulate";
 
 fn summary(simulated: &Simulated) -> String {

@@ -62,5 +62,5 @@ fn stage(
         (section.built.identity(), &section.common),
         study.about.seed
     ]);
-    calibrate::draw(study, posterior, "5-calibrate", &inputs, run, observer)
+    calibrate::draw(study, posterior, None, "5-calibrate", &inputs, run, observer)
 }

@@ -155,6 +155,10 @@ impl Component for Hamiltonian {
 }
 
 impl Sampler for Hamiltonian {
+    fn steps_are_draws(&self) -> bool {
+        true
+    }
+
     fn plan(&self, _dimension: usize) -> Plan {
         self.settings().plan()
     }

@@ -87,6 +87,10 @@ impl Component for NoUTurn {
 }
 
 impl Sampler for NoUTurn {
+    fn steps_are_draws(&self) -> bool {
+        true
+    }
+
     fn plan(&self, _dimension: usize) -> Plan {
         self.settings().plan()
     }

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use crate::data::Measurements;
+use crate::data::{Measurements, Observations};
 use crate::linalg::Matrix;
 use crate::plugin::discrepancy::{self, CommonError};
 use crate::plugin::{Discrepancy, Forward, Likelihood};
@@ -17,10 +17,11 @@ use super::stated_variance;
 /// See the module.
 pub struct Law<'a> {
     study: &'a Study,
-    measured: &'a Measured,
+    data: &'a Observations,
+    /// The replicates from which the error of their mean is known, where the study wants it.
+    replicates: Option<&'a Observations>,
     forward: &'a dyn Forward,
     plugin: &'a dyn Discrepancy,
-    replicate_error: bool,
     common: Vec<CommonError>,
     slopes: OnceLock<Result<Matrix, Stop>>,
 }
@@ -39,13 +40,25 @@ impl<'a> Law<'a> {
         if let (Some(kept), Some(section)) = (known.numerics, &study.numerical_error) {
             common.push(kept.value.common_error(section.written.whole()));
         }
+        let replicates = section.common.replicate_error.then_some(&measured.used);
+        Ok(Self { replicates, common, ..Self::bare(study, &measured.likelihood, known.forward)? })
+    }
+
+    /// That of data without any common error: the discrepancy alone.
+    pub fn bare(
+        study: &'a Study,
+        data: &'a Observations,
+        forward: &'a dyn Forward,
+    ) -> Result<Self, Stop> {
+        let section =
+            study.discrepancy.as_ref().ok_or_else(|| Stop::new("the study has no discrepancy"))?;
         Ok(Self {
             study,
-            measured,
-            forward: known.forward,
+            data,
+            replicates: None,
+            forward,
             plugin: &*section.built.plugin,
-            replicate_error: section.common.replicate_error,
-            common,
+            common: Vec::new(),
             slopes: OnceLock::new(),
         })
     }
@@ -72,17 +85,16 @@ impl<'a> Law<'a> {
             ..error.clone()
         };
         let mut own: Vec<CommonError> = self.common.iter().map(part).collect();
-        if self.replicate_error {
-            let of_replicates = common_error::of_replicates(&self.measured.used.blocks[i]);
+        if let Some(replicates) = self.replicates {
+            let of_replicates = common_error::of_replicates(&replicates.blocks[i]);
             let after = usize::from(own.first().is_some_and(|e| e.origin == "emulator"));
             own.splice(after..after, of_replicates);
         }
         let slopes = || {
-            let data = &self.measured.likelihood;
-            let made = || best_fit::slopes(self.study, data, self.forward);
+            let made = || best_fit::slopes(self.study, self.data, self.forward);
             Ok(rows(self.slopes.get_or_init(made).as_ref().map_err(Clone::clone)?, range.clone()))
         };
-        let data = &self.measured.likelihood.blocks[i];
+        let data = &self.data.blocks[i];
         make(&discrepancy::Known { data, common: &own, slopes: &slopes })
     }
 }
