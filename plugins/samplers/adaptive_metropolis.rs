@@ -96,4 +96,4 @@ impl Sampler for AdaptiveMetropolis {
     }
 }
 
-lacuna::register!(Sampler, "adaptive_metropolis", AdaptiveMetropolis);
+lacuna::register!(Sampler, "adaptive_metropolis", AdaptiveMetropolis, aliases: ["am", "haario"]);

@@ -155,4 +155,4 @@ impl Sampler for DifferentialEvolution {
     }
 }
 
-lacuna::register!(Sampler, "differential_evolution", DifferentialEvolution);
+lacuna::register!(Sampler, "differential_evolution", DifferentialEvolution, aliases: ["de", "demc", "dream"]);

@@ -92,4 +92,4 @@ impl Discrepancy for Autoregressive {
     }
 }
 
-lacuna::register!(Discrepancy, "autoregressive", Autoregressive);
+lacuna::register!(Discrepancy, "autoregressive", Autoregressive, aliases: ["ar", "ar1"]);

@@ -112,4 +112,4 @@ impl Discrepancy for StudentT {
     }
 }
 
-lacuna::register!(Discrepancy, "student_t", StudentT);
+lacuna::register!(Discrepancy, "student_t", StudentT, aliases: ["t", "student"]);

@@ -115,7 +115,7 @@ impl Sampler for NoUTurn {
     }
 }
 
-lacuna::register!(Sampler, "no_u_turn", NoUTurn);
+lacuna::register!(Sampler, "no_u_turn", NoUTurn, aliases: ["nuts"]);
 
 #[cfg(test)]
 mod tests;
