@@ -149,7 +149,8 @@ impl Parts {
                 ..error.clone()
             };
             let mut own: Vec<CommonError> = common.iter().map(part).collect();
-            if section.common.replicate_error {
+            // A stated covariance already says what the points of a replicate share.
+            if section.common.replicate_error && measured.used.blocks[i].covariance.is_none() {
                 let of_replicates = common_error::of_replicates(&measured.used.blocks[i]);
                 let after = usize::from(own.first().is_some_and(|e| e.origin == "emulator"));
                 own.splice(after..after, of_replicates);

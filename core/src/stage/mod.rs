@@ -3,6 +3,7 @@
 pub mod best_fit;
 pub mod calibrate;
 pub mod common_error;
+pub mod contents;
 pub mod derived;
 pub mod design;
 pub mod direct;
@@ -94,6 +95,7 @@ fn pursue(
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {
+    contents::before_all(study)?;
     manifest::begin(study, run)?;
     let findings = match (&study.target, &study.surrogate) {
         (Some(given), _) => target::run(study, given, run, observer)?,

@@ -17,8 +17,8 @@ use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, RunDirectory, Stop, files};
 use crate::study::Study;
 
-use super::screen;
 use super::simulate::{Simulated, inside};
+use super::{contents, results, screen};
 
 /// What was read.
 #[derive(Debug, Clone, PartialEq)]
@@ -197,9 +197,15 @@ pub fn ensemble_of(
             scenario: scenario.label(),
             layout: &layout,
         };
-        let ensemble = match &study.simulations {
-            Some(section) => section.built.plugin.ensemble(&source)?,
-            None => super::results::ensemble(&source)?,
+        let ensemble = match study.simulations.as_ref().map(|section| &section.built.plugin) {
+            Some(plugin) if plugin.names_files() || !results::are_own(&source) => {
+                plugin.ensemble(&source)?
+            }
+            reader => {
+                let made = runs.map_or(0, |runs| runs.made.scenarios[i].runs.len());
+                let allowed = reader.and_then(|plugin| plugin.allowed_failures(made));
+                results::ensemble(&source, allowed.unwrap_or(0))?
+            }
         };
         parts.push((ensemble, outputs));
     }
@@ -267,10 +273,15 @@ fn joined(study: &Study, mut parts: Vec<(Ensemble, Range<usize>)>) -> Result<Ens
 }
 
 fn measured(study: &Study) -> Result<Option<Measured>, Stop> {
+    measured_or_all(study).map_err(|all| contents::one(&all))
+}
+
+/// The measurements, or all that is wrong with their files.
+pub(super) fn measured_or_all(study: &Study) -> Result<Option<Measured>, Vec<Stop>> {
     let Some(section) = &study.measurements else { return Ok(None) };
     let read = observations(study, &*section.built.plugin)?;
     if read.count() == 0 {
-        return Err(Stop::new("the measurements hold no value"));
+        return Err(vec![Stop::new("the measurements hold no value")]);
     }
     let flagged = match &section.common.screen {
         Some(options) => {
@@ -286,23 +297,30 @@ fn measured(study: &Study) -> Result<Option<Measured>, Stop> {
 }
 
 /// The measurements of all scenarios: a replicate belongs to one scenario and has gaps in the others of its block.
-fn observations(study: &Study, reader: &dyn Reader) -> Result<Observations, Stop> {
+fn observations(study: &Study, reader: &dyn Reader) -> Result<Observations, Vec<Stop>> {
+    let mut errors = Vec::new();
     let mut blocks: Vec<Measurements> = study
         .layouts
         .blocks
         .iter()
-        .map(|layout| Measurements { layout: layout.clone(), replicates: Vec::new() })
+        .map(|layout| Measurements::new(layout.clone(), Vec::new()))
         .collect();
     let ranges: Vec<Range<usize>> = study.layouts.ranges().collect();
     for scenario in &study.scenarios {
         let (layout, outputs) = study
             .layouts
             .of_scenario(&scenario.name)
-            .ok_or_else(|| Stop::new(format!("no response to `{}`", scenario.name)))?;
+            .ok_or_else(|| vec![Stop::new(format!("no response to `{}`", scenario.name))])?;
         let label = scenario.label();
         let source =
             MeasurementSource { directory: &study.directory, scenario: label, layout: &layout };
-        let read = reader.measurements(&source)?;
+        let read = match reader.measurements(&source) {
+            Ok(read) => read,
+            Err(error) => {
+                errors.push(error);
+                continue;
+            }
+        };
         let block = ranges.iter().position(|range| range.contains(&outputs.start)).unwrap_or(0);
         let begin = outputs.start - ranges[block].start;
         for replicate in read.replicates {
@@ -312,8 +330,41 @@ fn observations(study: &Study, reader: &dyn Reader) -> Result<Observations, Stop
                 Some(label) => format!("{label} {}", replicate.name),
                 None => replicate.name,
             };
-            blocks[block].replicates.push(Replicate { name, values });
+            let sd = replicate.sd.map(|own| {
+                let mut sd = vec![0.0; ranges[block].len()];
+                sd[begin..begin + own.len()].copy_from_slice(&own);
+                sd
+            });
+            blocks[block].replicates.push(Replicate { name, values, sd });
+        }
+        if let Some(own) = read.covariance {
+            let size = ranges[block].len();
+            let all = blocks[block].covariance.get_or_insert_with(|| Matrix::zeros(size, size));
+            for (i, row) in own.iter_rows().enumerate() {
+                all.row_mut(begin + i)[begin..begin + row.len()].copy_from_slice(row);
+            }
         }
     }
+    if !errors.is_empty() {
+        return Err(contents::each(errors));
+    }
+    blocks.iter().try_for_each(stated_throughout).map_err(|stop| vec![stop])?;
     Ok(Observations { blocks })
+}
+
+/// Noise is stated of all replicates of a block or of none: a likelihood would have to guess the rest.
+fn stated_throughout(block: &Measurements) -> Result<(), Stop> {
+    if !block.states_noise() {
+        return Ok(());
+    }
+    for replicate in &block.replicates {
+        let mut measured = (0..replicate.values.len()).filter(|&i| replicate.values[i].is_some());
+        let missing = |i: &usize| !block.stated_variance(replicate, *i).is_some_and(|v| v > 0.0);
+        if let Some(i) = measured.find(missing) {
+            let (name, place) = (&replicate.name, block.layout.describe(i));
+            let text = format!("replicate `{name}` does not state its noise at {place}, others do");
+            return Err(Stop::new(text).help("state the noise of all scenarios, or of none"));
+        }
+    }
+    Ok(())
 }
