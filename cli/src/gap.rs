@@ -58,7 +58,8 @@ pub fn gap(
     }
     let gap = GapFindings { account: wanted, ..gap.clone() };
     let set = settings.set();
-    let begun = Begun { study: &study, path, settings: &set, findings: &findings, gap: &gap };
+    let begun =
+        Begun { study: &study, path, folder: out, settings: &set, findings: &findings, gap: &gap };
     let (added, with) = add(&begun, &run, &terminal)?;
     // The report of the study tells what became of it.
     let findings = stage::find_gap(&study, &mut run, &terminal)?;

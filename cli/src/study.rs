@@ -73,9 +73,35 @@ pub fn run(
     execute(&study, &folder(&study, out), false, trust)
 }
 
-/// The run directory of a study.
+/// The run directory of a study: the one that is asked for, else `runs/<study name>`.
+///
+/// A study that gives itself no name has that of its file or of the study that it extends, which others may have too, as
+/// `a/study.toml` and `b/study.toml` do. Where that directory belongs to another file that is still there, it is named
+/// after the file, after folder and file, or has a number behind it.
 pub fn folder(study: &Study, out: Option<&Path>) -> PathBuf {
-    out.map_or_else(|| Path::new("runs").join(&study.name), Path::to_owned)
+    if let Some(out) = out {
+        return out.to_owned();
+    }
+    let runs = Path::new("runs");
+    if study.named {
+        return runs.join(&study.name);
+    }
+    let file = std::path::absolute(&study.file).unwrap_or_else(|_| study.file.clone());
+    let text =
+        |name: Option<&std::ffi::OsStr>| name.unwrap_or_default().to_string_lossy().into_owned();
+    let stem = text(file.file_stem());
+    let long = match text(file.parent().and_then(Path::file_name)) {
+        folder if folder.is_empty() => stem.clone(),
+        folder => format!("{folder}-{stem}"),
+    };
+    let numbered = (2..1000).map(|n| format!("{long}-{n}"));
+    let names: Vec<String> =
+        [study.name.clone(), stem, long.clone()].into_iter().chain(numbered).collect();
+    let folders = || names.iter().map(|name| runs.join(name));
+    let of = |folder: &Path| stage::manifest::origin(folder);
+    let is_own = |folder: &PathBuf| of(folder).is_some_and(|other| other == file);
+    let is_free = |folder: &PathBuf| of(folder).is_none_or(|other| !other.exists());
+    folders().find(is_own).or_else(|| folders().find(is_free)).unwrap_or_else(|| runs.join(long))
 }
 
 /// `lacuna check STUDY`
@@ -85,6 +111,16 @@ pub fn check(path: &Path, settings: &Settings) -> Result<(), Failure> {
         print(&plugins::would_load(library));
     }
     let study = sound(checked, path)?;
+    let wrong = stage::contents::check(&study);
+    if !wrong.is_empty() {
+        let texts: Vec<String> = wrong.iter().map(ToString::to_string).collect();
+        let plural = if wrong.len() == 1 { "" } else { "s" };
+        let (count, files) = (wrong.len(), path.display());
+        let text = texts.join("\n\n");
+        return Err(Failure::wrong(format!(
+            "{text}\n\n{count} problem{plural} in the files of {files}"
+        )));
+    }
     let response = match &study.target {
         Some(_) => String::new(),
         None => format!(", {} values a response", study.layouts.len()),

@@ -65,9 +65,9 @@ fn data() -> Measurements {
             (i != UNMEASURED && (r == 0 || !(i + r).is_multiple_of(3))).then_some(measured)
         };
         let values = truth().iter().enumerate().map(value).collect();
-        Replicate { name: format!("p{r}"), values }
+        Replicate::new(format!("p{r}"), values)
     };
-    Measurements { layout: layout(), replicates: (0..5).map(replicate).collect() }
+    Measurements::new(layout(), (0..5).map(replicate).collect())
 }
 
 /// An error that all replicates share, about a quarter of the scatter of the data.
@@ -313,7 +313,7 @@ fn refuses_bad_data(discrepancy: &dyn Discrepancy) -> Result<(), String> {
         data.replicates.iter_mut().for_each(change);
         data
     };
-    let empty = Measurements { layout: layout(), replicates: Vec::new() };
+    let empty = Measurements::new(layout(), Vec::new());
     for (what, data) in [
         ("no replicate", empty),
         ("data without a value", changed(|r| r.values.fill(None))),

@@ -27,6 +27,12 @@ pub trait Discrepancy: Component {
         Ok(None)
     }
 
+    /// Whether the likelihood uses the noise that the data themselves state ([`Measurements::states_noise`]); where it does
+    /// not, such data are refused.
+    fn takes_stated_noise(&self) -> bool {
+        false
+    }
+
     /// The noise of one replicate around a response of this layout, where the options say how large it is: nothing of it
     /// is an unknown, and it does not come from the replicates.
     fn stated_noise(&self, _layout: &Layout, _response: &[f64]) -> Option<StatedNoise> {

@@ -4,6 +4,7 @@ pub mod assess;
 pub mod best_fit;
 pub mod calibrate;
 pub mod common_error;
+pub mod contents;
 pub mod coverage;
 pub mod curves;
 pub mod derived;
@@ -99,6 +100,7 @@ fn pursue(
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {
+    contents::before_all(study)?;
     manifest::begin(study, run)?;
     let observer = &Listener::new(observer);
     let findings = match (&study.target, &study.surrogate) {

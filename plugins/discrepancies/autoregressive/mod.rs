@@ -102,4 +102,4 @@ impl Discrepancy for Autoregressive {
     }
 }
 
-lacuna::register!(Discrepancy, "autoregressive", Autoregressive);
+lacuna::register!(Discrepancy, "autoregressive", Autoregressive, aliases: ["ar", "ar1"]);

@@ -121,4 +121,4 @@ impl Discrepancy for GaussianProcess {
     }
 }
 
-lacuna::register!(Discrepancy, "gaussian_process", GaussianProcess);
+lacuna::register!(Discrepancy, "gaussian_process", GaussianProcess, aliases: ["gp", "koh", "kennedy_ohagan"]);

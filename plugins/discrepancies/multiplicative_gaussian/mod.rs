@@ -188,4 +188,4 @@ impl Likelihood for Proportional {
     }
 }
 
-lacuna::register!(Discrepancy, "multiplicative_gaussian", MultiplicativeGaussian);
+lacuna::register!(Discrepancy, "multiplicative_gaussian", MultiplicativeGaussian, aliases: ["relative", "proportional"]);

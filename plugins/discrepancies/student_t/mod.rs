@@ -120,4 +120,4 @@ impl Discrepancy for StudentT {
     }
 }
 
-lacuna::register!(Discrepancy, "student_t", StudentT);
+lacuna::register!(Discrepancy, "student_t", StudentT, aliases: ["t", "student"]);

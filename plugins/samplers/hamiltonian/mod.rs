@@ -190,7 +190,7 @@ impl Sampler for Hamiltonian {
     }
 }
 
-lacuna::register!(Sampler, "hamiltonian", Hamiltonian);
+lacuna::register!(Sampler, "hamiltonian", Hamiltonian, aliases: ["hmc", "hamiltonian_monte_carlo"]);
 
 #[cfg(test)]
 pub(crate) mod laws;

@@ -124,7 +124,7 @@ impl Sampler for NoUTurn {
     }
 }
 
-lacuna::register!(Sampler, "no_u_turn", NoUTurn);
+lacuna::register!(Sampler, "no_u_turn", NoUTurn, aliases: ["nuts"]);
 
 #[cfg(test)]
 mod tests;

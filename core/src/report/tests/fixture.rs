@@ -166,9 +166,9 @@ fn measured(layout: &Layout) -> MeasuredFindings {
             // Sensor M fails late in one pulse.
             (!(r == 3 && i / TIMES == 3 && i % TIMES > 60)).then_some(clean + noise + odd)
         });
-        Replicate { name: format!("pulse {}", r + 1), values: values.collect() }
+        Replicate::new(format!("pulse {}", r + 1), values.collect())
     });
-    let used = Measurements { layout: layout.clone(), replicates: replicates.collect() };
+    let used = Measurements::new(layout.clone(), replicates.collect());
     let flagged = |replicate: &str, group: &str, distance, left_out| FlaggedCurve {
         replicate: replicate.into(),
         group: group.into(),

@@ -85,7 +85,9 @@ impl<'a> Law<'a> {
             ..error.clone()
         };
         let mut own: Vec<CommonError> = self.common.iter().map(part).collect();
-        if let Some(replicates) = self.replicates {
+        // A stated covariance already says what the points of a replicate share.
+        let shared = |replicates: &&Observations| replicates.blocks[i].covariance.is_none();
+        if let Some(replicates) = self.replicates.filter(shared) {
             let of_replicates = common_error::of_replicates(&replicates.blocks[i]);
             let after = usize::from(own.first().is_some_and(|e| e.origin == "emulator"));
             own.splice(after..after, of_replicates);
