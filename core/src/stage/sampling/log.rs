@@ -11,12 +11,15 @@ use crate::data::Draws;
 use crate::data::statistics::{Kind, Statistic, Statistics};
 use crate::linalg::Matrix;
 use crate::plugin::sampler::State;
-use crate::run::{Stop, files};
+use crate::run::{self, Stop, files};
 
 /// A state and the number of steps after which it holds.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Checkpoint {
     pub step: usize,
+    /// The hash of the inputs of the chain and of the program and plugins that made it: it is continued by no others.
+    #[serde(default)]
+    pub inputs: String,
     pub state: State,
     #[serde(default)]
     statistics: Vec<(String, Kind)>,
@@ -36,6 +39,7 @@ pub(super) struct Read {
 pub(super) struct Log {
     path: PathBuf,
     state_path: PathBuf,
+    inputs: String,
     file: BufWriter<File>,
     chains: usize,
     dimension: usize,
@@ -53,7 +57,8 @@ impl Log {
         let open = OpenOptions::new().create(true).append(true).open(&path);
         let file = BufWriter::new(open.map_err(|error| files::cannot_write(&path, &error))?);
         let (state_path, statistics) = (folder.join("state.json"), Vec::new());
-        Ok(Self { path, state_path, file, chains, dimension, statistics })
+        let inputs = run::inputs_of(folder);
+        Ok(Self { path, state_path, inputs, file, chains, dimension, statistics })
     }
 
     /// Numbers of a chain in one step: point, log density and statistics.
@@ -79,9 +84,8 @@ impl Log {
         }
         let fits = |c: &Checkpoint| {
             let needed = (c.step * self.record()) as u64;
-            needed <= length
-                && c.state.points.columns() == self.dimension
-                && names(&told(&c.state)) == c.statistics
+            let ours = c.inputs == self.inputs && c.state.points.columns() == self.dimension;
+            ours && needed <= length && names(&told(&c.state)) == c.statistics
         };
         let checkpoint = checkpoint.filter(fits);
         let kept = checkpoint.as_ref().map_or(0, |c| c.step * self.record());
@@ -116,10 +120,9 @@ impl Log {
     pub fn checkpoint(&mut self, step: usize, state: &State) -> Result<(), Stop> {
         let flushed = self.file.flush().and_then(|()| self.file.get_ref().sync_data());
         flushed.map_err(|error| files::cannot_write(&self.path, &error))?;
-        files::write_json(
-            &self.state_path,
-            &Checkpoint { step, state: state.clone(), statistics: self.statistics.clone() },
-        )
+        let (inputs, statistics) = (self.inputs.clone(), self.statistics.clone());
+        let checkpoint = Checkpoint { step, inputs, state: state.clone(), statistics };
+        files::write_json(&self.state_path, &checkpoint)
     }
 
     /// What was kept of the first steps.
