@@ -70,7 +70,7 @@ pub fn run(
     trust: Trust,
 ) -> Result<(), Failure> {
     let study = load(path, settings)?;
-    execute(&study, &folder(&study, out), trust)
+    execute(&study, &folder(&study, out), false, trust)
 }
 
 /// The run directory of a study.
@@ -96,7 +96,7 @@ pub fn check(path: &Path, settings: &Settings) -> Result<(), Failure> {
 
 /// `lacuna resume RUN`
 pub fn resume(folder: &Path, trust: Trust) -> Result<(), Failure> {
-    execute(&kept_study(folder)?, folder, trust)
+    execute(&kept_study(folder)?, folder, is_finished(folder), trust)
 }
 
 /// `lacuna report RUN`
@@ -108,7 +108,7 @@ pub fn report(folder: &Path, trust: Trust) -> Result<(), Failure> {
             .help(format!("`lacuna resume {}` goes on with it", folder.display()))
             .into());
     }
-    execute(&study, folder, trust)
+    execute(&study, folder, true, trust)
 }
 
 /// Prints finished runs side by side.
@@ -190,8 +190,12 @@ fn coloured(line: &str, level: Level) -> String {
     format!("\u{1b}[1;{colour}m{line}\u{1b}[0m")
 }
 
-fn execute(study: &Study, folder: &Path, trust: Trust) -> Result<(), Failure> {
+/// Runs all stages; a run that is only looked at is taken whatever version made it.
+fn execute(study: &Study, folder: &Path, look: bool, trust: Trust) -> Result<(), Failure> {
     let mut run = RunDirectory::open(folder)?;
+    if look {
+        run.look();
+    }
     let terminal = Terminal::new();
     let findings = stage::run(study, &mut run, &terminal)?;
     print("");

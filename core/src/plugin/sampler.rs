@@ -3,9 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Component, Fact};
+use crate::data::Statistic;
 use crate::linalg::Matrix;
 use crate::math::random::Stream;
 use crate::run::Stop;
+use crate::study::file::Start;
 
 /// A log density to draw from.
 ///
@@ -42,6 +44,17 @@ pub trait Sampler: Component {
     /// How many chains (walkers) and steps a run has on a density of this dimension.
     fn plan(&self, dimension: usize) -> Plan;
 
+    /// Whether the chains begin at the starting points that they are given. A method that draws its own from the prior
+    /// says no: it is then given draws of the prior, whatever their density, and no search for a start can stop it.
+    fn uses_starts(&self) -> bool {
+        true
+    }
+
+    /// Where the chains start when the study does not say.
+    fn start_where(&self) -> Start {
+        Start::Map
+    }
+
     /// The state before the first step, from one starting point a chain.
     fn start(&self, target: &dyn Target, points: Matrix) -> Result<State, Stop>;
 
@@ -62,6 +75,12 @@ pub trait Sampler: Component {
         _stream: &Stream,
     ) -> Result<Option<Harvest>, Stop> {
         Ok(None)
+    }
+
+    /// What there is to tell of the last step of each chain beside its point: the same statistics in the same order of
+    /// every state, that before the first step included. They are kept with the draws.
+    fn statistics(&self, _state: &State) -> Vec<Statistic> {
+        Vec::new()
     }
 
     /// Reasons not to trust the draws of a run that ended in this state, each with what would help; none

@@ -13,6 +13,8 @@ pub trait Observer: Sync {
     fn end(&self, stage: &str, note: &str);
     /// Something a person should know.
     fn warn(&self, text: &str);
+    /// Something worth telling that is no reason for concern.
+    fn note(&self, _text: &str) {}
     /// Something about this machine, these files or this attempt: it is told, and is no part of the result.
     fn remark(&self, text: &str) {
         self.warn(text);
@@ -56,6 +58,9 @@ impl Observer for Listener<'_> {
     fn warn(&self, text: &str) {
         self.observer.warn(text);
         self.with(|heard| heard.push(text.to_owned()));
+    }
+    fn note(&self, text: &str) {
+        self.observer.note(text);
     }
     fn remark(&self, text: &str) {
         self.observer.remark(text);

@@ -4,6 +4,7 @@ pub mod assess;
 pub mod best_fit;
 pub mod calibrate;
 pub mod common_error;
+pub mod curves;
 pub mod derived;
 pub mod design;
 pub mod direct;
@@ -17,6 +18,7 @@ pub mod manifest;
 pub mod numerical_error;
 pub mod power;
 pub mod predict;
+pub mod predictions;
 pub mod read;
 pub mod refine;
 pub mod report;
@@ -37,8 +39,9 @@ use crate::run::{Kept, Listener, Observer, RunDirectory, Stop};
 use crate::study::Study;
 
 use calibrate::Calibrated;
-use evidence::{Predicting, Weighed};
+use evidence::Weighed;
 use numerical_error::NumericalError;
+use predictions::Predicting;
 use read::Data;
 use refine::Refinement;
 use surrogate::Fitted;
@@ -162,6 +165,11 @@ fn conclude(
     if let Goal::Show(before) = goal {
         gap::show::stage(study, known, calibrated, before, run, observer)?;
     }
+    if let Some(calibrated) = calibrated {
+        let (weighed, validated) = (weighed.as_ref(), validated.as_ref());
+        let finished = inference_data::Finished { calibrated, weighed, validated };
+        inference_data::stage(study, known, &finished, run)?;
+    }
     report::stage(study, &report::Artifacts { gap: gap.as_ref(), ..made }, run, observer)
 }
 
@@ -181,7 +189,8 @@ fn weigh(
     let predicting = Predicting {
         forward: known.forward,
         likelihood: parts.likelihood(),
-        data: measured.likelihood.count(),
+        law: calibrate::Law::of(study, measured, known)?,
+        data: &measured.likelihood,
     };
     evidence::stage(study, &posterior, calibrated, Some(predicting), run, observer).map(Some)
 }

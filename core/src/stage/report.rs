@@ -1,4 +1,4 @@
-//! Stage 8: what was found, for people (`report.html`) and for scripts (`summary.json`, `posterior.nc`).
+//! Stage 8: what was found, for people (`report.html`) and for scripts (`summary.json`).
 
 use crate::assess::Assessment;
 use crate::data::{Draws, Ensemble, Observations};
@@ -8,10 +8,11 @@ use crate::linalg::Matrix;
 use crate::math::fit;
 use crate::math::moments::{self, Moments};
 use crate::report::findings::{
-    CalibrationFindings, CoordinateFindings, EnsembleFindings, Findings, FittedDistribution,
-    GapFindings, LeftOutFindings, MeasuredFindings, Role, SurrogateFindings,
+    CalibrationFindings, CoordinateFindings, CurvesLeftOutFindings, EnsembleFindings, Findings,
+    FittedDistribution, GapFindings, LeftOutFindings, MeasuredFindings, Role, SurrogateFindings,
 };
 use crate::report::{render, summary_json};
+use crate::run::directory::Record;
 use crate::run::{Kept, Observer, RunDirectory, Stop, files};
 use crate::study::Study;
 
@@ -19,9 +20,9 @@ use super::calibrate::Calibrated;
 use super::evidence::Weighed;
 use super::read::Measured;
 use super::validate::Validated;
-use super::{Known, derived, gap, inference_data};
+use super::{Known, derived, gap};
 
-/// Writes report, summary and posterior file; returns the findings.
+/// Writes report and summary; returns the findings.
 pub fn stage(
     study: &Study,
     all: &Artifacts<'_>,
@@ -36,12 +37,6 @@ pub fn stage(
     let page = render(&findings);
     files::write_atomic(&run.stage_folder("8-report").join("report.html"), page.as_bytes())?;
     files::write_atomic(&root.join("report.html"), page.as_bytes())?;
-    if let Some(calibrated) = calibrated {
-        let measured = all.measured();
-        let bytes = inference_data::encode(study, calibrated, measured, all.validated)
-            .map_err(|error| Stop::new(format!("cannot write posterior.nc: {error}")))?;
-        files::write_atomic(&root.join("posterior.nc"), &bytes)?;
-    }
     Ok(findings)
 }
 
@@ -80,11 +75,9 @@ fn findings(
     let calibration = calibrated.map(|c| calibration(study, c, weighed));
     let validation =
         all.validated.zip(measured).map(|(kept, measured)| kept.value.findings(measured));
-    let seconds = run
-        .records()
-        .iter()
-        .map(|r| (r.stage.split_once('-').map_or(r.stage.as_str(), |s| s.1).to_owned(), r.seconds))
-        .collect();
+    let stage = |r: &Record| r.stage.split_once('-').map_or(&*r.stage, |s| s.1).to_owned();
+    let seconds = run.records().iter().map(|r| (stage(r), r.seconds)).collect();
+    let made_by = run.records().iter().map(|r| (stage(r), r.lacuna.clone())).collect();
     Findings {
         title: study.about.title.clone(),
         study: study.name.clone(),
@@ -108,6 +101,7 @@ fn findings(
             added: gap::add::kept(run, &kept.hash),
         }),
         seconds,
+        made_by,
         note: study.about.note.clone(),
     }
 }
@@ -202,9 +196,20 @@ fn calibration(
         left_out: weighed.and_then(|w| w.left_out.as_ref()).map(|loo| LeftOutFindings {
             elpd: loo.elpd,
             error: loo.error,
+            error_by_curve: loo.error_by_curve,
             parameters: loo.parameters,
             unreliable: loo.unreliable,
+            limit: loo.limit,
             count: loo.data.len(),
+            curves: weighed.and_then(|w| w.curves_left_out.as_ref()).map(|curves| {
+                CurvesLeftOutFindings {
+                    elpd: curves.elpd,
+                    error: curves.error,
+                    parameters: curves.parameters,
+                    unreliable: curves.unreliable,
+                    count: curves.data.len(),
+                }
+            }),
         }),
     }
 }

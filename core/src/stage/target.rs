@@ -10,7 +10,7 @@ use crate::run::{Kept, Observer, RunDirectory, Stop};
 use crate::study::Study;
 
 use super::calibrate::{self, Calibrated};
-use super::{assess, evidence, report};
+use super::{assess, evidence, inference_data, report};
 
 /// Samples the target and reports.
 pub fn run(
@@ -28,6 +28,12 @@ pub fn run(
     let posterior = Posterior::new(&study.parameters, likelihood);
     let calibrated = stage(study, target, &posterior, run, observer)?;
     let weighed = evidence::stage(study, &posterior, &calibrated, None, run, observer)?;
+    let finished = inference_data::Finished {
+        calibrated: &calibrated,
+        weighed: Some(&weighed),
+        validated: None,
+    };
+    inference_data::of_target(study, &posterior, &finished, run)?;
     let made = report::Artifacts {
         known: None,
         calibrated: Some(&calibrated),

@@ -42,6 +42,7 @@ impl Study {
             layout,
             runs,
             common_errors: self.numerical_error.is_some() || emulator,
+            starts_programs: true,
         }
     }
 
@@ -62,6 +63,25 @@ impl Study {
             let (name, plugin) = (effect.built.name, &*effect.built.plugin);
             Chosen { section: "effect", name, plugin }
         }));
+        all
+    }
+
+    /// The options of every plugin with the section that it stands in.
+    pub(super) fn options(&self) -> Vec<(&'static str, &toml::Table)> {
+        let mut all = Vec::new();
+        macro_rules! add {
+            ($($section:ident),+) => {
+                $(if let Some(section) = &self.$section {
+                    all.push((stringify!($section), &section.built.options));
+                })+
+            };
+        }
+        add!(target, model, design, executor, simulations, measurements, surrogate, discrepancy);
+        add!(sampler);
+        all.extend(self.numerical_error.iter().map(|e| ("model", &e.model.built.options)));
+        all.extend(self.effects.iter().map(|effect| ("effect", &effect.built.options)));
+        let tried = self.gap.candidates.iter();
+        all.extend(tried.map(|candidate| ("gap.candidate", &candidate.built.options)));
         all
     }
 

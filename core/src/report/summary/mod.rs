@@ -53,7 +53,9 @@ pub const SCHEMA: u64 = 1;
 /// | `converged`, `verdict` | whether the run converged, and why in words |
 /// | `log_density.map`, `.best_draw` | log posterior density at the MAP and at the best draw |
 /// | `evidence.log`, `.error`, `.method` | log probability of the data, its standard error, how it was found; `evidence.limit`: why it is that of a part only, where a mode has no draws |
-/// | `loo.elpd`, `.error`, `.parameters`, `.unreliable`, `.count` | log predictive density of each datum from all others, summed (PSIS-LOO), its standard error, the effective number of parameters, how many of the data have estimates not to trust, and how many data there are |
+/// | `loo.elpd`, `.error`, `.parameters`, `.unreliable`, `.count` | log predictive density of each datum from all others, summed (PSIS-LOO), its standard error as if the data were independent, the effective number of parameters, how many of the data have estimates not to trust, and how many data there are |
+/// | `loo.error_by_curve`, `.k_limit` | the standard error from the scatter over curves, whose values may depend on each other (null below two curves); the largest k-hat that the number of draws allows |
+/// | `loo.curves.elpd`, `.error`, `.parameters`, `.unreliable`, `.count` | the same for whole curves, each predicted from all others; `loo.curves` is null where that is not known |
 /// | `accuracy.CASE.GROUP` | share of points inside the replicates' 95 % interval; cases `map`, `reference`; `average` is the mean over the groups |
 /// | `rmse.CASE` | root mean square difference from the replicates' mean, in the response's unit |
 /// | `simulated.CASE` | whether the model itself was run there (else the emulator answered) |
@@ -72,6 +74,7 @@ pub const SCHEMA: u64 = 1;
 /// | `gap.insight` | `foretold[]` (log score of left-out parts against `against`), `drift` (`reading`, `words`, `p` of equal parameters in all conditions and windows), and where there are any `separations`, `places`, `symbolic`, `stopgap` |
 /// | `gap.study`, `.run`, `.log_evidence` | the study with the effects, its run directory, and the evidences `before` and `after`, once it was run |
 /// | `seconds.STAGE` | wall-clock time when the stage's result was made |
+/// | `made_by.STAGE` | the version of Lacuna that made the stage's result |
 pub fn summary(findings: &Findings) -> Value {
     let mut summary = Map::new();
     let mut put = |key: &str, value: Value| summary.insert(key.to_owned(), value);
@@ -125,6 +128,8 @@ pub fn summary(findings: &Findings) -> Value {
         put("gap", gap::value(found));
     }
     put("seconds", pairs(&findings.seconds));
+    let made_by = findings.made_by.iter().map(|(stage, version)| (stage.clone(), json!(version)));
+    put("made_by", made_by.collect::<serde_json::Map<_, _>>().into());
     Value::Object(summary)
 }
 
@@ -229,9 +234,18 @@ fn left_out(loo: &LeftOutFindings) -> Value {
     json!({
         "elpd": loo.elpd,
         "error": loo.error,
+        "error_by_curve": loo.error_by_curve,
         "parameters": loo.parameters,
         "unreliable": loo.unreliable,
+        "k_limit": loo.limit,
         "count": loo.count,
+        "curves": loo.curves.as_ref().map(|curves| json!({
+            "elpd": curves.elpd,
+            "error": curves.error,
+            "parameters": curves.parameters,
+            "unreliable": curves.unreliable,
+            "count": curves.count,
+        })),
     })
 }
 
