@@ -7,6 +7,7 @@ mod commands;
 mod docs;
 mod effects;
 mod falling_balls;
+mod fidelity;
 mod forced_oscillator;
 mod kill;
 mod problems;

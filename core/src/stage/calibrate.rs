@@ -134,7 +134,7 @@ impl Parts {
             common.push(fitted.value.covariance(study, stated.as_deref())?);
         }
         if let (Some(kept), Some(section)) = (known.numerics, &study.numerical_error) {
-            common.push(kept.value.common_error(section.written.whole()));
+            common.push(kept.value.common_error(&section.written));
         }
         let slopes = OnceLock::new();
         let slopes = || {
@@ -218,7 +218,7 @@ pub fn stage(
         known.data.hash,
         known.origin,
         known.numerics.map(|n| &n.hash),
-        study.numerical_error.as_ref().map(|section| section.written.whole()),
+        study.numerical_error.as_ref().map(|section| section.written.scales()),
         known.region,
         laws,
         (discrepancy.built.identity(), &discrepancy.common),

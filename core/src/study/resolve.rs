@@ -9,16 +9,15 @@ use toml::Table;
 
 use super::context;
 use super::decode::{decode, fields};
+use super::fidelity::{LowFidelity, NumericalError, low_fidelity, numerical_error};
 use super::file::{
     DerivedSection, DesignKeys, DiscrepancyKeys, EffectKeys, MeasurementKeys, ModelKeys,
-    NumericalErrorSection, ResponseSection, SamplerKeys, StudySection, SurrogateKeys,
-    ValidateSection,
+    ResponseSection, SamplerKeys, StudySection, SurrogateKeys, ValidateSection,
 };
 use super::gap::{Gap, gap};
 use super::libraries::{Libraries, Seen, libraries};
 use super::sections::{
-    chosen, chosen_or, derived, effects, layouts, numerical_error, parameters, scenarios, table,
-    unknown_sections,
+    chosen, chosen_or, derived, effects, layouts, parameters, scenarios, table, unknown_sections,
 };
 use super::unknowns::{Unknown, unknowns};
 use super::{Node, Problems, Sources, inherit, overrides, resolved};
@@ -71,6 +70,8 @@ pub struct Study {
     pub sampler: Option<Section<dyn Sampler, SamplerKeys>>,
     /// `[numerical_error]`.
     pub numerical_error: Option<NumericalError>,
+    /// `[low_fidelity]`.
+    pub low_fidelity: Option<LowFidelity>,
     /// `[[derived]]`.
     pub derived_sections: Vec<DerivedSection>,
     /// `[[effect]]`.
@@ -83,18 +84,8 @@ pub struct Study {
     pub resolved: Table,
 }
 
-/// How the model's numerical error is estimated.
-pub struct NumericalError {
-    /// How many runs of the design are repeated.
-    pub runs: usize,
-    /// The model with finer numerics.
-    pub model: Section<dyn Model, ModelKeys>,
-    /// The section as it is written.
-    pub written: NumericalErrorSection,
-}
-
 /// The sections of the study language, in the order in which a study is written.
-pub const SECTIONS: [&str; 19] = [
+pub const SECTIONS: [&str; 20] = [
     "study",
     "plugins",
     "parameter",
@@ -110,6 +101,7 @@ pub const SECTIONS: [&str; 19] = [
     "surrogate",
     "discrepancy",
     "numerical_error",
+    "low_fidelity",
     "effect",
     "sampler",
     "validate",
@@ -261,6 +253,7 @@ fn structure(
     let discrepancy = chosen(root, "discrepancy", None, problems);
     let sampler = chosen(root, "sampler", None, problems);
     let numerical_error = numerical_error(root, problems);
+    let low_fidelity = low_fidelity(root, problems);
     let derived_sections = derived(root, problems);
     let effects = effects(root, problems);
     let validate = match root.get("validate") {
@@ -306,6 +299,7 @@ fn structure(
         discrepancy,
         sampler,
         numerical_error,
+        low_fidelity,
         derived_sections: derived_sections?,
         effects: effects?,
         validate: validate?,
@@ -326,7 +320,9 @@ fn structure(
 /// Third layer: what the plugins need of the machine.
 fn environment(study: &Study, purpose: Use, root: &Node, problems: &mut Problems) {
     study.each_plugin(root, problems, |section, component, context, complaints| {
-        if purpose != Use::Look || !["model", "numerical_error", "executor"].contains(&section) {
+        if purpose != Use::Look
+            || !["model", "numerical_error", "low_fidelity", "executor"].contains(&section)
+        {
             component.environment(context, complaints);
         }
     });
