@@ -80,7 +80,7 @@ impl NumericalErrorSection {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LowFidelitySection {
-    /// Options of `[model]` that make it cheaper, such as `{ numerics = { mesh = "coarse" } }`: the cheap model is run at
+    /// Options of `[model]` that make it cheaper, such as `{ numerics = { mesh = [10, 45] } }`: the cheap model is run at
     /// the points of the study's own runs, and at `runs` further ones.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<std::collections::BTreeMap<String, serde_json::Value>>")]
