@@ -64,6 +64,7 @@ pub fn load(path: &Path, settings: &[&str]) -> Study {
 #[derive(Default)]
 pub struct Watch {
     pub warnings: Mutex<Vec<String>>,
+    pub notes: Mutex<Vec<String>>,
 }
 
 impl Observer for Watch {
@@ -73,6 +74,9 @@ impl Observer for Watch {
     fn warn(&self, text: &str) {
         self.warnings.lock().unwrap().push(text.to_owned());
     }
+    fn note(&self, text: &str) {
+        self.notes.lock().unwrap().push(text.to_owned());
+    }
 }
 
 /// What a run through the library gives.
@@ -81,21 +85,30 @@ pub struct Ran {
     /// The stages that were made and not taken from what is kept.
     pub made: Vec<String>,
     pub warnings: Vec<String>,
+    /// What is said of other versions' results.
+    pub notes: Vec<String>,
 }
 
 /// Runs a study through the library.
 pub fn run(path: &Path, settings: &[&str], out: &Path) -> Result<Ran, Stop> {
+    run_as(env!("CARGO_PKG_VERSION"), path, settings, out)
+}
+
+/// The same as another version of the program.
+pub fn run_as(version: &str, path: &Path, settings: &[&str], out: &Path) -> Result<Ran, Stop> {
     let study = load(path, settings);
     let before = finished(out);
     let watch = Watch::default();
     let mut directory = RunDirectory::open(out)?;
+    directory.pretend(version);
     let findings = stage::run(&study, &mut directory, &watch)?;
     let made = directory
         .records()
         .iter()
         .filter(|r| !before.contains(&(r.stage.clone(), r.inputs.clone(), r.seconds.to_bits())));
     let made = made.map(|r| r.stage.clone()).collect();
-    Ok(Ran { findings, made, warnings: watch.warnings.into_inner().unwrap() })
+    let [warnings, notes] = [watch.warnings, watch.notes].map(|said| said.into_inner().unwrap());
+    Ok(Ran { findings, made, warnings, notes })
 }
 
 /// Every record of a finished stage that a run directory keeps, set aside or not.

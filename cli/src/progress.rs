@@ -39,6 +39,14 @@ impl Terminal {
         let mut current = self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         act(&mut current)
     }
+
+    /// Prints a line beside the bar.
+    fn say(&self, text: &str) {
+        self.with(|slot| match slot.as_ref().and_then(|current| current.bar.as_ref()) {
+            Some(bar) => bar.println(text),
+            None => eprintln!("{text}"),
+        });
+    }
 }
 
 impl Observer for Terminal {
@@ -81,10 +89,11 @@ impl Observer for Terminal {
     }
 
     fn warn(&self, text: &str) {
-        self.with(|slot| match slot.as_ref().and_then(|current| current.bar.as_ref()) {
-            Some(bar) => bar.println(format!("warning: {text}")),
-            None => eprintln!("warning: {text}"),
-        });
+        self.say(&format!("warning: {text}"));
+    }
+
+    fn note(&self, text: &str) {
+        self.say(text);
     }
 }
 

@@ -44,7 +44,7 @@ impl Settings {
 /// `lacuna run STUDY`
 pub fn run(path: &Path, settings: &Settings, out: Option<&Path>) -> Result<(), Failure> {
     let study = load(path, settings)?;
-    execute(&study, &folder(&study, out))
+    execute(&study, &folder(&study, out), false)
 }
 
 /// The run directory of a study.
@@ -70,7 +70,7 @@ pub fn check(path: &Path, settings: &Settings) -> Result<(), Failure> {
 
 /// `lacuna resume RUN`
 pub fn resume(folder: &Path) -> Result<(), Failure> {
-    execute(&kept_study(folder)?, folder)
+    execute(&kept_study(folder)?, folder, is_finished(folder))
 }
 
 /// `lacuna report RUN`
@@ -82,7 +82,7 @@ pub fn report(folder: &Path) -> Result<(), Failure> {
             .help(format!("`lacuna resume {}` goes on with it", folder.display()))
             .into());
     }
-    execute(&study, folder)
+    execute(&study, folder, true)
 }
 
 /// Prints finished runs side by side.
@@ -143,8 +143,12 @@ fn is_finished(folder: &Path) -> bool {
     folder.join("manifest.json").exists()
 }
 
-fn execute(study: &Study, folder: &Path) -> Result<(), Failure> {
+/// Runs all stages; a run that is only looked at is taken whatever version made it.
+fn execute(study: &Study, folder: &Path, look: bool) -> Result<(), Failure> {
     let mut run = RunDirectory::open(folder)?;
+    if look {
+        run.look();
+    }
     let terminal = Terminal::new();
     let findings = stage::run(study, &mut run, &terminal)?;
     print("");

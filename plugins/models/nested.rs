@@ -1,6 +1,7 @@
 //! A section inside a model's options that names a plugin of its own: a part of a chain, the reader of a command's
 //! output.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
@@ -36,7 +37,7 @@ impl<K: ?Sized, C> Nested<K, C> {
     }
 }
 
-impl<K: Component + ?Sized, C> Nested<K, C> {
+impl<K: Component + Kind + ?Sized, C> Nested<K, C> {
     /// Where the plugin says that it can answer no more.
     pub fn faults(&self) -> Vec<Arc<Fault>> {
         self.section().map_or_else(|_| Vec::new(), |section| section.built.plugin.faults())
@@ -45,6 +46,11 @@ impl<K: Component + ?Sized, C> Nested<K, C> {
     /// The libraries that the plugin needs.
     pub fn libraries(&self) -> Vec<&'static Library> {
         self.section().map_or_else(|_| Vec::new(), |section| section.built.libraries())
+    }
+
+    /// The revisions of the plugin and of those that it asks.
+    pub fn revisions(&self) -> BTreeMap<String, u32> {
+        self.section().map_or_else(|_| BTreeMap::new(), |section| section.built.revisions())
     }
 }
 

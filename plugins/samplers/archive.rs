@@ -18,6 +18,11 @@ const EVERY: u64 = 10;
 /// The largest number of places.
 const LARGEST: usize = 2000;
 
+/// The number of places of the first cloud, and of the draws of the prior beside it.
+pub(super) fn first(dimension: usize) -> usize {
+    (FIRST * dimension).max(2 * FIRST)
+}
+
 /// The archive as a step reads it.
 pub(super) struct Archive<'a> {
     /// The places, coordinate by coordinate.
@@ -28,18 +33,24 @@ pub(super) struct Archive<'a> {
 }
 
 impl<'a> Archive<'a> {
-    /// What a state keeps before the first step: a normal cloud around the best starting point.
-    pub(super) fn begin(shape: &Shape, points: &Matrix, log_density: &[f64]) -> Value {
+    /// What a state keeps before the first step: a normal cloud around the best starting point, and draws of the prior.
+    pub(super) fn begin(
+        shape: &Shape,
+        points: &Matrix,
+        log_density: &[f64],
+        prior: &Matrix,
+    ) -> Value {
         let dimension = points.columns();
         let best = (0..points.rows()).max_by(|&a, &b| log_density[a].total_cmp(&log_density[b]));
         let centre = points.row(best.unwrap_or(0));
         // The cloud is part of the proposal: any fixed stream will do.
         let mut rng = Stream::root(0).named("archive").generator();
-        let mut places = Matrix::zeros((FIRST * dimension).max(2 * FIRST), dimension);
+        let mut places = Matrix::zeros(first(dimension), dimension);
         for i in 0..places.rows() {
             let z = normals(dimension, &mut rng);
             shape.step(centre, 1.0, &z, places.row_mut(i));
         }
+        prior.iter_rows().for_each(|draw| places.push_row(draw));
         json!({
             "step": 0,
             "every": EVERY,
@@ -119,7 +130,9 @@ mod tests {
     #[test]
     fn it_grows_forgets_and_stays_small() {
         let points = Matrix::from_rows(2, [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]);
-        let mut memory = Archive::begin(&Shape::diagonal(&[1.0, 1.0]), &points, &[0.0, 1.0, 0.5]);
+        let none = Matrix::zeros(0, 2);
+        let shape = Shape::diagonal(&[1.0, 1.0]);
+        let mut memory = Archive::begin(&shape, &points, &[0.0, 1.0, 0.5], &none);
         assert_eq!(places(&memory), 20);
         let mut sizes = Vec::new();
         for _ in 0..20_000 {
@@ -140,7 +153,8 @@ mod tests {
     #[test]
     fn picked_places_differ() {
         let points = Matrix::from_rows(2, [[1.0, 2.0], [3.0, 4.0]]);
-        let memory = Archive::begin(&Shape::diagonal(&[1.0, 1.0]), &points, &[0.0, 1.0]);
+        let none = Matrix::zeros(0, 2);
+        let memory = Archive::begin(&Shape::diagonal(&[1.0, 1.0]), &points, &[0.0, 1.0], &none);
         let archive = Archive::read(&memory, 2).unwrap();
         let mut rng = Stream::root(1).generator();
         for _ in 0..200 {

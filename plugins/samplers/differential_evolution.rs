@@ -6,12 +6,13 @@ use lacuna::plugin::sampler::{Plan, State};
 use lacuna::plugin::{Component, Context, Fact, Sampler, Target};
 use lacuna::run::Stop;
 use lacuna::study::Complaints;
+use lacuna::study::file::Start;
 use rand::Rng;
 use rand::rngs::ChaCha8Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::archive::Archive;
+use super::archive::{self, Archive};
 use super::proposal::Proposal;
 use super::{chains, snooker};
 
@@ -31,7 +32,9 @@ const NOISE: f64 = 1e-4;
 /// another once the archive has both, and `snooker` is the share of moves along the line through
 /// another place, which do so too. It suits up to some thirty unknowns and several modes.
 ///
-/// The archive starts as a normal cloud of ten places for each unknown, takes in where the chains are at every
+/// The chains start at draws of the whole prior unless the study says `start`, so that each mode has a chance to catch some
+/// of them. The archive starts with ten draws of the prior and ten places of a normal cloud for each unknown, the first for
+/// jumps between modes and the second for steps within one. It takes in where the chains are at every
 /// tenth step, and forgets its first half at the end of the warm-up. It keeps growing, so that the
 /// chains are exact in the limit only; each addition weighs less than the one before. Above two thousand
 /// places every second visit is dropped, and new ones come in half as often. Chains share nothing but
@@ -50,9 +53,8 @@ pub struct DifferentialEvolution {
     pub warm_up: usize,
     /// The share of snooker moves.
     pub snooker: f64,
-    /// The shape of the first archive: `"curvature"`, the normal law that touches the density at its
-    /// maximum, or a fraction of the width of the prior, such as `{ prior = 1.0 }`, which finds several
-    /// modes more surely.
+    /// The shape of the first cloud: `"curvature"`, the normal law that touches the density at its
+    /// maximum, or a fraction of the width of the prior, such as `{ prior = 1.0 }`.
     pub archive: Proposal,
 }
 
@@ -111,11 +113,18 @@ impl Sampler for DifferentialEvolution {
         Plan { chains: self.chains, steps: self.steps, warm_up: self.warm_up, ensemble: false }
     }
 
+    fn start_where(&self) -> Start {
+        Start::Prior
+    }
+
     fn start(&self, target: &dyn Target, points: Matrix) -> Result<State, Stop> {
         chains::check_points(&points, self.chains, target.dimension(), "chains")?;
         let log_density = chains::log_density(target, &points, "chains")?;
         let (shape, evaluations) = self.archive.shape(target, &points, &log_density)?;
-        let memory = Archive::begin(&shape, &points, &log_density);
+        // The archive is part of the proposal: any fixed stream will do.
+        let prior = Stream::root(0).named("places");
+        let draws = target.prior_draws(archive::first(target.dimension()), &prior);
+        let memory = Archive::begin(&shape, &points, &log_density, &draws);
         let mut state = chains::state(points, log_density, memory);
         state.evaluations += evaluations;
         Ok(state)
@@ -156,3 +165,46 @@ impl Sampler for DifferentialEvolution {
 }
 
 lacuna::register!(Sampler, "differential_evolution", DifferentialEvolution);
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use lacuna::diagnose::chains::mcse_mean;
+    use lacuna::math::distribution::Distribution;
+    use lacuna::math::special::ln_sum_exp;
+
+    use super::*;
+    use crate::samplers::truth::{Density, run};
+
+    /// A law of known share: a normal one inside the unit square, and a quarter of one in its corner at (1, 0), both of
+    /// integral one (their tails beyond the square are below 1e-15).
+    #[test]
+    fn two_modes_get_their_shares_though_one_lies_in_a_corner() {
+        const SHARE: f64 = 0.3;
+        let normal = |x: f64, mean: f64, sd: f64| Distribution::Normal([mean, sd]).log_density(x);
+        let density = |x: &[f64]| {
+            if x.iter().any(|x| !(0.0..=1.0).contains(x)) {
+                return f64::NEG_INFINITY;
+            }
+            let inner = (1.0 - SHARE).ln() + normal(x[0], 0.35, 0.03) + normal(x[1], 0.6, 0.05);
+            let corner = (4.0 * SHARE).ln() + normal(x[0], 1.0, 0.05) + normal(x[1], 0.0, 0.08);
+            ln_sum_exp(inner, corner)
+        };
+        let priors = vec![Distribution::Uniform([0.0, 1.0]); 2];
+        let target = Density { bounds: vec![(0.0, 1.0); 2], ..Density::new(priors, density) };
+        let sampler = DifferentialEvolution { steps: 20_000, ..DifferentialEvolution::default() };
+        assert_eq!(sampler.start_where(), Start::Prior);
+        for seed in 1..=3 {
+            let draws = run(&sampler, &target, seed);
+            let in_corner = |chain: &Vec<f64>| chain.iter().map(|x| f64::from(*x > 0.7)).collect();
+            let each: Vec<Vec<f64>> =
+                draws.coordinate(0).collect::<Vec<_>>().iter().map(in_corner).collect();
+            let count: usize = each.iter().map(Vec::len).sum();
+            let share = each.iter().flatten().sum::<f64>() / count as f64;
+            let error = mcse_mean(&each);
+            assert!(error < 0.03, "{seed}: the share is known to {error} only");
+            assert!((share - SHARE).abs() < 4.0 * error, "{seed}: {share} with {error}");
+        }
+    }
+}

@@ -51,10 +51,10 @@ pub(super) fn check_counts(options: &[(&str, usize)], complaints: &mut Complaint
     }
 }
 
-/// The state before the first step, which draws from the prior: the starting points are checked and used for nothing
-/// else.
+/// The state before the first step, which draws from the prior: the starting points are counted and used for nothing
+/// else, so that their density does not matter.
 pub(super) fn start(target: &dyn Target, points: Matrix, count: usize) -> Result<State, Stop> {
-    let log_density = check_start(target, &points, count)?;
+    let log_density = counted(target, &points, count)?;
     Ok(State {
         points,
         log_density,
@@ -105,8 +105,8 @@ pub(super) fn remembered<M: DeserializeOwned>(state: &State) -> Result<M, Stop> 
     })
 }
 
-/// Checks one starting point a chain, and gives their log densities.
-fn check_start(target: &dyn Target, points: &Matrix, chains: usize) -> Result<Vec<f64>, Stop> {
+/// The log densities of one starting point a chain.
+fn counted(target: &dyn Target, points: &Matrix, chains: usize) -> Result<Vec<f64>, Stop> {
     let dimension = target.dimension();
     if (points.rows(), points.columns()) != (chains, dimension) {
         return Err(Stop::new(format!(
@@ -116,14 +116,7 @@ fn check_start(target: &dyn Target, points: &Matrix, chains: usize) -> Result<Ve
             points.columns()
         )));
     }
-    let log_density = target.log_density(points);
-    match log_density.iter().position(|value| !value.is_finite()) {
-        None => Ok(log_density),
-        Some(chain) => Err(Stop::new(format!(
-            "chain {} starts where the posterior density is zero or has no value",
-            chain + 1
-        ))),
-    }
+    Ok(target.log_density(points))
 }
 
 /// Draws of the prior, all of them inside the support of the density, and the support's share of the prior.

@@ -22,7 +22,8 @@ const FEW: usize = 20;
 ///   that very point, and so does the harvest;
 /// - a state written and read again continues with the same bits, to the harvest where there is one;
 /// - the number of threads changes nothing;
-/// - starting points outside the support, of the wrong number or not finite are refused;
+/// - starting points of the wrong number are refused, and those outside the support or not finite unless the sampler
+///   makes its own;
 /// - the mean and the standard deviation of a normal law in two correlated coordinates come out
 ///   within four Monte Carlo errors, from the steps after the warm-up or from the harvest, whose
 ///   draws are in random order and worth as many as it says;
@@ -176,10 +177,16 @@ fn refuses_bad_starts(sampler: &dyn Sampler) -> Result<(), String> {
         points
     };
     let short = good.select_rows(&(1..chains).collect::<Vec<_>>());
+    judge::refused("one point too few", || sampler.start(&Bounded, short))?;
+    if !sampler.uses_starts() {
+        let started = sampler.start(&Bounded, with(1.5));
+        return started.map(|_| ()).map_err(|stop| {
+            format!("it makes its own starting points, and stops at one that it ignores: {stop}")
+        });
+    }
     for (what, points) in [
         ("a point outside the support", with(1.5)),
         ("a point that is not a number", with(f64::NAN)),
-        ("one point too few", short),
     ] {
         judge::refused(what, || sampler.start(&Bounded, points))?;
     }

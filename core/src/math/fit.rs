@@ -1,10 +1,9 @@
 //! The named law that describes a sample best.
 
-use serde::{Deserialize, Serialize};
-use statrs::function::gamma::digamma;
-
 use super::distribution::Distribution;
 use super::moments::{kolmogorov_distance, kolmogorov_probability, mean, sorted, variance};
+use super::special::{inverse_ln_minus_digamma, ln_one_plus_minus};
+use serde::{Deserialize, Serialize};
 
 /// A law fitted to a sample by maximum likelihood.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -21,11 +20,15 @@ pub struct Fit {
     pub probability: f64,
 }
 
+/// The standard deviation relative to the mean below which laws of positive numbers are the normal law: its square
+/// times the size of a sample is what their log-likelihoods differ by.
+const NARROWEST: f64 = 1e-6;
+
 /// The normal, log-normal and gamma laws fitted to a sample, best first by AIC.
 ///
 /// `effective` is the number of independent draws the sample is worth. Laws of positive numbers
-/// are tried when all values are above zero. Fewer than three finite values, or values that are all
-/// equal, fit nothing.
+/// are tried when all values are above zero and their spread is more than a millionth of their mean: below
+/// that they cannot be told from the normal law. Fewer than three finite values, or values that are all equal, fit nothing.
 pub fn fit(values: &[f64], effective: f64) -> Vec<Fit> {
     let finite: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
     let ordered = sorted(&finite);
@@ -34,11 +37,12 @@ pub fn fit(values: &[f64], effective: f64) -> Vec<Fit> {
         return Vec::new();
     }
     let biased_sd = |x: &[f64]| (variance(x) * (n - 1.0) / n).sqrt();
-    let mut laws = vec![Distribution::Normal([mean(&ordered), biased_sd(&ordered)])];
-    if ordered[0] > 0.0 {
+    let (centre, sd) = (mean(&ordered), biased_sd(&ordered));
+    let mut laws = vec![Distribution::Normal([centre, sd])];
+    if ordered[0] > 0.0 && sd > NARROWEST * centre {
         let logs: Vec<f64> = ordered.iter().map(|x| x.ln()).collect();
         laws.push(Distribution::LogNormal([mean(&logs), biased_sd(&logs)]));
-        laws.push(gamma(mean(&ordered), mean(&logs)));
+        laws.extend(gamma(&ordered));
     }
     let effective = effective.clamp(1.0, n);
     let mut fits: Vec<Fit> = laws
@@ -55,36 +59,23 @@ pub fn fit(values: &[f64], effective: f64) -> Vec<Fit> {
     fits
 }
 
-/// The gamma law of largest likelihood, from the mean and the mean of the logarithms.
-///
-/// Newton's steps on the reciprocal of the shape (Minka, 2002).
-fn gamma(mean: f64, mean_of_logs: f64) -> Distribution {
-    let gap = mean.ln() - mean_of_logs;
-    let mut shape = (3.0 - gap + ((gap - 3.0).powi(2) + 24.0 * gap).sqrt()) / (12.0 * gap);
-    for _ in 0..50 {
-        let step =
-            (shape.ln() - digamma(shape) - gap) / (shape * shape * (1.0 / shape - trigamma(shape)));
-        let next = 1.0 / (1.0 / shape + step);
-        let done = (next - shape).abs() <= 1e-13 * shape;
-        shape = next;
-        if done {
-            break;
-        }
-    }
-    Distribution::Gamma([shape, mean / shape])
+/// The mean of the logarithms of positive numbers less the logarithm of their mean, without the cancellation where
+/// their spread is small against their mean.
+fn log_of_mean_exceeds(values: &[f64], mean: f64) -> f64 {
+    let n = values.len() as f64;
+    let relative = |x: &f64| (x - mean) / mean;
+    // Zero but for the rounding of the mean.
+    let offset = values.iter().map(relative).sum::<f64>() / n;
+    let curved = values.iter().map(|x| ln_one_plus_minus(relative(x))).sum::<f64>() / n;
+    ln_one_plus_minus(offset) - curved
 }
 
-/// The derivative of the digamma function: recurrence, then the asymptotic series
-/// (Abramowitz and Stegun 6.4.6 and 6.4.12).
-fn trigamma(x: f64) -> f64 {
-    let (mut x, mut sum) = (x, 0.0);
-    while x < 12.0 {
-        sum += 1.0 / (x * x);
-        x += 1.0;
-    }
-    let y = 1.0 / (x * x);
-    let series = y * (1.0 / 6.0 - y * (1.0 / 30.0 - y * (1.0 / 42.0 - y / 30.0)));
-    sum + (1.0 + 0.5 / x + series) / x
+/// The gamma law of largest likelihood; `None` where its shape has no value.
+fn gamma(values: &[f64]) -> Option<Distribution> {
+    let mean = mean(values);
+    let gap = log_of_mean_exceeds(values, mean);
+    let shape = (gap > 0.0 && gap.is_finite()).then(|| inverse_ln_minus_digamma(gap))?;
+    Some(Distribution::Gamma([shape, mean / shape]))
 }
 
 #[cfg(test)]
@@ -94,6 +85,7 @@ mod tests {
 
     use super::*;
     use crate::math::random::Stream;
+    use crate::math::special::normal_quantile;
 
     const SAMPLE: [f64; 12] = [0.9, 2.1, 0.3, 1.7, 5.2, 0.8, 1.1, 3.3, 2.4, 0.6, 1.5, 7.9];
 
@@ -142,6 +134,26 @@ mod tests {
             let best = &fit(&draws, 3000.0)[0];
             assert_eq!(best.distribution.name(), law.name());
             assert!(best.probability > 0.05, "{law}: {}", best.probability);
+        }
+    }
+
+    #[test]
+    fn narrow_samples_are_fitted_at_once() {
+        // The case: a mean of 1e9 with a standard deviation of one, and narrower and wider.
+        let z: Vec<f64> = (1..4000).map(|i| normal_quantile(f64::from(i) / 4000.0)).collect();
+        for relative in [1e-15, 1e-12, 1e-9, 1e-7, 1e-5, 1e-4, 1e-3, 1e-2] {
+            let values: Vec<f64> = z.iter().map(|z| 1e9 * (1.0 + relative * z)).collect();
+            let begun = std::time::Instant::now();
+            let fits = fit(&values, 4000.0);
+            assert!(begun.elapsed().as_secs_f64() < 1.0, "{relative}: {:?}", begun.elapsed());
+            assert_eq!(fits.len(), if relative > NARROWEST { 3 } else { 1 }, "{relative}");
+            let laws = fits.iter().map(|fit| &fit.distribution);
+            for law in laws.filter(|_| relative > 1e-14) {
+                // One over the square root of the shape is the relative width.
+                let width = law.sd() / law.mean() / relative;
+                assert!((width - 1.0).abs() < 0.01, "{relative}: {law}");
+                assert!((law.mean() / 1e9 - 1.0).abs() < 1e-3 * relative + 1e-15, "{law}");
+            }
         }
     }
 

@@ -1,5 +1,6 @@
 //! What all kinds of plugins share.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -29,6 +30,8 @@ pub struct Context<'a> {
     /// Whether the likelihood will have errors that all replicates share: of the emulator or of the
     /// model's numerics. Those of the replicates' mean are known only with the data.
     pub common_errors: bool,
+    /// Whether a plugin may start programs that the study names to look at them; `lacuna check` starts none.
+    pub starts_programs: bool,
 }
 
 impl<'a> Context<'a> {
@@ -42,6 +45,7 @@ impl<'a> Context<'a> {
             layout,
             runs: None,
             common_errors: false,
+            starts_programs: true,
         }
     }
 }
@@ -60,7 +64,8 @@ pub trait Component: Send + Sync {
     /// Second layer of checking: the options against the rest of the study. No files are touched.
     fn check(&self, _context: &Context<'_>, _complaints: &mut Complaints<'_>) {}
 
-    /// Third layer of checking: the options against the machine (files, commands). Nothing is changed.
+    /// Third layer of checking: the options against the machine (files, commands). Nothing is changed, and no program of the
+    /// study's is started unless the context allows it.
     fn environment(&self, _context: &Context<'_>, _complaints: &mut Complaints<'_>) {}
 
     /// Where it says that it can answer no more, for a plugin to which that may happen outside of any error; of one
@@ -72,6 +77,12 @@ pub trait Component: Send + Sync {
     /// The libraries of the plugins that it asks, where its options choose some; its own is not its business.
     fn libraries(&self) -> Vec<&'static Library> {
         Vec::new()
+    }
+
+    /// The revisions of the plugins that it asks, where its options choose some, by kind and name; its own is not its
+    /// business.
+    fn revisions(&self) -> BTreeMap<String, u32> {
+        BTreeMap::new()
     }
 }
 

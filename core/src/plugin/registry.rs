@@ -6,6 +6,8 @@
 //! lacuna::register!(Surrogate, "polynomial_chaos", PolynomialChaos);
 //! ```
 
+use std::collections::BTreeMap;
+
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -13,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use super::Component;
 use super::abi::Library;
 use super::manual::{Manual, generator, resolve};
+use crate::run::made_by::Plugin;
 use crate::study::decode::{decode, decode_beside, fields};
 use crate::study::emit;
 use crate::study::nearest::{nearest, one_of};
@@ -52,6 +55,8 @@ pub struct Entry<K: ?Sized + 'static> {
     pub module_path: &'static str,
     /// The version of the package or library it is in.
     pub version: &'static str,
+    /// The number that is raised whenever what it computes changes. A library has its hash instead.
+    pub revision: u32,
     /// The library it was loaded from, if it is not a part of the program.
     pub library: Option<&'static Library>,
 }
@@ -69,9 +74,11 @@ pub struct Built<K: ?Sized> {
     pub options: toml::Table,
     /// The library it was loaded from, if it is not a part of the program.
     pub library: Option<&'static Library>,
+    /// See [`Entry::revision`].
+    pub revision: u32,
 }
 
-impl<K: Component + ?Sized> Built<K> {
+impl<K: Component + Kind + ?Sized> Built<K> {
     /// The libraries that it needs, its own first: each once.
     pub fn libraries(&self) -> Vec<&'static Library> {
         let mut all: Vec<&'static Library> = Vec::new();
@@ -83,14 +90,24 @@ impl<K: Component + ?Sized> Built<K> {
         all
     }
 
-    /// What its results depend on, for the hash of a stage's inputs: name, options, and the libraries that it needs.
-    pub fn identity(&self) -> Identity<'_> {
+    /// The revisions of its code and of the plugins that it asks, by kind and name.
+    pub fn revisions(&self) -> BTreeMap<String, u32> {
+        let mut all = self.plugin.revisions();
+        all.insert(format!("{}.{}", K::NAME, self.name), self.revision);
+        all
+    }
+
+    /// What its results depend on, for the hash of a stage's inputs: name, options, the libraries that it needs, and
+    /// the revisions of its code.
+    pub fn identity(&self) -> Plugin<Identity<'_>> {
         let libraries = self.libraries();
-        if libraries.is_empty() {
-            return Identity::BuiltIn(self.name, &self.options);
-        }
-        let hashes = libraries.into_iter().map(|library| library.sha256.as_str()).collect();
-        Identity::Loaded(self.name, &self.options, hashes)
+        let identity = if libraries.is_empty() {
+            Identity::BuiltIn(self.name, &self.options)
+        } else {
+            let hashes = libraries.into_iter().map(|library| library.sha256.as_str()).collect();
+            Identity::Loaded(self.name, &self.options, hashes)
+        };
+        Plugin { identity, revisions: self.revisions() }
     }
 }
 
@@ -149,10 +166,18 @@ macro_rules! kind {
     };
 }
 
-/// Registers a plugin: its kind, its name in a study, its options, which implement the kind.
+/// Registers a plugin: its kind, its name in a study, its options, which implement the kind; and its revision, which is
+/// raised whenever what it computes changes, and is 1 when left out.
+///
+/// ```ignore
+/// lacuna::register!(Sampler, "metropolis", Metropolis, revision = 2);
+/// ```
 #[macro_export]
 macro_rules! register {
     ($kind:path, $name:literal, $options:ty) => {
+        $crate::register!($kind, $name, $options, revision = 1);
+    };
+    ($kind:path, $name:literal, $options:ty, revision = $revision:literal) => {
         $crate::plugin::registry::inventory::submit! {
             $crate::plugin::registry::Entry::<dyn $kind> {
                 name: $name,
@@ -165,6 +190,7 @@ macro_rules! register {
                 },
                 module_path: module_path!(),
                 version: env!("CARGO_PKG_VERSION"),
+                revision: $revision,
                 library: None,
             }
         }
@@ -195,7 +221,8 @@ pub fn build<K: ?Sized, O: DeserializeOwned + Serialize>(
     let options: O = decode_beside(node, beside, problems)?;
     match emit::to_table(&options) {
         Ok(written) => {
-            Some(Built { name, plugin: into_plugin(options), options: written, library: None })
+            let plugin = into_plugin(options);
+            Some(Built { name, plugin, options: written, library: None, revision: 1 })
         }
         Err(error) => {
             let message = format!("the options of `{name}` {error}");
@@ -317,7 +344,8 @@ pub fn section<K: Kind + ?Sized, C: DeserializeOwned>(
         }
     }?;
     let beside: Vec<&str> = std::iter::once("use").chain(common_keys.iter().copied()).collect();
-    let built = (entry.build)(&split.options, &beside, problems);
+    let built = (entry.build)(&split.options, &beside, problems)
+        .map(|built| Built { revision: entry.revision, ..built });
     Some(Section { common: common?, built: built? })
 }
 
@@ -343,7 +371,10 @@ pub fn from_text<K: Kind + ?Sized>(name: &str, options: &str) -> Result<Built<K>
     let source = sources.add_argument(&format!("{}.{name}", K::NAME), options.to_owned());
     let entry = located::<K>(name, Place::whole(source), &mut problems);
     let node = read(source, &sources, &mut problems);
-    let built = entry.zip(node).and_then(|(entry, node)| (entry.build)(&node, &[], &mut problems));
+    let built = entry.zip(node).and_then(|(entry, node)| {
+        let built = (entry.build)(&node, &[], &mut problems)?;
+        Some(Built { revision: entry.revision, ..built })
+    });
     built.ok_or_else(|| problems.render(&sources))
 }
 

@@ -6,6 +6,7 @@ use super::{Component, Fact};
 use crate::linalg::Matrix;
 use crate::math::random::Stream;
 use crate::run::Stop;
+use crate::study::file::Start;
 
 /// A log density to draw from.
 ///
@@ -41,6 +42,17 @@ pub trait Target: Sync {
 pub trait Sampler: Component {
     /// How many chains (walkers) and steps a run has on a density of this dimension.
     fn plan(&self, dimension: usize) -> Plan;
+
+    /// Whether the chains begin at the starting points that they are given. A method that draws its own from the prior
+    /// says no: it is then given draws of the prior, whatever their density, and no search for a start can stop it.
+    fn uses_starts(&self) -> bool {
+        true
+    }
+
+    /// Where the chains start when the study does not say.
+    fn start_where(&self) -> Start {
+        Start::Map
+    }
 
     /// The state before the first step, from one starting point a chain.
     fn start(&self, target: &dyn Target, points: Matrix) -> Result<State, Stop>;

@@ -39,6 +39,8 @@ pub struct Findings {
     pub validation: Option<ValidationFindings>,
     /// What the model misses.
     pub gap: Option<GapFindings>,
+    /// The version of Lacuna that made the result of each stage.
+    pub made_by: Vec<(String, String)>,
     /// The time each stage took when it was made, in seconds.
     pub seconds: Vec<(String, f64)>,
     /// Things a reader must know first: not converged, stranded walkers, runs left out.

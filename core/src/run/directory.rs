@@ -8,6 +8,7 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 
+use super::made_by::{Asked, MadeBy};
 use super::{Observer, Stop, files};
 use crate::plugin::Fault;
 
@@ -38,8 +39,14 @@ pub struct Kept<T> {
 pub struct Record {
     /// The stage's folder.
     pub stage: String,
-    /// The hash of everything that went in.
+    /// The hash of everything that went in, and of what made it.
     pub inputs: String,
+    /// The hash of everything that went in alone; the same as `inputs` where no code has a part in it.
+    #[serde(default)]
+    pub asked: Option<String>,
+    /// What made it, as far as it depends on that.
+    #[serde(default)]
+    pub made_by: MadeBy,
     /// The SHA-256 of each file that came out.
     pub outputs: BTreeMap<String, String>,
     /// How long it took, in seconds.
@@ -51,6 +58,12 @@ pub struct Record {
 }
 
 impl Record {
+    /// Whether it was made from inputs of this hash, whatever made it. A record from before this was written down has
+    /// that hash as its only one.
+    pub(super) fn is_of(&self, alone: &str) -> bool {
+        self.asked.as_ref().unwrap_or(&self.inputs) == alone
+    }
+
     fn hash(&self) -> String {
         let lines: String =
             self.outputs.iter().map(|(file, hash)| format!("{hash} {file}\n")).collect();
@@ -61,9 +74,14 @@ impl Record {
 /// A folder that holds all artifacts of a study's run.
 #[derive(Debug)]
 pub struct RunDirectory {
-    root: PathBuf,
+    pub(super) root: PathBuf,
     records: Vec<Record>,
     watched: Vec<Arc<Fault>>,
+    pub(super) version: String,
+    /// Whether a stage was made again because another version had made it.
+    pub(super) remade: bool,
+    /// Whether results are taken whatever made them.
+    pub(super) looking: bool,
     _lock: File,
 }
 
@@ -83,8 +101,13 @@ fn is_taken(tried: &Result<(), TryLockError>) -> bool {
     matches!(tried, Err(TryLockError::WouldBlock))
 }
 
-const RECORD: &str = "stage.json";
+pub(super) const RECORD: &str = "stage.json";
 pub(super) const INPUTS: &str = "inputs.sha256";
+
+/// The hash that the folder of a stage is for: of the stage's inputs and of what makes it; empty where there is none.
+pub fn inputs_of(folder: &Path) -> String {
+    fs::read_to_string(folder.join(INPUTS)).unwrap_or_default().trim().to_owned()
+}
 
 impl RunDirectory {
     /// Opens or makes the folder and locks it against other processes.
@@ -99,7 +122,15 @@ impl RunDirectory {
                 Stop::new(message).help("wait for it, or choose another folder with `--out DIR`")
             );
         }
-        Ok(Self { root: root.to_owned(), records: Vec::new(), watched: Vec::new(), _lock: lock })
+        Ok(Self {
+            root: root.to_owned(),
+            records: Vec::new(),
+            watched: Vec::new(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            remade: false,
+            looking: false,
+            _lock: lock,
+        })
     }
 
     /// Whether a process works in a folder.
@@ -123,12 +154,24 @@ impl RunDirectory {
         self.watched = faults;
     }
 
+    /// Takes what is finished whatever version made it: to look at a finished run is no reason to make it again.
+    pub fn look(&mut self) {
+        self.looking = true;
+    }
+
+    /// Works as another version of the program, for tests of what that changes.
+    #[doc(hidden)]
+    pub fn pretend(&mut self, version: &str) {
+        version.clone_into(&mut self.version);
+    }
+
     /// The folder of a stage.
     pub fn stage_folder(&self, stage: &str) -> PathBuf {
         self.root.join(stage)
     }
 
-    /// Returns the stage's saved result when the hash of its `inputs` is unchanged; else makes and saves it.
+    /// Returns the stage's saved result when the hash of its `inputs` and of [what makes it](MadeBy) is unchanged; else
+    /// makes and saves it. What another version made is told: what is taken of it, and what is made again and why.
     ///
     /// `make` gets the stage's folder; what it wrote there in an earlier, interrupted attempt with the same
     /// inputs is still there, so that it can go on. A folder made from other inputs is set aside, not deleted,
@@ -140,12 +183,20 @@ impl RunDirectory {
         observer: &dyn Observer,
         make: impl FnOnce(&Path) -> Result<T, Stop>,
     ) -> Result<Kept<T>, Stop> {
-        let inputs = hash_of(stage, inputs)?;
+        let Asked { alone, whole: inputs, made_by } = Asked::of(stage, inputs, &self.version)?;
         let folder = self.stage_folder(stage);
+        let inputs = self.looked_at(stage, &alone).unwrap_or(inputs);
+        let before = self.made_otherwise(stage, &alone, &inputs, &made_by);
         self.bring_folder(stage, &inputs)?;
         match finished(&folder, &inputs) {
             Finished::Whole(record) => match T::load(&folder) {
-                Ok(value) => return Ok(self.kept(record, value, false)),
+                Ok(value) => {
+                    if record.lacuna != self.version {
+                        let made = &record.lacuna;
+                        observer.note(&format!("`{stage}` is taken as lacuna {made} made it"));
+                    }
+                    return Ok(self.kept(record, value, false));
+                }
                 Err(_) => observer.warn(&format!(
                     "the files in {} do not read back; making them again",
                     folder.display()
@@ -155,7 +206,12 @@ impl RunDirectory {
                 "{} is missing or not as it was written; making it again",
                 folder.join(file).display()
             )),
-            Finished::No => {}
+            Finished::No => {
+                if let Some(why) = before {
+                    self.remade = true;
+                    observer.note(&format!("`{stage}` is made again: {why}"));
+                }
+            }
         }
         let begun = Instant::now();
         let made = make(&folder);
@@ -172,15 +228,29 @@ impl RunDirectory {
         }
         let finished =
             SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |elapsed| elapsed.as_secs());
-        let lacuna = env!("CARGO_PKG_VERSION").to_owned();
-        let record = Record { stage: stage.to_owned(), inputs, outputs, seconds, lacuna, finished };
+        let record = Record {
+            stage: stage.to_owned(),
+            inputs,
+            asked: Some(alone),
+            made_by,
+            outputs,
+            seconds,
+            lacuna: self.version.clone(),
+            finished,
+        };
         files::write_json(&folder.join(RECORD), &record)?;
         Ok(self.kept(record, value, true))
     }
 
+    /// The hash of a stage's inputs and of what makes it.
+    pub(super) fn hash_of(&self, stage: &str, inputs: &impl Serialize) -> Result<String, Stop> {
+        Ok(Asked::of(stage, inputs, &self.version)?.whole)
+    }
+
     /// Whether a stage is finished for these inputs.
     pub fn has(&self, stage: &str, inputs: &impl Serialize) -> Result<bool, Stop> {
-        let inputs = hash_of(stage, inputs)?;
+        let Asked { alone, whole, .. } = Asked::of(stage, inputs, &self.version)?;
+        let inputs = self.looked_at(stage, &alone).unwrap_or(whole);
         let folder = self.stage_folder(stage);
         let aside = self.aside(stage, &inputs);
         Ok([folder, aside].iter().any(|f| matches!(finished(f, &inputs), Finished::Whole(_))))
@@ -239,7 +309,7 @@ pub(super) fn move_folder(from: &Path, to: &Path) -> Result<(), Stop> {
 }
 
 /// Whether a folder holds a finished stage.
-enum Finished {
+pub(super) enum Finished {
     /// It does, and its files are as they were written.
     Whole(Record),
     /// It did: this file is missing or another one.
@@ -248,7 +318,7 @@ enum Finished {
     No,
 }
 
-fn finished(folder: &Path, inputs: &str) -> Finished {
+pub(super) fn finished(folder: &Path, inputs: &str) -> Finished {
     let record = files::read_json::<Record>(&folder.join(RECORD)).ok();
     let Some(record) = record.filter(|record| record.inputs == inputs) else {
         return Finished::No;
@@ -268,77 +338,5 @@ fn spent_before(folder: &Path) -> f64 {
     text.trim().parse().unwrap_or(0.0)
 }
 
-pub(super) fn hash_of(stage: &str, inputs: &impl Serialize) -> Result<String, Stop> {
-    let text = serde_json::to_string(&(stage, inputs))
-        .map_err(|error| Stop::new(format!("cannot hash the inputs of {stage}: {error}")))?;
-    Ok(files::hash(text.as_bytes()))
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::run::Silent;
-
-    #[derive(Debug, PartialEq)]
-    struct Number(f64);
-
-    impl Artifact for Number {
-        fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
-            files::write_json(&folder.join("number.json"), &self.0)?;
-            Ok(vec!["number.json".to_owned()])
-        }
-        fn load(folder: &Path) -> Result<Self, Stop> {
-            Ok(Self(files::read_json(&folder.join("number.json"))?))
-        }
-    }
-
-    fn keep(run: &mut RunDirectory, input: u32, value: f64) -> (f64, bool) {
-        let kept = run.keep("1-test", &input, &Silent, |_| Ok(Number(value))).unwrap();
-        (kept.value.0, kept.fresh)
-    }
-
-    #[test]
-    fn a_stage_is_made_once_for_each_input_and_never_lost() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut run = RunDirectory::open(folder.path()).unwrap();
-        assert_eq!(keep(&mut run, 1, 0.1), (0.1, true));
-        assert_eq!(keep(&mut run, 1, 9.0), (0.1, false));
-        assert_eq!(keep(&mut run, 2, 0.2), (0.2, true));
-        assert_eq!(keep(&mut run, 1, 9.0), (0.1, false));
-        assert_eq!(keep(&mut run, 2, 9.0), (0.2, false));
-    }
-
-    #[test]
-    fn a_damaged_artifact_is_made_again() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut run = RunDirectory::open(folder.path()).unwrap();
-        keep(&mut run, 1, 0.1);
-        fs::write(folder.path().join("1-test/number.json"), "0.3").unwrap();
-        assert_eq!(keep(&mut run, 1, 0.2), (0.2, true));
-    }
-
-    #[test]
-    fn an_interrupted_stage_finds_what_it_wrote() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut run = RunDirectory::open(folder.path()).unwrap();
-        let first = run.keep("1-test", &1, &Silent, |folder| {
-            files::write_json(&folder.join("half.json"), &0.5)?;
-            Err::<Number, _>(Stop::new("killed"))
-        });
-        assert_eq!(first.unwrap_err().message, "killed");
-        let second = run.keep("1-test", &1, &Silent, |folder| {
-            Ok(Number(files::read_json::<f64>(&folder.join("half.json"))? * 2.0))
-        });
-        assert_eq!(second.unwrap().value, Number(1.0));
-    }
-
-    #[test]
-    fn two_processes_do_not_share_a_run() {
-        let folder = tempfile::tempdir().unwrap();
-        let _first = RunDirectory::open(folder.path()).unwrap();
-        let second = RunDirectory::open(folder.path()).unwrap_err();
-        assert!(second.message.starts_with("another process is working in"));
-        let without_locks = std::io::Error::from(std::io::ErrorKind::Unsupported);
-        assert!(!is_taken(&Err(TryLockError::Error(without_locks))));
-    }
-}
+mod tests;

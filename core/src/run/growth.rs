@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::adopt::link;
-use super::directory::{INPUTS, hash_of, move_folder};
+use super::directory::{INPUTS, move_folder};
 use super::{RunDirectory, Stop, files};
 
 impl RunDirectory {
@@ -19,7 +19,7 @@ impl RunDirectory {
         inputs: &impl Serialize,
         smaller: &[impl Serialize],
     ) -> Result<(), Stop> {
-        let inputs = hash_of(stage, inputs)?;
+        let inputs = self.hash_of(stage, inputs)?;
         let folder = self.stage_folder(stage);
         let marked = fs::read_to_string(folder.join(INPUTS)).unwrap_or_default();
         let marked = marked.trim();
@@ -27,7 +27,7 @@ impl RunDirectory {
             return Ok(());
         }
         for smaller in smaller {
-            let smaller = hash_of(stage, smaller)?;
+            let smaller = self.hash_of(stage, smaller)?;
             let aside = self.aside(stage, &smaller);
             if marked == smaller {
                 link_whole(&folder, &aside)?;

@@ -12,6 +12,8 @@ pub trait Observer: Sync {
     fn end(&self, stage: &str, note: &str);
     /// Something a person should know.
     fn warn(&self, text: &str);
+    /// Something worth telling that is no reason for concern.
+    fn note(&self, _text: &str) {}
 }
 
 /// Watches nothing.

@@ -22,5 +22,7 @@ pub fn finished(study: &Study, folder: &Path) -> Result<Option<RunDirectory>, St
             "run the study again, or serve the run's own: `{folder}/resolved.toml` with `--out {folder}`"
         )));
     }
-    RunDirectory::open(folder).map(Some)
+    let mut run = RunDirectory::open(folder)?;
+    run.look();
+    Ok(Some(run))
 }

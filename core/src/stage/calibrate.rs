@@ -12,10 +12,11 @@ use crate::diagnose::Diagnosis;
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::math::optimise;
+use crate::math::random::Stream;
 use crate::plugin::discrepancy;
 use crate::plugin::discrepancy::CommonError;
 use crate::plugin::sampler::Evidence;
-use crate::plugin::{Fact, Forward, Likelihood, Target};
+use crate::plugin::{Fact, Forward, Likelihood, Sampler, Target};
 use crate::posterior::{Joint, OfData, Posterior};
 use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
@@ -268,18 +269,8 @@ fn calibrate(
     let maxima = maxima?;
     let best = &maxima[0];
     let plan = section.built.plugin.plan(posterior.dimension());
-    let start = || match section.common.start {
-        Start::Prior => {
-            let draws = posterior.prior_draws(4 * plan.chains, &random.named("start"));
-            inside(posterior, draws, plan.chains)
-        }
-        Start::Sobol => inside(posterior, sobol(posterior, 4 * plan.chains)?, plan.chains),
-        Start::Map => {
-            let laplace = optimise::laplace(posterior, &best.point)?;
-            let random = random.named("start");
-            optimise::scatter(posterior, &best.point, &laplace, plan.chains, &random)
-        }
-    };
+    let sampler = &*section.built.plugin;
+    let start = || starts(posterior, sampler, section.common.start, &best.point, &random);
     let coordinates = coordinates(study, posterior);
     let progress = Progress::new(observer);
     let length =
@@ -328,6 +319,35 @@ fn calibrate(
         evidence,
     };
     Ok(Calibrated { draws, outcome })
+}
+
+/// One starting point a chain.
+fn starts(
+    posterior: &Posterior<'_>,
+    sampler: &dyn Sampler,
+    wanted: Option<Start>,
+    best: &[f64],
+    random: &Stream,
+) -> Result<Matrix, Stop> {
+    let chains = sampler.plan(posterior.dimension()).chains;
+    let random = random.named("start");
+    // A method that makes its own is given points of the right number, whatever their density.
+    if !sampler.uses_starts() {
+        return Ok(posterior.prior_draws(chains, &random));
+    }
+    match wanted.unwrap_or_else(|| sampler.start_where()) {
+        Start::Prior => inside(posterior, chains, |piece| {
+            let more = random.named("more").at(piece as u64);
+            Ok(posterior.prior_draws(4 * chains, if piece == 0 { &random } else { &more }))
+        }),
+        Start::Sobol => {
+            inside(posterior, chains, |piece| sobol(posterior, 4 * chains * piece, 4 * chains))
+        }
+        Start::Map => match optimise::laplace(posterior, best) {
+            Ok(laplace) => optimise::scatter(posterior, best, &laplace, chains, &random),
+            Err(_) => optimise::scatter_without_bounds(posterior, best, chains, &random),
+        },
+    }
 }
 
 fn coordinates(study: &Study, posterior: &Posterior<'_>) -> Vec<Coordinate> {

@@ -11,6 +11,7 @@ use crate::report::findings::{
     GapFindings, LeftOutFindings, MeasuredFindings, Role, SurrogateFindings,
 };
 use crate::report::{render, summary_json};
+use crate::run::directory::Record;
 use crate::run::{Kept, RunDirectory, Stop, files};
 use crate::study::Study;
 
@@ -71,11 +72,9 @@ fn findings(
     let calibration = calibrated.map(|c| calibration(study, c, weighed));
     let validation =
         all.validated.zip(measured).map(|(kept, measured)| kept.value.findings(measured));
-    let seconds = run
-        .records()
-        .iter()
-        .map(|r| (r.stage.split_once('-').map_or(r.stage.as_str(), |s| s.1).to_owned(), r.seconds))
-        .collect();
+    let stage = |r: &Record| r.stage.split_once('-').map_or(&*r.stage, |s| s.1).to_owned();
+    let seconds = run.records().iter().map(|r| (stage(r), r.seconds)).collect();
+    let made_by = run.records().iter().map(|r| (stage(r), r.lacuna.clone())).collect();
     Findings {
         title: study.about.title.clone(),
         study: study.name.clone(),
@@ -98,6 +97,7 @@ fn findings(
             added: gap::add::kept(run, &kept.hash),
         }),
         seconds,
+        made_by,
         note: study.about.note.clone(),
     }
 }

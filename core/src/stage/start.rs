@@ -46,28 +46,35 @@ pub(super) fn maxima(
     Ok(maxima)
 }
 
-/// The first points at which the density is above zero.
+/// The first points of a sequence at which the density is above zero: `more` gives the sequence piece by piece.
 pub(super) fn inside(
     posterior: &Posterior<'_>,
-    points: Matrix,
     chains: usize,
+    mut more: impl FnMut(usize) -> Result<Matrix, Stop>,
 ) -> Result<Matrix, Stop> {
-    let density = posterior.log_density(&points);
-    let finite: Vec<usize> =
-        (0..points.rows()).filter(|&i| density[i].is_finite()).take(chains).collect();
-    if finite.len() < chains {
-        return Err(Stop::new(format!(
-            "only {} of {} points of the prior have a posterior density above zero, fewer than the {chains} chains",
-            finite.len(),
-            points.rows()
-        ))
-        .help("start the chains at the best fit: `start = \"map\"` in `[sampler]`"));
+    const PIECES: usize = 64;
+    let (mut found, mut tried) = (Matrix::zeros(0, posterior.dimension()), 0);
+    for piece in 0..PIECES {
+        let points = more(piece)?;
+        tried += points.rows();
+        let density = posterior.log_density(&points);
+        let finite = (0..points.rows()).filter(|&i| density[i].is_finite());
+        for i in finite.take(chains - found.rows()).collect::<Vec<_>>() {
+            found.push_row(points.row(i));
+        }
+        if found.rows() == chains {
+            return Ok(found);
+        }
     }
-    Ok(points.select_rows(&finite))
+    Err(Stop::new(format!(
+        "only {} of {tried} points of the prior have a posterior density above zero, fewer than the {chains} chains",
+        found.rows(),
+    ))
+    .help("start the chains at the best fit: `start = \"map\"` in `[sampler]`"))
 }
 
-/// A Sobol' sequence through the quantiles of the priors.
-pub(super) fn sobol(posterior: &Posterior<'_>, count: usize) -> Result<Matrix, Stop> {
+/// A Sobol' sequence through the quantiles of the priors: `count` points, after `from`.
+pub(super) fn sobol(posterior: &Posterior<'_>, from: usize, count: usize) -> Result<Matrix, Stop> {
     let priors: Vec<&Distribution> = posterior.priors().collect();
     if priors.len() > sobol::LARGEST_DIMENSION {
         let most = sobol::LARGEST_DIMENSION;
@@ -79,5 +86,5 @@ pub(super) fn sobol(posterior: &Posterior<'_>, count: usize) -> Result<Matrix, S
         let natural: Vec<f64> = priors.iter().zip(unit).map(|(p, u)| p.quantile(u)).collect();
         posterior.coordinates(&natural)
     };
-    Ok(Matrix::from_rows(priors.len(), (0..count).map(point)))
+    Ok(Matrix::from_rows(priors.len(), (from..from + count).map(point)))
 }

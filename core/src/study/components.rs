@@ -53,6 +53,7 @@ impl Study {
             layout,
             runs,
             common_errors: self.numerical_error.is_some() || emulator,
+            starts_programs: true,
         }
     }
 
@@ -107,6 +108,28 @@ impl Study {
                 plugin: &*s.built.plugin,
             }));
         }
+        all
+    }
+
+    /// The options of every plugin with the section that it stands in.
+    pub(super) fn options(&self) -> Vec<(&'static str, &toml::Table)> {
+        let mut all = Vec::new();
+        macro_rules! add {
+            ($($section:ident),+) => {
+                $(if let Some(section) = &self.$section {
+                    all.push((stringify!($section), &section.built.options));
+                })+
+            };
+        }
+        add!(target, model, design, executor, simulations, measurements, surrogate, discrepancy);
+        add!(sampler);
+        all.extend(self.numerical_error.iter().map(|e| ("model", &e.model.built.options)));
+        if let Some(Cheap::Model(model, _)) = self.low_fidelity.as_ref().map(|low| &low.source) {
+            all.push(("model", &model.built.options));
+        }
+        all.extend(self.effects.iter().map(|effect| ("effect", &effect.built.options)));
+        let tried = self.gap.candidates.iter();
+        all.extend(tried.map(|candidate| ("gap.candidate", &candidate.built.options)));
         all
     }
 

@@ -15,6 +15,12 @@ use crate::plugin::{Surrogate, registry};
 
 /// Reports everything that is inconsistent.
 pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
+    let before = problems.len();
+    super::sizes::check(study, root, problems);
+    // What follows may make what it looks at.
+    if problems.len() > before {
+        return;
+    }
     let mut complaints = Complaints::new(root, problems);
     if study.target.is_some() {
         beside_a_target(study, root, &mut complaints);
@@ -205,13 +211,13 @@ fn runs(study: &Study, complaints: &mut Complaints<'_>) {
         || !design.common.imports.is_empty();
     let (runs, kept) = (design.common.total(), surrogate.common.validation);
     let training = surrogate.common.training.map_or(1, usize::from);
-    if !imported && training + kept > runs {
+    if !imported && training.saturating_add(kept) > runs {
         let key = if surrogate.common.training.is_some() { "training" } else { "validation" };
         complaints
             .at(&format!("surrogate.{key}"))
             .say("more runs for training and validation than the design makes")
             .expected(format!("at most {runs} together"))
-            .found(training + kept);
+            .found(training.saturating_add(kept));
     }
 }
 

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 pub use super::derived::DerivedSection;
 pub use super::fidelity::{LowFidelitySection, NumericalErrorSection};
+use super::file_name::FileName;
 pub use super::quantity::Quantity;
 pub use super::response::{Axes, AxisSection, GridSection, ResponseSection};
 pub use super::scenario::{FunctionSection, ScenarioSection};
@@ -25,9 +26,9 @@ use crate::plugin::effect::On;
 pub struct StudySection {
     /// One line that says what the study is about.
     pub title: String,
-    /// The study's name, used for its run directory; the name of its file when left out.
+    /// The study's name, used for its run directory: a plain name, no path; the name of its file when left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub name: Option<String>,
+    pub name: Option<FileName>,
     /// The seed of all random numbers.
     #[serde(default)]
     pub seed: u64,
@@ -96,7 +97,8 @@ pub struct DesignKeys {
 impl DesignKeys {
     /// The number of runs that the design places, those added later too.
     pub fn total(&self) -> usize {
-        self.runs.get() + self.extended.iter().map(|count| count.get()).sum::<usize>()
+        let more = self.extended.iter().map(|count| count.get());
+        more.fold(self.runs.get(), usize::saturating_add)
     }
 }
 
@@ -232,8 +234,10 @@ pub struct EffectKeys {
 pub struct SamplerKeys {
     /// The share of the first steps that is left out of every summary.
     pub burn_in: Fraction,
-    /// Where the chains start.
-    pub start: Start,
+    /// Where the chains start; when left out, where the sampler starts best: `"prior"` for `differential_evolution`,
+    /// `"map"` for the others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub start: Option<Start>,
     /// Goes on after the sampler's own number of steps until this is reached.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stop: Option<StopRule>,
@@ -253,7 +257,7 @@ pub struct StopRule {
 impl Default for SamplerKeys {
     fn default() -> Self {
         let burn_in = Fraction::new(0.5).unwrap_or_else(|_| unreachable!("0.5 is a fraction"));
-        Self { burn_in, start: Start::Map, stop: None }
+        Self { burn_in, start: None, stop: None }
     }
 }
 

@@ -17,15 +17,17 @@ use super::file::{
 use super::gap::{Gap, gap};
 use super::libraries::{Libraries, Seen, libraries};
 use super::sections::{
-    chosen, chosen_or, derived, effects, layouts, parameters, scenarios, table, unknown_sections,
+    chosen, chosen_or, derived, effects, layouts, name, parameters, scenarios, table,
+    unknown_sections,
 };
 use super::unknowns::{Unknown, unknowns};
-use super::{Node, Problems, Sources, inherit, overrides, resolved};
+use super::{Node, Problems, Sources, inherit, overrides, resolved, sizes};
 use crate::data::{Layout, Layouts, Parameter, Scenario};
 use crate::plugin::registry::loaded::declaring;
 use crate::plugin::registry::{NoKeys, Section};
 use crate::plugin::{
-    Density, Design, Discrepancy, Effect, Executor, Given, Model, Reader, Sampler, Surrogate,
+    Context, Density, Design, Discrepancy, Effect, Executor, Given, Model, Reader, Sampler,
+    Surrogate,
 };
 
 /// A study that can be run.
@@ -277,9 +279,9 @@ fn structure(
     }
     let mut about = about?;
     about.directory = None;
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let name = name(&mut about, path, root, problems)?;
     let mut study = Study {
-        name: about.name.take().unwrap_or(stem),
+        name,
         directory,
         text,
         about,
@@ -319,11 +321,15 @@ fn structure(
 
 /// Third layer: what the plugins need of the machine.
 fn environment(study: &Study, purpose: Use, root: &Node, problems: &mut Problems) {
+    if purpose != Use::Look {
+        sizes::environment(study, root, problems);
+    }
     study.each_plugin(root, problems, |section, component, context, complaints| {
         if purpose != Use::Look
             || !["model", "numerical_error", "low_fidelity", "executor"].contains(&section)
         {
-            component.environment(context, complaints);
+            let starts_programs = purpose != Use::Check;
+            component.environment(&Context { starts_programs, ..*context }, complaints);
         }
     });
 }

@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::de::{self, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
 
+use super::sizes;
 use super::values::{Count, Name};
 use crate::data::{Axis, Unit};
 
@@ -70,7 +71,10 @@ impl GridSection {
         let numbers = match (self.first, self.last, self.count, &self.values, self.measured) {
             (None, None, None, None, true) => measured(&self.unit)?,
             (None, None, None, Some(values), false) => values.clone(),
-            (Some(first), Some(last), Some(count), None, false) => evenly(first, last, count.get()),
+            (Some(first), Some(last), Some(count), None, false) => {
+                sizes::axis(count.get())?;
+                evenly(first, last, count.get())
+            }
             _ => {
                 let ways =
                     "expected `first`, `last` and `count`, or `values`, or `measured = true`";

@@ -7,9 +7,11 @@ use serde::de::DeserializeOwned;
 use super::decode::decode;
 use super::file::{
     Axes, DerivedSection, EffectKeys, ParameterSection, ResponseSection, ScenarioSection,
+    StudySection,
 };
+use super::file_name::FileName;
 use super::resolve::SECTIONS;
-use super::{Complaints, Node, Problems, nearest};
+use super::{Complaints, Node, Problems, nearest, sizes};
 use crate::data::{Axis, Layout, Layouts, Scenario, Unit};
 use crate::plugin::reader::GridSource;
 use crate::plugin::registry::{Kind, Section, section};
@@ -122,7 +124,11 @@ pub(super) fn scenarios(
         problems.within(&path, |problems| {
             let section: ScenarioSection = decode(node, problems)?;
             let twice = sections.iter().any(|other| other.name == section.name);
-            let wrong = if section.name.is_empty() || section.name == "each" {
+            // Its name stands in those of files and of what is in them.
+            let plain = FileName::new(section.name.as_str());
+            let wrong = if let Err(unfit) = plain {
+                Some(format!("a scenario cannot be called this: {unfit}"))
+            } else if section.name == "each" {
                 Some("a scenario cannot be called this".to_owned())
             } else {
                 twice.then(|| format!("there are two scenarios `{}`", section.name))
@@ -164,6 +170,13 @@ pub(super) fn layouts(
     if scenarios.is_empty() {
         let grids = Grids { reader, directory, scenario: None };
         let axes = problems.within("response", |problems| grids.axes(own, node, problems))?;
+        let before = problems.len();
+        problems.within("response", |problems| {
+            sizes::response(axes.iter().map(Axis::len), node, problems);
+        });
+        if problems.len() > before {
+            return None;
+        }
         return Some(shape(axes).into());
     }
     let sections = root.get("scenario").map(Node::elements).unwrap_or_default();
@@ -183,7 +196,14 @@ pub(super) fn layouts(
             let from = |path: &str| if overridden(path) { section } else { node };
             grids.axes_from(&axes, from, problems)
         });
-        layouts.push((scenario.name.as_str(), shape(found?)));
+        let (found, before) = (found?, problems.len());
+        problems.within(&format!("scenario.{}", scenario.name), |problems| {
+            sizes::response(found.iter().map(Axis::len), section, problems);
+        });
+        if problems.len() > before {
+            return None;
+        }
+        layouts.push((scenario.name.as_str(), shape(found)));
     }
     Some(Layouts::of_scenarios(layouts))
 }
@@ -226,5 +246,30 @@ impl Grids<'_> {
         let source =
             GridSource { directory: self.directory, scenario: self.scenario, axis: name, unit };
         reader.grid(&source).map_err(|error| error.to_string())
+    }
+}
+
+/// What the study is called: as it says, else as its file is.
+pub(super) fn name(
+    about: &mut StudySection,
+    path: &Path,
+    root: &Node,
+    problems: &mut Problems,
+) -> Option<String> {
+    if let Some(name) = about.name.take() {
+        return Some(name.into());
+    }
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    match FileName::new(stem) {
+        Ok(name) => Some(name.into()),
+        Err(unfit) => {
+            Complaints::new(root, problems)
+                .at("study")
+                .say("the name of the study's file cannot be that of its run directory")
+                .expected(unfit.expected)
+                .found(unfit.found)
+                .help("say `name` in `[study]`");
+            None
+        }
     }
 }

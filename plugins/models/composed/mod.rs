@@ -278,6 +278,10 @@ impl Component for Composed {
     fn libraries(&self) -> Vec<&'static Library> {
         self.parts.iter().flat_map(Part::libraries).collect()
     }
+
+    fn revisions(&self) -> BTreeMap<String, u32> {
+        self.parts.iter().flat_map(Part::revisions).collect()
+    }
 }
 
 /// Looks at each part in the context that it sees: what the parts before it hand on is given.
@@ -296,6 +300,7 @@ fn each(
         let own = Context {
             given: &given,
             scenarios: &scenarios,
+            starts_programs: context.starts_programs,
             ..Context::new(context.directory, context.parameters, &link.asked)
         };
         look(i, link, &own);

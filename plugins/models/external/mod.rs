@@ -169,6 +169,10 @@ impl Component for External {
     fn libraries(&self) -> Vec<&'static Library> {
         self.output.file().map_or_else(Vec::new, output::File::libraries)
     }
+
+    fn revisions(&self) -> BTreeMap<String, u32> {
+        self.output.file().map_or_else(BTreeMap::new, output::File::revisions)
+    }
 }
 
 impl Model for External {

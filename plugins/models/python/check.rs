@@ -1,4 +1,5 @@
-//! What can be wrong with a Python file, found without running it.
+//! What can be wrong with a Python file, found without running it: by an interpreter that reads it, and by its text alone
+//! where no program may be started.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,8 +10,8 @@ use lacuna::study::nearest::nearest;
 use lacuna::study::problem::Complaints;
 use serde::Deserialize;
 
-use super::Python;
 use super::pool::interpreter;
+use super::{Python, written};
 use crate::models::given;
 
 const SCRIPT: &str = include_str!("names.py");
@@ -20,11 +21,15 @@ const EXTRA: [&str; 2] = ["layout", "scenario"];
 /// What a file defines.
 #[derive(Deserialize)]
 #[serde(untagged)]
-enum Names {
+pub enum Names {
+    /// It cannot be read.
     Wrong {
+        /// What is wrong.
         error: String,
+        /// Its line.
         line: Option<usize>,
     },
+    /// It can be read.
     Sound {
         /// The functions that were asked for, where their arguments can be seen.
         functions: BTreeMap<String, Option<Arguments>>,
@@ -37,10 +42,13 @@ enum Names {
 
 /// What a function takes by name.
 #[derive(Deserialize)]
-struct Arguments {
-    names: Vec<String>,
-    optional: Vec<String>,
-    any: bool,
+pub struct Arguments {
+    /// The arguments that can be given by name.
+    pub names: Vec<String>,
+    /// Those that have a default.
+    pub optional: Vec<String>,
+    /// Whether any other name is taken too.
+    pub any: bool,
 }
 
 /// The options against the machine.
@@ -62,6 +70,18 @@ pub fn files(model: &Python, context: &Context<'_>, complaints: &mut Complaints<
     }
 }
 
+/// What an interpreter reads in the file; `None` when it does not answer.
+fn read(python: &Path, file: &Path, wanted: &[&str]) -> Option<Names> {
+    let output = Command::new(python)
+        .args(["-c", SCRIPT])
+        .arg(file)
+        .args(wanted)
+        .stdin(Stdio::null())
+        .output();
+    let found = output.ok().filter(|output| output.status.success())?;
+    serde_json::from_slice::<Names>(&found.stdout).ok()
+}
+
 fn names(
     model: &Python,
     python: &Path,
@@ -71,15 +91,17 @@ fn names(
 ) {
     let wanted = [("function", Some(&model.function)), ("gradient", model.gradient.as_ref())];
     let wanted: Vec<_> = wanted.into_iter().filter_map(|(key, name)| Some(key).zip(name)).collect();
-    let output = Command::new(python)
-        .args(["-c", SCRIPT])
-        .arg(file)
-        .args(wanted.iter().map(|(_, name)| name))
-        .stdin(Stdio::null())
-        .output();
-    let found = output.ok().filter(|output| output.status.success());
-    let found = found.and_then(|output| serde_json::from_slice::<Names>(&output.stdout).ok());
+    let asked: Vec<&str> = wanted.iter().map(|(_, name)| name.as_str()).collect();
+    let found = if context.starts_programs {
+        read(python, file, &asked)
+    } else {
+        std::fs::read_to_string(file).ok().map(|text| written::names(&text, &asked))
+    };
     let Some(found) = found else {
+        if !context.starts_programs {
+            complaints.at("file").say(format!("{} is not text in UTF-8", file.display()));
+            return;
+        }
         let name = model.interpreter.display();
         complaints
             .at("interpreter")

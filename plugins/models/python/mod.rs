@@ -4,6 +4,7 @@ mod check;
 mod frame;
 mod pool;
 mod worker;
+mod written;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

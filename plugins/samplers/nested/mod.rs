@@ -122,6 +122,10 @@ impl Sampler for Nested {
         Plan { chains: self.live, steps: self.halvings, warm_up: 0, ensemble: true }
     }
 
+    fn uses_starts(&self) -> bool {
+        false
+    }
+
     fn start(&self, target: &dyn Target, points: Matrix) -> Result<State, Stop> {
         population::start(target, points, self.live)
     }

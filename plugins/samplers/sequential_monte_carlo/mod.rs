@@ -106,6 +106,10 @@ impl Sampler for SequentialMonteCarlo {
         Plan { chains: self.particles, steps: self.temperatures, warm_up: 0, ensemble: true }
     }
 
+    fn uses_starts(&self) -> bool {
+        false
+    }
+
     fn start(&self, target: &dyn Target, points: Matrix) -> Result<State, Stop> {
         population::start(target, points, self.particles)
     }

@@ -3,7 +3,7 @@
 use super::Distribution;
 use super::probability::ln_ratio;
 use crate::math::special::{
-    HALF_LN_TWO_PI, ln_beta_density, ln_gamma, ln_gamma_density, ln_normal_between,
+    HALF_LN_TWO_PI, ln_beta_density, ln_gamma_density, ln_gamma_half_step, ln_normal_between,
 };
 
 fn ln_standard_normal(z: f64) -> f64 {
@@ -40,8 +40,7 @@ impl Distribution {
             Self::Beta([a, b, lo, hi]) => log_density_of_beta([a, b, lo, hi], x),
             Self::StudentT([dof, location, scale]) => {
                 let z = (x - location) / scale;
-                ln_gamma(0.5 * (dof + 1.0))
-                    - ln_gamma(0.5 * dof)
+                ln_gamma_half_step(0.5 * dof)
                     - 0.5 * (dof * std::f64::consts::PI).ln()
                     - scale.ln()
                     - 0.5 * (dof + 1.0) * (z * z / dof).ln_1p()

@@ -3,8 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Region;
-use crate::linalg::{Matrix, multiply_transposed, multiply_vector, symmetric_eigen};
-use crate::math::random::{Stream, normal};
+use crate::linalg::{Matrix, multiply_transposed, symmetric_eigen};
 use crate::plugin::Target;
 use crate::run::Stop;
 
@@ -75,72 +74,6 @@ fn pressure(target: &dyn Target, maximum: &[f64]) -> Vec<f64> {
         if (*x <= lo && *g < 0.0) || (*x >= hi && *g > 0.0) { g * g } else { 0.0 }
     };
     maximum.iter().zip(&gradient).zip(target.bounds()).map(pressed).collect()
-}
-
-/// Starting points around a maximum: draws of its normal law inside the support.
-///
-/// Draws outside the support, and draws where the density is lower than draws of a normal law ever
-/// find it (more than `10 + 4 sqrt(d / 2)` below its median in logarithms), are drawn again, nearer to the
-/// maximum after every ten tries: a walker that starts there might never find in. Coordinates on which the likelihood
-/// does not depend are drawn from their priors: about a maximum that is at a bound in many of them a normal law has
-/// next to no draw inside.
-pub fn scatter(
-    target: &dyn Target,
-    maximum: &[f64],
-    laplace: &Laplace,
-    count: usize,
-    stream: &Stream,
-) -> Result<Matrix, Stop> {
-    const TRIES: u32 = 400;
-    let bounds = target.bounds();
-    let half = 0.5 * maximum.len() as f64;
-    let density = |x: &[f64]| target.log_density(&Matrix::from_rows(x.len(), [x]))[0];
-    let lowest = density(maximum) - half - 10.0 - 4.0 * half.sqrt();
-    let idle = idle(target, maximum, &stream.named("idle"));
-    let mut points = Matrix::zeros(0, maximum.len());
-    for index in 0..count {
-        let mut rng = stream.at(index as u64).generator();
-        let found = (0..TRIES).find_map(|attempt| {
-            let shrink = 0.8_f64.powi((attempt / 10) as i32);
-            let z: Vec<f64> = maximum.iter().map(|_| shrink * normal(&mut rng)).collect();
-            let offset = multiply_vector(&laplace.factor, &z);
-            let mut point: Vec<f64> = maximum.iter().zip(offset).map(|(x, o)| x + o).collect();
-            if !idle.is_empty() {
-                let tries = stream.named("idle").at(index as u64).at(u64::from(attempt));
-                let draw = target.prior_draws(1, &tries);
-                for &j in &idle {
-                    point[j] = draw[(0, j)];
-                }
-            }
-            let inside = point.iter().zip(&bounds).all(|(x, (lo, hi))| x >= lo && x <= hi);
-            (inside && density(&point) >= lowest).then_some(point)
-        });
-        match found {
-            Some(point) => points.push_row(&point),
-            None => {
-                return Err(Stop::new(
-                    "no starting point near the best fit has a posterior density above zero",
-                ));
-            }
-        }
-    }
-    Ok(points)
-}
-
-/// The coordinates that the likelihood at a point does not depend on: it is the same at draws of their priors.
-fn idle(target: &dyn Target, point: &[f64], stream: &Stream) -> Vec<usize> {
-    const DRAWS: usize = 2;
-    let d = point.len();
-    let draws = target.prior_draws(DRAWS, stream);
-    let mut moved = Matrix::from_rows(d, std::iter::repeat_n(point, 1 + d * DRAWS));
-    for (j, k) in (0..d).flat_map(|j| (0..DRAWS).map(move |k| (j, k))) {
-        moved[(1 + j * DRAWS + k, j)] = draws[(k, j)];
-    }
-    let (density, prior) = (target.log_density(&moved), target.log_prior(&moved));
-    let likelihood = |i: usize| density[i] - prior[i];
-    let rounding = |i: usize| 1e-12 * (density[i].abs() + prior[i].abs() + density[0].abs());
-    let same = |i: usize| (likelihood(i) - likelihood(0)).abs() <= rounding(i);
-    (0..d).filter(|j| (0..DRAWS).all(|k| same(1 + j * DRAWS + k))).collect()
 }
 
 /// The standard deviation of each coordinate given the others, from the curvature; the size of

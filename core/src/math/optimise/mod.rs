@@ -2,6 +2,7 @@
 
 mod bounded;
 mod laplace;
+mod scatter;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -12,7 +13,8 @@ use crate::math::random::Stream;
 use crate::plugin::Target;
 use bounded::Scaled;
 
-pub use laplace::{Laplace, laplace, scatter};
+pub use laplace::{Laplace, laplace};
+pub use scatter::{scatter, scatter_without_bounds};
 
 /// A maximum of a log density.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -185,5 +187,7 @@ fn gradient_norm(x: &[f64], gradient: &[f64], bounds: &[(f64, f64)], scales: &[f
     norm(&(0..x.len()).map(free).collect::<Vec<_>>())
 }
 
+#[cfg(test)]
+mod corners;
 #[cfg(test)]
 mod tests;

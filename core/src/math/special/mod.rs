@@ -5,7 +5,10 @@ mod gamma;
 mod normal;
 
 pub use beta::{beta_tails, inverse_beta, ln_beta_density};
-pub use gamma::{gamma_tails, inverse_gamma_tails, ln_gamma, ln_gamma_density};
+pub use gamma::{
+    gamma_tails, inverse_gamma_tails, inverse_ln_minus_digamma, ln_gamma, ln_gamma_density,
+    ln_gamma_half_step, ln_minus_digamma,
+};
 pub use normal::{
     inverse_erf, ln_normal_between, ln_normal_cdf, ln_normal_from, normal_cdf, normal_quantile,
     normal_quantile_of_ln,
@@ -17,6 +20,18 @@ pub const HALF_LN_TWO_PI: f64 = 0.918_938_533_204_672_8;
 /// `ln(1 - exp(x))` for `x <= 0` without cancellation (Mächler, 2012).
 pub fn ln_one_minus_exp(x: f64) -> f64 {
     if x > -std::f64::consts::LN_2 { (-x.exp_m1()).ln() } else { (-x.exp()).ln_1p() }
+}
+
+/// `ln(1 + x) - x` without cancellation where `x` is small; minus infinity at minus one.
+pub fn ln_one_plus_minus(x: f64) -> f64 {
+    if x.abs() >= 0.1 {
+        return x.ln_1p() - x;
+    }
+    // ln((1 + r) / (1 - r)) = 2 (r + r³/3 + ...) with r = x / (2 + x), and x - 2r = r x.
+    let r = x / (2.0 + x);
+    let square = r * r;
+    let odd = (1..12).rev().fold(0.0, |sum, k| square * (sum + 1.0 / f64::from(2 * k + 1)));
+    r * (2.0 * odd - x)
 }
 
 /// `ln(exp(a) + exp(b))` without overflow.

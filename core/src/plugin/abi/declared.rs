@@ -58,7 +58,7 @@ fn entry<K: Kind + ?Sized>(path: &Path, name: &str, make: fn() -> Box<K>) -> Opt
     let build = move |node: &Node, _: &[&str], _: &mut Problems| {
         let options = super::wire::json_of_node(node);
         let options = options.as_object().map(super::wire::table_of_json).unwrap_or_default();
-        Some(Built { name, plugin: make(), options, library: None })
+        Some(Built { name, plugin: make(), options, library: None, revision: 1 })
     };
     let entry: &'static Entry<K> = Box::leak(Box::new(Entry {
         name,
@@ -66,6 +66,7 @@ fn entry<K: Kind + ?Sized>(path: &Path, name: &str, make: fn() -> Box<K>) -> Opt
         build: Box::leak(Box::new(build)),
         module_path: Box::leak(path.display().to_string().into_boxed_str()),
         version: "",
+        revision: 1,
         library: None,
     }));
     Some(entry)

@@ -27,6 +27,8 @@ pub struct Listing {
     pub module_path: &'static str,
     /// The version of the package or library it is in.
     pub version: &'static str,
+    /// The number that is raised whenever what it computes changes.
+    pub revision: u32,
     /// The library it was loaded from, if it is not a part of the program.
     pub library: Option<&'static Library>,
     /// Its page of the manual.
@@ -58,6 +60,7 @@ fn list<K: Kind + ?Sized>() -> Vec<Listing> {
         name: entry.name,
         module_path: entry.module_path,
         version: entry.version,
+        revision: entry.revision,
         library: entry.library,
         documentation: |name| find::<K>(name).ok().map(Entry::documentation),
     };

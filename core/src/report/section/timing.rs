@@ -17,7 +17,12 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
         .map(|(stage, seconds)| Row {
             name: stage.clone(),
             value: *seconds,
-            text: format!("{} · {}", duration(*seconds), percent(seconds / total)),
+            text: format!(
+                "{} · {}{}",
+                duration(*seconds),
+                percent(seconds / total),
+                made_by(findings, stage)
+            ),
         })
         .collect();
     rows.push(Row { name: String::from("together"), value: total, text: duration(total) });
@@ -33,4 +38,11 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
         title: "Time",
         content: numbers.figure(&[drawing], &[], &caption),
     })
+}
+
+/// The version that made the result of a stage, where that is another than wrote the report.
+fn made_by(findings: &Findings, stage: &str) -> String {
+    let made = findings.made_by.iter().find(|(name, _)| name == stage);
+    let other = made.filter(|(_, version)| *version != findings.version);
+    other.map_or(String::new(), |(_, version)| format!(" · by lacuna {version}"))
 }

@@ -67,6 +67,7 @@ pub const SCHEMA: u64 = 1;
 /// | `gap.insight` | `foretold[]` (log score of left-out parts against `against`), `drift` (`reading`, `words`, `p` of equal parameters in all conditions and windows), and where there are any `separations`, `places`, `symbolic`, `stopgap` |
 /// | `gap.study`, `.run`, `.log_evidence` | the study with the effects, its run directory, and the evidences `before` and `after`, once it was run |
 /// | `seconds.STAGE` | wall-clock time when the stage's result was made |
+/// | `made_by.STAGE` | the version of Lacuna that made the stage's result |
 pub fn summary(findings: &Findings) -> Value {
     let mut summary = Map::new();
     let mut put = |key: &str, value: Value| summary.insert(key.to_owned(), value);
@@ -115,6 +116,8 @@ pub fn summary(findings: &Findings) -> Value {
         put("gap", gap::value(found));
     }
     put("seconds", pairs(&findings.seconds));
+    let made_by = findings.made_by.iter().map(|(stage, version)| (stage.clone(), json!(version)));
+    put("made_by", made_by.collect::<serde_json::Map<_, _>>().into());
     Value::Object(summary)
 }
 

@@ -46,6 +46,7 @@ pub fn findings() -> Findings {
         validation: Some(validation(&layout)),
         layouts: layout.into(),
         gap: None,
+        made_by: vec![("calibrate".to_owned(), "0.0.9".to_owned())],
         seconds: [
             ("design", 0.004),
             ("simulate", 1834.0),
@@ -78,6 +79,7 @@ pub fn bare() -> Findings {
         surrogate: None,
         calibration: None,
         validation: None,
+        made_by: Vec::new(),
         seconds: Vec::new(),
         warnings: Vec::new(),
         note: None,

@@ -87,7 +87,6 @@ pub(super) fn inputs(study: &Study, known: &Known<'_>) -> Value {
         pieces(study),
         candidates,
         study.about.seed,
-        env!("CARGO_PKG_VERSION"),
     ])
 }
 

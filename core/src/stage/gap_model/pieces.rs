@@ -12,6 +12,7 @@ use crate::plugin::effect::Description;
 use crate::plugin::registry::{self, Identity, Section};
 use crate::plugin::{Effect, Given, Model};
 use crate::run::Stop;
+use crate::run::made_by::Plugin;
 use crate::stage::simulator::{Other, Simulator};
 use crate::study::Study;
 use crate::study::file::ModelKeys;
@@ -97,7 +98,7 @@ impl Pieces {
     }
 
     /// What the wider model is, for the hash of what is made with it.
-    pub(super) fn model(&self) -> (Identity<'_>, &ModelKeys) {
+    pub(super) fn model(&self) -> (Plugin<Identity<'_>>, &ModelKeys) {
         let model = &self.whole.model;
         (model.built.identity(), &model.common)
     }

@@ -10,12 +10,15 @@ use serde::{Deserialize, Serialize};
 use crate::data::Draws;
 use crate::linalg::Matrix;
 use crate::plugin::sampler::State;
-use crate::run::{Stop, files};
+use crate::run::{self, Stop, files};
 
 /// A state and the number of steps after which it holds.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Checkpoint {
     pub step: usize,
+    /// The hash of the inputs of the chain and of the program and plugins that made it: it is continued by no others.
+    #[serde(default)]
+    pub inputs: String,
     pub state: State,
 }
 
@@ -23,6 +26,7 @@ pub(super) struct Checkpoint {
 pub(super) struct Log {
     path: PathBuf,
     state_path: PathBuf,
+    inputs: String,
     file: BufWriter<File>,
     chains: usize,
     dimension: usize,
@@ -33,7 +37,8 @@ impl Log {
         let path = folder.join("draws.bin");
         let open = OpenOptions::new().create(true).append(true).open(&path);
         let file = BufWriter::new(open.map_err(|error| files::cannot_write(&path, &error))?);
-        Ok(Self { state_path: folder.join("state.json"), path, file, chains, dimension })
+        let inputs = run::inputs_of(folder);
+        Ok(Self { state_path: folder.join("state.json"), inputs, path, file, chains, dimension })
     }
 
     /// Bytes of one step: point, log density and acceptance of each chain.
@@ -47,7 +52,8 @@ impl Log {
         let checkpoint: Option<Checkpoint> = files::read_json(&self.state_path).ok();
         let fits = |c: &Checkpoint| {
             let needed = (c.step * self.record()) as u64;
-            needed <= length && c.state.points.columns() == self.dimension
+            let ours = c.inputs == self.inputs && c.state.points.columns() == self.dimension;
+            ours && needed <= length
         };
         let checkpoint = checkpoint.filter(fits);
         let kept = checkpoint.as_ref().map_or(0, |c| c.step * self.record());
@@ -72,7 +78,8 @@ impl Log {
     pub fn checkpoint(&mut self, step: usize, state: &State) -> Result<(), Stop> {
         let flushed = self.file.flush().and_then(|()| self.file.get_ref().sync_data());
         flushed.map_err(|error| files::cannot_write(&self.path, &error))?;
-        files::write_json(&self.state_path, &Checkpoint { step, state: state.clone() })
+        let inputs = self.inputs.clone();
+        files::write_json(&self.state_path, &Checkpoint { step, inputs, state: state.clone() })
     }
 
     /// The draws of the first steps, without names, and the share of accepted moves of each chain.

@@ -112,6 +112,7 @@ unsafe fn offer<K: Kind + ?Sized, F: Table + Send + Sync + 'static>(
         })),
         module_path: path,
         version: &library.version,
+        revision: 1,
         library: Some(library),
     }));
     Ok(entry)
@@ -148,7 +149,8 @@ impl<K: Kind + ?Sized, F: Table> Offered<K, F> {
         match made {
             Ok((options, plugin)) => {
                 let plugin = (self.adapt)(plugin);
-                Some(Built { name: self.name, plugin, options, library: Some(self.library) })
+                let library = Some(self.library);
+                Some(Built { name: self.name, plugin, options, library, revision: 1 })
             }
             Err(refusal) if refusal.status == status::REJECTED => {
                 let complaints = &mut Complaints::new(node, problems);

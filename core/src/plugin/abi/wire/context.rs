@@ -17,6 +17,8 @@ pub struct OwnedContext {
     layout: Layout,
     runs: Option<usize>,
     common_errors: bool,
+    #[serde(default)]
+    starts_programs: bool,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -36,6 +38,7 @@ impl From<&Context<'_>> for OwnedContext {
             layout: context.layout.clone(),
             runs: context.runs,
             common_errors: context.common_errors,
+            starts_programs: context.starts_programs,
         }
     }
 }
@@ -53,6 +56,7 @@ impl OwnedContext {
             layout: &self.layout,
             runs: self.runs,
             common_errors: self.common_errors,
+            starts_programs: self.starts_programs,
         })
     }
 }

@@ -1,0 +1,186 @@
+//! What a study must not do before it runs, and what it must survive: names that are paths, sizes that no machine has,
+//! programs that `check` would start, posteriors that are narrow or lie in a corner.
+
+use std::fs;
+use std::path::Path;
+use std::time::Instant;
+
+use lacuna::study::resolve::{Use, load_for, load_text};
+
+use crate::quick;
+
+/// What is complained about in a study that the skeleton makes, with one text replaced by another.
+fn said(old: &str, new: &str) -> String {
+    let folder = quick::tables();
+    let path = folder.path().join("study.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    assert!(text.contains(old), "no `{old}`");
+    let checked = load_text(&path, &text.replace(old, new), &[]);
+    checked.complaints().replace(&folder.path().display().to_string(), "DIR")
+}
+
+#[test]
+fn names_that_become_files_are_no_paths() {
+    for name in ["../../evil", "/evil", "a/b", "..", ".", "", ".hidden", "a\\\\b", "x\\ny"] {
+        let text = said("name = \"oscillator\"", &format!("name = \"{name}\""));
+        assert!(text.contains("wrong value for `name`"), "{name}: {text}");
+        assert!(text.contains("expected a plain name for files"), "{name}: {text}");
+    }
+    let scenario = "[[scenario]]\nname = \"../up\"\n\n[response]";
+    let text = said("[response]", scenario);
+    assert!(text.contains("a scenario cannot be called this"), "{text}");
+    let text = load_text(Path::new("..toml"), "[study]\ntitle = \"x\"\n", &[]).complaints();
+    assert!(!text.contains("panicked"), "{text}");
+}
+
+/// Each size of a study that makes its runs, set to what no machine holds.
+#[test]
+fn impossible_sizes_are_refused_where_they_stand() {
+    let folder = quick::simulated();
+    let path = folder.path().join("study.toml");
+    let complaints = |settings: &[&str]| {
+        let settings: Vec<String> = settings.iter().map(ToString::to_string).collect();
+        let begun = Instant::now();
+        let text = load_for(&path, &settings, Use::Check).complaints();
+        assert!(begun.elapsed().as_secs_f64() < 5.0, "{settings:?} takes {:?}", begun.elapsed());
+        text
+    };
+    assert_eq!(complaints(&[]), "");
+    for (setting, key, what) in [
+        ("design.runs=1000000000000", "design.runs", "the runs need"),
+        ("design.runs=9223372036854775807", "design.runs", "the runs need"),
+        ("design.runs=1e12", "design.runs", "the runs need"),
+        ("design.extended=[9223372036854775807, 5]", "design.extended", "the runs need"),
+        ("sampler.steps=1000000000000", "sampler.steps", "is no possible size"),
+        ("sampler.steps=2000000000", "sampler.steps", "the draws need"),
+        ("sampler.walkers=1000000000000", "sampler.walkers", "is no possible size"),
+        ("sampler.walkers=2000000000", "sampler.walkers", "the draws need"),
+        ("surrogate.degree=1000000000000", "surrogate.degree", "is no possible size"),
+        ("surrogate.degree=1000000", "surrogate.degree", "are no range"),
+        ("response.axes.time.count=1000000000000", "response.axes.time", "needs 8.0 TB of memory"),
+        ("response.axes.time.count=9223372036854775807", "response.axes.time", "of memory"),
+        ("validate.emulator_check=1000000000000", "validate.emulator_check", "the runs need"),
+        ("surrogate.validation=9223372036854775807", "surrogate", "more runs"),
+        ("surrogate.refine.runs=1000000000000", "surrogate.refine.runs", "the runs of all rounds"),
+        ("sampler.stop.effective_sample_size=10", "", ""),
+    ] {
+        let text = complaints(&[setting]);
+        assert_eq!(text.is_empty(), what.is_empty(), "{setting}: {text}");
+        assert!(text.contains(what), "{setting}: {text}");
+        let last = key.rsplit('.').next().unwrap();
+        assert!(text.contains(last), "{setting}: {text}");
+        assert!(what.is_empty() || text.contains("expected"), "{setting}: {text}");
+    }
+    let many: Vec<String> =
+        ["use=nested", "live=2000000000"].map(|s| format!("sampler.{s}")).into();
+    let text = complaints(&many.iter().map(String::as_str).collect::<Vec<_>>());
+    assert!(text.contains("the draws need"), "{text}");
+    // As many halvings as one likes: the run ends by itself, and no step is a draw.
+    let fine = complaints(&["sampler.use=nested", "sampler.halvings=1000000000"]);
+    assert!(!fine.contains("memory"), "{fine}");
+}
+
+/// An interpreter that leaves a file behind when it is started.
+#[cfg(unix)]
+#[test]
+fn check_starts_no_program_that_a_study_names() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let folder = tempfile::tempdir().unwrap();
+    let trace = folder.path().join("trace");
+    let program = folder.path().join("interpreter");
+    fs::write(&program, format!("#!/bin/sh\ntouch {}\n", trace.display())).unwrap();
+    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+    fs::write(folder.path().join("model.py"), "def simulate(a):\n    return a\n").unwrap();
+    let study = |function: &str| {
+        format!(
+            "[study]\ntitle = \"x\"\n[[parameter]]\nname = \"a\"\nprior = {{ uniform = [0, 1] }}\n\
+             [response]\nname = \"y\"\n[model]\nuse = \"python\"\nfile = \"model.py\"\n\
+             function = \"{function}\"\ninterpreter = \"./interpreter\"\n[design]\nuse = \"random\"\n\
+             runs = 20\n[surrogate]\nuse = \"polynomial_chaos\"\ndegree = 1\n"
+        )
+    };
+    let path = folder.path().join("study.toml");
+    fs::write(&path, study("simulate")).unwrap();
+    let text = load_for(&path, &[], Use::Check).complaints();
+    assert_eq!(text, "");
+    fs::write(&path, study("simulat")).unwrap();
+    let text = load_for(&path, &[], Use::Check).complaints();
+    assert!(text.contains("model.py has no function `simulat`"), "{text}");
+    assert!(text.contains("did you mean `simulate`?"), "{text}");
+    assert!(!trace.exists(), "check has started the interpreter");
+    load_for(&path, &[], Use::Run);
+    assert!(trace.exists(), "the interpreter of this test leaves no trace");
+}
+
+/// A truth of 1e9 known to about 0.1: the case in which the report never ended.
+#[test]
+fn a_posterior_that_is_narrow_against_its_mean_has_a_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("study.toml");
+    let text = "[study]\ntitle = \"narrow\"\n[[parameter]]\nname = \"frequency\"\n\
+                prior = { uniform = [9e8, 1.1e9] }\n[target]\nuse = \"expression\"\n\
+                log_density = \"sum(normal_log_density(y, frequency * t, 1))\"\n\
+                data = { t = [1, 2, 3, 4], y = [1e9, 2e9, 3e9, 4e9] }\n\
+                [sampler]\nuse = \"affine_invariant_ensemble\"\nwalkers = 40\nsteps = 300\n";
+    fs::write(&path, text).unwrap();
+    let begun = Instant::now();
+    let out = folder.path().join("run");
+    quick::run(&path, &[], &out).unwrap_or_else(|stop| panic!("{stop}"));
+    assert!(begun.elapsed().as_secs_f64() < 60.0, "{:?}", begun.elapsed());
+    let found = &quick::summary(&out)["parameters"]["frequency"];
+    // The closed form: a normal law of mean 1e9 and variance 1 / sum(t^2).
+    let exact = 1.0 / 30.0_f64.sqrt();
+    let [mean, sd] = ["mean", "sd"].map(|key| found[key].as_f64().unwrap());
+    assert!((sd / exact - 1.0).abs() < 0.2, "{sd} {exact}");
+    assert!((mean - 1e9).abs() < 0.3 * exact, "{mean}");
+}
+
+/// Independent exponential laws within bounds: a corner of many, with a mean in closed form. Methods of every kind start
+/// there, those too that make their own starting points.
+#[test]
+fn a_mode_in_a_corner_stops_no_sampler() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("study.toml");
+    for active in [2, 5, 10] {
+        let names: Vec<String> = (0..active).map(|j| format!("x{j}")).collect();
+        let priors: String = names
+            .iter()
+            .map(|name| {
+                format!("[[parameter]]\nname = \"{name}\"\nprior = {{ uniform = [0, 1] }}\n")
+            })
+            .collect();
+        // The rates are 20, 30, 40, ...
+        let terms: Vec<String> =
+            names.iter().enumerate().map(|(j, name)| format!("{} * {name}", 20 + 10 * j)).collect();
+        for sampler in [
+            "use = \"affine_invariant_ensemble\"\nwalkers = 60\nsteps = 3000",
+            "use = \"no_u_turn\"\nchains = 4\nsteps = 1500\nwarm_up = 500",
+            "use = \"sequential_monte_carlo\"\nparticles = 500",
+            "use = \"nested\"\nlive = 400",
+        ] {
+            let text = format!(
+                "[study]\ntitle = \"corner\"\n{priors}[target]\nuse = \"expression\"\n\
+                 log_density = \"-({})\"\n[sampler]\n{sampler}\n",
+                terms.join(" + ")
+            );
+            fs::write(&path, text).unwrap();
+            let out = folder.path().join(format!("run{active}"));
+            quick::run(&path, &[], &out)
+                .unwrap_or_else(|stop| panic!("{active} bounds, {sampler}: {stop}"));
+            let summary = quick::summary(&out);
+            for (j, name) in names.iter().enumerate() {
+                let rate = 20.0 + 10.0 * j as f64;
+                // The mean of an exponential law on (0, 1): 1 / rate - 1 / (exp(rate) - 1).
+                let exact = 1.0 / rate - 1.0 / rate.exp_m1();
+                let found = &summary["parameters"][name];
+                let [mean, sd, size] =
+                    ["mean", "sd", "ess_bulk"].map(|key| found[key].as_f64().unwrap());
+                let error = sd / size.max(50.0).sqrt();
+                assert!(
+                    (mean - exact).abs() < 5.0 * error,
+                    "{active} bounds, {sampler}, {name}: {mean} and not {exact} with {error}"
+                );
+            }
+        }
+    }
+}
