@@ -38,7 +38,7 @@ impl<'a> Law<'a> {
             common.push(fitted.value.covariance(study, stated.as_deref())?);
         }
         if let (Some(kept), Some(section)) = (known.numerics, &study.numerical_error) {
-            common.push(kept.value.common_error(section.written.whole()));
+            common.push(kept.value.common_error(&section.written));
         }
         let replicates = section.common.replicate_error.then_some(&measured.used);
         Ok(Self { replicates, common, ..Self::bare(study, &measured.likelihood, known.forward)? })
