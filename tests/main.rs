@@ -1,6 +1,7 @@
 //! Tests of the whole, in one binary.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
+mod assess;
 mod bad_input;
 mod campaign;
 mod commands;
@@ -9,6 +10,7 @@ mod effects;
 mod falling_balls;
 mod forced_oscillator;
 mod kill;
+mod left_out;
 mod made_by;
 mod problems;
 mod python;

@@ -10,6 +10,7 @@ mod gap;
 pub(crate) mod number;
 mod page;
 mod power;
+mod qualified;
 mod scale;
 mod section;
 mod summary;

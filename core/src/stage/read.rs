@@ -17,8 +17,11 @@ use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, RunDirectory, Stop, files};
 use crate::study::Study;
 
+use self::outside::refuse;
 use super::screen;
 use super::simulate::{Simulated, inside};
+
+pub(super) mod outside;
 
 /// What was read.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,12 +131,22 @@ pub fn stage(
         let measured = measured(study)?;
         Ok(Data { ensemble, measured })
     })?;
-    for failed in kept.value.ensemble.iter().flat_map(|ensemble| &ensemble.failed) {
+    if let Some(ensemble) = &kept.value.ensemble {
+        refuse(study, ensemble)?;
+    }
+    let failed: Vec<_> = kept.value.ensemble.iter().flat_map(|e| &e.failed).collect();
+    for failed in failed.iter().take(TOLD) {
         observer.warn(&format!("run {} is left out: {}", failed.run, failed.reason));
+    }
+    if failed.len() > TOLD {
+        observer.warn(&format!("{} further runs are left out", failed.len() - TOLD));
     }
     observer.end("read", &summary(&kept.value));
     Ok(kept)
 }
+
+/// So many runs that are left out are told one by one.
+const TOLD: usize = 10;
 
 fn summary(data: &Data) -> String {
     let mut text = match &data.ensemble {

@@ -175,7 +175,7 @@ pub fn kept(
     let kept = run.keep(stage, &inputs, observer, make)?;
     let damaged = if kept.fresh { 0 } else { kept.value.damaged(&folder) };
     if damaged > 0 {
-        observer.warn(&format!(
+        observer.remark(&format!(
             "result files in {} are missing or not as they were written ({damaged} of {}); making them again",
             folder.display(),
             asked.names.len()
@@ -276,7 +276,7 @@ impl Work<'_> {
         let inputs = |i: usize| self.setting.inputs(self.asked.points.row(i));
         let jobs: Vec<Job> =
             missing.iter().map(|&i| Job { name: names[i].clone(), inputs: inputs(i) }).collect();
-        let warn = |text: &str| progress.warn(text);
+        let warn = |text: &str| progress.remark(text);
         let batch = Batch {
             model: self.simulator.model,
             recipe: &self.simulator.recipe,
