@@ -266,8 +266,7 @@ pub struct EffectKeys {
 pub struct SamplerKeys {
     /// The share of the first steps that is left out of every summary.
     pub burn_in: Fraction,
-    /// Where the chains start; when left out, where the sampler starts best: `"prior"` for `differential_evolution`,
-    /// `"map"` for the others.
+    /// Where the chains start; when left out, where the sampler starts best: about the maximum, unless its page says otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub start: Option<Start>,
     /// Goes on after the sampler's own number of steps until this is reached.
