@@ -17,7 +17,8 @@ fn another_version_takes_the_runs_and_makes_the_rest_again() {
     assert_eq!(run("0.0.9").notes, [""; 0]);
     let first = quick::results(&out);
     let later = run("0.1.0");
-    let again = ["3-read", "4-surrogate", "5-calibrate", "6-evidence", "6-validate"];
+    let again =
+        ["3-read", "4-surrogate", "5-calibrate", "6-evidence", "6-validate", "6-assess"];
     assert_eq!(later.made, again);
     // A line for each stage: two are taken, five made again.
     let taken = ["1-design", "2-simulate"]

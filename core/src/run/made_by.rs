@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 use super::{Stop, files};
 
 /// The stages, by the last of these words in the names of their folders, with what their artifacts depend on.
-pub const STAGES: [(&str, Depends); 11] = [
+pub const STAGES: [(&str, Depends); 12] = [
     ("design", Depends::OnNothing),
     ("simulate", Depends::OnRevisions(1)),
     ("read", Depends::OnVersion(1)),
@@ -20,6 +20,7 @@ pub const STAGES: [(&str, Depends); 11] = [
     ("calibrate", Depends::OnVersion(1)),
     ("evidence", Depends::OnVersion(1)),
     ("validate", Depends::OnVersion(1)),
+    ("assess", Depends::OnVersion(1)),
     ("gap", Depends::OnVersion(1)),
     ("show", Depends::OnVersion(1)),
     ("power", Depends::OnVersion(1)),
