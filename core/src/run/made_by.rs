@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 use super::{Stop, files};
 
 /// The stages, by the last of these words in the names of their folders, with what their artifacts depend on.
-pub const STAGES: [(&str, Depends); 11] = [
+pub const STAGES: [(&str, Depends); 12] = [
     ("design", Depends::OnNothing),
     ("simulate", Depends::OnRevisions(1)),
     ("read", Depends::OnVersion(1)),
@@ -23,6 +23,7 @@ pub const STAGES: [(&str, Depends); 11] = [
     ("gap", Depends::OnVersion(1)),
     ("show", Depends::OnVersion(1)),
     ("power", Depends::OnVersion(1)),
+    ("coverage", Depends::OnVersion(1)),
 ];
 
 /// What the artifacts of a stage depend on besides its inputs; the number is the stage's revision.
