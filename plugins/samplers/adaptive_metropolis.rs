@@ -100,4 +100,4 @@ impl Sampler for AdaptiveMetropolis {
     }
 }
 
-lacuna::register!(Sampler, "adaptive_metropolis", AdaptiveMetropolis);
+lacuna::register!(Sampler, "adaptive_metropolis", AdaptiveMetropolis, aliases: ["am", "haario"]);

@@ -160,11 +160,7 @@ impl Sampler for DelayedRejectionAdaptiveMetropolis {
     }
 }
 
-lacuna::register!(
-    Sampler,
-    "delayed_rejection_adaptive_metropolis",
-    DelayedRejectionAdaptiveMetropolis
-);
+lacuna::register!(Sampler, "delayed_rejection_adaptive_metropolis", DelayedRejectionAdaptiveMetropolis, aliases: ["dram"]);
 
 #[cfg(test)]
 mod tests {

@@ -168,7 +168,7 @@ impl Sampler for DifferentialEvolution {
     }
 }
 
-lacuna::register!(Sampler, "differential_evolution", DifferentialEvolution);
+lacuna::register!(Sampler, "differential_evolution", DifferentialEvolution, aliases: ["de", "demc", "dream"]);
 
 #[cfg(test)]
 mod tests {

@@ -133,4 +133,4 @@ impl Trial {
     }
 }
 
-lacuna::register!(Sampler, "metropolis", Metropolis);
+lacuna::register!(Sampler, "metropolis", Metropolis, aliases: ["mh", "metropolis_hastings", "random_walk"]);

@@ -11,6 +11,7 @@ mod gap;
 pub(crate) mod number;
 mod page;
 mod power;
+mod qualified;
 mod scale;
 mod section;
 mod summary;

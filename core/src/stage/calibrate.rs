@@ -1,22 +1,19 @@
 //! Stage 5: the posterior of the parameters.
 
 mod kept;
+mod law;
 
-use std::ops::Range;
 use std::path::Path;
-use std::sync::OnceLock;
 
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::data::{Draws, Observations, Unit};
+use crate::data::{Draws, Observations, Statistics, Unit};
 use crate::diagnose::Diagnosis;
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::math::optimise;
 use crate::math::random::Stream;
-use crate::plugin::discrepancy;
-use crate::plugin::discrepancy::CommonError;
 use crate::plugin::sampler::Evidence;
 use crate::plugin::{Fact, Forward, Likelihood, Sampler, Target};
 use crate::posterior::{Joint, OfData, Posterior};
@@ -24,16 +21,20 @@ use crate::run::{Kept, Observer, Progress, RunDirectory, Stop};
 use crate::study::Study;
 use crate::study::file::Start;
 
+pub use law::Law;
+
 use super::read::Measured;
 use super::sampling::{self, Length, Sampled};
 use super::start::{inside, maxima, sobol};
-use super::{Known, Trial, best_fit, common_error};
+use super::{Known, Trial, best_fit};
 
 /// The posterior as draws, with its maximum.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibrated {
     /// All draws in natural units, burn-in included.
     pub draws: Draws,
+    /// What the sampler told of the steps, burn-in included.
+    pub statistics: Statistics,
     /// The rest.
     pub outcome: Outcome,
 }
@@ -88,61 +89,18 @@ pub struct Parts {
 impl Parts {
     /// The likelihood of the study's measurements, with the common errors that the study wants.
     pub fn of(study: &Study, measured: &Measured, known: &Known<'_>) -> Result<Self, Stop> {
-        let section =
-            study.discrepancy.as_ref().ok_or_else(|| Stop::new("the study has no discrepancy"))?;
-        let mut common = Vec::new();
-        if let (Some(fitted), true) = (known.fitted, section.common.emulator_error) {
-            let data = &measured.likelihood;
-            let stated = stated_variance(study, data, known.forward)?;
-            common.push(fitted.value.covariance(study, stated.as_deref())?);
-        }
-        if let (Some(kept), Some(section)) = (known.numerics, &study.numerical_error) {
-            common.push(kept.value.common_error(section.written.whole()));
-        }
-        Self::with(study, &measured.likelihood, known.forward, |i, range| {
-            let part = |error: &CommonError| CommonError {
-                factor: rows(&error.factor, range.clone()),
-                ..error.clone()
-            };
-            let mut own: Vec<CommonError> = common.iter().map(part).collect();
-            if section.common.replicate_error {
-                let of_replicates = common_error::of_replicates(&measured.used.blocks[i]);
-                let after = usize::from(own.first().is_some_and(|e| e.origin == "emulator"));
-                own.splice(after..after, of_replicates);
-            }
-            own
-        })
+        Self::with(study, &Law::of(study, measured, known)?)
     }
 
     /// The likelihood of data without any common error: what the discrepancy alone says of them.
     pub fn bare(study: &Study, data: &Observations, forward: &dyn Forward) -> Result<Self, Stop> {
-        Self::with(study, data, forward, |_, _| Vec::new())
+        Self::with(study, &Law::bare(study, data, forward)?)
     }
 
-    /// The likelihood of data with the common errors of each block.
-    fn with(
-        study: &Study,
-        data: &Observations,
-        forward: &dyn Forward,
-        common: impl Fn(usize, &Range<usize>) -> Vec<CommonError>,
-    ) -> Result<Self, Stop> {
-        let section =
-            study.discrepancy.as_ref().ok_or_else(|| Stop::new("the study has no discrepancy"))?;
-        let slopes = OnceLock::new();
-        let slopes = || {
-            let made = || best_fit::slopes(study, data, forward);
-            slopes.get_or_init(made).clone()
-        };
+    fn with(study: &Study, law: &Law<'_>) -> Result<Self, Stop> {
         let layouts = &study.layouts;
-        let mut likelihoods = Vec::new();
-        for (i, range) in layouts.ranges().enumerate() {
-            let own = common(i, &range);
-            likelihoods.push(section.built.plugin.likelihood(&discrepancy::Known {
-                data: &data.blocks[i],
-                common: &own,
-                slopes: &|| Ok(rows(&slopes()?, range.clone())),
-            })?);
-        }
+        let mut likelihoods: Vec<Box<dyn Likelihood>> =
+            (0..layouts.blocks.len()).map(|i| law.block(i)).collect::<Result<_, _>>()?;
         let likelihood = match likelihoods.len() {
             1 => likelihoods.remove(0),
             _ => Box::new(Joint::new(layouts, likelihoods)),
@@ -160,11 +118,6 @@ impl Parts {
         let likelihood = OfData::new(known.forward, study.placed_effects(), self.likelihood());
         Posterior::new(&study.parameters, likelihood).within(known.region.map(<[_]>::to_vec))
     }
-}
-
-/// Some rows of a matrix.
-fn rows(matrix: &Matrix, range: Range<usize>) -> Matrix {
-    matrix.select_rows(&range.collect::<Vec<_>>())
 }
 
 /// The forward map's own variance of each output where it fits the data best; `None` when it knows none.
@@ -306,7 +259,7 @@ fn calibrate(
         facts: [posterior.facts(), section.built.plugin.facts(), harvested].concat(),
         evidence,
     };
-    Ok(Calibrated { draws, outcome })
+    Ok(Calibrated { draws, statistics: sampled.statistics, outcome })
 }
 
 /// One starting point a chain.

@@ -1,9 +1,12 @@
 //! The whole program: stages in order, each one function from plain data to plain data.
 
+pub mod assess;
 pub mod best_fit;
 pub mod calibrate;
 pub mod common_error;
+pub mod contents;
 pub mod coverage;
+pub mod curves;
 pub mod derived;
 pub mod design;
 pub mod direct;
@@ -17,6 +20,7 @@ pub mod manifest;
 pub mod numerical_error;
 pub mod power;
 pub mod predict;
+pub mod predictions;
 pub mod read;
 pub mod refine;
 pub mod report;
@@ -33,12 +37,13 @@ pub mod validate;
 use crate::math::random::Stream;
 use crate::plugin::{Emulator, Forward};
 use crate::report::findings::Findings;
-use crate::run::{Kept, Observer, RunDirectory, Stop};
+use crate::run::{Kept, Listener, Observer, RunDirectory, Stop};
 use crate::study::Study;
 
 use calibrate::Calibrated;
-use evidence::{Predicting, Weighed};
+use evidence::Weighed;
 use numerical_error::NumericalError;
+use predictions::Predicting;
 use read::Data;
 use refine::Refinement;
 use surrogate::Fitted;
@@ -95,7 +100,9 @@ fn pursue(
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {
+    contents::before_all(study)?;
     manifest::begin(study, run)?;
+    let observer = &Listener::new(observer);
     let findings = match (&study.target, &study.surrogate) {
         (Some(given), _) => target::run(study, given, run, observer)?,
         (None, Some(_)) => with_surrogate(study, goal, run, observer)?,
@@ -153,6 +160,16 @@ fn conclude(
 ) -> Result<Findings, Stop> {
     let weighed = weigh(study, known, calibrated, run, observer)?;
     let validated = validate::stage(study, known, calibrated, run, observer)?;
+    let made = report::Artifacts {
+        known: Some(known),
+        calibrated,
+        weighed: weighed.as_ref(),
+        validated: validated.as_ref(),
+        assessed: None,
+        gap: None,
+    };
+    let assessed = assess::stage(study, &made, run, observer)?;
+    let made = report::Artifacts { assessed: Some(&assessed), ..made };
     let gap = match goal {
         Goal::FindGap => gap::stage(study, known, run, observer)?,
         // What was found before is not lost in a report that is written again.
@@ -161,14 +178,12 @@ fn conclude(
     if let Goal::Show(before) = goal {
         gap::show::stage(study, known, calibrated, before, run, observer)?;
     }
-    let made = report::Artifacts {
-        known: Some(known),
-        calibrated,
-        weighed: weighed.as_ref(),
-        validated: validated.as_ref(),
-        gap: gap.as_ref(),
-    };
-    report::stage(study, &made, run)
+    if let Some(calibrated) = calibrated {
+        let (weighed, validated) = (weighed.as_ref(), validated.as_ref());
+        let finished = inference_data::Finished { calibrated, weighed, validated };
+        inference_data::stage(study, known, &finished, run)?;
+    }
+    report::stage(study, &report::Artifacts { gap: gap.as_ref(), ..made }, run, observer)
 }
 
 /// The evidence of a calibration, where there is one.
@@ -187,7 +202,8 @@ fn weigh(
     let predicting = Predicting {
         forward: known.forward,
         likelihood: parts.likelihood(),
-        data: measured.likelihood.count(),
+        law: calibrate::Law::of(study, measured, known)?,
+        data: &measured.likelihood,
     };
     evidence::stage(study, &posterior, calibrated, Some(predicting), run, observer).map(Some)
 }

@@ -54,13 +54,11 @@ pub fn stage(
         let ratio = error / data.sqrt();
         let clear = is_clear(study, learned.region.as_deref(), &kept(&calibrated));
         let reached = ratio <= refine.until.get() && clear;
-        let refinement = Refinement { rounds: round, ratio, clear, reached };
+        let until = refine.until.get();
+        let refinement = Refinement { rounds: round, ratio, until, clear, reached };
         observer.begin("refine", "round", refine.rounds.get() as u64);
         observer.end("refine", &refinement.summary(refine));
         if reached || round == refine.rounds.get() {
-            if !reached {
-                observer.warn(&format!("{}; allow more `rounds`", refinement.summary(refine)));
-            }
             learned.refinement = Some(refinement);
             break;
         }
@@ -80,6 +78,8 @@ pub struct Refinement {
     /// The error that the emulator had at the last new runs, before it learned from them, over the discrepancy: root
     /// mean squares over the outputs.
     pub ratio: f64,
+    /// The ratio that the study asks for.
+    pub until: f64,
     /// Whether the posterior keeps clear of the region's own edges.
     pub clear: bool,
     /// Whether the ratio is as small as the study wants, and the posterior clear of the region's edges.
@@ -192,7 +192,7 @@ fn next(
     let ensemble = data.value.runs()?;
     let error = error_at_new(ensemble, before, &*learned.emulator, learned.region.as_deref())?;
     let parameters: Vec<Parameter>;
-    let all = 0..ensemble.runs.len();
+    let all = (0..ensemble.runs.len()).filter(|&i| surrogate::is_wanted(study, ensemble, i));
     let fitting = match refine.region {
         Region::Design => Fitting {
             folder: &folder(round, "surrogate"),

@@ -8,11 +8,14 @@ use crate::run::arrays::{self, Array};
 
 use super::simulate::{TABLE, from_table};
 
-/// The runs of the simulate stage from the NetCDF files that [`crate::run::write_response`] wrote; none may have failed.
-pub fn ensemble(source: &EnsembleSource<'_>) -> Result<Ensemble, Stop> {
+/// The runs of the simulate stage from the NetCDF files that [`crate::run::write_response`] wrote, of which so many may
+/// have failed.
+pub fn ensemble(source: &EnsembleSource<'_>, allowed: usize) -> Result<Ensemble, Stop> {
     let ensemble = with_failed(source)?;
-    let Some(first) = ensemble.failed.first() else { return Ok(ensemble) };
-    let (count, all) = (ensemble.failed.len(), ensemble.failed.len() + ensemble.runs.len());
+    let (runs, failed) = (&ensemble.runs, &ensemble.failed);
+    let refused = |_: &&FailedRun| failed.len() > allowed || runs.is_empty();
+    let Some(first) = failed.first().filter(refused) else { return Ok(ensemble) };
+    let (count, all) = (failed.len(), failed.len() + runs.len());
     let message = format!("{count} of {all} runs failed, first `{}`: {}", first.run, first.reason);
     let folder = source.simulated.map(|folder| folder.display().to_string());
     Err(Stop::new(message)
@@ -60,6 +63,21 @@ pub fn with_failed(source: &EnsembleSource<'_>) -> Result<Ensemble, Stop> {
         valid,
         failed,
     })
+}
+
+/// Whether all results of the simulate stage are such files: the reader of a study is for what the simulator itself
+/// wrote.
+pub fn are_own(source: &EnsembleSource<'_>) -> bool {
+    let Some(folder) = source.simulated else { return false };
+    let Ok((records, ..)) = from_table(&folder.join(TABLE)) else { return false };
+    let mut files = records.iter().filter_map(|record| record.file.as_ref()).peekable();
+    let is_own = |file: &String| {
+        let path = folder.join(file);
+        path.extension().is_some_and(|extension| extension == "nc")
+            && arrays::read(&path, &source.layout.name)
+                .is_ok_and(|array| array.values.len() == source.layout.len())
+    };
+    files.peek().is_some() && files.all(is_own)
 }
 
 /// The values of a file, which are in the model's unit, in the study's.

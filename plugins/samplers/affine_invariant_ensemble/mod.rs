@@ -231,7 +231,7 @@ impl<'a> Batch<'a> {
     }
 }
 
-lacuna::register!(Sampler, "affine_invariant_ensemble", AffineInvariantEnsemble);
+lacuna::register!(Sampler, "affine_invariant_ensemble", AffineInvariantEnsemble, aliases: ["emcee", "ensemble", "stretch", "mcmc"]);
 
 #[cfg(test)]
 mod calibration;

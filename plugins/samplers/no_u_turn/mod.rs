@@ -2,6 +2,7 @@
 
 mod tree;
 
+use lacuna::data::Statistic;
 use lacuna::linalg::Matrix;
 use lacuna::math::random::Stream;
 use lacuna::plugin::sampler::{Plan, State};
@@ -11,7 +12,7 @@ use lacuna::study::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::hamiltonian::{Settings, Shape, chains};
+use super::hamiltonian::{Settings, Shape, chains, told};
 
 /// No-U-turn sampler: Hamiltonian Monte Carlo whose trajectories end where they would turn back.
 ///
@@ -104,6 +105,10 @@ impl Sampler for NoUTurn {
         })
     }
 
+    fn statistics(&self, state: &State) -> Vec<Statistic> {
+        told::statistics(state, true)
+    }
+
     fn doubts(&self, state: &State) -> Vec<String> {
         chains::doubts(&self.settings(), state)
     }
@@ -119,7 +124,7 @@ impl Sampler for NoUTurn {
     }
 }
 
-lacuna::register!(Sampler, "no_u_turn", NoUTurn);
+lacuna::register!(Sampler, "no_u_turn", NoUTurn, aliases: ["nuts"]);
 
 #[cfg(test)]
 mod tests;

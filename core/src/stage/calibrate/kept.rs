@@ -1,11 +1,18 @@
-//! A calibration in files.
+//! How a calibration is kept: `draws.nc` with the draws and what the sampler told of each step, and the rest as JSON.
 
 use std::path::Path;
 
-use super::{Calibrated, Outcome};
 use crate::data::Draws;
+use crate::data::statistics::{Kind, Statistics};
 use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Stop, files};
+
+use super::{Calibrated, Outcome};
+
+/// The name of a statistic's array.
+fn told(name: &str) -> String {
+    format!("step_{name}")
+}
 
 impl Artifact for Calibrated {
     fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
@@ -20,14 +27,21 @@ impl Artifact for Calibrated {
             values: values.to_vec(),
             unit: None,
         };
-        let arrays = [
+        let mut arrays = vec![
             array("draws", &d.values, Some(d.dimension())),
             array("log_density", &d.log_density, None),
         ];
+        let count = self.statistics.names.len();
+        for (i, (name, _)) in self.statistics.names.iter().enumerate() {
+            let all = self.statistics.values.len() / count;
+            let own = &self.statistics.values[i * all..(i + 1) * all];
+            arrays.push(array(&told(name), own, None));
+        }
         let names = d.names.join(" ");
         arrays::write(&folder.join("draws.nc"), &[("coordinates", names)], &arrays)?;
         files::write_json(&folder.join("outcome.json"), &self.outcome)?;
-        Ok(["draws.nc", "outcome.json"].map(str::to_owned).to_vec())
+        files::write_json(&folder.join("statistics.json"), &self.statistics.names)?;
+        Ok(["draws.nc", "outcome.json", "statistics.json"].map(str::to_owned).to_vec())
     }
 
     fn load(folder: &Path) -> Result<Self, Stop> {
@@ -42,6 +56,13 @@ impl Artifact for Calibrated {
             values: values.values,
             log_density: log_density.values,
         };
-        Ok(Self { draws, outcome })
+        let names: Vec<(String, Kind)> = files::read_json(&folder.join("statistics.json"))?;
+        let mut told_values = Vec::new();
+        for (name, _) in &names {
+            told_values.extend(arrays::read(&path, &told(name))?.values);
+        }
+        let (chains, steps) = (draws.chains, draws.steps);
+        let statistics = Statistics { names, chains, steps, values: told_values };
+        Ok(Self { draws, statistics, outcome })
     }
 }
