@@ -126,7 +126,7 @@ fn runs_that_are_held_back_are_truths() {
     });
     assert!(is_there, "{truth}");
     // Several fits, none of all runs.
-    assert!(out.join("7-coverage-fit-2").exists());
+    assert!(out.join("7-coverage-surrogate-2").exists());
 }
 
 #[test]

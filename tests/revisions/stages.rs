@@ -10,7 +10,7 @@ use super::{Bits, Made};
 use crate::quick::{self, Watch};
 
 /// Stages whose artifacts take minutes: they are compared by tests of their own.
-const UNTRIED: [&str; 3] = ["gap", "show", "power"];
+const UNTRIED: [&str; 4] = ["gap", "show", "power", "coverage"];
 
 /// The artifacts of a run of the small study, by stage: of files that hold results, not times.
 pub fn all() -> BTreeMap<String, Made> {

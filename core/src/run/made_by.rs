@@ -24,6 +24,7 @@ pub const STAGES: [(&str, Depends); 12] = [
     ("gap", Depends::OnVersion(1)),
     ("show", Depends::OnVersion(1)),
     ("power", Depends::OnVersion(1)),
+    ("coverage", Depends::OnVersion(1)),
 ];
 
 /// What the artifacts of a stage depend on besides its inputs; the number is the stage's revision.

@@ -240,7 +240,7 @@ fn refitted<'a>(
         let place = |wanted: &[usize]| -> Vec<usize> {
             (0..kept.len()).filter(|&i| wanted.contains(&kept[i])).collect()
         };
-        let folder = format!("7-coverage-fit-{}", k + 1);
+        let folder = format!("7-coverage-surrogate-{}", k + 1);
         let fitting = Fitting {
             folder: &folder,
             parameters: &study.parameters,

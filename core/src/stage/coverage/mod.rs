@@ -80,12 +80,8 @@ pub fn coverage(
     refuse(study)?;
     directory.watch(study.faults());
     let ground = Ground::of(study, asked, directory, observer)?;
-    let inputs = json!([
-        ground.inputs(),
-        (asked.quick, ground.noise, ground.source),
-        study.about.seed,
-        env!("CARGO_PKG_VERSION")
-    ]);
+    let inputs =
+        json!([ground.inputs(), (asked.quick, ground.noise, ground.source), study.about.seed]);
     let wanted = ground.count();
     if directory.has(FOLDER, &inputs)? {
         let there = Cases::load(&directory.stage_folder(FOLDER)).map_or(0, |kept| kept.cases.len());

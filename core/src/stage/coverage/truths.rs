@@ -25,8 +25,8 @@ pub struct Truths {
     pub parts: Vec<usize>,
 }
 
-const FOLDER: &str = "7-coverage-truths";
-const FINER: &str = "7-coverage-truths-finer";
+const FOLDER: &str = "7-coverage-simulate";
+const FINER: &str = "7-coverage-simulate-finer";
 
 /// Draws from the priors of the parameters, one a row: the first ones are the same however many there are.
 fn draws(study: &Study, count: usize, stream: &Stream) -> Matrix {
