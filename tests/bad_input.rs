@@ -128,8 +128,10 @@ fn a_truncated_run_is_named_and_left_out_only_when_allowed() {
     assert_eq!(left_out[0], format!("run run007 is left out: {reason}"));
     assert_eq!(quick::summary(&out)["runs"]["used"], 39);
     assert_eq!(quick::summary(&out)["runs"]["failed"], 1);
-    let warnings = quick::summary(&out)["warnings"].to_string();
-    assert!(warnings.contains("1 simulation run has no usable response"), "{warnings}");
+    let summary = quick::summary(&out);
+    assert!(summary["warnings"][0].as_str().unwrap().contains("run run007 is left out"));
+    let findings = summary["assessment"]["findings"].as_array().unwrap();
+    assert!(findings.iter().any(|finding| finding["code"] == "failed_runs"), "{findings:?}");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Tests of the whole, in one binary.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
+mod assess;
 mod bad_input;
 mod campaign;
 mod commands;
@@ -10,6 +11,7 @@ mod falling_balls;
 mod faulty_tables;
 mod forced_oscillator;
 mod kill;
+mod left_out;
 mod made_by;
 mod problems;
 mod python;

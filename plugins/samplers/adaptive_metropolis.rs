@@ -72,6 +72,10 @@ impl Component for AdaptiveMetropolis {
 }
 
 impl Sampler for AdaptiveMetropolis {
+    fn steps_are_draws(&self) -> bool {
+        true
+    }
+
     fn plan(&self, _dimension: usize) -> Plan {
         Plan { chains: self.chains, steps: self.steps, warm_up: self.warm_up, ensemble: false }
     }

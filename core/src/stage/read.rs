@@ -16,9 +16,13 @@ use crate::report::findings::FlaggedCurve;
 use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, RunDirectory, Stop, files};
 use crate::study::Study;
+use crate::study::file::MeasurementKeys;
 
+use self::outside::refuse;
 use super::simulate::{Simulated, inside};
 use super::{contents, results, screen};
+
+pub(super) mod outside;
 
 /// What was read.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,12 +132,22 @@ pub fn stage(
         let measured = measured(study)?;
         Ok(Data { ensemble, measured })
     })?;
-    for failed in kept.value.ensemble.iter().flat_map(|ensemble| &ensemble.failed) {
+    if let Some(ensemble) = &kept.value.ensemble {
+        refuse(study, ensemble)?;
+    }
+    let failed: Vec<_> = kept.value.ensemble.iter().flat_map(|e| &e.failed).collect();
+    for failed in failed.iter().take(TOLD) {
         observer.warn(&format!("run {} is left out: {}", failed.run, failed.reason));
+    }
+    if failed.len() > TOLD {
+        observer.warn(&format!("{} further runs are left out", failed.len() - TOLD));
     }
     observer.end("read", &summary(&kept.value));
     Ok(kept)
 }
+
+/// So many runs that are left out are told one by one.
+const TOLD: usize = 10;
 
 fn summary(data: &Data) -> String {
     let mut text = match &data.ensemble {
@@ -177,11 +191,41 @@ pub fn ensemble(study: &Study, runs: Option<Runs<'_>>) -> Result<Ensemble, Stop>
     ensemble_of(study, &study.parameters, runs)
 }
 
+/// The same of runs that the study's model made, some of which may have failed, as far as a reader allows it. A reader of
+/// tables that were made before is not asked: it does not know these runs.
+pub fn ensemble_with_failed(study: &Study, runs: Runs<'_>) -> Result<Ensemble, Stop> {
+    let reader = study.simulations.as_ref().filter(|_| study.design.is_some());
+    let reader = reader.map(|section| &*section.built.plugin);
+    read_with(study, &study.parameters, Some(runs), |source| match reader {
+        Some(reader) if !results::are_own(source) => Ok(reader.ensemble(source)?),
+        _ => results::with_failed(source),
+    })
+}
+
 /// The same of runs of other parameters.
 pub fn ensemble_of(
     study: &Study,
     parameters: &[Parameter],
     runs: Option<Runs<'_>>,
+) -> Result<Ensemble, Stop> {
+    let reader = study.simulations.as_ref().map(|section| &section.built.plugin);
+    read_with(study, parameters, runs, |source| match reader {
+        Some(plugin) if plugin.names_files() || !results::are_own(source) => {
+            Ok(plugin.ensemble(source)?)
+        }
+        reader => {
+            let made = runs.map_or(0, |runs| runs.made.points.rows());
+            let allowed = reader.and_then(|plugin| plugin.allowed_failures(made));
+            results::ensemble(source, allowed.unwrap_or(0))
+        }
+    })
+}
+
+fn read_with(
+    study: &Study,
+    parameters: &[Parameter],
+    runs: Option<Runs<'_>>,
+    read: impl Fn(&EnsembleSource<'_>) -> Result<Ensemble, Stop>,
 ) -> Result<Ensemble, Stop> {
     let mut parts = Vec::new();
     for (i, scenario) in study.scenarios.iter().enumerate() {
@@ -197,16 +241,7 @@ pub fn ensemble_of(
             scenario: scenario.label(),
             layout: &layout,
         };
-        let ensemble = match study.simulations.as_ref().map(|section| &section.built.plugin) {
-            Some(plugin) if plugin.names_files() || !results::are_own(&source) => {
-                plugin.ensemble(&source)?
-            }
-            reader => {
-                let made = runs.map_or(0, |runs| runs.made.scenarios[i].runs.len());
-                let allowed = reader.and_then(|plugin| plugin.allowed_failures(made));
-                results::ensemble(&source, allowed.unwrap_or(0))?
-            }
-        };
+        let ensemble = read(&source)?;
         parts.push((ensemble, outputs));
     }
     let joined = joined(study, parts)?;
@@ -283,7 +318,12 @@ pub(super) fn measured_or_all(study: &Study) -> Result<Option<Measured>, Vec<Sto
     if read.count() == 0 {
         return Err(vec![Stop::new("the measurements hold no value")]);
     }
-    let flagged = match &section.common.screen {
+    Ok(Some(screened(&section.common, read)))
+}
+
+/// Measurements as the calibration uses them: screened, and with the curves that the study adds.
+pub(super) fn screened(keys: &MeasurementKeys, read: Observations) -> Measured {
+    let flagged = match &keys.screen {
         Some(options) => {
             let (threshold, leave_out) = (options.threshold.get(), options.leave_out);
             read.blocks.iter().flat_map(|data| screen::flag(data, threshold, leave_out)).collect()
@@ -291,9 +331,9 @@ pub(super) fn measured_or_all(study: &Study) -> Result<Option<Measured>, Vec<Sto
         None => Vec::new(),
     };
     let used = read.map(|data| screen::without(data, &flagged));
-    let added = &section.common.added_curves;
+    let added = &keys.added_curves;
     let likelihood = used.map(|data| screen::with_added_curves(data, added));
-    Ok(Some(Measured { read, used, likelihood, flagged }))
+    Measured { read, used, likelihood, flagged }
 }
 
 /// The measurements of all scenarios: a replicate belongs to one scenario and has gaps in the others of its block.

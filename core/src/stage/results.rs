@@ -8,10 +8,21 @@ use crate::run::arrays::{self, Array};
 
 use super::simulate::{TABLE, from_table};
 
-/// The runs of the simulate stage from the NetCDF files that [`crate::run::write_response`] wrote.
-///
-/// So many runs may have failed.
+/// The runs of the simulate stage from the NetCDF files that [`crate::run::write_response`] wrote; so many may have failed.
 pub fn ensemble(source: &EnsembleSource<'_>, allowed: usize) -> Result<Ensemble, Stop> {
+    let ensemble = with_failed(source)?;
+    let too_many = ensemble.failed.len() > allowed || ensemble.runs.is_empty();
+    let Some(first) = ensemble.failed.first().filter(|_| too_many) else { return Ok(ensemble) };
+    let (count, all) = (ensemble.failed.len(), ensemble.failed.len() + ensemble.runs.len());
+    let message = format!("{count} of {all} runs failed, first `{}`: {}", first.run, first.reason);
+    let folder = source.simulated.map(|folder| folder.display().to_string());
+    Err(Stop::new(message)
+        .saved(format!("the other runs in {}", folder.unwrap_or_default()))
+        .help("`lacuna campaign status RUN` says why each has failed, `lacuna campaign retry RUN` makes them again; or name a reader in `[simulations]` and say there how many may be left out (`allow_failed`)"))
+}
+
+/// The same with those that failed, however many.
+pub fn with_failed(source: &EnsembleSource<'_>) -> Result<Ensemble, Stop> {
     let folder = source.simulated.ok_or_else(|| {
         Stop::new("the study has no simulation runs").help("add `[simulations]` with their files")
     })?;
@@ -39,14 +50,6 @@ pub fn ensemble(source: &EnsembleSource<'_>, allowed: usize) -> Result<Ensemble,
                 reason: record.reason.clone().unwrap_or_default(),
             }),
         }
-    }
-    if let Some(first) = failed.first().filter(|_| failed.len() > allowed || runs.is_empty()) {
-        let (count, all) = (failed.len(), failed.len() + runs.len());
-        let message =
-            format!("{count} of {all} runs failed, first `{}`: {}", first.run, first.reason);
-        return Err(Stop::new(message)
-            .saved(format!("the other runs in {}", folder.display()))
-            .help("`lacuna campaign status RUN` says why each has failed, `lacuna campaign retry RUN` makes them again; or name a reader in `[simulations]` and say there how many may be left out (`allow_failed`)"));
     }
     Ok(Ensemble {
         parameters,

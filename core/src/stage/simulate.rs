@@ -176,7 +176,7 @@ pub fn kept(
     let kept = run.keep(stage, &inputs, observer, make)?;
     let damaged = if kept.fresh { 0 } else { kept.value.damaged(&folder) };
     if damaged > 0 {
-        observer.warn(&format!(
+        observer.remark(&format!(
             "result files in {} are missing or not as they were written ({damaged} of {}); making them again",
             folder.display(),
             asked.names.len()
@@ -187,6 +187,26 @@ pub fn kept(
         return run.keep(stage, &inputs, observer, make);
     }
     Ok(kept)
+}
+
+/// The same of runs of which a run directory may hold the first ones already: those are not made again.
+pub fn grown(
+    study: &Study,
+    simulator: &Simulator<'_>,
+    stage: &str,
+    asked: Asked<'_>,
+    model: &impl Serialize,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Kept<Simulated>, Stop> {
+    let inputs = Inputs::of(simulator, model)?;
+    let first = |count: usize| {
+        let points = asked.points.select_rows(&(0..count).collect::<Vec<_>>());
+        inputs.value(Asked { names: &asked.names[..count], points: &points, imported: &[] })
+    };
+    let smaller: Vec<Value> = (1..asked.names.len()).rev().map(first).collect();
+    run.go_on_from(stage, &inputs.value(asked), &smaller)?;
+    kept(study, simulator, stage, asked, model, run, observer)
 }
 
 const STAGE: &str = "2-simulate";
@@ -288,7 +308,7 @@ impl Work<'_> {
         let inputs = |i: usize| self.setting.inputs(self.asked.points.row(i));
         let jobs: Vec<Job> =
             missing.iter().map(|&i| Job { name: names[i].clone(), inputs: inputs(i) }).collect();
-        let warn = |text: &str| progress.warn(text);
+        let warn = |text: &str| progress.remark(text);
         let batch = Batch {
             model: self.simulator.model,
             recipe: &self.simulator.recipe,

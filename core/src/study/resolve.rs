@@ -11,8 +11,8 @@ use super::context;
 use super::decode::{decode, fields};
 use super::file::{
     DerivedSection, DesignKeys, DiscrepancyKeys, EffectKeys, MeasurementKeys, ModelKeys,
-    NumericalErrorSection, ResponseSection, SamplerKeys, StudySection, SurrogateKeys,
-    ValidateSection,
+    NumericalErrorSection, ResponseSection, SamplerKeys, SimulationKeys, StudySection,
+    SurrogateKeys, ValidateSection,
 };
 use super::gap::{Gap, gap};
 use super::libraries::{Libraries, Seen, libraries};
@@ -65,7 +65,7 @@ pub struct Study {
     /// `[executor]`.
     pub executor: Option<Section<dyn Executor, NoKeys>>,
     /// `[simulations]`.
-    pub simulations: Option<Section<dyn Reader, NoKeys>>,
+    pub simulations: Option<Section<dyn Reader, SimulationKeys>>,
     /// `[measurements]`.
     pub measurements: Option<Section<dyn Reader, MeasurementKeys>>,
     /// `[surrogate]`.
@@ -257,6 +257,7 @@ fn common_keys(section: &str) -> &'static [&'static str] {
     match section {
         "model" => fields::<ModelKeys>(),
         "design" => fields::<DesignKeys>(),
+        "simulations" => fields::<SimulationKeys>(),
         "measurements" => fields::<MeasurementKeys>(),
         "surrogate" => fields::<SurrogateKeys>(),
         "discrepancy" => fields::<DiscrepancyKeys>(),

@@ -33,12 +33,13 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// The noise of data; its unknown variances are added to the hyperparameters.
+    /// The noise of data; its unknown variances are added to the hyperparameters. A measured variance is the one between
+    /// the replicates of `shown`, of which the data are a part.
     pub fn new(
         known: &Known<'_>,
+        shown: &Measurements,
         replicates: &Replicates,
-        variance: &Variance,
-        by: &By,
+        (variance, by): (&Variance, &By),
         hyper: &mut Vec<Hyperparameter>,
     ) -> Result<Self, Stop> {
         let layout = &known.data.layout;
@@ -51,9 +52,11 @@ impl Noise {
             Variance::Measured(quantity) => {
                 let unknown = Unknown { name: "multiplier", unit: Unit::dimensionless() };
                 let scale = if known.data.states_noise() {
-                    known.data.stated_sd().iter().map(|sd| sd * sd).collect()
+                    shown.stated_sd().iter().map(|sd| sd * sd).collect()
                 } else {
-                    Pooled::of(&groups, replicates).measured(&groups, replicates)?
+                    let whole = Replicates::of(shown, &[])?;
+                    let all = Groups::of(layout, by).map_err(Stop::new)?.with_data(&whole.measured);
+                    Pooled::of(&all, &whole).measured(&all, &whole)?
                 };
                 (quantity, scale, unknown)
             }

@@ -10,7 +10,7 @@ mod statistics;
 #[cfg(test)]
 mod tests;
 
-use lacuna::data::Layout;
+use lacuna::data::{Layout, Measurements};
 use lacuna::plugin::component::{Component, Context};
 use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood, StatedNoise};
 use lacuna::run::Stop;
@@ -101,6 +101,20 @@ impl Discrepancy for Gaussian {
 
     fn takes_stated_noise(&self) -> bool {
         true
+    }
+
+    fn likelihood_of_part(
+        &self,
+        known: &Known<'_>,
+        part: &Measurements,
+    ) -> Result<Option<Box<dyn Likelihood>>, Stop> {
+        // Noise that differs from curve to curve has no such form yet.
+        if stated::is_needed(self, known.data) {
+            return Ok(None);
+        }
+        let known_part = Known { data: part, ..*known };
+        let likelihood = GaussianLikelihood::under(self, &known_part, known.data)?;
+        Ok(Some(Box::new(likelihood)))
     }
 
     fn stated_noise(&self, layout: &Layout, _: &[f64]) -> Option<StatedNoise> {

@@ -9,7 +9,7 @@ mod solve;
 #[cfg(test)]
 mod tests;
 
-use lacuna::data::Layout;
+use lacuna::data::{Layout, Measurements};
 use lacuna::plugin::component::{Component, Context};
 use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood, StatedNoise};
 use lacuna::run::Stop;
@@ -103,6 +103,16 @@ impl Component for GaussianProcess {
 impl Discrepancy for GaussianProcess {
     fn likelihood(&self, known: &Known<'_>) -> Result<Box<dyn Likelihood>, Stop> {
         Ok(Box::new(BiasedLikelihood::new(self, known)?))
+    }
+
+    fn likelihood_of_part(
+        &self,
+        known: &Known<'_>,
+        part: &Measurements,
+    ) -> Result<Option<Box<dyn Likelihood>>, Stop> {
+        let known_part = Known { data: part, ..*known };
+        let likelihood = BiasedLikelihood::under(self, &known_part, known.data)?;
+        Ok(likelihood.map(|likelihood| Box::new(likelihood) as Box<dyn Likelihood>))
     }
 
     fn stated_noise(&self, layout: &Layout, _: &[f64]) -> Option<StatedNoise> {

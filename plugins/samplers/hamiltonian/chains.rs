@@ -1,5 +1,7 @@
 //! Independent chains that learn a step size each and a common metric.
 
+use lacuna::data::Statistic;
+use lacuna::data::statistics::Kind;
 use lacuna::linalg::Matrix;
 use lacuna::math::random::Stream;
 use lacuna::math::transform::Unconstrained;
@@ -95,6 +97,10 @@ pub(crate) struct Transition {
     pub divergent: bool,
     /// Whether the trajectory was cut off.
     pub saturated: bool,
+    /// Kinetic energy less log density of the free coordinates, of the point where it ends with its momentum there.
+    pub energy: f64,
+    /// How often the trajectory was doubled, where it grows by doubling.
+    pub depth: Option<u32>,
 }
 
 /// What is kept between steps.
@@ -117,6 +123,56 @@ struct Chain {
     divergences: u64,
     /// Trajectories since the warm-up that were cut off.
     saturated: u64,
+    /// The last trajectory.
+    #[serde(default)]
+    last: Option<Last>,
+}
+
+/// What is told of a trajectory.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Last {
+    acceptance: f64,
+    divergent: bool,
+    energy: f64,
+    gradients: u64,
+    saturated: bool,
+    step: f64,
+    depth: Option<u32>,
+}
+
+impl Last {
+    fn of(done: &Transition, step: f64) -> Self {
+        let &Transition { acceptance, gradients, divergent, saturated, energy, depth, .. } = done;
+        Self { acceptance, divergent, energy, gradients, saturated, step, depth }
+    }
+}
+
+/// What is told of a trajectory: its name, its kind, its value.
+type Told = (&'static str, Kind, fn(&Last) -> f64);
+
+/// The statistics of the last trajectories; `doubles` where these grow by doubling.
+pub(crate) fn statistics(state: &State, doubles: bool) -> Vec<Statistic> {
+    const ALL: [Told; 7] = [
+        ("acceptance_rate", Kind::Number, |last| last.acceptance),
+        ("diverging", Kind::Flag, |last| f64::from(u8::from(last.divergent))),
+        ("energy", Kind::Number, |last| last.energy),
+        ("n_steps", Kind::Count, |last| last.gradients as f64),
+        ("step_size", Kind::Number, |last| last.step),
+        ("tree_depth", Kind::Count, |last| f64::from(last.depth.unwrap_or(0))),
+        ("reached_max_treedepth", Kind::Flag, |last| f64::from(u8::from(last.saturated))),
+    ];
+    let chains = state.memory.get("chains").and_then(serde_json::Value::as_array);
+    let last: Vec<Option<Last>> = chains
+        .into_iter()
+        .flatten()
+        .map(|chain| chain.get("last").and_then(|last| Last::deserialize(last).ok()))
+        .collect();
+    let one = |&(name, kind, value): &Told| Statistic {
+        name: name.to_owned(),
+        kind,
+        values: last.iter().map(|last| last.as_ref().map_or(f64::NAN, value)).collect(),
+    };
+    ALL[..if doubles { 7 } else { 5 }].iter().map(one).collect()
 }
 
 impl Memory {
@@ -193,7 +249,8 @@ pub(crate) fn start(
         Metric::of(settings.shape(target.dimension()), &curvature.covariance).ok_or_else(|| {
             Stop::new("the curvature at the starting points gives no scale of the posterior")
         })?;
-    let chain = |point| Chain { point, pace: None, spread: None, divergences: 0, saturated: 0 };
+    let chain =
+        |point| Chain { point, pace: None, spread: None, divergences: 0, saturated: 0, last: None };
     let memory = Memory { step: 0, metric, chains: starts.into_iter().map(chain).collect() };
     let count = points.rows();
     let mut state = State {
@@ -237,6 +294,7 @@ where
                 pace
             });
             let done = transition(&flow, &chain.point, pace.step, &mut rng);
+            chain.last = Some(Last::of(&done, pace.step));
             if step < settings.warm_up {
                 pace.learn(done.acceptance, settings.target_acceptance);
             } else {

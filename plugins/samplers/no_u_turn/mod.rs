@@ -2,6 +2,7 @@
 
 mod tree;
 
+use lacuna::data::Statistic;
 use lacuna::linalg::Matrix;
 use lacuna::math::random::Stream;
 use lacuna::plugin::sampler::{Plan, State};
@@ -86,6 +87,10 @@ impl Component for NoUTurn {
 }
 
 impl Sampler for NoUTurn {
+    fn steps_are_draws(&self) -> bool {
+        true
+    }
+
     fn plan(&self, _dimension: usize) -> Plan {
         self.settings().plan()
     }
@@ -98,6 +103,10 @@ impl Sampler for NoUTurn {
         chains::advance(&self.settings(), target, state, stream, |flow, point, step, rng| {
             tree::transition(flow, point, step, self.depth, rng)
         })
+    }
+
+    fn statistics(&self, state: &State) -> Vec<Statistic> {
+        chains::statistics(state, true)
     }
 
     fn doubts(&self, state: &State) -> Vec<String> {
