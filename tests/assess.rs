@@ -279,3 +279,18 @@ fn a_prior_far_from_the_data_is_a_conflict() {
     let assessment = target("-0.5 * ((a - 16) / 0.5)^2 - 0.5 * b^2", NUTS);
     assert_eq!(found(&assessment, "prior_conflict", Severity::Failure).place, "a");
 }
+
+/// One value of one run: 19.3 instead of 1.93.
+#[test]
+fn one_wrong_value_in_one_curve_is_named_with_its_place() {
+    let folder = quick::tables();
+    let path = folder.path().join("responses.csv");
+    let text = fs::read_to_string(&path).unwrap();
+    let line = text.lines().filter(|line| line.starts_with("r17,")).next().unwrap();
+    let (place, value) = line.rsplit_once(',').unwrap();
+    let wrong = 10.0 * value.parse::<f64>().unwrap();
+    fs::write(&path, text.replace(line, &format!("{place},{wrong}"))).unwrap();
+    let assessment = assess(folder.path(), &[]);
+    let finding = found(&assessment, "suspicious_run", Severity::Reservation);
+    assert!(finding.place == "run r17" && finding.message.contains("0.05"), "{finding:?}");
+}

@@ -9,6 +9,7 @@ mod docs;
 mod effects;
 mod falling_balls;
 mod faulty_tables;
+mod fidelity;
 mod forced_oscillator;
 mod kill;
 mod left_out;

@@ -6,6 +6,8 @@
 //! smooth function that the polynomials do not reach leaves residuals of one size at many runs; a typing error leaves
 //! a large one at one run. More than a few of them are no typing errors.
 
+pub mod values;
+
 use super::words::{percent, short};
 use super::{Finding, Rule, Severity};
 use crate::linalg::{Matrix, multiply, thin_qr, transposed_multiply};
@@ -33,12 +35,14 @@ pub fn rules() -> Vec<Rule> {
     vec![Rule {
         code: CODE,
         looks_at: "each run's jack-knife residual, scaled by its leverage, over the root mean square of those of all \
-                   other runs; of polynomials of the parameters and of the emulator"
+                   other runs; of polynomials of the parameters and of the emulator; the same value by value"
             .to_owned(),
         threshold: format!(
-            "{SCORE}: reservation; at most {} runs or {} of them",
+            "{SCORE}: reservation, at most {} runs or {} of them; single values of a curve: {}, at most {}",
             MOST.0,
-            percent(MOST.1)
+            percent(MOST.1),
+            values::SCORE,
+            values::MOST
         ),
         why: "one wrong number bends the emulator everywhere; normal residuals do not reach 10, and of 400 sound \
               ensembles of smooth functions at most 1 % have a run above it (counted by a test)",
@@ -240,8 +244,10 @@ fn basis(points: &Matrix, degree: usize) -> Matrix {
 
 /// How far off, in residuals of the other runs, a response counts as explained.
 const EXPLAINED: f64 = 4.0;
+/// A parameter explains a run when its best value leaves so small a part of the misfit.
+const REST: f64 = 0.2;
 /// Into how many steps a parameter's range is cut in search of the value that fits.
-const STEPS: usize = 60;
+const STEPS: usize = 200;
 
 /// What would explain a run, from a fit to the other runs: one factor on its response, or another value of one parameter.
 fn explain(
@@ -296,7 +302,8 @@ fn explain(
         }
     }
     let several = own.len() > 1;
-    let parameter = best.filter(|(least, _)| several && *least < EXPLAINED).map(|(_, at)| at);
+    let parameter =
+        best.filter(|(least, _)| several && *least < REST * off(expected)).map(|(_, at)| at);
     (factor, parameter)
 }
 

@@ -7,7 +7,7 @@ use crate::linalg::{self, Matrix};
 use crate::math::distribution::Distribution;
 use crate::math::random::{Stream, normal, uniform};
 use crate::plugin::forward::Linear;
-use crate::plugin::surrogate::{Emulator, Indices, Surrogate, Training};
+use crate::plugin::surrogate::{Emulator, Indices, Summand, Surrogate, Training};
 use crate::run::{Progress, Silent};
 
 /// Puts a surrogate through the contract, on 60 runs of a smooth function of two parameters with ten outputs, one of
@@ -19,15 +19,17 @@ use crate::run::{Progress, Silent};
 ///   give; a linear emulator is the product of its basis and its coefficients, and its sums of squares are right
 ///   to the error that they state;
 /// - Sobol' indices are shares: first order up to total, from 0 to 1;
+/// - a weighted sum of emulators, where the method has one, has the sum of their responses and slopes;
 /// - it reads back from its bytes bit for bit, and damaged bytes are refused;
 /// - the same runs give the same bytes, on any number of threads;
 /// - runs that are too few, of unequal number or not finite are refused.
 pub fn surrogate(name: &str, surrogate: &dyn Surrogate) -> Result<(), Vec<String>> {
     let problem = Problem::new();
-    let checks: [Check<'_>; 6] = [
+    let checks: [Check<'_>; 7] = [
         ("emulates", Box::new(|| emulates(surrogate, &problem))),
         ("knows its derivatives", Box::new(|| knows_its_derivatives(surrogate, &problem))),
         ("shares out the variance", Box::new(|| shares_out_the_variance(surrogate, &problem))),
+        ("adds up", Box::new(|| adds_up(surrogate, &problem))),
         ("reads back", Box::new(|| reads_back(surrogate, &problem))),
         ("repeats itself", Box::new(|| same_on_threads(|| problem.bytes(surrogate)))),
         ("refuses bad runs", Box::new(|| refuses_bad_runs(surrogate, &problem))),
@@ -205,6 +207,38 @@ fn shares_out_the_variance(surrogate: &dyn Surrogate, problem: &Problem) -> Resu
         return Err("an output that does not vary has shares".into());
     }
     Ok(())
+}
+
+/// The sum of an emulator of all runs and one of half of them, against the numbers of both.
+fn adds_up(surrogate: &dyn Surrogate, problem: &Problem) -> Result<(), String> {
+    let half: Vec<usize> = (0..RUNS / 2).collect();
+    let few = (problem.points.select_rows(&half), problem.responses.select_rows(&half));
+    let first = problem.fit(surrogate)?;
+    let Ok(second) = problem.fit_to(surrogate, &few.0, &few.1) else { return Ok(()) };
+    let weights = [(0..10).map(|j| 0.5 + f64::from(j)).collect::<Vec<f64>>(), vec![-0.25; 10]];
+    let offset: Vec<f64> = (0..10).map(|j| f64::from(j) - 3.0).collect();
+    let bytes = [&first, &second].map(|e| e.save().map_err(|stop| stop.to_string()));
+    let [one, two] = bytes;
+    let (one, two) = (one?, two?);
+    let parts = [
+        Summand { bytes: &one, weights: &weights[0] },
+        Summand { bytes: &two, weights: &weights[1] },
+    ];
+    let sum = surrogate.sum(&parts, &offset).map_err(|stop| format!("no sum: {stop}"))?;
+    let Some(sum) = sum else { return Ok(()) };
+    let weighted = |a: &Matrix, b: &Matrix, start: &dyn Fn(usize) -> f64| {
+        Matrix::from_fn(a.rows(), a.columns(), |i, j| {
+            start(j) + weights[0][j] * a[(i, j)] + weights[1][j] * b[(i, j)]
+        })
+    };
+    let points = &problem.fresh;
+    let expected = weighted(&first.mean(points), &second.mean(points), &|j| offset[j]);
+    agree("the sum, entry", sum.mean(points).as_slice(), expected.as_slice(), 1e-9)?;
+    let slopes = |e: &dyn Emulator| e.jacobian(points.row(0)).transposed();
+    let expected = weighted(&slopes(&*first), &slopes(&*second), &|_| 0.0);
+    agree("the sum's slopes, entry", slopes(&*sum).as_slice(), expected.as_slice(), 1e-9)?;
+    let damaged = [Summand { bytes: &one[..one.len() / 2], weights: &weights[0] }];
+    refused("a sum of damaged bytes", || surrogate.sum(&damaged, &offset))
 }
 
 fn shares(what: &str, indices: &Indices, rows: usize, pairs: usize) -> Result<(), String> {

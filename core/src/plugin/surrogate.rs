@@ -20,6 +20,27 @@ pub trait Surrogate: Component {
 
     /// An emulator from what [`Emulator::save`] wrote.
     fn load(&self, bytes: &[u8]) -> Result<Box<dyn Emulator>, Stop>;
+
+    /// The sum of emulators that this surrogate fitted, each output of each times its weight, plus an offset for each output:
+    /// as one emulator of the same form. `None` where the method has no such form, or these emulators do not go together.
+    ///
+    /// It is asked for the response and its sensitivity only: what it says of its errors means nothing.
+    fn sum(
+        &self,
+        _parts: &[Summand<'_>],
+        _offset: &[f64],
+    ) -> Result<Option<Box<dyn Emulator>>, Stop> {
+        Ok(None)
+    }
+}
+
+/// A part of a sum of emulators.
+#[derive(Debug, Clone, Copy)]
+pub struct Summand<'a> {
+    /// What [`Emulator::save`] wrote.
+    pub bytes: &'a [u8],
+    /// One weight an output.
+    pub weights: &'a [f64],
 }
 
 /// The runs to which a surrogate is fitted.

@@ -154,7 +154,7 @@ pub fn stage(
         known.data.hash,
         known.origin,
         known.numerics.map(|n| &n.hash),
-        study.numerical_error.as_ref().map(|section| section.written.whole()),
+        study.numerical_error.as_ref().map(|section| section.written.scales()),
         known.region,
         laws,
         (discrepancy.built.identity(), &discrepancy.common),

@@ -11,11 +11,13 @@ pub mod derived;
 pub mod design;
 pub mod direct;
 pub mod evidence;
+pub mod fidelity;
 pub mod gap;
 pub mod gap_model;
 mod idle;
 pub mod imports;
 pub mod inference_data;
+pub mod low_fidelity;
 pub mod manifest;
 pub mod numerical_error;
 pub mod power;
@@ -37,8 +39,9 @@ pub mod validate;
 use crate::math::random::Stream;
 use crate::plugin::{Emulator, Forward};
 use crate::report::findings::Findings;
-use crate::run::{Kept, Listener, Observer, RunDirectory, Stop};
+use crate::run::{Kept, Listener, Observer, RunDirectory, Stop, files};
 use crate::study::Study;
+use serde_json::json;
 
 use calibrate::Calibrated;
 use evidence::Weighed;
@@ -141,12 +144,12 @@ pub fn prepare(
     let placed = design::stage(study, run, observer)?;
     let simulated = simulate::stage(study, placed.as_ref(), run, observer)?;
     let data = read::stage(study, simulated.as_ref(), run, observer)?;
+    let data = low_fidelity::stage(study, placed.as_ref(), data, run, observer)?;
     let fitting = surrogate::Fitting::of(study, data.value.runs()?)?;
-    let (fitted, emulator) = surrogate::stage(study, &data, &fitting, run, observer)?;
+    let fitted = surrogate::stage(study, &data, &fitting, run, observer)?;
     let folders = numerical_error::FOLDERS;
     let numerics = numerical_error::stage(study, &data, None, folders, run, observer)?;
-    let (region, refinement, trial) = (None, None, None);
-    Ok(Learned { data, fitted, numerics, emulator, region, refinement, trial })
+    Learned::new(study, data, fitted, numerics, None)
 }
 
 /// Evidence, validation, gap and report of a calibration.
@@ -212,13 +215,13 @@ fn weigh(
 pub struct Known<'a> {
     /// The runs and the measurements.
     pub data: &'a Kept<Data>,
-    /// From parameters to responses: the emulator, or the model itself.
+    /// From parameters to responses: the emulator, with what is predicted of the numerical error, or the model itself.
     pub forward: &'a dyn Forward,
     /// A hash of what the forward map was made of.
     pub origin: &'a str,
     /// The fitted surrogate with its errors, in a study with a surrogate.
     pub fitted: Option<&'a Kept<Fitted>>,
-    /// The emulator, in a study with a surrogate.
+    /// The emulator of the model as it was run, in a study with a surrogate.
     pub emulator: Option<&'a dyn Emulator>,
     /// The model's numerical error, if the study asks for it.
     pub numerics: Option<&'a Kept<NumericalError>>,
@@ -259,6 +262,10 @@ pub struct Learned {
     pub numerics: Option<Kept<NumericalError>>,
     /// The emulator.
     pub emulator: Box<dyn Emulator>,
+    /// The emulator with what is predicted of the numerical error, where anything is.
+    pub corrected: Option<Box<dyn Emulator>>,
+    /// A hash of what the forward map was made of.
+    pub origin: String,
     /// See [`Known::region`].
     pub region: Option<Vec<(f64, f64)>>,
     /// How far a refinement came, where the study asks for one.
@@ -268,12 +275,36 @@ pub struct Learned {
 }
 
 impl Learned {
+    /// Of a study's runs, the emulator made of them and the model's numerical error.
+    fn new(
+        study: &Study,
+        data: Kept<Data>,
+        (fitted, emulator): (Kept<Fitted>, Box<dyn Emulator>),
+        numerics: Option<Kept<NumericalError>>,
+        trial: Option<Trial>,
+    ) -> Result<Self, Stop> {
+        let corrected = match &numerics {
+            Some(numerics) => numerics.value.corrected(study, &fitted.value)?,
+            None => None,
+        };
+        let section = study.numerical_error.as_ref();
+        let origin = match (&corrected, &numerics, section) {
+            (Some(_), Some(numerics), Some(section)) => {
+                let of = json!([fitted.hash, numerics.hash, section.written.whole()]);
+                files::hash(of.to_string().as_bytes())
+            }
+            _ => fitted.hash.clone(),
+        };
+        let (region, refinement) = (None, None);
+        Ok(Self { data, fitted, numerics, emulator, corrected, origin, region, refinement, trial })
+    }
+
     /// The same as it is handed on.
     pub fn known(&self) -> Known<'_> {
         Known {
             data: &self.data,
-            forward: &*self.emulator,
-            origin: &self.fitted.hash,
+            forward: self.corrected.as_deref().map_or(&*self.emulator as &dyn Forward, |c| c),
+            origin: &self.origin,
             fitted: Some(&self.fitted),
             emulator: Some(&*self.emulator),
             numerics: self.numerics.as_ref(),

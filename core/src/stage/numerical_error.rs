@@ -1,63 +1,171 @@
 //! The model's own numerical error: some runs of the design again, with finer numerics.
 //!
 //! A mesh that is fine enough for a picture may be too coarse for a calibration over ten thousand points: its
-//! error is common to all replicates and correlated between outputs, and looks like a change of the parameters.
+//! error is common to all replicates and correlated between outputs, and looks like a change of the parameters. It has a sign
+//! and depends on the parameters, so that it is predicted from them as far as runs that are left out confirm it; what
+//! is left is noise about zero.
 
 use std::path::Path;
 
+use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use crate::data::{Ensemble, Parameter};
 use crate::linalg::Matrix;
+use crate::math::distribution::Distribution;
 use crate::math::moments;
 use crate::plugin::discrepancy::CommonError;
+use crate::plugin::surrogate::FitError;
+use crate::plugin::{Emulator, Fact};
 use crate::run::arrays::{self, Array};
-use crate::run::{Artifact, Kept, Observer, RunDirectory, Stop};
+use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
 use crate::study::Study;
+use crate::study::fidelity::NumericalError as Asked;
+use crate::study::file::NumericalErrorSection;
 
+use super::fidelity::{Combined, Coverage, Difference, Lesson, Rule, Source, Verdict, cover};
+use super::idle::Used;
 use super::read::{self, Data, Runs};
-use super::simulate;
 use super::simulator::Simulator;
+use super::surrogate::Fitted;
+use super::{low_fidelity, simulate, stream};
 
 /// Differences between finer and ordinary runs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NumericalError {
     /// Finer minus ordinary response of each repeated run, `runs x outputs`.
     pub differences: Matrix,
+    /// The parameters of those runs.
+    pub points: Matrix,
+    /// How the differences follow from the parameters, where the study wants to know.
+    pub prediction: Option<Difference>,
+    /// The interval of each parameter in which the runs were chosen, where that is narrower than the design.
+    pub region: Option<Vec<(f64, f64)>>,
+}
+
+/// What a person may want to read of it.
+#[derive(Serialize, Deserialize)]
+struct Readable {
+    region: Option<Vec<(f64, f64)>>,
+    prediction: Option<Vec<Verdict>>,
 }
 
 const FILE: &str = "differences.nc";
+const PREDICTION: &str = "prediction.bin";
+const READABLE: &str = "prediction.json";
 /// The folders of the finer runs and of the differences.
 pub const FOLDERS: [&str; 2] = ["2-simulate-finer", "3-numerical-error"];
 
 impl Artifact for NumericalError {
     fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
-        let array = Array::matrix("differences", "run", "output", &self.differences);
-        arrays::write(&folder.join(FILE), &[], &[array])?;
-        Ok(vec![FILE.to_owned()])
+        let arrays = [
+            Array::matrix("differences", "run", "output", &self.differences),
+            Array::matrix("points", "run", "parameter", &self.points),
+        ];
+        arrays::write(&folder.join(FILE), &[], &arrays)?;
+        let prediction = self.prediction.as_ref().map(|p| p.verdicts.clone());
+        let readable = Readable { region: self.region.clone(), prediction };
+        files::write_json(&folder.join(READABLE), &readable)?;
+        let mut written = vec![FILE.to_owned(), READABLE.to_owned()];
+        if let Some(prediction) = &self.prediction {
+            files::write_atomic(&folder.join(PREDICTION), &prediction.to_bytes()?)?;
+            written.push(PREDICTION.to_owned());
+        }
+        Ok(written)
     }
 
     fn load(folder: &Path) -> Result<Self, Stop> {
-        let differences = arrays::read(&folder.join(FILE), "differences")?.into_matrix();
-        Ok(Self { differences })
+        let readable: Readable = files::read_json(&folder.join(READABLE))?;
+        let bytes =
+            readable.prediction.map(|_| files::read(&folder.join(PREDICTION))).transpose()?;
+        let path = folder.join(FILE);
+        Ok(Self {
+            differences: arrays::read(&path, "differences")?.into_matrix(),
+            points: arrays::read(&path, "points")?.into_matrix(),
+            prediction: bytes.map(|bytes| Difference::from_bytes(&bytes)).transpose()?,
+            region: readable.region,
+        })
     }
 }
 
 impl NumericalError {
-    /// The covariance of the numerical error: the mean square of `whole` times the differences about zero, since all
-    /// of them may lie on one side.
-    pub fn common_error(&self, whole: f64) -> CommonError {
-        let scale = (self.differences.rows() as f64).sqrt() / whole;
+    /// The covariance of what is not known of the numerical error, `whole` being the whole error over a difference.
+    ///
+    /// Where the differences are predicted it is `whole` times the errors of the prediction at runs left out, and
+    /// the share `extrapolation` of what lies beyond the finer runs; elsewhere `whole` times the differences, their mean square
+    /// about zero, since all of them may lie on one side.
+    pub fn common_error(&self, section: &NumericalErrorSection) -> CommonError {
         let d = &self.differences;
-        let factor = Matrix::from_fn(d.columns(), d.rows(), |i, k| d[(k, i)] / scale);
+        let (runs, outputs) = (d.rows(), d.columns());
+        let ([whole, share], root) = (section.scales(), (runs as f64).sqrt());
+        let predicted = |j: usize| self.prediction.as_ref().is_some_and(|p| p.corrects(j));
+        let beyond = if (0..outputs).any(predicted) { (whole - 1.0) * share } else { 0.0 };
+        let columns = if beyond > 0.0 { 2 * runs } else { runs };
+        let factor = Matrix::from_fn(outputs, columns, |j, k| match &self.prediction {
+            Some(_) if k >= runs && !predicted(j) => 0.0,
+            Some(_) if k >= runs => beyond * d[(k - runs, j)] / root,
+            Some(prediction) => whole * prediction.residuals[(k, j)] / root,
+            None => whole * d[(k, j)] / root,
+        });
         CommonError { origin: "numerics".to_owned(), factor, predictive: true }
+    }
+
+    /// The study's emulator with the predicted numerical error added; `None` where none is predicted.
+    pub fn corrected(
+        &self,
+        study: &Study,
+        fitted: &Fitted,
+    ) -> Result<Option<Box<dyn Emulator>>, Stop> {
+        let (Some(section), Some(prediction)) = (&study.numerical_error, &self.prediction) else {
+            return Ok(None);
+        };
+        if !prediction.is_used() {
+            return Ok(None);
+        }
+        let whole = section.written.whole();
+        let (mut sources, mut offset) = low_fidelity::sources(study, &fitted.bytes)?;
+        for (j, scale) in prediction.scale.iter().enumerate() {
+            let own = 1.0 + whole * (scale - 1.0);
+            sources.iter_mut().for_each(|source| source.weights[j] *= own);
+            offset[j] = own * offset[j] + whole * prediction.offset[j];
+        }
+        if let (Some(bytes), Some((plugin, name))) =
+            (&prediction.emulator, predictor(study, section))
+        {
+            let weight = |emulated: &bool| if *emulated { whole } else { 0.0 };
+            let weights = prediction.emulated.iter().map(weight).collect();
+            sources.push(Source { plugin, name, bytes: bytes.clone(), weights });
+        }
+        // Its errors are not those of the emulator of the ordinary runs: nobody asks for them.
+        let sum = Combined::new(&sources, &offset, FitError::default(), Vec::new(), Vec::new())?;
+        Ok(Some(Used::of(study)?.widen(Box::new(sum))))
+    }
+
+    /// What is worth telling.
+    pub fn facts(&self, unit: &str) -> Vec<Fact> {
+        let told = self.prediction.iter().flat_map(|prediction| prediction.facts(unit));
+        told.map(|fact| Fact::new(format!("numerical error: {}", fact.name), fact.value)).collect()
     }
 
     /// The root mean square difference over runs and outputs.
     pub fn rms(&self) -> f64 {
-        let squares: Vec<f64> = self.differences.as_slice().iter().map(|d| d * d).collect();
-        moments::mean(&squares).sqrt()
+        rms(&self.differences)
     }
+}
+
+fn rms(matrix: &Matrix) -> f64 {
+    let squares: Vec<f64> = matrix.as_slice().iter().map(|d| d * d).collect();
+    moments::mean(&squares).sqrt()
+}
+
+/// The surrogate that predicts the differences, with its name.
+fn predictor<'a>(
+    study: &'a Study,
+    section: &'a Asked,
+) -> Option<(&'a dyn crate::plugin::Surrogate, &'a str)> {
+    let own = section.surrogate.as_ref().map(|s| &s.built);
+    let built = own.or(study.surrogate.as_ref().map(|s| &s.built))?;
+    Some((&*built.plugin, built.name))
 }
 
 /// Repeats runs with finer numerics, those inside the prior and the region; `None` when the study does not ask for
@@ -96,33 +204,105 @@ pub fn stage(
     )?;
     let made = run.stage_folder(runs_folder);
     let reader = study.simulations.as_ref().map(|s| s.built.identity());
-    let inputs = json!([runs.hash, data.hash, reader]);
+    let surrogate = section.surrogate.as_ref().map(|s| s.built.identity());
+    let study_surrogate = study.surrogate.as_ref().map(|s| s.built.identity());
+    let parameters = designed(study, region);
+    let laws: Vec<_> = parameters.iter().map(|p| (&p.name, &p.design)).collect();
+    let predictor = section.written.predict.then_some((surrogate, study_surrogate, laws));
+    let inputs = json!([runs.hash, data.hash, reader, predictor, study.about.seed]);
     let kept = run.keep(folder, &inputs, observer, |_| {
         let runs = Runs { folder: &made, made: &runs.value };
         let finer = read::ensemble(study, Some(runs))?;
-        let ordinary = ensemble;
-        let mut differences = Matrix::zeros(0, study.layouts.len());
-        for (name, response) in finer.runs.iter().zip(finer.responses.iter_rows()) {
-            if let Some(row) = ordinary.runs.iter().position(|run| run == name) {
-                let base = ordinary.responses.row(row);
-                let difference: Vec<f64> = response.iter().zip(base).map(|(a, b)| a - b).collect();
-                differences.push_row(&difference);
-            }
-        }
-        if differences.rows() == 0 {
-            return Err(Stop::new("none of the repeated runs has a usable response"));
-        }
-        Ok(NumericalError { differences })
+        let region = region.map(<[_]>::to_vec);
+        let pairs = Pairs::of(&finer, ensemble)?;
+        let differences = pairs.differences();
+        let prediction = section.written.predict.then(|| pairs.learn(study, section, &parameters));
+        let prediction = prediction.transpose()?;
+        Ok(NumericalError { differences, points: pairs.points, prediction, region })
     })?;
-    let unit = study.layouts.unit();
-    observer.end(
-        "finer",
-        &format!("{} runs, rms difference {:.3e} {unit}", names.len(), kept.value.rms()),
-    );
+    observer.end("finer", &summary(study, &kept.value));
     Ok(Some(kept))
 }
 
-/// The first runs inside the prior and the region.
+fn summary(study: &Study, error: &NumericalError) -> String {
+    let unit = study.layouts.unit();
+    let text = format!("{} runs, rms difference {:.3e} {unit}", error.points.rows(), error.rms());
+    match &error.prediction {
+        Some(prediction) if prediction.is_used() => {
+            format!("{text}, {:.3e} after prediction", rms(&prediction.residuals))
+        }
+        Some(_) => format!("{text}, not predictable from the parameters"),
+        None => text,
+    }
+}
+
+/// The parameters with the laws of the runs that are repeated.
+fn designed(study: &Study, region: Option<&[(f64, f64)]>) -> Vec<Parameter> {
+    let narrowed = |(i, parameter): (usize, &Parameter)| Parameter {
+        design: region.map_or_else(
+            || parameter.design.clone(),
+            |region| Distribution::Uniform([region[i].0, region[i].1]),
+        ),
+        ..parameter.clone()
+    };
+    study.parameters.iter().enumerate().map(narrowed).collect()
+}
+
+/// Finer runs with the ordinary ones at the same points.
+struct Pairs {
+    points: Matrix,
+    finer: Matrix,
+    ordinary: Matrix,
+}
+
+impl Pairs {
+    fn of(finer: &Ensemble, ordinary: &Ensemble) -> Result<Self, Stop> {
+        let row = |name: &String| ordinary.runs.iter().position(|run| run == name);
+        let (rows, others): (Vec<usize>, Vec<usize>) =
+            finer.runs.iter().enumerate().filter_map(|(i, name)| Some((i, row(name)?))).unzip();
+        if rows.is_empty() {
+            return Err(Stop::new("none of the repeated runs has a usable response"));
+        }
+        Ok(Self {
+            points: ordinary.points.select_rows(&others),
+            finer: finer.responses.select_rows(&rows),
+            ordinary: ordinary.responses.select_rows(&others),
+        })
+    }
+
+    fn differences(&self) -> Matrix {
+        let (rows, columns) = (self.finer.rows(), self.finer.columns());
+        Matrix::from_fn(rows, columns, |i, j| self.finer[(i, j)] - self.ordinary[(i, j)])
+    }
+
+    /// How the differences follow from the parameters.
+    fn learn(
+        &self,
+        study: &Study,
+        section: &Asked,
+        parameters: &[Parameter],
+    ) -> Result<Difference, Stop> {
+        let used = Used::of(study)?;
+        let (plugin, _) =
+            predictor(study, section).ok_or_else(|| Stop::new("the study has no surrogate"))?;
+        let lesson = Lesson {
+            plugin,
+            parameters: &used.parameters(parameters),
+            layouts: &study.layouts,
+            points: &used.points(&self.points),
+            fine: &self.finer,
+            cheap: &self.ordinary,
+            predicted: &self.ordinary,
+            rules: &Rule::OF_CORRECTION,
+            stream: &stream(study, "numerical-error"),
+        };
+        lesson.learn(&Progress::new(&crate::run::Silent))
+    }
+}
+
+/// The runs inside the prior and the region that together lie nearest to all others there.
+///
+/// Among the runs that the design began with, where these are enough: a design that grows repeats the same runs.
 fn chosen(
     study: &Study,
     ensemble: &Ensemble,
@@ -135,5 +315,12 @@ fn chosen(
         study.parameters.iter().zip(point).all(possible)
             && region.is_none_or(|r| r.iter().zip(point).all(|(&(a, b), &x)| a <= x && x <= b))
     };
-    (0..ensemble.runs.len()).filter(inside).take(count).collect()
+    let first = study.design.as_ref().map_or(usize::MAX, |design| design.common.runs.get());
+    let among = |runs: usize| (0..runs).filter(inside).collect::<Vec<usize>>();
+    let mut candidates = among(ensemble.runs.len().min(first));
+    if region.is_some() || candidates.len() < count {
+        candidates = among(ensemble.runs.len());
+    }
+    let coverage = Coverage::new(&designed(study, region), &ensemble.points);
+    cover(&coverage, &candidates, count)
 }

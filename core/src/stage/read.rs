@@ -31,6 +31,8 @@ pub struct Data {
     pub ensemble: Option<Ensemble>,
     /// The measurements, if the study has any.
     pub measured: Option<Measured>,
+    /// Runs of a cheaper kind, if the study has any; they are kept by a stage of their own.
+    pub cheaper: Option<Ensemble>,
 }
 
 /// The measurements as the calibration uses them.
@@ -82,7 +84,7 @@ impl Artifact for Data {
         let measured = files::read_json(&folder.join(MEASUREMENTS))?;
         let path = folder.join("ensemble.nc");
         if !path.is_file() {
-            return Ok(Self { ensemble: None, measured });
+            return Ok(Self { ensemble: None, measured, cheaper: None });
         }
         let labels: Labels = files::read_json(&folder.join("ensemble.json"))?;
         let ensemble = Ensemble {
@@ -95,7 +97,7 @@ impl Artifact for Data {
             valid: labels.valid,
             failed: labels.failed,
         };
-        Ok(Self { ensemble: Some(ensemble), measured })
+        Ok(Self { ensemble: Some(ensemble), measured, cheaper: None })
     }
 }
 
@@ -130,7 +132,7 @@ pub fn stage(
     let kept = run.keep("3-read", &inputs, observer, |_| {
         let ensemble = if study.surrogate.is_some() { Some(ensemble(study, made)?) } else { None };
         let measured = measured(study)?;
-        Ok(Data { ensemble, measured })
+        Ok(Data { ensemble, measured, cheaper: None })
     })?;
     if let Some(ensemble) = &kept.value.ensemble {
         refuse(study, ensemble)?;
@@ -166,15 +168,25 @@ fn summary(data: &Data) -> String {
 
 /// The hash of the user's own files.
 fn source_hash(study: &Study) -> Result<String, Stop> {
-    let runs = study.simulations.iter().map(|s| &s.built.plugin);
-    let data = study.measurements.iter().map(|s| &s.built.plugin);
+    let runs = study.simulations.iter().map(|s| &*s.built.plugin);
+    let data = study.measurements.iter().map(|s| &*s.built.plugin);
+    files::hash_sources(&files_of(study, runs.chain(data)))
+}
+
+/// The user's own files that some readers read, each once.
+pub(super) fn files_of<'a>(
+    study: &Study,
+    readers: impl Iterator<Item = &'a dyn Reader>,
+) -> Vec<PathBuf> {
     let names: Vec<Option<&str>> = study.scenarios.iter().map(Scenario::label).collect();
-    let of =
-        |reader| names.iter().flat_map(move |name| Reader::files(reader, &study.directory, *name));
-    let mut paths: Vec<PathBuf> = runs.chain(data).flat_map(|reader| of(&**reader)).collect();
+    let of = |reader: &dyn Reader| {
+        let files = names.iter().flat_map(|name| reader.files(&study.directory, *name));
+        files.collect::<Vec<PathBuf>>()
+    };
+    let mut paths: Vec<PathBuf> = readers.flat_map(of).collect();
     paths.sort();
     paths.dedup();
-    files::hash_sources(&paths)
+    paths
 }
 
 /// The folder of the runs that the study made, with what is there.
@@ -196,8 +208,10 @@ pub fn ensemble(study: &Study, runs: Option<Runs<'_>>) -> Result<Ensemble, Stop>
 pub fn ensemble_with_failed(study: &Study, runs: Runs<'_>) -> Result<Ensemble, Stop> {
     let reader = study.simulations.as_ref().filter(|_| study.design.is_some());
     let reader = reader.map(|section| &*section.built.plugin);
-    read_with(study, &study.parameters, Some(runs), |source| match reader {
-        Some(reader) if !results::are_own(source) => Ok(reader.ensemble(source)?),
+    read_with(study, &study.parameters, Some(runs), |source, _| match reader {
+        Some(reader) if reader.names_files() || !results::are_own(source) => {
+            Ok(reader.ensemble(source)?)
+        }
         _ => results::with_failed(source),
     })
 }
@@ -208,14 +222,23 @@ pub fn ensemble_of(
     parameters: &[Parameter],
     runs: Option<Runs<'_>>,
 ) -> Result<Ensemble, Stop> {
-    let reader = study.simulations.as_ref().map(|section| &section.built.plugin);
-    read_with(study, parameters, runs, |source| match reader {
-        Some(plugin) if plugin.names_files() || !results::are_own(source) => {
-            Ok(plugin.ensemble(source)?)
+    let reader = study.simulations.as_ref().map(|section| &*section.built.plugin);
+    ensemble_through(study, parameters, reader, runs)
+}
+
+/// The same through another reader than the study's.
+pub fn ensemble_through(
+    study: &Study,
+    parameters: &[Parameter],
+    reader: Option<&dyn Reader>,
+    runs: Option<Runs<'_>>,
+) -> Result<Ensemble, Stop> {
+    read_with(study, parameters, runs, |source, made| match reader {
+        Some(reader) if reader.names_files() || !results::are_own(source) => {
+            Ok(reader.ensemble(source)?)
         }
-        reader => {
-            let made = runs.map_or(0, |runs| runs.made.points.rows());
-            let allowed = reader.and_then(|plugin| plugin.allowed_failures(made));
+        _ => {
+            let allowed = reader.and_then(|reader| reader.allowed_failures(made));
             results::ensemble(source, allowed.unwrap_or(0))
         }
     })
@@ -225,7 +248,7 @@ fn read_with(
     study: &Study,
     parameters: &[Parameter],
     runs: Option<Runs<'_>>,
-    read: impl Fn(&EnsembleSource<'_>) -> Result<Ensemble, Stop>,
+    read: impl Fn(&EnsembleSource<'_>, usize) -> Result<Ensemble, Stop>,
 ) -> Result<Ensemble, Stop> {
     let mut parts = Vec::new();
     for (i, scenario) in study.scenarios.iter().enumerate() {
@@ -241,7 +264,8 @@ fn read_with(
             scenario: scenario.label(),
             layout: &layout,
         };
-        let ensemble = read(&source)?;
+        let made = runs.map_or(0, |runs| runs.made.scenarios[i].runs.len());
+        let ensemble = read(&source, made)?;
         parts.push((ensemble, outputs));
     }
     let joined = joined(study, parts)?;

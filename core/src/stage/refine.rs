@@ -19,7 +19,7 @@ use crate::study::Study;
 use crate::study::file::{Refine, Region};
 
 use super::calibrate::{self, Calibrated, Parts};
-use super::numerical_error;
+use super::numerical_error::{self, NumericalError};
 use super::read::{self, Data, Runs};
 use super::simulator::Simulator;
 use super::surrogate::{self, Fitting};
@@ -212,17 +212,25 @@ fn next(
         }
     };
     let (fitted, emulator) = surrogate::stage(study, &data, &fitting, run, observer)?;
-    let numerics = if round == 1 {
-        // The first runs about the posterior tell more of its numerical error than those of the design.
-        let [finer, folder] = ["simulate-finer", "numerical-error"].map(|what| folder(1, what));
+    let stays = learned.numerics.as_ref().is_some_and(|kept| holds(&kept.value, &place));
+    let numerics = if round == 1 || !stays {
+        // The first runs about the posterior tell more of its numerical error than those of the design; and where the
+        // region has left theirs, what they tell does not hold.
+        let [finer, folder] = ["simulate-finer", "numerical-error"].map(|what| folder(round, what));
         let folders = [finer.as_str(), folder.as_str()];
         numerical_error::stage(study, &data, Some(&place), folders, run, observer)?
     } else {
         learned.numerics
     };
     let region = (refine.region == Region::Posterior).then_some(place);
-    let refinement = None;
-    Ok((Learned { data, fitted, numerics, emulator, region, refinement, trial }, error))
+    let again = Learned::new(study, data, (fitted, emulator), numerics, trial)?;
+    Ok((Learned { region, ..again }, error))
+}
+
+/// Whether what was learned of the numerical error holds in all of a region.
+fn holds(numerics: &NumericalError, place: &[(f64, f64)]) -> bool {
+    let inside = |(&(low, high), &(a, b)): (&(f64, f64), &(f64, f64))| low <= a && b <= high;
+    numerics.region.as_ref().is_none_or(|region| region.iter().zip(place).all(inside))
 }
 
 /// The root mean square error of an emulator at the runs from `first` on that lie where it was fitted; infinite when
@@ -286,8 +294,8 @@ fn extended(
     observer.end("refine", &format!("{} runs near the posterior", names.len()));
     let folder = run.stage_folder(&stage);
     let more = read::ensemble(study, Some(Runs { folder: &folder, made: &made.value }))?;
-    let Data { ensemble, measured } = data.value;
-    let value = Data { ensemble: ensemble.map(|first| joined(first, more)), measured };
+    let ensemble = data.value.ensemble.map(|first| joined(first, more));
+    let value = Data { ensemble, ..data.value };
     let hash = crate::run::files::hash(json!([data.hash, made.hash]).to_string().as_bytes());
     Ok(Kept { value, hash, ..data })
 }

@@ -145,13 +145,16 @@ fn fingerprint(data: &Observations) -> String {
 
 fn surrogate(known: &Known<'_>, validated: Option<&Kept<Validated>>) -> Option<SurrogateFindings> {
     let errors = &known.fitted?.value.errors;
+    let unit = known.data.value.ensemble.as_ref().map(|e| e.layouts.unit().to_string());
+    let unit = unit.unwrap_or_default();
+    let of_numerics = known.numerics.iter().flat_map(|kept| kept.value.facts(&unit));
     let sobol = known.emulator?.sensitivity().map(|s| {
         let total = s.aggregated.total.row(0).iter();
         s.aggregated.first.row(0).iter().zip(total).map(|(f, t)| (*f, *t)).collect()
     });
     Some(SurrogateFindings {
         refinement: known.refinement.map(|r| (r.rounds, r.ratio, r.reached)),
-        facts: errors.facts.clone(),
+        facts: errors.facts.iter().cloned().chain(of_numerics).collect(),
         training: errors.training,
         validation: errors.validation,
         mae: errors.mae,

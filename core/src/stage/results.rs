@@ -8,12 +8,14 @@ use crate::run::arrays::{self, Array};
 
 use super::simulate::{TABLE, from_table};
 
-/// The runs of the simulate stage from the NetCDF files that [`crate::run::write_response`] wrote; so many may have failed.
+/// The runs of the simulate stage from the NetCDF files that [`crate::run::write_response`] wrote, of which so many may
+/// have failed.
 pub fn ensemble(source: &EnsembleSource<'_>, allowed: usize) -> Result<Ensemble, Stop> {
     let ensemble = with_failed(source)?;
-    let too_many = ensemble.failed.len() > allowed || ensemble.runs.is_empty();
-    let Some(first) = ensemble.failed.first().filter(|_| too_many) else { return Ok(ensemble) };
-    let (count, all) = (ensemble.failed.len(), ensemble.failed.len() + ensemble.runs.len());
+    let (runs, failed) = (&ensemble.runs, &ensemble.failed);
+    let refused = |_: &&FailedRun| failed.len() > allowed || runs.is_empty();
+    let Some(first) = failed.first().filter(refused) else { return Ok(ensemble) };
+    let (count, all) = (failed.len(), failed.len() + runs.len());
     let message = format!("{count} of {all} runs failed, first `{}`: {}", first.run, first.reason);
     let folder = source.simulated.map(|folder| folder.display().to_string());
     Err(Stop::new(message)

@@ -9,15 +9,15 @@ use crate::data::{Ensemble, Parameter};
 use crate::linalg::{self, Matrix};
 use crate::plugin::discrepancy::CommonError;
 use crate::plugin::surrogate::Training;
-use crate::plugin::{Emulator, Fact, Surrogate};
+use crate::plugin::{Emulator, Fact};
 use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
 use crate::study::Study;
 use crate::study::file::InvalidRuns;
 
 use super::idle::Used;
+use super::low_fidelity;
 use super::read::Data;
-use super::stream;
 
 /// A fitted emulator as it is kept, with its measured error.
 #[derive(Debug, Clone, PartialEq)]
@@ -127,7 +127,6 @@ pub fn stage(
 ) -> Result<(Kept<Fitted>, Box<dyn Emulator>), Stop> {
     let section =
         study.surrogate.as_ref().ok_or_else(|| Stop::new("the study has no surrogate"))?;
-    let plugin = &*section.built.plugin;
     let used = Used::of(study)?;
     let parameters = used.parameters(fitting.parameters);
     let laws: Vec<_> = parameters.iter().map(|p| (&p.name, &p.design)).collect();
@@ -138,12 +137,16 @@ pub fn stage(
         laws,
         study.about.seed
     ]);
+    let inputs = match low_fidelity::identity(study) {
+        Some(identity) => json!([inputs, { "low_fidelity": identity }]),
+        None => inputs,
+    };
     let ensemble = data.value.runs()?;
     observer.begin("surrogate", "output", ensemble.layouts.len() as u64);
     let kept = run.keep(fitting.folder, &inputs, observer, |_| {
-        fit(study, plugin, ensemble, fitting, &used, observer)
+        fit(study, &data.value, fitting, &used, observer)
     })?;
-    let emulator = used.widen(plugin.load(&kept.value.bytes)?);
+    let emulator = used.widen(low_fidelity::load(study, &kept.value.bytes)?);
     let errors = &kept.value.errors;
     let unit = study.layouts.unit();
     observer.end("surrogate", &format!("rmse {:.3e} {unit}, loo {:.2e}", errors.rmse, errors.loo));
@@ -176,12 +179,12 @@ fn split(study: &Study, ensemble: &Ensemble) -> Result<(usize, usize), Stop> {
 
 fn fit(
     study: &Study,
-    plugin: &dyn Surrogate,
-    ensemble: &Ensemble,
+    data: &Data,
     fitting: &Fitting<'_>,
     used: &Used,
     observer: &dyn Observer,
 ) -> Result<Fitted, Stop> {
+    let ensemble = data.runs()?;
     let points = ensemble.points.select_rows(&fitting.training);
     let responses = ensemble.responses.select_rows(&fitting.training);
     let runs = Training {
@@ -191,7 +194,10 @@ fn fit(
         responses: &responses,
     };
     let progress = Progress::new(observer);
-    let emulator = plugin.fit(&runs, &stream(study, "surrogate"), &progress)?;
+    let cheap = data.cheaper.as_ref().map(|cheap| (used.points(&cheap.points), &cheap.responses));
+    let cheap = cheap.as_ref().map(|(points, responses)| (points, *responses));
+    let wide = used.parameters(&study.parameters);
+    let emulator = low_fidelity::fit(study, &runs, cheap, &wide, &progress)?;
     let emulator = used.clone().widen(emulator);
     let test_points = ensemble.points.select_rows(&fitting.validation);
     let simulated = ensemble.responses.select_rows(&fitting.validation);

@@ -11,7 +11,7 @@ use crate::linalg::Matrix;
 use crate::math::moments;
 use crate::math::random::{Stream, normal};
 use crate::plugin::model::EvalError;
-use crate::plugin::{Forward, Likelihood};
+use crate::plugin::{Emulator, Forward, Likelihood};
 use crate::report::findings::{ValidationCase, ValidationFindings};
 use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
 use crate::study::Study;
@@ -78,6 +78,7 @@ pub fn stage(
             study,
             measured,
             forward: known.forward,
+            emulator: known.emulator,
             simulator,
             rerun,
             progress: Progress::new(observer),
@@ -114,6 +115,8 @@ struct Work<'a> {
     study: &'a Study,
     measured: &'a Measured,
     forward: &'a dyn Forward,
+    /// The emulator of the model as it was run.
+    emulator: Option<&'a dyn Emulator>,
     simulator: Option<Simulator<'a>>,
     rerun: bool,
     progress: Progress<'a>,
@@ -148,7 +151,7 @@ impl Work<'_> {
     ) -> Result<ValidationCase, Stop> {
         let simulated = match (&self.simulator, self.rerun) {
             (Some(simulator), true) => match simulator.respond(point) {
-                Ok(response) => Some(response.values),
+                Ok(response) => Some(self.with_numerics(response.values, point)),
                 Err(EvalError::Rejected(reason)) => {
                     failed.push(format!(
                         "the model gave no answer at the {name} parameters: {reason}"
@@ -177,6 +180,17 @@ impl Work<'_> {
         })
     }
 
+    /// A response of the model with what is predicted of its numerical error.
+    fn with_numerics(&self, mut response: Vec<f64>, point: &[f64]) -> Vec<f64> {
+        let row = Matrix::from_vec(1, point.len(), point.to_vec());
+        if let Some(emulator) = self.emulator {
+            let (with, without) = (self.forward.mean(&row), emulator.mean(&row));
+            let differences = with.row(0).iter().zip(without.row(0)).map(|(a, b)| a - b);
+            response.iter_mut().zip(differences).for_each(|(y, difference)| *y += difference);
+        }
+        response
+    }
+
     /// The emulator against fresh runs of the model at evenly spaced posterior draws.
     fn check_emulator(
         &self,
@@ -193,7 +207,10 @@ impl Work<'_> {
             match simulator.respond(point) {
                 Ok(response) => {
                     let row = Matrix::from_vec(1, d, point.to_vec());
-                    let emulated = self.forward.mean(&row);
+                    let emulated = match self.emulator {
+                        Some(emulator) => emulator.mean(&row),
+                        None => self.forward.mean(&row),
+                    };
                     let pairs = response.values.iter().zip(emulated.row(0));
                     squares += pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>();
                     checked += 1;

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::fidelity::Cheap;
 use super::file::EffectKeys;
 use super::resolve::Study;
 use super::{Complaints, Node, Problems};
@@ -19,6 +20,16 @@ pub struct Chosen<'a> {
     /// The plugin with its options.
     pub plugin: &'a dyn Component,
 }
+
+/// The sections whose plugins see the response to one scenario.
+const OF_RECORDS: [&str; 6] = [
+    "model",
+    "numerical_error",
+    "low_fidelity",
+    "low_fidelity.simulations",
+    "simulations",
+    "measurements",
+];
 
 /// What an effect is called: its own name, or that of its plugin.
 pub(super) fn effect_name(section: &Section<dyn Effect, EffectKeys>) -> &str {
@@ -66,6 +77,40 @@ impl Study {
         all
     }
 
+    /// The plugins of runs of another cost: finer and cheaper models, readers of cheaper runs, surrogates of differences.
+    fn of_other_cost(&self) -> Vec<Chosen<'_>> {
+        let mut all = Vec::new();
+        if let Some(error) = &self.numerical_error {
+            let (name, plugin) = (error.model.built.name, &*error.model.built.plugin);
+            all.push(Chosen { section: "numerical_error", name, plugin });
+            all.extend(error.surrogate.as_ref().map(|s| Chosen {
+                section: "numerical_error.surrogate",
+                name: s.built.name,
+                plugin: &*s.built.plugin,
+            }));
+        }
+        if let Some(low) = &self.low_fidelity {
+            all.push(match &low.source {
+                Cheap::Model(model, _) => Chosen {
+                    section: "low_fidelity",
+                    name: model.built.name,
+                    plugin: &*model.built.plugin,
+                },
+                Cheap::Reader(reader) => Chosen {
+                    section: "low_fidelity.simulations",
+                    name: reader.built.name,
+                    plugin: &*reader.built.plugin,
+                },
+            });
+            all.extend(low.surrogate.as_ref().map(|s| Chosen {
+                section: "low_fidelity.surrogate",
+                name: s.built.name,
+                plugin: &*s.built.plugin,
+            }));
+        }
+        all
+    }
+
     /// The options of every plugin with the section that it stands in.
     pub(super) fn options(&self) -> Vec<(&'static str, &toml::Table)> {
         let mut all = Vec::new();
@@ -79,6 +124,9 @@ impl Study {
         add!(target, model, design, executor, simulations, measurements, surrogate, discrepancy);
         add!(sampler);
         all.extend(self.numerical_error.iter().map(|e| ("model", &e.model.built.options)));
+        if let Some(Cheap::Model(model, _)) = self.low_fidelity.as_ref().map(|low| &low.source) {
+            all.push(("model", &model.built.options));
+        }
         all.extend(self.effects.iter().map(|effect| ("effect", &effect.built.options)));
         let tried = self.gap.candidates.iter();
         all.extend(tried.map(|candidate| ("gap.candidate", &candidate.built.options)));
@@ -87,10 +135,10 @@ impl Study {
 
     /// Where plugins say that they can answer no more.
     pub fn faults(&self) -> Vec<Arc<Fault>> {
-        let finer = self.numerical_error.as_ref().map(|error| error.model.built.plugin.faults());
+        let other = self.of_other_cost().into_iter().map(|chosen| chosen.plugin.faults());
         let tried = self.gap.candidates.iter().map(|candidate| candidate.built.plugin.faults());
         let chosen = self.components().into_iter().map(|chosen| chosen.plugin.faults());
-        chosen.chain(finer).chain(tried).flatten().collect()
+        chosen.chain(other).chain(tried).flatten().collect()
     }
 
     /// The effects with their names and places.
@@ -116,11 +164,6 @@ impl Study {
             .collect();
         let unwritten = Node::table(root.place.clone());
         let mut effects = root.get("effect").map(Node::elements).unwrap_or_default().iter();
-        let finer = self.numerical_error.as_ref().map(|error| Chosen {
-            section: "numerical_error",
-            name: error.model.built.name,
-            plugin: &*error.model.built.plugin,
-        });
         let tried = self.gap.candidates.iter().map(|candidate| Chosen {
             section: "gap.candidate",
             name: candidate.built.name,
@@ -128,15 +171,14 @@ impl Study {
         });
         let mut candidates =
             root.find("gap.candidate").map(Node::elements).unwrap_or_default().iter();
-        let all = self.components().into_iter().chain(finer).chain(tried);
+        let all = self.components().into_iter().chain(self.of_other_cost()).chain(tried);
         for Chosen { section, plugin, .. } in all {
             let node = match section {
                 "effect" => effects.next(),
                 "gap.candidate" => candidates.next(),
-                _ => root.get(section),
+                _ => root.find(section),
             };
-            let of_records =
-                ["model", "numerical_error", "simulations", "measurements"].contains(&section);
+            let of_records = OF_RECORDS.contains(&section);
             let layouts = if of_records { &records } else { &self.layouts.blocks };
             for layout in layouts {
                 let before = problems.len();

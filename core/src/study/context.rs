@@ -6,6 +6,7 @@ mod inputs;
 mod inside;
 mod outputs;
 
+use super::fidelity::LowFidelity;
 use super::nearest::one_of;
 use super::resolve::Study;
 use super::{Complaints, Node, Problems};
@@ -95,6 +96,7 @@ fn without_surrogate(study: &Study, complaints: &mut Complaints<'_>) {
         ("design", study.design.is_some()),
         ("simulations", study.simulations.is_some()),
         ("numerical_error", study.numerical_error.is_some()),
+        ("low_fidelity", study.low_fidelity.is_some()),
     ];
     for (name, _) in useless.iter().filter(|(_, there)| *there) {
         complaints
@@ -123,6 +125,13 @@ fn runs_to_learn_from(study: &Study, complaints: &mut Complaints<'_>) {
             .at("numerical_error")
             .say("the study makes no runs that could be repeated")
             .expected("`[model]` and `[design]`, and no files of finished runs in `[simulations]`");
+    }
+    let cheap_model = study.low_fidelity.as_ref().is_some_and(LowFidelity::is_run);
+    if cheap_model && (study.design.is_none() || imported) {
+        complaints
+            .at("low_fidelity")
+            .say("the study makes no runs that could be made at lower cost")
+            .expected("`[model]` and `[design]`, or `simulations` in place of `model` and `runs`");
     }
 }
 

@@ -10,6 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use super::derived::DerivedSection;
+pub use super::fidelity::{LowFidelitySection, NumericalErrorSection};
 use super::file_name::FileName;
 pub use super::quantity::Quantity;
 pub use super::response::{Axes, AxisSection, GridSection, ResponseSection};
@@ -243,43 +244,6 @@ pub struct DiscrepancyKeys {
 impl Default for DiscrepancyKeys {
     fn default() -> Self {
         Self { emulator_error: true, replicate_error: true }
-    }
-}
-
-/// How the model's own numerical error is estimated: some runs of the design are repeated with finer numerics,
-/// and the differences are a covariance in the likelihood, common to all replicates and correlated
-/// between outputs.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct NumericalErrorSection {
-    /// How many runs are repeated: the first ones of the design that lie inside the prior.
-    pub runs: Count,
-    /// Options of `[model]` that make it finer, such as `{ numerics = { mesh = "fine" } }`.
-    #[schemars(with = "std::collections::BTreeMap<String, serde_json::Value>")]
-    pub model: toml::Table,
-    /// How many times finer the repeated runs are, in each direction.
-    #[serde(default = "NumericalErrorSection::ratio")]
-    pub ratio: Positive,
-    /// The order of convergence: the error falls with the `order`-th power of the cells' size. The difference between
-    /// two meshes is not the whole error of the coarser: that is larger by `1 / (1 - ratio^-order)` (Richardson's
-    /// extrapolation; Roache, J. Fluids Eng. 116 (1994) 405), which is 2 for the defaults. Shocks and contacts
-    /// are of first order whatever the scheme. A large number takes the difference for the whole error.
-    #[serde(default = "NumericalErrorSection::order")]
-    pub order: Positive,
-}
-
-impl NumericalErrorSection {
-    fn ratio() -> Positive {
-        Positive::new(2.0).unwrap_or_else(|_| unreachable!("2 is positive"))
-    }
-
-    fn order() -> Positive {
-        Positive::new(1.0).unwrap_or_else(|_| unreachable!("1 is positive"))
-    }
-
-    /// The whole numerical error over the difference of the repeated runs.
-    pub fn whole(&self) -> f64 {
-        1.0 / (1.0 - self.ratio.get().powf(-self.order.get()))
     }
 }
 

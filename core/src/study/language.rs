@@ -5,9 +5,9 @@ use schemars::JsonSchema;
 use serde_json::Value;
 
 use super::file::{
-    DerivedSection, DesignKeys, DiscrepancyKeys, EffectKeys, MeasurementKeys, ModelKeys,
-    NumericalErrorSection, ParameterSection, ResponseSection, SamplerKeys, ScenarioSection,
-    SimulationKeys, StudySection, SurrogateKeys, ValidateSection,
+    DerivedSection, DesignKeys, DiscrepancyKeys, EffectKeys, LowFidelitySection, MeasurementKeys,
+    ModelKeys, NumericalErrorSection, ParameterSection, ResponseSection, SamplerKeys,
+    ScenarioSection, SimulationKeys, StudySection, SurrogateKeys, ValidateSection,
 };
 use super::gap::{CandidateKeys, GapSection, SwapKeys, SwitchSection, TermKeys};
 use super::libraries::PluginsSection;
@@ -39,6 +39,7 @@ pub fn schema() -> Value {
         .section::<dyn Surrogate, SurrogateKeys>("surrogate")
         .section::<dyn Discrepancy, DiscrepancyKeys>("discrepancy")
         .table::<NumericalErrorSection>("numerical_error")
+        .table::<LowFidelitySection>("low_fidelity")
         .sections::<dyn Effect, EffectKeys>("effect")
         .section::<dyn Sampler, SamplerKeys>("sampler")
         .table::<ValidateSection>("validate")
@@ -66,6 +67,7 @@ pub fn manual() -> Vec<Manual> {
         page::<SurrogateKeys>("[surrogate]"),
         page::<DiscrepancyKeys>("[discrepancy]"),
         page::<NumericalErrorSection>("[numerical_error]"),
+        page::<LowFidelitySection>("[low_fidelity]"),
         page::<EffectKeys>("[[effect]]"),
         page::<SamplerKeys>("[sampler]"),
         page::<ValidateSection>("[validate]"),

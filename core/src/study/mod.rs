@@ -5,6 +5,7 @@ mod context;
 pub mod decode;
 pub mod derived;
 pub mod emit;
+pub mod fidelity;
 pub mod file;
 pub mod file_name;
 pub mod gap;

@@ -9,16 +9,16 @@ use toml::Table;
 
 use super::context;
 use super::decode::{decode, fields};
+use super::fidelity::{LowFidelity, NumericalError, low_fidelity, numerical_error};
 use super::file::{
     DerivedSection, DesignKeys, DiscrepancyKeys, EffectKeys, MeasurementKeys, ModelKeys,
-    NumericalErrorSection, ResponseSection, SamplerKeys, SimulationKeys, StudySection,
-    SurrogateKeys, ValidateSection,
+    ResponseSection, SamplerKeys, SimulationKeys, StudySection, SurrogateKeys, ValidateSection,
 };
 use super::gap::{Gap, gap};
 use super::libraries::{Libraries, Seen, libraries};
 use super::sections::{
-    chosen, chosen_or, derived, effects, layouts, name, numerical_error, parameters, scenarios,
-    table, unknown_sections,
+    chosen, chosen_or, derived, effects, layouts, name, parameters, scenarios, table,
+    unknown_sections,
 };
 use super::unknowns::{Unknown, unknowns};
 use super::{Node, Problems, Sources, Value, inherit, overrides, resolved, sizes};
@@ -76,6 +76,8 @@ pub struct Study {
     pub sampler: Option<Section<dyn Sampler, SamplerKeys>>,
     /// `[numerical_error]`.
     pub numerical_error: Option<NumericalError>,
+    /// `[low_fidelity]`.
+    pub low_fidelity: Option<LowFidelity>,
     /// `[[derived]]`.
     pub derived_sections: Vec<DerivedSection>,
     /// `[[effect]]`.
@@ -88,18 +90,8 @@ pub struct Study {
     pub resolved: Table,
 }
 
-/// How the model's numerical error is estimated.
-pub struct NumericalError {
-    /// How many runs of the design are repeated.
-    pub runs: usize,
-    /// The model with finer numerics.
-    pub model: Section<dyn Model, ModelKeys>,
-    /// The section as it is written.
-    pub written: NumericalErrorSection,
-}
-
 /// The sections of the study language, in the order in which a study is written.
-pub const SECTIONS: [&str; 19] = [
+pub const SECTIONS: [&str; 20] = [
     "study",
     "plugins",
     "parameter",
@@ -115,6 +107,7 @@ pub const SECTIONS: [&str; 19] = [
     "surrogate",
     "discrepancy",
     "numerical_error",
+    "low_fidelity",
     "effect",
     "sampler",
     "validate",
@@ -298,6 +291,7 @@ fn structure(
     let discrepancy = chosen(root, "discrepancy", None, problems);
     let sampler = chosen(root, "sampler", None, problems);
     let numerical_error = numerical_error(root, problems);
+    let low_fidelity = low_fidelity(root, problems);
     let derived_sections = derived(root, problems);
     let effects = effects(root, problems);
     let validate = match root.get("validate") {
@@ -345,6 +339,7 @@ fn structure(
         discrepancy,
         sampler,
         numerical_error,
+        low_fidelity,
         derived_sections: derived_sections?,
         effects: effects?,
         validate: validate?,
@@ -368,7 +363,9 @@ fn environment(study: &Study, purpose: Use, root: &Node, problems: &mut Problems
         sizes::environment(study, root, problems);
     }
     study.each_plugin(root, problems, |section, component, context, complaints| {
-        if purpose != Use::Look || !["model", "numerical_error", "executor"].contains(&section) {
+        if purpose != Use::Look
+            || !["model", "numerical_error", "low_fidelity", "executor"].contains(&section)
+        {
             let starts_programs = purpose != Use::Check;
             component.environment(&Context { starts_programs, ..*context }, complaints);
         }

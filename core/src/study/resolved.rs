@@ -65,6 +65,10 @@ pub(super) fn table(
         let table = to_table(&numerical_error.written)?;
         whole.insert("numerical_error".to_owned(), table.into());
     }
+    if let Some(low_fidelity) = &study.low_fidelity {
+        let table = to_table(&low_fidelity.written)?;
+        whole.insert("low_fidelity".to_owned(), table.into());
+    }
     if !study.effects.is_empty() {
         let effects: Result<Vec<Table>, _> = study.effects.iter().map(merged).collect();
         whole.insert("effect".to_owned(), effects?.into());

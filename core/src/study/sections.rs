@@ -6,11 +6,11 @@ use serde::de::DeserializeOwned;
 
 use super::decode::decode;
 use super::file::{
-    Axes, DerivedSection, EffectKeys, NumericalErrorSection, ParameterSection, ResponseSection,
-    ScenarioSection, StudySection,
+    Axes, DerivedSection, EffectKeys, ParameterSection, ResponseSection, ScenarioSection,
+    StudySection,
 };
 use super::file_name::FileName;
-use super::resolve::{NumericalError, SECTIONS};
+use super::resolve::SECTIONS;
 use super::{Complaints, Node, Problems, nearest, sizes};
 use crate::data::{Axis, Layout, Layouts, Scenario, Unit};
 use crate::plugin::reader::GridSource;
@@ -81,43 +81,6 @@ pub(super) fn parameters(root: &Node, problems: &mut Problems) -> Option<Vec<Par
         })
         .collect();
     decoded.into_iter().collect()
-}
-
-/// `[numerical_error]`: the study's model with some options changed.
-pub(super) fn numerical_error(root: &Node, problems: &mut Problems) -> Option<NumericalError> {
-    let node = root.get("numerical_error")?;
-    problems.within("numerical_error", |problems| {
-        let written: NumericalErrorSection = decode(node, problems)?;
-        if written.ratio.get() <= 1.0 {
-            let place = node.get("ratio").unwrap_or(node).place.clone();
-            let found = written.ratio.get();
-            problems
-                .report(Some(place), "the finer runs are no finer")
-                .expected("a `ratio` above 1")
-                .found(found.to_string());
-            return None;
-        }
-        let Some(base) = root.get("model") else {
-            problems.report(Some(node.place.clone()), "the study has no model to run finer");
-            return None;
-        };
-        let mut finer = base.clone();
-        overlay(&mut finer, node.get("model")?);
-        let model = problems.within("model", |problems| section(&finer, None, problems))?;
-        Some(NumericalError { runs: written.runs.get(), model, written })
-    })
-}
-
-/// Puts the values of `over` in the place of those of `base`, table by table.
-fn overlay(base: &mut Node, over: &Node) {
-    for (key, value) in over.entries() {
-        match base.get_mut(&key.name) {
-            Some(old) if !old.entries().is_empty() && !value.entries().is_empty() => {
-                overlay(old, value);
-            }
-            _ => base.set(key.clone(), value.clone()),
-        }
-    }
 }
 
 pub(super) fn effects(

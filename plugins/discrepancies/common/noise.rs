@@ -52,7 +52,7 @@ impl Noise {
             Variance::Measured(quantity) => {
                 let unknown = Unknown { name: "multiplier", unit: Unit::dimensionless() };
                 let scale = if known.data.states_noise() {
-                    shown.stated_sd().iter().map(|sd| sd * sd).collect()
+                    known.data.stated_sd().iter().map(|sd| sd * sd).collect()
                 } else {
                     let whole = Replicates::of(shown, &[])?;
                     let all = Groups::of(layout, by).map_err(Stop::new)?.with_data(&whole.measured);

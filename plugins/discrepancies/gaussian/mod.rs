@@ -99,22 +99,18 @@ impl Discrepancy for Gaussian {
         Ok(Box::new(GaussianLikelihood::new(self, known)?))
     }
 
-    fn takes_stated_noise(&self) -> bool {
-        true
-    }
-
     fn likelihood_of_part(
         &self,
         known: &Known<'_>,
         part: &Measurements,
     ) -> Result<Option<Box<dyn Likelihood>>, Stop> {
-        // Noise that differs from curve to curve has no such form yet.
-        if stated::is_needed(self, known.data) {
-            return Ok(None);
-        }
         let known_part = Known { data: part, ..*known };
         let likelihood = GaussianLikelihood::under(self, &known_part, known.data)?;
         Ok(Some(Box::new(likelihood)))
+    }
+
+    fn takes_stated_noise(&self) -> bool {
+        true
     }
 
     fn stated_noise(&self, layout: &Layout, _: &[f64]) -> Option<StatedNoise> {

@@ -5,6 +5,7 @@ pub(crate) mod curvature;
 mod leapfrog;
 mod metric;
 mod pace;
+pub(crate) mod told;
 mod windows;
 
 use lacuna::data::Statistic;
@@ -174,7 +175,7 @@ impl Sampler for Hamiltonian {
     }
 
     fn statistics(&self, state: &State) -> Vec<Statistic> {
-        chains::statistics(state, false)
+        told::statistics(state, false)
     }
 
     fn doubts(&self, state: &State) -> Vec<String> {

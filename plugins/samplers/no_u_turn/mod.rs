@@ -12,7 +12,7 @@ use lacuna::study::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::hamiltonian::{Settings, Shape, chains};
+use super::hamiltonian::{Settings, Shape, chains, told};
 
 /// No-U-turn sampler: Hamiltonian Monte Carlo whose trajectories end where they would turn back.
 ///
@@ -106,7 +106,7 @@ impl Sampler for NoUTurn {
     }
 
     fn statistics(&self, state: &State) -> Vec<Statistic> {
-        chains::statistics(state, true)
+        told::statistics(state, true)
     }
 
     fn doubts(&self, state: &State) -> Vec<String> {

@@ -83,6 +83,11 @@ impl Expansion {
         Self { basis, coefficients, sparse, fit_error, summary }
     }
 
+    /// The same with other terms and coefficients.
+    pub(super) fn with(self, basis: Basis, coefficients: Matrix) -> Self {
+        Self::new(basis, coefficients, self.fit_error, self.summary)
+    }
+
     /// The mean and the variance of each output under the design's distribution.
     pub fn mean_and_variance(&self) -> (Vec<f64>, Vec<f64>) {
         let Sensitivity { mean, variance, .. } = self.moments();

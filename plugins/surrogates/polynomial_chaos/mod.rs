@@ -21,6 +21,7 @@ mod sensitivity;
 mod sparse;
 mod squares;
 mod subspace_pursuit;
+mod sum;
 mod terms;
 mod trend;
 
@@ -29,7 +30,7 @@ mod tests;
 
 use lacuna::data::Parameter;
 use lacuna::math::random::Stream;
-use lacuna::plugin::surrogate::{Surrogate, Training};
+use lacuna::plugin::surrogate::{Summand, Surrogate, Training};
 use lacuna::plugin::{Component, Context, Emulator};
 use lacuna::run::{Progress, Stop};
 use lacuna::study::problem::Complaints;
@@ -278,6 +279,15 @@ impl Surrogate for PolynomialChaos {
 
     fn load(&self, bytes: &[u8]) -> Result<Box<dyn Emulator>, Stop> {
         Ok(Box::new(Expansion::from_bytes(bytes)?))
+    }
+
+    fn sum(
+        &self,
+        parts: &[Summand<'_>],
+        offset: &[f64],
+    ) -> Result<Option<Box<dyn Emulator>>, Stop> {
+        let sum = sum::sum(parts, offset)?;
+        Ok(sum.map(|sum| Box::new(sum) as Box<dyn Emulator>))
     }
 }
 

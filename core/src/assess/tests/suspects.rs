@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::assess::suspicious::suspects;
+use crate::assess::suspicious::values::values;
 
 type Function = fn(&[f64], f64) -> f64;
 
@@ -71,7 +72,10 @@ fn sound_ensembles_have_no_suspicious_run() {
             for seed in 0..20 {
                 let (points, responses) = self::runs(function, count, outputs, seed);
                 let found = suspects(&points, &responses, None);
-                if let Some(first) = found.first() {
+                let single = values(&points, &responses, None);
+                if let Some(first) = single.first().filter(|_| outputs > 1) {
+                    false_alarms.push((f, count, outputs, seed, first.score));
+                } else if let Some(first) = found.first() {
                     false_alarms.push((f, count, outputs, seed, first.score));
                 }
             }
@@ -114,6 +118,17 @@ fn a_wrong_parameter_is_found_and_named() {
     let (parameter, value) = found[0].parameter.unwrap();
     assert_eq!(parameter, 0);
     assert!((value - right).abs() < 0.1, "{value} {right}");
+}
+
+/// One value of one curve ten times too large: 19.3 instead of 1.93.
+#[test]
+fn a_single_wrong_value_is_found_in_its_curve() {
+    let (points, mut responses) = self::runs(FUNCTIONS[3], 150, 20, 2);
+    let right = responses[(11, 6)];
+    responses[(11, 6)] *= 10.0;
+    let found = values(&points, &responses, None);
+    assert_eq!(found.iter().map(|v| (v.run, v.output)).collect::<Vec<_>>(), [(11, 6)]);
+    assert!((found[0].expected - right).abs() < 0.5 * right.abs(), "{} {right}", found[0].expected);
 }
 
 /// The emulator's leave-one-out residuals alone tell where a polynomial is too coarse.

@@ -2,7 +2,7 @@
 
 use crate::assess::Finding;
 use crate::assess::runs::{self as check, Invalid};
-use crate::assess::suspicious::{self, Suspect};
+use crate::assess::suspicious::{self, Suspect, values};
 use crate::data::Ensemble;
 use crate::linalg::Matrix;
 use crate::math::moments;
@@ -176,7 +176,20 @@ fn suspicious(study: &Study, known: &Known<'_>, ensemble: &Ensemble) -> Result<V
         });
         suspicious::suspicious(&ensemble.runs[row], suspect, value)
     };
-    Ok(suspects.iter().map(told).collect())
+    // One wrong value makes its whole run far off: then the value is told.
+    let wrong = match columns.len() {
+        1 => Vec::new(),
+        _ => values::values(&points, &responses, left_out.as_ref()),
+    };
+    let whole = suspects.iter().filter(|s| wrong.iter().all(|value| value.run != s.run));
+    let mut found: Vec<Finding> = whole.map(told).collect();
+    found.extend(wrong.iter().map(|value| {
+        let (row, column) = (rows[value.run], columns[value.output]);
+        let place = ensemble.layouts.describe(column);
+        let number = ensemble.responses[(row, column)];
+        values::suspicious(&ensemble.runs[row], &place, number, value)
+    }));
+    Ok(found)
 }
 
 /// From natural values to the unit interval: by the design's law, or by the range of the runs where these go beyond it.

@@ -38,7 +38,7 @@ impl<'a> Law<'a> {
             common.push(fitted.value.covariance(study, stated.as_deref())?);
         }
         if let (Some(kept), Some(section)) = (known.numerics, &study.numerical_error) {
-            common.push(kept.value.common_error(section.written.whole()));
+            common.push(kept.value.common_error(&section.written));
         }
         let replicates = section.common.replicate_error.then_some(&measured.used);
         Ok(Self { replicates, common, ..Self::bare(study, &measured.likelihood, known.forward)? })
@@ -85,10 +85,10 @@ impl<'a> Law<'a> {
             ..error.clone()
         };
         let mut own: Vec<CommonError> = self.common.iter().map(part).collect();
-        if let Some(replicates) = self.replicates {
-            // A stated covariance already says what the points of a replicate share.
-            let block = Some(&replicates.blocks[i]).filter(|block| block.covariance.is_none());
-            let of_replicates = block.and_then(common_error::of_replicates);
+        // A stated covariance already says what the points of a replicate share.
+        let shared = |replicates: &&Observations| replicates.blocks[i].covariance.is_none();
+        if let Some(replicates) = self.replicates.filter(shared) {
+            let of_replicates = common_error::of_replicates(&replicates.blocks[i]);
             let after = usize::from(own.first().is_some_and(|e| e.origin == "emulator"));
             own.splice(after..after, of_replicates);
         }

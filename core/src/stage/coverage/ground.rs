@@ -250,21 +250,27 @@ fn refitted<'a>(
         let value = Data {
             ensemble: Some(some(ensemble, &kept)),
             measured: whole.data.value.measured.clone(),
+            cheaper: whole
+                .data
+                .value
+                .cheaper
+                .as_ref()
+                .map(|cheap| elsewhere(cheap, ensemble, part)),
         };
         let hash = files::hash(json!([whole.data.hash, "without", part]).to_string().as_bytes());
         let data = Kept { value, hash, ..whole.data.clone() };
-        let (own, emulator) = surrogate::stage(study, &data, &fitting, run, observer)?;
-        fitted.push(Learned {
-            data,
-            fitted: own,
-            numerics: whole.numerics.clone(),
-            emulator,
-            region: None,
-            refinement: None,
-            trial: None,
-        });
+        let own = surrogate::stage(study, &data, &fitting, run, observer)?;
+        fitted.push(Learned::new(study, data, own, whole.numerics.clone(), None)?);
     }
     Ok(Base::Emulated(fitted))
+}
+
+/// The runs of a cheaper kind that were not made at the points of a part of the others.
+fn elsewhere(cheap: &Ensemble, ensemble: &Ensemble, part: &[usize]) -> Ensemble {
+    let is_left_out = |point: &[f64]| part.iter().any(|&k| ensemble.points.row(k) == point);
+    let rows: Vec<usize> =
+        (0..cheap.runs.len()).filter(|&i| !is_left_out(cheap.points.row(i))).collect();
+    some(cheap, &rows)
 }
 
 /// Some runs of an ensemble.

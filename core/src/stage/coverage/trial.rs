@@ -15,7 +15,7 @@ use super::{Tried, ended, noise, truths};
 use crate::stage::calibrate::{self, Calibrated};
 use crate::stage::idle::Used;
 use crate::stage::read::{Data, screened};
-use crate::stage::{Known, Learned, Trial, refine, stream};
+use crate::stage::{Known, Learned, Trial, low_fidelity, refine, stream};
 
 /// Makes the data of one truth and calibrates them. What the calibration needs to go on after an interruption is kept in a
 /// folder of its own until it is done.
@@ -108,7 +108,11 @@ fn calibrated(
     let measured = Some(screened(keys, data));
     let hash = files::hash(json!([known.data.hash, number]).to_string().as_bytes());
     let ensemble = if is_refined(ground) { known.data.value.ensemble.clone() } else { None };
-    let data = Kept { value: Data { ensemble, measured }, hash, ..kept_without(known.data) };
+    let data = Kept {
+        value: Data { ensemble, measured, cheaper: None },
+        hash,
+        ..kept_without(known.data)
+    };
     let trial = Some(Trial { number: number as u64, quick: ground.quick });
     let calibrated = match &ground.base {
         Base::Emulated(all) if is_refined(ground) => {
@@ -124,7 +128,7 @@ fn calibrated(
 }
 
 fn kept_without(kept: &Kept<Data>) -> Kept<Data> {
-    let value = Data { ensemble: None, measured: None };
+    let value = Data { ensemble: None, measured: None, cheaper: None };
     Kept { value, hash: String::new(), seconds: kept.seconds, fresh: kept.fresh }
 }
 
@@ -135,18 +139,10 @@ fn copied(
     data: Kept<Data>,
     trial: Option<Trial>,
 ) -> Result<Learned, Stop> {
-    let section = ground.study.surrogate.as_ref();
-    let plugin = &section.ok_or_else(|| Stop::new("the study has no surrogate"))?.built.plugin;
-    let used = Used::of(ground.study)?;
-    Ok(Learned {
-        data,
-        fitted: learned.fitted.clone(),
-        numerics: learned.numerics.clone(),
-        emulator: used.widen(plugin.load(&learned.fitted.value.bytes)?),
-        region: None,
-        refinement: None,
-        trial,
-    })
+    let (study, fitted) = (ground.study, learned.fitted.clone());
+    let used = Used::of(study)?;
+    let emulator = used.widen(low_fidelity::load(study, &fitted.value.bytes)?);
+    Learned::new(study, data, (fitted, emulator), learned.numerics.clone(), trial)
 }
 
 fn judged(ground: &Ground<'_>, truth: &[f64], calibrated: &Calibrated) -> Calibration {

@@ -79,7 +79,7 @@ pub(super) fn inputs(study: &Study, known: &Known<'_>) -> Value {
         known.data.hash,
         known.origin,
         known.numerics.map(|n| &n.hash),
-        study.numerical_error.as_ref().map(|section| section.written.whole()),
+        study.numerical_error.as_ref().map(|section| section.written.scales()),
         known.region,
         laws,
         effects,

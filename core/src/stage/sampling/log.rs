@@ -84,10 +84,8 @@ impl Log {
         }
         let fits = |c: &Checkpoint| {
             let needed = (c.step * self.record()) as u64;
-            needed <= length
-                && c.inputs == self.inputs
-                && c.state.points.columns() == self.dimension
-                && names(&told(&c.state)) == c.statistics
+            let ours = c.inputs == self.inputs && c.state.points.columns() == self.dimension;
+            ours && needed <= length && names(&told(&c.state)) == c.statistics
         };
         let checkpoint = checkpoint.filter(fits);
         let kept = checkpoint.as_ref().map_or(0, |c| c.step * self.record());
@@ -123,10 +121,8 @@ impl Log {
         let flushed = self.file.flush().and_then(|()| self.file.get_ref().sync_data());
         flushed.map_err(|error| files::cannot_write(&self.path, &error))?;
         let (inputs, statistics) = (self.inputs.clone(), self.statistics.clone());
-        files::write_json(
-            &self.state_path,
-            &Checkpoint { step, inputs, state: state.clone(), statistics },
-        )
+        let checkpoint = Checkpoint { step, inputs, state: state.clone(), statistics };
+        files::write_json(&self.state_path, &checkpoint)
     }
 
     /// What was kept of the first steps.
