@@ -65,7 +65,14 @@ fn searched(truth: Oscillator) -> (Account, Option<String>) {
     let findings = lacuna::stage::find_gap(&study, &mut run, &Silent).unwrap();
     let gap = findings.gap.as_ref().unwrap();
     let written = (!gap.account.additions.is_empty()).then(|| {
-        let begun = Begun { study: &study, path: &path, settings: &[], findings: &findings, gap };
+        let begun = Begun {
+            study: &study,
+            path: &path,
+            folder: None,
+            settings: &[],
+            findings: &findings,
+            gap,
+        };
         let (added, _) = add(&begun, &run, &Silent).unwrap();
         fs::read_to_string(&added.study).unwrap()
     });

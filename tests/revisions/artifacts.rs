@@ -164,9 +164,9 @@ fn discrepancy(_: &str, discrepancy: &dyn Discrepancy, bits: &mut Bits) {
     let replicate = |r: usize| {
         let mut rng = Stream::root(7).at(r as u64).generator();
         let values = response(0.0).iter().map(|y| Some(y + 0.2 * normal(&mut rng))).collect();
-        Replicate { name: format!("p{r}"), values }
+        Replicate::new(format!("p{r}"), values)
     };
-    let data = Measurements { layout: layout(), replicates: (0..4).map(replicate).collect() };
+    let data = Measurements::new(layout(), (0..4).map(replicate).collect());
     let mut rng = Stream::root(8).generator();
     let factor = Matrix::from_fn(16, 2, |_, _| 0.05 * normal(&mut rng));
     let common = [CommonError { origin: "emulator".into(), factor, predictive: true }];

@@ -180,9 +180,7 @@ macro_rules! kind {
 /// Registers a plugin: its kind, its name in a study, its options, which implement the kind; what others call it; and its
 /// revision, which is raised whenever what it computes changes, and is 1 when left out.
 ///
-/// ```ignore
-/// lacuna::register!(Sampler, "no_u_turn", NoUTurn, aliases: ["nuts"], revision = 2);
-/// ```
+/// `lacuna::register!(Sampler, "no_u_turn", NoUTurn, aliases: ["nuts"], revision = 2);`
 #[macro_export]
 macro_rules! register {
     ($kind:path, $name:literal, $options:ty $(, aliases: [$($alias:literal),+ $(,)?])? $(,)?) => {
