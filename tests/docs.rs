@@ -119,6 +119,20 @@ fn the_keys_of_the_summary_are_those_of_the_program() {
 }
 
 #[test]
+fn the_checks_of_the_assessment_are_those_of_the_program() {
+    let page = fs::read_to_string(root().join("docs/assessment.md")).unwrap();
+    let mark = "<!-- checks: written by tests/docs.rs from core/src/assess -->\n\n";
+    let (before, _) = page.split_once(mark).expect("the mark of the table");
+    let mut table =
+        String::from("| code | looks at | threshold | why | what helps |\n|---|---|---|---|---|\n");
+    for rule in lacuna::assess::rules() {
+        let cells = [&*rule.looks_at, &*rule.threshold, rule.why, rule.action];
+        writeln!(table, "| `{}` | {} |", rule.code, cells.join(" | ")).unwrap();
+    }
+    compare(&BTreeMap::from([("docs/assessment.md".to_owned(), format!("{before}{mark}{table}"))]));
+}
+
+#[test]
 fn the_plugins_of_the_guide_are_the_ones_that_are_compiled() {
     let guide = fs::read_to_string(root().join("CONTRIBUTING.md")).unwrap();
     let (mut whole, mut rest) = (String::new(), &guide[..]);

@@ -7,7 +7,7 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::process::Command;
 
-use crate::quick;
+use crate::{left_out, quick};
 
 /// The interpreter that has these packages; `None` when there is none and none is required.
 pub fn interpreter(packages: &str) -> Option<OsString> {
@@ -72,6 +72,138 @@ fn arviz_reads_the_posterior() {
         let sizes = &found["sizes"][group];
         assert_eq!((sizes["sensor"].as_u64(), sizes["time"].as_u64()), (Some(3), Some(20)));
     }
+}
+
+/// What ArviZ makes of a run and of another of the same data, every function that needs more than draws included.
+const WHOLE: &str = r"
+import json, sys, warnings
+import matplotlib
+matplotlib.use('Agg')
+import arviz as az
+warnings.simplefilter('ignore')
+data, other = (az.from_netcdf(path) for path in sys.argv[1:])
+name = list(data.observed_data.data_vars)[0]
+def told(loo):
+    return {'elpd': float(loo.elpd_loo), 'error': float(loo.se), 'parameters': float(loo.p_loo),
+        'unreliable': int((loo.pareto_k > loo.good_k).sum()), 'k_limit': float(loo.good_k),
+        'count': int(loo.n_data_points)}
+reff = lambda group: float(group.attrs['relative_efficiency'])
+curves = az.InferenceData(posterior=data.posterior, log_likelihood=data.log_likelihood_by_curve)
+compared = az.compare({'data': data, 'other': other})
+az.plot_ppc(data)
+az.plot_ppc(data, group='prior')
+az.plot_loo_pit(data, y=name)
+has_energy = 'energy' in data.sample_stats
+if has_energy:
+    az.plot_energy(data)
+stats = data.sample_stats
+draws = data.posterior_predictive[name]
+print(json.dumps({
+    'names': {group: sorted(data[group].data_vars) for group in data.groups()},
+    'loo': told(az.loo(data, pointwise=True)),
+    'told_efficiency': told(az.loo(data, pointwise=True, reff=reff(data.log_likelihood))),
+    'curves': told(az.loo(curves, pointwise=True, reff=reff(data.log_likelihood_by_curve))),
+    'curve_names': [str(c) for c in data.log_likelihood_by_curve['curve'].values],
+    'waic': float(az.waic(data).elpd_waic),
+    'first': str(compared.index[0]), 'diff': float(compared['elpd_diff'].iloc[1]), 'dse': float(compared['dse'].iloc[1]),
+    'bfmi': [float(b) for b in az.bfmi(data)] if has_energy else [],
+    'kinds': {n: str(stats[n].dtype) for n in stats.data_vars},
+    'energy': [float(stats['energy'].mean()), float(-stats['lp'].mean())] if has_energy else [],
+    'largest': [int(stats['n_steps'].max()), 2 ** int(stats['tree_depth'].max()) - 1] if has_energy else [],
+    'diverging': int(stats['diverging'].sum()) if has_energy else -1,
+    'dims': list(draws.dims), 'coordinates': sorted(str(c) for c in draws.coords),
+    'predictive': [float(draws.mean()), float(draws.std())],
+    'observed': int(data.observed_data[name].count()),
+    'prior': [float(data.prior[list(data.prior.data_vars)[0]].mean()), float(data.prior_predictive[name].std())],
+    'attributes': {str(k): str(v) for k, v in data.posterior.attrs.items()},
+    'constants': sorted(data.constant_data.data_vars),
+}))
+";
+
+/// One study twice, the second with too little noise, and what `arviz` says of both.
+fn weighed(gaps: bool, steps: usize) -> Option<(serde_json::Value, [serde_json::Value; 2])> {
+    let data = left_out::data(8, gaps);
+    let (folder, path) = left_out::study(&data, &left_out::independent(), steps);
+    let runs = [folder.path().join("run"), folder.path().join("other")];
+    for (out, setting) in runs.iter().zip([None, Some("discrepancy.variance.known=0.05")]) {
+        let settings: Vec<&str> = setting.into_iter().collect();
+        quick::run(&path, &settings, out).unwrap_or_else(|stop| panic!("{stop}"));
+    }
+    let files = runs.each_ref().map(|out| out.join("posterior.nc"));
+    let found = python(WHOLE, &[&files[0], &files[1]])?;
+    Some((found, runs.each_ref().map(|out| quick::summary(out))))
+}
+
+fn agree(found: &serde_json::Value, ours: &serde_json::Value) {
+    for key in ["elpd", "error", "parameters", "unreliable", "count", "k_limit"] {
+        let Some(own) = ours[key].as_f64() else { continue };
+        let theirs = found[key].as_f64().unwrap();
+        assert!((theirs - own).abs() <= 1e-9 * own.abs().max(1.0), "{key}: {theirs} and {own}");
+    }
+}
+
+#[test]
+fn arviz_judges_predictions_as_we_do() {
+    // All 1000 draws are in the file: nothing has to be told. With gaps the data are one after another.
+    for gaps in [false, true] {
+        let Some((found, [ours, other])) = weighed(gaps, 550) else { return };
+        agree(&found["loo"], &ours["loo"]);
+        agree(&found["told_efficiency"], &ours["loo"]);
+        agree(&found["curves"], &ours["loo"]["curves"]);
+        assert_eq!(found["curve_names"].as_array().unwrap().len(), 8);
+        assert_eq!(found["first"], "data");
+        let behind = ours["loo"]["elpd"].as_f64().unwrap() - other["loo"]["elpd"].as_f64().unwrap();
+        assert!((found["diff"].as_f64().unwrap() - behind).abs() < 1e-8, "{found} {behind}");
+        let waic = found["waic"].as_f64().unwrap();
+        assert!((waic - ours["loo"]["elpd"].as_f64().unwrap()).abs() < 0.2, "{waic}");
+        assert_eq!(found["observed"], ours["loo"]["count"]);
+        let dims = found["dims"].to_string();
+        let expected = if gaps {
+            r#"["chain","draw","datum"]"#
+        } else {
+            r#"["chain","draw","replicate","time"]"#
+        };
+        assert_eq!(dims, expected);
+        let coordinates = found["coordinates"].to_string();
+        assert!(
+            coordinates.contains(if gaps { "datum_time" } else { "\"time\"" }),
+            "{coordinates}"
+        );
+        // About a level of 2 with noise of variance 0.25; from the prior with the variance 4 + 0.25, of 500 draws.
+        let pair = |key: &str| [0, 1].map(|i| found[key][i].as_f64().unwrap());
+        let [mean, sd] = pair("predictive");
+        assert!((mean - 2.0).abs() < 0.3 && (sd - 0.5).abs() < 0.03, "{mean} {sd}");
+        let [prior, spread] = pair("prior");
+        assert!((prior - 1.0).abs() < 4.0 * 2.0 / 500_f64.sqrt(), "{prior}");
+        assert!((spread - 4.25_f64.sqrt()).abs() < 4.0 * 2.06 / 1000_f64.sqrt(), "{spread}");
+    }
+}
+
+#[test]
+fn arviz_finds_what_a_hamiltonian_sampler_tells() {
+    // 4000 draws, of which 1000 are predicted at.
+    let Some((found, [ours, _])) = weighed(false, 1300) else { return };
+    agree(&found["told_efficiency"], &ours["loo"]);
+    let stats =
+        ["acceptance_rate", "diverging", "energy", "lp", "n_steps", "reached_max_treedepth"];
+    let stats = [&stats[..], &["step_size", "tree_depth"]].concat();
+    assert_eq!(found["names"]["sample_stats"], serde_json::json!(stats));
+    for (name, kind) in [("diverging", "bool"), ("tree_depth", "int64"), ("energy", "float64")] {
+        assert_eq!(found["kinds"][name], kind, "{name}");
+    }
+    assert_eq!(found["diverging"], 0);
+    for bfmi in found["bfmi"].as_array().unwrap() {
+        // A normal law in one dimension: the energy is half a chi-squared number of two degrees of freedom, and each new
+        // momentum changes half of it (Betancourt, arXiv 1604.00695): about one.
+        assert!((0.6..1.6).contains(&bfmi.as_f64().unwrap()), "{bfmi}");
+    }
+    // One unknown has a mean kinetic energy of one half.
+    let [energy, lp] = [0, 1].map(|i| found["energy"][i].as_f64().unwrap());
+    assert!((energy - lp - 0.5).abs() < 0.1, "{energy} {lp}");
+    let [steps, tree] = [0, 1].map(|i| found["largest"][i].as_i64().unwrap());
+    assert!(steps <= tree && steps > 0, "{steps} {tree}");
+    assert_eq!(found["attributes"]["inference_library"], "lacuna");
+    assert_eq!(found["constants"], serde_json::json!(["level_reference"]));
 }
 
 /// The times and the last value of every global variable of an Exodus history file, by the variables' names.

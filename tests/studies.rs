@@ -13,8 +13,16 @@ fn run(folder: &Path, settings: &[&str], out: &str) -> Ran {
     quick::run(&folder.join("study.toml"), settings, &out).unwrap_or_else(|stop| panic!("{stop}"))
 }
 
-const STAGES: [&str; 7] =
-    ["1-design", "2-simulate", "3-read", "4-surrogate", "5-calibrate", "6-evidence", "6-validate"];
+const STAGES: [&str; 8] = [
+    "1-design",
+    "2-simulate",
+    "3-read",
+    "4-surrogate",
+    "5-calibrate",
+    "6-evidence",
+    "6-validate",
+    "6-assess",
+];
 
 #[test]
 fn a_study_runs_from_nothing_to_its_report() {
@@ -119,7 +127,7 @@ fn what_is_kept_is_taken_and_only_what_depends_on_a_change_is_made_again() {
     let longer = ["sampler.steps=80"];
     assert_eq!(
         run(folder.path(), &longer, "run").made,
-        ["5-calibrate", "6-evidence", "6-validate"]
+        ["5-calibrate", "6-evidence", "6-validate", "6-assess"]
     );
     let changed = quick::results(&out);
     assert_ne!(changed["5-calibrate/draws.nc"], first["5-calibrate/draws.nc"]);
@@ -132,7 +140,10 @@ fn what_is_kept_is_taken_and_only_what_depends_on_a_change_is_made_again() {
 
     let degree = ["surrogate.degree=2"];
     assert_eq!(run(folder.path(), &degree, "run").made, STAGES[3..]);
-    assert_eq!(run(folder.path(), &["validate.emulator_check=1"], "run").made, ["6-validate"]);
+    assert_eq!(
+        run(folder.path(), &["validate.emulator_check=1"], "run").made,
+        ["6-validate", "6-assess"]
+    );
     // A word that no result depends on.
     assert_eq!(run(folder.path(), &["study.title=\"Another title\""], "run").made, [""; 0]);
     // Another measurement: the runs stay.
@@ -168,7 +179,8 @@ fn results_do_not_depend_on_the_number_of_threads() {
 fn a_study_of_tables_runs_without_a_model() {
     let folder = quick::tables();
     let ran = run(folder.path(), &["sampler.steps=300"], "run");
-    assert_eq!(ran.made, ["3-read", "4-surrogate", "5-calibrate", "6-evidence", "6-validate"]);
+    let made = ["3-read", "4-surrogate", "5-calibrate", "6-evidence", "6-validate", "6-assess"];
+    assert_eq!(ran.made, made);
     let summary = quick::summary(&folder.path().join("run"));
     assert_eq!(summary["simulated"]["map"], false);
     let findings = ran.findings.calibration.unwrap();
@@ -303,8 +315,9 @@ fn a_parameter_that_the_model_does_not_use_keeps_its_prior() {
     let settings = ["sampler.use=no_u_turn", "sampler.warm_up=200", "sampler.steps=500"];
     let out = folder.path().join("run");
     let ran = quick::run(&path, &settings, &out).unwrap_or_else(|stop| panic!("{stop}"));
-    let note = "`void_gradient` is not used by the model: its posterior is its prior";
-    assert!(ran.findings.warnings.iter().any(|said| said == note), "{:?}", ran.findings.warnings);
+    let idle: Vec<&str> =
+        ran.findings.assessment.of_code("idle_parameter").map(|f| f.place.as_str()).collect();
+    assert_eq!(idle, ["void_gradient"]);
     let summary = quick::summary(&out);
     let number = |name: &str, key: &str| summary["parameters"][name][key].as_f64().unwrap();
     let (size, sd) = (number("void_gradient", "ess_bulk"), 1.0 / 12_f64.sqrt());

@@ -23,7 +23,7 @@ const LAYERS: [&[&str]; 11] = [
     &["stage"],
     &["contract"],
     &["report"],
-    &["diagnose"],
+    &["diagnose", "assess"],
     &["gap"],
     &["posterior"],
     &["plugin", "study", "run", "expression", "work"],

@@ -7,13 +7,13 @@ use lacuna::gap::account::{Account, Addition};
 use lacuna::gap::name::Word;
 use lacuna::gap::power::Amount;
 use lacuna::report::findings::{Findings, GapFindings};
-use lacuna::report::{gap_text, power_text, summary_text};
+use lacuna::report::{gap_text, power_text};
 use lacuna::run::{RunDirectory, Stop};
 use lacuna::stage;
 use lacuna::stage::gap::add::{Begun, add};
 
 use crate::progress::Terminal;
-use crate::study::{Settings, folder, load};
+use crate::study::{Settings, Trust, folder, load, print_summary};
 use crate::{Failure, print};
 
 /// What is done with what was found.
@@ -33,6 +33,7 @@ pub fn gap(
     settings: &Settings,
     out: Option<&Path>,
     manner: &Manner,
+    trust: Trust,
 ) -> Result<(), Failure> {
     if manner.interactive && !std::io::stdin().is_terminal() {
         let text = "error: `--interactive` asks at a terminal, and there is none; `--dry-run` only reports";
@@ -46,28 +47,31 @@ pub fn gap(
     let report = |root: &Path| print(&format!("report: {}", root.join("report.html").display()));
     let gap = found(&findings)?;
     print("");
+    print(&format!("before anything is added: {}", findings.assessment.line()));
+    print("");
     print(gap_text(&findings).trim_end());
     print("");
     let wanted = wanted(&gap.account, manner)?;
     if wanted.additions.is_empty() {
         report(&root);
-        return Ok(());
+        return trust.demand(&findings.assessment);
     }
     let gap = GapFindings { account: wanted, ..gap.clone() };
     let set = settings.set();
-    let begun = Begun { study: &study, path, settings: &set, findings: &findings, gap: &gap };
+    let begun =
+        Begun { study: &study, path, folder: out, settings: &set, findings: &findings, gap: &gap };
     let (added, with) = add(&begun, &run, &terminal)?;
     // The report of the study tells what became of it.
     let findings = stage::find_gap(&study, &mut run, &terminal)?;
     print("");
-    print(summary_text(&with).trim_end());
+    print_summary(&with);
     print("");
     print(gap_text(&findings).trim_end());
     print("");
     print(&format!("study with what was missing: {}", added.study.display()));
     report(&added.run);
     report(&root);
-    Ok(())
+    trust.demand(&with.assessment)
 }
 
 /// `lacuna power STUDY`

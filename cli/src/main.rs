@@ -1,6 +1,7 @@
 //! The `lacuna` command: arguments and printing, no numerics.
 
 mod campaign;
+mod coverage;
 mod gap;
 mod inspect;
 mod new;
@@ -45,6 +46,8 @@ enum Verb {
         /// The run directory; `runs/<study name>` when left out.
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
+        #[command(flatten)]
+        trust: study::Trust,
     },
     /// Check a study and list every problem at once, with line and caret.
     Check {
@@ -64,6 +67,8 @@ enum Verb {
         out: Option<PathBuf>,
         #[command(flatten)]
         manner: gap::Manner,
+        #[command(flatten)]
+        trust: study::Trust,
     },
     /// Plant every effect in a study's own noise: what `lacuna gap` would find there, how small, and how often it errs.
     Power {
@@ -78,15 +83,31 @@ enum Verb {
         #[arg(long)]
         quick: bool,
     },
+    /// Count how often a study's intervals hold the truth: truths from the prior, data made of them, each calibrated.
+    Coverage {
+        /// The study file.
+        study: PathBuf,
+        #[command(flatten)]
+        settings: study::Settings,
+        /// The run directory; `runs/<study name>` when left out.
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        #[command(flatten)]
+        manner: coverage::Manner,
+    },
     /// Go on with a run that was interrupted, from its directory.
     Resume {
         /// The run directory.
         run: PathBuf,
+        #[command(flatten)]
+        trust: study::Trust,
     },
     /// Write the report of a finished run again.
     Report {
         /// The run directory.
         run: PathBuf,
+        #[command(flatten)]
+        trust: study::Trust,
     },
     /// Put finished runs side by side: posteriors, errors, evidences, predictions.
     Compare {
@@ -162,16 +183,21 @@ fn main() -> ExitCode {
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global();
     }
     let result = match arguments.verb {
-        Verb::Run { study, settings, out } => study::run(&study, &settings, out.as_deref()),
+        Verb::Run { study, settings, out, trust } => {
+            study::run(&study, &settings, out.as_deref(), trust)
+        }
         Verb::Check { study, settings } => study::check(&study, &settings),
-        Verb::Gap { study, settings, out, manner } => {
-            gap::gap(&study, &settings, out.as_deref(), &manner)
+        Verb::Gap { study, settings, out, manner, trust } => {
+            gap::gap(&study, &settings, out.as_deref(), &manner, trust)
         }
         Verb::Power { study, settings, out, quick } => {
             gap::power(&study, &settings, out.as_deref(), quick)
         }
-        Verb::Resume { run } => study::resume(&run),
-        Verb::Report { run } => study::report(&run),
+        Verb::Coverage { study, settings, out, manner } => {
+            coverage::coverage(&study, &settings, out.as_deref(), &manner)
+        }
+        Verb::Resume { run, trust } => study::resume(&run, trust),
+        Verb::Report { run, trust } => study::report(&run, trust),
         Verb::Compare { runs, json } => study::compare(&runs, json),
         Verb::Plugins { name, markdown, libraries } => {
             plugins::list(name.as_deref(), markdown, &libraries)
@@ -200,7 +226,7 @@ fn main() -> ExitCode {
 /// A command that did not do what it was asked.
 struct Failure {
     text: String,
-    /// 1: a run stopped; 2: the study or the arguments are wrong.
+    /// 1: a run stopped; 2: the study or the arguments are wrong; 3: the result is not trusted, under `--strict`.
     code: u8,
 }
 

@@ -1,8 +1,11 @@
 //! `run`, `check`, `resume`, `report`, `compare`.
 
+use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
+use lacuna::assess::{Assessment, Level};
 use lacuna::compare::{self, Finished};
+use lacuna::report::findings::Findings;
 use lacuna::report::summary_text;
 use lacuna::run::{RunDirectory, Stop, files};
 use lacuna::stage;
@@ -41,15 +44,64 @@ impl Settings {
     }
 }
 
-/// `lacuna run STUDY`
-pub fn run(path: &Path, settings: &Settings, out: Option<&Path>) -> Result<(), Failure> {
-    let study = load(path, settings)?;
-    execute(&study, &folder(&study, out), false)
+/// What is done about a verdict.
+#[derive(Clone, Copy, clap::Args)]
+pub struct Trust {
+    /// Exit with code 3 unless the result is trusted without reservations.
+    #[arg(long)]
+    strict: bool,
 }
 
-/// The run directory of a study.
+impl Trust {
+    /// A failure where the study asked for trust and there is none.
+    pub fn demand(self, assessment: &Assessment) -> Result<(), Failure> {
+        if !self.strict || assessment.level == Level::Trusted {
+            return Ok(());
+        }
+        Err(Failure { text: format!("error: {} (`--strict`)", assessment.line()), code: 3 })
+    }
+}
+
+/// `lacuna run STUDY`
+pub fn run(
+    path: &Path,
+    settings: &Settings,
+    out: Option<&Path>,
+    trust: Trust,
+) -> Result<(), Failure> {
+    let study = load(path, settings)?;
+    execute(&study, &folder(&study, out), false, trust)
+}
+
+/// The run directory of a study: the one that is asked for, else `runs/<study name>`.
+///
+/// A study that gives itself no name has that of its file or of the study that it extends, which others may have too, as
+/// `a/study.toml` and `b/study.toml` do. Where that directory belongs to another file that is still there, it is named
+/// after the file, after folder and file, or has a number behind it.
 pub fn folder(study: &Study, out: Option<&Path>) -> PathBuf {
-    out.map_or_else(|| Path::new("runs").join(&study.name), Path::to_owned)
+    if let Some(out) = out {
+        return out.to_owned();
+    }
+    let runs = Path::new("runs");
+    if study.named {
+        return runs.join(&study.name);
+    }
+    let file = std::path::absolute(&study.file).unwrap_or_else(|_| study.file.clone());
+    let text =
+        |name: Option<&std::ffi::OsStr>| name.unwrap_or_default().to_string_lossy().into_owned();
+    let stem = text(file.file_stem());
+    let long = match text(file.parent().and_then(Path::file_name)) {
+        folder if folder.is_empty() => stem.clone(),
+        folder => format!("{folder}-{stem}"),
+    };
+    let numbered = (2..1000).map(|n| format!("{long}-{n}"));
+    let names: Vec<String> =
+        [study.name.clone(), stem, long.clone()].into_iter().chain(numbered).collect();
+    let folders = || names.iter().map(|name| runs.join(name));
+    let of = |folder: &Path| stage::manifest::origin(folder);
+    let is_own = |folder: &PathBuf| of(folder).is_some_and(|other| other == file);
+    let is_free = |folder: &PathBuf| of(folder).is_none_or(|other| !other.exists());
+    folders().find(is_own).or_else(|| folders().find(is_free)).unwrap_or_else(|| runs.join(long))
 }
 
 /// `lacuna check STUDY`
@@ -59,6 +111,16 @@ pub fn check(path: &Path, settings: &Settings) -> Result<(), Failure> {
         print(&plugins::would_load(library));
     }
     let study = sound(checked, path)?;
+    let wrong = stage::contents::check(&study);
+    if !wrong.is_empty() {
+        let texts: Vec<String> = wrong.iter().map(ToString::to_string).collect();
+        let plural = if wrong.len() == 1 { "" } else { "s" };
+        let (count, files) = (wrong.len(), path.display());
+        let text = texts.join("\n\n");
+        return Err(Failure::wrong(format!(
+            "{text}\n\n{count} problem{plural} in the files of {files}"
+        )));
+    }
     let response = match &study.target {
         Some(_) => String::new(),
         None => format!(", {} values a response", study.layouts.len()),
@@ -69,12 +131,12 @@ pub fn check(path: &Path, settings: &Settings) -> Result<(), Failure> {
 }
 
 /// `lacuna resume RUN`
-pub fn resume(folder: &Path) -> Result<(), Failure> {
-    execute(&kept_study(folder)?, folder, is_finished(folder))
+pub fn resume(folder: &Path, trust: Trust) -> Result<(), Failure> {
+    execute(&kept_study(folder)?, folder, is_finished(folder), trust)
 }
 
 /// `lacuna report RUN`
-pub fn report(folder: &Path) -> Result<(), Failure> {
+pub fn report(folder: &Path, trust: Trust) -> Result<(), Failure> {
     let study = kept_study(folder)?;
     if !is_finished(folder) {
         let stop = Stop::new(format!("the run in {} is not finished", folder.display()));
@@ -82,7 +144,7 @@ pub fn report(folder: &Path) -> Result<(), Failure> {
             .help(format!("`lacuna resume {}` goes on with it", folder.display()))
             .into());
     }
-    execute(&study, folder, true)
+    execute(&study, folder, true, trust)
 }
 
 /// Prints finished runs side by side.
@@ -143,8 +205,29 @@ fn is_finished(folder: &Path) -> bool {
     folder.join("manifest.json").exists()
 }
 
+/// The closing summary, its first line in the colour of the verdict where a terminal shows colours.
+pub fn print_summary(findings: &Findings) {
+    let text = summary_text(findings);
+    let (first, rest) = text.trim_end().split_once('\n').unwrap_or((text.trim_end(), ""));
+    print(&coloured(first, findings.assessment.level));
+    print(rest);
+}
+
+fn coloured(line: &str, level: Level) -> String {
+    let plain = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+    if plain || !std::io::stdout().is_terminal() {
+        return line.to_owned();
+    }
+    let colour = match level {
+        Level::Trusted => "32",
+        Level::TrustedWithReservations => "33",
+        Level::NotTrusted => "31",
+    };
+    format!("\u{1b}[1;{colour}m{line}\u{1b}[0m")
+}
+
 /// Runs all stages; a run that is only looked at is taken whatever version made it.
-fn execute(study: &Study, folder: &Path, look: bool) -> Result<(), Failure> {
+fn execute(study: &Study, folder: &Path, look: bool, trust: Trust) -> Result<(), Failure> {
     let mut run = RunDirectory::open(folder)?;
     if look {
         run.look();
@@ -152,8 +235,8 @@ fn execute(study: &Study, folder: &Path, look: bool) -> Result<(), Failure> {
     let terminal = Terminal::new();
     let findings = stage::run(study, &mut run, &terminal)?;
     print("");
-    print(summary_text(&findings).trim_end());
+    print_summary(&findings);
     print("");
     print(&format!("report: {}", folder.join("report.html").display()));
-    Ok(())
+    trust.demand(&findings.assessment)
 }

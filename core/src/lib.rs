@@ -4,6 +4,7 @@
 //! plain data, keeps every artifact, and names no plugin. Plugins register themselves
 //! (see [`plugin::registry`]); the binary links the crate that holds them.
 
+pub mod assess;
 pub mod campaign;
 pub mod compare;
 pub mod contract;

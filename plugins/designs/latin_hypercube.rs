@@ -221,7 +221,7 @@ impl Products {
     }
 }
 
-lacuna::register!(Design, "latin_hypercube", LatinHypercube);
+lacuna::register!(Design, "latin_hypercube", LatinHypercube, aliases: ["lhs", "lhd"]);
 
 #[cfg(test)]
 mod tests {

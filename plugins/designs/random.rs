@@ -41,4 +41,4 @@ impl Design for Random {
     }
 }
 
-lacuna::register!(Design, "random", Random);
+lacuna::register!(Design, "random", Random, aliases: ["mc", "monte_carlo"]);

@@ -94,7 +94,7 @@ impl Design for Sobol {
     }
 }
 
-lacuna::register!(Design, "sobol", Sobol);
+lacuna::register!(Design, "sobol", Sobol, aliases: ["sobol_sequence", "qmc", "saltelli"]);
 
 #[cfg(test)]
 mod tests {

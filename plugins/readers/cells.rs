@@ -70,21 +70,41 @@ pub struct LongColumns<'a> {
 impl<'a> LongColumns<'a> {
     /// Finds the columns named like the axes and the response.
     pub fn find(sheet: &Sheet, layout: &'a Layout) -> Result<Self, ReadError> {
-        let axes = layout
-            .axes
-            .iter()
-            .map(|axis| {
-                let column = sheet.column(&axis.name)?;
+        let value = sheet
+            .column(&layout.name)
+            .and_then(|value| Ok((value, sheet.conversion(value, &layout.unit)?)));
+        match (Self::axes(sheet, layout), value) {
+            (Ok(axes), Ok((value, conversion))) => Ok(Self { layout, axes, value, conversion }),
+            (axes, value) => Err(ReadError::of_all(axes.err().into_iter().chain(value.err()))
+                .unwrap_or_else(|| ReadError::new(&sheet.path, "cannot be read"))),
+        }
+    }
+
+    /// Only those that say where something belongs, which stands in the column `value`.
+    pub fn places(sheet: &Sheet, layout: &'a Layout, value: usize) -> Result<Self, ReadError> {
+        let conversion = Conversion::none(&layout.unit);
+        Ok(Self { layout, axes: Self::axes(sheet, layout)?, value, conversion })
+    }
+
+    fn axes(sheet: &Sheet, layout: &Layout) -> Result<Vec<(usize, Option<Conversion>)>, ReadError> {
+        let mut wrong = Vec::new();
+        let mut columns = Vec::with_capacity(layout.axes.len());
+        for axis in &layout.axes {
+            let found = sheet.column(&axis.name).and_then(|column| {
                 let conversion = match &axis.coordinates {
                     Coordinates::Labels(_) => None,
                     Coordinates::Grid { unit, .. } => Some(sheet.conversion(column, unit)?),
                 };
                 Ok((column, conversion))
-            })
-            .collect::<Result<_, ReadError>>()?;
-        let value = sheet.column(&layout.name)?;
-        let conversion = sheet.conversion(value, &layout.unit)?;
-        Ok(Self { layout, axes, value, conversion })
+            });
+            found.map_or_else(|error| wrong.push(error), |found| columns.push(found));
+        }
+        ReadError::of_all(wrong).map_or(Ok(columns), Err)
+    }
+
+    /// How the values' unit changes.
+    pub fn conversion(&self) -> &Conversion {
+        &self.conversion
     }
 
     /// Whether a column is one of these.
@@ -130,4 +150,35 @@ pub fn grid_places(
         ));
     }
     numbers.iter().map(|x| on_axis(axis, &x.to_string(), convert)).collect()
+}
+
+/// The value that the heading of a wide table means: `B 1e-5`, or `B:1e-5`.
+pub fn headed_place(layout: &Layout, heading: &str) -> Result<usize, String> {
+    if layout.axes.is_empty() {
+        let expected = &layout.name;
+        return if heading == expected {
+            Ok(0)
+        } else {
+            Err(format!("expected the column `{expected}`, found `{heading}`"))
+        };
+    }
+    let parts: Vec<&str> = match layout.axes.len() {
+        // A single axis takes the heading whole: labels may contain blanks.
+        1 => vec![heading],
+        _ => heading.split([' ', ':', ';', '|', '@']).filter(|part| !part.is_empty()).collect(),
+    };
+    if parts.len() != layout.axes.len() {
+        let axes: Vec<String> = layout.axes.iter().map(example).collect();
+        return Err(format!("expected a heading like `{}`, found `{heading}`", axes.join(" ")));
+    }
+    let places = layout.axes.iter().zip(parts).map(|(axis, part)| on_axis(axis, part, Some));
+    Ok(layout.index(&places.collect::<Result<Vec<_>, _>>()?))
+}
+
+fn example(axis: &Axis) -> String {
+    match &axis.coordinates {
+        _ if axis.is_empty() => axis.name.clone(),
+        Coordinates::Labels(labels) => labels[0].clone(),
+        Coordinates::Grid { values, .. } => format!("{:e}", values[0]),
+    }
 }

@@ -3,7 +3,10 @@
 pub mod cells;
 pub mod contents;
 pub mod csv;
+mod ending;
+mod faults;
 pub mod netcdf;
+mod noise;
 pub mod runs;
 pub mod scenario;
 pub mod sheet;

@@ -78,70 +78,79 @@ pub fn table_path(
 /// Reads a table with the columns `run` and one a parameter, and `file`, `status`, `valid` and
 /// `reason` where it has them. Relative files start at the table's folder.
 pub fn read_runs(path: &Path, parameters: &[Parameter]) -> Result<Vec<Run>, ReadError> {
-    let sheet = Sheet::read(path)?;
-    let run = sheet.column("run")?;
-    let columns = parameters
+    let (sheet, mut faults) = Sheet::open(path)?;
+    let run = faults.take(sheet.heading_line, sheet.column("run"));
+    let columns: Vec<_> = parameters
         .iter()
-        .map(|p| {
-            let column = sheet.column(&p.name)?;
-            // `height[A]` is the parameter of scenario `A`, not one in amperes.
-            let of_scenario = p.name.ends_with(']') && sheet.headings[column].text == p.name;
-            let conversion = if of_scenario {
-                Conversion::none(&p.unit)
-            } else {
-                sheet.conversion(column, &p.unit)?
-            };
-            Ok((column, conversion))
-        })
-        .collect::<Result<Vec<_>, ReadError>>()?;
+        .filter_map(|p| faults.take(sheet.heading_line, parameter_column(&sheet, p)))
+        .collect();
+    let Some(run) = run.filter(|_| columns.len() == parameters.len()) else {
+        return faults.or(Vec::new());
+    };
     let mut names = BTreeSet::new();
     let mut runs = Vec::with_capacity(sheet.records.len());
     for record in &sheet.records {
-        let name = record.cells[run].clone();
+        let name = record.cells[run].to_owned();
         if name.is_empty() || !names.insert(name.clone()) {
             let text = if name.is_empty() {
                 "has no name".into()
             } else {
                 format!("`{name}` appears twice")
             };
-            return Err(sheet.complain(record, run, format!("a run {text}")));
+            faults.note(record.line, sheet.complain(record, run, format!("a run {text}")));
         }
-        let mut point = Vec::with_capacity(columns.len());
-        for (column, conversion) in &columns {
-            let x = sheet.number(record, *column)?.and_then(|x| conversion.apply(x));
-            let x = x.filter(|x| x.is_finite()).ok_or_else(|| {
-                let found = &record.cells[*column];
-                sheet.complain(
-                    record,
-                    *column,
-                    format!("expected a finite number, found `{found}`"),
-                )
-            })?;
-            point.push(x);
-        }
+        let one = |(column, conversion): &(usize, Conversion)| {
+            number(&sheet, record, *column, conversion)
+        };
+        let point: Vec<f64> =
+            columns.iter().filter_map(|column| faults.take(record.line, one(column))).collect();
         let file = cell(&sheet, record, "file").filter(|text| !text.is_empty());
+        let failure = faults.take(record.line, failure(&sheet, record)).flatten();
+        let valid = faults.take(record.line, word(&sheet, record, "valid", ["true", "false"]));
         runs.push(Run {
             name,
             file: file.map(|file| path.with_file_name(file)),
-            failure: failure(&sheet, record)?,
-            valid: word(&sheet, record, "valid", ["true", "false"])?,
+            failure,
+            valid: valid.unwrap_or_default(),
             point,
         });
     }
-    if runs.is_empty() {
+    if runs.is_empty() && faults.is_empty() {
         return Err(ReadError::new(path, "has no runs"));
     }
-    Ok(runs)
+    faults.or(runs)
+}
+
+fn parameter_column(sheet: &Sheet, p: &Parameter) -> Result<(usize, Conversion), ReadError> {
+    let column = sheet.column(&p.name)?;
+    // `height[A]` is the parameter of scenario `A`, not one in amperes.
+    let of_scenario = p.name.ends_with(']') && sheet.headings[column].text == p.name;
+    let conversion =
+        if of_scenario { Conversion::none(&p.unit) } else { sheet.conversion(column, &p.unit)? };
+    Ok((column, conversion))
+}
+
+fn number(
+    sheet: &Sheet,
+    record: &Record,
+    column: usize,
+    conversion: &Conversion,
+) -> Result<f64, ReadError> {
+    let x = sheet.number(record, column)?.and_then(|x| conversion.apply(x));
+    x.filter(|x| x.is_finite()).ok_or_else(|| {
+        let text = format!("expected a finite number, found `{}`", &record.cells[column]);
+        sheet.complain(record, column, text)
+    })
 }
 
 fn cell<'a>(sheet: &Sheet, record: &'a Record, name: &str) -> Option<&'a str> {
-    sheet.find(name).map(|column| record.cells[column].as_str())
+    sheet.find(name).map(|column| &record.cells[column])
 }
 
 /// Whether a cell has the first of two words; so it is where the column or the word is missing.
 fn word(sheet: &Sheet, record: &Record, name: &str, words: [&str; 2]) -> Result<bool, ReadError> {
     let Some(column) = sheet.find(name) else { return Ok(true) };
-    let found = record.cells[column].as_str();
+    let found = &record.cells[column];
     if found.is_empty() || found.eq_ignore_ascii_case(words[0]) {
         Ok(true)
     } else if found.eq_ignore_ascii_case(words[1]) {

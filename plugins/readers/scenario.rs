@@ -7,6 +7,7 @@ use lacuna::plugin::Context;
 use lacuna::plugin::reader::{ReadError, scenario_path};
 use lacuna::study::problem::Complaints;
 
+use super::faults::Faults;
 use super::listed;
 use super::sheet::Sheet;
 
@@ -45,8 +46,8 @@ pub fn sheet(
     path: &Path,
     scenario: Option<&str>,
     ignore: &[String],
-) -> Result<Sheet, ReadError> {
-    let sheet = Sheet::read(&scenario_path(directory, path, scenario))?;
+) -> Result<(Sheet, Faults), ReadError> {
+    let (sheet, faults) = Sheet::open(&scenario_path(directory, path, scenario))?;
     let column = sheet.find(SCENARIO).filter(|_| !ignore.iter().any(|name| name == SCENARIO));
     match (column, scenario) {
         (None, Some(_)) if !each_has_its_file(path) => Err(ReadError::new(
@@ -54,20 +55,20 @@ pub fn sheet(
             "has no column `scenario`, and the study has scenarios",
         )
         .help(format!("add the column, or name a file for each scenario: a path with `{PLACE}`"))),
-        (None, _) => Ok(sheet),
+        (None, _) => Ok((sheet, faults)),
         (Some(column), None) => {
             let text = "has a column `scenario`, and the study has no scenarios";
             Err(ReadError::new(&sheet.path, text)
                 .at(format!("line {}, column {}", sheet.heading_line, column + 1))
                 .help("add `[[scenario]]` sections, or list the column under `ignore`"))
         }
-        (Some(column), Some(name)) => some(sheet, column, name),
+        (Some(column), Some(name)) => Ok((some(sheet, column, name)?, faults)),
     }
 }
 
 fn some(mut sheet: Sheet, column: usize, name: &str) -> Result<Sheet, ReadError> {
-    let mut known: Vec<String> = sheet.records.iter().map(|r| r.cells[column].clone()).collect();
-    sheet.records.retain(|record| record.cells[column] == name);
+    let mut known: Vec<String> = sheet.records.iter().map(|r| r.cells[column].to_owned()).collect();
+    sheet.records.retain(|record| &record.cells[column] == name);
     if sheet.records.is_empty() {
         known.sort();
         known.dedup();

@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use csv::{ErrorKind, ReaderBuilder, Trim};
+use csv::{ErrorKind, ReaderBuilder, StringRecord, Trim};
 use lacuna::data::Unit;
 use lacuna::plugin::reader::ReadError;
 
-use super::listed;
+use super::faults::Faults;
+use super::{ending, listed};
 
 /// The heading of a column: `time [s]`.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,7 +26,7 @@ pub struct Record {
     /// Its line in the file, counted from 1.
     pub line: usize,
     /// Its cells, without blanks around them.
-    pub cells: Vec<String>,
+    pub cells: StringRecord,
 }
 
 /// A CSV file in memory.
@@ -52,36 +53,92 @@ impl Sheet {
 
     /// Reads the bytes of a file; `path` only names them in messages.
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, ReadError> {
+        let (sheet, faults) = Self::scan(path, bytes)?;
+        faults.or(sheet)
+    }
+
+    /// Opens a file for [`Sheet::scan`].
+    pub fn open(path: &Path) -> Result<(Self, Faults), ReadError> {
+        let bytes = std::fs::read(path)
+            .map_err(|e| ReadError::new(path, format!("cannot be opened: {e}")))?;
+        Self::scan(path, &bytes)
+    }
+
+    /// The lines that can be read, and what is wrong with the others: for those who go on to look at the cells. The
+    /// sheet is not whole unless there are no faults.
+    pub fn scan(path: &Path, bytes: &[u8]) -> Result<(Self, Faults), ReadError> {
         let mut reader = ReaderBuilder::new()
             .delimiter(delimiter(bytes))
             .comment(Some(b'#'))
             .trim(Trim::All)
             .from_reader(bytes);
-        let broken = |error: csv::Error| unequal(path, &error);
-        let names = reader.headers().map_err(broken)?.clone();
-        if names.is_empty() {
+        let comma = delimiter(bytes) == b',';
+        let broken = |error: csv::Error| unequal(path, comma, &error);
+        let names = reader.headers().map_err(|error| broken(error).1)?.clone();
+        if names.iter().all(str::is_empty) {
             return Err(ReadError::new(path, "is empty: expected a line of column names"));
         }
         let heading_line = names.position().map_or(1, |p| p.line() as usize);
         let mut headings: Vec<Heading> = Vec::with_capacity(names.len());
+        let mut faults = Faults::default();
         for (column, text) in names.iter().enumerate() {
-            let heading = heading(text).map_err(|message| {
+            let wrong = |message: String| {
                 ReadError::new(path, message)
                     .at(format!("line {heading_line}, column {}", column + 1))
-            })?;
+            };
+            let heading = heading(text).map_err(&wrong)?;
             if headings.iter().any(|h| h.text == heading.text) {
-                let message = format!("two columns are called `{}`", heading.name);
-                return Err(ReadError::new(path, message).at(format!("line {heading_line}")));
+                faults.note(
+                    heading_line,
+                    wrong(format!("two columns are called `{}`", heading.name)),
+                );
             }
             headings.push(heading);
         }
         let mut records = Vec::new();
         for record in reader.records() {
-            let record = record.map_err(broken)?;
-            let line = record.position().map_or(0, |p| p.line() as usize);
-            records.push(Record { line, cells: record.iter().map(str::to_owned).collect() });
+            match record {
+                Ok(record) => {
+                    let line = record.position().map_or(0, |p| p.line() as usize);
+                    records.push(Record { line, cells: record });
+                }
+                Err(error) => {
+                    let (line, error) = broken(error);
+                    faults.note(line, error);
+                }
+            }
         }
-        Ok(Self { path: path.to_owned(), headings, heading_line, records })
+        let sheet = Self { path: path.to_owned(), headings, heading_line, records };
+        if let Some((line, error)) = sheet.cut(bytes) {
+            faults.note(line, error);
+        }
+        Ok((sheet, faults))
+    }
+
+    /// What is wrong with the last line of a file without a final line end; see [`ending`].
+    fn cut(&self, bytes: &[u8]) -> Option<(usize, ReadError)> {
+        if bytes.ends_with(b"\n") || bytes.ends_with(b"\r") {
+            return None;
+        }
+        let last_line = bytes.rsplit(|&b| b == b'\n').next().unwrap_or_default();
+        if last_line.starts_with(b"#") {
+            return None;
+        }
+        let (last, above) = self.records.split_last()?;
+        let column = self.headings.len() - 1;
+        let quotes = bytes.iter().filter(|&&b| b == b'"').count();
+        let reason = if quotes % 2 == 1 {
+            "a quote is not closed".to_owned()
+        } else {
+            let above = above.iter().map(|record| &record.cells[column]);
+            ending::cut(&last.cells[column], above)?
+        };
+        let text =
+            format!("the file seems to be cut off: its last line has no line end, and {reason}");
+        let error = self
+            .complain(last, column, text)
+            .help("write the file again; if it is whole, end its last line with a line break");
+        Some((last.line, error))
     }
 
     /// The position of a column, if there is one of this name.
@@ -113,12 +170,17 @@ impl Sheet {
 
     /// A cell as a number; `None` if it is blank, `NaN` or `NA`.
     pub fn number(&self, record: &Record, column: usize) -> Result<Option<f64>, ReadError> {
-        let cell = record.cells[column].as_str();
+        let cell = &record.cells[column];
         if ["", "nan", "na"].iter().any(|missing| cell.eq_ignore_ascii_case(missing)) {
             return Ok(None);
         }
         cell.parse().map(Some).map_err(|_| {
-            self.complain(record, column, format!("expected a number, found `{cell}`"))
+            let error = self.complain(record, column, format!("expected a number, found `{cell}`"));
+            let point = cell.replacen(',', ".", 1);
+            match point.parse::<f64>() {
+                Ok(_) => error.help(format!("decimals follow a point: `{point}`")),
+                Err(_) => error,
+            }
         })
     }
 
@@ -132,7 +194,8 @@ impl Sheet {
                 "expected a unit that converts to `{to}`, found `{}` in `{from}`",
                 heading.name
             );
-            return Err(ReadError::new(&self.path, text).at(format!("line {}", self.heading_line)));
+            let place = format!("line {}, column {}", self.heading_line, column + 1);
+            return Err(ReadError::new(&self.path, text).at(place));
         }
         Ok(conversion)
     }
@@ -155,9 +218,20 @@ impl Conversion {
     pub fn apply(&self, x: f64) -> Option<f64> {
         self.from.as_ref().map_or(Some(x), |from| from.convert(x, &self.to))
     }
+
+    /// A difference in the new unit, such as a standard deviation: the zeros of the units do not count.
+    pub fn width(&self, x: f64) -> Option<f64> {
+        Some(self.apply(x)? - self.apply(0.0)?)
+    }
+
+    /// Whether the source says its unit.
+    pub fn is_stated(&self) -> bool {
+        self.from.is_some()
+    }
 }
 
-fn delimiter(bytes: &[u8]) -> u8 {
+/// What separates the fields of a table, by its first line.
+pub(super) fn delimiter(bytes: &[u8]) -> u8 {
     let first = bytes.split(|&b| b == b'\n').find(|line| !line.starts_with(b"#"));
     let first = first.unwrap_or_default();
     let has = |c: u8| first.contains(&c);
@@ -181,16 +255,20 @@ fn heading(text: &str) -> Result<Heading, String> {
     }
 }
 
-fn unequal(path: &Path, error: &csv::Error) -> ReadError {
-    let at = |line: u64, text: String| ReadError::new(path, text).at(format!("line {line}"));
+/// An error of the table's form, with its line.
+fn unequal(path: &Path, comma: bool, error: &csv::Error) -> (usize, ReadError) {
+    let line_of = |pos: &Option<csv::Position>| pos.as_ref().map_or(0, |p| p.line() as usize);
+    let at =
+        |line: usize, text: String| (line, ReadError::new(path, text).at(format!("line {line}")));
     match error.kind() {
         ErrorKind::UnequalLengths { pos, expected_len, len } => {
-            let line = pos.as_ref().map_or(0, csv::Position::line);
-            at(line, format!("expected {expected_len} fields as in the first line, found {len}"))
+            let text = format!("expected {expected_len} fields as in the first line, found {len}");
+            let (line, error) = at(line_of(pos), text);
+            let more = comma && len > expected_len;
+            let help = "decimals follow a point, not a comma; a text with a comma needs quotes";
+            (line, if more { error.help(help) } else { error })
         }
-        ErrorKind::Utf8 { pos, .. } => {
-            at(pos.as_ref().map_or(0, csv::Position::line), "is not UTF-8 text".to_owned())
-        }
-        _ => ReadError::new(path, format!("cannot be read: {error}")),
+        ErrorKind::Utf8 { pos, .. } => at(line_of(pos), "is not UTF-8 text".to_owned()),
+        _ => (0, ReadError::new(path, format!("cannot be read: {error}"))),
     }
 }

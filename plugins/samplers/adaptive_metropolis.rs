@@ -72,6 +72,10 @@ impl Component for AdaptiveMetropolis {
 }
 
 impl Sampler for AdaptiveMetropolis {
+    fn steps_are_draws(&self) -> bool {
+        true
+    }
+
     fn plan(&self, _dimension: usize) -> Plan {
         Plan { chains: self.chains, steps: self.steps, warm_up: self.warm_up, ensemble: false }
     }
@@ -96,4 +100,4 @@ impl Sampler for AdaptiveMetropolis {
     }
 }
 
-lacuna::register!(Sampler, "adaptive_metropolis", AdaptiveMetropolis);
+lacuna::register!(Sampler, "adaptive_metropolis", AdaptiveMetropolis, aliases: ["am", "haario"]);

@@ -131,6 +131,10 @@ impl Component for DelayedRejectionAdaptiveMetropolis {
 }
 
 impl Sampler for DelayedRejectionAdaptiveMetropolis {
+    fn steps_are_draws(&self) -> bool {
+        true
+    }
+
     fn plan(&self, _dimension: usize) -> Plan {
         Plan { chains: self.chains, steps: self.steps, warm_up: self.warm_up, ensemble: false }
     }
@@ -156,11 +160,7 @@ impl Sampler for DelayedRejectionAdaptiveMetropolis {
     }
 }
 
-lacuna::register!(
-    Sampler,
-    "delayed_rejection_adaptive_metropolis",
-    DelayedRejectionAdaptiveMetropolis
-);
+lacuna::register!(Sampler, "delayed_rejection_adaptive_metropolis", DelayedRejectionAdaptiveMetropolis, aliases: ["dram"]);
 
 #[cfg(test)]
 mod tests {

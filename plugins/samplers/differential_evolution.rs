@@ -109,6 +109,10 @@ impl Component for DifferentialEvolution {
 }
 
 impl Sampler for DifferentialEvolution {
+    fn steps_are_draws(&self) -> bool {
+        true
+    }
+
     fn plan(&self, _dimension: usize) -> Plan {
         Plan { chains: self.chains, steps: self.steps, warm_up: self.warm_up, ensemble: false }
     }
@@ -164,7 +168,7 @@ impl Sampler for DifferentialEvolution {
     }
 }
 
-lacuna::register!(Sampler, "differential_evolution", DifferentialEvolution);
+lacuna::register!(Sampler, "differential_evolution", DifferentialEvolution, aliases: ["de", "demc", "dream"]);
 
 #[cfg(test)]
 mod tests {

@@ -55,6 +55,10 @@ impl Component for Metropolis {
 }
 
 impl Sampler for Metropolis {
+    fn steps_are_draws(&self) -> bool {
+        true
+    }
+
     fn plan(&self, _dimension: usize) -> Plan {
         Plan { chains: self.chains, steps: self.steps, warm_up: 0, ensemble: false }
     }
@@ -129,4 +133,4 @@ impl Trial {
     }
 }
 
-lacuna::register!(Sampler, "metropolis", Metropolis);
+lacuna::register!(Sampler, "metropolis", Metropolis, aliases: ["mh", "metropolis_hastings", "random_walk"]);

@@ -70,11 +70,9 @@ fn with_posterior(test: impl FnOnce(&Posterior<'_>)) {
         registry::from_text::<dyn Effect>("gain", "factor = { normal = [1, 0.1] }").unwrap().plugin;
     let options = "variance = { half_normal = 0.5 }";
     let discrepancy = registry::from_text::<dyn Discrepancy>("gaussian", options).unwrap().plugin;
-    let replicates = DATA
-        .iter()
-        .enumerate()
-        .map(|(r, values)| Replicate { name: format!("p{r}"), values: values.to_vec() });
-    let data = Measurements { layout: layout(), replicates: replicates.collect() };
+    let replicates =
+        DATA.iter().enumerate().map(|(r, values)| Replicate::new(format!("p{r}"), values.to_vec()));
+    let data = Measurements::new(layout(), replicates.collect());
     let likelihood: Box<dyn Likelihood> =
         discrepancy.likelihood(&Known::without_slopes(&data, &[])).unwrap();
     let (layout, parameters, emulator) = (layout(), parameters(), Quadratic);

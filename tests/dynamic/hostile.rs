@@ -109,11 +109,13 @@ fn a_file_that_is_no_library_says_so() {
 fn data() -> Measurements {
     let axes = vec![Axis::grid("time", (0..10).map(f64::from).collect(), Unit::dimensionless())];
     let layout = Layout { name: "y".to_owned(), unit: Unit::dimensionless(), axes };
-    let replicate = |r: usize| Replicate {
-        name: format!("p{r}"),
-        values: (0..10).map(|i| Some(f64::from(i).sin() + 0.1 * r as f64)).collect(),
+    let replicate = |r: usize| {
+        Replicate::new(
+            format!("p{r}"),
+            (0..10).map(|i| Some(f64::from(i).sin() + 0.1 * r as f64)).collect(),
+        )
     };
-    Measurements { layout, replicates: (0..5).map(replicate).collect() }
+    Measurements::new(layout, (0..5).map(replicate).collect())
 }
 
 /// A discrepancy that misbehaves in one way.

@@ -16,8 +16,8 @@ fn panicking(call: &str) -> Built<dyn Discrepancy> {
 }
 
 fn likelihood(built: &Built<dyn Discrepancy>) -> Result<Box<dyn Likelihood>, String> {
-    let replicates = vec![Replicate { name: "1".to_owned(), values: vec![Some(1.0)] }];
-    let data = Measurements { layout: Layout::number("y"), replicates };
+    let replicates = vec![Replicate::new("1".to_owned(), vec![Some(1.0)])];
+    let data = Measurements::new(Layout::number("y"), replicates);
     built.plugin.likelihood(&Known::without_slopes(&data, &[])).map_err(|stop| stop.to_string())
 }
 

@@ -78,12 +78,14 @@ pub fn emulator() -> &'static (Box<dyn Emulator>, CommonError) {
 
 /// Some replicates of a case.
 pub fn observations(case: &Case, replicates: Range<usize>) -> Observations {
-    let replicate = |r: usize| Replicate {
-        name: r.to_string(),
-        values: case.replicates.iter().flat_map(|c| c[r].iter().map(|y| Some(*y))).collect(),
+    let replicate = |r: usize| {
+        Replicate::new(
+            r.to_string(),
+            case.replicates.iter().flat_map(|c| c[r].iter().map(|y| Some(*y))).collect(),
+        )
     };
     let layout = layouts().blocks[0].clone();
-    Measurements { layout, replicates: replicates.map(replicate).collect() }.into()
+    Measurements::new(layout, replicates.map(replicate).collect()).into()
 }
 
 /// What the workflow says of a case.

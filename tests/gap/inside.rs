@@ -358,7 +358,8 @@ fn the_study_with_the_drag_is_written_and_run() {
     let kinds: Vec<&str> = account.additions.iter().map(|a| a.kind.as_str()).collect();
     assert_eq!((account.verdict.word, &kinds[..]), (Word::Named, &["quadratic_friction"][..]));
     assert!(account.held_out[0].proof.shrank, "{:?}", account.held_out);
-    let begun = Begun { study: &study, path: &path, settings: &[], findings: &findings, gap };
+    let begun =
+        Begun { study: &study, path: &path, folder: None, settings: &[], findings: &findings, gap };
     let (added, _) = add(&begun, &run, &Silent).unwrap();
     assert!(added.held_out[0].proof.shrank, "{:?}", added.held_out);
     let unknown = &added.unknowns[0];

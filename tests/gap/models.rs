@@ -127,7 +127,8 @@ fn the_model_that_made_the_data_takes_the_place_of_the_studys() {
     assert!((drag.value - DRAG).abs() < 4.0 * drag.sd, "{drag:?}");
 
     let path = folder.path().join("study.toml");
-    let begun = Begun { study: &study, path: &path, settings: &[], findings: &findings, gap };
+    let begun =
+        Begun { study: &study, path: &path, folder: None, settings: &[], findings: &findings, gap };
     let (added, with) = add(&begun, &run, &Silent).unwrap();
     assert_eq!(added.study, folder.path().join("study+newton.toml"));
     let text = fs::read_to_string(&added.study).unwrap();

@@ -85,8 +85,8 @@ fn asked(length: usize, coefficients: &[f64], gap: &dyn Fn(f64) -> f64, seed: u6
         let model = truth[0] * forward.slope(0, i) + truth[1] * forward.slope(1, i);
         Some(model + e + gap(i as f64 / length as f64))
     });
-    let replicate = Replicate { name: "0".into(), values: values.collect() };
-    let data: Observations = Measurements { layout, replicates: vec![replicate] }.into();
+    let replicate = Replicate::new("0".into(), values.collect());
+    let data: Observations = Measurements::new(layout, vec![replicate]).into();
     let experiment = Experiment::new(&layouts, &parameters, &forward, &data);
     let system = System::new(&experiment, Vec::new());
     let around = Around::fit(&system, &system.linearised(&truth));

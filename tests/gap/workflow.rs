@@ -33,7 +33,14 @@ fn a_hidden_effect_is_found_added_and_shown_to_close_the_gap() {
     let findings = stage::find_gap(&study, &mut run, &Silent).unwrap();
     let gap = findings.gap.as_ref().unwrap();
     let settings = ["sampler.steps=600".to_owned()];
-    let begun = Begun { study: &study, path: &path, settings: &settings, findings: &findings, gap };
+    let begun = Begun {
+        study: &study,
+        path: &path,
+        folder: None,
+        settings: &settings,
+        findings: &findings,
+        gap,
+    };
     let (added, _) = add(&begun, &run, &Silent).unwrap();
 
     // The old study, word for word but for its name, and a block that says why it is there.

@@ -107,13 +107,13 @@ fn parameters() -> Vec<Parameter> {
 
 /// Three replicates with gaps; the values are replaced by simulated ones.
 fn pattern() -> Measurements {
-    let replicate = |r: usize| Replicate {
-        name: format!("p{r}"),
-        values: (0..OUTPUTS)
-            .map(|i| (!(i + 2 * r).is_multiple_of(7)).then_some(i as f64))
-            .collect(),
+    let replicate = |r: usize| {
+        Replicate::new(
+            format!("p{r}"),
+            (0..OUTPUTS).map(|i| (!(i + 2 * r).is_multiple_of(7)).then_some(i as f64)).collect(),
+        )
     };
-    Measurements { layout: layout(), replicates: (0..3).map(replicate).collect() }
+    Measurements::new(layout(), (0..3).map(replicate).collect())
 }
 
 fn likelihood(discrepancy: &dyn Discrepancy, data: &Measurements) -> Box<dyn Likelihood> {

@@ -119,9 +119,11 @@ fn data() -> Fallible<Measurements> {
         unit: Unit::dimensionless(),
         axes: vec![Axis::labels("sensor", sensors), Axis::grid("time", times, Unit::parse("s")?)],
     };
-    let replicate = |r: u64| Replicate {
-        name: r.to_string(),
-        values: random(1, OUTPUTS, 1.0, 100 + r).row(0).iter().map(|y| Some(*y)).collect(),
+    let replicate = |r: u64| {
+        Replicate::new(
+            r.to_string(),
+            random(1, OUTPUTS, 1.0, 100 + r).row(0).iter().map(|y| Some(*y)).collect(),
+        )
     };
-    Ok(Measurements { layout, replicates: (0..REPLICATES).map(replicate).collect() })
+    Ok(Measurements::new(layout, (0..REPLICATES).map(replicate).collect()))
 }

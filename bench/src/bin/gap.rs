@@ -157,8 +157,8 @@ fn measured(layouts: &Layouts, replicates: std::ops::Range<usize>) -> Observatio
             }
             values
         });
-        Replicate { name: r.to_string(), values: noisy.collect() }
+        Replicate::new(r.to_string(), noisy.collect())
     };
     let layout = layouts.blocks[0].clone();
-    Measurements { layout, replicates: replicates.map(replicate).collect() }.into()
+    Measurements::new(layout, replicates.map(replicate).collect()).into()
 }

@@ -153,10 +153,10 @@ fn measured(emulator: &dyn Emulator, layout: &Layout) -> Measurements {
     let replicate = |r: usize| {
         let mut rng = Stream::root(3).at(r as u64).generator();
         let values = truth.row(0).iter().map(|m| Some(m + NOISE * normal(&mut rng))).collect();
-        Replicate { name: r.to_string(), values }
+        Replicate::new(r.to_string(), values)
     };
     let replicates = (0..REPLICATES).map(replicate).collect();
-    Measurements { layout: layout.clone(), replicates }
+    Measurements::new(layout.clone(), replicates)
 }
 
 /// An emulator's error in `rank` directions, a fifth of the noise altogether.

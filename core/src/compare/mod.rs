@@ -22,6 +22,8 @@ pub struct Finished {
     pub summary: Value,
     /// Its predictions of left-out data.
     left_out: Option<LeaveOneOut>,
+    /// Its predictions of left-out curves.
+    curves_left_out: Option<LeaveOneOut>,
 }
 
 impl Finished {
@@ -34,7 +36,8 @@ impl Finished {
         let known = summary.get("loo").is_some();
         let folder = directory.join(evidence::FOLDER);
         let left_out = known.then(|| evidence::left_out(&folder)).transpose()?;
-        Ok(Self { directory: directory.to_owned(), summary, left_out })
+        let curves_left_out = left_out.as_ref().and_then(|_| evidence::curves_left_out(&folder));
+        Ok(Self { directory: directory.to_owned(), summary, left_out, curves_left_out })
     }
 
     /// A number of the summary by its path.
@@ -88,10 +91,17 @@ pub struct Entry {
     pub evidence_behind: Option<[f64; 2]>,
     /// The posterior probability of the study among those compared, all being equally probable before.
     pub probability: Option<f64>,
-    /// The log predictive density of left-out data and its standard error.
+    /// The log predictive density of left-out data and its standard error: by curve, where curves are known.
     pub loo: Option<[f64; 2]>,
-    /// How much less that is than the best one's, and the standard error of the difference datum by datum.
+    /// How much less that is than the best one's, and the standard error of the difference: curve by curve where the curves
+    /// are known, else datum by datum.
     pub loo_behind: Option<[f64; 2]>,
+    /// The log predictive density of left-out curves and its standard error.
+    pub curves: Option<[f64; 2]>,
+    /// How much less that is than the best one's, and the standard error of the difference curve by curve.
+    pub curves_behind: Option<[f64; 2]>,
+    /// How many curves are not predicted reliably.
+    pub curves_unreliable: Option<f64>,
     /// How many of its predictions cannot be trusted.
     pub loo_unreliable: Option<f64>,
     /// The time its stages took when they were made, in seconds.
@@ -147,8 +157,12 @@ fn entry(run: &Finished) -> Entry {
         evidence: pair("evidence", "log"),
         evidence_behind: None,
         probability: None,
-        loo: pair("loo", "elpd"),
+        loo: pair("loo", "elpd")
+            .map(|[elpd, error]| [elpd, run.number(&["loo", "error_by_curve"]).unwrap_or(error)]),
         loo_behind: None,
+        curves: run.curves_left_out.as_ref().map(|curves| [curves.elpd, curves.error]),
+        curves_behind: None,
+        curves_unreliable: run.number(&["loo", "curves", "unreliable"]),
         loo_unreliable: run.number(&["loo", "unreliable"]),
         seconds: part("seconds"),
     }
@@ -170,11 +184,19 @@ fn rank_evidences(entries: &mut [Entry]) {
 }
 
 fn rank_predictions(runs: &[Finished], entries: &mut [Entry]) {
-    let known = runs.iter().filter_map(|run| run.left_out.as_ref());
-    let Some(best) = known.reduce(|a, b| if b.elpd > a.elpd { b } else { a }) else { return };
-    for (run, entry) in runs.iter().zip(entries) {
-        let behind = run.left_out.as_ref().and_then(|own| difference(best, own).ok());
-        entry.loo_behind = behind.map(|d| [d.elpd, d.error]);
+    let behind = |of: fn(&Finished) -> Option<&LeaveOneOut>| -> Vec<Option<[f64; 2]>> {
+        let known = runs.iter().filter_map(of);
+        let best = known.reduce(|a, b| if b.elpd > a.elpd { b } else { a });
+        let one = |run| {
+            let difference = difference(best?, of(run)?).ok()?;
+            Some([difference.elpd, difference.error_by_curve.unwrap_or(difference.error)])
+        };
+        runs.iter().map(one).collect()
+    };
+    let (data, curves) =
+        (behind(|run| run.left_out.as_ref()), behind(|run| run.curves_left_out.as_ref()));
+    for (entry, (data, curves)) in entries.iter_mut().zip(data.into_iter().zip(curves)) {
+        (entry.loo_behind, entry.curves_behind) = (data, curves);
     }
 }
 

@@ -143,6 +143,13 @@ fn weights(comparison: &Comparison, names: &[String]) -> Table {
     row(&mut table, "data predicted unreliably", "", runs, |run| {
         run.loo_unreliable.map(|count| format!("{count}"))
     });
+    if runs.iter().any(|run| run.curves.is_some()) {
+        row(&mut table, "the same of whole curves", "", runs, |run| pair(run.curves));
+        row(&mut table, "behind the best", "", runs, |run| pair(run.curves_behind));
+        row(&mut table, "curves predicted unreliably", "", runs, |run| {
+            run.curves_unreliable.map(|count| format!("{count}"))
+        });
+    }
     table
 }
 

@@ -15,6 +15,7 @@ fn finished(name: &str, log: f64, error: f64, hash: &str) -> Finished {
             "evidence": { "log": log, "error": error },
         }),
         left_out: None,
+        curves_left_out: None,
     }
 }
 

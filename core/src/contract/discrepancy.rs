@@ -17,7 +17,7 @@ use crate::run::Stop;
 ///   off, and never a number for hyperparameters that are none;
 /// - its derivatives are those that differences give, and none by what was not measured;
 /// - the density of a value given all others, where it is known, is the quotient of the likelihoods with and
-///   without the value;
+///   without the value; and of those of all data and of the part without it, where it has such a form;
 /// - reduced to a linear emulator it is the same function, with the same derivatives;
 /// - simulated data have the gaps of the measurements, and the variance that is predicted for a new replicate,
 ///   within five Monte Carlo errors;
@@ -36,11 +36,12 @@ pub fn discrepancy(name: &str, discrepancy: &dyn Discrepancy) -> Result<(), Vec<
     };
     // An error of the data's mean belongs to data that are there, not to a replicate that is new.
     let (of_data, of_model) = (|| common("replicates", false), || common("numerics", true));
-    let checks: [Check<'_>; 7] = [
+    let checks: [Check<'_>; 8] = [
         ("has sound hyperparameters", Box::new(over(has_sound_hyperparameters, of_data()))),
         ("judges responses", Box::new(over(judges_responses, of_data()))),
         ("knows its derivatives", Box::new(over(knows_its_derivatives, of_data()))),
         ("leaves values out", Box::new(|| leaves_values_out(discrepancy))),
+        ("stands for parts", Box::new(|| stands_for_parts(discrepancy))),
         ("compresses exactly", Box::new(over(compresses_exactly, of_data()))),
         ("simulates what it predicts", Box::new(over(simulates_what_it_predicts, of_model()))),
         ("refuses bad data", Box::new(|| refuses_bad_data(discrepancy))),
@@ -64,9 +65,9 @@ fn data() -> Measurements {
             (i != UNMEASURED && (r == 0 || !(i + r).is_multiple_of(3))).then_some(measured)
         };
         let values = truth().iter().enumerate().map(value).collect();
-        Replicate { name: format!("p{r}"), values }
+        Replicate::new(format!("p{r}"), values)
     };
-    Measurements { layout: layout(), replicates: (0..5).map(replicate).collect() }
+    Measurements::new(layout(), (0..5).map(replicate).collect())
 }
 
 /// An error that all replicates share, about a quarter of the scatter of the data.
@@ -192,6 +193,42 @@ fn leaves_values_out(discrepancy: &dyn Discrepancy) -> Result<(), String> {
     agree("the density of value", &densities, &quotients, 1e-8)
 }
 
+/// The part of the data without a value has the law of all of them, whatever the discrepancy takes from the data.
+fn stands_for_parts(discrepancy: &dyn Discrepancy) -> Result<(), String> {
+    let (data, truth, errors) = (data(), truth(), [common("emulator", true)]);
+    let known = known(&data, &errors);
+    let refused = |stop: Stop| format!("sound data are refused: {stop}");
+    let whole = discrepancy.likelihood(&known).map_err(refused)?;
+    let hyper = start(&*whole);
+    let of = |part: &dyn Likelihood| {
+        let all = whole.hyperparameters();
+        let own = part.hyperparameters().iter().map(|own| {
+            all.iter().position(|other| other.name == own.name).map_or(f64::NAN, |i| hyper[i])
+        });
+        part.log_likelihood(&truth, &own.collect::<Vec<_>>())
+    };
+    let Some(same) = discrepancy.likelihood_of_part(&known, &data).map_err(refused)? else {
+        return Ok(());
+    };
+    agree("the likelihood of all data as a part", &[of(&*same)], &[of(&*whole)], 1e-12)?;
+    let Some(given) = whole.left_out(&truth, &hyper) else { return Ok(()) };
+    let (mut densities, mut quotients) = (Vec::new(), Vec::new());
+    let mut next = given.iter();
+    for (r, replicate) in data.replicates.iter().enumerate() {
+        for i in (0..OUTPUTS).filter(|&i| replicate.values[i].is_some()) {
+            let density = next.next().copied().unwrap_or(f64::NAN);
+            let mut less = data.clone();
+            less.replicates[r].values[i] = None;
+            let part = discrepancy.likelihood_of_part(&known, &less).map_err(refused)?;
+            if let Some(part) = part {
+                densities.push(density);
+                quotients.push(of(&*whole) - of(&*part));
+            }
+        }
+    }
+    agree("the density of a value", &densities, &quotients, 1e-8)
+}
+
 /// Coefficients of four terms, whose values are the coordinates themselves.
 struct Terms(Matrix);
 
@@ -276,7 +313,7 @@ fn refuses_bad_data(discrepancy: &dyn Discrepancy) -> Result<(), String> {
         data.replicates.iter_mut().for_each(change);
         data
     };
-    let empty = Measurements { layout: layout(), replicates: Vec::new() };
+    let empty = Measurements::new(layout(), Vec::new());
     for (what, data) in [
         ("no replicate", empty),
         ("data without a value", changed(|r| r.values.fill(None))),

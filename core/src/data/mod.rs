@@ -7,6 +7,7 @@ pub mod layouts;
 pub mod measurements;
 pub mod parameter;
 pub mod scenario;
+pub mod statistics;
 pub mod table;
 pub mod unit;
 
@@ -17,5 +18,6 @@ pub use layouts::Layouts;
 pub use measurements::{Measurements, Observations, Replicate};
 pub use parameter::Parameter;
 pub use scenario::{Condition, Function, Scenario};
+pub use statistics::{Statistic, Statistics};
 pub use table::Table;
 pub use unit::{Unit, UnitError};

@@ -14,6 +14,7 @@
 pub mod autocorrelation;
 pub mod bridge;
 pub mod chains;
+pub mod coverage;
 pub mod leave_one_out;
 pub mod pareto;
 pub mod walkers;

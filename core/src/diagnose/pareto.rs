@@ -2,7 +2,7 @@
 //!
 //! Vehtari, Simpson, Gelman, Yao and Gabry, J. Mach. Learn. Res. 25 (2024) 72; the fit of the law is that
 //! of Zhang and Stephens, Technometrics 51 (2009) 316. Weights with `k_hat` above 0.7 do not have
-//! a mean that any practical number of draws would find.
+//! a mean that any practical number of draws would find; few draws find it only below [`limit`].
 
 /// Smoothed weights.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,8 +16,14 @@ pub struct Smoothed {
     pub effective_size: f64,
 }
 
-/// The largest `k_hat` with which importance sampling is reliable.
+/// The largest `k_hat` with which importance sampling is reliable, for any number of draws.
 pub const LARGEST_K: f64 = 0.7;
+
+/// The largest `k_hat` with which this number of draws is enough: `min(1 - 1 / log10 S, 0.7)` (Vehtari et al. 2024,
+/// section 3.2.4), which is 0.7 from 2200 draws on.
+pub fn limit(draws: usize) -> f64 {
+    (1.0 - 1.0 / (draws.max(2) as f64).log10()).min(LARGEST_K)
+}
 
 /// Fewer values than this fit no law.
 const FEWEST: usize = 5;
@@ -31,6 +37,12 @@ const ROUNDING: f64 = 1e-10;
 /// `k_hat` is zero. Where a ratio is not a number or plus infinity, or none has weight, the
 /// weights are equal and worth nothing.
 pub fn smooth(log_ratios: &[f64]) -> Smoothed {
+    smooth_dependent(log_ratios, 1.0)
+}
+
+/// The same for draws that depend on each other: each is worth the share `efficiency` of an independent one, and the
+/// tail is taken longer in its place (section 6 of Vehtari, Gelman and Gabry 2017).
+pub fn smooth_dependent(log_ratios: &[f64], efficiency: f64) -> Smoothed {
     let count = log_ratios.len();
     let largest = log_ratios.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if !largest.is_finite() || log_ratios.iter().any(|l| l.is_nan()) {
@@ -38,7 +50,8 @@ pub fn smooth(log_ratios: &[f64]) -> Smoothed {
         return Smoothed { log_weights, k_hat: f64::INFINITY, effective_size: 0.0 };
     }
     let mut logs: Vec<f64> = log_ratios.iter().map(|l| l - largest).collect();
-    let k_hat = if logs.iter().all(|l| *l > -ROUNDING) { 0.0 } else { smooth_tail(&mut logs) };
+    let k_hat =
+        if logs.iter().all(|l| *l > -ROUNDING) { 0.0 } else { smooth_tail(&mut logs, efficiency) };
     let total = logs.iter().map(|l| l.exp()).sum::<f64>().ln();
     for log in &mut logs {
         *log -= total;
@@ -49,11 +62,12 @@ pub fn smooth(log_ratios: &[f64]) -> Smoothed {
 
 /// Replaces the largest of logarithms whose maximum is zero by the quantiles of the law fitted to
 /// them, and gives its shape.
-fn smooth_tail(logs: &mut [f64]) -> f64 {
+fn smooth_tail(logs: &mut [f64], efficiency: f64) -> f64 {
     let count = logs.len();
     let mut order: Vec<usize> = (0..count).collect();
     order.sort_by(|&a, &b| logs[a].total_cmp(&logs[b]).then(a.cmp(&b)));
-    let tail = (count as f64 / 5.0).min(3.0 * (count as f64).sqrt()).ceil() as usize;
+    let independent = count as f64 / efficiency;
+    let tail = (count as f64 / 5.0).min(3.0 * independent.sqrt()).ceil() as usize;
     if tail >= count {
         return f64::INFINITY;
     }

@@ -144,13 +144,12 @@ fn part(data: &Observations, wanted: impl Fn(usize, usize, usize, usize) -> bool
     for (b, block) in data.blocks.iter().enumerate() {
         let mut replicates = Vec::new();
         for (r, replicate) in block.replicates.iter().enumerate() {
-            let pick = |(i, y): (usize, &Option<f64>)| y.filter(|_| wanted(b, r, begin + i, i));
-            let values: Vec<Option<f64>> = replicate.values.iter().enumerate().map(pick).collect();
-            if values.iter().any(Option::is_some) {
-                replicates.push(Replicate { name: replicate.name.clone(), values });
+            let own = replicate.only(|i| wanted(b, r, begin + i, i));
+            if own.values.iter().any(Option::is_some) {
+                replicates.push(own);
             }
         }
-        blocks.push(Measurements { layout: block.layout.clone(), replicates });
+        blocks.push(block.with_replicates(replicates));
         begin += block.layout.len();
     }
     Observations { blocks }
@@ -188,11 +187,8 @@ fn conditions(layout: &Layout, replicate: &Replicate) -> Vec<bool> {
 /// Blocks inside each curve: the same of all its replicates, so that two of them still show how they differ.
 fn blocks(data: &Observations, share: f64, stream: &Stream) -> Split {
     let mut training = data.clone();
-    let mut held_out: Vec<Measurements> = data
-        .blocks
-        .iter()
-        .map(|block| Measurements { layout: block.layout.clone(), replicates: Vec::new() })
-        .collect();
+    let mut held_out: Vec<Measurements> =
+        data.blocks.iter().map(|block| block.with_replicates(Vec::new())).collect();
     let mut drawn = 0;
     for (b, block) in data.blocks.iter().enumerate() {
         let length = match block.layout.axes.last().map(|axis| &axis.coordinates) {
@@ -206,13 +202,11 @@ fn blocks(data: &Observations, share: f64, stream: &Stream) -> Split {
             for own in set_aside(measured.len(), share, &stream.at(drawn)) {
                 let place = block.layout.describe(measured[own.start]);
                 for replicate in &mut training.blocks[b].replicates {
-                    let mut values = vec![None; replicate.values.len()];
-                    for &i in &measured[own.clone()] {
-                        values[i] = replicate.values[i].take();
-                    }
-                    if values.iter().any(Option::is_some) {
+                    let aside = replicate.only(|i| measured[own.clone()].contains(&i));
+                    measured[own.clone()].iter().for_each(|&i| replicate.values[i] = None);
+                    if aside.values.iter().any(Option::is_some) {
                         let name = format!("{} from {place}", replicate.name);
-                        held_out[b].replicates.push(Replicate { name, values });
+                        held_out[b].replicates.push(Replicate { name, ..aside });
                     }
                 }
             }
@@ -241,11 +235,13 @@ mod tests {
             Axis::grid("time", times, Unit::parse("s").unwrap()),
         ];
         let layout = Layout { name: "y".into(), unit: Unit::dimensionless(), axes };
-        let replicate = |r: usize| Replicate {
-            name: r.to_string(),
-            values: (0..2 * length).map(|i| Some((r * 1000 + i) as f64)).collect(),
+        let replicate = |r: usize| {
+            Replicate::new(
+                r.to_string(),
+                (0..2 * length).map(|i| Some((r * 1000 + i) as f64)).collect(),
+            )
         };
-        Measurements { layout, replicates: (0..replicates).map(replicate).collect() }.into()
+        Measurements::new(layout, (0..replicates).map(replicate).collect()).into()
     }
 
     /// Every value is in one part and in no other.

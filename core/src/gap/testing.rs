@@ -98,10 +98,9 @@ impl World {
     /// An experiment of so many replicates a condition around a truth.
     pub fn experiment(&self, truth: &[f64], replicates: usize, stream: &Stream) -> Experiment<'_> {
         let layout = self.layouts.blocks[0].clone();
-        let empty =
-            |r: usize| Replicate { name: r.to_string(), values: vec![Some(0.0); truth.len()] };
+        let empty = |r: usize| Replicate::new(r.to_string(), vec![Some(0.0); truth.len()]);
         let data: Observations =
-            Measurements { layout, replicates: (0..replicates).map(empty).collect() }.into();
+            Measurements::new(layout, (0..replicates).map(empty).collect()).into();
         let experiment = Experiment::new(&self.layouts, &self.parameters, &self.forward, &data);
         let replicates = self.noise.simulate(&experiment, truth, stream);
         experiment.with_replicates(replicates)

@@ -81,10 +81,10 @@ fn data(seed: u64, truth: &[f64], count: usize) -> Measurements {
     let replicate = |r: usize| {
         let mut rng = Stream::root(seed).at(r as u64).generator();
         let values = truth.iter().map(|y| Some(y + NOISE * normal(&mut rng))).collect();
-        Replicate { name: r.to_string(), values }
+        Replicate::new(r.to_string(), values)
     };
     let layout = layouts().blocks[0].clone();
-    Measurements { layout, replicates: (0..count).map(replicate).collect() }
+    Measurements::new(layout, (0..count).map(replicate).collect())
 }
 
 /// Bayesian linear regression: posterior precision `J'J R / s^2 + 1 / v`, evidence of the means `N(m0, s^2 / R + J v J')`

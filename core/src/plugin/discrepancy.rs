@@ -15,6 +15,24 @@ pub trait Discrepancy: Component {
     /// The likelihood of what is known.
     fn likelihood(&self, known: &Known<'_>) -> Result<Box<dyn Likelihood>, Stop>;
 
+    /// The likelihood of a part of the known data, some of whose values are missing, under the law that stands for all of
+    /// them: what is estimated from the replicates is so from all. The log density of the missing values given the part is
+    /// the difference of the two log-likelihoods. Hyperparameters keep their names; one that belongs to missing values
+    /// alone may be gone. `None` when the discrepancy has no such form.
+    fn likelihood_of_part(
+        &self,
+        _known: &Known<'_>,
+        _part: &Measurements,
+    ) -> Result<Option<Box<dyn Likelihood>>, Stop> {
+        Ok(None)
+    }
+
+    /// Whether the likelihood uses the noise that the data themselves state ([`Measurements::states_noise`]); where it does
+    /// not, such data are refused.
+    fn takes_stated_noise(&self) -> bool {
+        false
+    }
+
     /// The noise of one replicate around a response of this layout, where the options say how large it is: nothing of it
     /// is an unknown, and it does not come from the replicates.
     fn stated_noise(&self, _layout: &Layout, _response: &[f64]) -> Option<StatedNoise> {

@@ -26,6 +26,11 @@ pub trait Reader: Component {
         Err(ReadError::new(source.directory, "this reader does not read simulation runs"))
     }
 
+    /// How many of so many runs may fail, where the options say it.
+    fn allowed_failures(&self, _runs: usize) -> Option<usize> {
+        None
+    }
+
     /// Replicated measurements.
     fn measurements(&self, source: &MeasurementSource<'_>) -> Result<Measurements, ReadError> {
         Err(ReadError::new(source.directory, "this reader does not read measurements"))
@@ -140,12 +145,33 @@ pub struct ReadError {
     pub message: String,
     /// What to do about it.
     pub help: Option<String>,
+    /// What else is wrong with the same files, in the order of the files.
+    pub further: Vec<ReadError>,
 }
 
 impl ReadError {
     /// An error about a whole file.
     pub fn new(path: impl Into<PathBuf>, message: impl Into<String>) -> Self {
-        Self { path: path.into(), place: String::new(), message: message.into(), help: None }
+        Self {
+            path: path.into(),
+            place: String::new(),
+            message: message.into(),
+            help: None,
+            further: Vec::new(),
+        }
+    }
+
+    /// All of a list as one error; `None` when there is none.
+    pub fn of_all(errors: impl IntoIterator<Item = Self>) -> Option<Self> {
+        let mut each = errors.into_iter().flat_map(Self::into_each);
+        let first = each.next()?;
+        Some(Self { further: each.collect(), ..first })
+    }
+
+    /// Each error alone.
+    pub fn into_each(mut self) -> Vec<Self> {
+        let further = std::mem::take(&mut self.further);
+        std::iter::once(self).chain(further.into_iter().flat_map(Self::into_each)).collect()
     }
 
     /// The same error at a place in the file.
@@ -165,6 +191,8 @@ impl ReadError {
     fn render(&self) -> String {
         let place = if self.place.is_empty() { String::new() } else { format!(", {}", self.place) };
         let help = self.help.as_ref().map_or(String::new(), |h| format!("\nhelp: {h}"));
-        format!("{}{place}: {}{help}", self.path.display(), self.message)
+        let mut text = format!("{}{place}: {}{help}", self.path.display(), self.message);
+        self.further.iter().for_each(|error| text.push_str(&format!("\n{error}")));
+        text
     }
 }

@@ -47,6 +47,8 @@ pub trait Kind: 'static {
 pub struct Entry<K: ?Sized + 'static> {
     /// The name a study chooses it by.
     pub name: &'static str,
+    /// What others call it, such as `nuts`: a study that says so is told the name.
+    pub aliases: &'static [&'static str],
     /// The schema of its options.
     pub schema: &'static (dyn Fn(&mut SchemaGenerator) -> Schema + Send + Sync),
     /// Decodes its options, the given keys of the section being the engine's.
@@ -131,7 +133,16 @@ impl<K: Kind + ?Sized> Entry<K> {
     pub fn documentation(&self) -> Manual {
         let mut generator = generator();
         let schema = (self.schema)(&mut generator);
-        Manual::of_schema(&self.full_name(), &resolve(&schema, &generator), &generator)
+        let mut manual =
+            Manual::of_schema(&self.full_name(), &resolve(&schema, &generator), &generator);
+        if !self.aliases.is_empty() {
+            let names: Vec<String> = self.aliases.iter().map(|name| format!("`{name}`")).collect();
+            let paragraph = format!("Known elsewhere as {}.", names.join(", "));
+            let parts = [manual.prose.trim_end(), paragraph.as_str()];
+            manual.prose =
+                parts.into_iter().filter(|t| !t.is_empty()).collect::<Vec<_>>().join("\n\n");
+        }
+        manual
     }
 }
 
@@ -166,21 +177,25 @@ macro_rules! kind {
     };
 }
 
-/// Registers a plugin: its kind, its name in a study, its options, which implement the kind; and its revision, which is
-/// raised whenever what it computes changes, and is 1 when left out.
+/// Registers a plugin: its kind, its name in a study, its options, which implement the kind; what others call it; and its
+/// revision, which is raised whenever what it computes changes, and is 1 when left out.
 ///
 /// ```ignore
-/// lacuna::register!(Sampler, "metropolis", Metropolis, revision = 2);
+/// lacuna::register!(Sampler, "no_u_turn", NoUTurn, aliases: ["nuts"], revision = 2);
 /// ```
 #[macro_export]
 macro_rules! register {
-    ($kind:path, $name:literal, $options:ty) => {
-        $crate::register!($kind, $name, $options, revision = 1);
+    ($kind:path, $name:literal, $options:ty $(, aliases: [$($alias:literal),+ $(,)?])? $(,)?) => {
+        $crate::register!($kind, $name, $options $(, aliases: [$($alias),+])?, revision = 1);
     };
-    ($kind:path, $name:literal, $options:ty, revision = $revision:literal) => {
+    (
+        $kind:path, $name:literal, $options:ty $(, aliases: [$($alias:literal),+ $(,)?])?,
+        revision = $revision:literal
+    ) => {
         $crate::plugin::registry::inventory::submit! {
             $crate::plugin::registry::Entry::<dyn $kind> {
                 name: $name,
+                aliases: &[$($($alias),+)?],
                 schema: &<$options as $crate::plugin::registry::Documented>::json_schema,
                 build: &|node, beside, problems| {
                     $crate::plugin::registry::build(node, beside, problems, $name, |options| {
@@ -253,7 +268,11 @@ pub fn find<K: Kind + ?Sized>(name: &str) -> Result<&'static Entry<K>, Box<Probl
     } else {
         problem.expected(one_of(names()));
     }
-    if let Some(near) = nearest(name, names()) {
+    let plain = |text: &str| text.to_lowercase().replace(['-', ' ', '_'], "");
+    let is_called =
+        |entry: &&&Entry<K>| entry.aliases.iter().any(|alias| plain(alias) == plain(name));
+    let known = entries.iter().find(is_called).map(|entry| entry.name);
+    if let Some(near) = known.or_else(|| nearest(name, names())) {
         problem.help(format!("did you mean `{near}`?"));
     }
     Err(Box::new(problem))

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Component, Fact};
+use crate::data::Statistic;
 use crate::linalg::Matrix;
 use crate::math::random::Stream;
 use crate::run::Stop;
@@ -65,6 +66,11 @@ pub trait Sampler: Component {
         false
     }
 
+    /// Whether the points of each step are draws, so that a run may end after any number of steps past the warm-up.
+    fn steps_are_draws(&self) -> bool {
+        false
+    }
+
     /// The draws of a method whose steps are not draws themselves (populations that are cooled, live points,
     /// fits), from its last state; `None` where the points of each step are draws.
     fn harvest(
@@ -74,6 +80,12 @@ pub trait Sampler: Component {
         _stream: &Stream,
     ) -> Result<Option<Harvest>, Stop> {
         Ok(None)
+    }
+
+    /// What there is to tell of the last step of each chain beside its point: the same statistics in the same order of
+    /// every state, that before the first step included. They are kept with the draws.
+    fn statistics(&self, _state: &State) -> Vec<Statistic> {
+        Vec::new()
     }
 
     /// Reasons not to trust the draws of a run that ended in this state, each with what would help; none

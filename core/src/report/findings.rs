@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::assess::Assessment;
 use crate::data::{FailedRun, Layouts, Observations, Parameter, Unit};
 use crate::gap::account::{Account, HeldOut};
 use crate::gap::added::Added;
@@ -43,7 +44,9 @@ pub struct Findings {
     pub made_by: Vec<(String, String)>,
     /// The time each stage took when it was made, in seconds.
     pub seconds: Vec<(String, f64)>,
-    /// Things a reader must know first: not converged, stranded walkers, runs left out.
+    /// Whether all this can be trusted, and what speaks against it.
+    pub assessment: Assessment,
+    /// What was told on the way beside these findings: runs left out, evaluations without an answer.
     pub warnings: Vec<String>,
     /// What the stand-in or the data are not, as the study's `note` says.
     pub note: Option<String>,
@@ -181,13 +184,34 @@ pub struct CalibrationFindings {
 pub struct LeftOutFindings {
     /// The expected log predictive density, summed over the data.
     pub elpd: f64,
-    /// Its standard error.
+    /// Its standard error, as if the data were independent of each other.
     pub error: f64,
+    /// Its standard error from the scatter over the curves; `None` below two.
+    pub error_by_curve: Option<f64>,
     /// The effective number of parameters.
     pub parameters: f64,
     /// How many data have estimates that cannot be trusted.
     pub unreliable: usize,
+    /// The largest k-hat that can be trusted with the draws there are.
+    pub limit: f64,
     /// The number of data.
+    pub count: usize,
+    /// The prediction of whole curves from all others.
+    pub curves: Option<CurvesLeftOutFindings>,
+}
+
+/// How well whole curves are predicted from all others (PSIS with the joint density of a curve).
+#[derive(Debug, Clone, PartialEq)]
+pub struct CurvesLeftOutFindings {
+    /// The expected log predictive density, summed over the curves.
+    pub elpd: f64,
+    /// Its standard error, from the scatter over the curves.
+    pub error: f64,
+    /// The effective number of parameters.
+    pub parameters: f64,
+    /// How many curves have estimates that cannot be trusted.
+    pub unreliable: usize,
+    /// The number of curves.
     pub count: usize,
 }
 

@@ -4,12 +4,14 @@
 //! [`summary_json`] what scripts read; all three from [`findings::Findings`] and nothing else.
 
 mod chart;
+mod coverage;
 mod curve;
 pub mod findings;
 mod gap;
 pub(crate) mod number;
 mod page;
 mod power;
+mod qualified;
 mod scale;
 mod section;
 mod summary;
@@ -17,6 +19,7 @@ mod svg;
 pub(crate) mod table;
 mod terminal;
 
+pub use coverage::{coverage_page, coverage_text};
 pub use gap::gap_text;
 pub use page::render;
 pub use power::power_text;

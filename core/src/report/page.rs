@@ -101,7 +101,8 @@ fn legend_key(key: &Key) -> Markup {
     }
 }
 
-const STYLE: &str = include_str!("page.css");
+/// How everything looks.
+pub const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 
 /// The whole report as one HTML file.

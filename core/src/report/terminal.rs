@@ -1,11 +1,11 @@
 //! The closing summary that a terminal shows after a run.
 
 use super::findings::Findings;
-use super::section::{accuracy_table, evidence, group_word, headline, posterior_table};
+use super::section::{accuracy_table, banner, evidence, group_word, headline, posterior_table};
 
-/// The result of a run in plain text: warnings, what came out, the posterior, the accuracy.
+/// The result of a run in plain text: the verdict in the first line, its findings, warnings, what came out, the posterior, the accuracy.
 pub fn summary_text(findings: &Findings) -> String {
-    let mut parts = Vec::new();
+    let mut parts = vec![banner::lines(&findings.assessment).join("\n") + "\n"];
     if !findings.warnings.is_empty() {
         let lines: Vec<String> =
             findings.warnings.iter().map(|warning| format!("warning: {warning}")).collect();
@@ -14,7 +14,7 @@ pub fn summary_text(findings: &Findings) -> String {
     parts.push(headline::sentences(findings).join("\n") + "\n");
     if let Some(calibration) = &findings.calibration {
         parts.push(posterior_table(calibration).text());
-        let evidence = evidence::sentences(calibration);
+        let evidence = evidence::sentences(findings, calibration);
         if !evidence.is_empty() {
             parts.push(evidence.join("\n") + "\n");
         }

@@ -55,6 +55,9 @@ pub struct Record {
     pub lacuna: String,
     /// When it was finished, in seconds since 1970 (UTC).
     pub finished: u64,
+    /// What was told while it was made.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
 }
 
 impl Record {
@@ -195,14 +198,15 @@ impl RunDirectory {
                         let made = &record.lacuna;
                         observer.note(&format!("`{stage}` is taken as lacuna {made} made it"));
                     }
+                    record.warnings.iter().for_each(|text| observer.recall(text));
                     return Ok(self.kept(record, value, false));
                 }
-                Err(_) => observer.warn(&format!(
+                Err(_) => observer.remark(&format!(
                     "the files in {} do not read back; making them again",
                     folder.display()
                 )),
             },
-            Finished::Changed(file) => observer.warn(&format!(
+            Finished::Changed(file) => observer.remark(&format!(
                 "{} is missing or not as it was written; making it again",
                 folder.join(file).display()
             )),
@@ -214,6 +218,7 @@ impl RunDirectory {
             }
         }
         let begun = Instant::now();
+        let before = observer.heard().len();
         let made = make(&folder);
         // What went wrong first explains more than what followed from it.
         if let Some(said) = self.watched.iter().find_map(|fault| fault.said()) {
@@ -228,6 +233,7 @@ impl RunDirectory {
         }
         let finished =
             SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |elapsed| elapsed.as_secs());
+        let warnings = observer.heard().split_off(before);
         let record = Record {
             stage: stage.to_owned(),
             inputs,
@@ -237,6 +243,7 @@ impl RunDirectory {
             seconds,
             lacuna: self.version.clone(),
             finished,
+            warnings,
         };
         files::write_json(&folder.join(RECORD), &record)?;
         Ok(self.kept(record, value, true))

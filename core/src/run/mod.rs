@@ -12,5 +12,5 @@ pub mod stop;
 
 pub use arrays::write_response;
 pub use directory::{Artifact, Kept, RunDirectory, inputs_of};
-pub use progress::{Observer, Progress, Silent};
+pub use progress::{Listener, Observer, Progress, Silent};
 pub use stop::Stop;

@@ -1,5 +1,6 @@
 //! Progress, told to whoever watches.
 
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Watches a run.
@@ -14,6 +15,62 @@ pub trait Observer: Sync {
     fn warn(&self, text: &str);
     /// Something worth telling that is no reason for concern.
     fn note(&self, _text: &str) {}
+    /// Something about this machine, these files or this attempt: it is told, and is no part of the result.
+    fn remark(&self, text: &str) {
+        self.warn(text);
+    }
+    /// Every warning so far, where someone listens for the report.
+    fn heard(&self) -> Vec<String> {
+        Vec::new()
+    }
+    /// A warning of a stage that is kept, given when it was made.
+    fn recall(&self, _text: &str) {}
+}
+
+/// Passes everything on and remembers the warnings, which belong to the result as much as its numbers.
+pub struct Listener<'a> {
+    observer: &'a dyn Observer,
+    heard: Mutex<Vec<String>>,
+}
+
+impl<'a> Listener<'a> {
+    /// Has heard nothing yet.
+    pub fn new(observer: &'a dyn Observer) -> Self {
+        Self { observer, heard: Mutex::default() }
+    }
+
+    fn with<R>(&self, act: impl FnOnce(&mut Vec<String>) -> R) -> R {
+        // A thread that panicked while it warned spoils nothing here.
+        act(&mut self.heard.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
+    }
+}
+
+impl Observer for Listener<'_> {
+    fn begin(&self, stage: &str, unit: &str, total: u64) {
+        self.observer.begin(stage, unit, total);
+    }
+    fn advance(&self, done: u64) {
+        self.observer.advance(done);
+    }
+    fn end(&self, stage: &str, note: &str) {
+        self.observer.end(stage, note);
+    }
+    fn warn(&self, text: &str) {
+        self.observer.warn(text);
+        self.with(|heard| heard.push(text.to_owned()));
+    }
+    fn note(&self, text: &str) {
+        self.observer.note(text);
+    }
+    fn remark(&self, text: &str) {
+        self.observer.remark(text);
+    }
+    fn heard(&self) -> Vec<String> {
+        self.with(|heard| heard.clone())
+    }
+    fn recall(&self, text: &str) {
+        self.with(|heard| heard.push(text.to_owned()));
+    }
 }
 
 /// Watches nothing.
@@ -48,5 +105,10 @@ impl<'a> Progress<'a> {
     /// Something a person should know.
     pub fn warn(&self, text: &str) {
         self.observer.warn(text);
+    }
+
+    /// See [`Observer::remark`].
+    pub fn remark(&self, text: &str) {
+        self.observer.remark(text);
     }
 }

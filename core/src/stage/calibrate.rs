@@ -1,38 +1,40 @@
 //! Stage 5: the posterior of the parameters.
 
-use std::ops::Range;
+mod kept;
+mod law;
+
 use std::path::Path;
-use std::sync::OnceLock;
 
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::data::{Draws, Observations, Unit};
+use crate::data::{Draws, Observations, Statistics, Unit};
 use crate::diagnose::Diagnosis;
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::math::optimise;
 use crate::math::random::Stream;
-use crate::plugin::discrepancy;
-use crate::plugin::discrepancy::CommonError;
 use crate::plugin::sampler::Evidence;
 use crate::plugin::{Fact, Forward, Likelihood, Sampler, Target};
 use crate::posterior::{Joint, OfData, Posterior};
-use crate::run::arrays::{self, Array};
-use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
+use crate::run::{Kept, Observer, Progress, RunDirectory, Stop};
 use crate::study::Study;
 use crate::study::file::Start;
+
+pub use law::Law;
 
 use super::read::Measured;
 use super::sampling::{self, Length, Sampled};
 use super::start::{inside, maxima, sobol};
-use super::{Known, best_fit, common_error, stream};
+use super::{Known, Trial, best_fit};
 
 /// The posterior as draws, with its maximum.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibrated {
     /// All draws in natural units, burn-in included.
     pub draws: Draws,
+    /// What the sampler told of the steps, burn-in included.
+    pub statistics: Statistics,
     /// The rest.
     pub outcome: Outcome,
 }
@@ -79,45 +81,6 @@ pub struct Coordinate {
     pub reference: Option<f64>,
 }
 
-impl Artifact for Calibrated {
-    fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
-        let d = &self.draws;
-        let axes = |last: Option<usize>| {
-            let both = [("chain".to_owned(), d.chains), ("step".to_owned(), d.steps)];
-            both.into_iter().chain(last.map(|n| ("coordinate".to_owned(), n))).collect()
-        };
-        let array = |name: &str, values: &[f64], last| Array {
-            name: name.to_owned(),
-            dimensions: axes(last),
-            values: values.to_vec(),
-            unit: None,
-        };
-        let arrays = [
-            array("draws", &d.values, Some(d.dimension())),
-            array("log_density", &d.log_density, None),
-        ];
-        let names = d.names.join(" ");
-        arrays::write(&folder.join("draws.nc"), &[("coordinates", names)], &arrays)?;
-        files::write_json(&folder.join("outcome.json"), &self.outcome)?;
-        Ok(["draws.nc", "outcome.json"].map(str::to_owned).to_vec())
-    }
-
-    fn load(folder: &Path) -> Result<Self, Stop> {
-        let outcome: Outcome = files::read_json(&folder.join("outcome.json"))?;
-        let path = folder.join("draws.nc");
-        let values = arrays::read(&path, "draws")?;
-        let log_density = arrays::read(&path, "log_density")?;
-        let draws = Draws {
-            names: outcome.coordinates.iter().map(|c| c.name.clone()).collect(),
-            chains: values.dimensions[0].1,
-            steps: values.dimensions[1].1,
-            values: values.values,
-            log_density: log_density.values,
-        };
-        Ok(Self { draws, outcome })
-    }
-}
-
 /// The parts of a posterior that outlive the stage.
 pub struct Parts {
     likelihood: Box<dyn Likelihood>,
@@ -126,41 +89,18 @@ pub struct Parts {
 impl Parts {
     /// The likelihood of the study's measurements, with the common errors that the study wants.
     pub fn of(study: &Study, measured: &Measured, known: &Known<'_>) -> Result<Self, Stop> {
-        let section =
-            study.discrepancy.as_ref().ok_or_else(|| Stop::new("the study has no discrepancy"))?;
-        let mut common = Vec::new();
-        if let (Some(fitted), true) = (known.fitted, section.common.emulator_error) {
-            let data = &measured.likelihood;
-            let stated = stated_variance(study, data, known.forward)?;
-            common.push(fitted.value.covariance(study, stated.as_deref())?);
-        }
-        if let (Some(kept), Some(section)) = (known.numerics, &study.numerical_error) {
-            common.push(kept.value.common_error(&section.written));
-        }
-        let slopes = OnceLock::new();
-        let slopes = || {
-            let made = || best_fit::slopes(study, &measured.likelihood, known.forward);
-            slopes.get_or_init(made).clone()
-        };
+        Self::with(study, &Law::of(study, measured, known)?)
+    }
+
+    /// The likelihood of data without any common error: what the discrepancy alone says of them.
+    pub fn bare(study: &Study, data: &Observations, forward: &dyn Forward) -> Result<Self, Stop> {
+        Self::with(study, &Law::bare(study, data, forward)?)
+    }
+
+    fn with(study: &Study, law: &Law<'_>) -> Result<Self, Stop> {
         let layouts = &study.layouts;
-        let mut likelihoods = Vec::new();
-        for (i, range) in layouts.ranges().enumerate() {
-            let part = |error: &CommonError| CommonError {
-                factor: rows(&error.factor, range.clone()),
-                ..error.clone()
-            };
-            let mut own: Vec<CommonError> = common.iter().map(part).collect();
-            if section.common.replicate_error {
-                let of_replicates = common_error::of_replicates(&measured.used.blocks[i]);
-                let after = usize::from(own.first().is_some_and(|e| e.origin == "emulator"));
-                own.splice(after..after, of_replicates);
-            }
-            likelihoods.push(section.built.plugin.likelihood(&discrepancy::Known {
-                data: &measured.likelihood.blocks[i],
-                common: &own,
-                slopes: &|| Ok(rows(&slopes()?, range.clone())),
-            })?);
-        }
+        let mut likelihoods: Vec<Box<dyn Likelihood>> =
+            (0..layouts.blocks.len()).map(|i| law.block(i)).collect::<Result<_, _>>()?;
         let likelihood = match likelihoods.len() {
             1 => likelihoods.remove(0),
             _ => Box::new(Joint::new(layouts, likelihoods)),
@@ -178,11 +118,6 @@ impl Parts {
         let likelihood = OfData::new(known.forward, study.placed_effects(), self.likelihood());
         Posterior::new(&study.parameters, likelihood).within(known.region.map(<[_]>::to_vec))
     }
-}
-
-/// Some rows of a matrix.
-fn rows(matrix: &Matrix, range: Range<usize>) -> Matrix {
-    matrix.select_rows(&range.collect::<Vec<_>>())
 }
 
 /// The forward map's own variance of each output where it fits the data best; `None` when it knows none.
@@ -229,13 +164,14 @@ pub fn stage(
     ]);
     let parts = Parts::of(study, measured, known)?;
     let posterior = parts.posterior(study, known);
-    draw(study, &posterior, folder, &inputs, run, observer).map(Some)
+    draw(study, &posterior, known.trial, folder, &inputs, run, observer).map(Some)
 }
 
 /// Draws from any posterior, kept in a folder.
 pub fn draw(
     study: &Study,
     posterior: &Posterior<'_>,
+    trial: Option<Trial>,
     folder: &str,
     inputs: &impl Serialize,
     run: &mut RunDirectory,
@@ -244,8 +180,9 @@ pub fn draw(
     let section = study.sampler.as_ref().ok_or_else(|| Stop::new("the study has no sampler"))?;
     let plan = section.built.plugin.plan(posterior.dimension());
     observer.begin("calibrate", "step", plan.steps as u64);
-    let kept =
-        run.keep(folder, inputs, observer, |folder| calibrate(study, posterior, folder, observer))?;
+    let kept = run.keep(folder, inputs, observer, |folder| {
+        calibrate(study, posterior, trial, folder, observer)
+    })?;
     observer.end("calibrate", &summary(&kept.value));
     Ok(kept)
 }
@@ -259,11 +196,12 @@ fn summary(calibrated: &Calibrated) -> String {
 fn calibrate(
     study: &Study,
     posterior: &Posterior<'_>,
+    trial: Option<Trial>,
     folder: &Path,
     observer: &dyn Observer,
 ) -> Result<Calibrated, Stop> {
     let section = study.sampler.as_ref().ok_or_else(|| Stop::new("the study has no sampler"))?;
-    let random = stream(study, "calibrate");
+    let random = Trial::stream(trial, study, "calibrate");
     let maxima = maxima(posterior, &random.named("optimise"));
     sampling::broken(posterior)?;
     let maxima = maxima?;
@@ -273,8 +211,11 @@ fn calibrate(
     let start = || starts(posterior, sampler, section.common.start, &best.point, &random);
     let coordinates = coordinates(study, posterior);
     let progress = Progress::new(observer);
-    let length =
-        Length { burn_in: section.common.burn_in.get(), stop: section.common.stop.as_ref() };
+    let length = Length {
+        burn_in: section.common.burn_in.get(),
+        stop: section.common.stop.as_ref(),
+        half: trial.is_some_and(|trial| trial.quick),
+    };
     let mut sampled = sampling::sample(
         &*section.built.plugin,
         posterior,
@@ -318,7 +259,7 @@ fn calibrate(
         facts: [posterior.facts(), section.built.plugin.facts(), harvested].concat(),
         evidence,
     };
-    Ok(Calibrated { draws, outcome })
+    Ok(Calibrated { draws, statistics: sampled.statistics, outcome })
 }
 
 /// One starting point a chain.

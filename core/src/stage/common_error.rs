@@ -45,12 +45,12 @@ mod tests {
         let replicate = |r: usize| {
             let gain = 1.0 + 0.1 * normal(&mut Stream::root(3).at(r as u64).generator());
             let values = curve.iter().map(|y| Some(gain * y)).collect();
-            Replicate { name: r.to_string(), values }
+            Replicate::new(r.to_string(), values)
         };
         let unit = Unit::dimensionless();
         let axes = vec![Axis::grid("time", grid.clone(), unit.clone())];
         let layout = Layout { name: "y".into(), unit, axes };
-        let data = Measurements { layout, replicates: (0..count).map(replicate).collect() };
+        let data = Measurements::new(layout, (0..count).map(replicate).collect());
         let factor = of_replicates(&data).unwrap().factor;
         let norm: f64 = curve.iter().map(|y| y * y).sum();
         let along: f64 = (0..count)

@@ -30,7 +30,8 @@ pub(super) fn run(
     let known = prepared.known();
     let calibrated = calibrate::stage(study, &known, "5-calibrate", run, observer)?;
     if let Some(tally) = prepared.direct.tally() {
-        observer.warn(&tally);
+        // How many there were depends on where a run was interrupted; the assessment counts them anew.
+        observer.remark(&tally);
     }
     super::conclude(study, goal, &known, calibrated.as_ref(), run, observer)
 }
@@ -68,6 +69,7 @@ impl<'a> Prepared<'a> {
             numerics: None,
             region: None,
             refinement: None,
+            trial: None,
         }
     }
 }

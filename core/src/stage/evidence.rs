@@ -1,27 +1,27 @@
-//! Stage 6: how probable the data are under the study, and how well each datum is predicted from the others.
+//! Stage 6: how probable the data are under the study, and how well each datum and each curve is predicted from the others.
 //!
 //! What [`compare`](crate::compare) puts side by side for several studies of the same data.
 
-use std::path::Path;
+mod kept;
 
-use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use crate::data::Draws;
 use crate::diagnose::bridge;
-use crate::diagnose::leave_one_out::{LeaveOneOut, Left};
+use crate::diagnose::leave_one_out::LeaveOneOut;
 use crate::linalg::Matrix;
 use crate::plugin::sampler::Evidence;
-use crate::plugin::{Forward, Likelihood};
 use crate::posterior::Posterior;
 use crate::report::number::significant;
-use crate::run::arrays::{self, Array};
-use crate::run::{Artifact, Kept, Observer, RunDirectory, Stop, files};
+use crate::run::{Kept, Observer, RunDirectory, Stop};
 use crate::study::Study;
 
+pub use kept::{curves_left_out, left_out};
+
 use super::calibrate::Calibrated;
-use super::{predict, stream};
+use super::curves::{self, Curves};
+use super::predictions::{self, Chosen, Predicting};
+use super::stream;
 
 /// What speaks for a study as a whole.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -30,77 +30,16 @@ pub struct Weighed {
     pub evidence: Option<Evidence>,
     /// The prediction of each datum from all others, where the discrepancy knows it.
     pub left_out: Option<LeaveOneOut>,
+    /// The prediction of each curve from all others, where the discrepancy knows it and there are several.
+    pub curves_left_out: Option<LeaveOneOut>,
+    /// The log density of each curve given all other data and the parameters, at the draws that [`Chosen`] has.
+    pub by_curve: Option<Matrix>,
     /// Why something is missing, or less than it could be.
     pub missing: Vec<String>,
 }
 
-/// The part of it that is no array.
-#[derive(Serialize, Deserialize)]
-struct Header {
-    evidence: Option<Evidence>,
-    left_out: bool,
-    missing: Vec<String>,
-}
-
-impl Artifact for Weighed {
-    fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
-        let header = Header {
-            evidence: self.evidence.clone(),
-            left_out: self.left_out.is_some(),
-            missing: self.missing.clone(),
-        };
-        files::write_json(&folder.join("evidence.json"), &header)?;
-        let mut names = vec!["evidence.json".to_owned()];
-        if let Some(loo) = &self.left_out {
-            let column = |name: &str, value: fn(&Left) -> f64| Array {
-                name: name.to_owned(),
-                dimensions: vec![("datum".to_owned(), loo.data.len())],
-                values: loo.data.iter().map(value).collect(),
-                unit: None,
-            };
-            let columns = [
-                column("elpd", |left| left.elpd),
-                column("with_it", |left| left.with_it),
-                column("k_hat", |left| left.k_hat),
-            ];
-            arrays::write(&folder.join(LEFT_OUT), &[], &columns)?;
-            names.push(LEFT_OUT.to_owned());
-        }
-        Ok(names)
-    }
-
-    fn load(folder: &Path) -> Result<Self, Stop> {
-        let header: Header = files::read_json(&folder.join("evidence.json"))?;
-        let left_out = header.left_out.then(|| left_out(folder)).transpose()?;
-        Ok(Self { evidence: header.evidence, left_out, missing: header.missing })
-    }
-}
-
 /// The folder of the stage.
 pub const FOLDER: &str = "6-evidence";
-const LEFT_OUT: &str = "left_out.nc";
-
-/// The predictions that a run kept in the stage's folder.
-pub fn left_out(folder: &Path) -> Result<LeaveOneOut, Stop> {
-    let path = folder.join(LEFT_OUT);
-    let column = |name: &str| arrays::read(&path, name).map(|array| array.values);
-    let (elpd, with_it, k_hat) = (column("elpd")?, column("with_it")?, column("k_hat")?);
-    let each = elpd.into_iter().zip(with_it).zip(k_hat);
-    Ok(LeaveOneOut::sum(
-        each.map(|((elpd, with_it), k_hat)| Left { elpd, with_it, k_hat }).collect(),
-    ))
-}
-
-/// What predicts the data, where there are any.
-#[derive(Clone, Copy)]
-pub struct Predicting<'a> {
-    /// From parameters to responses.
-    pub forward: &'a dyn Forward,
-    /// The likelihood.
-    pub likelihood: &'a dyn Likelihood,
-    /// The number of data in it.
-    pub data: usize,
-}
 
 /// Weighs a calibrated study.
 pub fn stage(
@@ -125,8 +64,11 @@ pub fn stage(
             .map_err(|reason| missing.push(format!("no evidence: {reason}")))
             .ok(),
         };
-        let left_out = predicting.and_then(|p| predictions(study, p, &draws, &mut missing));
-        Ok(Weighed { evidence, left_out, missing })
+        let weighed = Weighed { evidence, missing, ..Weighed::default() };
+        match predicting {
+            Some(p) => weighed.predicting(study, &p, &calibrated.value),
+            None => Ok(weighed),
+        }
     })?;
     observer.end("evidence", &summary(&kept.value));
     Ok(kept)
@@ -139,7 +81,8 @@ fn summary(weighed: &Weighed) -> String {
         .into_iter()
         .collect();
     let loo = weighed.left_out.as_ref();
-    parts.extend(loo.map(|l| format!("log predictive density {:.1} ± {:.1}", l.elpd, l.error)));
+    let error = |l: &LeaveOneOut| l.error_by_curve.unwrap_or(l.error);
+    parts.extend(loo.map(|l| format!("log predictive density {:.1} ± {:.1}", l.elpd, error(l))));
     parts.extend(weighed.missing.iter().cloned());
     parts.join(", ")
 }
@@ -168,41 +111,54 @@ fn coordinates(posterior: &Posterior<'_>, draws: &Draws) -> Draws {
     draws
 }
 
-/// The number of draws behind the predictions of left-out data.
-const PREDICTED: usize = 400;
+/// So many values of data are weighed at most to leave out all curves at all draws.
+const WORK: usize = 1 << 33;
 
-/// How many draws are looked at together.
-const TOGETHER: usize = 40;
-
-fn predictions(
-    study: &Study,
-    p: Predicting<'_>,
-    draws: &Draws,
-    missing: &mut Vec<String>,
-) -> Option<LeaveOneOut> {
-    let wanted = PREDICTED.min(draws.len());
-    let count = predict::affordable(wanted, p.data);
-    let chosen = draws.points().select_rows(&predict::spaced(count, draws.len()));
-    let own = p.likelihood.hyperparameters().len();
-    let mut all: Option<Matrix> = None;
-    for first in (0..count).step_by(TOGETHER) {
-        let rows: Vec<usize> = (first..count.min(first + TOGETHER)).collect();
-        let some = chosen.select_rows(&rows);
-        let responses = predict::responses(study, p.forward, &some);
-        let left_out = |(i, response): (usize, &Vec<f64>)| {
-            p.likelihood.left_out(response, &some.row(i)[some.columns() - own..])
+impl Weighed {
+    /// The same with the predictions of left-out data.
+    fn predicting(
+        mut self,
+        study: &Study,
+        p: &Predicting<'_>,
+        calibrated: &Calibrated,
+    ) -> Result<Self, Stop> {
+        let data = p.data.count();
+        let chosen = Chosen::of(calibrated, data);
+        let responses = predictions::responses(study, p, &chosen);
+        let Some(densities) = predictions::pointwise(study, p, &chosen, responses.as_deref())
+        else {
+            return Ok(self);
         };
-        let densities: Option<Vec<_>> = responses.par_iter().enumerate().map(left_out).collect();
-        for (row, density) in rows.iter().zip(densities?) {
-            let all = all.get_or_insert_with(|| Matrix::zeros(count, density.len()));
-            all.row_mut(*row).copy_from_slice(&density);
+        let count = chosen.points.rows();
+        if !chosen.written {
+            self.missing.push(format!(
+                "each of {data} data is predicted from {count} draws; the predictions are too many for `posterior.nc`, \
+                 which goes without them"
+            ));
         }
+        let curves = Curves::of(p.data);
+        self.left_out = Some(LeaveOneOut::of(&densities, chosen.efficiency, curves.of.clone()));
+        let work = curves.all.len().saturating_mul(count).saturating_mul(data);
+        let Some(responses) = responses.filter(|_| work <= WORK) else {
+            self.missing.push(format!(
+                "no curve is predicted from the others: {} curves of {data} data are too many",
+                curves.all.len()
+            ));
+            return Ok(self);
+        };
+        let names = p.likelihood.hyperparameters();
+        let d = chosen.points.columns();
+        let own: Vec<usize> = (d - names.len()..d).collect();
+        let hyper = chosen.points.select_columns(&own);
+        let ranges: Vec<_> = study.layouts.ranges().collect();
+        let unknowns = (names, &hyper);
+        self.by_curve = if curves.all.is_empty() {
+            None
+        } else {
+            curves::left_out(&curves.all, &p.law, p.data, &ranges, &responses, unknowns)?
+        };
+        let of = |densities| LeaveOneOut::of(densities, chosen.efficiency, Vec::new());
+        self.curves_left_out = self.by_curve.as_ref().map(of);
+        Ok(self)
     }
-    if all.is_some() && count < wanted {
-        missing.push(format!(
-            "each of {} data is predicted from {count} draws, not from {wanted}: more would not fit into memory",
-            p.data
-        ));
-    }
-    all.as_ref().map(LeaveOneOut::of)
 }

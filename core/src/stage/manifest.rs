@@ -1,14 +1,32 @@
 //! What a run was made from: the study as written, the study as resolved, and the provenance of every stage.
 
+use std::path::{Path, PathBuf};
+
 use serde_json::{Value, json};
 
 use crate::plugin::abi::Library;
 use crate::run::{RunDirectory, Stop, files};
 use crate::study::{Study, emit};
 
-/// Writes `study.toml` (byte for byte) and `resolved.toml` (which runs as it stands).
+/// Where the study of a run directory is: the absolute path of its file.
+const ORIGIN: &str = "study.path";
+
+/// The file of the study that a run directory belongs to; `None` where it was not noted.
+pub fn origin(root: &Path) -> Option<PathBuf> {
+    let text = std::fs::read_to_string(root.join(ORIGIN)).ok()?;
+    Some(PathBuf::from(text.trim_end_matches('\n')))
+}
+
+/// Writes `study.toml` (byte for byte), `resolved.toml` (which runs as it stands) and where the study is.
 pub fn begin(study: &Study, run: &mut RunDirectory) -> Result<(), Stop> {
     run.watch(study.faults());
+    let file = std::path::absolute(&study.file).unwrap_or_else(|_| study.file.clone());
+    // A run that is resumed is read from its own directory.
+    let root = std::path::absolute(run.root()).unwrap_or_else(|_| run.root().to_owned());
+    if !file.starts_with(&root) {
+        let text = format!("{}\n", file.display());
+        files::write_atomic(&run.root().join(ORIGIN), text.as_bytes())?;
+    }
     files::write_atomic(&run.root().join("study.toml"), study.text.as_bytes())?;
     let resolved = emit::to_toml(&study.resolved)
         .map_err(|error| Stop::new(format!("cannot write resolved.toml: {error}")))?;

@@ -1,8 +1,12 @@
 //! The whole program: stages in order, each one function from plain data to plain data.
 
+pub mod assess;
 pub mod best_fit;
 pub mod calibrate;
 pub mod common_error;
+pub mod contents;
+pub mod coverage;
+pub mod curves;
 pub mod derived;
 pub mod design;
 pub mod direct;
@@ -18,6 +22,7 @@ pub mod manifest;
 pub mod numerical_error;
 pub mod power;
 pub mod predict;
+pub mod predictions;
 pub mod read;
 pub mod refine;
 pub mod report;
@@ -34,13 +39,14 @@ pub mod validate;
 use crate::math::random::Stream;
 use crate::plugin::{Emulator, Forward};
 use crate::report::findings::Findings;
-use crate::run::{Kept, Observer, RunDirectory, Stop, files};
+use crate::run::{Kept, Listener, Observer, RunDirectory, Stop, files};
 use crate::study::Study;
 use serde_json::json;
 
 use calibrate::Calibrated;
-use evidence::{Predicting, Weighed};
+use evidence::Weighed;
 use numerical_error::NumericalError;
+use predictions::Predicting;
 use read::Data;
 use refine::Refinement;
 use surrogate::Fitted;
@@ -97,7 +103,9 @@ fn pursue(
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {
+    contents::before_all(study)?;
     manifest::begin(study, run)?;
+    let observer = &Listener::new(observer);
     let findings = match (&study.target, &study.surrogate) {
         (Some(given), _) => target::run(study, given, run, observer)?,
         (None, Some(_)) => with_surrogate(study, goal, run, observer)?,
@@ -123,6 +131,16 @@ pub fn learn(
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<(Learned, Option<Kept<Calibrated>>), Stop> {
+    let first = prepare(study, run, observer)?;
+    refine::stage(study, first, run, observer)
+}
+
+/// All stages of a study with a surrogate up to its emulator and what is known of its errors.
+pub fn prepare(
+    study: &Study,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Learned, Stop> {
     let placed = design::stage(study, run, observer)?;
     let simulated = simulate::stage(study, placed.as_ref(), run, observer)?;
     let data = read::stage(study, simulated.as_ref(), run, observer)?;
@@ -131,8 +149,7 @@ pub fn learn(
     let fitted = surrogate::stage(study, &data, &fitting, run, observer)?;
     let folders = numerical_error::FOLDERS;
     let numerics = numerical_error::stage(study, &data, None, folders, run, observer)?;
-    let first = Learned::new(study, data, fitted, numerics)?;
-    refine::stage(study, first, run, observer)
+    Learned::new(study, data, fitted, numerics)
 }
 
 /// Evidence, validation, gap and report of a calibration.
@@ -146,6 +163,16 @@ fn conclude(
 ) -> Result<Findings, Stop> {
     let weighed = weigh(study, known, calibrated, run, observer)?;
     let validated = validate::stage(study, known, calibrated, run, observer)?;
+    let made = report::Artifacts {
+        known: Some(known),
+        calibrated,
+        weighed: weighed.as_ref(),
+        validated: validated.as_ref(),
+        assessed: None,
+        gap: None,
+    };
+    let assessed = assess::stage(study, &made, run, observer)?;
+    let made = report::Artifacts { assessed: Some(&assessed), ..made };
     let gap = match goal {
         Goal::FindGap => gap::stage(study, known, run, observer)?,
         // What was found before is not lost in a report that is written again.
@@ -154,14 +181,12 @@ fn conclude(
     if let Goal::Show(before) = goal {
         gap::show::stage(study, known, calibrated, before, run, observer)?;
     }
-    let made = report::Artifacts {
-        known: Some(known),
-        calibrated,
-        weighed: weighed.as_ref(),
-        validated: validated.as_ref(),
-        gap: gap.as_ref(),
-    };
-    report::stage(study, &made, run)
+    if let Some(calibrated) = calibrated {
+        let (weighed, validated) = (weighed.as_ref(), validated.as_ref());
+        let finished = inference_data::Finished { calibrated, weighed, validated };
+        inference_data::stage(study, known, &finished, run)?;
+    }
+    report::stage(study, &report::Artifacts { gap: gap.as_ref(), ..made }, run, observer)
 }
 
 /// The evidence of a calibration, where there is one.
@@ -180,7 +205,8 @@ fn weigh(
     let predicting = Predicting {
         forward: known.forward,
         likelihood: parts.likelihood(),
-        data: measured.likelihood.count(),
+        law: calibrate::Law::of(study, measured, known)?,
+        data: &measured.likelihood,
     };
     evidence::stage(study, &posterior, calibrated, Some(predicting), run, observer).map(Some)
 }
@@ -203,6 +229,27 @@ pub struct Known<'a> {
     pub region: Option<&'a [(f64, f64)]>,
     /// How far a refinement came.
     pub refinement: Option<&'a Refinement>,
+    /// Which trial the data are of, where they were made and not measured.
+    pub trial: Option<Trial>,
+}
+
+/// One of many calibrations of data that were made: it has random numbers of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Trial {
+    /// Its number.
+    pub number: u64,
+    /// Whether the chains have half of their steps, where the steps of the sampler are draws.
+    pub quick: bool,
+}
+
+impl Trial {
+    /// The random stream of a stage: the study's own where nothing is tried.
+    fn stream(trial: Option<Self>, study: &Study, stage: &str) -> Stream {
+        match trial {
+            None => stream(study, stage),
+            Some(trial) => stream(study, "trial").at(trial.number).named(stage),
+        }
+    }
 }
 
 /// What runs and measurements have taught.
@@ -223,6 +270,8 @@ pub struct Learned {
     pub region: Option<Vec<(f64, f64)>>,
     /// How far a refinement came, where the study asks for one.
     pub refinement: Option<Refinement>,
+    /// See [`Known::trial`].
+    pub trial: Option<Trial>,
 }
 
 impl Learned {
@@ -245,8 +294,8 @@ impl Learned {
             }
             _ => fitted.hash.clone(),
         };
-        let (region, refinement) = (None, None);
-        Ok(Self { data, fitted, numerics, emulator, corrected, origin, region, refinement })
+        let (region, refinement, trial) = (None, None, None);
+        Ok(Self { data, fitted, numerics, emulator, corrected, origin, region, refinement, trial })
     }
 
     /// The same as it is handed on.
@@ -260,6 +309,7 @@ impl Learned {
             numerics: self.numerics.as_ref(),
             region: self.region.as_deref(),
             refinement: self.refinement.as_ref(),
+            trial: self.trial,
         }
     }
 }

@@ -16,9 +16,13 @@ use crate::report::findings::FlaggedCurve;
 use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, RunDirectory, Stop, files};
 use crate::study::Study;
+use crate::study::file::MeasurementKeys;
 
-use super::screen;
+use self::outside::refuse;
 use super::simulate::{Simulated, inside};
+use super::{contents, results, screen};
+
+pub(super) mod outside;
 
 /// What was read.
 #[derive(Debug, Clone, PartialEq)]
@@ -130,12 +134,22 @@ pub fn stage(
         let measured = measured(study)?;
         Ok(Data { ensemble, measured, cheaper: None })
     })?;
-    for failed in kept.value.ensemble.iter().flat_map(|ensemble| &ensemble.failed) {
+    if let Some(ensemble) = &kept.value.ensemble {
+        refuse(study, ensemble)?;
+    }
+    let failed: Vec<_> = kept.value.ensemble.iter().flat_map(|e| &e.failed).collect();
+    for failed in failed.iter().take(TOLD) {
         observer.warn(&format!("run {} is left out: {}", failed.run, failed.reason));
+    }
+    if failed.len() > TOLD {
+        observer.warn(&format!("{} further runs are left out", failed.len() - TOLD));
     }
     observer.end("read", &summary(&kept.value));
     Ok(kept)
 }
+
+/// So many runs that are left out are told one by one.
+const TOLD: usize = 10;
 
 fn summary(data: &Data) -> String {
     let mut text = match &data.ensemble {
@@ -189,6 +203,19 @@ pub fn ensemble(study: &Study, runs: Option<Runs<'_>>) -> Result<Ensemble, Stop>
     ensemble_of(study, &study.parameters, runs)
 }
 
+/// The same of runs that the study's model made, some of which may have failed, as far as a reader allows it. A reader of
+/// tables that were made before is not asked: it does not know these runs.
+pub fn ensemble_with_failed(study: &Study, runs: Runs<'_>) -> Result<Ensemble, Stop> {
+    let reader = study.simulations.as_ref().filter(|_| study.design.is_some());
+    let reader = reader.map(|section| &*section.built.plugin);
+    read_with(study, &study.parameters, Some(runs), |source, _| match reader {
+        Some(reader) if reader.names_files() || !results::are_own(source) => {
+            Ok(reader.ensemble(source)?)
+        }
+        _ => results::with_failed(source),
+    })
+}
+
 /// The same of runs of other parameters.
 pub fn ensemble_of(
     study: &Study,
@@ -206,6 +233,23 @@ pub fn ensemble_through(
     reader: Option<&dyn Reader>,
     runs: Option<Runs<'_>>,
 ) -> Result<Ensemble, Stop> {
+    read_with(study, parameters, runs, |source, made| match reader {
+        Some(reader) if reader.names_files() || !results::are_own(source) => {
+            Ok(reader.ensemble(source)?)
+        }
+        _ => {
+            let allowed = reader.and_then(|reader| reader.allowed_failures(made));
+            results::ensemble(source, allowed.unwrap_or(0))
+        }
+    })
+}
+
+fn read_with(
+    study: &Study,
+    parameters: &[Parameter],
+    runs: Option<Runs<'_>>,
+    read: impl Fn(&EnsembleSource<'_>, usize) -> Result<Ensemble, Stop>,
+) -> Result<Ensemble, Stop> {
     let mut parts = Vec::new();
     for (i, scenario) in study.scenarios.iter().enumerate() {
         let (layout, outputs) = study
@@ -220,10 +264,8 @@ pub fn ensemble_through(
             scenario: scenario.label(),
             layout: &layout,
         };
-        let ensemble = match reader {
-            Some(reader) => reader.ensemble(&source)?,
-            None => super::results::ensemble(&source)?,
-        };
+        let made = runs.map_or(0, |runs| runs.made.scenarios[i].runs.len());
+        let ensemble = read(&source, made)?;
         parts.push((ensemble, outputs));
     }
     let joined = joined(study, parts)?;
@@ -290,12 +332,22 @@ fn joined(study: &Study, mut parts: Vec<(Ensemble, Range<usize>)>) -> Result<Ens
 }
 
 fn measured(study: &Study) -> Result<Option<Measured>, Stop> {
+    measured_or_all(study).map_err(|all| contents::one(&all))
+}
+
+/// The measurements, or all that is wrong with their files.
+pub(super) fn measured_or_all(study: &Study) -> Result<Option<Measured>, Vec<Stop>> {
     let Some(section) = &study.measurements else { return Ok(None) };
     let read = observations(study, &*section.built.plugin)?;
     if read.count() == 0 {
-        return Err(Stop::new("the measurements hold no value"));
+        return Err(vec![Stop::new("the measurements hold no value")]);
     }
-    let flagged = match &section.common.screen {
+    Ok(Some(screened(&section.common, read)))
+}
+
+/// Measurements as the calibration uses them: screened, and with the curves that the study adds.
+pub(super) fn screened(keys: &MeasurementKeys, read: Observations) -> Measured {
+    let flagged = match &keys.screen {
         Some(options) => {
             let (threshold, leave_out) = (options.threshold.get(), options.leave_out);
             read.blocks.iter().flat_map(|data| screen::flag(data, threshold, leave_out)).collect()
@@ -303,29 +355,36 @@ fn measured(study: &Study) -> Result<Option<Measured>, Stop> {
         None => Vec::new(),
     };
     let used = read.map(|data| screen::without(data, &flagged));
-    let added = &section.common.added_curves;
+    let added = &keys.added_curves;
     let likelihood = used.map(|data| screen::with_added_curves(data, added));
-    Ok(Some(Measured { read, used, likelihood, flagged }))
+    Measured { read, used, likelihood, flagged }
 }
 
 /// The measurements of all scenarios: a replicate belongs to one scenario and has gaps in the others of its block.
-fn observations(study: &Study, reader: &dyn Reader) -> Result<Observations, Stop> {
+fn observations(study: &Study, reader: &dyn Reader) -> Result<Observations, Vec<Stop>> {
+    let mut errors = Vec::new();
     let mut blocks: Vec<Measurements> = study
         .layouts
         .blocks
         .iter()
-        .map(|layout| Measurements { layout: layout.clone(), replicates: Vec::new() })
+        .map(|layout| Measurements::new(layout.clone(), Vec::new()))
         .collect();
     let ranges: Vec<Range<usize>> = study.layouts.ranges().collect();
     for scenario in &study.scenarios {
         let (layout, outputs) = study
             .layouts
             .of_scenario(&scenario.name)
-            .ok_or_else(|| Stop::new(format!("no response to `{}`", scenario.name)))?;
+            .ok_or_else(|| vec![Stop::new(format!("no response to `{}`", scenario.name))])?;
         let label = scenario.label();
         let source =
             MeasurementSource { directory: &study.directory, scenario: label, layout: &layout };
-        let read = reader.measurements(&source)?;
+        let read = match reader.measurements(&source) {
+            Ok(read) => read,
+            Err(error) => {
+                errors.push(error);
+                continue;
+            }
+        };
         let block = ranges.iter().position(|range| range.contains(&outputs.start)).unwrap_or(0);
         let begin = outputs.start - ranges[block].start;
         for replicate in read.replicates {
@@ -335,8 +394,41 @@ fn observations(study: &Study, reader: &dyn Reader) -> Result<Observations, Stop
                 Some(label) => format!("{label} {}", replicate.name),
                 None => replicate.name,
             };
-            blocks[block].replicates.push(Replicate { name, values });
+            let sd = replicate.sd.map(|own| {
+                let mut sd = vec![0.0; ranges[block].len()];
+                sd[begin..begin + own.len()].copy_from_slice(&own);
+                sd
+            });
+            blocks[block].replicates.push(Replicate { name, values, sd });
+        }
+        if let Some(own) = read.covariance {
+            let size = ranges[block].len();
+            let all = blocks[block].covariance.get_or_insert_with(|| Matrix::zeros(size, size));
+            for (i, row) in own.iter_rows().enumerate() {
+                all.row_mut(begin + i)[begin..begin + row.len()].copy_from_slice(row);
+            }
         }
     }
+    if !errors.is_empty() {
+        return Err(contents::each(errors));
+    }
+    blocks.iter().try_for_each(stated_throughout).map_err(|stop| vec![stop])?;
     Ok(Observations { blocks })
+}
+
+/// Noise is stated of all replicates of a block or of none: a likelihood would have to guess the rest.
+fn stated_throughout(block: &Measurements) -> Result<(), Stop> {
+    if !block.states_noise() {
+        return Ok(());
+    }
+    for replicate in &block.replicates {
+        let mut measured = (0..replicate.values.len()).filter(|&i| replicate.values[i].is_some());
+        let missing = |i: &usize| !block.stated_variance(replicate, *i).is_some_and(|v| v > 0.0);
+        if let Some(i) = measured.find(missing) {
+            let (name, place) = (&replicate.name, block.layout.describe(i));
+            let text = format!("replicate `{name}` does not state its noise at {place}, others do");
+            return Err(Stop::new(text).help("state the noise of all scenarios, or of none"));
+        }
+    }
+    Ok(())
 }

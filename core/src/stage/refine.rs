@@ -23,7 +23,7 @@ use super::numerical_error::{self, NumericalError};
 use super::read::{self, Data, Runs};
 use super::simulator::Simulator;
 use super::surrogate::{self, Fitting};
-use super::{Learned, simulate, stream};
+use super::{Learned, Trial, simulate};
 
 /// An interval of each parameter.
 type Intervals = Vec<(f64, f64)>;
@@ -54,13 +54,11 @@ pub fn stage(
         let ratio = error / data.sqrt();
         let clear = is_clear(study, learned.region.as_deref(), &kept(&calibrated));
         let reached = ratio <= refine.until.get() && clear;
-        let refinement = Refinement { rounds: round, ratio, clear, reached };
+        let until = refine.until.get();
+        let refinement = Refinement { rounds: round, ratio, until, clear, reached };
         observer.begin("refine", "round", refine.rounds.get() as u64);
         observer.end("refine", &refinement.summary(refine));
         if reached || round == refine.rounds.get() {
-            if !reached {
-                observer.warn(&format!("{}; allow more `rounds`", refinement.summary(refine)));
-            }
             learned.refinement = Some(refinement);
             break;
         }
@@ -80,6 +78,8 @@ pub struct Refinement {
     /// The error that the emulator had at the last new runs, before it learned from them, over the discrepancy: root
     /// mean squares over the outputs.
     pub ratio: f64,
+    /// The ratio that the study asks for.
+    pub until: f64,
     /// Whether the posterior keeps clear of the region's own edges.
     pub clear: bool,
     /// Whether the ratio is as small as the study wants, and the posterior clear of the region's edges.
@@ -184,14 +184,15 @@ fn next(
     observer: &dyn Observer,
 ) -> Result<(Learned, f64), Stop> {
     let draws = kept(calibrated);
-    let random = stream(study, "refine").at(round as u64);
+    let trial = learned.trial;
+    let random = Trial::stream(trial, study, "refine").at(round as u64);
     let points = choose::points(&learned, &draws, &place, refine.runs.get(), &random)?;
     let before = learned.data.value.runs()?.runs.len();
     let data = extended(study, round, learned.data, &points, run, observer)?;
     let ensemble = data.value.runs()?;
     let error = error_at_new(ensemble, before, &*learned.emulator, learned.region.as_deref())?;
     let parameters: Vec<Parameter>;
-    let all = 0..ensemble.runs.len();
+    let all = (0..ensemble.runs.len()).filter(|&i| surrogate::is_wanted(study, ensemble, i));
     let fitting = match refine.region {
         Region::Design => Fitting {
             folder: &folder(round, "surrogate"),
@@ -223,7 +224,7 @@ fn next(
     };
     let region = (refine.region == Region::Posterior).then_some(place);
     let again = Learned::new(study, data, (fitted, emulator), numerics)?;
-    Ok((Learned { region, ..again }, error))
+    Ok((Learned { region, trial, ..again }, error))
 }
 
 /// Whether what was learned of the numerical error holds in all of a region.

@@ -1,5 +1,6 @@
-//! Stage 8: what was found, for people (`report.html`) and for scripts (`summary.json`, `posterior.nc`).
+//! Stage 8: what was found, for people (`report.html`) and for scripts (`summary.json`).
 
+use crate::assess::Assessment;
 use crate::data::{Draws, Ensemble, Observations};
 use crate::diagnose::Diagnosis;
 use crate::gap::account::Account;
@@ -7,36 +8,35 @@ use crate::linalg::Matrix;
 use crate::math::fit;
 use crate::math::moments::{self, Moments};
 use crate::report::findings::{
-    CalibrationFindings, CoordinateFindings, EnsembleFindings, Findings, FittedDistribution,
-    GapFindings, LeftOutFindings, MeasuredFindings, Role, SurrogateFindings,
+    CalibrationFindings, CoordinateFindings, CurvesLeftOutFindings, EnsembleFindings, Findings,
+    FittedDistribution, GapFindings, LeftOutFindings, MeasuredFindings, Role, SurrogateFindings,
 };
 use crate::report::{render, summary_json};
 use crate::run::directory::Record;
-use crate::run::{Kept, RunDirectory, Stop, files};
+use crate::run::{Kept, Observer, RunDirectory, Stop, files};
 use crate::study::Study;
 
 use super::calibrate::Calibrated;
 use super::evidence::Weighed;
 use super::read::Measured;
 use super::validate::Validated;
-use super::{Known, derived, gap, idle, inference_data};
+use super::{Known, derived, gap};
 
-/// Writes report, summary and posterior file; returns the findings.
-pub fn stage(study: &Study, all: &Artifacts<'_>, run: &RunDirectory) -> Result<Findings, Stop> {
+/// Writes report and summary; returns the findings.
+pub fn stage(
+    study: &Study,
+    all: &Artifacts<'_>,
+    run: &RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Findings, Stop> {
     let calibrated = all.calibrated.map(|kept| derived::extended(study, &kept.value));
     let calibrated = calibrated.as_ref();
-    let findings = findings(study, all, calibrated, run);
+    let findings = findings(study, all, calibrated, run, observer);
     let root = run.root();
     files::write_atomic(&root.join("summary.json"), summary_json(&findings).as_bytes())?;
     let page = render(&findings);
     files::write_atomic(&run.stage_folder("8-report").join("report.html"), page.as_bytes())?;
     files::write_atomic(&root.join("report.html"), page.as_bytes())?;
-    if let Some(calibrated) = calibrated {
-        let measured = all.measured();
-        let bytes = inference_data::encode(study, calibrated, measured, all.validated)
-            .map_err(|error| Stop::new(format!("cannot write posterior.nc: {error}")))?;
-        files::write_atomic(&root.join("posterior.nc"), &bytes)?;
-    }
     Ok(findings)
 }
 
@@ -51,6 +51,8 @@ pub struct Artifacts<'a> {
     pub weighed: Option<&'a Kept<Weighed>>,
     /// The calibrated model against the data.
     pub validated: Option<&'a Kept<Validated>>,
+    /// Whether all that can be trusted.
+    pub assessed: Option<&'a Kept<Assessment>>,
     /// What the model misses, where that was searched for.
     pub gap: Option<&'a Kept<Account>>,
 }
@@ -66,6 +68,7 @@ fn findings(
     all: &Artifacts<'_>,
     calibrated: Option<&Calibrated>,
     run: &RunDirectory,
+    observer: &dyn Observer,
 ) -> Findings {
     let measured = all.measured();
     let weighed = all.weighed.map(|w| &w.value);
@@ -88,7 +91,8 @@ fn findings(
             .and_then(|known| Some(ensemble(study, known.data.value.ensemble.as_ref()?))),
         measured: measured.map(|m| measurements(study, m)),
         surrogate: all.known.and_then(|known| surrogate(known, all.validated)),
-        warnings: warnings(study, all, calibration.as_ref()),
+        warnings: warnings(observer),
+        assessment: all.assessed.map(|kept| kept.value.clone()).unwrap_or_default(),
         calibration,
         validation,
         gap: all.gap.map(|kept| GapFindings {
@@ -195,9 +199,20 @@ fn calibration(
         left_out: weighed.and_then(|w| w.left_out.as_ref()).map(|loo| LeftOutFindings {
             elpd: loo.elpd,
             error: loo.error,
+            error_by_curve: loo.error_by_curve,
             parameters: loo.parameters,
             unreliable: loo.unreliable,
+            limit: loo.limit,
             count: loo.data.len(),
+            curves: weighed.and_then(|w| w.curves_left_out.as_ref()).map(|curves| {
+                CurvesLeftOutFindings {
+                    elpd: curves.elpd,
+                    error: curves.error,
+                    parameters: curves.parameters,
+                    unreliable: curves.unreliable,
+                    count: curves.data.len(),
+                }
+            }),
         }),
     }
 }
@@ -252,52 +267,13 @@ fn correlation(kept: &Draws) -> Matrix {
     Moments::of_rows(&kept.points()).correlation()
 }
 
-fn warnings(
-    study: &Study,
-    all: &Artifacts<'_>,
-    calibration: Option<&CalibrationFindings>,
-) -> Vec<String> {
-    let mut warnings = Vec::new();
-    if let Some(c) = calibration {
-        if !c.converged {
-            warnings.push(format!("the sampler has not converged: {}", c.verdict));
-        }
-        if !c.stranded.is_empty() {
-            let list: Vec<String> = c.stranded.iter().map(ToString::to_string).collect();
-            warnings.push(format!(
-                "{} of {} walkers are stranded far below the bulk of the density: {}",
-                c.stranded.len(),
-                c.chains,
-                list.join(", ")
-            ));
+/// What was told on the way, each once.
+fn warnings(observer: &dyn Observer) -> Vec<String> {
+    let mut warnings: Vec<String> = Vec::new();
+    for text in observer.heard() {
+        if !warnings.contains(&text) {
+            warnings.push(text);
         }
     }
-    let failed = all
-        .known
-        .and_then(|known| known.data.value.ensemble.as_ref())
-        .map_or(0, |ensemble| ensemble.failed.len());
-    if failed > 0 {
-        warnings.push(if failed == 1 {
-            "1 simulation run has no usable response and is left out".to_owned()
-        } else {
-            format!("{failed} simulation runs have no usable response and are left out")
-        });
-    }
-    if let Some(others) = all.calibrated.map(|c| c.value.outcome.other_maxima.len())
-        && others > 0
-    {
-        warnings.push(format!(
-            "the posterior has {others} further local maxima within ten of the best log density"
-        ));
-    }
-    // An effect may use what the model does not.
-    if calibration.is_some() && study.effects.is_empty() {
-        let idle = idle::parameters(study).unwrap_or_default().into_iter();
-        warnings.extend(idle.map(|i| {
-            let name = &study.parameters[i].name;
-            format!("`{name}` is not used by the model: its posterior is its prior")
-        }));
-    }
-    warnings.extend(all.validated.iter().flat_map(|v| v.value.failed.clone()));
     warnings
 }

@@ -8,8 +8,23 @@ use crate::run::arrays::{self, Array};
 
 use super::simulate::{TABLE, from_table};
 
-/// The runs of the simulate stage from the NetCDF files that [`crate::run::write_response`] wrote.
-pub fn ensemble(source: &EnsembleSource<'_>) -> Result<Ensemble, Stop> {
+/// The runs of the simulate stage from the NetCDF files that [`crate::run::write_response`] wrote, of which so many may
+/// have failed.
+pub fn ensemble(source: &EnsembleSource<'_>, allowed: usize) -> Result<Ensemble, Stop> {
+    let ensemble = with_failed(source)?;
+    let (runs, failed) = (&ensemble.runs, &ensemble.failed);
+    let refused = |_: &&FailedRun| failed.len() > allowed || runs.is_empty();
+    let Some(first) = failed.first().filter(refused) else { return Ok(ensemble) };
+    let (count, all) = (failed.len(), failed.len() + runs.len());
+    let message = format!("{count} of {all} runs failed, first `{}`: {}", first.run, first.reason);
+    let folder = source.simulated.map(|folder| folder.display().to_string());
+    Err(Stop::new(message)
+        .saved(format!("the other runs in {}", folder.unwrap_or_default()))
+        .help("`lacuna campaign status RUN` says why each has failed, `lacuna campaign retry RUN` makes them again; or name a reader in `[simulations]` and say there how many may be left out (`allow_failed`)"))
+}
+
+/// The same with those that failed, however many.
+pub fn with_failed(source: &EnsembleSource<'_>) -> Result<Ensemble, Stop> {
     let folder = source.simulated.ok_or_else(|| {
         Stop::new("the study has no simulation runs").help("add `[simulations]` with their files")
     })?;
@@ -38,14 +53,6 @@ pub fn ensemble(source: &EnsembleSource<'_>) -> Result<Ensemble, Stop> {
             }),
         }
     }
-    if let Some(first) = failed.first() {
-        let (count, all) = (failed.len(), failed.len() + runs.len());
-        let message =
-            format!("{count} of {all} runs failed, first `{}`: {}", first.run, first.reason);
-        return Err(Stop::new(message)
-            .saved(format!("the other runs in {}", folder.display()))
-            .help("`lacuna campaign status RUN` says why each has failed, `lacuna campaign retry RUN` makes them again; or name a reader in `[simulations]` and say there how many may be left out (`allow_failed`)"));
-    }
     Ok(Ensemble {
         parameters,
         units: source.parameters.iter().map(|p| p.unit.clone()).collect(),
@@ -56,6 +63,21 @@ pub fn ensemble(source: &EnsembleSource<'_>) -> Result<Ensemble, Stop> {
         valid,
         failed,
     })
+}
+
+/// Whether all results of the simulate stage are such files: the reader of a study is for what the simulator itself
+/// wrote.
+pub fn are_own(source: &EnsembleSource<'_>) -> bool {
+    let Some(folder) = source.simulated else { return false };
+    let Ok((records, ..)) = from_table(&folder.join(TABLE)) else { return false };
+    let mut files = records.iter().filter_map(|record| record.file.as_ref()).peekable();
+    let is_own = |file: &String| {
+        let path = folder.join(file);
+        path.extension().is_some_and(|extension| extension == "nc")
+            && arrays::read(&path, &source.layout.name)
+                .is_ok_and(|array| array.values.len() == source.layout.len())
+    };
+    files.peek().is_some() && files.all(is_own)
 }
 
 /// The values of a file, which are in the model's unit, in the study's.

@@ -8,7 +8,7 @@ mod log;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use crate::data::Draws;
+use crate::data::{Draws, Statistics};
 use crate::diagnose::chains;
 use crate::linalg::Matrix;
 use crate::math::random::Stream;
@@ -18,7 +18,7 @@ use crate::run::{Progress, Stop};
 use crate::study::file::StopRule;
 use crate::study::values::Count;
 
-use log::Log;
+use log::{Log, Read};
 
 /// All draws of a run with what became of each step.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +27,8 @@ pub struct Sampled {
     pub draws: Draws,
     /// The share of accepted moves of each chain; empty where the draws are those of a harvest.
     pub acceptance: Vec<f64>,
+    /// What the sampler told of each step; nothing where the draws are those of a harvest.
+    pub statistics: Statistics,
     /// The number of first steps that are left out.
     pub burn_in: usize,
     /// What the method brings home, if its steps are no draws; then `draws` are made of it.
@@ -42,6 +44,9 @@ pub struct Length<'a> {
     pub burn_in: f64,
     /// What must be reached.
     pub stop: Option<&'a StopRule>,
+    /// Whether half of the planned steps after the warm-up are enough, where the steps are draws; then nothing must be
+    /// reached.
+    pub half: bool,
 }
 
 /// How soon the state is written first; each further time takes twice as long, up to [`INTERVAL`].
@@ -70,18 +75,24 @@ pub fn sample(
 ) -> Result<Sampled, Stop> {
     let plan = sampler.plan(target.dimension());
     let mut log = Log::open(folder, plan.chains, target.dimension())?;
-    let (mut step, mut state) = match log.resume()? {
+    let (mut step, mut state) = match log.resume(|state| sampler.statistics(state))? {
         Some(checkpoint) => (checkpoint.step, checkpoint.state),
-        None => (0, sampler.start(target, start()?)?),
+        None => {
+            let state = sampler.start(target, start()?)?;
+            log.begin(&sampler.statistics(&state));
+            (0, state)
+        }
     };
     progress.add(step as u64);
     let (mut written, mut interval) = (Instant::now(), FIRST);
-    let mut limit = plan.steps;
+    let half = length.half && sampler.steps_are_draws();
+    let mut limit = if half { plan.steps - draws_of(plan) / 2 } else { plan.steps };
+    let rule = length.stop.filter(|_| !half);
     loop {
         while step < limit && !sampler.finished(&state) {
             sampler.step(target, &mut state, &stream.at(step as u64))?;
             broken(target)?;
-            log.append(&state)?;
+            log.append(&state, &sampler.statistics(&state))?;
             step += 1;
             progress.add(1);
             if written.elapsed() > interval {
@@ -90,10 +101,10 @@ pub fn sample(
             }
         }
         log.checkpoint(step, &state)?;
-        match length.stop {
+        match rule {
             Some(rule) if !sampler.finished(&state) => {
-                let (draws, _) = log.read(limit)?;
-                match next_limit(&draws, plan, length.burn_in, rule) {
+                let read = log.read(limit)?;
+                match next_limit(&read.draws, plan, length.burn_in, rule) {
                     Some(next) => limit = next,
                     None => break,
                 }
@@ -101,18 +112,23 @@ pub fn sample(
             _ => break,
         }
     }
-    let (draws, acceptance) = log.read(step)?;
+    let Read { draws, acceptance, statistics } = log.read(step)?;
     let burn_in = burn_in(plan, length.burn_in, step);
     let harvest = sampler.harvest(target, &state, &stream.named("harvest"))?;
     Ok(match harvest {
         Some(harvest) => {
             let draws = dealt(&harvest);
             // The moves are those of particles, which the chains of the draws are not.
-            let acceptance = Vec::new();
-            Sampled { draws, acceptance, burn_in: 0, harvest: Some(harvest), state }
+            let (acceptance, statistics) = (Vec::new(), Statistics::default());
+            Sampled { draws, acceptance, statistics, burn_in: 0, harvest: Some(harvest), state }
         }
-        None => Sampled { draws, acceptance, burn_in, harvest: None, state },
+        None => Sampled { draws, acceptance, statistics, burn_in, harvest: None, state },
     })
+}
+
+/// The steps of a plan that can be draws.
+fn draws_of(plan: Plan) -> usize {
+    plan.steps.saturating_sub(plan.warm_up)
 }
 
 /// The steps that are left out of this many.

@@ -102,10 +102,9 @@ pub fn with_added_curves(data: &Measurements, curves: &[AddedCurve]) -> Measurem
                 shifted()
             }
         };
-        extended.replicates.push(Replicate {
-            name: name.to_owned(),
-            values: summaries.iter().map(value).collect(),
-        });
+        extended
+            .replicates
+            .push(Replicate::new(name.to_owned(), summaries.iter().map(value).collect()));
     }
     extended
 }
@@ -135,9 +134,8 @@ mod tests {
             };
             (0..100).map(|i| value(i, &mut rng)).collect()
         };
-        let replicates =
-            (0..12).map(|r| Replicate { name: format!("p{r}"), values: curve(r) }).collect();
-        Measurements { layout, replicates }
+        let replicates = (0..12).map(|r| Replicate::new(format!("p{r}"), curve(r))).collect();
+        Measurements::new(layout, replicates)
     }
 
     #[test]

@@ -171,11 +171,12 @@ pub fn kept(
 ) -> Result<Kept<Simulated>, Stop> {
     let inputs = Inputs::of(simulator, model)?.value(asked);
     let folder = run.stage_folder(stage);
-    let make = |folder: &Path| simulate(study, simulator, asked, folder, observer);
+    let strict = stage == STAGE && none_may_fail(study, asked.names.len());
+    let make = |folder: &Path| simulate(study, simulator, asked, strict, folder, observer);
     let kept = run.keep(stage, &inputs, observer, make)?;
     let damaged = if kept.fresh { 0 } else { kept.value.damaged(&folder) };
     if damaged > 0 {
-        observer.warn(&format!(
+        observer.remark(&format!(
             "result files in {} are missing or not as they were written ({damaged} of {}); making them again",
             folder.display(),
             asked.names.len()
@@ -188,7 +189,33 @@ pub fn kept(
     Ok(kept)
 }
 
+/// The same of runs of which a run directory may hold the first ones already: those are not made again.
+pub fn grown(
+    study: &Study,
+    simulator: &Simulator<'_>,
+    stage: &str,
+    asked: Asked<'_>,
+    model: &impl Serialize,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Kept<Simulated>, Stop> {
+    let inputs = Inputs::of(simulator, model)?;
+    let first = |count: usize| {
+        let points = asked.points.select_rows(&(0..count).collect::<Vec<_>>());
+        inputs.value(Asked { names: &asked.names[..count], points: &points, imported: &[] })
+    };
+    let smaller: Vec<Value> = (1..asked.names.len()).rev().map(first).collect();
+    run.go_on_from(stage, &inputs.value(asked), &smaller)?;
+    kept(study, simulator, stage, asked, model, run, observer)
+}
+
 const STAGE: &str = "2-simulate";
+
+/// Whether the data cannot be read when a run has failed.
+fn none_may_fail(study: &Study, runs: usize) -> bool {
+    let reader = study.simulations.as_ref().map(|section| &section.built.plugin);
+    reader.map_or(Some(0), |reader| reader.allowed_failures(runs)) == Some(0)
+}
 
 fn summary(simulated: &Simulated) -> String {
     let invalid = simulated.all().filter(|r| r.file.is_some() && !r.valid).count();
@@ -206,6 +233,7 @@ fn simulate(
     study: &Study,
     simulator: &Simulator<'_>,
     asked: Asked<'_>,
+    strict: bool,
     folder: &Path,
     observer: &dyn Observer,
 ) -> Result<Simulated, Stop> {
@@ -216,7 +244,8 @@ fn simulate(
         let folder = inside(folder, &setting.folder);
         fs::create_dir_all(&folder).map_err(|error| files::cannot_write(&folder, &error))?;
         let executor = &*executor.built.plugin;
-        let work = Work { study, executor, simulator, setting, place, asked, folder: &folder };
+        let work =
+            Work { study, executor, simulator, setting, place, asked, strict, folder: &folder };
         Ok(Made { folder: setting.folder.clone(), runs: work.run(&progress)? })
     };
     let settings = simulator.settings.iter().enumerate();
@@ -246,6 +275,8 @@ struct Work<'a> {
     /// The scenario's place among all.
     place: usize,
     asked: Asked<'a>,
+    /// Whether no run may fail: the first one tells whether the others are worth making.
+    strict: bool,
     folder: &'a Path,
 }
 
@@ -272,11 +303,12 @@ impl Work<'_> {
         }
         let missing: Vec<usize> =
             (0..names.len()).filter(|&i| !ended.contains_key(&names[i])).collect();
+        let fresh = missing.len() == names.len();
         progress.add((names.len() - missing.len()) as u64);
         let inputs = |i: usize| self.setting.inputs(self.asked.points.row(i));
         let jobs: Vec<Job> =
             missing.iter().map(|&i| Job { name: names[i].clone(), inputs: inputs(i) }).collect();
-        let warn = |text: &str| progress.warn(text);
+        let warn = |text: &str| progress.remark(text);
         let batch = Batch {
             model: self.simulator.model,
             recipe: &self.simulator.recipe,
@@ -289,22 +321,43 @@ impl Work<'_> {
             directory: folder,
             warn: &warn,
         };
+        let mut hopeless = None;
         let mut note = |finished: Finished| {
+            // Which run is the first to end is chance; which is the first of the design is not.
+            let first = finished.index == 0;
             let record = record(&jobs[finished.index].name, finished, folder)?;
             log.note(&record)?;
+            let failed = record.reason.clone().filter(|_| first && fresh);
+            if let (true, Some(reason)) = (self.strict, failed) {
+                let stop = first_failed(&record.run, &reason);
+                ended.insert(record.run.clone(), record);
+                hopeless = Some(stop.clone());
+                return Err(stop);
+            }
             ended.insert(record.run.clone(), record);
             progress.add(1);
             Ok(())
         };
         let submitted = self.executor.submit(&batch, &mut note);
+        if hopeless.is_some() {
+            // Jobs that wait somewhere else would be made for nothing.
+            self.executor.cancel(folder)?;
+        }
         submitted.map_err(|stop| {
-            let done = names.len() - missing.len()
-                + jobs.iter().filter(|j| ended.contains_key(&j.name)).count();
+            let made = |name: &String| ended.get(name).is_some_and(|r| r.file.is_some());
+            let done = names.iter().filter(|name| made(name)).count();
             stop.saved(format!("{done} of {} runs in {}", names.len(), folder.display()))
         })?;
         let runs: Option<Vec<RunRecord>> = names.iter().map(|name| ended.remove(name)).collect();
         runs.ok_or_else(|| Stop::new("the executor left runs out"))
     }
+}
+
+fn first_failed(run: &str, reason: &str) -> Stop {
+    Stop::new(format!(
+        "the first run, `{run}`, failed, and no run may fail; the others are not made: {reason}"
+    ))
+    .help("mend it and run the same command again; `allow_failed` in `[simulations]` says how many runs may fail")
 }
 
 /// `run001`, `run002`, …, with as many digits as the last one needs.

@@ -13,6 +13,7 @@ use crate::plugin::{Emulator, Fact};
 use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
 use crate::study::Study;
+use crate::study::file::InvalidRuns;
 
 use super::idle::Used;
 use super::low_fidelity;
@@ -98,11 +99,20 @@ impl<'a> Fitting<'a> {
     pub fn of(study: &'a Study, ensemble: &Ensemble) -> Result<Self, Stop> {
         let (training, validation) = split(study, ensemble)?;
         let runs = ensemble.runs.len();
+        let wanted = |rows: std::ops::Range<usize>| -> Vec<usize> {
+            rows.filter(|&i| is_wanted(study, ensemble, i)).collect()
+        };
+        let training = wanted(0..training);
+        if training.is_empty() {
+            return Err(Stop::new("every training run is outside the model's validity").help(
+                "narrow the `design` to where the model holds, or set `invalid_runs = \"train\"` in `[surrogate]`",
+            ));
+        }
         Ok(Self {
             folder: "4-surrogate",
             parameters: &study.parameters,
-            training: (0..training).collect(),
-            validation: (runs - validation..runs).collect(),
+            training,
+            validation: wanted(runs - validation..runs),
         })
     }
 }
@@ -141,6 +151,13 @@ pub fn stage(
     let unit = study.layouts.unit();
     observer.end("surrogate", &format!("rmse {:.3e} {unit}, loo {:.2e}", errors.rmse, errors.loo));
     Ok((kept, emulator))
+}
+
+/// Whether a surrogate may learn from a run: it is inside the model's validity, or the study does not mind.
+pub(super) fn is_wanted(study: &Study, ensemble: &Ensemble, run: usize) -> bool {
+    let section = study.surrogate.as_ref();
+    ensemble.valid[run]
+        || section.is_some_and(|section| section.common.invalid_runs == InvalidRuns::Train)
 }
 
 /// The numbers of training and validation runs.

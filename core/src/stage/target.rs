@@ -10,7 +10,7 @@ use crate::run::{Kept, Observer, RunDirectory, Stop};
 use crate::study::Study;
 
 use super::calibrate::{self, Calibrated};
-use super::{evidence, report};
+use super::{assess, evidence, inference_data, report};
 
 /// Samples the target and reports.
 pub fn run(
@@ -28,14 +28,23 @@ pub fn run(
     let posterior = Posterior::new(&study.parameters, likelihood);
     let calibrated = stage(study, target, &posterior, run, observer)?;
     let weighed = evidence::stage(study, &posterior, &calibrated, None, run, observer)?;
+    let finished = inference_data::Finished {
+        calibrated: &calibrated,
+        weighed: Some(&weighed),
+        validated: None,
+    };
+    inference_data::of_target(study, &posterior, &finished, run)?;
     let made = report::Artifacts {
         known: None,
         calibrated: Some(&calibrated),
         weighed: Some(&weighed),
         validated: None,
+        assessed: None,
         gap: None,
     };
-    report::stage(study, &made, run)
+    let assessed = assess::stage(study, &made, run, observer)?;
+    let made = report::Artifacts { assessed: Some(&assessed), ..made };
+    report::stage(study, &made, run, observer)
 }
 
 fn stage(
@@ -53,5 +62,5 @@ fn stage(
         (section.built.identity(), &section.common),
         study.about.seed
     ]);
-    calibrate::draw(study, posterior, "5-calibrate", &inputs, run, observer)
+    calibrate::draw(study, posterior, None, "5-calibrate", &inputs, run, observer)
 }

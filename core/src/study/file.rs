@@ -102,6 +102,36 @@ impl DesignKeys {
     }
 }
 
+/// The engine's keys of `[simulations]`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct SimulationKeys {
+    /// What is done about runs outside the declared `design` of a parameter.
+    pub outside_design: OutsideDesign,
+}
+
+/// What is done about runs outside the declared design.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OutsideDesign {
+    /// They stop the run, which says which they are: either the design or the table is wrong.
+    #[default]
+    Refuse,
+    /// They are used like all others, and the assessment says so.
+    Allow,
+}
+
+/// What is done about runs outside the model's validity.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum InvalidRuns {
+    /// The surrogate is neither trained nor tested on them.
+    #[default]
+    LeaveOut,
+    /// They are used like all others, and the assessment says so.
+    Train,
+}
+
 /// The engine's keys of `[measurements]`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
@@ -151,6 +181,8 @@ pub struct SurrogateKeys {
     pub training: Option<Count>,
     /// The number of runs kept aside to measure the error, the last ones of the design.
     pub validation: usize,
+    /// What is done about runs that the model calls outside its validity.
+    pub invalid_runs: InvalidRuns,
     /// Further runs after the calibration, where posterior and emulator's error are large.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refine: Option<Refine>,

@@ -2,7 +2,7 @@
 //!
 //! A table with a header is merged key by key; a table in braces is one value and replaces the
 //! base's. Lists of named tables (`[[parameter]]`) are merged by name; other arrays are replaced.
-//! A section that changes its `use` loses the base's options of the old plugin.
+//! A section that changes its `use` loses the base's options of the old plugin; one that is `false` is taken out.
 
 use std::path::{Path, PathBuf};
 

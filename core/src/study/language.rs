@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::file::{
     DerivedSection, DesignKeys, DiscrepancyKeys, EffectKeys, LowFidelitySection, MeasurementKeys,
     ModelKeys, NumericalErrorSection, ParameterSection, ResponseSection, SamplerKeys,
-    ScenarioSection, StudySection, SurrogateKeys, ValidateSection,
+    ScenarioSection, SimulationKeys, StudySection, SurrogateKeys, ValidateSection,
 };
 use super::gap::{CandidateKeys, GapSection, SwapKeys, SwitchSection, TermKeys};
 use super::libraries::PluginsSection;
@@ -34,7 +34,7 @@ pub fn schema() -> Value {
         .section::<dyn Model, ModelKeys>("model")
         .section::<dyn Design, DesignKeys>("design")
         .section::<dyn Executor, NoKeys>("executor")
-        .section::<dyn Reader, NoKeys>("simulations")
+        .section::<dyn Reader, SimulationKeys>("simulations")
         .section::<dyn Reader, MeasurementKeys>("measurements")
         .section::<dyn Surrogate, SurrogateKeys>("surrogate")
         .section::<dyn Discrepancy, DiscrepancyKeys>("discrepancy")
@@ -62,6 +62,7 @@ pub fn manual() -> Vec<Manual> {
         page::<ResponseSection>("[response]"),
         page::<ModelKeys>("[model]"),
         page::<DesignKeys>("[design]"),
+        page::<SimulationKeys>("[simulations]"),
         page::<MeasurementKeys>("[measurements]"),
         page::<SurrogateKeys>("[surrogate]"),
         page::<DiscrepancyKeys>("[discrepancy]"),

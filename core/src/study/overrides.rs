@@ -53,7 +53,7 @@ impl Assignment {
                 .expected("keys joined by `.`, such as `sampler.steps`");
             return None;
         }
-        let value = value(text, equals + 1, source, problems)?;
+        let value = text::value(text, equals + 1..text.len(), source, problems)?;
         Some(Self { path, value, adds })
     }
 
@@ -67,8 +67,13 @@ impl Assignment {
         let Some(last) = path.pop() else { return };
         let mut node = study;
         for (i, key) in path.iter().enumerate() {
+            let inner = i > 0 && matches!(node.value, Value::Table(_));
             let Some(next) = descend(node, key, &path[..i], problems) else { return };
             node = next;
+            // A complaint about a table inside a section is about what was set in it.
+            if inner && matches!(node.value, Value::Table(_)) {
+                node.place = key.place.clone();
+            }
         }
         if !matches!(node.value, Value::Table(_)) {
             let message = format!("`{}` has no keys to set", joined(&path));
@@ -176,27 +181,7 @@ fn outside_quotes(text: &str, wanted: char) -> impl Iterator<Item = usize> {
     })
 }
 
-/// The value as TOML; a bare word is a string.
-fn value(text: &str, start: usize, source: SourceId, problems: &mut Problems) -> Option<Node> {
-    let written = &text[start..];
-    let trimmed = written.trim();
-    let from = start + (written.len() - written.trim_start().len());
-    match super::read::read_value(trimmed, source, from, problems) {
-        Ok(node) => Some(node),
-        Err(_) if is_bare_word(trimmed) => {
-            Some(Node::string(trimmed, Place { source, span: from..from + trimmed.len() }))
-        }
-        Err(errors) => {
-            super::read::report(&errors, source, from, problems);
-            None
-        }
-    }
-}
-
-/// True for a text that can only have been meant as itself: no quotes, brackets, braces, `=` or `#`.
-fn is_bare_word(text: &str) -> bool {
-    !text.is_empty() && !text.contains(['"', '\'', '[', ']', '{', '}', '=', '#', '\n'])
-}
+mod text;
 
 #[cfg(test)]
 mod tests;

@@ -12,7 +12,7 @@ use super::decode::{decode, fields};
 use super::fidelity::{LowFidelity, NumericalError, low_fidelity, numerical_error};
 use super::file::{
     DerivedSection, DesignKeys, DiscrepancyKeys, EffectKeys, MeasurementKeys, ModelKeys,
-    ResponseSection, SamplerKeys, StudySection, SurrogateKeys, ValidateSection,
+    ResponseSection, SamplerKeys, SimulationKeys, StudySection, SurrogateKeys, ValidateSection,
 };
 use super::gap::{Gap, gap};
 use super::libraries::{Libraries, Seen, libraries};
@@ -21,7 +21,7 @@ use super::sections::{
     unknown_sections,
 };
 use super::unknowns::{Unknown, unknowns};
-use super::{Node, Problems, Sources, inherit, overrides, resolved, sizes};
+use super::{Node, Problems, Sources, Value, inherit, overrides, resolved, sizes};
 use crate::data::{Layout, Layouts, Parameter, Scenario};
 use crate::plugin::registry::loaded::declaring;
 use crate::plugin::registry::{NoKeys, Section};
@@ -32,8 +32,12 @@ use crate::plugin::{
 
 /// A study that can be run.
 pub struct Study {
-    /// Its name: the stem of its file.
+    /// Its name: the one it gives itself, else the stem of its file.
     pub name: String,
+    /// Whether it gives itself its name, in its file or on the command line; one that it inherits is another's.
+    pub named: bool,
+    /// Its file.
+    pub file: PathBuf,
     /// The folder of its file; relative paths start there.
     pub directory: PathBuf,
     /// Its file, byte for byte.
@@ -61,7 +65,7 @@ pub struct Study {
     /// `[executor]`.
     pub executor: Option<Section<dyn Executor, NoKeys>>,
     /// `[simulations]`.
-    pub simulations: Option<Section<dyn Reader, NoKeys>>,
+    pub simulations: Option<Section<dyn Reader, SimulationKeys>>,
     /// `[measurements]`.
     pub measurements: Option<Section<dyn Reader, MeasurementKeys>>,
     /// `[surrogate]`.
@@ -184,11 +188,14 @@ fn finish(
     let mut seen = Vec::new();
     let study = root.and_then(|mut root| {
         overrides::apply(&mut root, arguments, &common_keys, &mut sources, &mut problems);
+        take_out(&mut root);
+        let named = gives_its_name(path, &root, &sources);
         let libraries = libraries(&root, &directory(path, &root), purpose, &mut problems)?;
         seen.clone_from(&libraries.seen);
         let declared = if purpose == Use::Check { libraries.declared() } else { Vec::new() };
         declaring(declared, || {
-            let study = structure(path, text, &root, libraries, &mut problems)?;
+            let mut study = structure(path, text, &root, libraries, &mut problems)?;
+            study.named = named;
             if problems.is_empty() {
                 context::check(&study, &root, &mut problems);
             }
@@ -200,6 +207,34 @@ fn finish(
     });
     let study = study.filter(|_| problems.is_empty());
     Checked { sources, problems, libraries: seen, study }
+}
+
+/// See [`Study::named`].
+fn gives_its_name(path: &Path, root: &Node, sources: &Sources) -> bool {
+    let source = root.find("study.name").map(|name| sources.get(name.place.source));
+    source.is_some_and(|source| source.path.as_deref().is_none_or(|file| file == path))
+}
+
+/// Tables inside a section that a study may leave out.
+const OPTIONAL: [(&str, &str); 3] =
+    [("measurements", "screen"), ("surrogate", "refine"), ("sampler", "stop")];
+
+/// Takes out what is `false` in the place of a section: `numerical_error = false` removes the section that another study
+/// has, of which this one says what differs.
+fn take_out(root: &mut Node) {
+    let is_false = |node: Option<&Node>| node.is_some_and(|n| n.value == Value::Boolean(false));
+    for name in SECTIONS {
+        if is_false(root.get(name)) {
+            root.remove(name);
+        }
+    }
+    for (section, key) in OPTIONAL {
+        if let Some(section) = root.get_mut(section)
+            && is_false(section.get(key))
+        {
+            section.remove(key);
+        }
+    }
 }
 
 /// Where the relative paths of a study start. It is never empty: an empty path has no absolute one.
@@ -215,6 +250,7 @@ fn common_keys(section: &str) -> &'static [&'static str] {
     match section {
         "model" => fields::<ModelKeys>(),
         "design" => fields::<DesignKeys>(),
+        "simulations" => fields::<SimulationKeys>(),
         "measurements" => fields::<MeasurementKeys>(),
         "surrogate" => fields::<SurrogateKeys>(),
         "discrepancy" => fields::<DiscrepancyKeys>(),
@@ -282,6 +318,8 @@ fn structure(
     let name = name(&mut about, path, root, problems)?;
     let mut study = Study {
         name,
+        named: false,
+        file: path.to_owned(),
         directory,
         text,
         about,

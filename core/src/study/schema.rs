@@ -149,6 +149,12 @@ impl Language {
 
     /// The whole schema.
     pub fn finish(mut self) -> Value {
+        let required: Vec<&str> = self.required.iter().filter_map(Value::as_str).collect();
+        for (name, schema) in &mut self.properties {
+            if name != "extends" && !required.contains(&name.as_str()) {
+                removable(schema);
+            }
+        }
         let mut definitions = self.generator.take_definitions(true);
         let mut whole = json!({
             "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -168,6 +174,25 @@ impl Language {
         }
         without_machine_formats(&mut whole);
         whole
+    }
+}
+
+/// Lets `false` stand in the place of a section that a study may do without; see `extends`.
+fn removable(schema: &mut Value) {
+    let none =
+        json!({ "const": false, "description": "Takes the section out that another study has." });
+    match schema {
+        // A section that chooses a plugin has a case for each.
+        Value::Object(own)
+            if own.get("oneOf").and_then(Value::as_array).is_some_and(|o| o.len() > 1) =>
+        {
+            own.remove("type");
+            if let Some(Value::Array(cases)) = own.get_mut("oneOf") {
+                cases.push(none);
+            }
+        }
+        Value::Object(own) if own.contains_key("oneOf") => {}
+        other => *other = json!({ "anyOf": [other.clone(), none] }),
     }
 }
 

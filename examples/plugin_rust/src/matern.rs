@@ -168,14 +168,11 @@ impl Likelihood for MaternLikelihood {
         let mut rng = stream.generator();
         let z: Vec<f64> = (0..self.shared.columns()).map(|_| normal(&mut rng)).collect();
         let bias = multiply_vector(&self.shared, &z);
-        let mut new = |old: &Replicate| Replicate {
-            name: old.name.clone(),
-            values: (old.values.iter().enumerate())
+        let mut new = |old: &Replicate| Replicate::new(old.name.clone(), (old.values.iter().enumerate())
                 .map(|(i, value)| value.map(|_| response[i] + bias[i] + self.noise * normal(&mut rng)))
-                .collect(),
-        };
+                .collect());
         let replicates = self.data.replicates.iter().map(&mut new).collect();
-        vec![Measurements { layout: self.data.layout.clone(), replicates }]
+        vec![Measurements::new(self.data.layout.clone(), replicates)]
     }
 
     fn facts(&self) -> Vec<Fact> {

@@ -160,4 +160,4 @@ impl Design for Quadrature {
     }
 }
 
-lacuna::register!(Design, "quadrature", Quadrature);
+lacuna::register!(Design, "quadrature", Quadrature, aliases: ["sparse_grid", "gauss", "smolyak"]);

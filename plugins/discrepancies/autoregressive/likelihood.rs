@@ -72,13 +72,23 @@ struct Solved {
 
 impl AutoregressiveLikelihood {
     pub(super) fn new(options: &Autoregressive, known: &Known<'_>) -> Result<Self, Stop> {
+        Self::under(options, known, known.data)
+    }
+
+    /// The same where the noise that replicates show is that of `shown`.
+    pub(super) fn under(
+        options: &Autoregressive,
+        known: &Known<'_>,
+        shown: &Measurements,
+    ) -> Result<Self, Stop> {
         let replicates = Replicates::of(known.data, known.common)?;
         let layout = &known.data.layout;
         let series = Series::of(layout, options.along.as_deref()).map_err(Stop::new)?;
         let times = Groups::of(layout, &options.correlation_by).map_err(Stop::new)?;
         let times = times.with_data(&replicates.measured);
         let mut hyper = Vec::new();
-        let noise = Noise::new(known, &replicates, &options.variance, &options.by, &mut hyper)?;
+        let noise =
+            Noise::new(known, shown, &replicates, (&options.variance, &options.by), &mut hyper)?;
         let name = Unknown { name: "correlation_time", unit: series.unit.clone() };
         let length = series.grid.last().zip(series.grid.first()).map_or(0.0, |(b, a)| b - a);
         let spacing = length / (series.grid.len() as f64 - 1.0).max(1.0);

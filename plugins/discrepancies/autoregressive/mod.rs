@@ -5,7 +5,7 @@ mod steps;
 #[cfg(test)]
 mod tests;
 
-use lacuna::data::Layout;
+use lacuna::data::{Layout, Measurements};
 use lacuna::plugin::component::{Component, Context};
 use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood, StatedNoise};
 use lacuna::run::Stop;
@@ -82,6 +82,16 @@ impl Discrepancy for Autoregressive {
         Ok(Box::new(AutoregressiveLikelihood::new(self, known)?))
     }
 
+    fn likelihood_of_part(
+        &self,
+        known: &Known<'_>,
+        part: &Measurements,
+    ) -> Result<Option<Box<dyn Likelihood>>, Stop> {
+        let known_part = Known { data: part, ..*known };
+        let likelihood = AutoregressiveLikelihood::under(self, &known_part, known.data)?;
+        Ok(Some(Box::new(likelihood)))
+    }
+
     fn stated_noise(&self, layout: &Layout, _: &[f64]) -> Option<StatedNoise> {
         // Values along another axis than the last do not follow each other in a curve.
         let last = Series::of(layout, None).ok()?.axis;
@@ -92,4 +102,4 @@ impl Discrepancy for Autoregressive {
     }
 }
 
-lacuna::register!(Discrepancy, "autoregressive", Autoregressive);
+lacuna::register!(Discrepancy, "autoregressive", Autoregressive, aliases: ["ar", "ar1"]);

@@ -14,7 +14,8 @@ pub struct Setting {
     /// The data.
     pub data: Measurements,
     common: Vec<CommonError>,
-    /// The pooled variance between the replicates of each output's group, where there are any.
+    /// The variance that the data state of each output, else the pooled variance between the replicates of its group,
+    /// where there are any.
     replicated: Option<Vec<f64>>,
 }
 
@@ -32,12 +33,13 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// The noise of data; its unknown variances are added to the hyperparameters.
+    /// The noise of data; its unknown variances are added to the hyperparameters. A measured variance is the one between
+    /// the replicates of `shown`, of which the data are a part.
     pub fn new(
         known: &Known<'_>,
+        shown: &Measurements,
         replicates: &Replicates,
-        variance: &Variance,
-        by: &By,
+        (variance, by): (&Variance, &By),
         hyper: &mut Vec<Hyperparameter>,
     ) -> Result<Self, Stop> {
         let layout = &known.data.layout;
@@ -49,11 +51,19 @@ impl Noise {
             }
             Variance::Measured(quantity) => {
                 let unknown = Unknown { name: "multiplier", unit: Unit::dimensionless() };
-                let scale = Pooled::of(&groups, replicates).measured(&groups, replicates)?;
+                let scale = if known.data.states_noise() {
+                    known.data.stated_sd().iter().map(|sd| sd * sd).collect()
+                } else {
+                    let whole = Replicates::of(shown, &[])?;
+                    let all = Groups::of(layout, by).map_err(Stop::new)?.with_data(&whole.measured);
+                    Pooled::of(&all, &whole).measured(&all, &whole)?
+                };
                 (quantity, scale, unknown)
             }
         };
-        let start = |g: usize| start(&groups, replicates, &scale, g);
+        // What the data state of their noise is where its multiplier starts.
+        let stated = known.data.states_noise();
+        let start = |g: usize| if stated { 1.0 } else { start(&groups, replicates, &scale, g) };
         Ok(Self {
             variance: PerGroup::new(quantity, &groups, &unknown, start, hyper),
             setting: Setting::new(known, replicates, &groups),
@@ -86,7 +96,11 @@ impl Setting {
         Self {
             data: known.data.clone(),
             common: known.common.to_vec(),
-            replicated: Pooled::of(groups, replicates).by_output(groups),
+            replicated: if known.data.states_noise() {
+                Some(known.data.stated_sd().iter().map(|sd| sd * sd).collect())
+            } else {
+                Pooled::of(groups, replicates).by_output(groups)
+            },
         }
     }
 

@@ -27,20 +27,19 @@ pub fn layout() -> Layout {
 /// Unequal replicates with gaps; output 4 and all of the last window of sensor G are never measured.
 pub fn data(seed: u64, replicates: usize) -> Measurements {
     let mut rng = Stream::root(seed).generator();
-    let replicate = |r: usize, rng: &mut _| Replicate {
-        name: r.to_string(),
-        values: (0..OUTPUTS)
-            .map(|i| {
-                let y = normal(rng) * (1.0 + (i / TIMES) as f64) + (i as f64).sin();
-                let kept = r == 0 || uniform(rng) < 0.7;
-                (i != 4 && i < OUTPUTS - 2 && kept).then_some(y)
-            })
-            .collect(),
+    let replicate = |r: usize, rng: &mut _| {
+        Replicate::new(
+            r.to_string(),
+            (0..OUTPUTS)
+                .map(|i| {
+                    let y = normal(rng) * (1.0 + (i / TIMES) as f64) + (i as f64).sin();
+                    let kept = r == 0 || uniform(rng) < 0.7;
+                    (i != 4 && i < OUTPUTS - 2 && kept).then_some(y)
+                })
+                .collect(),
+        )
     };
-    Measurements {
-        layout: layout(),
-        replicates: (0..replicates).map(|r| replicate(r, &mut rng)).collect(),
-    }
+    Measurements::new(layout(), (0..replicates).map(|r| replicate(r, &mut rng)).collect())
 }
 
 pub fn random_matrix(rows: usize, columns: usize, seed: u64) -> Matrix {

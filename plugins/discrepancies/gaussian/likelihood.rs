@@ -30,9 +30,19 @@ type Split = Vec<(Vec<f64>, Vec<f64>)>;
 
 impl GaussianLikelihood {
     pub(super) fn new(options: &Gaussian, known: &Known<'_>) -> Result<Self, Stop> {
+        Self::under(options, known, known.data)
+    }
+
+    /// The same where the noise that replicates show is that of `shown`.
+    pub(super) fn under(
+        options: &Gaussian,
+        known: &Known<'_>,
+        shown: &Measurements,
+    ) -> Result<Self, Stop> {
         let replicates = Replicates::of(known.data, known.common)?;
         let mut hyper = Vec::new();
-        let noise = Noise::new(known, &replicates, &options.variance, &options.by, &mut hyper)?;
+        let noise =
+            Noise::new(known, shown, &replicates, (&options.variance, &options.by), &mut hyper)?;
         let count = noise.groups.count();
         let common = known.common;
         let coupled = count > 1 && common.iter().any(|e| e.factor.columns() > 0);

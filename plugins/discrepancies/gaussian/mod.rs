@@ -5,11 +5,12 @@ mod grams;
 mod integral;
 mod law;
 mod likelihood;
+mod stated;
 mod statistics;
 #[cfg(test)]
 mod tests;
 
-use lacuna::data::Layout;
+use lacuna::data::{Layout, Measurements};
 use lacuna::plugin::component::{Component, Context};
 use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood, StatedNoise};
 use lacuna::run::Stop;
@@ -19,6 +20,7 @@ use serde::{Deserialize, Serialize};
 
 use super::common::{By, Groups, Variance};
 use likelihood::GaussianLikelihood;
+use stated::StatedLikelihood;
 
 /// Independent normal differences between data and model, of one unknown variance or of one for
 /// each group of outputs.
@@ -33,6 +35,12 @@ use likelihood::GaussianLikelihood;
 /// sufficient; with a linear emulator it is reduced further, by an orthogonal factorisation, to the
 /// size of the emulator's basis. Both are exact.
 ///
+/// **Measurements that state their own noise** (a column `sigma`, or a `covariance`): with `variance = { measured = { known =
+/// 1 } }` that is all there is, which is generalised least squares; with an unknown multiplier, such as `{ measured = {
+/// inverse_gamma = [102, 103] } }`, the stated variances are right but for one factor; every other `variance`, unknown or
+/// known, is added on top of the stated one, as what the model or the statement misses. Beside a `covariance` one variance
+/// is shared by all outputs, and what the replicates share is not estimated from them.
+///
 /// The variance of a new replicate is told in parts: `measurement` is what the replicates of the
 /// group show, `model_form` is the rest, `emulator` and others are the common errors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -46,7 +54,8 @@ pub struct Gaussian {
     /// between its replicates times an unknown `multiplier` (the error multipliers of Dakota, with
     /// a prior whose mean and mode are about 1); with `{ measured = { known = 1 } }` it is the
     /// measured variance itself. An output with fewer than two different values takes the measured
-    /// variance of its group.
+    /// variance of its group. Where the measurements state their noise, `measured` is what they
+    /// state, and any other variance is added to it.
     pub variance: Variance,
     /// Which outputs share a variance, or a multiplier: `"all"`; `"sensor"` or another axis, one
     /// for each of its values; `["sensor", { axis = "time", windows = 5 }]`, one for each sensor
@@ -84,7 +93,24 @@ impl Component for Gaussian {
 
 impl Discrepancy for Gaussian {
     fn likelihood(&self, known: &Known<'_>) -> Result<Box<dyn Likelihood>, Stop> {
+        if stated::is_needed(self, known.data) {
+            return Ok(Box::new(StatedLikelihood::new(self, known)?));
+        }
         Ok(Box::new(GaussianLikelihood::new(self, known)?))
+    }
+
+    fn likelihood_of_part(
+        &self,
+        known: &Known<'_>,
+        part: &Measurements,
+    ) -> Result<Option<Box<dyn Likelihood>>, Stop> {
+        let known_part = Known { data: part, ..*known };
+        let likelihood = GaussianLikelihood::under(self, &known_part, known.data)?;
+        Ok(Some(Box::new(likelihood)))
+    }
+
+    fn takes_stated_noise(&self) -> bool {
+        true
     }
 
     fn stated_noise(&self, layout: &Layout, _: &[f64]) -> Option<StatedNoise> {
@@ -93,4 +119,4 @@ impl Discrepancy for Gaussian {
     }
 }
 
-lacuna::register!(Discrepancy, "gaussian", Gaussian);
+lacuna::register!(Discrepancy, "gaussian", Gaussian, aliases: ["normal", "iid", "least_squares"]);

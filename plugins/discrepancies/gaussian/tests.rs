@@ -13,6 +13,7 @@ use crate::discrepancies::common::testing::options;
 
 mod groups;
 mod smooth;
+mod stated;
 
 const OUTPUTS: usize = 7;
 const TERMS: usize = 3;
@@ -36,24 +37,26 @@ impl Linear for Emulated {
 /// Random data with unequal replicates and missing values.
 fn data(seed: u64) -> Measurements {
     let mut rng = Stream::root(seed).generator();
-    let replicate = |r: usize, rng: &mut _| Replicate {
-        name: r.to_string(),
-        values: (0..OUTPUTS)
-            .map(|i| {
-                let y = normal(rng) + i as f64;
-                (i != 4 && (r == 0 || uniform(rng) < 0.6)).then_some(y)
-            })
-            .collect(),
+    let replicate = |r: usize, rng: &mut _| {
+        Replicate::new(
+            r.to_string(),
+            (0..OUTPUTS)
+                .map(|i| {
+                    let y = normal(rng) + i as f64;
+                    (i != 4 && (r == 0 || uniform(rng) < 0.6)).then_some(y)
+                })
+                .collect(),
+        )
     };
     let grid = (0..OUTPUTS).map(|i| i as f64).collect();
-    Measurements {
-        layout: Layout {
+    Measurements::new(
+        Layout {
             name: "y".into(),
             unit: Unit::parse("m").unwrap(),
             axes: vec![Axis::grid("time", grid, Unit::parse("s").unwrap())],
         },
-        replicates: (0..5).map(|r| replicate(r, &mut rng)).collect(),
-    }
+        (0..5).map(|r| replicate(r, &mut rng)).collect(),
+    )
 }
 
 fn random_matrix(rows: usize, columns: usize, seed: u64) -> Matrix {

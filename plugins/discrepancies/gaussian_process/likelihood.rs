@@ -30,6 +30,23 @@ pub(super) struct BiasedLikelihood {
 
 impl BiasedLikelihood {
     pub(super) fn new(options: &GaussianProcess, known: &Known<'_>) -> Result<Self, Stop> {
+        let likelihood = Self::under(options, known, known.data)?;
+        likelihood.ok_or_else(|| Stop::new("the data are no part of themselves"))
+    }
+
+    /// The same where the noise that replicates show is that of `shown`; `None` where the bias is orthogonal to what the
+    /// parameters do to outputs that only `shown` has: less of them is another law.
+    pub(super) fn under(
+        options: &GaussianProcess,
+        known: &Known<'_>,
+        shown: &Measurements,
+    ) -> Result<Option<Self>, Stop> {
+        let whole = shown.summaries();
+        let lost =
+            known.data.summaries().iter().zip(&whole).any(|(a, b)| a.count == 0 && b.count > 0);
+        if options.orthogonal && lost {
+            return Ok(None);
+        }
         let replicates = Replicates::of(known.data, known.common)?;
         let layout = &known.data.layout;
         let series = Series::of(layout, options.along.as_deref()).map_err(Stop::new)?;
@@ -44,7 +61,8 @@ impl BiasedLikelihood {
         let reach = series.grid.last().zip(series.grid.first()).map_or(0.0, |(b, a)| b - a);
         let tenth = |_| if reach > 0.0 { 0.1 * reach } else { 1.0 };
         let length = PerGroup::new(&options.correlation_length, &groups, &name, tenth, &mut hyper);
-        let noise = Noise::new(known, &replicates, &options.variance, &options.by, &mut hyper)?;
+        let noise =
+            Noise::new(known, shown, &replicates, (&options.variance, &options.by), &mut hyper)?;
         let basis = if options.orthogonal {
             basis(&(known.slopes)()?, &replicates)?
         } else {
@@ -56,7 +74,7 @@ impl BiasedLikelihood {
         let kernel = options.kernel;
         let bias = Bias { kernel, blocks, grid: series.grid, basis, sd, length };
         let factor = replicates.common_factor(known.common)?;
-        Ok(Self { noise, hyper, replicates, place, bias, factor })
+        Ok(Some(Self { noise, hyper, replicates, place, bias, factor }))
     }
 
     /// The variance of each measured output.

@@ -9,7 +9,7 @@ mod solve;
 #[cfg(test)]
 mod tests;
 
-use lacuna::data::Layout;
+use lacuna::data::{Layout, Measurements};
 use lacuna::plugin::component::{Component, Context};
 use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood, StatedNoise};
 use lacuna::run::Stop;
@@ -105,10 +105,20 @@ impl Discrepancy for GaussianProcess {
         Ok(Box::new(BiasedLikelihood::new(self, known)?))
     }
 
+    fn likelihood_of_part(
+        &self,
+        known: &Known<'_>,
+        part: &Measurements,
+    ) -> Result<Option<Box<dyn Likelihood>>, Stop> {
+        let known_part = Known { data: part, ..*known };
+        let likelihood = BiasedLikelihood::under(self, &known_part, known.data)?;
+        Ok(likelihood.map(|likelihood| Box::new(likelihood) as Box<dyn Likelihood>))
+    }
+
     fn stated_noise(&self, layout: &Layout, _: &[f64]) -> Option<StatedNoise> {
         let sd = self.variance.known_sd(layout, &self.by)?;
         Some(StatedNoise { sd, correlation_time: None })
     }
 }
 
-lacuna::register!(Discrepancy, "gaussian_process", GaussianProcess);
+lacuna::register!(Discrepancy, "gaussian_process", GaussianProcess, aliases: ["gp", "koh", "kennedy_ohagan"]);

@@ -84,6 +84,15 @@ impl Discrepancy for MultiplicativeGaussian {
         }))
     }
 
+    fn likelihood_of_part(
+        &self,
+        known: &Known<'_>,
+        part: &Measurements,
+    ) -> Result<Option<Box<dyn Likelihood>>, Stop> {
+        // Nothing of the law comes from the replicates.
+        self.likelihood(&Known { data: part, ..*known }).map(Some)
+    }
+
     fn stated_noise(&self, layout: &Layout, response: &[f64]) -> Option<StatedNoise> {
         let relative = self.relative.known(layout, &self.by)?;
         let floor = match &self.floor {
@@ -179,4 +188,4 @@ impl Likelihood for Proportional {
     }
 }
 
-lacuna::register!(Discrepancy, "multiplicative_gaussian", MultiplicativeGaussian);
+lacuna::register!(Discrepancy, "multiplicative_gaussian", MultiplicativeGaussian, aliases: ["relative", "proportional"]);

@@ -37,6 +37,15 @@ struct At<'a> {
 
 impl StudentLikelihood {
     pub(super) fn new(options: &StudentT, known: &Known<'_>) -> Result<Self, Stop> {
+        Self::of_part(options, known, known.data)
+    }
+
+    /// The likelihood of a part of the data, with the directions of the common errors that all data have.
+    pub(super) fn of_part(
+        options: &StudentT,
+        known: &Known<'_>,
+        part: &Measurements,
+    ) -> Result<Self, Stop> {
         let replicates = Replicates::of(known.data, known.common)?;
         let layout = &known.data.layout;
         let groups =
@@ -53,8 +62,9 @@ impl StudentLikelihood {
         let latent: Vec<Latent> = latent
             .map(|error| Latent::new(error, &replicates, options.common, &mut hyper))
             .collect::<Result<_, _>>()?;
-        let outputs = replicates.measured.iter().map(|&i| (i, known.data.values(i))).collect();
-        let setting = Setting::new(known, &replicates, &groups);
+        let outputs = replicates.measured.iter().map(|&i| (i, part.values(i))).collect();
+        let known = Known { data: part, ..*known };
+        let setting = Setting::new(&known, &replicates, &groups);
         Ok(Self { setting, hyper, groups, scale, freedom, latent, outputs })
     }
 

@@ -5,7 +5,7 @@ mod likelihood;
 #[cfg(test)]
 mod tests;
 
-use lacuna::data::Layout;
+use lacuna::data::{Layout, Measurements};
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::component::{Component, Context};
 use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood, StatedNoise};
@@ -104,6 +104,14 @@ impl Discrepancy for StudentT {
         Ok(Box::new(StudentLikelihood::new(self, known)?))
     }
 
+    fn likelihood_of_part(
+        &self,
+        known: &Known<'_>,
+        part: &Measurements,
+    ) -> Result<Option<Box<dyn Likelihood>>, Stop> {
+        Ok(Some(Box::new(StudentLikelihood::of_part(self, known, part)?)))
+    }
+
     fn stated_noise(&self, layout: &Layout, _: &[f64]) -> Option<StatedNoise> {
         let scales = self.scale.known(layout, &self.by)?;
         let degrees = self.degrees_of_freedom.known(layout, &By::default())?;
@@ -112,4 +120,4 @@ impl Discrepancy for StudentT {
     }
 }
 
-lacuna::register!(Discrepancy, "student_t", StudentT);
+lacuna::register!(Discrepancy, "student_t", StudentT, aliases: ["t", "student"]);

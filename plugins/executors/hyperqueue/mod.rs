@@ -273,7 +273,7 @@ impl HyperQueue {
     }
 }
 
-lacuna::register!(Executor, "hyperqueue", HyperQueue);
+lacuna::register!(Executor, "hyperqueue", HyperQueue, aliases: ["hq"]);
 
 #[cfg(test)]
 mod tests;

@@ -93,4 +93,4 @@ impl Executor for Local {
     }
 }
 
-lacuna::register!(Executor, "local", Local);
+lacuna::register!(Executor, "local", Local, aliases: ["threads", "multiprocessing"]);

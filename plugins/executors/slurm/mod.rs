@@ -325,7 +325,7 @@ impl Slurm {
     }
 }
 
-lacuna::register!(Executor, "slurm", Slurm);
+lacuna::register!(Executor, "slurm", Slurm, aliases: ["sbatch"]);
 
 #[cfg(test)]
 mod tests;

@@ -223,4 +223,4 @@ impl Gradient for Equations {
     }
 }
 
-lacuna::register!(Model, "equations", Equations);
+lacuna::register!(Model, "equations", Equations, aliases: ["ode", "odes"]);

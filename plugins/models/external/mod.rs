@@ -235,7 +235,7 @@ impl External {
     }
 }
 
-lacuna::register!(Model, "external", External);
+lacuna::register!(Model, "external", External, aliases: ["command", "executable", "subprocess"]);
 
 #[cfg(all(test, unix))]
 mod tests;

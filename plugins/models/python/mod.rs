@@ -168,7 +168,7 @@ impl Gradient for Python {
     }
 }
 
-lacuna::register!(Model, "python", Python);
+lacuna::register!(Model, "python", Python, aliases: ["py"]);
 
 #[cfg(all(test, unix))]
 mod tests;

@@ -174,4 +174,4 @@ impl Model for UmBridge {
     }
 }
 
-lacuna::register!(Model, "um_bridge", UmBridge);
+lacuna::register!(Model, "um_bridge", UmBridge, aliases: ["umbridge"]);

@@ -19,7 +19,7 @@ pub(super) fn contents(sheet: &Sheet) -> Contents {
     for (column, heading) in sheet.headings.iter().enumerate() {
         let Some(numbers) = numbers(sheet, column) else {
             let texts: BTreeSet<&str> =
-                sheet.records.iter().map(|record| record.cells[column].as_str()).collect();
+                sheet.records.iter().map(|record| &record.cells[column]).collect();
             let texts: Vec<&str> = texts.into_iter().collect();
             facts.push(fact(&heading.name, format!("{} texts: {}", texts.len(), listed(&texts))));
             continue;

@@ -7,7 +7,9 @@ use lacuna::data::{Layout, Measurements, Replicate, Unit};
 use lacuna::plugin::reader::ReadError;
 
 use crate::readers::cells::LongColumns;
-use crate::readers::sheet::{Record, Sheet};
+use crate::readers::faults::Faults;
+use crate::readers::noise::{MASK, REPLICATE, SIGMA, left_out};
+use crate::readers::sheet::{Conversion, Record, Sheet};
 
 /// A replicate while its rows come in, with the line of each value.
 struct Rows {
@@ -15,59 +17,164 @@ struct Rows {
     lines: Vec<usize>,
 }
 
-/// Reads the table: one replicate for each name in the column `replicate`.
+/// The columns of a table.
+struct Columns<'a> {
+    places: LongColumns<'a>,
+    replicate: Option<usize>,
+    sigma: Option<(usize, Conversion)>,
+    mask: Option<usize>,
+}
+
+/// One row: its replicate, place, value and standard deviation.
+struct Row<'a> {
+    replicate: &'a str,
+    place: usize,
+    value: Option<f64>,
+    sd: f64,
+}
+
+/// The name of the curve of a table without a column `replicate`.
+const ONLY: &str = "1";
+
+/// Reads the table: one replicate for each name in the column `replicate`, one in all without that column.
 pub(super) fn measurements(
-    sheet: &Sheet,
+    (sheet, mut faults): (Sheet, Faults),
     layout: &Layout,
     ignore: &[String],
 ) -> Result<Measurements, ReadError> {
-    let columns = LongColumns::find(sheet, layout)?;
-    let name = sheet.column("replicate")?;
-    reject_unknown(sheet, ignore, |c| columns.has(c) || c == name)?;
+    let sheet = &sheet;
+    let columns = match Columns::find(sheet, layout, ignore) {
+        Ok(columns) => columns,
+        Err(error) => {
+            faults.note(sheet.heading_line, error);
+            return faults.or(Measurements::new(layout.clone(), Vec::new()));
+        }
+    };
     let mut order: BTreeMap<&str, usize> = BTreeMap::new();
     let mut found: Vec<Rows> = Vec::new();
     for record in &sheet.records {
-        let place = columns.place(sheet, record)?;
-        let replicate = record.cells[name].as_str();
-        let number = *order.entry(replicate).or_insert_with(|| {
-            let values = vec![None; layout.len()];
-            let replicate = Replicate { name: replicate.to_owned(), values };
+        let Some(row) = faults.take(record.line, columns.row(sheet, record)) else { continue };
+        let number = *order.entry(row.replicate).or_insert_with(|| {
+            let mut replicate = Replicate::new(row.replicate, vec![None; layout.len()]);
+            replicate.sd = columns.sigma.is_some().then(|| vec![0.0; layout.len()]);
             found.push(Rows { replicate, lines: vec![0; layout.len()] });
             found.len() - 1
         });
         let rows = &mut found[number];
-        if rows.lines[place] > 0 {
-            let text = format!(
-                "a second value of replicate `{replicate}` for {}; the first is in line {}",
-                layout.describe(place),
-                rows.lines[place]
-            );
-            return Err(sheet.complain(record, columns.value, text));
+        if rows.lines[row.place] > 0 {
+            let first = rows.lines[row.place];
+            faults.note(record.line, columns.twice(sheet, record, layout, &row, first));
+            continue;
         }
-        rows.lines[place] = record.line;
-        rows.replicate.values[place] = measured(sheet, record, &columns)?;
+        rows.lines[row.place] = record.line;
+        rows.replicate.values[row.place] = row.value;
+        if let (Some(sd), Some(_)) = (&mut rows.replicate.sd, row.value) {
+            sd[row.place] = row.sd;
+        }
     }
-    reject_absent(sheet, layout, &found)?;
+    if faults.is_empty() {
+        reject_absent(sheet, layout, &found, &mut faults);
+    }
     let replicates = found.into_iter().map(|rows| rows.replicate).collect();
-    Ok(Measurements { layout: layout.clone(), replicates })
+    faults.or(Measurements::new(layout.clone(), replicates))
+}
+
+impl<'a> Columns<'a> {
+    fn find(sheet: &Sheet, layout: &'a Layout, ignore: &[String]) -> Result<Self, ReadError> {
+        let known = |name: &str| sheet.find(name).filter(|_| !ignore.iter().any(|i| i == name));
+        let places = LongColumns::find(sheet, layout);
+        let of_places = places.as_ref().ok();
+        // The response itself may be called so.
+        let known = |name: &str| known(name).filter(|c| of_places.is_none_or(|p| !p.has(*c)));
+        let sigma = known(SIGMA)
+            .map(|column| {
+                let own = sheet.conversion(column, &layout.unit)?;
+                // Without a unit of its own it is in that of the values.
+                let of_values = of_places.filter(|_| !own.is_stated()).map(LongColumns::conversion);
+                Ok((column, of_values.cloned().unwrap_or(own)))
+            })
+            .transpose();
+        let (replicate, mask) = (known(REPLICATE), known(MASK));
+        let unknown = of_places.map_or(Ok(()), |places| {
+            let own = [replicate, mask, known(SIGMA)];
+            reject_unknown(sheet, ignore, |c| places.has(c) || own.contains(&Some(c)))
+        });
+        match (places, sigma, unknown) {
+            (Ok(places), Ok(sigma), Ok(())) => Ok(Self { places, replicate, sigma, mask }),
+            (places, sigma, unknown) => {
+                let all = [places.err(), sigma.err(), unknown.err()].into_iter().flatten();
+                Err(ReadError::of_all(all)
+                    .unwrap_or_else(|| ReadError::new(&sheet.path, "cannot be read")))
+            }
+        }
+    }
+
+    fn row<'r>(&self, sheet: &Sheet, record: &'r Record) -> Result<Row<'r>, ReadError> {
+        let mut faults = Faults::default();
+        let replicate = self.replicate.map_or(ONLY, |column| &record.cells[column]);
+        if let (true, Some(column)) = (replicate.is_empty(), self.replicate) {
+            let text = "expected the name of a replicate, found a blank";
+            faults.note(1, sheet.complain(record, column, text));
+        }
+        let place = faults.take(1, self.places.place(sheet, record));
+        let value = faults.take(1, measured(sheet, record, &self.places)).flatten();
+        let mask = self.mask.map(|column| left_out(sheet, record, column)).transpose();
+        let masked = faults.take(1, mask).flatten().unwrap_or(false);
+        let value = value.filter(|_| !masked);
+        let sd = match (&self.sigma, value) {
+            (Some(sigma), Some(_)) => faults.take(1, stated(sheet, record, sigma)),
+            _ => Some(0.0),
+        };
+        let (place, sd) = (place.unwrap_or_default(), sd.unwrap_or_default());
+        faults.or(Row { replicate, place, value, sd })
+    }
+
+    fn twice(
+        &self,
+        sheet: &Sheet,
+        record: &Record,
+        layout: &Layout,
+        row: &Row<'_>,
+        first: usize,
+    ) -> ReadError {
+        let place = layout.describe(row.place);
+        let of = match self.replicate {
+            Some(_) => format!(" of replicate `{}`", row.replicate),
+            None => String::new(),
+        };
+        let text = format!("a second value{of} for {place}; the first is in line {first}");
+        let error = sheet.complain(record, self.places.value, text);
+        match self.replicate {
+            Some(_) => error,
+            None => error.help("a column `replicate` tells repeated measurements apart"),
+        }
+    }
 }
 
 /// The numbers of an axis that appear in the table, increasing.
-pub(super) fn grid(sheet: &Sheet, axis: &str, unit: &Unit) -> Result<Vec<f64>, ReadError> {
+pub(super) fn grid(
+    (sheet, mut faults): (Sheet, Faults),
+    axis: &str,
+    unit: &Unit,
+) -> Result<Vec<f64>, ReadError> {
+    let sheet = &sheet;
     let column = sheet.column(axis)?;
     let conversion = sheet.conversion(column, unit)?;
     let mut numbers = Vec::with_capacity(sheet.records.len());
     for record in &sheet.records {
-        let x = sheet.number(record, column)?.and_then(|x| conversion.apply(x));
-        let x = x.filter(|x| x.is_finite()).ok_or_else(|| {
-            let cell = &record.cells[column];
-            sheet.complain(record, column, format!("expected a finite number, found `{cell}`"))
-        })?;
-        numbers.push(x);
+        let x = sheet.number(record, column).and_then(|x| {
+            let x = x.and_then(|x| conversion.apply(x)).filter(|x| x.is_finite());
+            x.ok_or_else(|| {
+                let cell = &record.cells[column];
+                let text = format!("expected a finite number, found `{cell}`");
+                sheet.complain(record, column, text)
+            })
+        });
+        numbers.extend(faults.take(record.line, x));
     }
     numbers.sort_by(f64::total_cmp);
     numbers.dedup();
-    Ok(numbers)
+    faults.or(numbers)
 }
 
 fn measured(
@@ -84,6 +191,22 @@ fn measured(
     Ok(value)
 }
 
+/// The standard deviation of a value.
+fn stated(
+    sheet: &Sheet,
+    record: &Record,
+    (column, conversion): &(usize, Conversion),
+) -> Result<f64, ReadError> {
+    let sd = sheet.number(record, *column)?.and_then(|x| conversion.width(x));
+    sd.filter(|sd| sd.is_finite() && *sd > 0.0).ok_or_else(|| {
+        let cell = &record.cells[*column];
+        let text = format!("expected a standard deviation above zero, found `{cell}`");
+        sheet
+            .complain(record, *column, text)
+            .help("a value that is not to be used has a blank cell, or 1 in a column `mask`")
+    })
+}
+
 /// A column that nothing reads may hold a condition: replicates of different conditions must not
 /// silently become one.
 fn reject_unknown(
@@ -91,18 +214,20 @@ fn reject_unknown(
     ignore: &[String],
     known: impl Fn(usize) -> bool,
 ) -> Result<(), ReadError> {
-    let unknown = (0..sheet.headings.len()).find(|&c| {
+    let unknown = (0..sheet.headings.len()).filter(|&c| {
         !known(c) && sheet.headings[c].name != SCENARIO && !ignore.contains(&sheet.headings[c].name)
     });
-    let Some(column) = unknown else { return Ok(()) };
-    let text = format!("column `{}` has no meaning here", sheet.headings[column].name);
-    Err(ReadError::new(&sheet.path, text)
-        .at(format!("line {}, column {}", sheet.heading_line, column + 1))
-        .help("list it under `ignore` if it means nothing, or make it a scenario if it is a condition"))
+    let error = |column: usize| {
+        let text = format!("column `{}` has no meaning here", sheet.headings[column].name);
+        ReadError::new(&sheet.path, text)
+            .at(format!("line {}, column {}", sheet.heading_line, column + 1))
+            .help("list it under `ignore` if it means nothing, or make it a scenario if it is a condition")
+    };
+    ReadError::of_all(unknown.map(error)).map_or(Ok(()), Err)
 }
 
 /// Every sensor and every time of the response has to appear in some row, be it without a value.
-fn reject_absent(sheet: &Sheet, layout: &Layout, found: &[Rows]) -> Result<(), ReadError> {
+fn reject_absent(sheet: &Sheet, layout: &Layout, found: &[Rows], faults: &mut Faults) {
     let mut seen: Vec<Vec<bool>> = layout.axes.iter().map(|a| vec![false; a.len()]).collect();
     for flat in 0..layout.len() {
         if found.iter().any(|rows| rows.lines[flat] > 0) {
@@ -112,12 +237,14 @@ fn reject_absent(sheet: &Sheet, layout: &Layout, found: &[Rows]) -> Result<(), R
         }
     }
     for (axis, seen) in layout.axes.iter().zip(seen) {
-        if let Some(i) = seen.iter().position(|seen| !seen) {
-            let text = format!("has no row for {} `{}`", axis.name, axis.text(i));
-            return Err(ReadError::new(&sheet.path, text).help(
-                "a value that was not measured is a row with a blank cell, or a shorter axis",
-            ));
-        }
+        let absent: Vec<usize> = (0..seen.len()).filter(|&i| !seen[i]).collect();
+        let Some(first) = absent.first() else { continue };
+        let more = match absent.len() - 1 {
+            0 => String::new(),
+            n => format!(" and {n} more"),
+        };
+        let text = format!("has no row for {} `{}`{more}", axis.name, axis.text(*first));
+        let help = "a value that was not measured is a row with a blank cell, or a shorter axis";
+        faults.note(0, ReadError::new(&sheet.path, text).help(help));
     }
-    Ok(())
 }

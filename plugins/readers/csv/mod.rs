@@ -16,6 +16,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::cells::LongColumns;
+use super::noise;
 use super::runs::{self, AllowFailed};
 use super::scenario;
 use super::sheet::Sheet;
@@ -33,9 +34,18 @@ use super::sierra::heartbeat;
 /// value, headed by its place (`B 1e-5`). A wide table of a response without axes has one column,
 /// named after the response.
 ///
-/// **Measurements** (section `measurements`): one long table `path` with the columns `replicate`,
-/// the axes and the response's name. A blank cell, `NaN`, or a row that is not there is a missing
-/// value.
+/// **Measurements** (section `measurements`): one long table `path` with the columns of the axes and the response's
+/// name. A column `replicate` names repeated measurements; a table without it is one curve. A blank cell, `NaN`, or a row
+/// that is not there is a missing value, and so is one with 1 in a column `mask`.
+///
+/// **Noise** of the measurements, where it is known: a column `sigma` with the standard deviation of each value (in the
+/// unit of its heading, else in that of the values), or a file `covariance` for one whole curve. What the likelihood
+/// makes of it, the page of the discrepancy says.
+///
+/// **Cut files**: a last line without a line end is refused when its last field is shorter than those above it, as it is
+/// when a program is killed while it writes: it has fewer decimals, or fewer significant digits, than every other number
+/// of a column in which all have equally many, or at least two fewer than nearly all where they vary; it has a shorter
+/// exponent; it is blank where no other is; or it is the beginning of a text above it.
 ///
 /// **Scenarios**: in a study with `[[scenario]]` sections the column `scenario` of these tables says to which a row
 /// belongs; or a path holds `{scenario}`, and each scenario has a file of its own.
@@ -55,6 +65,17 @@ pub struct Csv {
     /// has a file of its own, named in the column `file` of the table of runs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub responses: Option<PathBuf>,
+    /// Covariance of the noise of one curve, relative to the study file, in the squared unit of the response: a square of
+    /// numbers, as text without headings or in the variable `covariance` of a netCDF file (`.nc`). Rows and columns
+    /// follow the response, its last axis fastest; or the columns of a text have headings as in a wide table, and the
+    /// rows follow them. It has to be symmetric and positive definite.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<PathBuf>,
+    /// Table of values that are left out, relative to the study file: the columns of the axes and `mask`, which is 1 for
+    /// a value that is left out and 0 for one that is used (as in a masked array of NumPy), and `replicate` where
+    /// it is not the same for all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mask: Option<PathBuf>,
     /// How many runs without a complete response may be left out: below 1 a fraction, from 1 on a
     /// count.
     pub allow_failed: AllowFailed,
@@ -65,6 +86,15 @@ pub struct Csv {
 
 impl Component for Csv {
     fn check(&self, _context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        for (key, given) in
+            [("covariance", self.covariance.is_some()), ("mask", self.mask.is_some())]
+        {
+            if given && self.path.is_none() {
+                complaints
+                    .at(key)
+                    .say(format!("`{key}` needs `path`: the measurements that it is about"));
+            }
+        }
         if self.responses.is_some() && self.parameters.is_none() {
             complaints
                 .at("responses")
@@ -77,6 +107,8 @@ impl Component for Csv {
             ("path", &self.path),
             ("parameters", &self.parameters),
             ("responses", &self.responses),
+            ("covariance", &self.covariance),
+            ("mask", &self.mask),
         ];
         let paths = paths.map(|(key, path)| (key, path.as_deref()));
         scenario::check_files(paths, context, complaints);
@@ -98,6 +130,10 @@ impl Reader for Csv {
         self.path.is_some() || self.parameters.is_some()
     }
 
+    fn allowed_failures(&self, runs: usize) -> Option<usize> {
+        Some(self.allow_failed.of(runs))
+    }
+
     fn ensemble(&self, source: &EnsembleSource<'_>) -> Result<Ensemble, ReadError> {
         let table = runs::table_path(source, self.parameters.as_deref(), "parameters")?;
         let list = runs::read_runs(&table, source.parameters)?;
@@ -110,11 +146,14 @@ impl Reader for Csv {
                 self.response(file, source.layout)
             });
         };
-        let sheet = scenario::sheet(source.directory, responses, source.scenario, &self.ignore)?;
-        let values = ensemble::responses(&sheet, &list, source.layout)?;
+        let opened = scenario::sheet(source.directory, responses, source.scenario, &self.ignore)?;
+        let path = opened.0.path.clone();
+        let values = ensemble::responses(opened, &list, source.layout)?;
         runs::ensemble(source, &table, &list, self.allow_failed, |run| {
-            let values = list.iter().position(|r| r.name == run.name).map(|i| &values[i]);
-            complete(&sheet.path, source.layout, values.map_or(&[][..], Vec::as_slice))
+            let values =
+                list.iter().position(|r| r.name == run.name).and_then(|i| values[i].as_ref());
+            let values = values.ok_or_else(|| ReadError::new(&path, "has no row of it"))?;
+            complete(&path, source.layout, values)
         })
     }
 
@@ -124,7 +163,19 @@ impl Reader for Csv {
                 .help("name it with `path`")
         })?;
         let sheet = scenario::sheet(source.directory, path, source.scenario, &self.ignore)?;
-        measurements::measurements(&sheet, source.layout, &self.ignore)
+        let mut data = measurements::measurements(sheet, source.layout, &self.ignore)?;
+        let file = |path: &PathBuf| scenario_path(source.directory, path, source.scenario);
+        if let Some(mask) = self.mask.as_ref().map(file) {
+            noise::apply_mask(&mask, source.layout, &mut data)?;
+        }
+        if let Some(path) = self.covariance.as_ref().map(file) {
+            if data.states_noise() {
+                return Err(ReadError::new(path, "the measurements have a column `sigma` too")
+                    .help("the noise is stated once: take out `covariance`, or list `sigma` under `ignore`"));
+            }
+            data.covariance = Some(noise::covariance(&path, source.layout)?);
+        }
+        Ok(data)
     }
 
     fn grid(&self, source: &GridSource<'_>) -> Result<Vec<f64>, ReadError> {
@@ -133,7 +184,7 @@ impl Reader for Csv {
                 .help("name it with `path`")
         })?;
         let sheet = scenario::sheet(source.directory, path, source.scenario, &self.ignore)?;
-        measurements::grid(&sheet, source.axis, source.unit)
+        measurements::grid(sheet, source.axis, source.unit)
     }
 
     fn response(&self, path: &Path, layout: &Layout) -> Result<Vec<f64>, ReadError> {
@@ -153,7 +204,8 @@ impl Reader for Csv {
     }
 
     fn files(&self, directory: &Path, scenario: Option<&str>) -> Vec<PathBuf> {
-        let mut files: Vec<PathBuf> = [&self.path, &self.parameters, &self.responses]
+        let own = [&self.path, &self.parameters, &self.responses, &self.covariance, &self.mask];
+        let mut files: Vec<PathBuf> = own
             .into_iter()
             .flatten()
             .map(|path| scenario_path(directory, path, scenario))
@@ -179,7 +231,7 @@ fn complete(path: &Path, layout: &Layout, values: &[Option<f64>]) -> Result<Vec<
     Ok(values)
 }
 
-lacuna::register!(Reader, "csv", Csv);
+lacuna::register!(Reader, "csv", Csv, aliases: ["tsv", "table"]);
 
 #[cfg(test)]
 mod tests;

@@ -208,9 +208,12 @@ fn every_complaint_names_the_place_and_what_would_be_right() {
     let complaint = |head: &str| measured(&format!("{head}{all}"), Csv::default()).unwrap_err();
     for (head, expected) in [
         ("replicate,sensor,time,stress\n", "no column `strain`; it has `replicate`, `sensor`"),
-        ("replicate,sensor,time [kg],strain\n", "line 1: expected a unit that converts to `s`"),
+        (
+            "replicate,sensor,time [kg],strain\n",
+            "line 1, column 3: expected a unit that converts to `s`",
+        ),
         ("replicate,sensor,time [sec],strain\n", "line 1, column 3"),
-        ("replicate,sensor,sensor,strain\n", "line 1: two columns are called `sensor`"),
+        ("replicate,sensor,sensor,strain\n", "line 1, column 3: two columns are called `sensor`"),
     ] {
         let text = complaint(head);
         assert!(text.contains(expected), "expected `{expected}` in `{text}`");

@@ -6,11 +6,14 @@ use std::sync::Arc;
 use hdf5_reader::{FileStorage, Storage};
 use lacuna::data::layouts::SCENARIO;
 use lacuna::data::{Axis, Coordinates, Layout, Unit};
+use lacuna::linalg::Matrix;
 use lacuna::plugin::reader::ReadError;
 use netcdf_reader::{NcFile, NcOpenOptions, NcType, NcVariable};
 
+use crate::discrepancies::common::squared;
 use crate::readers::cells::{grid_places, on_axis};
 use crate::readers::listed;
+use crate::readers::noise::REPLICATE;
 use crate::readers::sierra::container::read_limit;
 
 /// An open netCDF file.
@@ -186,12 +189,12 @@ impl File {
         &self,
         name: &str,
         layout: &Layout,
-        outer: &str,
+        outer: Option<&str>,
         scenario: Option<&str>,
     ) -> Result<Vec<Vec<f64>>, ReadError> {
         let divided = self.variable(name)?.dimensions().iter().any(|d| d.name == SCENARIO);
         let Some(scenario) = scenario.filter(|_| divided) else {
-            return self.responses(name, layout, Some(outer));
+            return self.responses(name, layout, outer);
         };
         let labels = self.labels(&Axis::labels(SCENARIO, [""; 0]))?;
         let place = labels.iter().position(|label| label == scenario).ok_or_else(|| {
@@ -202,8 +205,65 @@ impl File {
         all.axes.insert(0, Axis::labels(SCENARIO, labels));
         let length = layout.len();
         let own = place * length..(place + 1) * length;
-        let responses = self.responses(name, &all, Some(outer))?;
+        let responses = self.responses(name, &all, outer)?;
         Ok(responses.into_iter().map(|response| response[own.clone()].to_vec()).collect())
+    }
+
+    /// Measured curves, one a place of the dimension `replicate`; a single one where the variable has only the axes.
+    pub(super) fn curves(
+        &self,
+        name: &str,
+        layout: &Layout,
+        scenario: Option<&str>,
+    ) -> Result<Vec<Vec<f64>>, ReadError> {
+        let dimensions = self.variable(name)?.dimensions();
+        let has = |wanted: &str| dimensions.iter().any(|d| d.name == wanted);
+        let axes = layout.axes.len() + usize::from(scenario.is_some() && has(SCENARIO));
+        let outer = has(REPLICATE) || dimensions.len() > axes;
+        self.of_scenario(name, layout, outer.then_some(REPLICATE), scenario)
+    }
+
+    /// Standard deviations in the unit of the layout.
+    pub(super) fn widths(
+        &self,
+        name: &str,
+        layout: &Layout,
+        scenario: Option<&str>,
+    ) -> Result<Vec<Vec<f64>>, ReadError> {
+        let own = self.unit(self.variable(name)?)?;
+        let own = own.unwrap_or_else(|| layout.unit.clone());
+        let [one, zero] = [1.0, 0.0].map(|x| own.convert(x, &layout.unit));
+        let (Some(one), Some(zero)) = (one, zero) else {
+            let text = format!("is in `{own}`, which does not convert to `{}`", layout.unit);
+            return Err(self.complain(text).at(format!("variable `{name}`")));
+        };
+        let curves = self.curves(name, &Layout { unit: own, ..layout.clone() }, scenario)?;
+        let scaled = |curve: Vec<f64>| curve.into_iter().map(|x| x * (one - zero)).collect();
+        Ok(curves.into_iter().map(scaled).collect())
+    }
+
+    /// A square variable of a covariance in the squared unit of the layout, in its order.
+    pub(super) fn square(&self, name: &str, layout: &Layout) -> Result<Matrix, ReadError> {
+        let variable = self.variable(name)?;
+        let sizes: Vec<usize> = variable.dimensions().iter().map(|d| d.size as usize).collect();
+        let size = layout.len();
+        if sizes != [size, size] {
+            let text = format!("expected {size} x {size} numbers, found dimensions {sizes:?}");
+            return Err(self.complain(text).at(format!("variable `{name}`")));
+        }
+        let mut numbers = self.numbers(name)?;
+        if let Some(unit) = self.unit(variable)? {
+            let squared = squared(&layout.unit).map_err(|e| self.complain(e.to_string()))?;
+            let factor = unit.factor_to(&squared).ok_or_else(|| {
+                let text = format!("is in `{unit}`, which does not convert to `{squared}`");
+                self.complain(text).at(format!("variable `{name}`"))
+            })?;
+            numbers.iter_mut().for_each(|x| *x *= factor);
+        }
+        if let Some(x) = numbers.iter().find(|x| !x.is_finite()) {
+            return Err(self.complain(format!("holds {x}")).at(format!("variable `{name}`")));
+        }
+        Ok(Matrix::from_vec(size, size, numbers))
     }
 
     /// The numbers of a coordinate variable, increasing.

@@ -5,7 +5,7 @@ mod inspect;
 
 use std::path::{Path, PathBuf};
 
-use lacuna::data::{Ensemble, Layout, Measurements, Replicate};
+use lacuna::data::{Ensemble, Layout, Measurements, Replicate, Unit};
 use lacuna::plugin::reader::{
     Contents, EnsembleSource, GridSource, MeasurementSource, ReadError, scenario_path,
 };
@@ -15,6 +15,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use self::array::File;
+use super::noise::{self, MASK, REPLICATE, SIGMA};
 use super::runs::{self, AllowFailed, Run};
 use super::scenario;
 use super::sierra;
@@ -31,7 +32,11 @@ use super::sierra;
 /// variable over it for each parameter, or a table `runs` with a file for each run.
 ///
 /// **Measurements** (section `measurements`): one file `path` with a further dimension
-/// `replicate`.
+/// `replicate`; a variable that has only the axes is one curve.
+///
+/// **Noise** of the measurements, where it is known: a variable `sigma` with the standard deviation of each value, over the
+/// axes and where it differs over `replicate`, or a file `covariance` for one whole curve. A variable `mask` over the
+/// same dimensions is not zero where a value is left out.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct NetCdf {
@@ -42,6 +47,11 @@ pub struct NetCdf {
     /// parameter. Left out, and without `path`, the runs are those that the study simulates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub runs: Option<PathBuf>,
+    /// Covariance of the noise of one curve, relative to the study file, in the squared unit of the response: a square
+    /// variable `covariance` of a netCDF file (`.nc`), or a square of numbers as text. Rows and columns follow the
+    /// response, its last axis fastest; it has to be symmetric and positive definite.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<PathBuf>,
     /// Variable that holds the response; its name is that of the response when left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variable: Option<String>,
@@ -58,7 +68,8 @@ impl Component for NetCdf {
     }
 
     fn environment(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        let paths = [("path", self.path.as_deref()), ("runs", self.runs.as_deref())];
+        let paths = [("path", &self.path), ("runs", &self.runs), ("covariance", &self.covariance)];
+        let paths = paths.map(|(key, path)| (key, path.as_deref()));
         scenario::check_files(paths, context, complaints);
     }
 }
@@ -75,7 +86,7 @@ impl NetCdf {
     ) -> Result<Ensemble, ReadError> {
         let file = File::open(path)?;
         let variable = self.variable(source.layout);
-        let values = file.of_scenario(variable, source.layout, "run", source.scenario)?;
+        let values = file.of_scenario(variable, source.layout, Some("run"), source.scenario)?;
         let names = file.names("run", values.len())?;
         let columns = source
             .parameters
@@ -126,6 +137,10 @@ impl Reader for NetCdf {
         self.path.is_some() || self.runs.is_some()
     }
 
+    fn allowed_failures(&self, runs: usize) -> Option<usize> {
+        Some(self.allow_failed.of(runs))
+    }
+
     fn ensemble(&self, source: &EnsembleSource<'_>) -> Result<Ensemble, ReadError> {
         if let Some(path) = &self.path {
             return self
@@ -151,18 +166,53 @@ impl Reader for NetCdf {
         let file = File::open(&path)?;
         let layout = source.layout;
         let variable = self.variable(layout);
-        let values = file.of_scenario(variable, layout, "replicate", source.scenario)?;
-        let names = file.names("replicate", values.len())?;
-        let replicates = names.into_iter().zip(values).map(|(name, values)| {
+        let values = file.curves(variable, layout, source.scenario)?;
+        let names = file.names(REPLICATE, values.len())?;
+        let beside = |name: &str| file.has(name) && name != variable;
+        let mask = if beside(MASK) {
+            let plain = Layout { unit: Unit::dimensionless(), ..layout.clone() };
+            Some(repeated(file.curves(MASK, &plain, source.scenario)?, values.len(), &file, MASK)?)
+        } else {
+            None
+        };
+        let sigma = if beside(SIGMA) {
+            Some(repeated(
+                file.widths(SIGMA, layout, source.scenario)?,
+                values.len(),
+                &file,
+                SIGMA,
+            )?)
+        } else {
+            None
+        };
+        let mut replicates = Vec::new();
+        for (r, (name, values)) in names.into_iter().zip(values).enumerate() {
             if let Some(i) = values.iter().position(|y| y.is_infinite()) {
                 let text = format!("replicate `{name}` is {} at {}", values[i], layout.describe(i));
                 return Err(ReadError::new(&path, text));
             }
-            let values = values.into_iter().map(|y| (!y.is_nan()).then_some(y)).collect();
-            Ok(Replicate { name, values })
-        });
-        let replicates = replicates.collect::<Result<_, _>>()?;
-        Ok(Measurements { layout: layout.clone(), replicates })
+            let out = |i: usize| mask.as_ref().is_some_and(|mask| mask[r][i] != 0.0);
+            let used = |(i, y): (usize, f64)| (!y.is_nan() && !out(i)).then_some(y);
+            let mut replicate =
+                Replicate::new(name, values.into_iter().enumerate().map(used).collect());
+            replicate.sd = sigma.as_ref().map(|sigma| sigma[r].clone());
+            stated(&path, layout, &mut replicate)?;
+            replicates.push(replicate);
+        }
+        let mut data = Measurements::new(layout.clone(), replicates);
+        let of_curve = self.covariance.as_ref();
+        if let Some(covariance) = of_curve {
+            let covariance = scenario_path(source.directory, covariance, source.scenario);
+            if data.states_noise() {
+                return Err(ReadError::new(
+                    &path,
+                    "has a variable `sigma`, and the study names a covariance too",
+                )
+                .help("the noise is stated once: take out `covariance`, or the variable"));
+            }
+            data.covariance = Some(noise::covariance(&covariance, layout)?);
+        }
+        Ok(data)
     }
 
     fn grid(&self, source: &GridSource<'_>) -> Result<Vec<f64>, ReadError> {
@@ -185,7 +235,7 @@ impl Reader for NetCdf {
     fn files(&self, directory: &Path, scenario: Option<&str>) -> Vec<PathBuf> {
         let file = |path: &PathBuf| scenario_path(directory, path, scenario);
         let mut files: Vec<PathBuf> =
-            [&self.path, &self.runs].into_iter().flatten().map(file).collect();
+            [&self.path, &self.runs, &self.covariance].into_iter().flatten().map(file).collect();
         if let Some(table) = &self.runs {
             files.extend(runs::named_files(&file(table)));
         }
@@ -193,7 +243,48 @@ impl Reader for NetCdf {
     }
 }
 
-lacuna::register!(Reader, "netcdf", NetCdf);
+/// One row a replicate of what a variable holds for each or for all.
+fn repeated(
+    mut rows: Vec<Vec<f64>>,
+    replicates: usize,
+    file: &File,
+    name: &str,
+) -> Result<Vec<Vec<f64>>, ReadError> {
+    if rows.len() == 1 {
+        rows.resize(replicates, rows[0].clone());
+    }
+    if rows.len() != replicates {
+        let text = format!("expected {replicates} replicates, found {}", rows.len());
+        return Err(file.complain(text).at(format!("variable `{name}`")));
+    }
+    Ok(rows)
+}
+
+/// Refuses a measured value without a standard deviation above zero.
+fn stated(path: &Path, layout: &Layout, replicate: &mut Replicate) -> Result<(), ReadError> {
+    let Some(sd) = &mut replicate.sd else { return Ok(()) };
+    for (i, sd) in sd.iter_mut().enumerate() {
+        if replicate.values[i].is_none() {
+            *sd = 0.0;
+        } else if !(sd.is_finite() && *sd > 0.0) {
+            let text = format!(
+                "expected a standard deviation above zero, found {sd} at {} of replicate `{}`",
+                layout.describe(i),
+                replicate.name
+            );
+            return Err(ReadError::new(path, text).at(format!("variable `{SIGMA}`")));
+        }
+    }
+    Ok(())
+}
+
+/// A square variable of a file; see [`noise::covariance`].
+pub(super) fn square(path: &Path, name: &str, layout: &Layout) -> Result<noise::Square, ReadError> {
+    let values = File::open(path)?.square(name, layout)?;
+    Ok(noise::Square { places: (0..layout.len()).collect(), values })
+}
+
+lacuna::register!(Reader, "netcdf", NetCdf, aliases: ["nc", "netcdf4"]);
 
 #[cfg(test)]
 mod tests;

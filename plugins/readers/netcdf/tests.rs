@@ -173,3 +173,80 @@ fn damaged_files_do_no_harm() {
         }
     }
 }
+
+/// One curve `strain(sensor, time)` with its standard deviations in microstrain, a value that is left out, and a covariance
+/// in squared microstrain.
+fn write_stated(folder: &Path, sigma: [f64; 6], covariance: &[f64]) {
+    let save = |name: &str, file: NcFileBuilder| {
+        let options = NcWriteOptions { format: NcWriteFormat::Cdf5 };
+        std::fs::write(folder.join(name), file.to_vec(options).unwrap().1).unwrap();
+    };
+    let mut file = NcFileBuilder::new();
+    let sensor = file.add_dimension("sensor", 2).unwrap();
+    let time = file.add_dimension("time", 3).unwrap();
+    let letters = file.add_dimension("letters", 1).unwrap();
+    let v = file.add_variable::<f64>("time", &[time]).unwrap();
+    file.write_variable(v, &[1e-5, 2e-5, 3e-5]).unwrap();
+    let v = file.add_char_variable("sensor", &[sensor, letters]).unwrap();
+    file.write_char_variable(v, b"BC").unwrap();
+    for (name, unit, values) in [
+        ("strain", Some("microstrain"), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]),
+        ("sigma", Some("microstrain"), sigma),
+        ("mask", None, [0.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
+    ] {
+        let v = file.add_variable::<f64>(name, &[sensor, time]).unwrap();
+        file.write_variable(v, &values).unwrap();
+        if let Some(unit) = unit {
+            file.add_variable_attribute(v, "units", NcAttrValue::Chars(unit.into())).unwrap();
+        }
+    }
+    save("a.nc", file);
+    let mut file = NcFileBuilder::new();
+    let size = covariance.len().isqrt() as u64;
+    let rows = file.add_dimension("row", size).unwrap();
+    let columns = file.add_dimension("column", size).unwrap();
+    let v = file.add_variable::<f64>("covariance", &[rows, columns]).unwrap();
+    file.write_variable(v, covariance).unwrap();
+    file.add_variable_attribute(v, "units", NcAttrValue::Chars("microstrain^2".into())).unwrap();
+    save("covariance.nc", file);
+}
+
+#[test]
+fn one_curve_states_its_noise() {
+    let folder = tempfile::tempdir().unwrap();
+    let layout = layout();
+    let covariance: Vec<f64> = (0..36)
+        .map(|k| {
+            if k / 6 == k % 6 {
+                4.0
+            } else if (k / 6).abs_diff(k % 6) == 1 {
+                1.0
+            } else {
+                0.0
+            }
+        })
+        .collect();
+    let read = |reader: &NetCdf| {
+        let source =
+            MeasurementSource { directory: folder.path(), scenario: None, layout: &layout };
+        reader.measurements(&source).map_err(|error| error.to_string())
+    };
+    let plain = NetCdf { path: Some("a.nc".into()), ..NetCdf::default() };
+    let with = NetCdf { covariance: Some("covariance.nc".into()), ..plain.clone() };
+    write_stated(folder.path(), [0.5, 1.0, 1.5, 2.0, f64::NAN, 3.0], &covariance);
+    let data = read(&plain).unwrap();
+    assert_eq!((data.replicates.len(), data.count()), (1, 5));
+    let sd = data.replicates[0].sd.as_ref().unwrap();
+    for (found, expected) in sd.iter().zip([0.5, 1.0, 1.5, 2.0, 0.0, 3.0]) {
+        assert!((found - 1e-6 * expected).abs() < 1e-18, "{found}");
+    }
+    assert!(read(&with).unwrap_err().contains("has a variable `sigma`"));
+    write_stated(folder.path(), [0.5, 1.0, 0.0, 2.0, 1.0, 3.0], &covariance);
+    let text = read(&plain).unwrap_err();
+    assert!(text.contains("above zero, found 0 at sensor `B`, time 0.00003 s"), "{text}");
+    let own = super::noise::covariance(&folder.path().join("covariance.nc"), &layout).unwrap();
+    assert!((own[(0, 0)] - 4e-12).abs() < 1e-24 && (own[(2, 1)] - 1e-12).abs() < 1e-24);
+    write_stated(folder.path(), [1.0; 6], &covariance[..25]);
+    let text = super::noise::covariance(&folder.path().join("covariance.nc"), &layout).unwrap_err();
+    assert!(text.to_string().contains("expected 6 x 6 numbers, found dimensions [5, 5]"), "{text}");
+}

@@ -194,6 +194,10 @@ impl Reader for Sierra {
         self.runs.is_some()
     }
 
+    fn allowed_failures(&self, runs: usize) -> Option<usize> {
+        Some(self.allow_failed.of(runs))
+    }
+
     fn ensemble(&self, source: &EnsembleSource<'_>) -> Result<Ensemble, ReadError> {
         let table = runs::table_path(source, self.runs.as_deref(), "runs")?;
         let list = runs::read_runs(&table, source.parameters)?;
@@ -298,7 +302,7 @@ impl<'a> Curves<'a> {
     }
 }
 
-lacuna::register!(Reader, "sierra", Sierra);
+lacuna::register!(Reader, "sierra", Sierra, aliases: ["exodus", "exodusii"]);
 
 #[cfg(test)]
 mod tests;

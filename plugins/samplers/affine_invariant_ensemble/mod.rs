@@ -121,6 +121,10 @@ impl Component for AffineInvariantEnsemble {
 }
 
 impl Sampler for AffineInvariantEnsemble {
+    fn steps_are_draws(&self) -> bool {
+        true
+    }
+
     fn plan(&self, _dimension: usize) -> Plan {
         Plan { chains: self.walkers, steps: self.steps, warm_up: 0, ensemble: true }
     }
@@ -227,7 +231,7 @@ impl<'a> Batch<'a> {
     }
 }
 
-lacuna::register!(Sampler, "affine_invariant_ensemble", AffineInvariantEnsemble);
+lacuna::register!(Sampler, "affine_invariant_ensemble", AffineInvariantEnsemble, aliases: ["emcee", "ensemble", "stretch", "mcmc"]);
 
 #[cfg(test)]
 mod calibration;

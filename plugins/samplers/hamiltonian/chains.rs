@@ -15,6 +15,7 @@ use super::curvature;
 use super::leapfrog::{Flow, Point};
 use super::metric::{Metric, Shape, Spread};
 use super::pace::Pace;
+use super::told::Last;
 use super::windows::Windows;
 
 /// The options that methods with gradients share.
@@ -95,6 +96,10 @@ pub(crate) struct Transition {
     pub divergent: bool,
     /// Whether the trajectory was cut off.
     pub saturated: bool,
+    /// Kinetic energy less log density of the free coordinates, of the point where it ends with its momentum there.
+    pub energy: f64,
+    /// How often the trajectory was doubled, where it grows by doubling.
+    pub depth: Option<u32>,
 }
 
 /// What is kept between steps.
@@ -117,6 +122,9 @@ struct Chain {
     divergences: u64,
     /// Trajectories since the warm-up that were cut off.
     saturated: u64,
+    /// The last trajectory.
+    #[serde(default)]
+    last: Option<Last>,
 }
 
 impl Memory {
@@ -193,7 +201,8 @@ pub(crate) fn start(
         Metric::of(settings.shape(target.dimension()), &curvature.covariance).ok_or_else(|| {
             Stop::new("the curvature at the starting points gives no scale of the posterior")
         })?;
-    let chain = |point| Chain { point, pace: None, spread: None, divergences: 0, saturated: 0 };
+    let chain =
+        |point| Chain { point, pace: None, spread: None, divergences: 0, saturated: 0, last: None };
     let memory = Memory { step: 0, metric, chains: starts.into_iter().map(chain).collect() };
     let count = points.rows();
     let mut state = State {
@@ -237,6 +246,7 @@ where
                 pace
             });
             let done = transition(&flow, &chain.point, pace.step, &mut rng);
+            chain.last = Some(Last::of(&done, pace.step));
             if step < settings.warm_up {
                 pace.learn(done.acceptance, settings.target_acceptance);
             } else {

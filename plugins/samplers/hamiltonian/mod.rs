@@ -5,8 +5,10 @@ pub(crate) mod curvature;
 mod leapfrog;
 mod metric;
 mod pace;
+pub(crate) mod told;
 mod windows;
 
+use lacuna::data::Statistic;
 use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::sampler::{Plan, State};
@@ -113,9 +115,12 @@ impl Hamiltonian {
             gradients += 1;
         }
         let error = phase.energy() - energy;
-        let acceptance = (-error).exp().min(1.0);
+        // What is not a number would pass for the smaller one.
+        let acceptance = if error.is_nan() { 0.0 } else { (-error).exp().min(1.0) };
         let accepted = uniform(rng) < acceptance;
         Transition {
+            energy: if accepted { phase.energy() } else { energy },
+            depth: None,
             point: if accepted { phase.point } else { from.clone() },
             moved: accepted,
             acceptance,
@@ -151,6 +156,10 @@ impl Component for Hamiltonian {
 }
 
 impl Sampler for Hamiltonian {
+    fn steps_are_draws(&self) -> bool {
+        true
+    }
+
     fn plan(&self, _dimension: usize) -> Plan {
         self.settings().plan()
     }
@@ -163,6 +172,10 @@ impl Sampler for Hamiltonian {
         chains::advance(&self.settings(), target, state, stream, |flow, point, step, rng| {
             self.coast(flow, point, step, rng)
         })
+    }
+
+    fn statistics(&self, state: &State) -> Vec<Statistic> {
+        told::statistics(state, false)
     }
 
     fn doubts(&self, state: &State) -> Vec<String> {
@@ -178,7 +191,7 @@ impl Sampler for Hamiltonian {
     }
 }
 
-lacuna::register!(Sampler, "hamiltonian", Hamiltonian);
+lacuna::register!(Sampler, "hamiltonian", Hamiltonian, aliases: ["hmc", "hamiltonian_monte_carlo"]);
 
 #[cfg(test)]
 pub(crate) mod laws;

@@ -280,7 +280,7 @@ impl Nested {
     }
 }
 
-lacuna::register!(Sampler, "nested", Nested);
+lacuna::register!(Sampler, "nested", Nested, aliases: ["nested_sampling", "dynesty", "multinest", "ultranest"]);
 
 #[cfg(test)]
 mod tests;

@@ -2,6 +2,7 @@
 
 mod tree;
 
+use lacuna::data::Statistic;
 use lacuna::linalg::Matrix;
 use lacuna::math::random::Stream;
 use lacuna::plugin::sampler::{Plan, State};
@@ -11,7 +12,7 @@ use lacuna::study::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::hamiltonian::{Settings, Shape, chains};
+use super::hamiltonian::{Settings, Shape, chains, told};
 
 /// No-U-turn sampler: Hamiltonian Monte Carlo whose trajectories end where they would turn back.
 ///
@@ -86,6 +87,10 @@ impl Component for NoUTurn {
 }
 
 impl Sampler for NoUTurn {
+    fn steps_are_draws(&self) -> bool {
+        true
+    }
+
     fn plan(&self, _dimension: usize) -> Plan {
         self.settings().plan()
     }
@@ -98,6 +103,10 @@ impl Sampler for NoUTurn {
         chains::advance(&self.settings(), target, state, stream, |flow, point, step, rng| {
             tree::transition(flow, point, step, self.depth, rng)
         })
+    }
+
+    fn statistics(&self, state: &State) -> Vec<Statistic> {
+        told::statistics(state, true)
     }
 
     fn doubts(&self, state: &State) -> Vec<String> {
@@ -115,7 +124,7 @@ impl Sampler for NoUTurn {
     }
 }
 
-lacuna::register!(Sampler, "no_u_turn", NoUTurn);
+lacuna::register!(Sampler, "no_u_turn", NoUTurn, aliases: ["nuts"]);
 
 #[cfg(test)]
 mod tests;

@@ -19,6 +19,8 @@ struct Tree {
     log_weight: f64,
     /// One of its points, drawn by density.
     draw: Point,
+    /// The energy of that point with its momentum.
+    energy: f64,
 }
 
 impl Tree {
@@ -29,6 +31,7 @@ impl Tree {
             total: phase.momentum.clone(),
             log_weight,
             draw: phase.point.clone(),
+            energy: phase.energy(),
         }
     }
 
@@ -49,6 +52,7 @@ impl Tree {
             last: next.last,
             total,
             log_weight: ln_sum_exp(self.log_weight, next.log_weight),
+            energy: if take_next { next.energy } else { self.energy },
             draw: if take_next { next.draw } else { self.draw },
         };
         (joined, ahead)
@@ -115,7 +119,7 @@ pub(super) fn transition(
     let (mut backward, mut forward) = (phase.clone(), phase);
     let mut builder =
         Builder { flow, energy, rng, acceptance: 0.0, gradients: 0, divergent: false };
-    let mut ahead = true;
+    let (mut ahead, mut doubled) = (true, 0);
     for level in 0..depth {
         let goes_forward = uniform(builder.rng) < 0.5;
         let grown = if goes_forward {
@@ -124,6 +128,7 @@ pub(super) fn transition(
             builder.build(&mut backward, -step, level)
         };
         ahead = false;
+        doubled = level + 1;
         let Some(new) = grown else { break };
         // The new half is favoured, which carries the draw away from the start.
         let take_new = uniform(builder.rng) < (new.log_weight - tree.log_weight).exp();
@@ -139,6 +144,8 @@ pub(super) fn transition(
     Transition {
         moved: tree.draw.place != from.place,
         point: tree.draw,
+        energy: tree.energy,
+        depth: Some(doubled),
         acceptance: builder.acceptance / builder.gradients.max(1) as f64,
         gradients: builder.gradients,
         divergent: builder.divergent,

@@ -169,7 +169,7 @@ impl Sampler for SequentialMonteCarlo {
     }
 }
 
-lacuna::register!(Sampler, "sequential_monte_carlo", SequentialMonteCarlo);
+lacuna::register!(Sampler, "sequential_monte_carlo", SequentialMonteCarlo, aliases: ["smc", "tmcmc"]);
 
 #[cfg(test)]
 mod tests;

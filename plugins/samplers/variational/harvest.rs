@@ -1,6 +1,6 @@
 //! Draws of the mixture of all paths' laws, weighed by importance.
 
-use lacuna::diagnose::pareto::{self, LARGEST_K, Smoothed};
+use lacuna::diagnose::pareto::{self, Smoothed};
 use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, normal, permutation, uniform};
 use lacuna::math::special::ln_sum_exp;
@@ -36,9 +36,10 @@ pub(super) fn harvest(
     let tails = if options.importance { &TAILS[..] } else { &TAILS[..1] };
     // Twice as many as are wanted, so that few of them are drawn twice.
     let count = 2 * options.draws;
+    let limit = pareto::limit(count);
     let mut weighed = Weighed::of(&free, Mixture::of(&fits, None), count, &stream.named("normal"));
     for &tail in &tails[1..] {
-        if weighed.smoothed.k_hat <= LARGEST_K {
+        if weighed.smoothed.k_hat <= limit {
             break;
         }
         let stream = stream.named("heavy").at(u64::from(tail.unwrap_or(0)));
@@ -63,7 +64,7 @@ pub(super) fn harvest(
         log_density: target.log_density(&points),
         points,
         effective_size: worth(&smoothed, options.draws),
-        evidence: (smoothed.k_hat <= LARGEST_K).then(|| evidence(&ratios)),
+        evidence: (smoothed.k_hat <= limit).then(|| evidence(&ratios)),
         doubts: doubts(options, paths, &fits, &smoothed),
         facts: facts(&fits, &smoothed, tail),
     })
@@ -179,11 +180,13 @@ fn doubts(
     smoothed: &Smoothed,
 ) -> Vec<String> {
     let mut doubts = Vec::new();
-    if smoothed.k_hat > LARGEST_K {
+    let limit = pareto::limit(smoothed.log_weights.len());
+    if smoothed.k_hat > limit {
         doubts.push(format!(
-            "the Pareto k-hat is {:.2}, above {LARGEST_K}: no normal law is near the posterior, and weights \
+            "the Pareto k-hat is {:.2}, above {}: no normal law is near the posterior, and weights \
              do not make up for it; use `no_u_turn` or `sequential_monte_carlo`",
-            smoothed.k_hat
+            smoothed.k_hat,
+            (100.0 * limit).round() / 100.0
         ));
     }
     let late = paths.iter().filter(|path| path.stage != Stage::Done).count();

@@ -221,7 +221,7 @@ impl Sampler for Variational {
     }
 }
 
-lacuna::register!(Sampler, "variational", Variational);
+lacuna::register!(Sampler, "variational", Variational, aliases: ["vi", "advi"]);
 
 #[cfg(test)]
 mod tests;

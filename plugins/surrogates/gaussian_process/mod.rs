@@ -144,4 +144,4 @@ impl Surrogate for GaussianProcess {
     }
 }
 
-lacuna::register!(Surrogate, "gaussian_process", GaussianProcess);
+lacuna::register!(Surrogate, "gaussian_process", GaussianProcess, aliases: ["gp", "gpr", "kriging"]);

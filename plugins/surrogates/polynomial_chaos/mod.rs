@@ -291,4 +291,4 @@ impl Surrogate for PolynomialChaos {
     }
 }
 
-lacuna::register!(Surrogate, "polynomial_chaos", PolynomialChaos);
+lacuna::register!(Surrogate, "polynomial_chaos", PolynomialChaos, aliases: ["pce", "pc", "polynomial_chaos_expansion"]);

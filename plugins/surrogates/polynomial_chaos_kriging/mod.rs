@@ -176,4 +176,4 @@ impl Surrogate for PolynomialChaosKriging {
     }
 }
 
-lacuna::register!(Surrogate, "polynomial_chaos_kriging", PolynomialChaosKriging);
+lacuna::register!(Surrogate, "polynomial_chaos_kriging", PolynomialChaosKriging, aliases: ["pck", "pc_kriging", "pce_kriging"]);

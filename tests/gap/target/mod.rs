@@ -66,10 +66,10 @@ fn measured(truth: &[f64], seed: u64) -> Measurements {
                 noise = 0.4 * noise + 0.84_f64.sqrt() * normal(&mut rng);
             }
         }
-        Replicate { name: r.to_string(), values }
+        Replicate::new(r.to_string(), values)
     };
     let replicates = (0..REPLICATES).map(replicate).collect();
-    Measurements { layout: layouts().blocks[0].clone(), replicates }
+    Measurements::new(layouts().blocks[0].clone(), replicates)
 }
 
 /// The measurements of a truth with the forward map and its errors, handed to `use_it` with where fits start.

@@ -6,6 +6,7 @@
 
 pub mod chain;
 pub mod hidden;
+pub mod line;
 pub mod noise;
 pub mod oscillator;
 

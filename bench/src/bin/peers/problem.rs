@@ -136,10 +136,9 @@ pub fn layout(outputs: usize) -> Fallible<Layout> {
 /// The measured curves.
 pub fn measurements(folder: &Path) -> Fallible<Measurements> {
     let curves = load(folder, "curves", OUTPUTS)?;
-    let replicate = |(r, values): (usize, &[f64])| Replicate {
-        name: r.to_string(),
-        values: values.iter().map(|&y| Some(y)).collect(),
+    let replicate = |(r, values): (usize, &[f64])| {
+        Replicate::new(r.to_string(), values.iter().map(|&y| Some(y)).collect())
     };
     let replicates = curves.iter_rows().enumerate().map(replicate).collect();
-    Ok(Measurements { layout: layout(OUTPUTS)?, replicates })
+    Ok(Measurements::new(layout(OUTPUTS)?, replicates))
 }

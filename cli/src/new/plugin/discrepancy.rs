@@ -243,10 +243,9 @@ mod tests {
     fn with_one_common_error_it_is_the_density_written_out() {
         let axes = vec![Axis::grid("time", vec![0.0, 1.0], Unit::dimensionless())];
         let layout = Layout { axes, ..Layout::number("y") };
-        let replicate =
-            |values: [f64; 2]| Replicate { name: "p".into(), values: values.map(Some).to_vec() };
+        let replicate = |values: [f64; 2]| Replicate::new("p", values.map(Some).to_vec());
         let replicates = vec![replicate([1.0, 2.5]), replicate([1.4, 2.0])];
-        let data = Measurements { layout, replicates };
+        let data = Measurements::new(layout, replicates);
         let factor = Matrix::from_vec(2, 1, vec![0.3, -0.2]);
         let common = [CommonError { origin: "emulator".into(), factor, predictive: true }];
         let built = Skeleton::default().likelihood(&Known::without_slopes(&data, &common)).unwrap();

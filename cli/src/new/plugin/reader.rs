@@ -198,12 +198,12 @@ impl Reader for Skeleton {
             let known = replicates.iter().position(|replicate| replicate.name == *name);
             let r = known.unwrap_or_else(|| {
                 let values = vec![None; source.layout.len()];
-                replicates.push(Replicate { name: name.clone(), values });
+                replicates.push(Replicate::new(name.clone(), values));
                 replicates.len() - 1
             });
             replicates[r].values[place] = y;
         }
-        Ok(Measurements { layout: source.layout.clone(), replicates })
+        Ok(Measurements::new(source.layout.clone(), replicates))
     }
 
     fn response(&self, path: &Path, layout: &Layout) -> Result<Vec<f64>, ReadError> {

@@ -69,9 +69,9 @@ fn measured<'a>(
     replicates: usize,
 ) -> Experiment<'a> {
     let values = vec![Some(0.0); 3 * LENGTH];
-    let replicate = |r: usize| Replicate { name: r.to_string(), values: values.clone() };
+    let replicate = |r: usize| Replicate::new(r.to_string(), values.clone());
     let layout = layouts.blocks[0].clone();
-    let data = Measurements { layout, replicates: (0..replicates).map(replicate).collect() };
+    let data = Measurements::new(layout, (0..replicates).map(replicate).collect());
     let experiment = Experiment::new(layouts, parameters, forward, &data.into());
     let new = truth().simulate(&experiment, &forward.0, &Stream::root(5));
     experiment.with_replicates(new)

@@ -84,7 +84,7 @@ fn layouts() -> Layouts {
 fn unknowns_stand_in_the_order_of_the_effects() {
     let layouts = layouts();
     let parameters = [Parameter::plain("a", Distribution::Normal([0.0, 1.0]))];
-    let measured = Measurements { layout: layouts.blocks[0].clone(), replicates: Vec::new() };
+    let measured = Measurements::new(layouts.blocks[0].clone(), Vec::new());
     let measured = measured.into();
     let base = Powers(1);
     let wide = Wide { forward: Box::new(Powers(3)), inputs: inputs(), common: Vec::new() };

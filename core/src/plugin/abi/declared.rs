@@ -62,6 +62,7 @@ fn entry<K: Kind + ?Sized>(path: &Path, name: &str, make: fn() -> Box<K>) -> Opt
     };
     let entry: &'static Entry<K> = Box::leak(Box::new(Entry {
         name,
+        aliases: &[],
         schema: &|_| schemars::Schema::try_from(json!({ "type": "object" })).unwrap_or_default(),
         build: Box::leak(Box::new(build)),
         module_path: Box::leak(path.display().to_string().into_boxed_str()),

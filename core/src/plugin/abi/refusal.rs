@@ -53,11 +53,16 @@ impl From<EvalError> for Refusal {
 
 impl From<ReadError> for Refusal {
     fn from(error: ReadError) -> Self {
-        let told = serde_json::json!({
-            "path": error.path, "place": error.place, "message": error.message, "help": error.help,
-        });
-        Self::new(status::REJECTED, told.to_string())
+        Self::new(status::REJECTED, told(&error).to_string())
     }
+}
+
+fn told(error: &ReadError) -> serde_json::Value {
+    let ReadError { path, place, message, help, further } = error;
+    let further: Vec<_> = further.iter().map(told).collect();
+    serde_json::json!({
+        "path": path, "place": place, "message": message, "help": help, "further": further,
+    })
 }
 
 impl From<serde_json::Error> for Refusal {

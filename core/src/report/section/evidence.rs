@@ -5,11 +5,12 @@ use maud::html;
 use crate::report::findings::{CalibrationFindings, Findings};
 use crate::report::number::{count, decimals, fixed, typeset};
 use crate::report::page::{Section, paragraph};
+use crate::report::qualified;
 
 /// The evidence and the prediction of left-out data, where they are known.
 pub fn section(findings: &Findings) -> Option<Section> {
     let calibration = findings.calibration.as_ref()?;
-    let sentences = sentences(calibration);
+    let sentences = sentences(findings, calibration);
     if sentences.is_empty() {
         return None;
     }
@@ -24,8 +25,20 @@ pub fn section(findings: &Findings) -> Option<Section> {
     Some(Section { id: "evidence", title: "Evidence", content })
 }
 
+/// Whether estimates can be relied on.
+fn trusted(unreliable: usize, limit: f64) -> String {
+    match unreliable {
+        0 => String::from("all estimates are reliable"),
+        bad => format!(
+            "{} estimates have k-hat above {}: do not rely on it",
+            count(bad),
+            (100.0 * limit).round() / 100.0
+        ),
+    }
+}
+
 /// The same in words.
-pub fn sentences(calibration: &CalibrationFindings) -> Vec<String> {
+pub fn sentences(findings: &Findings, calibration: &CalibrationFindings) -> Vec<String> {
     let number = |value: f64, error: f64| {
         let places = decimals(error, f64::NAN).min(4);
         format!("{} ± {}", typeset(&fixed(value, places)), fixed(error, places))
@@ -33,20 +46,34 @@ pub fn sentences(calibration: &CalibrationFindings) -> Vec<String> {
     let mut sentences = Vec::new();
     if let Some(evidence) = &calibration.evidence {
         let value = number(evidence.log, evidence.error);
-        sentences.push(format!("Log evidence {value} ({}).", evidence.method));
+        let limit = qualified::evidence(findings).map_or(String::new(), |why| format!(", {why}"));
+        sentences.push(format!("Log evidence {value} ({}){limit}.", evidence.method));
     }
     if let Some(left) = &calibration.left_out {
-        let value = number(left.elpd, left.error);
-        let trusted = match left.unreliable {
-            0 => String::from("all estimates are reliable"),
-            bad => format!("{} estimates have k-hat above 0.7: do not rely on it", count(bad)),
+        let value = number(left.elpd, left.error_by_curve.unwrap_or(left.error));
+        let origin = match left.error_by_curve {
+            Some(_) => format!(
+                " (standard error by curve; {} as if the data were independent)",
+                fixed(left.error, decimals(left.error, f64::NAN).min(4))
+            ),
+            None => " (standard error as if the data were independent)".to_owned(),
         };
         sentences.push(format!(
-            "Log density of each of {} data predicted from all others (PSIS-LOO), summed: {value}, {} \
-             effective parameters; {trusted}.",
+            "Log density of each of {} data predicted from all others (PSIS-LOO), summed: {value}{origin}, {} \
+             effective parameters; {}.",
             count(left.count),
             fixed(left.parameters, 1),
+            trusted(left.unreliable, left.limit),
         ));
+        sentences.extend(left.curves.as_ref().map(|curves| {
+            format!(
+                "Log density of each of {} curves predicted from all others, summed: {}, {} effective parameters; {}.",
+                count(curves.count),
+                number(curves.elpd, curves.error),
+                fixed(curves.parameters, 1),
+                trusted(curves.unreliable, left.limit),
+            )
+        }));
     }
     sentences
 }

@@ -2,18 +2,20 @@
 
 use maud::{Markup, html};
 
-use super::{coordinate_unit, response_unit};
+use super::{banner, coordinate_unit, response_unit};
 use crate::report::findings::{CalibrationFindings, Findings, ValidationFindings};
 use crate::report::gap::verdict;
 use crate::report::number::{decimals, fixed, percent, typeset};
 use crate::report::page::paragraph;
+use crate::report::qualified;
 
 /// The box at the top of the page.
 pub fn headline(findings: &Findings) -> Markup {
     html! {
+        (banner::banner(&findings.assessment))
         @if !findings.warnings.is_empty() {
             div.warnings role="note" {
-                h2 { "Read this first" }
+                h2 { "Warnings on the way" }
                 ul { @for warning in &findings.warnings { li { (paragraph(warning)) } } }
             }
         }
@@ -30,7 +32,7 @@ pub fn sentences(findings: &Findings) -> Vec<String> {
     let mut sentences = Vec::new();
     if let Some(calibration) = &findings.calibration {
         sentences.push(estimate(findings, calibration));
-        sentences.push(convergence(calibration));
+        sentences.push(convergence(findings, calibration));
     }
     sentences.extend(findings.validation.as_ref().and_then(|v| agreement(findings, v)));
     sentences.extend(findings.gap.as_ref().map(|gap| verdict(&gap.account)));
@@ -70,9 +72,9 @@ fn chosen(findings: &Findings) -> (usize, usize) {
     (shown, all - shown)
 }
 
-fn convergence(calibration: &CalibrationFindings) -> String {
+fn convergence(findings: &Findings, calibration: &CalibrationFindings) -> String {
     let outcome = if calibration.converged { "The chains converged" } else { "Not converged" };
-    match calibration.verdict.trim_end_matches('.') {
+    match qualified::convergence(findings, calibration).trim_end_matches('.') {
         "" | "converged" => format!("{outcome}."),
         verdict if calibration.converged => format!("{outcome}; note: {verdict}."),
         verdict => format!("{outcome}: {verdict}."),

@@ -1,5 +1,6 @@
 //! The sections of the report, one a file; each is left out when the run has nothing for it.
 
+pub mod banner;
 mod curves;
 mod ensemble;
 pub mod evidence;

@@ -4,10 +4,13 @@ mod gap;
 
 use serde_json::{Map, Value, json};
 
+use crate::assess::{Finding, Severity};
+
 use super::findings::{
     CalibrationFindings, CoordinateFindings, Findings, LeftOutFindings, SurrogateFindings,
     ValidationCase,
 };
+use super::qualified;
 
 /// The version of the keys and their meaning.
 pub const SCHEMA: u64 = 1;
@@ -22,7 +25,9 @@ pub const SCHEMA: u64 = 1;
 /// | `schema` | version of this table: 1 |
 /// | `study`, `title`, `seed`, `version` | the study's name and title, its seed, the version of Lacuna |
 /// | `components.KIND` | the plugin that the study chose, such as `sampler`: `affine_invariant_ensemble` |
-/// | `warnings` | what a reader must know first, in words |
+/// | `assessment.level` | whether the result can be trusted: `trusted`, `trusted_with_reservations`, `not_trusted` |
+/// | `assessment.findings[]` | what speaks for that, the worst first: `code`, `where` (parameter, sensor, run), `figure`, `threshold`, `severity` (`note`, `reservation`, `failure`), `message`, `action`; `docs/assessment.md` lists the codes |
+/// | `warnings` | reservations and failures in words, and everything that was told as a warning on the way |
 /// | `runs.used`, `.failed`, `.invalid`, `.in_prior` | simulation runs with a response, without one, outside the model's validity, inside the prior's support |
 /// | `data.replicates`, `.values`, `.count` | replicates used, their measured values, the number of data in the likelihood |
 /// | `data.sha256` | hash of those data: evidences and predictions are comparable where it is the same |
@@ -47,8 +52,10 @@ pub const SCHEMA: u64 = 1;
 /// | `chains.count`, `.steps`, `.burn_in`, `.stranded` | the chains; `stranded` lists those that stayed far below the bulk of the density, from 0 |
 /// | `converged`, `verdict` | whether the run converged, and why in words |
 /// | `log_density.map`, `.best_draw` | log posterior density at the MAP and at the best draw |
-/// | `evidence.log`, `.error`, `.method` | log probability of the data, its standard error, how it was found |
-/// | `loo.elpd`, `.error`, `.parameters`, `.unreliable`, `.count` | log predictive density of each datum from all others, summed (PSIS-LOO), its standard error, the effective number of parameters, how many of the data have estimates not to trust, and how many data there are |
+/// | `evidence.log`, `.error`, `.method` | log probability of the data, its standard error, how it was found; `evidence.limit`: why it is that of a part only, where a mode has no draws |
+/// | `loo.elpd`, `.error`, `.parameters`, `.unreliable`, `.count` | log predictive density of each datum from all others, summed (PSIS-LOO), its standard error as if the data were independent, the effective number of parameters, how many of the data have estimates not to trust, and how many data there are |
+/// | `loo.error_by_curve`, `.k_limit` | the standard error from the scatter over curves, whose values may depend on each other (null below two curves); the largest k-hat that the number of draws allows |
+/// | `loo.curves.elpd`, `.error`, `.parameters`, `.unreliable`, `.count` | the same for whole curves, each predicted from all others; `loo.curves` is null where that is not known |
 /// | `accuracy.CASE.GROUP` | share of points inside the replicates' 95 % interval; cases `map`, `reference`; `average` is the mean over the groups |
 /// | `rmse.CASE` | root mean square difference from the replicates' mean, in the response's unit |
 /// | `simulated.CASE` | whether the model itself was run there (else the emulator answered) |
@@ -77,7 +84,8 @@ pub fn summary(findings: &Findings) -> Value {
     put("seed", json!(findings.seed));
     put("version", json!(findings.version));
     put("components", components(findings));
-    put("warnings", json!(findings.warnings));
+    put("assessment", json!(findings.assessment));
+    put("warnings", json!(warnings(findings)));
     if let Some(runs) = runs(findings) {
         put("runs", runs);
     }
@@ -95,11 +103,15 @@ pub fn summary(findings: &Findings) -> Value {
         }
         put("chains", chains(calibration));
         put("converged", json!(calibration.converged));
-        put("verdict", json!(calibration.verdict));
+        put("verdict", json!(qualified::convergence(findings, calibration)));
         let (map, best) = calibration.log_density;
         put("log_density", json!({ "map": map, "best_draw": best }));
         if let Some(e) = &calibration.evidence {
-            put("evidence", json!({ "log": e.log, "error": e.error, "method": e.method }));
+            let mut evidence = json!({ "log": e.log, "error": e.error, "method": e.method });
+            if let Some(limit) = qualified::evidence(findings) {
+                evidence["limit"] = json!(limit);
+            }
+            put("evidence", evidence);
         }
         if let Some(loo) = &calibration.left_out {
             put("loo", left_out(loo));
@@ -124,6 +136,12 @@ pub fn summary(findings: &Findings) -> Value {
 /// The text of `summary.json`.
 pub fn summary_json(findings: &Findings) -> String {
     format!("{:#}\n", summary(findings))
+}
+
+/// Failures and reservations in words, then what was told on the way.
+fn warnings(findings: &Findings) -> Vec<String> {
+    let grave = findings.assessment.findings.iter().filter(|f| f.severity > Severity::Note);
+    grave.map(Finding::sentence).chain(findings.warnings.iter().cloned()).collect()
 }
 
 fn components(findings: &Findings) -> Value {
@@ -216,9 +234,18 @@ fn left_out(loo: &LeftOutFindings) -> Value {
     json!({
         "elpd": loo.elpd,
         "error": loo.error,
+        "error_by_curve": loo.error_by_curve,
         "parameters": loo.parameters,
         "unreliable": loo.unreliable,
+        "k_limit": loo.limit,
         "count": loo.count,
+        "curves": loo.curves.as_ref().map(|curves| json!({
+            "elpd": curves.elpd,
+            "error": curves.error,
+            "parameters": curves.parameters,
+            "unreliable": curves.unreliable,
+            "count": curves.count,
+        })),
     })
 }
 

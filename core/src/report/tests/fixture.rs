@@ -47,6 +47,7 @@ pub fn findings() -> Findings {
         layouts: layout.into(),
         gap: None,
         made_by: vec![("calibrate".to_owned(), "0.0.9".to_owned())],
+        assessment: crate::assess::Assessment::default(),
         seconds: [
             ("design", 0.004),
             ("simulate", 1834.0),
@@ -165,9 +166,9 @@ fn measured(layout: &Layout) -> MeasuredFindings {
             // Sensor M fails late in one pulse.
             (!(r == 3 && i / TIMES == 3 && i % TIMES > 60)).then_some(clean + noise + odd)
         });
-        Replicate { name: format!("pulse {}", r + 1), values: values.collect() }
+        Replicate::new(format!("pulse {}", r + 1), values.collect())
     });
-    let used = Measurements { layout: layout.clone(), replicates: replicates.collect() };
+    let used = Measurements::new(layout.clone(), replicates.collect());
     let flagged = |replicate: &str, group: &str, distance, left_out| FlaggedCurve {
         replicate: replicate.into(),
         group: group.into(),
@@ -254,9 +255,18 @@ fn calibration() -> CalibrationFindings {
         left_out: Some(crate::report::findings::LeftOutFindings {
             elpd: -1200.0,
             error: 20.0,
+            error_by_curve: Some(31.0),
             parameters: 3.9,
             unreliable: 0,
+            limit: 0.67,
             count: 500,
+            curves: Some(crate::report::findings::CurvesLeftOutFindings {
+                elpd: -1190.0,
+                error: 33.0,
+                parameters: 4.2,
+                unreliable: 1,
+                count: 5,
+            }),
         }),
         coordinates: coordinates(),
         best_draw: MEAN.to_vec(),

@@ -61,7 +61,7 @@ fn numbers_that_are_not_finite_are_null() {
 #[test]
 fn the_terminal_gets_warnings_then_tables_aligned() {
     let text = summary_text(&findings());
-    assert!(text.starts_with("warning: 2 of 120 chains are stranded"));
+    assert!(text.starts_with("trusted\n\nwarning: 2 of 120 chains are stranded"));
     let header = text.lines().find(|line| line.starts_with("parameter")).unwrap();
     let row = text.lines().find(|line| line.starts_with("density")).unwrap();
     assert_eq!(header.chars().count(), row.chars().count(), "{text}");

@@ -20,6 +20,8 @@ pub struct Begun<'a> {
     pub study: &'a Study,
     /// Its file.
     pub path: &'a Path,
+    /// The folder into which the study with the effects is written; beside the study's file when left out.
+    pub folder: Option<&'a Path>,
     /// What was set on the command line.
     pub settings: &'a [String],
     /// What it found.
@@ -34,9 +36,9 @@ pub fn add(
     run: &RunDirectory,
     observer: &dyn Observer,
 ) -> Result<(Added, Findings), Stop> {
-    let Begun { study, path, settings, findings, gap } = begun;
+    let Begun { study, path, folder, settings, findings, gap } = begun;
     let account = &gap.account;
-    let file = study_file::write(study, path, account)?;
+    let file = study_file::write(study, path, *folder, account)?;
     let checked = resolve::load(&file, settings);
     let complaints = checked.complaints();
     let Some(augmented) = checked.study else {

@@ -1,6 +1,6 @@
 //! From the study's data and a model to the account of a search.
 
-use crate::data::{Observations, Parameter};
+use crate::data::{Measurements, Observations, Parameter};
 use crate::gap::account::{Account, HeldOut};
 use crate::gap::candidates::{Candidate, proposed};
 use crate::gap::common::shared;
@@ -226,18 +226,30 @@ impl<'a> Base<'a> {
         Around { response, slopes }
     }
 
-    /// The noise as the study's discrepancy states it, for all outputs.
-    fn stated(&self, response: &[f64]) -> Option<StatedNoise> {
-        let plugin = &self.study.discrepancy.as_ref()?.built.plugin;
+    /// The noise as the data state it, else as the study's discrepancy does, for all outputs.
+    fn stated(&self, data: &Observations, response: &[f64]) -> Result<Option<StatedNoise>, Stop> {
+        if data.blocks.iter().any(|block| block.covariance.is_some()) {
+            let text =
+                "the search for what is missing cannot use a `covariance` of the measurements";
+            return Err(Stop::new(text).help(
+                "state the noise of single values, in a column `sigma`, or let replicates show it",
+            ));
+        }
+        if data.states_noise() {
+            let sd = data.blocks.iter().flat_map(Measurements::stated_sd).collect();
+            return Ok(Some(StatedNoise { sd, correlation_time: None }));
+        }
+        let Some(section) = &self.study.discrepancy else { return Ok(None) };
         let mut all = StatedNoise { sd: Vec::new(), correlation_time: None };
         for (layout, range) in self.study.layouts.parts() {
-            let own = plugin.stated_noise(layout, &response[range])?;
+            let own = section.built.plugin.stated_noise(layout, &response[range]);
+            let Some(own) = own else { return Ok(None) };
             all.sd.extend(own.sd);
             if let Some(times) = own.correlation_time {
                 all.correlation_time.get_or_insert_default().extend(times);
             }
         }
-        Some(all)
+        Ok(Some(all))
     }
 
     /// The measurements with the forward map and all errors that replicates share.
@@ -248,7 +260,7 @@ impl<'a> Base<'a> {
         experiment.wide = self.wide;
         let around = self.around(point);
         let response = &around.response;
-        experiment.stated = self.stated(response);
+        experiment.stated = self.stated(data, response)?;
         let noise = Noise::of(&experiment, &around, None);
         let all = shared(&experiment, &noise, response, &self.samples(data)?);
         (experiment.common, experiment.remainder) = (all.common, all.remainder);

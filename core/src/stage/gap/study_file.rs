@@ -12,11 +12,24 @@ use crate::study::emit::{key, string, to_line};
 use crate::study::gap::Edit;
 use crate::study::{Problems, Sources, Study, read};
 
-/// Writes `STUDY+EFFECT.toml` beside the study and returns its path. A file of that name with another text is set aside.
-pub fn write(study: &Study, path: &Path, account: &Account) -> Result<PathBuf, Stop> {
+/// Writes `STUDY+EFFECT.toml` beside the study, or into another folder, and returns its path. A file of that name with
+/// another text is set aside.
+pub fn write(
+    study: &Study,
+    path: &Path,
+    folder: Option<&Path>,
+    account: &Account,
+) -> Result<PathBuf, Stop> {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let new = path.with_file_name(format!("{}.toml", with_names(&stem, study, account)));
-    let text = text(study, path, account)?;
+    let name = format!("{}.toml", with_names(&stem, study, account));
+    let mut text = text(study, path, account)?;
+    let new = match folder {
+        None => path.with_file_name(name),
+        Some(folder) => {
+            text = moved(text, &study.directory, path);
+            folder.join(name)
+        }
+    };
     match std::fs::read_to_string(&new) {
         Ok(old) if old == text => return Ok(new),
         Ok(_) => set_aside(&new)?,
@@ -24,6 +37,47 @@ pub fn write(study: &Study, path: &Path, account: &Account) -> Result<PathBuf, S
     }
     files::write_atomic(&new, text.as_bytes())?;
     Ok(new)
+}
+
+/// The text with the places of its files as they are seen from any other folder.
+fn moved(mut text: String, directory: &Path, path: &Path) -> String {
+    let absolute = |path: &Path| {
+        let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        string(&path.to_string_lossy())
+    };
+    let place = |text: &str, key: &str| {
+        let mut sources = Sources::default();
+        let source = sources.add_file(Path::new("study"), text.to_owned());
+        let root = read::read(source, &sources, &mut Problems::new())?;
+        let found = root.find(key)?;
+        Some((found.place.span.clone(), found.as_str().unwrap_or_default().to_owned()))
+    };
+    if let Some((span, base)) = place(&text, "extends") {
+        text.replace_range(span, &absolute(&path.with_file_name("").join(base)));
+    }
+    let directory = absolute(directory);
+    match place(&text, "study.directory") {
+        Some((span, _)) => text.replace_range(span, &directory),
+        None => match header(&text, "[study]") {
+            Some(end) => text.insert_str(end, &format!("\ndirectory = {directory}")),
+            // All of `[study]` is that of the study it extends.
+            None => text.push_str(&format!("\n[study]\ndirectory = {directory}\n")),
+        },
+    }
+    text
+}
+
+/// Where the header of a table ends.
+fn header(text: &str, header: &str) -> Option<usize> {
+    let mut begin = 0;
+    for line in text.split_inclusive('\n') {
+        let start = line.len() - line.trim_start().len();
+        if line.trim_start().starts_with(header) {
+            return Some(begin + start + header.len());
+        }
+        begin += line.len();
+    }
+    None
 }
 
 /// A name with those of the effects behind it: `sns+damping`.
@@ -196,4 +250,31 @@ fn block(study: &Study, addition: &Addition) -> Result<String, Stop> {
 
 fn line(value: &impl Serialize) -> Result<String, Stop> {
     to_line(value).map_err(|error| Stop::new(format!("the new study {error}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a study names is found from any folder: what it extends beside its file, the rest in its directory.
+    #[test]
+    fn a_study_that_is_moved_names_its_files_from_the_root() {
+        let (directory, path) = (Path::new("/data"), Path::new("/studies/a.toml"));
+        for (text, expected) in [
+            (
+                "extends = \"base.toml\"\n\n# [study] of others\n[study]\ntitle = \"x\"\n",
+                "extends = \"/studies/base.toml\"\n\n# [study] of others\n[study]\ndirectory = \"/data\"\ntitle = \"x\"\n",
+            ),
+            (
+                "[study]\ntitle = \"x\"\ndirectory = \"../data\"\n",
+                "[study]\ntitle = \"x\"\ndirectory = \"/data\"\n",
+            ),
+            (
+                "extends = \"base.toml\"\n[design]\nruns = 3\n",
+                "extends = \"/studies/base.toml\"\n[design]\nruns = 3\n\n[study]\ndirectory = \"/data\"\n",
+            ),
+        ] {
+            assert_eq!(moved(text.to_owned(), directory, path), expected);
+        }
+    }
 }

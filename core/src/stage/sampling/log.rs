@@ -1,5 +1,5 @@
 //! The files of a run of a sampler: `draws.bin` grows by one record a step; `state.json` says after how many steps
-//! the state in it holds. A run that goes on cuts the file back to that many records.
+//! the state in it holds, and which statistics a record has. A run that goes on cuts the file back to that many records.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Read as _, Write as _};
@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::data::Draws;
+use crate::data::statistics::{Kind, Statistic, Statistics};
 use crate::linalg::Matrix;
 use crate::plugin::sampler::State;
 use crate::run::{self, Stop, files};
@@ -20,6 +21,18 @@ pub(super) struct Checkpoint {
     #[serde(default)]
     pub inputs: String,
     pub state: State,
+    #[serde(default)]
+    statistics: Vec<(String, Kind)>,
+}
+
+/// What a run has kept.
+pub(super) struct Read {
+    /// The draws, without names.
+    pub draws: Draws,
+    /// The share of accepted moves of each chain.
+    pub acceptance: Vec<f64>,
+    /// What the sampler told of each step.
+    pub statistics: Statistics,
 }
 
 /// The file of draws.
@@ -30,6 +43,12 @@ pub(super) struct Log {
     file: BufWriter<File>,
     chains: usize,
     dimension: usize,
+    statistics: Vec<(String, Kind)>,
+}
+
+/// The names and kinds of statistics.
+fn names(statistics: &[Statistic]) -> Vec<(String, Kind)> {
+    statistics.iter().map(|one| (one.name.clone(), one.kind)).collect()
 }
 
 impl Log {
@@ -37,23 +56,36 @@ impl Log {
         let path = folder.join("draws.bin");
         let open = OpenOptions::new().create(true).append(true).open(&path);
         let file = BufWriter::new(open.map_err(|error| files::cannot_write(&path, &error))?);
+        let (state_path, statistics) = (folder.join("state.json"), Vec::new());
         let inputs = run::inputs_of(folder);
-        Ok(Self { state_path: folder.join("state.json"), inputs, path, file, chains, dimension })
+        Ok(Self { path, state_path, inputs, file, chains, dimension, statistics })
     }
 
-    /// Bytes of one step: point, log density and acceptance of each chain.
+    /// Numbers of a chain in one step: point, log density and statistics.
+    fn numbers(&self) -> usize {
+        self.dimension + 1 + self.statistics.len()
+    }
+
+    /// Bytes of one step: the numbers and the acceptance of each chain.
     fn record(&self) -> usize {
-        self.chains * (8 * (self.dimension + 1) + 1)
+        self.chains * (8 * self.numbers() + 1)
     }
 
-    /// The last checkpoint, with the file cut back to it; an empty file when there is none.
-    pub fn resume(&mut self) -> Result<Option<Checkpoint>, Stop> {
+    /// The last checkpoint, with the file cut back to it; an empty file when there is none. `told` gives what the sampler
+    /// tells of a state.
+    pub fn resume(
+        &mut self,
+        told: impl Fn(&State) -> Vec<Statistic>,
+    ) -> Result<Option<Checkpoint>, Stop> {
         let length = fs::metadata(&self.path).map_or(0, |m| m.len());
         let checkpoint: Option<Checkpoint> = files::read_json(&self.state_path).ok();
+        if let Some(checkpoint) = &checkpoint {
+            self.statistics.clone_from(&checkpoint.statistics);
+        }
         let fits = |c: &Checkpoint| {
             let needed = (c.step * self.record()) as u64;
             let ours = c.inputs == self.inputs && c.state.points.columns() == self.dimension;
-            ours && needed <= length
+            ours && needed <= length && names(&told(&c.state)) == c.statistics
         };
         let checkpoint = checkpoint.filter(fits);
         let kept = checkpoint.as_ref().map_or(0, |c| c.step * self.record());
@@ -62,10 +94,20 @@ impl Log {
         Ok(checkpoint)
     }
 
-    pub fn append(&mut self, state: &State) -> Result<(), Stop> {
+    /// Begins a run whose steps have these statistics.
+    pub fn begin(&mut self, statistics: &[Statistic]) {
+        self.statistics = names(statistics);
+    }
+
+    pub fn append(&mut self, state: &State, statistics: &[Statistic]) -> Result<(), Stop> {
+        if names(statistics) != self.statistics {
+            return Err(Stop::new("the sampler tells of this step what it did not tell of others"));
+        }
         let mut write = || -> io::Result<()> {
-            for (point, density) in state.points.iter_rows().zip(&state.log_density) {
-                for value in point.iter().chain([density]) {
+            let chains = state.points.iter_rows().zip(&state.log_density).enumerate();
+            for (chain, (point, density)) in chains {
+                let told = statistics.iter().map(|one| &one.values[chain]);
+                for value in point.iter().chain([density]).chain(told) {
                     self.file.write_all(&value.to_le_bytes())?;
                 }
             }
@@ -78,12 +120,13 @@ impl Log {
     pub fn checkpoint(&mut self, step: usize, state: &State) -> Result<(), Stop> {
         let flushed = self.file.flush().and_then(|()| self.file.get_ref().sync_data());
         flushed.map_err(|error| files::cannot_write(&self.path, &error))?;
-        let inputs = self.inputs.clone();
-        files::write_json(&self.state_path, &Checkpoint { step, inputs, state: state.clone() })
+        let (inputs, statistics) = (self.inputs.clone(), self.statistics.clone());
+        let checkpoint = Checkpoint { step, inputs, state: state.clone(), statistics };
+        files::write_json(&self.state_path, &checkpoint)
     }
 
-    /// The draws of the first steps, without names, and the share of accepted moves of each chain.
-    pub fn read(&self, steps: usize) -> Result<(Draws, Vec<f64>), Stop> {
+    /// What was kept of the first steps.
+    pub fn read(&self, steps: usize) -> Result<Read, Stop> {
         let (chains, d, record) = (self.chains, self.dimension, self.record());
         let mut bytes = Vec::with_capacity(steps * record);
         let file = File::open(&self.path).map_err(|e| files::cannot_read(&self.path, &e))?;
@@ -101,15 +144,24 @@ impl Log {
         let mut moves = vec![0_u32; chains];
         for step in 0..steps {
             let from = step * record;
-            let point = |c: usize, j: usize| number(from + 8 * (c * (d + 1) + j));
+            let point = |c: usize, j: usize| number(from + 8 * (c * self.numbers() + j));
             let points = Matrix::from_fn(chains, d, point);
             let density = (0..chains).map(|c| point(c, d)).collect();
             records.push((points, density));
             for (c, count) in moves.iter_mut().enumerate() {
-                *count += u32::from(bytes[from + 8 * chains * (d + 1) + c]);
+                *count += u32::from(bytes[from + 8 * chains * self.numbers() + c]);
             }
         }
         let acceptance = moves.iter().map(|&m| f64::from(m) / steps.max(1) as f64).collect();
-        Ok((Draws::from_steps(vec![String::new(); d], &records), acceptance))
+        let mut values = Vec::with_capacity(self.statistics.len() * chains * steps);
+        for s in 0..self.statistics.len() {
+            for c in 0..chains {
+                let at = |step| step * record + 8 * (c * self.numbers() + d + 1 + s);
+                values.extend((0..steps).map(|step| number(at(step))));
+            }
+        }
+        let names = self.statistics.clone();
+        let draws = Draws::from_steps(vec![String::new(); d], &records);
+        Ok(Read { draws, acceptance, statistics: Statistics { names, chains, steps, values } })
     }
 }

@@ -98,3 +98,52 @@ fn errors_name_the_argument() {
     assert!(applied(&["sampler..x=1"]).unwrap_err().contains("has an empty step"));
     assert!(applied(&["=1"]).unwrap_err().contains("has an empty step"));
 }
+
+#[test]
+fn strings_need_no_quotes() {
+    let set = |text: &str| applied(&[text]).map(|study| study["sampler"]["x"].clone());
+    for (written, expected) in [
+        ("external", json!("external")),
+        ("Foo's study # 2", json!("Foo's study # 2")),
+        ("data/my file=1.csv", json!("data/my file=1.csv")),
+        ("[python, run.py, 3]", json!(["python", "run.py", 3])),
+        ("{ uniform = [0, 1] }", json!({ "uniform": [0, 1] })),
+        (
+            "{ path = a.csv, all = [[B, C], []] }",
+            json!({ "path": "a.csv", "all": [["B", "C"], []] }),
+        ),
+        ("\"2024\"", json!("2024")),
+        ("12", json!(12)),
+    ] {
+        assert_eq!(set(&format!("sampler.x={written}")).unwrap(), expected, "{written}");
+    }
+    for wrong in ["", "\"open", "[1", "{ a }"] {
+        let said = set(&format!("sampler.x={wrong}")).unwrap_err();
+        assert!(said.starts_with("--set: "), "{said}");
+        assert!(said.contains(&format!("| sampler.x={wrong}")), "{said}");
+        assert!(said.contains('^'), "{said}");
+    }
+}
+
+/// What a plugin says of a table as a whole is about the key that was set in it.
+#[test]
+fn a_table_that_is_changed_is_that_of_the_argument() {
+    let path = Path::new("study.toml");
+    let text = "[surrogate]\nuse = 'x'\ndegree = { max = 3 }\n[surrogate.solver]\nterms = 3\n";
+    let (mut sources, mut problems) = (Sources::default(), Problems::new());
+    let source = sources.add_file(path, text.to_owned());
+    let mut study = super::super::read::read(source, &sources, &mut problems).unwrap();
+    let arguments = ["surrogate.degree.max=0".to_owned()];
+    apply(&mut study, &arguments, &|_| &[], &mut sources, &mut problems);
+    let written = |key: &str| sources.text(&study.find(key).unwrap().place).to_owned();
+    assert_eq!(written("surrogate.degree"), "degree");
+    assert_eq!(sources.get(study.find("surrogate.degree").unwrap().place.source).name, "--set");
+    assert_eq!(
+        sources.get(study.find("surrogate.solver").unwrap().place.source).name,
+        path.display().to_string()
+    );
+    assert_eq!(
+        sources.get(study.get("surrogate").unwrap().place.source).name,
+        path.display().to_string()
+    );
+}

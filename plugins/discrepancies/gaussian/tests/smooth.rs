@@ -79,12 +79,9 @@ fn measured(emulator: &dyn Emulator, replicates: usize, sd: f64) -> Measurements
             let y = m + sd * normal(&mut rng);
             (!(k + r).is_multiple_of(17)).then_some(y)
         };
-        Replicate {
-            name: r.to_string(),
-            values: truth.row(0).iter().enumerate().map(value).collect(),
-        }
+        Replicate::new(r.to_string(), truth.row(0).iter().enumerate().map(value).collect())
     };
-    Measurements { layout: layout(), replicates: (0..replicates).map(replicate).collect() }
+    Measurements::new(layout(), (0..replicates).map(replicate).collect())
 }
 
 fn likelihood(data: &Measurements, common: &[CommonError]) -> GaussianLikelihood {

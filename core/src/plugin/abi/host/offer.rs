@@ -106,6 +106,7 @@ unsafe fn offer<K: Kind + ?Sized, F: Table + Send + Sync + 'static>(
         Box::leak(Box::new(|generator: &mut SchemaGenerator| offered.options.schema(generator)));
     let entry: &'static Entry<K> = Box::leak(Box::new(Entry {
         name,
+        aliases: &[],
         schema,
         build: Box::leak(Box::new(|node: &Node, beside: &[&str], problems: &mut Problems| {
             offered.build(node, beside, problems)

@@ -80,12 +80,11 @@ impl Plugin<ReaderFunctions> {
         if let Some(x) = values.as_slice().iter().find(|x| x.is_infinite()) {
             return Err(Refusal::stop(format!("`measurements` answers the value {x}")));
         }
-        let replicate = |(name, row): (String, &[f64])| Replicate {
-            name,
-            values: row.iter().map(|y| (!y.is_nan()).then_some(*y)).collect(),
+        let replicate = |(name, row): (String, &[f64])| {
+            Replicate::new(name, row.iter().map(|y| (!y.is_nan()).then_some(*y)).collect())
         };
         let replicates = names.into_iter().zip(values.iter_rows()).map(replicate).collect();
-        Ok(Measurements { layout: source.layout.clone(), replicates })
+        Ok(Measurements::new(source.layout.clone(), replicates))
     }
 
     fn one(&self, path: &Path, layout: &Layout) -> Result<Vec<f64>, Refusal> {

@@ -112,6 +112,7 @@ pub struct FailureAbout {
     place: String,
     message: String,
     help: Option<String>,
+    further: Vec<FailureAbout>,
 }
 
 impl FailureAbout {
@@ -120,7 +121,18 @@ impl FailureAbout {
         let plain = || Self { path: path.to_owned(), message: text.to_owned(), ..Self::default() };
         let told: Self = serde_json::from_str(text).unwrap_or_else(|_| plain());
         let message = format!("{who}: {}", told.message);
-        ReadError { path: told.path, place: told.place, message, help: told.help }
+        let about = Self { message, ..told };
+        about.error()
+    }
+
+    fn error(self) -> ReadError {
+        ReadError {
+            path: self.path,
+            place: self.place,
+            message: self.message,
+            help: self.help,
+            further: self.further.into_iter().map(Self::error).collect(),
+        }
     }
 }
 

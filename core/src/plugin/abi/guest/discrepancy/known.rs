@@ -38,7 +38,7 @@ impl<'a> OwnedKnown<'a> {
         let row = |(i, name): (usize, String)| {
             let marks = &measured[i * values.columns()..];
             let value = |(&y, &mark): (&f64, &u8)| (mark != 0).then_some(y);
-            Replicate { name, values: values.row(i).iter().zip(marks).map(value).collect() }
+            Replicate::new(name, values.row(i).iter().zip(marks).map(value).collect())
         };
         if replicates.len() != values.rows() || measured.len() != count {
             return Err(Refusal::stop("the replicates have not as many names as values"));
@@ -46,7 +46,7 @@ impl<'a> OwnedKnown<'a> {
         let replicates = replicates.into_iter().enumerate().map(row).collect();
         // SAFETY: as the caller promises.
         let common = unsafe { common(known)? };
-        Ok(Self { data: Measurements { layout, replicates }, common, known, functions })
+        Ok(Self { data: Measurements::new(layout, replicates), common, known, functions })
     }
 
     /// Looks at it as discrepancies do.

@@ -1,0 +1,231 @@
+//! Figures of the simulation runs.
+
+use crate::assess::Finding;
+use crate::assess::runs::{self as check, Invalid};
+use crate::assess::suspicious::{self, Suspect, values};
+use crate::data::Ensemble;
+use crate::linalg::Matrix;
+use crate::math::moments;
+use crate::run::Stop;
+use crate::stage::calibrate::Calibrated;
+use crate::stage::read::outside;
+use crate::stage::surrogate::Fitting;
+use crate::stage::{Known, idle};
+use crate::study::Study;
+use crate::study::file::InvalidRuns;
+
+/// What is to be said of the runs; `shift` is what the emulator's error does to the estimates, in posterior standard
+/// deviations.
+pub(super) fn findings(
+    study: &Study,
+    known: &Known<'_>,
+    calibrated: Option<&Calibrated>,
+    shift: Option<f64>,
+) -> Result<Vec<Finding>, Stop> {
+    let mut found = Vec::new();
+    if let Some(ensemble) = &known.data.value.ensemble {
+        found.extend(few(study, known, calibrated, shift));
+        found.extend(beyond(study, known, calibrated));
+        found.extend(sparse(study, known, calibrated, shift));
+        found.extend(of_design(study, ensemble));
+        found.extend(invalid(study, ensemble));
+        let failed = ensemble.failed.len();
+        found.extend(check::failed(failed, failed + ensemble.runs.len()));
+        found.extend(suspicious(study, known, ensemble)?);
+    }
+    // An effect may use what the model does not.
+    if calibrated.is_some() && study.effects.is_empty() {
+        let idle = idle::parameters(study)?;
+        found.extend(idle.iter().map(|&i| check::idle(&study.parameters[i].name)));
+    }
+    Ok(found)
+}
+
+/// The parameters of the training runs.
+fn training(known: &Known<'_>) -> Option<Matrix> {
+    let fitted = &known.fitted?.value;
+    Some(fitted.sample_points.select_rows(&(0..fitted.errors.training).collect::<Vec<_>>()))
+}
+
+fn few(
+    study: &Study,
+    known: &Known<'_>,
+    calibrated: Option<&Calibrated>,
+    shift: Option<f64>,
+) -> Option<Finding> {
+    calibrated?;
+    let points = training(known)?;
+    let intervals: Vec<(f64, f64)> = match known.region {
+        Some(region) => region.to_vec(),
+        None => {
+            let middle =
+                |p: &crate::data::Parameter| (p.prior.quantile(0.005), p.prior.quantile(0.995));
+            study.parameters.iter().map(middle).collect()
+        }
+    };
+    let inside = |point: &&[f64]| {
+        intervals.iter().zip(*point).all(|(&(low, high), &x)| low <= x && x <= high)
+    };
+    let inside = points.iter_rows().filter(inside).count();
+    check::few_in_prior(inside, points.rows(), study.parameters.len(), shift)
+}
+
+/// How far the posterior mean is from its nearest training runs, one more than there are parameters, over the median of
+/// the same distance from each run to the others.
+fn sparse(
+    study: &Study,
+    known: &Known<'_>,
+    calibrated: Option<&Calibrated>,
+    shift: Option<f64>,
+) -> Option<Finding> {
+    let (points, calibrated) = (training(known)?, calibrated?);
+    let (runs, d) = (points.rows(), points.columns());
+    if runs <= d + 2 {
+        return None;
+    }
+    let scale = Scale::of(study, &points);
+    let unit = |point: &[f64]| -> Vec<f64> {
+        point.iter().enumerate().map(|(j, &x)| scale.unit(j, x)).collect()
+    };
+    let all: Vec<Vec<f64>> = points.iter_rows().map(unit).collect();
+    let draws = calibrated.draws.from_step(calibrated.outcome.burn_in);
+    let mean: Vec<f64> = (0..d).map(|j| moments::mean(&draws.pooled(j))).collect();
+    let distance = |from: &[f64], without: Option<usize>| {
+        let others = all.iter().enumerate().filter(|(i, _)| Some(*i) != without);
+        let squares: Vec<f64> =
+            others.map(|(_, to)| from.iter().zip(to).map(|(a, b)| (a - b).powi(2)).sum()).collect();
+        moments::sorted(&squares)[d].sqrt()
+    };
+    let usual: Vec<f64> =
+        all.iter().enumerate().map(|(i, point)| distance(point, Some(i))).collect();
+    let ratio = distance(&unit(&mean), None) / moments::quantile(&moments::sorted(&usual), 0.5);
+    check::sparse(ratio, shift)
+}
+
+/// Draws beyond all training runs, and a step between runs more.
+fn beyond(study: &Study, known: &Known<'_>, calibrated: Option<&Calibrated>) -> Vec<Finding> {
+    let (Some(points), Some(calibrated)) = (training(known), calibrated) else { return Vec::new() };
+    let draws = calibrated.draws.from_step(calibrated.outcome.burn_in);
+    let one = |(j, parameter): (usize, &crate::data::Parameter)| {
+        let column = points.column(j);
+        let low = column.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let step = (high - low) / column.len() as f64;
+        let values = draws.pooled(j);
+        let count = values.iter().filter(|&&x| x < low - step || x > high + step).count();
+        check::extrapolated(&parameter.name, count as f64 / values.len() as f64, (low, high))
+    };
+    study.parameters.iter().enumerate().filter_map(one).collect()
+}
+
+fn of_design(study: &Study, ensemble: &Ensemble) -> Option<Finding> {
+    let outside = outside::runs(&study.parameters, ensemble);
+    let mut rows: Vec<usize> = outside.iter().map(|o| o.run).collect();
+    rows.dedup();
+    let concerned = study.parameters.iter().enumerate();
+    let concerned: Vec<String> = concerned
+        .filter(|(j, _)| outside.iter().any(|o| o.parameter == *j))
+        .map(|(_, p)| p.name.clone())
+        .collect();
+    check::outside_design(rows.len(), ensemble.runs.len(), &concerned)
+}
+
+fn invalid(study: &Study, ensemble: &Ensemble) -> Option<Finding> {
+    let inside = |i: &usize| {
+        let point = ensemble.points.row(*i);
+        study.parameters.iter().zip(point).all(|(p, &x)| p.prior.log_density(x).is_finite())
+    };
+    let all: Vec<usize> = (0..ensemble.runs.len()).collect();
+    let in_prior: Vec<usize> = all.iter().copied().filter(inside).collect();
+    let count = |rows: &[usize]| (rows.iter().filter(|&&i| !ensemble.valid[i]).count(), rows.len());
+    let kept = study.surrogate.as_ref().map(|s| s.common.invalid_runs).unwrap_or_default();
+    check::invalid(&Invalid {
+        all: count(&all),
+        in_prior: count(&in_prior),
+        trained: kept == InvalidRuns::Train,
+    })
+}
+
+/// More numbers than this are not fitted again and again: a part of the outputs stands for all.
+const MOST: usize = 20_000_000;
+
+fn suspicious(study: &Study, known: &Known<'_>, ensemble: &Ensemble) -> Result<Vec<Finding>, Stop> {
+    let Some(fitted) = known.fitted else { return Ok(Vec::new()) };
+    // With refinement the runs of the last fit are no longer those of the design.
+    let rows: Vec<usize> = if known.refinement.is_some() {
+        (0..ensemble.runs.len()).filter(|&i| ensemble.valid[i]).collect()
+    } else {
+        Fitting::of(study, ensemble)?.training
+    };
+    let outputs = ensemble.layouts.len();
+    let step = (rows.len() * outputs).div_ceil(MOST).max(1);
+    let columns: Vec<usize> = (0..outputs).step_by(step).collect();
+    let responses = ensemble.responses.select_rows(&rows).select_columns(&columns);
+    let raw = ensemble.points.select_rows(&rows);
+    let scale = Scale::of(study, &raw);
+    let points = Matrix::from_fn(raw.rows(), raw.columns(), |i, j| scale.unit(j, raw[(i, j)]));
+    let left_out = known.refinement.is_none().then(|| {
+        let own: Vec<usize> = (0..rows.len()).collect();
+        fitted.value.samples.select_rows(&own).select_columns(&columns)
+    });
+    let suspects = suspicious::suspects(&points, &responses, left_out.as_ref());
+    let told = |suspect: &Suspect| {
+        let row = rows[suspect.run];
+        let value = suspect.parameter.map(|(j, unit)| {
+            (study.parameters[j].name.as_str(), ensemble.points[(row, j)], scale.natural(j, unit))
+        });
+        suspicious::suspicious(&ensemble.runs[row], suspect, value)
+    };
+    // One wrong value makes its whole run far off: then the value is told.
+    let wrong = match columns.len() {
+        1 => Vec::new(),
+        _ => values::values(&points, &responses, left_out.as_ref()),
+    };
+    let whole = suspects.iter().filter(|s| wrong.iter().all(|value| value.run != s.run));
+    let mut found: Vec<Finding> = whole.map(told).collect();
+    found.extend(wrong.iter().map(|value| {
+        let (row, column) = (rows[value.run], columns[value.output]);
+        let place = ensemble.layouts.describe(column);
+        let number = ensemble.responses[(row, column)];
+        values::suspicious(&ensemble.runs[row], &place, number, value)
+    }));
+    Ok(found)
+}
+
+/// From natural values to the unit interval: by the design's law, or by the range of the runs where these go beyond it.
+struct Scale<'a> {
+    study: &'a Study,
+    ranges: Vec<(f64, f64)>,
+}
+
+impl<'a> Scale<'a> {
+    fn of(study: &'a Study, points: &Matrix) -> Self {
+        let range = |j: usize| {
+            let column = points.column(j);
+            let low = column.iter().copied().fold(f64::INFINITY, f64::min);
+            (low, column.iter().copied().fold(f64::NEG_INFINITY, f64::max))
+        };
+        Self { study, ranges: (0..points.columns()).map(range).collect() }
+    }
+
+    fn by_law(&self, j: usize) -> bool {
+        let (low, high) = self.study.parameters[j].design.support();
+        low <= self.ranges[j].0 && self.ranges[j].1 <= high
+    }
+
+    fn unit(&self, j: usize, x: f64) -> f64 {
+        if self.by_law(j) {
+            return self.study.parameters[j].design.cdf(x);
+        }
+        let (low, high) = self.ranges[j];
+        if high > low { (x - low) / (high - low) } else { 0.5 }
+    }
+
+    fn natural(&self, j: usize, unit: f64) -> f64 {
+        if self.by_law(j) {
+            return self.study.parameters[j].design.quantile(unit.clamp(0.001, 0.999));
+        }
+        let (low, high) = self.ranges[j];
+        low + unit * (high - low)
+    }
+}

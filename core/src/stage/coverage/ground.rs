@@ -1,0 +1,272 @@
+//! What all cases of a study share: its truths, its emulator, its noise.
+
+use serde_json::{Value, json};
+
+use crate::data::{Draws, Ensemble};
+use crate::diagnose::coverage::{Coordinate, Noise, Source};
+use crate::linalg::Matrix;
+use crate::plugin::Forward;
+use crate::run::{Kept, Observer, RunDirectory, Silent, Stop, files};
+use crate::study::Study;
+
+use super::noise::{fewest, of_replicates};
+use super::truths::{self, Truths};
+use super::{Asked, ENOUGH, coordinates};
+use crate::stage::calibrate::{self, Calibrated, Parts};
+use crate::stage::read::{Data, Measured};
+use crate::stage::surrogate::{self, Fitting};
+use crate::stage::{Known, Learned, best_fit, direct, predict, prepare, refine, stream};
+
+/// What the cases of a study share.
+pub struct Ground<'a> {
+    /// The study.
+    pub study: &'a Study,
+    /// From parameters to responses, with what is known of it.
+    pub base: Base<'a>,
+    /// The truths.
+    pub truths: Truths,
+    /// Where their responses come from.
+    pub source: Source,
+    /// The noise.
+    pub noise: Noise,
+    /// The unknowns whose truths are known.
+    pub coordinates: Vec<Coordinate>,
+    /// Points that fit the study's own data, in natural units: draws of its posterior, or the best fit. Each with its response.
+    pub fits: Vec<(Vec<f64>, Vec<f64>)>,
+    /// Whether chains are halved.
+    pub quick: bool,
+    /// How many runs could be truths, where they are held back.
+    candidates: Option<usize>,
+    hash: String,
+}
+
+/// The forward map of the cases.
+pub enum Base<'a> {
+    /// An emulator; several where truths are runs that are held back, one a part of them.
+    Emulated(Vec<Learned>),
+    /// The model itself.
+    Direct(direct::Prepared<'a>),
+}
+
+impl Base<'_> {
+    /// What is known of one part.
+    pub fn known(&self, part: usize) -> Known<'_> {
+        match self {
+            Self::Emulated(all) => all[part].known(),
+            Self::Direct(ready) => ready.known(),
+        }
+    }
+}
+
+/// So many draws stand for the study's posterior.
+const DRAWS: usize = 1000;
+
+impl<'a> Ground<'a> {
+    /// Runs the study as far as it is needed, and draws the truths.
+    pub fn of(
+        study: &'a Study,
+        asked: &Asked,
+        run: &mut RunDirectory,
+        observer: &dyn Observer,
+    ) -> Result<Self, Stop> {
+        let random = stream(study, "coverage").named("truths");
+        let is_of_runs = asked.from_runs || study.model.is_none();
+        if is_of_runs && study.surrogate.is_none() {
+            return Err(Stop::new("the study has no simulation runs that could be held back")
+                .help("leave `--from-runs` out: the truths are then runs of the model"));
+        }
+        let base = match study.surrogate {
+            Some(_) => Base::Emulated(vec![prepare(study, run, observer)?]),
+            None => Base::Direct(direct::Prepared::of(study, run, observer)?),
+        };
+        let data = base.known(0).data.clone();
+        let measured = data.value.measured.as_ref();
+        let measured = measured.ok_or_else(|| Stop::new("the study has no measurements"))?;
+        let noise = asked.noise.unwrap_or_else(|| usual(measured));
+        if noise == Noise::Replicates {
+            // Whether there is anything to draw from is known before the model is run.
+            of_replicates(&measured.used, &vec![0.0; study.layouts.len()], &random)?;
+        }
+        let parts = Parts::of(study, measured, &base.known(0))?;
+        let own = parts.likelihood().hyperparameters().len();
+        let hyper = parts.posterior(study, &base.known(0)).hyperparameters().to_vec();
+        drop(parts);
+        let coordinates = coordinates(study, &hyper, own, noise);
+        let fits = fits(study, noise, &base, measured, run, observer)?;
+        let mut hash = json!([data.hash, base.known(0).origin]);
+        let (base, truths, source, candidates) = if is_of_runs {
+            let validation = Fitting::of(study, data.value.runs()?)?.validation;
+            let (truths, all, parts) =
+                truths::held_back(study, data.value.runs()?, &validation, asked.count, &random)?;
+            let base = refitted(study, base, &validation, &parts, run, observer)?;
+            (base, truths, Source::HeldBack, Some(all))
+        } else {
+            let (truths, source) = truths::of_model(study, asked.count, &random, run, observer)?;
+            (base, truths, source, None)
+        };
+        let numerics = base.known(0).numerics.map(|n| &n.hash);
+        hash = json!([hash, numerics, fits.first().map(|fit| &fit.0)]);
+        let hash = files::hash(hash.to_string().as_bytes());
+        let quick = asked.quick;
+        Ok(Self { study, base, truths, source, noise, coordinates, fits, quick, candidates, hash })
+    }
+
+    /// The number of truths.
+    pub fn count(&self) -> usize {
+        self.truths.responses.len()
+    }
+
+    /// The measurements whose replicates and gaps the cases have.
+    pub fn measured(&self) -> &Measured {
+        let known = self.base.known(0);
+        known.data.value.measured.as_ref().unwrap_or_else(|| unreachable!("refused before"))
+    }
+
+    /// What the cases depend on, but for their number.
+    pub fn inputs(&self) -> Value {
+        let study = self.study;
+        let laws: Vec<_> =
+            study.parameters.iter().map(|p| (&p.name, &p.prior, &p.design)).collect();
+        let effects: Vec<_> =
+            study.effects.iter().map(|e| (e.built.identity(), &e.common)).collect();
+        json!([
+            self.hash,
+            study.measurements.as_ref().map(|m| &m.common),
+            study.numerical_error.as_ref().map(|n| n.written.scales()),
+            laws,
+            effects,
+            study.model.as_ref().map(|m| (m.built.identity(), &m.common)),
+            study.surrogate.as_ref().map(|s| (s.built.identity(), &s.common)),
+            study.discrepancy.as_ref().map(|d| (d.built.identity(), &d.common)),
+            study.sampler.as_ref().map(|s| (s.built.identity(), &s.common)),
+        ])
+    }
+
+    /// What a reader should know of the way in which it was counted.
+    pub fn notes(&self, asked: &Asked) -> Vec<String> {
+        let mut notes = Vec::new();
+        if asked.quick {
+            notes.push("a first look: few truths, and chains of half their length where a sampler's steps are draws".to_owned());
+        }
+        if let Some(all) = self.candidates {
+            notes.push(format!(
+                "the truths are runs, held back from an emulator that was fitted to the others; {all} runs can stand for draws from the prior"
+            ));
+            if all < asked.count {
+                notes.push(format!("{} truths were asked for, and {all} are counted", asked.count));
+            }
+        }
+        notes
+    }
+}
+
+/// The noise where nothing else is asked: what the replicates show, where there are enough of them.
+fn usual(measured: &Measured) -> Noise {
+    let enough = fewest(&measured.used) >= ENOUGH;
+    if enough { Noise::Replicates } else { Noise::Posterior }
+}
+
+/// Points that fit the study's own data, with their responses.
+fn fits(
+    study: &Study,
+    noise: Noise,
+    base: &Base<'_>,
+    measured: &Measured,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Vec<(Vec<f64>, Vec<f64>)>, Stop> {
+    let points = match noise {
+        Noise::Replicates => return Ok(Vec::new()),
+        Noise::Prior => {
+            let known = base.known(0);
+            let best = best_fit::point(study, &measured.likelihood, known.forward)?;
+            let absent: Vec<f64> =
+                study.placed_effects().iter().flat_map(|e| e.absent().to_vec()).collect();
+            let point = [best, absent].concat();
+            Matrix::from_vec(1, point.len(), point)
+        }
+        Noise::Posterior => posterior(study, base, run, observer)?,
+    };
+    let forward = match base {
+        Base::Emulated(all) => &*all[0].emulator as &dyn Forward,
+        Base::Direct(ready) => ready.known().forward,
+    };
+    let responses = predict::responses(study, forward, &points);
+    Ok(points.iter_rows().map(<[f64]>::to_vec).zip(responses).collect())
+}
+
+/// Draws of the study's own posterior.
+fn posterior(
+    study: &Study,
+    base: &Base<'_>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Matrix, Stop> {
+    let calibrated = match base {
+        // What was prepared before is taken from the run directory: the refinement works on its own copy.
+        Base::Emulated(_) => refine::stage(study, prepare(study, run, &Silent)?, run, observer)?.1,
+        Base::Direct(ready) => {
+            calibrate::stage(study, &ready.known(), "5-calibrate", run, observer)?
+        }
+    };
+    let calibrated: Kept<Calibrated> =
+        calibrated.ok_or_else(|| Stop::new("the study has no posterior"))?;
+    let draws: Draws = calibrated.value.draws.from_step(calibrated.value.outcome.burn_in);
+    if draws.is_empty() {
+        return Err(
+            Stop::new("the study's own posterior has no draws").help("`--noise prior` needs none")
+        );
+    }
+    let count = predict::affordable(DRAWS.min(draws.len()), study.layouts.len());
+    Ok(draws.points().select_rows(&predict::spaced(count, draws.len())))
+}
+
+/// Emulators that do not know some of the runs: one a part of those that are held back.
+fn refitted<'a>(
+    study: &'a Study,
+    base: Base<'a>,
+    validation: &[usize],
+    parts: &[Vec<usize>],
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Base<'a>, Stop> {
+    let Base::Emulated(mut all) = base else { return Ok(base) };
+    let whole = all.remove(0);
+    let training = Fitting::of(study, whole.data.value.runs()?)?.training;
+    let mut fitted = Vec::new();
+    for (k, part) in parts.iter().enumerate() {
+        let ensemble = whole.data.value.runs()?;
+        let kept: Vec<usize> = (0..ensemble.runs.len()).filter(|i| !part.contains(i)).collect();
+        let place = |wanted: &[usize]| -> Vec<usize> {
+            (0..kept.len()).filter(|&i| wanted.contains(&kept[i])).collect()
+        };
+        let folder = format!("7-coverage-fit-{}", k + 1);
+        let fitting = Fitting {
+            folder: &folder,
+            parameters: &study.parameters,
+            training: place(&training),
+            validation: place(validation),
+        };
+        let value = Data {
+            ensemble: Some(some(ensemble, &kept)),
+            measured: whole.data.value.measured.clone(),
+            cheaper: whole.data.value.cheaper.clone(),
+        };
+        let hash = files::hash(json!([whole.data.hash, "without", part]).to_string().as_bytes());
+        let data = Kept { value, hash, ..whole.data.clone() };
+        let (own, emulator) = surrogate::stage(study, &data, &fitting, run, observer)?;
+        fitted.push(Learned::new(study, data, (own, emulator), whole.numerics.clone())?);
+    }
+    Ok(Base::Emulated(fitted))
+}
+
+/// Some runs of an ensemble.
+fn some(ensemble: &Ensemble, rows: &[usize]) -> Ensemble {
+    Ensemble {
+        runs: rows.iter().map(|&i| ensemble.runs[i].clone()).collect(),
+        points: ensemble.points.select_rows(rows),
+        responses: ensemble.responses.select_rows(rows),
+        valid: rows.iter().map(|&i| ensemble.valid[i]).collect(),
+        ..ensemble.clone()
+    }
+}

@@ -1,0 +1,151 @@
+//! One case: data of a truth, and their calibration.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::json;
+
+use crate::data::Observations;
+use crate::diagnose::coverage::{Calibration, Case, Ended, Noise, judge};
+use crate::math::random::{Stream, below};
+use crate::run::{Kept, RunDirectory, Silent, Stop, files};
+
+use super::ground::{Base, Ground};
+use super::{Tried, ended, noise, truths};
+use crate::stage::calibrate::{self, Calibrated};
+use crate::stage::idle::Used;
+use crate::stage::low_fidelity;
+use crate::stage::read::{Data, screened};
+use crate::stage::{Known, Learned, Trial, refine, stream};
+
+/// Makes the data of one truth and calibrates them. What the calibration needs to go on after an interruption is kept in a
+/// folder of its own until it is done.
+pub fn run(ground: &Ground<'_>, number: usize, folder: &Path) -> Result<Tried, Stop> {
+    let response = match &ground.truths.responses[number] {
+        Ok(response) => response,
+        Err(reason) => return Ok(ended(number, Ended::NoData(reason.clone()))),
+    };
+    let random = stream(ground.study, "coverage").named("data").at(number as u64);
+    let (truth, data) = match made(ground, number, response, &random) {
+        Ok(made) => made,
+        Err(stop) => return Ok(ended(number, Ended::NoData(stop.message))),
+    };
+    let values = data.blocks.iter().flat_map(|b| &b.replicates).flat_map(|r| &r.values);
+    if values.flatten().any(|y| !y.is_finite()) {
+        let reason = "the data of the truth are not finite".to_owned();
+        return Ok(ended(number, Ended::NoData(reason)));
+    }
+    let own = folder.join("cases").join(format!("{:05}", number + 1));
+    let scatter = noise::scatter(&data);
+    let mut directory = RunDirectory::open(&own)?;
+    let outcome = calibrated(ground, number, data, &mut directory);
+    let ended = match outcome {
+        Ok(calibrated) => Ended::Calibrated(judged(ground, &truth, &calibrated)),
+        Err(stop) => Ended::Failed(stop.message),
+    };
+    drop(directory);
+    // Refined cases hold runs of the model, which are not made twice.
+    if !matches!(ended, Ended::Failed(_)) && !is_refined(ground) {
+        fs::remove_dir_all(&own).map_err(|error| files::cannot_write(&own, &error))?;
+    }
+    Ok(Tried { case: Case { number, ended }, scatter })
+}
+
+fn is_refined(ground: &Ground<'_>) -> bool {
+    ground.study.surrogate.as_ref().is_some_and(|s| s.common.refine.is_some())
+}
+
+/// The values of all unknowns whose truths are known, and data of them.
+fn made(
+    ground: &Ground<'_>,
+    number: usize,
+    response: &[f64],
+    random: &Stream,
+) -> Result<(Vec<f64>, Observations), Stop> {
+    let study = ground.study;
+    let known = ground.base.known(ground.truths.parts[number]);
+    let theta = ground.truths.points.row(number);
+    let mut truth = theta.to_vec();
+    let mut response = response.to_vec();
+    for (k, effect) in study.placed_effects().iter().enumerate() {
+        let values =
+            truths::of_priors(&effect.hyperparameters(), &random.named("effect").at(k as u64));
+        response = effect.apply(&response, &values);
+        truth.extend(values);
+    }
+    let measured = ground.measured();
+    let noise = random.named("noise");
+    if ground.noise == Noise::Replicates {
+        return Ok((truth, noise::of_replicates(&measured.used, &response, &noise)?));
+    }
+    let chosen = below(&mut random.named("fit").generator(), ground.fits.len());
+    let (point, fitted) = &ground.fits[chosen];
+    let hyper = match ground.noise {
+        Noise::Prior => {
+            let own = &ground.coordinates[truth.len()..];
+            let mut rng = random.named("hyper").generator();
+            own.iter().map(|c| c.prior.sample(&mut rng)).collect()
+        }
+        _ => point[truth.len()..].to_vec(),
+    };
+    let both = [&fitted[..], &response[..]];
+    let data = noise::of_discrepancy(study, known.forward, &measured.used, both, &hyper, &noise)?;
+    truth.extend(hyper);
+    Ok((truth, data))
+}
+
+/// The calibration of data, with the study's own emulator and sampler.
+fn calibrated(
+    ground: &Ground<'_>,
+    number: usize,
+    data: Observations,
+    directory: &mut RunDirectory,
+) -> Result<Calibrated, Stop> {
+    let study = ground.study;
+    let section = study.measurements.as_ref();
+    let keys = &section.ok_or_else(|| Stop::new("the study has no measurements"))?.common;
+    let part = ground.truths.parts[number];
+    let known = ground.base.known(part);
+    let measured = Some(screened(keys, data));
+    let hash = files::hash(json!([known.data.hash, number]).to_string().as_bytes());
+    let ensemble = if is_refined(ground) { known.data.value.ensemble.clone() } else { None };
+    let cheaper = if is_refined(ground) { known.data.value.cheaper.clone() } else { None };
+    let value = Data { ensemble, measured, cheaper };
+    let data = Kept { value, hash, ..kept_without(known.data) };
+    let trial = Some(Trial { number: number as u64, quick: ground.quick });
+    let calibrated = match &ground.base {
+        Base::Emulated(all) if is_refined(ground) => {
+            let learned = copied(ground, &all[part], data, trial)?;
+            refine::stage(study, learned, directory, &Silent)?.1
+        }
+        _ => {
+            let known = Known { data: &data, trial, ..known };
+            calibrate::stage(study, &known, "5-calibrate", directory, &Silent)?
+        }
+    };
+    calibrated.map(|kept| kept.value).ok_or_else(|| Stop::new("the study has no posterior"))
+}
+
+fn kept_without(kept: &Kept<Data>) -> Kept<Data> {
+    let value = Data { ensemble: None, measured: None, cheaper: None };
+    Kept { value, hash: String::new(), seconds: kept.seconds, fresh: kept.fresh }
+}
+
+/// What was learned, for a refinement that goes on from it.
+fn copied(
+    ground: &Ground<'_>,
+    learned: &Learned,
+    data: Kept<Data>,
+    trial: Option<Trial>,
+) -> Result<Learned, Stop> {
+    let used = Used::of(ground.study)?;
+    let emulator = used.widen(low_fidelity::load(ground.study, &learned.fitted.value.bytes)?);
+    let made = (learned.fitted.clone(), emulator);
+    let again = Learned::new(ground.study, data, made, learned.numerics.clone())?;
+    Ok(Learned { trial, ..again })
+}
+
+fn judged(ground: &Ground<'_>, truth: &[f64], calibrated: &Calibrated) -> Calibration {
+    let draws = calibrated.draws.from_step(calibrated.outcome.burn_in);
+    judge(&ground.coordinates, truth, &draws, &calibrated.outcome.diagnosis)
+}

@@ -1,0 +1,185 @@
+//! `lacuna coverage`: right where the posterior is right, and not where it is not.
+
+use std::fs;
+use std::path::Path;
+
+use generator::{line, noise};
+use lacuna::diagnose::coverage::{Coverage, Noise, Source, Word};
+use lacuna::run::{RunDirectory, Silent, Stop};
+use lacuna::stage::coverage::{Asked, FOLDER, coverage};
+use tempfile::TempDir;
+
+use crate::quick::{load, replace, root};
+
+/// The line with eight replicates of noise of this size.
+pub fn study(sd: f64) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let from = root().join("tests/coverage/study.toml");
+    fs::copy(from, folder.path().join("study.toml")).unwrap();
+    let data = line::replicates([0.4, -0.3], sd, 8, &mut noise::Source::new(5));
+    fs::write(folder.path().join("line.csv"), line::table(&data)).unwrap();
+    folder
+}
+
+fn asked(count: usize, noise: Option<Noise>) -> Asked {
+    Asked { count, quick: false, noise, from_runs: false }
+}
+
+fn count(folder: &Path, out: &Path, settings: &[&str], asked: &Asked) -> Result<Coverage, Stop> {
+    let study = load(&folder.join("study.toml"), settings);
+    coverage(&study, asked, &mut RunDirectory::open(out).unwrap(), &Silent)
+}
+
+fn cases(out: &Path) -> String {
+    fs::read_to_string(out.join(FOLDER).join("cases.json")).unwrap()
+}
+
+/// The closed form: intervals hold what they say, ranks are uniform, and the posterior's width is the known one.
+#[test]
+fn a_posterior_in_closed_form_is_nominal() {
+    let folder = study(0.5);
+    let out = folder.path().join("out");
+    let found = count(folder.path(), &out, &[], &asked(200, Some(Noise::Prior))).unwrap();
+    assert_eq!(found.tally.verdict.word, Word::Nominal, "{}", found.tally.verdict.text);
+    assert_eq!((found.tally.calibrated, found.source), (200, Source::Model));
+    let exact = line::posterior(&vec![vec![0.0; 6]; 8], 0.5);
+    for (j, row) in found.tally.rows.iter().enumerate() {
+        assert_eq!(row.uniform, Some(true), "{row:?}");
+        let expected = exact.covariance[j][j].sqrt() / line::PRIOR[j];
+        // The median over 200 chains of some hundred independent draws each; the relative error of one sd is 5 %.
+        let error = 4.0 * 0.05 * 1.25 / 200.0_f64.sqrt();
+        assert!((row.shrinkage[1] / expected - 1.0).abs() < error, "{row:?} {expected}");
+        assert!((row.z[1] - 1.0).abs() < 4.0 * 0.5_f64.sqrt() / 200.0_f64.sqrt(), "{row:?}");
+    }
+    for file in ["coverage.json", "coverage.html"] {
+        assert!(out.join(FOLDER).join(file).exists(), "{file}");
+    }
+    assert!(!out.join(FOLDER).join("cases/00001").exists());
+}
+
+/// Noise three times as large as the study states. With the noise of the replicates that is seen; with the
+/// stated one the coverage is right for data that nobody measured, and the difference is told.
+#[test]
+fn noise_that_is_stated_too_small_is_found_in_the_replicates() {
+    let folder = study(1.5);
+    let out = folder.path().join("out");
+    let found = count(folder.path(), &out, &[], &asked(100, None)).unwrap();
+    assert_eq!(found.noise, Noise::Replicates);
+    assert_eq!(found.tally.verdict.word, Word::TooNarrow, "{}", found.tally.verdict.text);
+    // 2 Phi(1.96 / 3) - 1, within four standard errors, the two unknowns counted as one.
+    let share = found.tally.overall.as_ref().unwrap().levels[2].share;
+    assert!((share - 0.486).abs() < 4.0 * (0.25_f64 / 100.0).sqrt(), "{share}");
+    assert!((found.noise_ratio.unwrap() - 1.0).abs() < 0.15, "{found:?}");
+    let stated = count(folder.path(), &out, &[], &asked(40, Some(Noise::Posterior))).unwrap();
+    assert_ne!(stated.tally.verdict.word, Word::TooNarrow);
+    assert!((stated.noise_ratio.unwrap() - 1.0 / 3.0).abs() < 0.05, "{stated:?}");
+    let text = lacuna::report::coverage_text(&stated);
+    assert!(text.contains("Replicates scatter by 0.3"), "{text}");
+}
+
+/// One thread or two, interrupted or not, at once or in two goes: the same bits.
+#[test]
+fn the_cases_do_not_depend_on_threads_or_interruptions() {
+    let folder = study(0.5);
+    let short = ["sampler.steps=200"];
+    let with = |threads: usize, name: &str, n: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let out = folder.path().join(name);
+        pool.install(|| count(folder.path(), &out, &short, &asked(n, None))).unwrap();
+        cases(&out)
+    };
+    let whole = with(1, "one", 12);
+    assert_eq!(whole, with(2, "two", 12));
+    // Fewer truths first: those that are there are taken.
+    with(2, "three", 5);
+    let log = folder.path().join("three").join(FOLDER).join("cases.jsonl");
+    let before = fs::read_to_string(&log).unwrap();
+    assert_eq!(whole, with(2, "three", 12));
+    assert!(fs::read_to_string(&log).unwrap().starts_with(&before));
+    // Killed while it wrote a line: no stage record, half of a case.
+    let killed = folder.path().join("two").join(FOLDER);
+    let text = fs::read_to_string(killed.join("cases.jsonl")).unwrap();
+    fs::write(killed.join("cases.jsonl"), &text[..text.len() / 2]).unwrap();
+    for file in ["stage.json", "cases.json"] {
+        fs::remove_file(killed.join(file)).unwrap();
+    }
+    assert_eq!(whole, with(1, "two", 12));
+}
+
+/// Without a model the truths are runs that the emulator of each case was not fitted to.
+#[test]
+fn runs_that_are_held_back_are_truths() {
+    let folder = crate::quick::tables();
+    let out = folder.path().join("out");
+    let asked = asked(8, Some(Noise::Prior));
+    let found = count(folder.path(), &out, &["sampler.steps=300"], &asked).unwrap();
+    assert_eq!((found.source, found.tally.truths), (Source::HeldBack, 8));
+    assert!(found.notes.iter().any(|note| note.contains("held back")), "{:?}", found.notes);
+    let runs = fs::read_to_string(folder.path().join("runs.csv")).unwrap();
+    let kept: serde_json::Value = serde_json::from_str(&cases(&out)).unwrap();
+    let truth =
+        kept["cases"][0]["case"]["ended"]["calibrated"]["unknowns"][0]["truth"].as_f64().unwrap();
+    let is_there = runs.lines().skip(1).any(|line| {
+        line.split(',')
+            .filter_map(|cell| cell.parse::<f64>().ok())
+            .any(|x| (x - truth).abs() <= 1e-12 * x.abs())
+    });
+    assert!(is_there, "{truth}");
+    // Several fits, none of all runs.
+    assert!(out.join("7-coverage-fit-2").exists());
+}
+
+#[test]
+fn what_cannot_be_counted_is_refused() {
+    let folder = study(0.5);
+    let stop = |settings: &[&str], asked: &Asked| {
+        let out = folder.path().join("refused");
+        count(folder.path(), &out, settings, asked).unwrap_err().to_string()
+    };
+    let few = asked(4, None);
+    let eight = root().join("configs/target/eight_schools.toml");
+    let target = load(&eight, &[]);
+    let mut run = RunDirectory::open(&folder.path().join("target")).unwrap();
+    let error = coverage(&target, &few, &mut run, &Silent).unwrap_err().to_string();
+    assert!(error.contains("`[target]`"), "{error}");
+    let text = fs::read_to_string(folder.path().join("study.toml")).unwrap();
+    let (before, _) = text.split_once("[discrepancy]").unwrap();
+    let (first, rest) = before.split_once("[measurements]").unwrap();
+    let (_, surrogate) = rest.split_once("[surrogate]").unwrap();
+    let path = folder.path().join("study.toml");
+    fs::write(&path, format!("{first}[surrogate]{surrogate}")).unwrap();
+    let error = stop(&[], &few);
+    assert!(error.contains("no `[measurements]`"), "{error}");
+    fs::write(&path, &text).unwrap();
+    // One replicate has no residuals.
+    let data = line::replicates([0.4, -0.3], 0.5, 1, &mut noise::Source::new(5));
+    fs::write(folder.path().join("line.csv"), line::table(&data)).unwrap();
+    let error = stop(&["sampler.steps=200"], &asked(3, Some(Noise::Replicates)));
+    assert!(error.contains("the fewest"), "{error}");
+}
+
+/// A model that answers on one side of the prior only: truths without a response are told and counted nowhere.
+#[test]
+fn truths_at_which_the_model_fails_are_told() {
+    let folder = study(0.5);
+    let path = folder.path().join("study.toml");
+    // The logarithm of what is below zero is no number.
+    let observe = "observe = \"level * exp(0 * log((level0 + 0.5 {m}) / (1 {m})))\"";
+    replace(&path, "observe = \"level\"", observe);
+    // The emulator has learned from tables in which nothing failed.
+    let design = "[design]\nuse = \"latin_hypercube\"\nruns = 40\n";
+    let tables =
+        "[simulations]\nuse = \"csv\"\nparameters = \"runs.csv\"\nresponses = \"responses.csv\"\n";
+    replace(&path, design, tables);
+    let names = ["runs.csv", "responses.csv"];
+    for (name, text) in names.iter().zip(line::runs(40, &mut noise::Source::new(6))) {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    let out = folder.path().join("out");
+    let found = count(folder.path(), &out, &["sampler.steps=200"], &asked(12, None)).unwrap();
+    let lost: usize = found.tally.without_data.iter().map(|(_, count)| count).sum();
+    assert!((1..12).contains(&lost), "{:?}", found.tally.without_data);
+    assert_eq!(found.tally.calibrated + lost, 12);
+    let text = lacuna::report::coverage_text(&found);
+    assert!(text.contains("Truths without data"), "{text}");
+}
