@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 use super::{Stop, files};
 
 /// The stages, by the last of these words in the names of their folders, with what their artifacts depend on.
-pub const STAGES: [(&str, Depends); 12] = [
+pub const STAGES: [(&str, Depends); 13] = [
     ("design", Depends::OnNothing),
     ("simulate", Depends::OnRevisions(1)),
     ("read", Depends::OnVersion(1)),

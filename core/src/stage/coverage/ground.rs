@@ -132,7 +132,7 @@ impl<'a> Ground<'a> {
         json!([
             self.hash,
             study.measurements.as_ref().map(|m| &m.common),
-            study.numerical_error.as_ref().map(|n| n.written.whole()),
+            study.numerical_error.as_ref().map(|n| n.written.scales()),
             laws,
             effects,
             study.model.as_ref().map(|m| (m.built.identity(), &m.common)),

@@ -108,11 +108,9 @@ fn calibrated(
     let measured = Some(screened(keys, data));
     let hash = files::hash(json!([known.data.hash, number]).to_string().as_bytes());
     let ensemble = if is_refined(ground) { known.data.value.ensemble.clone() } else { None };
-    let data = Kept {
-        value: Data { ensemble, measured, cheaper: None },
-        hash,
-        ..kept_without(known.data)
-    };
+    let cheaper = if is_refined(ground) { known.data.value.cheaper.clone() } else { None };
+    let value = Data { ensemble, measured, cheaper };
+    let data = Kept { value, hash, ..kept_without(known.data) };
     let trial = Some(Trial { number: number as u64, quick: ground.quick });
     let calibrated = match &ground.base {
         Base::Emulated(all) if is_refined(ground) => {
