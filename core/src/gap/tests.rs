@@ -194,12 +194,10 @@ fn unknowns_of_many_decades_are_found() {
         }
         parameters[0].prior = Distribution::LogUniform([1e-3, 1e4]);
         let curve = decay(20.0, truth);
-        let replicate = |r: usize| Replicate {
-            name: r.to_string(),
-            values: curve.iter().map(|y| Some(*y)).collect(),
-        };
+        let values: Vec<_> = curve.iter().map(|y| Some(*y)).collect();
+        let replicate = |r: usize| Replicate::new(r.to_string(), values.clone());
         let layout = layouts.blocks[0].clone();
-        let exact = Measurements { layout, replicates: (0..REPLICATES).map(replicate).collect() };
+        let exact = Measurements::new(layout, (0..REPLICATES).map(replicate).collect());
         let measured = exact.into();
         let experiment = Experiment::new(&layouts, &parameters, &Decay, &measured);
         let (_, means) = experiment.means();

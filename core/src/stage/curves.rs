@@ -161,12 +161,12 @@ mod tests {
         ];
         let axes: Vec<Axis> = axes.into_iter().filter(|axis| !axis.is_empty()).collect();
         let layout = Layout { name: "y".into(), unit: Unit::dimensionless(), axes };
-        let replicate = |r: usize| Replicate {
-            name: format!("p{r}"),
-            values: (0..layout.len()).map(|i| Some((10 * r + i) as f64)).collect(),
+        let value = |r: usize, i: usize| Some((10 * r + i) as f64);
+        let replicate = |r: usize| {
+            Replicate::new(format!("p{r}"), (0..layout.len()).map(|i| value(r, i)).collect())
         };
         let replicates = (0..replicates).map(replicate).collect();
-        Measurements { layout, replicates }
+        Measurements::new(layout, replicates)
     }
 
     fn names(curves: &Curves) -> Vec<&str> {

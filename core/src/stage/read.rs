@@ -16,7 +16,6 @@ use crate::report::findings::FlaggedCurve;
 use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, RunDirectory, Stop, files};
 use crate::study::Study;
-use crate::study::file::MeasurementKeys;
 
 use self::outside::refuse;
 use super::simulate::{Simulated, inside};
@@ -342,22 +341,7 @@ pub(super) fn measured_or_all(study: &Study) -> Result<Option<Measured>, Vec<Sto
     if read.count() == 0 {
         return Err(vec![Stop::new("the measurements hold no value")]);
     }
-    Ok(Some(screened(&section.common, read)))
-}
-
-/// Measurements as the calibration uses them: screened, and with the curves that the study adds.
-pub(super) fn screened(keys: &MeasurementKeys, read: Observations) -> Measured {
-    let flagged = match &keys.screen {
-        Some(options) => {
-            let (threshold, leave_out) = (options.threshold.get(), options.leave_out);
-            read.blocks.iter().flat_map(|data| screen::flag(data, threshold, leave_out)).collect()
-        }
-        None => Vec::new(),
-    };
-    let used = read.map(|data| screen::without(data, &flagged));
-    let added = &keys.added_curves;
-    let likelihood = used.map(|data| screen::with_added_curves(data, added));
-    Measured { read, used, likelihood, flagged }
+    Ok(Some(screen::screened(&section.common, read)))
 }
 
 /// The measurements of all scenarios: a replicate belongs to one scenario and has gaps in the others of its block.

@@ -1,10 +1,12 @@
 //! Faulty curves among the replicates, and curves over the replicates that a study adds to its data.
 
 use crate::data::layout::Group;
-use crate::data::measurements::{Measurements, Replicate};
+use crate::data::measurements::{Measurements, Observations, Replicate};
 use crate::math::moments::{quantile, sorted};
 use crate::report::findings::FlaggedCurve;
-use crate::study::file::AddedCurve;
+use crate::study::file::{AddedCurve, MeasurementKeys};
+
+use super::read::Measured;
 
 /// The factor that turns a median absolute deviation into the standard deviation of a normal law.
 const MAD: f64 = 1.482_602_218_505_602;
@@ -107,6 +109,21 @@ pub fn with_added_curves(data: &Measurements, curves: &[AddedCurve]) -> Measurem
             .push(Replicate::new(name.to_owned(), summaries.iter().map(value).collect()));
     }
     extended
+}
+
+/// Measurements as the calibration uses them: screened, and with the curves that the study adds.
+pub(super) fn screened(keys: &MeasurementKeys, read: Observations) -> Measured {
+    let flagged = match &keys.screen {
+        Some(options) => {
+            let (threshold, leave_out) = (options.threshold.get(), options.leave_out);
+            read.blocks.iter().flat_map(|data| flag(data, threshold, leave_out)).collect()
+        }
+        None => Vec::new(),
+    };
+    let used = read.map(|data| without(data, &flagged));
+    let added = &keys.added_curves;
+    let likelihood = used.map(|data| with_added_curves(data, added));
+    Measured { read, used, likelihood, flagged }
 }
 
 #[cfg(test)]

@@ -215,7 +215,7 @@ fn write_stated(folder: &Path, sigma: [f64; 6], covariance: &[f64]) {
 fn one_curve_states_its_noise() {
     let folder = tempfile::tempdir().unwrap();
     let layout = layout();
-    let covariance: Vec<f64> = (0..36)
+    let covariance: Vec<f64> = (0..36_usize)
         .map(|k| {
             if k / 6 == k % 6 {
                 4.0

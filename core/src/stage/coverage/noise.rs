@@ -113,9 +113,9 @@ mod tests {
             let gap = |i: usize| (i == 5 && r % 2 == 0).then_some(());
             let values =
                 (0..6).map(|i| gap(i).map_or(Some(5.0 + gain * (i + 1) as f64), |()| None));
-            Replicate { name: r.to_string(), values: values.collect() }
+            Replicate::new(r.to_string(), values.collect())
         };
-        Measurements { layout, replicates: (0..replicates).map(one).collect() }.into()
+        Measurements::new(layout, (0..replicates).map(one).collect()).into()
     }
 
     /// Curves that differ by one random factor: curves drawn again differ by it too, so that all their values are

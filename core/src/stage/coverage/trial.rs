@@ -14,7 +14,8 @@ use super::ground::{Base, Ground};
 use super::{Tried, ended, noise, truths};
 use crate::stage::calibrate::{self, Calibrated};
 use crate::stage::idle::Used;
-use crate::stage::read::{Data, screened};
+use crate::stage::read::Data;
+use crate::stage::screen::screened;
 use crate::stage::{Known, Learned, Trial, low_fidelity, refine, stream};
 
 /// Makes the data of one truth and calibrates them. What the calibration needs to go on after an interruption is kept in a
