@@ -111,9 +111,9 @@ fn the_cases_do_not_depend_on_threads_or_interruptions() {
 fn runs_that_are_held_back_are_truths() {
     let folder = crate::quick::tables();
     let out = folder.path().join("out");
-    let asked = asked(8, Some(Noise::Prior));
+    let asked = asked(20, Some(Noise::Prior));
     let found = count(folder.path(), &out, &["sampler.steps=300"], &asked).unwrap();
-    assert_eq!((found.source, found.tally.truths), (Source::HeldBack, 8));
+    assert_eq!((found.source, found.tally.truths), (Source::HeldBack, 20));
     assert!(found.notes.iter().any(|note| note.contains("held back")), "{:?}", found.notes);
     let runs = fs::read_to_string(folder.path().join("runs.csv")).unwrap();
     let kept: serde_json::Value = serde_json::from_str(&cases(&out)).unwrap();

@@ -13,7 +13,7 @@ const SHARE: (f64, f64) = (0.2, 0.33);
 const MANY: (usize, f64) = (3, 0.5);
 
 const WIDEN: &str = "widen the prior (and the design, with runs there) if the value is possible; if not, look \
-                     for what the model lacks: `lacuna gap`";
+                     for what the model lacks: `lacuna gap STUDY`";
 
 /// See [`super::rules`].
 pub fn rules() -> Vec<Rule> {

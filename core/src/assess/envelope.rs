@@ -16,7 +16,7 @@ const FACTOR: f64 = 5.0;
 const NEAR: f64 = 1.6;
 
 const WIDEN: &str = "look at the data and the model together: a sign, an offset, a delay, a unit, or physics that \
-                     the model lacks (`lacuna gap`); widen the design where the parameters may go further";
+                     the model lacks (`lacuna gap STUDY`); widen the design where the parameters may go further";
 const RESTRICT: &str = "narrow the prior to where the model answers, or mend the model";
 const UNIT: &str = "check the unit of the measurements and of the model's response";
 

@@ -24,7 +24,8 @@ const MISFIT: f64 = 4.0;
 
 const START_AGAIN: &str =
     "look at the emulator near both points: the model was run there; add runs between them";
-const GAP: &str = "`lacuna gap` says where the model and the data disagree and what may be missing";
+const GAP: &str =
+    "`lacuna gap STUDY` says where the model and the data disagree and what may be missing";
 
 /// See [`super::rules`].
 pub fn rules() -> Vec<Rule> {

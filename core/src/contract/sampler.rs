@@ -177,19 +177,19 @@ fn refuses_bad_starts(sampler: &dyn Sampler) -> Result<(), String> {
         points
     };
     let short = good.select_rows(&(1..chains).collect::<Vec<_>>());
-    judge::refused("one point too few", || sampler.start(&Bounded, short))?;
-    if !sampler.uses_starts() {
-        let started = sampler.start(&Bounded, with(1.5));
-        return started.map(|_| ()).map_err(|stop| {
+    if sampler.uses_starts() {
+        for (what, points) in [
+            ("a point outside the support", with(1.5)),
+            ("a point that is not a number", with(f64::NAN)),
+        ] {
+            judge::refused(what, || sampler.start(&Bounded, points))?;
+        }
+    } else {
+        sampler.start(&Bounded, with(1.5)).map_err(|stop| {
             format!("it makes its own starting points, and stops at one that it ignores: {stop}")
-        });
+        })?;
     }
-    for (what, points) in [
-        ("a point outside the support", with(1.5)),
-        ("a point that is not a number", with(f64::NAN)),
-    ] {
-        judge::refused(what, || sampler.start(&Bounded, points))?;
-    }
+    judge::refused("one point too few", || sampler.start(&Bounded, short))?;
     Ok(())
 }
 

@@ -41,13 +41,13 @@ impl BiasedLikelihood {
         known: &Known<'_>,
         shown: &Measurements,
     ) -> Result<Option<Self>, Stop> {
+        let replicates = Replicates::of(known.data, known.common)?;
         let whole = shown.summaries();
         let lost =
             known.data.summaries().iter().zip(&whole).any(|(a, b)| a.count == 0 && b.count > 0);
         if options.orthogonal && lost {
             return Ok(None);
         }
-        let replicates = Replicates::of(known.data, known.common)?;
         let layout = &known.data.layout;
         let series = Series::of(layout, options.along.as_deref()).map_err(Stop::new)?;
         let groups = Groups::of(layout, &options.bias_by).map_err(Stop::new)?;

@@ -99,9 +99,10 @@ fn warnings_come_before_results() {
 #[test]
 fn evidence_and_predictions_are_told_on_the_page_and_in_the_terminal() {
     let (page, text) = (render(&findings()), summary_text(&findings()));
-    for told in
-        ["Log evidence −1234.50 ± 0.05 (bridge sampling).", "summed: −1200 ± 20, 3.9 effective"]
-    {
+    for told in [
+        "Log evidence −1234.50 ± 0.05 (bridge sampling).",
+        "summed: −1200 ± 31 (standard error by curve; 20 as if the data were independent), 3.9 effective",
+    ] {
         assert!(page.contains(told) && text.contains(told), "{text}");
     }
 }

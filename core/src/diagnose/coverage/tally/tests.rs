@@ -1,4 +1,4 @@
-use super::super::{Calibration, Word};
+use super::super::{Calibration, EDGE, Word};
 use super::*;
 use crate::data::Unit;
 use crate::math::distribution::Distribution;
@@ -23,6 +23,12 @@ fn case(number: usize, unknowns: usize, factor: f64) -> Case {
         let (mean, sd) = (0.8 * (truth + 0.5 * normal(&mut rng)), factor * 0.2_f64.sqrt());
         let ends =
             |level: f64| [-1.0, 1.0].map(|s| mean + s * sd * normal_quantile(0.5 + 0.5 * level));
+        // What a right posterior expects at the edges is in closed form too.
+        let within = |low: f64, high: f64| {
+            (normal_cdf((high - mean) / sd) - normal_cdf((low - mean) / sd)).max(0.0)
+        };
+        let edges = [EDGE, 1.0 - EDGE].map(normal_quantile);
+        let central = |[low, high]: [f64; 2]| within(low.max(edges[0]), high.min(edges[1]));
         Judged {
             truth,
             mean,
@@ -30,8 +36,8 @@ fn case(number: usize, unknowns: usize, factor: f64) -> Case {
             rank: (normal_cdf((truth - mean) / sd) * (RANKS + 1) as f64) as usize,
             size: 1000.0,
             intervals: LEVELS.map(ends),
-            edge: 0.2,
-            edge_inside: LEVELS.map(|level| 0.2 * level),
+            edge: 1.0 - within(edges[0], edges[1]),
+            edge_inside: LEVELS.map(|level| level - central(ends(level))),
             inside: LEVELS,
         }
     };
