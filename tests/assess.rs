@@ -286,7 +286,7 @@ fn one_wrong_value_in_one_curve_is_named_with_its_place() {
     let folder = quick::tables();
     let path = folder.path().join("responses.csv");
     let text = fs::read_to_string(&path).unwrap();
-    let line = text.lines().filter(|line| line.starts_with("r17,")).next().unwrap();
+    let line = text.lines().find(|line| line.starts_with("r17,")).unwrap();
     let (place, value) = line.rsplit_once(',').unwrap();
     let wrong = 10.0 * value.parse::<f64>().unwrap();
     fs::write(&path, text.replace(line, &format!("{place},{wrong}"))).unwrap();

@@ -122,7 +122,7 @@ fn arguments(code: &str) -> Option<Arguments> {
 mod tests {
     use super::*;
 
-    const FILE: &str = r##"
+    const FILE: &str = r#"
 """A model.
 
 def commented(a, b):
@@ -146,7 +146,7 @@ def only(a, /, b, *more):
     return a
 
 made = np.vectorize(only)
-"##;
+"#;
 
     fn sound(wanted: &[&str]) -> (BTreeMap<String, Option<Arguments>>, Vec<String>, Vec<String>) {
         match names(FILE, wanted) {

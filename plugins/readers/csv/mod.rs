@@ -72,7 +72,7 @@ pub struct Csv {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub covariance: Option<PathBuf>,
     /// Table of values that are left out, relative to the study file: the columns of the axes and `mask`, which is 1 for
-    /// a value that is left out and 0 for one that is used (as in a masked array of NumPy), and `replicate` where
+    /// a value that is left out and 0 for one that is used (as in a masked array of `NumPy`), and `replicate` where
     /// it is not the same for all.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mask: Option<PathBuf>,

@@ -168,7 +168,7 @@ fn simulated_data_have_the_stated_noise() {
     let response = vec![0.0; OUTPUTS];
     for data in [with_sigma(4, false), with_covariance(4)] {
         let built = build(&data, &[], ADDED);
-        let mut squares = vec![0.0; OUTPUTS];
+        let mut squares = [0.0; OUTPUTS];
         let draws = 4000;
         for draw in 0..draws {
             let made = &built.simulate(&response, &[0.3], &Stream::root(9).at(draw))[0];
