@@ -260,14 +260,10 @@ fn faults_of_stated_noise_are_told() {
         ),
         (
             square(
-                &|i, j| {
-                    if i == j {
-                        1.0
-                    } else if i > j {
-                        0.2
-                    } else {
-                        0.1
-                    }
+                &|i, j| match i.cmp(&j) {
+                    std::cmp::Ordering::Equal => 1.0,
+                    std::cmp::Ordering::Greater => 0.2,
+                    std::cmp::Ordering::Less => 0.1,
                 },
                 20,
             ),

@@ -55,7 +55,9 @@ struct Bits(Vec<u8>);
 
 impl Bits {
     fn add(&mut self, numbers: &[f64]) {
-        numbers.iter().for_each(|x| self.0.extend(x.to_bits().to_le_bytes()));
+        for x in numbers {
+            self.0.extend(x.to_bits().to_le_bytes());
+        }
     }
 
     fn matrix(&mut self, matrix: &Matrix) {

@@ -114,8 +114,8 @@ fn a_column_sigma_weighs_the_values() {
     let noise = Matrix::from_fn(TIMES, TIMES, |i, j| if i == j { sd(i) * sd(i) } else { 0.0 });
     let y = made(&noise, 1);
     let mut table = "time [s],y,sigma\n".to_owned();
-    for i in 0..TIMES {
-        writeln!(table, "{},{:.6},{}", time(i), y[i], sd(i)).unwrap();
+    for (i, y) in y.iter().enumerate() {
+        writeln!(table, "{},{y:.6},{}", time(i), sd(i)).unwrap();
     }
     let folder = study(&table);
     has(folder.path(), &[], closed_form(&y, &noise));
@@ -143,8 +143,8 @@ fn a_covariance_of_the_curve_is_used_whole() {
     });
     let y = made(&noise, 2);
     let mut table = "time [s],y\n".to_owned();
-    for i in 0..TIMES {
-        writeln!(table, "{},{:.6}", time(i), y[i]).unwrap();
+    for (i, y) in y.iter().enumerate() {
+        writeln!(table, "{},{y:.6}", time(i)).unwrap();
     }
     let folder = study(&table);
     let row =

@@ -14,7 +14,7 @@ const CLOSE: f64 = 3.0;
 /// How far above the optimised maximum a draw may be.
 const ABOVE: f64 = 1.0;
 
-const START: &str = "use a sampler that finds all modes (`sequential_monte_carlo`, `nested`), or start the chains from \
+const START: &str = "use a sampler that finds all modes (`lacuna plugins sampler` tells which), or start the chains from \
                      the prior: `[sampler] start = \"prior\"`";
 const SEARCH: &str = "look at the traces: the density has a ridge or several modes; draw more";
 

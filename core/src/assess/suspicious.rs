@@ -147,7 +147,9 @@ fn scores(residuals: &Matrix, leverage: &[f64], sizes: &[f64]) -> Vec<f64> {
             let inner = &sorted[..(9 * n).div_ceil(10)];
             (inner.iter().sum::<f64>() / inner.len() as f64).max(floor)
         };
-        all.iter_mut().for_each(|s| *s /= unit);
+        for s in &mut *all {
+            *s /= unit;
+        }
         square.iter_mut().zip(&all).for_each(|(sum, s)| *sum += s);
     }
     let total: f64 = square.iter().sum();

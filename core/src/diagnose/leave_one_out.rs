@@ -79,7 +79,10 @@ impl LeaveOneOut {
             error: error_of_sum(&elpd),
             error_by_curve: error_by_curve(&elpd, &curve),
             parameters: data.iter().map(|left| left.with_it - left.elpd).sum(),
-            unreliable: data.iter().filter(|left| !(left.k_hat <= limit)).count(),
+            unreliable: data
+                .iter()
+                .filter(|left| left.k_hat.is_nan() || left.k_hat > limit)
+                .count(),
             limit,
             data,
             curve,

@@ -148,8 +148,9 @@ fn strip(value: &mut Value, plugins: &mut BTreeMap<String, u32>) {
     match value {
         Value::Object(table) if table.contains_key(MARK) => {
             let mut own: Map<String, Value> = std::mem::take(table);
-            let revisions = own.remove("revisions").and_then(|r| serde_json::from_value(r).ok());
-            plugins.extend(revisions.unwrap_or_else(BTreeMap::<String, u32>::new));
+            let revisions: Option<BTreeMap<String, u32>> =
+                own.remove("revisions").and_then(|r| serde_json::from_value(r).ok());
+            plugins.extend(revisions.unwrap_or_default());
             *value = own.remove(MARK).unwrap_or(Value::Null);
             strip(value, plugins);
         }

@@ -56,7 +56,9 @@ impl Curves {
             let parts = parts(&measured.layout);
             let mut part_of = vec![0; measured.layout.len()];
             for (p, (_, outputs)) in parts.iter().enumerate() {
-                outputs.iter().for_each(|&i| part_of[i] = p);
+                for &i in outputs {
+                    part_of[i] = p;
+                }
             }
             for (replicate, values) in measured.replicates.iter().enumerate() {
                 let is_measured = |i: usize| values.values[i].is_some();

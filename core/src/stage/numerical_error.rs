@@ -126,7 +126,9 @@ impl NumericalError {
         let (mut sources, mut offset) = low_fidelity::sources(study, &fitted.bytes)?;
         for (j, scale) in prediction.scale.iter().enumerate() {
             let own = 1.0 + whole * (scale - 1.0);
-            sources.iter_mut().for_each(|source| source.weights[j] *= own);
+            for source in &mut sources {
+                source.weights[j] *= own;
+            }
             offset[j] = own * offset[j] + whole * prediction.offset[j];
         }
         if let (Some(bytes), Some((plugin, name))) =

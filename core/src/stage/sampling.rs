@@ -75,13 +75,13 @@ pub fn sample(
 ) -> Result<Sampled, Stop> {
     let plan = sampler.plan(target.dimension());
     let mut log = Log::open(folder, plan.chains, target.dimension())?;
-    let (mut step, mut state) = match log.resume(|state| sampler.statistics(state))? {
-        Some(checkpoint) => (checkpoint.step, checkpoint.state),
-        None => {
-            let state = sampler.start(target, start()?)?;
-            log.begin(&sampler.statistics(&state));
-            (0, state)
-        }
+    let checkpoint = log.resume(|state| sampler.statistics(state))?;
+    let (mut step, mut state) = if let Some(checkpoint) = checkpoint {
+        (checkpoint.step, checkpoint.state)
+    } else {
+        let state = sampler.start(target, start()?)?;
+        log.begin(&sampler.statistics(&state));
+        (0, state)
     };
     progress.add(step as u64);
     let (mut written, mut interval) = (Instant::now(), FIRST);

@@ -33,7 +33,7 @@ fn amount(bytes: f64) -> String {
     const UNITS: [&str; 9] = ["bytes", "kB", "MB", "GB", "TB", "PB", "EB", "ZB", "YB"];
     let thousands = (bytes.max(1.0).log10() / 3.0).floor().clamp(0.0, UNITS.len() as f64 - 1.0);
     let value = bytes / 1000.0_f64.powf(thousands);
-    let digits = if value < 10.0 { 1 } else { 0 };
+    let digits = usize::from(value < 10.0);
     format!("{value:.digits$} {}", UNITS[thousands as usize])
 }
 

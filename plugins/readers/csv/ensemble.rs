@@ -24,7 +24,7 @@ pub(super) fn responses(
         if long {
             long_table(&sheet, &names, layout, &mut faults)
         } else {
-            wide_table(&sheet, &names, layout, &mut faults)
+            Ok(wide_table(&sheet, &names, layout, &mut faults))
         }
     });
     let values = faults.take(sheet.heading_line, read);
@@ -86,7 +86,7 @@ fn wide_table(
     names: &Names<'_>,
     layout: &Layout,
     faults: &mut Faults,
-) -> Result<Vec<Option<Values>>, ReadError> {
+) -> Vec<Option<Values>> {
     let mut columns = Vec::with_capacity(layout.len());
     let mut headed: Vec<Option<usize>> = vec![None; layout.len()];
     for column in (0..sheet.headings.len()).filter(|&c| c != names.column) {
@@ -129,5 +129,5 @@ fn wide_table(
         }
         values[run] = Some(own);
     }
-    Ok(values)
+    values
 }

@@ -258,7 +258,9 @@ impl File {
                 let text = format!("is in `{unit}`, which does not convert to `{squared}`");
                 self.complain(text).at(format!("variable `{name}`"))
             })?;
-            numbers.iter_mut().for_each(|x| *x *= factor);
+            for x in &mut numbers {
+                *x *= factor;
+            }
         }
         if let Some(x) = numbers.iter().find(|x| !x.is_finite()) {
             return Err(self.complain(format!("holds {x}")).at(format!("variable `{name}`")));

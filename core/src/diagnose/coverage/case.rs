@@ -173,7 +173,8 @@ mod tests {
             .collect();
         let draws = Draws::from_steps(vec!["x".into()], &steps);
         let diagnosis = Diagnosis::of(&draws, false);
-        let judged = judge(&[coordinate.clone()], &[0.1], &draws, &diagnosis).unknowns.remove(0);
+        let judged =
+            judge(std::slice::from_ref(&coordinate), &[0.1], &draws, &diagnosis).unknowns.remove(0);
         assert!(judged.is_at_edge(&coordinate));
         // Four standard errors of a share among 20000 draws, a fifth of which are at the edges.
         let error = 4.0 * (0.75 * 0.25 / 4000.0_f64).sqrt();

@@ -188,7 +188,7 @@ fn row(coordinate: &Coordinate, judged: &[&Judged], bands: Option<&[ranks::Band;
         ranks,
         shrinkage: spread(&shrinkage),
         z: z(judged),
-        correlated: judged.iter().filter(|j| !(j.size >= RANKS as f64)).count(),
+        correlated: judged.iter().filter(|j| j.size.is_nan() || j.size < RANKS as f64).count(),
     }
 }
 
@@ -240,7 +240,7 @@ fn overall(coordinates: &[Coordinate], all: &[&super::Calibration]) -> Option<Ro
         uniform_jointly: None,
         shrinkage: spread(&sorted(&shrinkage.collect::<Vec<_>>())),
         z: z(&judged),
-        correlated: judged.iter().filter(|j| !(j.size >= RANKS as f64)).count(),
+        correlated: judged.iter().filter(|j| j.size.is_nan() || j.size < RANKS as f64).count(),
     })
 }
 

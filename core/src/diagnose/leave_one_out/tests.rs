@@ -245,7 +245,7 @@ fn left_out_curves_of_correlated_values_have_their_exact_predictions() {
         -0.5 * (quadratic + (1.0 + n * s).ln()) - n * HALF_LN_TWO_PI
     };
     let means: Vec<f64> = data.iter().map(|y| mean(y)).collect();
-    let spread = (1.0 / m as f64 + t * t) / count as f64;
+    let spread = (1.0 / f64::from(m) + t * t) / count as f64;
     let levels: Vec<f64> =
         (0..draws).map(|_| mean(&means) + spread.sqrt() * normal(&mut rng)).collect();
     let found = LeaveOneOut::of(
@@ -257,7 +257,7 @@ fn left_out_curves_of_correlated_values_have_their_exact_predictions() {
     let mut total = 0.0;
     for (c, left) in found.data.iter().enumerate() {
         let centre = (mean(&means) * count as f64 - means[c]) / others;
-        let exact = law(&data[c], centre, t * t + (1.0 / m as f64 + t * t) / others);
+        let exact = law(&data[c], centre, t * t + (1.0 / f64::from(m) + t * t) / others);
         total += exact;
         // Ratios of fifteen curves vary little over the posterior: 8000 draws give two digits and more.
         assert!((left.elpd - exact).abs() < 0.03, "{c}: {} and {exact}", left.elpd);

@@ -140,7 +140,7 @@ impl Cloud for Bounded<'_> {
 
 /// The normal law of a density without bounds.
 struct Free<'a> {
-    free: &'a Unconstrained<'a>,
+    space: &'a Unconstrained<'a>,
     top: Vec<f64>,
     value: f64,
     laplace: Laplace,
@@ -150,11 +150,11 @@ impl Cloud for Free<'_> {
     fn point(&self, z: &[f64]) -> Option<Vec<f64>> {
         let offset = multiply_vector(&self.laplace.factor, z);
         let u: Vec<f64> = self.top.iter().zip(offset).map(|(u, o)| u + WIDER * o).collect();
-        u.iter().all(|u| u.is_finite()).then(|| self.free.bounded(&u))
+        u.iter().all(|u| u.is_finite()).then(|| self.space.bounded(&u))
     }
 
     fn log_density(&self, point: &[f64]) -> f64 {
-        density(self.free, &self.free.free(point))
+        density(self.space, &self.space.free(point))
     }
 
     fn lowest(&self) -> f64 {
@@ -174,7 +174,7 @@ fn without_bounds(
     let start = free.free(&inside(target, maximum)?);
     let top = maximise(&free, &Matrix::from_rows(start.len(), [&start])).into_iter().next()?;
     let laplace = laplace(&free, &top.point).ok()?;
-    let cloud = Free { free: &free, top: top.point, value: top.value, laplace };
+    let cloud = Free { space: &free, top: top.point, value: top.value, laplace };
     about(&cloud, target, idle, count, stream)
 }
 

@@ -213,7 +213,8 @@ pub fn inverse_gamma_tails(a: f64, p: f64, q: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     // Tables keep the digits as the programs print them.
-    #![allow(clippy::unreadable_literal)]
+    // Digits as they were published.
+    #![allow(clippy::unreadable_literal, clippy::excessive_precision)]
 
     use super::*;
 

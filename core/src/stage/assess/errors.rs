@@ -9,7 +9,6 @@ use crate::assess::Finding;
 use crate::assess::emulator::{self as check, Effect};
 use crate::linalg::{Matrix, multiply_vector, transposed_multiply_vector};
 use crate::math::moments::{self, Moments};
-use crate::run::Stop;
 use crate::stage::Known;
 use crate::stage::report::Artifacts;
 
@@ -26,12 +25,12 @@ pub(super) struct Errors {
     pub shift: Option<f64>,
 }
 
-pub(super) fn of(judged: &Judged<'_>, all: &Artifacts<'_>) -> Result<Errors, Stop> {
+pub(super) fn of(judged: &Judged<'_>, all: &Artifacts<'_>) -> Errors {
     let known = judged.known;
     let section = judged.study.discrepancy.as_ref();
     let mut errors = Errors::default();
     if known.fitted.is_none() && known.numerics.is_none() {
-        return Ok(errors);
+        return errors;
     }
     let moves = Moves::of(judged);
     if let Some(fitted) = known.fitted {
@@ -54,7 +53,7 @@ pub(super) fn of(judged: &Judged<'_>, all: &Artifacts<'_>) -> Result<Errors, Sto
         let effect = moves.effect(&kept.value.differences, numerics.written.whole(), true);
         errors.findings.extend(check::numerical(&effect));
     }
-    Ok(errors)
+    errors
 }
 
 /// What is to be said of an emulator whatever was measured.

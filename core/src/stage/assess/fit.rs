@@ -57,14 +57,12 @@ fn reference(judged: &Judged<'_>, validated: &Validated) -> Option<Finding> {
 
 fn form(validated: &Validated) -> Option<Finding> {
     let of = |origin: &str| validated.spread.iter().find(|(o, _)| o == origin).map(|(_, sd)| *sd);
-    match (of("model_form"), of("measurement")) {
-        (Some(form), Some(measurement)) => check::model_form(form, measurement),
-        _ => {
-            let (all, replicates) = (of("discrepancy")?, of("replicates")?);
-            let rest = (all * all - replicates * replicates).max(0.0).sqrt();
-            check::model_form(rest, replicates)
-        }
+    if let (Some(form), Some(measurement)) = (of("model_form"), of("measurement")) {
+        return check::model_form(form, measurement);
     }
+    let (all, replicates) = (of("discrepancy")?, of("replicates")?);
+    let rest = (all * all - replicates * replicates).max(0.0).sqrt();
+    check::model_form(rest, replicates)
 }
 
 fn covered(judged: &Judged<'_>, validated: &Validated) -> Option<Finding> {

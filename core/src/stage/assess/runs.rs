@@ -55,14 +55,9 @@ fn few(
 ) -> Option<Finding> {
     calibrated?;
     let points = training(known)?;
-    let intervals: Vec<(f64, f64)> = match known.region {
-        Some(region) => region.to_vec(),
-        None => {
-            let middle =
-                |p: &crate::data::Parameter| (p.prior.quantile(0.005), p.prior.quantile(0.995));
-            study.parameters.iter().map(middle).collect()
-        }
-    };
+    let middle = |p: &crate::data::Parameter| (p.prior.quantile(0.005), p.prior.quantile(0.995));
+    let whole = || study.parameters.iter().map(middle).collect();
+    let intervals: Vec<(f64, f64)> = known.region.map_or_else(whole, <[_]>::to_vec);
     let inside = |point: &&[f64]| {
         intervals.iter().zip(*point).all(|(&(low, high), &x)| low <= x && x <= high)
     };

@@ -41,6 +41,8 @@ pub struct Ground<'a> {
 }
 
 /// The forward map of the cases.
+// There is one of them in a program.
+#[allow(clippy::large_enum_variant)]
 pub enum Base<'a> {
     /// An emulator; several where truths are runs that are held back, one a part of them.
     Emulated(Vec<Learned>),
@@ -166,6 +168,9 @@ fn usual(measured: &Measured) -> Noise {
     if enough { Noise::Replicates } else { Noise::Posterior }
 }
 
+/// A point with its response.
+type Fit = (Vec<f64>, Vec<f64>);
+
 /// Points that fit the study's own data, with their responses.
 fn fits(
     study: &Study,
@@ -174,14 +179,13 @@ fn fits(
     measured: &Measured,
     run: &mut RunDirectory,
     observer: &dyn Observer,
-) -> Result<Vec<(Vec<f64>, Vec<f64>)>, Stop> {
+) -> Result<Vec<Fit>, Stop> {
     let points = match noise {
         Noise::Replicates => return Ok(Vec::new()),
         Noise::Prior => {
             let known = base.known(0);
             let best = best_fit::point(study, &measured.likelihood, known.forward)?;
-            let absent: Vec<f64> =
-                study.placed_effects().iter().flat_map(|e| e.absent().to_vec()).collect();
+            let absent: Vec<f64> = study.placed_effects().iter().flat_map(|e| e.absent()).collect();
             let point = [best, absent].concat();
             Matrix::from_vec(1, point.len(), point)
         }

@@ -110,7 +110,7 @@ mod tests {
         let one = |r: usize| {
             let mut rng = Stream::root(3).at(r as u64).generator();
             let gain = normal(&mut rng);
-            let gap = |i: usize| (i == 5 && r % 2 == 0).then_some(());
+            let gap = |i: usize| (i == 5 && r.is_multiple_of(2)).then_some(());
             let values =
                 (0..6).map(|i| gap(i).map_or(Some(5.0 + gain * (i + 1) as f64), |()| None));
             Replicate::new(r.to_string(), values.collect())

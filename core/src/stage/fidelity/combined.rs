@@ -100,7 +100,7 @@ impl Several {
                 Some(part) => {
                     rows.extend(part.coefficients().iter_rows().map(|row| {
                         row.iter().zip(weights).map(|(c, w)| c * w).collect::<Vec<f64>>()
-                    }))
+                    }));
                 }
                 None => linear = false,
             }

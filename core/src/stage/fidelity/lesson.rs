@@ -98,9 +98,10 @@ impl Lesson<'_> {
                 }
             }
         }
-        match residuals.as_slice().iter().all(|r| r.is_finite()) {
-            true => Ok(residuals),
-            false => Err(Stop::new("the emulator of the difference is not finite")),
+        if residuals.as_slice().iter().all(|r| r.is_finite()) {
+            Ok(residuals)
+        } else {
+            Err(Stop::new("the emulator of the difference is not finite"))
         }
     }
 
@@ -197,7 +198,9 @@ impl Lesson<'_> {
             for &j in &group.indices {
                 emulated[j] = rule.difference == Shape::Emulated;
                 if let Some(of_rule) = &tried[k].residuals {
-                    all.iter().for_each(|&i| residuals[(i, j)] = of_rule[(i, j)]);
+                    for &i in &all {
+                        residuals[(i, j)] = of_rule[(i, j)];
+                    }
                 }
             }
             let error = |tried: &Tried| {

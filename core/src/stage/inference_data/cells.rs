@@ -26,6 +26,9 @@ pub struct Place {
     pub blocks: Vec<Vec<DimensionId>>,
 }
 
+/// The place of an axis in a layout, its values and their unit.
+type Grid<'a> = (usize, &'a [f64], String);
+
 impl Place {
     /// A variable on these dimensions behind others.
     pub fn variable(
@@ -154,11 +157,10 @@ impl<'a> Cells<'a> {
         if let Some(unit) =
             unit.filter(|u| grids.iter().all(|g| g.as_ref().is_some_and(|g| g.2 == *u)))
         {
-            let number =
-                |(block, grid, i): (&Measurements, &Option<(usize, &[f64], String)>, usize)| {
-                    grid.as_ref()
-                        .map_or(f64::NAN, |(place, grid, _)| grid[block.layout.place(i)[*place]])
-                };
+            let number = |(block, grid, i): (&Measurements, &Option<Grid<'_>>, usize)| {
+                grid.as_ref()
+                    .map_or(f64::NAN, |(place, grid, _)| grid[block.layout.place(i)[*place]])
+            };
             let values: Vec<f64> = cells().map(number).collect();
             return file.numbers(path, &[datum], &values, Some(&unit)).map(|_| ());
         }

@@ -73,7 +73,6 @@ fn parts(text: &str, span: Range<usize>) -> impl Iterator<Item = Range<usize>> {
     for (at, c) in text[span.clone()].char_indices() {
         match (c, quote) {
             (_, Some(open)) if c == open => quote = None,
-            (_, Some(_)) => {}
             ('"' | '\'', None) => quote = Some(c),
             ('[' | '{', None) => depth += 1,
             (']' | '}', None) => depth = depth.saturating_sub(1),
