@@ -185,7 +185,11 @@ fn fits(
         Noise::Prior => {
             let known = base.known(0);
             let best = best_fit::point(study, &measured.likelihood, known.forward)?;
-            let absent: Vec<f64> = study.placed_effects().iter().flat_map(|e| e.absent()).collect();
+            let absent: Vec<f64> = study
+                .placed_effects()
+                .iter()
+                .flat_map(crate::plugin::effect::Placed::absent)
+                .collect();
             let point = [best, absent].concat();
             Matrix::from_vec(1, point.len(), point)
         }
