@@ -62,7 +62,7 @@ fn a_cluster_gives_the_bits_that_this_machine_gives() {
 /// What happens to each of six runs, two a job: an exit code of the model; its job killed; cancelled from outside; the
 /// others are sound.
 const TROUBLE: &str = "case $1 in
-    run001) exit 7;;
+    run002) exit 7;;
     run004) kill -9 $PPID;;
     run006) touch \"$3/cancel-me\"; sleep 60;;
 esac
@@ -82,7 +82,7 @@ fn each_cause_is_told(kind: Kind) {
     assert_eq!(child.wait().unwrap().code(), Some(1));
     let failed = failures(&out);
     let names: Vec<&str> = failed.iter().map(|(name, _)| name.as_str()).collect();
-    assert_eq!(names, ["run001", "run004", "run006"], "{failed:?}");
+    assert_eq!(names, ["run002", "run004", "run006"], "{failed:?}");
     assert!(failed[0].1.contains("exit code 7"), "{failed:?}");
     assert!(
         failed[1].1.contains("it failed") && failed[1].1.contains("exit code 137"),

@@ -19,7 +19,7 @@ const LEFT_OUT: (f64, f64) = (0.1, 0.3);
 /// How many times larger than stated the emulator's error may be at the posterior.
 const LARGER: (f64, f64) = (2.0, 5.0);
 
-const MORE_RUNS: &str = "add runs near the posterior: `[surrogate] refine = { runs = 20 }`, or `lacuna campaign extend`";
+const MORE_RUNS: &str = "add runs near the posterior: `[surrogate] refine = { runs = 20 }`, or `lacuna campaign extend RUN --runs 20`";
 const ALLOW: &str =
     "allow for it: `[discrepancy] emulator_error = true`, and add runs near the posterior";
 const FINER: &str = "use a finer mesh for the runs inside the prior, or repeat more of them in \
