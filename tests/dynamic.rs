@@ -10,9 +10,14 @@ mod contracts;
 mod elsewhere;
 #[path = "dynamic/examples.rs"]
 mod examples;
+#[path = "dynamic/forwarded.rs"]
+mod forwarded;
 #[cfg(unix)]
 #[path = "dynamic/hostile.rs"]
 mod hostile;
+#[cfg(unix)]
+#[path = "dynamic/optional.rs"]
+mod optional;
 #[path = "dynamic/panics.rs"]
 mod panics;
 #[path = "quick.rs"]

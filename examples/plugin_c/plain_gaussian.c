@@ -460,11 +460,11 @@ static int32_t likelihood(void *plugin, const LacunaKnown *known, LacunaLikeliho
 /* ---- the library ---- */
 
 static const LacunaComponentFunctions component = {
-    sizeof(LacunaComponentFunctions), schema, create, free, NULL, NULL, NULL
+    .size = sizeof(LacunaComponentFunctions), .schema = schema, .create = create, .destroy = free
 };
 
 static const LacunaDiscrepancyFunctions discrepancy = {
-    sizeof(LacunaDiscrepancyFunctions), likelihood, NULL
+    .size = sizeof(LacunaDiscrepancyFunctions), .likelihood = likelihood
 };
 
 static const LacunaEntry entries[] = {

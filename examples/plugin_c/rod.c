@@ -328,11 +328,12 @@ static size_t batch(void *plugin)
 /* ---- the library ---- */
 
 static const LacunaComponentFunctions component = {
-    sizeof(LacunaComponentFunctions), schema, create, free, options, check, NULL
+    .size = sizeof(LacunaComponentFunctions), .schema = schema, .create = create, .destroy = free, .options = options,
+    .check = check
 };
 
 static const LacunaModelFunctions model = {
-    sizeof(LacunaModelFunctions), signature, predict, batch, NULL, NULL, NULL, NULL
+    .size = sizeof(LacunaModelFunctions), .signature = signature, .predict = predict, .batch = batch
 };
 
 static const LacunaEntry entries[] = {

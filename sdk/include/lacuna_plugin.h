@@ -16,7 +16,7 @@ extern "C" {
 
 #define LACUNA_MAGIC UINT64_C(0x6c6163756e61706c)
 #define LACUNA_MAJOR 1u
-#define LACUNA_MINOR 0u
+#define LACUNA_MINOR 1u
 
 /* What a function returns. */
 enum {
@@ -96,6 +96,10 @@ typedef struct LacunaComponentFunctions {
     /* The same against the machine: files, commands. Nothing is changed. */
     /* May be null. */
     int32_t (*environment)(void *plugin, LacunaText context, const LacunaAnswer *answer);
+    /* The revision of the plugin, a number from 1 that its author raises whenever what it computes changes; 1 where
+     * it is null. Since version 1.1. */
+    /* May be null. */
+    uint32_t (*revision)(void);
 } LacunaComponentFunctions;
 
 /* A sum of squares `|R (psi(x), 1)|^2` as a function of the point. */
@@ -189,6 +193,13 @@ typedef struct LacunaKnown {
     const LacunaCommonErrorView *common;
     /* How many there are. */
     size_t common_count;
+    /* The standard deviation of the noise of each value, where the data state it: `replicates x outputs`, a row of
+     * NaN for a replicate that states none, zero where nothing was measured; no rows where no replicate states any.
+     * Since version 1.1. */
+    LacunaNumbers sd;
+    /* The covariance of the noise of one complete measurement, `outputs x outputs`, where the data state it; no
+     * rows where they do not. Since version 1.1. */
+    LacunaNumbers covariance;
 } LacunaKnown;
 
 /* A likelihood as a function of the basis functions of a linear emulator. */
@@ -274,6 +285,16 @@ typedef struct LacunaDiscrepancyFunctions {
      * values are not independent. `ABSENT` where the noise is unknown. */
     /* May be null. */
     int32_t (*stated_noise)(void *plugin, LacunaText layout, LacunaNumbers response, const LacunaAnswer *answer);
+    /* The likelihood of a part of the known data, some of whose values are missing, under the law that stands for
+     * all of them: what is estimated from the replicates is estimated from all. Of `part` only the data count.
+     * Hyperparameters keep their names; one that belongs to missing values alone may be gone. `ABSENT` where there
+     * is no such form. Since version 1.1. */
+    /* May be null. */
+    int32_t (*likelihood_of_part)(void *plugin, const LacunaKnown *known, const LacunaKnown *part, LacunaLikelihood *out, const LacunaAnswer *answer);
+    /* Writes 1 where the likelihood uses the noise that the data state (`sd` and `covariance` of what is known), 0
+     * where not; where it does not, or is null, such data are refused. Since version 1.1. */
+    /* May be null. */
+    int32_t (*takes_stated_noise)(void *plugin, uint8_t *takes, const LacunaAnswer *answer);
 } LacunaDiscrepancyFunctions;
 
 /* What can be asked of a log density. */
@@ -366,6 +387,24 @@ typedef struct LacunaSamplerFunctions {
     /* Answers what is worth telling of the method, a JSON list of `{"name", "value"}`. */
     /* May be null. */
     int32_t (*facts)(void *plugin, const LacunaAnswer *answer);
+    /* Writes 1 where the chains begin at the starting points that they are given, as they do where it is null; 0
+     * for a method that draws its own from the prior. Since version 1.1. */
+    /* May be null. */
+    int32_t (*uses_starts)(void *plugin, uint8_t *uses, const LacunaAnswer *answer);
+    /* Answers where the chains start when the study does not say: `map` (about the maximum of the posterior
+     * density, as where it is null), `prior` or `sobol`. Since version 1.1. */
+    /* May be null. */
+    int32_t (*start_where)(void *plugin, const LacunaAnswer *answer);
+    /* Writes 1 where the points of each step are draws, so that a run may end after any number of steps past the
+     * warm-up; 0, or null, where they are not. Since version 1.1. */
+    /* May be null. */
+    int32_t (*steps_are_draws)(void *plugin, uint8_t *draws, const LacunaAnswer *answer);
+    /* Answers what there is to tell of the last step of each chain beside its point: a JSON list of `{"name",
+     * "kind"}` with the kind `flag` (0 or 1), `count` or `number`, and a matrix `statistics x chains`, NaN before
+     * the first step. The same statistics in the same order of every state; `ABSENT` where there are none. Since
+     * version 1.1. */
+    /* May be null. */
+    int32_t (*statistics)(void *plugin, const LacunaState *state, const LacunaAnswer *answer);
 } LacunaSamplerFunctions;
 
 /* Places points in the unit cube. */
@@ -377,6 +416,11 @@ typedef struct LacunaDesignFunctions {
     /* Points for these parameters, a JSON list: for a design whose points depend on the laws that will map them. */
     /* May be null. */
     int32_t (*place)(void *plugin, LacunaText parameters, size_t count, size_t dimension, LacunaKey key, double *points, const LacunaAnswer *answer);
+    /* `count` further points beside those of `known` (one a row), which this design placed and which stay where
+     * they are; the key is the one that placed them. `STOP` with the reason, or `ABSENT`, where it cannot go on.
+     * Since version 1.1. */
+    /* May be null. */
+    int32_t (*extend)(void *plugin, LacunaText parameters, LacunaNumbers known, size_t count, LacunaKey key, double *points, const LacunaAnswer *answer);
 } LacunaDesignFunctions;
 
 /* Evaluations that are asked of a model, which differ in their inputs and folders only. */
@@ -422,6 +466,11 @@ typedef struct LacunaModelFunctions {
      * derivatives is the question. */
     /* May be null. */
     int32_t (*jacobian)(void *plugin, const LacunaCalls *calls, double *jacobian, const LacunaAnswer *answer);
+    /* The response of one call, as `predict` gives it, and its derivatives, as `jacobian` gives them, from one run;
+     * `ABSENT` where that costs no less than asking for each. `valid` and the text are as those of `predict` for
+     * this call. Since version 1.1. */
+    /* May be null. */
+    int32_t (*with_response)(void *plugin, const LacunaCalls *calls, double *response, double *jacobian, uint8_t *valid, const LacunaAnswer *answer);
 } LacunaModelFunctions;
 
 /* One candidate piece of missing physics on the model's response. Its first parameter is its size. `layout` is the
@@ -473,7 +522,11 @@ typedef struct LacunaReaderFunctions {
     /* May be null. */
     int32_t (*ensemble)(void *plugin, LacunaText source, const LacunaAnswer *answer);
     /* Answers measurements: a matrix `replicates x outputs` with NaN where nothing was measured, and the JSON list
-     * of the replicates' names. `source` is `{"directory", "scenario", "layout"}`. */
+     * of the replicates' names. `source` is `{"directory", "scenario", "layout"}`. Where the data state their
+     * noise, the JSON is `{"replicates": ["…"], "sd": true, "covariance": true}` in the place of the list: with
+     * `sd` a matrix of standard deviations follows (`replicates x outputs`, a row of NaN for a replicate that
+     * states none, zero where nothing was measured), with `covariance` that of one complete measurement (`outputs x
+     * outputs`). */
     /* May be null. */
     int32_t (*measurements)(void *plugin, LacunaText source, const LacunaAnswer *answer);
     /* Answers the numbers of an axis at which a scenario was measured: one row. `source` is `{"directory",
@@ -483,6 +536,9 @@ typedef struct LacunaReaderFunctions {
     /* One response from one file. */
     /* May be null. */
     int32_t (*response)(void *plugin, LacunaText path, LacunaText layout, size_t outputs, double *values, const LacunaAnswer *answer);
+    /* How many of so many simulation runs may fail; `ABSENT` where the options do not say it. Since version 1.1. */
+    /* May be null. */
+    int32_t (*allowed_failures)(void *plugin, size_t runs, size_t *allowed, const LacunaAnswer *answer);
 } LacunaReaderFunctions;
 
 /* How far a fit came. */
@@ -545,6 +601,11 @@ typedef struct LacunaEmulatorFunctions {
     /* Answers what is worth telling, a JSON list of `{"name", "value"}`. */
     /* May be null. */
     int32_t (*facts)(void *emulator, const LacunaAnswer *answer);
+    /* The means at one point, and the derivatives of each output (rows) by `count` parameters (columns), given by
+     * their numbers from zero; by all, in order, where `parameters` is null. What `mean` and `jacobian` answer,
+     * where that costs less together. Since version 1.1. */
+    /* May be null. */
+    int32_t (*mean_and_jacobian)(void *emulator, LacunaNumbers point, const size_t *parameters, size_t count, double *mean, double *jacobian, const LacunaAnswer *answer);
 } LacunaEmulatorFunctions;
 
 /* A fitted surrogate. */
@@ -561,6 +622,14 @@ typedef struct LacunaEmulator {
     size_t outputs;
 } LacunaEmulator;
 
+/* A part of a sum of emulators. */
+typedef struct LacunaSummand {
+    /* What `save` of an emulator answered. */
+    LacunaText bytes;
+    /* One weight an output. */
+    LacunaNumbers weights;
+} LacunaSummand;
+
 /* Fits emulators to simulation runs. */
 typedef struct LacunaSurrogateFunctions {
     /* The size of this table in bytes. */
@@ -569,6 +638,11 @@ typedef struct LacunaSurrogateFunctions {
     int32_t (*fit)(void *plugin, const LacunaTraining *training, LacunaKey key, const LacunaProgress *progress, LacunaEmulator *out, const LacunaAnswer *answer);
     /* An emulator from what `save` answered. */
     int32_t (*load)(void *plugin, LacunaText bytes, LacunaEmulator *out, const LacunaAnswer *answer);
+    /* The sum of `count` emulators that this surrogate fitted, each output of each times its weight, plus an offset
+     * for each output (one row), as one emulator of the same form: it is asked for the response and its sensitivity
+     * only. `ABSENT` where the method has no such form, or these emulators do not go together. Since version 1.1. */
+    /* May be null. */
+    int32_t (*sum)(void *plugin, const LacunaSummand *parts, size_t count, LacunaNumbers offset, LacunaEmulator *out, const LacunaAnswer *answer);
 } LacunaSurrogateFunctions;
 
 /* The program that loads a library. */
@@ -626,7 +700,7 @@ typedef struct LacunaDeclaration {
     int32_t (*start)(const LacunaHost *host);
 } LacunaDeclaration;
 
-#define LACUNA_RECORD_BEGIN "lacuna-plugin-record:1.0\n"
+#define LACUNA_RECORD_BEGIN "lacuna-plugin-record:1.1\n"
 
 /* A text from a string literal. */
 #define LACUNA_TEXT(literal) { (const uint8_t *)(literal), sizeof(literal) - 1 }

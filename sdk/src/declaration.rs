@@ -8,8 +8,11 @@ pub use lacuna::plugin::abi::table::{Declaration, Entry};
 /// With what a library was made.
 const SDK: &str = concat!("lacuna-plugin ", env!("CARGO_PKG_VERSION"));
 
-/// One plugin of a library.
-pub const fn entry<K: Export<T> + ?Sized, T>(kind: &'static str, name: &'static str) -> Entry {
+/// One plugin of a library, with its revision.
+pub const fn entry<K: Export<T, REVISION> + ?Sized, T, const REVISION: u32>(
+    kind: &'static str,
+    name: &'static str,
+) -> Entry {
     Entry {
         size: size_of::<Entry>(),
         kind: Text::of(kind),

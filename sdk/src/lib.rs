@@ -21,10 +21,11 @@ pub mod declaration;
 
 /// Exports plugins from a library: for each its kind, its name in a study and its options, which implement the kind.
 ///
-/// It may stand once in a library. The kinds are those that [`kind_name!`](crate::kind_name) knows.
+/// It may stand once in a library. The kinds are those that [`kind_name!`](crate::kind_name) knows. A plugin whose results
+/// change gets a higher revision, which is 1 when left out: `Sampler "difference_walk" DifferenceWalk as revision 2`.
 #[macro_export]
 macro_rules! export {
-    ($($kind:ident $name:literal $options:ty),+ $(,)?) => {
+    ($($kind:ident $name:literal $options:ty $(as revision $revision:literal)?),+ $(,)?) => {
         #[doc(hidden)]
         #[allow(unsafe_code, reason = "the one symbol that the program looks for")]
         const _: () = {
@@ -34,9 +35,9 @@ macro_rules! export {
                 "end\n"
             );
             static ENTRIES: &[$crate::declaration::Entry] = &[
-                $($crate::declaration::entry::<dyn $crate::plugin::$kind, $options>(
-                    $crate::kind_name!($kind), $name,
-                )),+
+                $($crate::declaration::entry::<
+                    dyn $crate::plugin::$kind, $options, { $crate::revision!($($revision)?) },
+                >($crate::kind_name!($kind), $name)),+
             ];
             #[used]
             #[unsafe(no_mangle)]
@@ -52,8 +53,21 @@ macro_rules! export {
 #[macro_export]
 macro_rules! abi_version {
     () => {
-        "1.0"
+        "1.1"
     };
+}
+
+/// A revision as a library gives it.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! revision {
+    () => {
+        1
+    };
+    ($revision:literal) => {{
+        assert!($revision > 0, "a revision is a number from 1");
+        $revision
+    }};
 }
 
 /// What a study calls the kind of a trait.

@@ -240,18 +240,63 @@ static int32_t likelihood(void *plugin, const LacunaKnown *known, LacunaLikeliho
     return LACUNA_OK;
 }
 
+static int32_t likelihood_of_part(void *plugin, const LacunaKnown *known, const LacunaKnown *part, LacunaLikelihood *out,
+                                  const LacunaAnswer *answer)
+{
+    (void)part;
+#if defined(PART_STOPS)
+    return say(answer, LACUNA_STOP, "no part is whole");
+#elif defined(PART_ABSENT)
+    return LACUNA_ABSENT;
+#elif defined(PART_MAKES_NOTHING)
+    return LACUNA_OK;
+#endif
+    return likelihood(plugin, known, out, answer);
+}
+
+static int32_t takes_stated_noise(void *plugin, uint8_t *takes, const LacunaAnswer *answer)
+{
+    (void)plugin;
+#if defined(TAKES_STOPS)
+    return say(answer, LACUNA_STOP, "who knows");
+#elif defined(ODD_TAKES)
+    *takes = 7;
+#elif !defined(NO_TAKES)
+    *takes = 1;
+#endif
+    (void)takes;
+    (void)answer;
+    return LACUNA_OK;
+}
+
+static uint32_t revision(void)
+{
+#if defined(NO_REVISION)
+    return 0;
+#else
+    return 5;
+#endif
+}
+
 static const LacunaComponentFunctions component = {
-    sizeof(LacunaComponentFunctions), schema, create, destroy, NULL, NULL, NULL
+#ifdef FIRST_VERSION
+    .size = offsetof(LacunaComponentFunctions, revision),
+#else
+    .size = sizeof(LacunaComponentFunctions),
+#endif
+    .schema = schema, .create = create, .destroy = destroy, .revision = revision
 };
 
 static const LacunaDiscrepancyFunctions discrepancy = {
-    sizeof(LacunaDiscrepancyFunctions),
-#ifdef NO_FUNCTION
-    NULL,
+#ifdef FIRST_VERSION
+    .size = offsetof(LacunaDiscrepancyFunctions, likelihood_of_part),
 #else
-    likelihood,
+    .size = sizeof(LacunaDiscrepancyFunctions),
 #endif
-    NULL
+#ifndef NO_FUNCTION
+    .likelihood = likelihood,
+#endif
+    .likelihood_of_part = likelihood_of_part, .takes_stated_noise = takes_stated_noise
 };
 
 #ifdef WRONG_KIND
@@ -297,8 +342,10 @@ static int32_t start(const LacunaHost *host)
 #define MAJOR LACUNA_MAJOR
 #endif
 
-#ifdef NEWER_MINOR
+#if defined(NEWER_MINOR)
 #define MINOR 99u
+#elif defined(FIRST_VERSION)
+#define MINOR 0u
 #else
 #define MINOR LACUNA_MINOR
 #endif

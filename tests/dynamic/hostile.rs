@@ -61,7 +61,7 @@ fn a_library_that_cannot_be_used_says_why() {
         (
             "wrong_major",
             "WRONG_MAJOR",
-            "it is made for version 9.0 of the boundary, and this program speaks 1.0",
+            "it is made for version 9.1 of the boundary, and this program speaks 1.1",
         ),
         ("newer_minor", "NEWER_MINOR", "it is made for version 1.99 of the boundary"),
         ("aborts", "ABORTS", "it is built with `panic = \"abort\"`"),
@@ -87,6 +87,11 @@ fn a_library_that_cannot_be_used_says_why() {
             "that is none: `schema` answers JSON that cannot be read: recursion limit",
         ),
         ("no_start", "DOES_NOT_START", "it does not start: status 3"),
+        (
+            "no_revision",
+            "NO_REVISION",
+            "its discrepancy `no_revision` has the revision 0, expected a number from 1",
+        ),
     ] {
         let said = refused(name, &[define]);
         assert!(said.contains(expected), "{name}: {said}");
@@ -106,7 +111,7 @@ fn a_file_that_is_no_library_says_so() {
 }
 
 /// Ten outputs, five replicates.
-fn data() -> Measurements {
+pub fn data() -> Measurements {
     let axes = vec![Axis::grid("time", (0..10).map(f64::from).collect(), Unit::dimensionless())];
     let layout = Layout { name: "y".to_owned(), unit: Unit::dimensionless(), axes };
     let replicate = |r: usize| {
@@ -119,13 +124,13 @@ fn data() -> Measurements {
 }
 
 /// A discrepancy that misbehaves in one way.
-fn misbehaving(name: &str, define: &str) -> Built<dyn Discrepancy> {
+pub fn misbehaving(name: &str, define: &str) -> Built<dyn Discrepancy> {
     let folder = tempfile::tempdir().unwrap();
     library::load(&broken(folder.path(), name, &[define]), None).unwrap_or_else(|e| panic!("{e}"));
     registry::from_text::<dyn Discrepancy>(name, "").unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn likelihood(built: &Built<dyn Discrepancy>) -> Result<Box<dyn Likelihood>, String> {
+pub fn likelihood(built: &Built<dyn Discrepancy>) -> Result<Box<dyn Likelihood>, String> {
     built.plugin.likelihood(&Known::without_slopes(&data(), &[])).map_err(|stop| stop.to_string())
 }
 
@@ -278,7 +283,7 @@ fn a_study_says_at_which_line_a_library_is_broken() {
         "[plugins]\nload = [\"libold.so\", \"libnone.so\"]\n\n[study]",
     );
     let complaints = load_for(&study, &[], Use::Run).complaints();
-    let old = "the library of plugins libold.so cannot be used: it is made for version 9.0 of the boundary";
+    let old = "the library of plugins libold.so cannot be used: it is made for version 9.1 of the boundary";
     assert!(complaints.contains(old), "{complaints}");
     let none = "the library of plugins libnone.so cannot be used: no such file or directory";
     assert!(complaints.contains(none), "{complaints}");
@@ -346,8 +351,8 @@ fn the_header_serves_another_language() {
                 static void destroy(void *) {}\n\
                 static int32_t points(void *, size_t count, size_t dimension, LacunaKey, double *to, const LacunaAnswer *)\n\
                 { for (size_t i = 0; i < count * dimension; ++i) to[i] = 0.5; return LACUNA_OK; }\n\
-                static const LacunaComponentFunctions component = { sizeof component, schema, create, destroy, 0, 0, 0 };\n\
-                static const LacunaDesignFunctions design = { sizeof design, points, 0 };\n\
+                static const LacunaComponentFunctions component = { sizeof component, schema, create, destroy, 0, 0, 0, 0 };\n\
+                static const LacunaDesignFunctions design = { sizeof design, points, 0, 0 };\n\
                 static const LacunaEntry entries[] = { LACUNA_ENTRY(\"design\", \"middle\", component, design) };\n\
                 LACUNA_DECLARE(\"middle\", \"1\", LACUNA_PROVIDES(\"design\", \"middle\"), entries);\n";
     std::fs::write(&source, text).unwrap();
@@ -370,4 +375,10 @@ fn the_header_serves_another_language() {
     let built = registry::from_text::<dyn lacuna::plugin::Design>("middle", "").unwrap();
     let points = built.plugin.points(3, 2, &lacuna::math::random::Stream::root(1)).unwrap();
     assert_eq!(points.as_slice(), [0.5; 6]);
+    // What it leaves out is as a plugin in the tree leaves it out.
+    assert_eq!(built.revision, 1);
+    let stop = built.plugin.extend(&[], &points, 2, &lacuna::math::random::Stream::root(1));
+    let stop = stop.unwrap_err();
+    assert_eq!(stop.message, "this design cannot be extended without moving its points");
+    assert!(stop.help.unwrap().contains("a greater number of `runs`"));
 }

@@ -6,6 +6,7 @@ use lacuna::math::random::Stream;
 use lacuna::plugin::discrepancy::Known;
 use lacuna::plugin::registry::{self, Built};
 use lacuna::plugin::{Discrepancy, Likelihood, Sampler, Target};
+use lacuna::study::file::Start;
 
 use super::twin;
 
@@ -54,6 +55,19 @@ fn a_panic_of_a_discrepancy_is_an_error_or_a_fault() {
             format!("discrepancy `panicking` of {}: `{call}` panicked: as I was told", library())
         );
     }
+    let built = panicking("takes_stated_noise");
+    assert!(!built.plugin.takes_stated_noise());
+    let said = format!(
+        "discrepancy `panicking` of {}: `takes_stated_noise` panicked: as I was told",
+        library()
+    );
+    assert_eq!(built.plugin.faults()[0].said(), Some(&*said));
+    let data = Measurements::new(Layout::number("y"), Vec::new());
+    let known = Known::without_slopes(&data, &[]);
+    let of_part = |call| panicking(call).plugin.likelihood_of_part(&known, &data);
+    let said = of_part("likelihood_of_part").map(|_| ()).unwrap_err().message;
+    assert!(said.ends_with("`likelihood_of_part` panicked: as I was told"), "{said}");
+    assert!(of_part("").unwrap().is_none());
     // Even where nothing can be said.
     drop(likelihood(&panicking("drop")).unwrap());
     // And the next one is sound.
@@ -87,6 +101,9 @@ impl Target for Brittle {
     }
 }
 
+/// One thing that is asked of a sampler.
+type AskSampler<'a> = &'a dyn Fn(&dyn Sampler);
+
 #[test]
 fn a_panic_of_a_sampler_or_of_its_density_is_an_error() {
     twin();
@@ -112,6 +129,21 @@ fn a_panic_of_a_sampler_or_of_its_density_is_an_error() {
         planned.faults()[0].said(),
         Some(&*format!("{who}: `plan` panicked: as I was told"))
     );
+    for (call, ask) in [
+        ("uses_starts", &(|s: &dyn Sampler| assert!(s.uses_starts())) as AskSampler<'_>),
+        ("start_where", &|s: &dyn Sampler| assert_eq!(s.start_where(), Start::Map)),
+        ("steps_are_draws", &|s: &dyn Sampler| assert!(!s.steps_are_draws())),
+        ("statistics", &|s: &dyn Sampler| assert_eq!(s.statistics(&before), [])),
+    ] {
+        let sampler = of(call);
+        ask(&*sampler);
+        let said = format!("{who}: `{call}` panicked: as I was told");
+        assert_eq!(sampler.faults()[0].said(), Some(&*said));
+    }
+    let sound = of("");
+    assert!(!sound.uses_starts() && sound.steps_are_draws());
+    assert_eq!((sound.start_where(), sound.statistics(&before)), (Start::Prior, Vec::new()));
+    assert_eq!(sound.faults()[0].said(), None);
     // A panic of the program, asked by the library, crosses twice and ends as an error.
     let begun = of("").start(&Brittle, points(-1.0)).unwrap_err();
     assert_eq!(begun.message, format!("{who}: the program: below zero"));

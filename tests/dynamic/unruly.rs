@@ -15,7 +15,7 @@ use tempfile::TempDir;
 use super::hostile::misguided;
 
 /// A plugin that misbehaves in one way, and the folder of its library.
-fn misbehaving<K: Kind + ?Sized>(name: &str, define: &str) -> (Box<K>, TempDir) {
+pub fn misbehaving<K: Kind + ?Sized>(name: &str, define: &str) -> (Box<K>, TempDir) {
     let folder = tempfile::tempdir().unwrap();
     let library = misguided(folder.path(), "unruly.c", name, &[define]);
     library::load(&library, None).unwrap_or_else(|e| panic!("{e}"));
@@ -60,7 +60,7 @@ fn an_answer_of_a_model_is_checked() {
 }
 
 /// A flat density.
-struct Flat;
+pub struct Flat;
 
 impl Target for Flat {
     fn dimension(&self) -> usize {
@@ -115,7 +115,7 @@ fn a_plan_of_a_sampler_is_checked() {
     }
 }
 
-fn fitted(surrogate: &dyn Surrogate) -> Result<Box<dyn Emulator>, String> {
+pub fn fitted(surrogate: &dyn Surrogate) -> Result<Box<dyn Emulator>, String> {
     let parameters = [Parameter::plain("a", Distribution::Uniform([0.0, 1.0]))];
     let layouts = Layouts::from(Layout::number("y"));
     let (points, responses) = (Matrix::zeros(6, 1), Matrix::zeros(6, 1));

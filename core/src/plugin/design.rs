@@ -31,7 +31,12 @@ pub trait Design: Component {
         _count: usize,
         _stream: &Stream,
     ) -> Result<Matrix, Stop> {
-        Err(Stop::new("this design cannot be extended without moving its points")
-            .help("take another design for further runs, or a greater number of `runs`"))
+        Err(fixed_points())
     }
+}
+
+/// That a design cannot go on beside the points that it placed.
+pub(super) fn fixed_points() -> Stop {
+    Stop::new("this design cannot be extended without moving its points")
+        .help("take another design for further runs, or a greater number of `runs`")
 }

@@ -1,7 +1,8 @@
 //! Built-in plugins once more, under other names, in a library that is loaded: they must give the same bits. Beside them
-//! plugins that panic.
+//! plugins that panic, and one that leaves out what it may.
 
 mod panicking;
+mod rigid;
 
 use lacuna_plugins::designs::latin_hypercube::LatinHypercube;
 use lacuna_plugins::designs::quadrature::Quadrature;
@@ -21,10 +22,12 @@ use lacuna_plugins::samplers::no_u_turn::NoUTurn;
 use lacuna_plugins::surrogates::gaussian_process::GaussianProcess as Kriging;
 use lacuna_plugins::surrogates::polynomial_chaos::PolynomialChaos;
 use panicking::Panicking;
+use rigid::Rigid;
 
 lacuna_plugin::export! {
     Design "twin_latin_hypercube" LatinHypercube,
     Design "twin_quadrature" Quadrature,
+    Design "rigid" Rigid as revision 3,
     Discrepancy "twin_autoregressive" Autoregressive,
     Discrepancy "twin_gaussian" Gaussian,
     Discrepancy "twin_gaussian_process" GaussianProcess,

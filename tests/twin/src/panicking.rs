@@ -1,6 +1,6 @@
 //! Plugins that panic, each in the call that its option names.
 
-use lacuna_plugin::data::Measurements;
+use lacuna_plugin::data::{Measurements, Statistic};
 use lacuna_plugin::linalg::Matrix;
 use lacuna_plugin::math::distribution::Distribution;
 use lacuna_plugin::math::random::Stream;
@@ -9,6 +9,7 @@ use lacuna_plugin::plugin::sampler::{Plan, Sampler, State, Target};
 use lacuna_plugin::plugin::{Component, Context, Hyperparameter};
 use lacuna_plugin::run::Stop;
 use lacuna_plugin::study::Complaints;
+use lacuna_plugin::study::file::Start;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -44,6 +45,20 @@ impl Discrepancy for Panicking {
             start: 1.0,
         };
         Ok(Box::new(Panics { own: self.clone(), hyper: [hyper], data: known.data.clone() }))
+    }
+
+    fn likelihood_of_part(
+        &self,
+        _: &Known<'_>,
+        _: &Measurements,
+    ) -> Result<Option<Box<dyn Likelihood>>, Stop> {
+        self.at("likelihood_of_part");
+        Ok(None)
+    }
+
+    fn takes_stated_noise(&self) -> bool {
+        self.at("takes_stated_noise");
+        true
     }
 }
 
@@ -89,6 +104,26 @@ impl Sampler for Panicking {
     fn plan(&self, _: usize) -> Plan {
         self.at("plan");
         Plan { chains: 2, steps: 5, warm_up: 0, ensemble: false }
+    }
+
+    fn uses_starts(&self) -> bool {
+        self.at("uses_starts");
+        false
+    }
+
+    fn start_where(&self) -> Start {
+        self.at("start_where");
+        Start::Prior
+    }
+
+    fn steps_are_draws(&self) -> bool {
+        self.at("steps_are_draws");
+        true
+    }
+
+    fn statistics(&self, _: &State) -> Vec<Statistic> {
+        self.at("statistics");
+        Vec::new()
     }
 
     fn start(&self, target: &dyn Target, points: Matrix) -> Result<State, Stop> {

@@ -83,6 +83,11 @@ impl Discrepancy for Absent {
     fn likelihood(&self, _: &Known<'_>) -> Result<Box<dyn Likelihood>, Stop> {
         Err(stop())
     }
+
+    /// Whether it does is not known, so that data that state their noise are right.
+    fn takes_stated_noise(&self) -> bool {
+        true
+    }
 }
 
 impl Sampler for Absent {

@@ -109,6 +109,19 @@ pub unsafe fn fill(to: *mut f64, count: usize, from: &[f64]) -> Result<(), Refus
     Ok(())
 }
 
+/// Runs a body that says yes or no, and writes it as a mark.
+///
+/// # Safety
+/// `to` leads to a place for one mark that nobody else uses.
+pub unsafe fn mark(to: *mut u8, answer: *const Answer, body: impl FnOnce() -> bool) -> i32 {
+    guard(answer, |_| {
+        let mark = u8::from(body());
+        // SAFETY: as the caller promises.
+        unsafe { *to = mark };
+        Ok(())
+    })
+}
+
 /// Makes an object for the other side, which ends it with [`end`].
 pub fn begin<T>(object: T) -> *mut c_void {
     Box::into_raw(Box::new(object)).cast()

@@ -1,7 +1,7 @@
 //! What a library says of itself in plain text, so that it can be looked at without being loaded.
 //!
 //! ```text
-//! lacuna-plugin-record:1.0
+//! lacuna-plugin-record:1.1
 //! discrepancy=matern
 //! end
 //! ```

@@ -20,8 +20,9 @@ pub trait Authored: Component + Serialize + DeserializeOwned + JsonSchema + 'sta
 
 impl<T: Component + Serialize + DeserializeOwned + JsonSchema + 'static> Authored for T {}
 
-/// A kind of plugin that a library can offer; implemented by the trait object of the kind, as by `dyn Sampler`.
-pub trait Export<T> {
+/// A kind of plugin that a library can offer, with the plugin's revision; implemented by the trait object of the kind,
+/// as by `dyn Sampler`.
+pub trait Export<T, const REVISION: u32> {
     /// The table of the kind's functions.
     const FUNCTIONS: *const c_void;
     /// The table of what all kinds do.
@@ -29,9 +30,9 @@ pub trait Export<T> {
 }
 
 /// The functions of a component.
-pub(super) struct Components<T>(std::marker::PhantomData<T>);
+pub(super) struct Components<T, const REVISION: u32>(std::marker::PhantomData<T>);
 
-impl<T: Authored> Components<T> {
+impl<T: Authored, const REVISION: u32> Components<T, REVISION> {
     pub(super) const FUNCTIONS: &'static ComponentFunctions = &ComponentFunctions {
         size: size_of::<ComponentFunctions>(),
         schema: Some(schema::<T>),
@@ -40,7 +41,12 @@ impl<T: Authored> Components<T> {
         options: Some(options::<T>),
         check: Some(check::<T>),
         environment: Some(environment::<T>),
+        revision: Some(revision::<REVISION>),
     };
+}
+
+unsafe extern "C" fn revision<const REVISION: u32>() -> u32 {
+    REVISION
 }
 
 unsafe extern "C" fn schema<T: Authored>(answer: *const Answer) -> i32 {

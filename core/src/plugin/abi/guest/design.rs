@@ -7,11 +7,11 @@ use crate::data::Parameter;
 use crate::math::random::Stream;
 use crate::plugin::Design;
 use crate::plugin::abi::guard::{fill, guard, object};
-use crate::plugin::abi::table::{Answer, ComponentFunctions, DesignFunctions, Key, Text};
+use crate::plugin::abi::table::{Answer, ComponentFunctions, DesignFunctions, Key, Numbers, Text};
 
-impl<T: Design + Authored> Export<T> for dyn Design {
+impl<T: Design + Authored, const REVISION: u32> Export<T, REVISION> for dyn Design {
     const FUNCTIONS: *const c_void = std::ptr::from_ref(Functions::<T>::TABLE).cast();
-    const COMPONENT: *const ComponentFunctions = Components::<T>::FUNCTIONS;
+    const COMPONENT: *const ComponentFunctions = Components::<T, REVISION>::FUNCTIONS;
 }
 
 struct Functions<T>(std::marker::PhantomData<T>);
@@ -21,6 +21,7 @@ impl<T: Design + Authored> Functions<T> {
         size: size_of::<DesignFunctions>(),
         points: Some(points::<T>),
         place: Some(place::<T>),
+        extend: Some(extend::<T>),
     };
 }
 
@@ -57,5 +58,25 @@ unsafe extern "C" fn place<T: Design + Authored>(
         let points = plugin.place(&parameters, count, &Stream::from_key(key.words))?;
         // SAFETY: the buffer holds `count x dimension` numbers.
         unsafe { fill(to, count * dimension, points.as_slice()) }
+    })
+}
+
+unsafe extern "C" fn extend<T: Design + Authored>(
+    plugin: *mut c_void,
+    parameters: Text,
+    known: Numbers,
+    count: usize,
+    key: Key,
+    to: *mut f64,
+    answer: *const Answer,
+) -> i32 {
+    guard(answer, |_| {
+        // SAFETY: as in `place`; the known points are there for the time of the call.
+        let (plugin, parameters, known) =
+            unsafe { (object::<T>(plugin), parameters.bytes(), known.matrix()?) };
+        let parameters: Vec<Parameter> = serde_json::from_slice(parameters)?;
+        let points = plugin.extend(&parameters, &known, count, &Stream::from_key(key.words))?;
+        // SAFETY: the buffer holds `count x parameters` numbers.
+        unsafe { fill(to, count * parameters.len(), points.as_slice()) }
     })
 }

@@ -11,9 +11,9 @@ use crate::plugin::abi::table::{Answer, ComponentFunctions, EffectFunctions, Num
 use crate::plugin::abi::wire::{EffectAbout, OwnedSituation, json_of_table};
 use crate::plugin::abi::{Memo, Refusal};
 
-impl<T: Effect + Authored> Export<T> for dyn Effect {
+impl<T: Effect + Authored, const REVISION: u32> Export<T, REVISION> for dyn Effect {
     const FUNCTIONS: *const c_void = std::ptr::from_ref(Functions::<T>::TABLE).cast();
-    const COMPONENT: *const ComponentFunctions = Components::<T>::FUNCTIONS;
+    const COMPONENT: *const ComponentFunctions = Components::<T, REVISION>::FUNCTIONS;
 }
 
 struct Functions<T>(std::marker::PhantomData<T>);

@@ -16,9 +16,9 @@ use crate::plugin::abi::wire::{CallSaid, CallsAbout, OwnedContext, ResponseAbout
 use crate::plugin::model::{Call, EvalError, Response};
 use crate::plugin::{Context, Model};
 
-impl<T: Model + Authored> Export<T> for dyn Model {
+impl<T: Model + Authored, const REVISION: u32> Export<T, REVISION> for dyn Model {
     const FUNCTIONS: *const c_void = std::ptr::from_ref(Functions::<T>::TABLE).cast();
-    const COMPONENT: *const ComponentFunctions = Components::<T>::FUNCTIONS;
+    const COMPONENT: *const ComponentFunctions = Components::<T, REVISION>::FUNCTIONS;
 }
 
 struct Functions<T>(std::marker::PhantomData<T>);
@@ -33,6 +33,7 @@ impl<T: Model + Authored> Functions<T> {
         files: Some(files::<T>),
         write: Some(write::<T>),
         jacobian: Some(jacobian::<T>),
+        with_response: Some(with_response::<T>),
     };
 }
 
@@ -180,6 +181,34 @@ unsafe extern "C" fn jacobian<T: Model + Authored>(
         let slopes = gradient.jacobian(&call)?;
         // SAFETY: the buffer holds `outputs x inputs` numbers.
         unsafe { fill(to, count, slopes.as_slice()) }
+    })
+}
+
+unsafe extern "C" fn with_response<T: Model + Authored>(
+    plugin: *mut c_void,
+    calls: *const Calls,
+    response: *mut f64,
+    to: *mut f64,
+    valid: *mut u8,
+    answer: *const Answer,
+) -> i32 {
+    guard(answer, |out| {
+        // SAFETY: as in `predict`.
+        let (plugin, calls) = unsafe { (object::<T>(plugin), OwnedCalls::read(&*calls)?) };
+        let outputs = calls.about.layout.len();
+        let gradient = plugin.gradient().ok_or_else(Refusal::absent)?;
+        let call = calls.calls().into_iter().next().ok_or_else(Refusal::absent)?;
+        let (made, slopes) = gradient.with_response(&call).ok_or_else(Refusal::absent)??;
+        // SAFETY: the buffers hold `outputs` and `outputs x inputs` numbers and one mark.
+        unsafe {
+            fill(response, outputs, &made.values)?;
+            fill(to, outputs * calls.inputs.columns(), slopes.as_slice())?;
+            *valid = u8::from(made.valid);
+        }
+        if made.facts.is_empty() {
+            return Ok(());
+        }
+        out.json(&[CallSaid { message: String::new(), facts: made.facts }])
     })
 }
 

@@ -9,11 +9,11 @@ use crate::plugin::Reader;
 use crate::plugin::abi::Refusal;
 use crate::plugin::abi::guard::{Out, fill, guard, guard_number, object};
 use crate::plugin::abi::table::{Answer, ComponentFunctions, ReaderFunctions, Text};
-use crate::plugin::abi::wire::{ContentsAbout, EnsembleAbout, OwnedSource};
+use crate::plugin::abi::wire::{ContentsAbout, EnsembleAbout, MeasuredAbout, OwnedSource};
 
-impl<T: Reader + Authored> Export<T> for dyn Reader {
+impl<T: Reader + Authored, const REVISION: u32> Export<T, REVISION> for dyn Reader {
     const FUNCTIONS: *const c_void = std::ptr::from_ref(Functions::<T>::TABLE).cast();
-    const COMPONENT: *const ComponentFunctions = Components::<T>::FUNCTIONS;
+    const COMPONENT: *const ComponentFunctions = Components::<T, REVISION>::FUNCTIONS;
 }
 
 struct Functions<T>(std::marker::PhantomData<T>);
@@ -29,6 +29,7 @@ impl<T: Reader + Authored> Functions<T> {
         measurements: Some(measurements::<T>),
         grid: Some(grid::<T>),
         response: Some(response::<T>),
+        allowed_failures: Some(allowed_failures::<T>),
     };
 }
 
@@ -128,7 +129,14 @@ unsafe extern "C" fn measurements<T: Reader + Authored>(
                 replicate.values.iter().map(|value| value.unwrap_or(f64::NAN)).collect::<Vec<f64>>()
             });
             out.numbers(&Matrix::from_rows(read.layout.len(), rows));
-            out.json(&read.replicates.iter().map(|replicate| &replicate.name).collect::<Vec<_>>())
+            let about = MeasuredAbout::of(&read);
+            if matches!(about, MeasuredAbout::Stated { sd: true, .. }) {
+                let none = || vec![f64::NAN; read.layout.len()];
+                let sd = read.replicates.iter().map(|r| r.sd.clone().unwrap_or_else(none));
+                out.numbers(&Matrix::from_rows(read.layout.len(), sd));
+            }
+            read.covariance.iter().for_each(|covariance| out.numbers(covariance));
+            out.json(&about)
         })
     }
 }
@@ -162,5 +170,21 @@ unsafe extern "C" fn response<T: Reader + Authored>(
         let response = plugin.response(Path::new(&path), &serde_json::from_slice(layout)?)?;
         // SAFETY: the buffer holds one number an output.
         unsafe { fill(values, outputs, &response) }
+    })
+}
+
+unsafe extern "C" fn allowed_failures<T: Reader + Authored>(
+    plugin: *mut c_void,
+    runs: usize,
+    allowed: *mut usize,
+    answer: *const Answer,
+) -> i32 {
+    guard(answer, |_| {
+        // SAFETY: the plugin that `create` made.
+        let plugin = unsafe { object::<T>(plugin) };
+        let count = plugin.allowed_failures(runs).ok_or_else(Refusal::absent)?;
+        // SAFETY: the caller gives a place for one number.
+        unsafe { *allowed = count };
+        Ok(())
     })
 }

@@ -9,16 +9,16 @@ use super::target::TargetView;
 use crate::linalg::Matrix;
 use crate::math::random::Stream;
 use crate::plugin::abi::Refusal;
-use crate::plugin::abi::guard::{Out, fill, guard, guard_number, object};
+use crate::plugin::abi::guard::{Out, fill, guard, guard_number, mark, object};
 use crate::plugin::abi::table::{
     Answer, ComponentFunctions, Key, Plan, SamplerFunctions, State as Table, Target,
 };
-use crate::plugin::abi::wire::HarvestAbout;
+use crate::plugin::abi::wire::{HarvestAbout, StatisticAbout};
 use crate::plugin::sampler::{Sampler, State};
 
-impl<T: Sampler + Authored> Export<T> for dyn Sampler {
+impl<T: Sampler + Authored, const REVISION: u32> Export<T, REVISION> for dyn Sampler {
     const FUNCTIONS: *const c_void = std::ptr::from_ref(Functions::<T>::TABLE).cast();
-    const COMPONENT: *const ComponentFunctions = Components::<T>::FUNCTIONS;
+    const COMPONENT: *const ComponentFunctions = Components::<T, REVISION>::FUNCTIONS;
 }
 
 struct Functions<T>(std::marker::PhantomData<T>);
@@ -34,6 +34,10 @@ impl<T: Sampler + Authored> Functions<T> {
         doubts: Some(doubts::<T>),
         notes: Some(notes::<T>),
         facts: Some(facts::<T>),
+        uses_starts: Some(uses_starts::<T>),
+        start_where: Some(start_where::<T>),
+        steps_are_draws: Some(steps_are_draws::<T>),
+        statistics: Some(statistics::<T>),
     };
 }
 
@@ -219,4 +223,51 @@ unsafe extern "C" fn facts<T: Sampler + Authored>(
 ) -> i32 {
     // SAFETY: the plugin that `create` made.
     guard(answer, |out| out.json(&unsafe { object::<T>(plugin) }.facts()))
+}
+
+unsafe extern "C" fn uses_starts<T: Sampler + Authored>(
+    plugin: *mut c_void,
+    uses: *mut u8,
+    answer: *const Answer,
+) -> i32 {
+    // SAFETY: the plugin that `create` made, and a place for one mark.
+    unsafe { mark(uses, answer, || object::<T>(plugin).uses_starts()) }
+}
+
+unsafe extern "C" fn start_where<T: Sampler + Authored>(
+    plugin: *mut c_void,
+    answer: *const Answer,
+) -> i32 {
+    guard(answer, |out| {
+        // SAFETY: the plugin that `create` made.
+        let start = serde_json::to_value(unsafe { object::<T>(plugin) }.start_where())?;
+        out.text(start.as_str().unwrap_or_default());
+        Ok(())
+    })
+}
+
+unsafe extern "C" fn steps_are_draws<T: Sampler + Authored>(
+    plugin: *mut c_void,
+    draws: *mut u8,
+    answer: *const Answer,
+) -> i32 {
+    // SAFETY: as in `uses_starts`.
+    unsafe { mark(draws, answer, || object::<T>(plugin).steps_are_draws()) }
+}
+
+unsafe extern "C" fn statistics<T: Sampler + Authored>(
+    plugin: *mut c_void,
+    state: *const Table,
+    answer: *const Answer,
+) -> i32 {
+    guard(answer, |out| {
+        // SAFETY: as in `start`.
+        let (plugin, state) = unsafe { (object::<T>(plugin), read(&*state)?) };
+        let all = plugin.statistics(&state);
+        if all.is_empty() {
+            return Err(Refusal::absent());
+        }
+        out.numbers(&Matrix::from_rows(state.points.rows(), all.iter().map(|one| &one.values)));
+        out.json(&all.iter().map(StatisticAbout::from).collect::<Vec<_>>())
+    })
 }

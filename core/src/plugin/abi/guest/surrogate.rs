@@ -14,12 +14,12 @@ use crate::plugin::abi::table::{
 };
 use crate::plugin::abi::wire::TrainingAbout;
 use crate::plugin::forward;
-use crate::plugin::surrogate::{Emulator, Surrogate, Training};
+use crate::plugin::surrogate::{Emulator, Summand, Surrogate, Training};
 use crate::run::{Observer, Progress};
 
-impl<T: Surrogate + Authored> Export<T> for dyn Surrogate {
+impl<T: Surrogate + Authored, const REVISION: u32> Export<T, REVISION> for dyn Surrogate {
     const FUNCTIONS: *const c_void = std::ptr::from_ref(Functions::<T>::TABLE).cast();
-    const COMPONENT: *const ComponentFunctions = Components::<T>::FUNCTIONS;
+    const COMPONENT: *const ComponentFunctions = Components::<T, REVISION>::FUNCTIONS;
 }
 
 struct Functions<T>(std::marker::PhantomData<T>);
@@ -29,6 +29,7 @@ impl<T: Surrogate + Authored> Functions<T> {
         size: size_of::<SurrogateFunctions>(),
         fit: Some(fit::<T>),
         load: Some(load::<T>),
+        sum: Some(sum::<T>),
     };
 }
 
@@ -43,6 +44,7 @@ static EMULATOR: EmulatorFunctions = EmulatorFunctions {
     linear: Some(linear),
     sensitivity: Some(sensitivity),
     facts: Some(facts),
+    mean_and_jacobian: Some(mean_and_jacobian),
 };
 
 /// Tells the program how far a fit came; it counts units, not totals.
@@ -157,6 +159,32 @@ unsafe extern "C" fn load<T: Surrogate + Authored>(
     })
 }
 
+unsafe extern "C" fn sum<T: Surrogate + Authored>(
+    plugin: *mut c_void,
+    parts: *const table::Summand,
+    count: usize,
+    offset: Numbers,
+    made: *mut table::Emulator,
+    answer: *const Answer,
+) -> i32 {
+    guard(answer, |_| {
+        // SAFETY: as in `fit`; the pointer leads to so many parts.
+        let (plugin, offset) = unsafe { (object::<T>(plugin), offset.slice()?) };
+        let mut all = Vec::with_capacity(count);
+        for i in 0..count {
+            // SAFETY: as above.
+            let part = unsafe { &*parts.add(i) };
+            // SAFETY: what a part points to is there for the time of the call.
+            let (bytes, weights) = unsafe { (part.bytes.bytes(), part.weights.slice()?) };
+            all.push(Summand { bytes, weights });
+        }
+        let emulator = plugin.sum(&all, offset)?.ok_or_else(Refusal::absent)?;
+        // SAFETY: the caller gives a place for one emulator.
+        unsafe { *made = handed(emulator) };
+        Ok(())
+    })
+}
+
 /// The emulator behind the first argument.
 ///
 /// # Safety
@@ -206,6 +234,36 @@ unsafe extern "C" fn jacobian(
         let (emulator, point) = unsafe { (own(this), point.slice()?) };
         // SAFETY: the buffer holds `outputs x parameters` numbers.
         unsafe { fill(to, point.len() * emulator.outputs(), emulator.jacobian(point).as_slice()) }
+    })
+}
+
+unsafe extern "C" fn mean_and_jacobian(
+    this: *mut c_void,
+    point: Numbers,
+    parameters: *const usize,
+    count: usize,
+    mean: *mut f64,
+    jacobian: *mut f64,
+    answer: *const Answer,
+) -> i32 {
+    guard(answer, |_| {
+        // SAFETY: as in `mean`.
+        let (emulator, point) = unsafe { (own(this), point.slice()?) };
+        let (means, slopes) = if parameters.is_null() {
+            emulator.mean_and_jacobian(point)
+        } else {
+            // SAFETY: the pointer is not null, and leads to so many numbers of parameters.
+            let parameters = unsafe { std::slice::from_raw_parts(parameters, count) };
+            if let Some(odd) = parameters.iter().find(|&&i| i >= emulator.dimension()) {
+                return Err(Refusal::stop(format!("was asked for the parameter number {odd}")));
+            }
+            emulator.mean_and_jacobian_by(point, parameters)
+        };
+        // SAFETY: the buffers hold `outputs` and `outputs x count` numbers.
+        unsafe {
+            fill(mean, emulator.outputs(), &means)?;
+            fill(jacobian, emulator.outputs() * count, slopes.as_slice())
+        }
     })
 }
 

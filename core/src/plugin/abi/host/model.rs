@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::de::DeserializeOwned;
 
 use super::Plugin;
-use super::object::{UNMARKED, marks};
+use super::object::{UNMARKED, marks, numbers_only};
 use super::plugin::optional;
 use crate::linalg::Matrix;
 use crate::plugin::Context;
@@ -83,8 +83,13 @@ impl Plugin<ModelFunctions> {
             |a| optional(ask, |f| unsafe { f(this, &raw const table, to, codes, valid_to, a) });
         let said = said(&self.object.demand("predict", call)?, calls.len())?;
         let each = said.into_iter().enumerate().map(|(i, said)| {
-            let answer =
-                Answered { code: statuses[i], valid: valid[i], values: values.row(i), said };
+            let answer = Answered {
+                what: "predict",
+                code: statuses[i],
+                valid: valid[i],
+                values: values.row(i),
+                said,
+            };
             self.object.or_error(answer.response())
         });
         Ok(each.collect())
@@ -99,6 +104,27 @@ impl Plugin<ModelFunctions> {
             optional(ask, |f| unsafe { f(this, &raw const table, to, a) })
         })?;
         Ok(slopes.map(|slopes| Matrix::from_vec(rows, columns, slopes)))
+    }
+
+    /// The response with its derivatives from one run; `None` where the model gives them one by one only.
+    fn both(&self, call: &Call<'_>) -> Result<Option<(Response, Matrix)>, Refusal> {
+        let Some(ask) = self.object.functions.with_response else { return Ok(None) };
+        let Some(handed) = HandedCalls::of(&[*call])? else { return Ok(None) };
+        let (table, rows, columns) = (handed.table(), handed.outputs, call.inputs.len());
+        let (mut values, mut valid) = (vec![f64::NAN; rows], UNMARKED);
+        let (this, response, mark) = (self.object.this, values.as_mut_ptr(), &raw mut valid);
+        let mut slopes = vec![f64::NAN; rows * columns];
+        let to = slopes.as_mut_ptr();
+        // SAFETY: the function belongs to the plugin; the buffers hold `outputs` and `outputs x inputs` numbers and one
+        // mark, and are there until it returns.
+        let ask = |a| unsafe { ask(this, &raw const table, response, to, mark, a) };
+        let Some(reply) = self.object.ask("with_response", ask)? else { return Ok(None) };
+        let said = said(&reply, 1)?.pop().unwrap_or_default();
+        let answered =
+            Answered { what: "with_response", code: status::OK, valid, values: &values, said };
+        let response = answered.response()?;
+        numbers_only("with_response", &slopes)?;
+        Ok(Some((response, Matrix::from_vec(rows, columns, slopes))))
     }
 
     fn written(
@@ -150,8 +176,9 @@ fn said(reply: &Reply, count: usize) -> Result<Vec<CallSaid>, Refusal> {
     let Some(said) = said else { return Ok(vec![CallSaid::default(); count]) };
     if said.len() != count {
         let found = said.len();
+        let what = reply.what;
         return Err(Refusal::stop(format!(
-            "`predict` says something of {found} calls where there are {count}"
+            "`{what}` says something of {found} calls where there are {count}"
         )));
     }
     Ok(said.into_iter().map(Option::unwrap_or_default).collect())
@@ -159,6 +186,8 @@ fn said(reply: &Reply, count: usize) -> Result<Vec<CallSaid>, Refusal> {
 
 /// The answer to one call.
 struct Answered<'a> {
+    /// The function that was called.
+    what: &'static str,
     code: i32,
     /// Its mark: 1 where the run stayed inside the model's range of validity.
     valid: u8,
@@ -168,25 +197,26 @@ struct Answered<'a> {
 
 impl Answered<'_> {
     fn response(self) -> Result<Response, Refusal> {
-        let Self { code, valid, values, said: CallSaid { message, facts } } = self;
+        let Self { what, code, valid, values, said: CallSaid { message, facts } } = self;
         match code {
             status::OK => {}
             status::REJECTED..=status::ABSENT if message.is_empty() => {
-                return Err(Refusal::new(code, "`predict` has no answer and gives no reason"));
+                let message = format!("`{what}` has no answer and gives no reason");
+                return Err(Refusal::new(code, message));
             }
             status::REJECTED..=status::ABSENT => return Err(Refusal::new(code, message)),
             other => {
                 let message =
-                    format!("`predict` gives a run the status {other}, which has no meaning");
+                    format!("`{what}` gives a run the status {other}, which has no meaning");
                 return Err(Refusal::stop(message));
             }
         }
-        let valid = marks("predict", &[valid])?[0];
+        let valid = marks(what, &[valid])?[0];
         match values.iter().position(|value| !value.is_finite()) {
             None => Ok(Response { values: values.to_vec(), valid, facts }),
             Some(i) => {
                 let (count, found) = (values.len(), values[i]);
-                let message = format!("`predict` gives {found} as value {} of {count}", i + 1);
+                let message = format!("`{what}` gives {found} as value {} of {count}", i + 1);
                 Err(Refusal::new(status::REJECTED, message))
             }
         }
@@ -253,5 +283,9 @@ impl Gradient for Plugin<ModelFunctions> {
         let none =
             || EvalError::Fatal(format!("{}: `jacobian` is not there", self.object.fault().who()));
         slopes.ok_or_else(none)
+    }
+
+    fn with_response(&self, call: &Call<'_>) -> Option<Result<(Response, Matrix), EvalError>> {
+        self.object.or_error(self.both(call)).transpose()
     }
 }

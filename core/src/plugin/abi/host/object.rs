@@ -122,6 +122,21 @@ impl<F> Object<F> {
         Ok(numbers)
     }
 
+    /// Makes a call that writes one mark; `otherwise` where the object does not have what is asked for.
+    pub fn mark(
+        &self,
+        what: &'static str,
+        otherwise: bool,
+        call: impl FnOnce(*mut u8, *const Answer) -> i32,
+    ) -> Result<bool, Refusal> {
+        let mut mark = UNMARKED;
+        let to = &raw mut mark;
+        match self.ask(what, |answer| call(to, answer))? {
+            Some(_) => Ok(marks(what, &[mark])?[0]),
+            None => Ok(otherwise),
+        }
+    }
+
     /// Makes a call that must fill a buffer with log densities.
     pub fn densities(
         &self,
@@ -155,7 +170,13 @@ impl<F> Object<F> {
 
     /// What was answered, or why a stage cannot go on.
     pub fn or_stop<T>(&self, answered: Result<T, Refusal>) -> Result<T, Stop> {
-        answered.map_err(|refusal| Stop::new(format!("{}: {}", self.fault.who(), refusal.message)))
+        answered.map_err(|refusal| {
+            let who = self.fault.who();
+            match refusal.message.split_once("\nhelp: ") {
+                Some((message, help)) => Stop::new(format!("{who}: {message}")).help(help),
+                None => Stop::new(format!("{who}: {}", refusal.message)),
+            }
+        })
     }
 
     /// What was answered, or why there is no answer.

@@ -97,10 +97,18 @@ unsafe fn offer<K: Kind + ?Sized, F: Table + Send + Sync + 'static>(
         unsafe { (copied::<F>(raw.functions.cast()), copied(raw.component)) };
     let said = |refusal: Refusal| refusal.message;
     let (functions, component) = (functions.map_err(said)?, component.map_err(said)?);
+    let revision = revision(&component).map_err(said)?;
     let options = Options::new(schema(&component).map_err(said)?, format!("{}.{name}", K::NAME));
     let name: &'static str = Box::leak(name.to_owned().into_boxed_str());
-    let offered: &'static Offered<K, F> =
-        Box::leak(Box::new(Offered { name, functions, component, options, library, adapt }));
+    let offered: &'static Offered<K, F> = Box::leak(Box::new(Offered {
+        name,
+        functions,
+        component,
+        revision,
+        options,
+        library,
+        adapt,
+    }));
     let path: &'static str = Box::leak(library.path.display().to_string().into_boxed_str());
     let schema: &'static (dyn Fn(&mut SchemaGenerator) -> Schema + Send + Sync) =
         Box::leak(Box::new(|generator: &mut SchemaGenerator| offered.options.schema(generator)));
@@ -113,10 +121,19 @@ unsafe fn offer<K: Kind + ?Sized, F: Table + Send + Sync + 'static>(
         })),
         module_path: path,
         version: &library.version,
-        revision: 1,
+        revision,
         library: Some(library),
     }));
     Ok(entry)
+}
+
+/// The revision of a plugin; 1 where it does not say.
+fn revision(component: &ComponentFunctions) -> Result<u32, Refusal> {
+    // SAFETY: the function belongs to a library that stays, and is given nothing.
+    match component.revision.map_or(1, |revision| unsafe { revision() }) {
+        0 => Err(Refusal::stop("has the revision 0, expected a number from 1")),
+        revision => Ok(revision),
+    }
 }
 
 /// The schema that a plugin gives of its options.
@@ -136,6 +153,7 @@ struct Offered<K: ?Sized, F> {
     name: &'static str,
     functions: F,
     component: ComponentFunctions,
+    revision: u32,
     options: Options,
     library: &'static Library,
     adapt: fn(Plugin<F>) -> Box<K>,
@@ -150,8 +168,8 @@ impl<K: Kind + ?Sized, F: Table> Offered<K, F> {
         match made {
             Ok((options, plugin)) => {
                 let plugin = (self.adapt)(plugin);
-                let library = Some(self.library);
-                Some(Built { name: self.name, plugin, options, library, revision: 1 })
+                let (library, revision) = (Some(self.library), self.revision);
+                Some(Built { name: self.name, plugin, options, library, revision })
             }
             Err(refusal) if refusal.status == status::REJECTED => {
                 let complaints = &mut Complaints::new(node, problems);

@@ -6,8 +6,11 @@ use super::Plugin;
 use super::object::{finite_only, shaped};
 use super::plugin::optional;
 use crate::data::{Ensemble, Layout, Measurements, Replicate};
+use crate::linalg::Matrix;
 use crate::plugin::abi::table::{Answer, ReaderFunctions, Text};
-use crate::plugin::abi::wire::{ContentsAbout, EnsembleAbout, FailureAbout, OwnedSource};
+use crate::plugin::abi::wire::{
+    ContentsAbout, EnsembleAbout, FailureAbout, MeasuredAbout, OwnedSource,
+};
 use crate::plugin::abi::{Refusal, Reply};
 use crate::plugin::reader::{
     Contents, EnsembleSource, GridSource, MeasurementSource, ReadError, Reader,
@@ -71,20 +74,58 @@ impl Plugin<ReaderFunctions> {
         })
     }
 
+    fn allowed(&self, runs: usize) -> Result<Option<usize>, Refusal> {
+        let Some(ask) = self.object.functions.allowed_failures else { return Ok(None) };
+        let (this, mut allowed) = (self.object.this, usize::MAX);
+        let to = &raw mut allowed;
+        // SAFETY: the function belongs to the plugin, and the place for the number is there until it returns.
+        let call = |a| unsafe { ask(this, runs, to, a) };
+        match self.object.ask("allowed_failures", call)? {
+            None => Ok(None),
+            Some(_) if allowed == usize::MAX => {
+                Err(Refusal::stop("`allowed_failures` gives no number of runs"))
+            }
+            Some(_) => Ok(Some(allowed)),
+        }
+    }
+
     fn measured(&self, source: &MeasurementSource<'_>) -> Result<Measurements, Refusal> {
         let reply =
             self.of_source("measurements", self.object.functions.measurements, &source.into())?;
-        let names: Vec<String> = reply.json()?;
-        let [values] = reply.matrices()?;
-        shaped("measurements", &values, names.len(), source.layout.len())?;
+        let (names, states_sd, states_covariance) = reply.json::<MeasuredAbout>()?.parts();
+        let (count, outputs) = (names.len(), source.layout.len());
+        let (values, sd, covariance) = match (states_sd, states_covariance) {
+            (false, false) => {
+                let [values] = reply.matrices()?;
+                (values, None, None)
+            }
+            (true, false) => {
+                let [values, sd] = reply.matrices()?;
+                (values, Some(sd), None)
+            }
+            (false, true) => {
+                let [values, covariance] = reply.matrices()?;
+                (values, None, Some(covariance))
+            }
+            (true, true) => {
+                let [values, sd, covariance] = reply.matrices()?;
+                (values, Some(sd), Some(covariance))
+            }
+        };
+        shaped("measurements", &values, count, outputs)?;
+        sd.iter().try_for_each(|sd| deviations(sd, count, outputs))?;
+        covariance.iter().try_for_each(|covariance| variances(covariance, outputs))?;
         if let Some(x) = values.as_slice().iter().find(|x| x.is_infinite()) {
             return Err(Refusal::stop(format!("`measurements` answers the value {x}")));
         }
-        let replicate = |(name, row): (String, &[f64])| {
-            Replicate::new(name, row.iter().map(|y| (!y.is_nan()).then_some(*y)).collect())
+        let replicate = |(r, (name, row)): (usize, (String, &[f64]))| {
+            let values = row.iter().map(|y| (!y.is_nan()).then_some(*y)).collect();
+            let sd = sd.as_ref().map(|sd| sd.row(r)).filter(|sd| !states_nothing(sd));
+            Replicate { name, values, sd: sd.map(<[f64]>::to_vec) }
         };
-        let replicates = names.into_iter().zip(values.iter_rows()).map(replicate).collect();
-        Ok(Measurements::new(source.layout.clone(), replicates))
+        let rows = names.into_iter().zip(values.iter_rows()).enumerate();
+        let (layout, replicates) = (source.layout.clone(), rows.map(replicate).collect());
+        Ok(Measurements { layout, replicates, covariance })
     }
 
     fn one(&self, path: &Path, layout: &Layout) -> Result<Vec<f64>, Refusal> {
@@ -100,6 +141,43 @@ impl Plugin<ReaderFunctions> {
         finite_only("response", &values)?;
         Ok(values)
     }
+}
+
+/// Whether a replicate states no standard deviations.
+fn states_nothing(sd: &[f64]) -> bool {
+    sd.iter().all(|sd| sd.is_nan())
+}
+
+/// Complains of what are no standard deviations: of each replicate that states any they are finite and not negative.
+fn deviations(sd: &Matrix, replicates: usize, outputs: usize) -> Result<(), Refusal> {
+    shaped("measurements", sd, replicates, outputs)?;
+    let mut stated = sd.iter_rows().filter(|row| !states_nothing(row)).flatten();
+    match stated.find(|sd| !(sd.is_finite() && **sd >= 0.0)) {
+        None => Ok(()),
+        Some(x) => Err(Refusal::stop(format!("`measurements` answers the standard deviation {x}"))),
+    }
+}
+
+/// Complains of what is no covariance: it is finite, symmetric up to round-off, and no variance is negative.
+fn variances(covariance: &Matrix, outputs: usize) -> Result<(), Refusal> {
+    shaped("measurements", covariance, outputs, outputs)?;
+    finite_only("measurements", covariance.as_slice())?;
+    for i in 0..outputs {
+        if covariance[(i, i)] < 0.0 {
+            let x = covariance[(i, i)];
+            return Err(Refusal::stop(format!("`measurements` answers the variance {x}")));
+        }
+        for j in 0..i {
+            let (a, b) = (covariance[(i, j)], covariance[(j, i)]);
+            let size = (covariance[(i, i)] * covariance[(j, j)]).sqrt();
+            if (a - b).abs() > 1e-6 * size {
+                let place = format!("of outputs {} and {}", j + 1, i + 1);
+                let message = format!("answers {b} and {a} as the covariance {place}");
+                return Err(Refusal::stop(format!("`measurements` {message}")));
+            }
+        }
+    }
+    Ok(())
 }
 
 impl Reader for Plugin<ReaderFunctions> {
@@ -134,6 +212,10 @@ impl Reader for Plugin<ReaderFunctions> {
 
     fn ensemble(&self, source: &EnsembleSource<'_>) -> Result<Ensemble, ReadError> {
         self.or_unread(self.runs(source), source.directory)
+    }
+
+    fn allowed_failures(&self, runs: usize) -> Option<usize> {
+        self.object.or_fault(self.allowed(runs), || None)
     }
 
     fn measurements(&self, source: &MeasurementSource<'_>) -> Result<Measurements, ReadError> {

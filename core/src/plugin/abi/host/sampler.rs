@@ -4,14 +4,17 @@ use super::Plugin;
 use super::object::{densities_only, finite_only, marks, shaped};
 use super::plugin::{facts, optional, texts};
 use super::target::ServedTarget;
+use crate::data::Statistic;
+use crate::data::statistics::Kind;
 use crate::linalg::Matrix;
 use crate::math::random::Stream;
 use crate::plugin::Fact;
 use crate::plugin::abi::table::{self, Key, SamplerFunctions, Text};
-use crate::plugin::abi::wire::HarvestAbout;
+use crate::plugin::abi::wire::{HarvestAbout, StatisticAbout};
 use crate::plugin::abi::{Refusal, Reply};
 use crate::plugin::sampler::{Harvest, Plan, Sampler, State, Target};
 use crate::run::Stop;
+use crate::study::file::Start;
 
 /// A state as it is handed over.
 struct Handed {
@@ -153,6 +156,33 @@ impl Plugin<SamplerFunctions> {
         }))
     }
 
+    fn chosen_start(&self) -> Result<Start, Refusal> {
+        let (ask, this) = (self.object.functions.start_where, self.object.this);
+        // SAFETY: the function belongs to the plugin.
+        let call = |a| optional(ask, |f| unsafe { f(this, a) });
+        let Some(reply) = self.object.ask("start_where", call)? else { return Ok(Start::Map) };
+        let text = reply.string();
+        serde_json::from_value(text.as_str().into()).map_err(|_| {
+            let expected = "expected `map`, `prior` or `sobol`";
+            Refusal::stop(format!("`start_where` answers `{text}`, {expected}"))
+        })
+    }
+
+    fn told(&self, state: &State) -> Result<Vec<Statistic>, Refusal> {
+        let Some(ask) = self.object.functions.statistics else { return Ok(Vec::new()) };
+        let mut handed = Handed::of(state)?;
+        let (given, this) = (handed.table(), self.object.this);
+        // SAFETY: as in `begun`.
+        let call = |a| unsafe { ask(this, &raw const given, a) };
+        let Some(reply) = self.object.ask("statistics", call)? else { return Ok(Vec::new()) };
+        let about: Vec<StatisticAbout> = reply.json()?;
+        let [values] = reply.matrices()?;
+        shaped("statistics", &values, about.len(), state.points.rows())?;
+        let all = about.into_iter().zip(values.iter_rows());
+        let all = all.map(|(about, row)| about.with(row.to_vec())).collect::<Vec<_>>();
+        sound_statistics(&all).map(|()| all)
+    }
+
     /// What is said of a run that ended in a state.
     fn said(
         &self,
@@ -177,10 +207,42 @@ impl Plugin<SamplerFunctions> {
     }
 }
 
+/// Complains of statistics without a name of their own, and of values that are not of their kind; what is not a number
+/// is a value that is not there.
+fn sound_statistics(all: &[Statistic]) -> Result<(), Refusal> {
+    for (i, Statistic { name, kind, values }) in all.iter().enumerate() {
+        if name.is_empty() || all[..i].iter().any(|other| other.name == *name) {
+            let message = format!("statistic {} is called `{name}`", i + 1);
+            return Err(Refusal::stop(format!("{message}, expected a name of its own")));
+        }
+        let (fits, expected): (fn(f64) -> bool, _) = match kind {
+            Kind::Flag => (|x| x == 0.0 || x == 1.0, "0 or 1"),
+            Kind::Count => (|x| x >= 0.0 && x.fract() == 0.0, "a whole number"),
+            Kind::Number => (|_| true, "a number"),
+        };
+        if let Some(x) = values.iter().find(|x| !x.is_nan() && !fits(**x)) {
+            let message = format!("`statistics` gives {x} as `{name}`, expected {expected}");
+            return Err(Refusal::stop(message));
+        }
+    }
+    Ok(())
+}
+
 impl Sampler for Plugin<SamplerFunctions> {
     fn plan(&self, dimension: usize) -> Plan {
         let nothing = || Plan { chains: 1, steps: 0, warm_up: 0, ensemble: false };
         self.object.or_fault(self.planned(dimension), nothing)
+    }
+
+    fn uses_starts(&self) -> bool {
+        let (ask, this) = (self.object.functions.uses_starts, self.object.this);
+        // SAFETY: the function belongs to the plugin, and the place for the mark is there until it returns.
+        let call = |to, a| optional(ask, |f| unsafe { f(this, to, a) });
+        self.object.or_fault(self.object.mark("uses_starts", true, call), || true)
+    }
+
+    fn start_where(&self) -> Start {
+        self.object.or_fault(self.chosen_start(), || Start::Map)
     }
 
     fn start(&self, target: &dyn Target, points: Matrix) -> Result<State, Stop> {
@@ -202,6 +264,13 @@ impl Sampler for Plugin<SamplerFunctions> {
         self.object.or_fault(handed, || true)
     }
 
+    fn steps_are_draws(&self) -> bool {
+        let (ask, this) = (self.object.functions.steps_are_draws, self.object.this);
+        // SAFETY: as in `uses_starts`.
+        let call = |to, a| optional(ask, |f| unsafe { f(this, to, a) });
+        self.object.or_fault(self.object.mark("steps_are_draws", false, call), || false)
+    }
+
     fn harvest(
         &self,
         target: &dyn Target,
@@ -209,6 +278,10 @@ impl Sampler for Plugin<SamplerFunctions> {
         stream: &Stream,
     ) -> Result<Option<Harvest>, Stop> {
         self.object.or_stop(self.harvested(target, state, stream))
+    }
+
+    fn statistics(&self, state: &State) -> Vec<Statistic> {
+        self.object.or_fault(self.told(state), Vec::new)
     }
 
     fn doubts(&self, state: &State) -> Vec<String> {

@@ -4,7 +4,7 @@ use std::ffi::c_void;
 use std::sync::{Arc, OnceLock};
 
 use super::Plugin;
-use super::object::{Object, finite_only, shaped};
+use super::object::{Object, finite_only, numbers_only, shaped};
 use super::plugin::{facts, optional};
 use crate::linalg::Matrix;
 use crate::math::random::Stream;
@@ -16,7 +16,7 @@ use crate::plugin::abi::table::{
 };
 use crate::plugin::abi::wire::TrainingAbout;
 use crate::plugin::forward::{Forward, Linear};
-use crate::plugin::surrogate::{Emulator, FitError, Sensitivity, Surrogate, Training};
+use crate::plugin::surrogate::{Emulator, FitError, Sensitivity, Summand, Surrogate, Training};
 use crate::plugin::{Fact, Fault};
 use crate::run::{Progress, Stop};
 
@@ -72,7 +72,7 @@ impl Plugin<SurrogateFunctions> {
             optional(ask, |f| unsafe { f(this, &raw const training, key, &raw const told, to, a) })
         };
         self.object.demand("fit", call)?;
-        let emulator = LoadedEmulator::new(made, self.object.fault().clone())?;
+        let emulator = LoadedEmulator::new(&made, self.object.fault().clone())?.judged()?;
         let (dimension, outputs) = (emulator.dimension, emulator.outputs);
         if (dimension, outputs) != (runs.points.columns(), runs.responses.columns()) {
             return Err(Refusal::stop(format!(
@@ -90,7 +90,35 @@ impl Plugin<SurrogateFunctions> {
         self.object.demand("load", |a| {
             optional(ask, |f| unsafe { f(this, Text::of_bytes(bytes), to, a) })
         })?;
-        LoadedEmulator::new(made, self.object.fault().clone())
+        LoadedEmulator::new(&made, self.object.fault().clone())?.judged()
+    }
+
+    fn summed(
+        &self,
+        parts: &[Summand<'_>],
+        offset: &[f64],
+    ) -> Result<Option<LoadedEmulator>, Refusal> {
+        let Some(ask) = self.object.functions.sum else { return Ok(None) };
+        let part = |part: &Summand<'_>| table::Summand {
+            bytes: Text::of_bytes(part.bytes),
+            weights: Numbers::row(part.weights),
+        };
+        let handed: Vec<table::Summand> = parts.iter().map(part).collect();
+        let (mut made, this) = (nothing(), self.object.this);
+        let (first, count, added, to) =
+            (handed.as_ptr(), handed.len(), Numbers::row(offset), &raw mut made);
+        // SAFETY: as in `fitted`.
+        let call = |a| unsafe { ask(this, first, count, added, to, a) };
+        if self.object.ask("sum", call)?.is_none() {
+            return Ok(None);
+        }
+        let emulator = LoadedEmulator::new(&made, self.object.fault().clone())?;
+        if emulator.outputs != offset.len() {
+            let (found, outputs) = (emulator.outputs, offset.len());
+            let message = format!("`sum` gives an emulator of {found} outputs");
+            return Err(Refusal::stop(format!("{message} where {outputs} belong")));
+        }
+        Ok(Some(emulator))
     }
 }
 
@@ -107,6 +135,15 @@ impl Surrogate for Plugin<SurrogateFunctions> {
     fn load(&self, bytes: &[u8]) -> Result<Box<dyn Emulator>, Stop> {
         Ok(Box::new(self.object.or_stop(self.loaded(bytes))?))
     }
+
+    fn sum(
+        &self,
+        parts: &[Summand<'_>],
+        offset: &[f64],
+    ) -> Result<Option<Box<dyn Emulator>>, Stop> {
+        let sum = self.object.or_stop(self.summed(parts, offset))?;
+        Ok(sum.map(|sum| -> Box<dyn Emulator> { Box::new(sum) }))
+    }
 }
 
 /// An emulator that a library evaluates.
@@ -120,7 +157,8 @@ struct LoadedEmulator {
 }
 
 impl LoadedEmulator {
-    fn new(made: table::Emulator, fault: Arc<Fault>) -> Result<Self, Refusal> {
+    /// An emulator whose errors are as it says.
+    fn new(made: &table::Emulator, fault: Arc<Fault>) -> Result<Self, Refusal> {
         // SAFETY: whoever made the emulator gave it over with its table, a constant.
         let object = unsafe {
             Object::made("emulator", made.emulator, made.functions, |table| table.destroy, fault)?
@@ -130,10 +168,41 @@ impl LoadedEmulator {
         let reply = object.demand("fit_error", |a| optional(ask, |f| unsafe { f(this, a) }))?;
         let [relative, residuals] = reply.matrices()?;
         let (dimension, outputs) = (made.dimension, made.outputs);
-        shaped("fit_error", &relative, 1, outputs)?;
-        shaped("fit_error", &residuals, residuals.rows(), outputs)?;
         let fit_error = FitError { relative: relative.into_vec(), residuals };
         Ok(Self { linear: OnceLock::new(), object, dimension, outputs, fit_error })
+    }
+
+    /// The same, if its errors are of the shape of its outputs.
+    fn judged(self) -> Result<Self, Refusal> {
+        let FitError { relative, residuals } = &self.fit_error;
+        let relative = Matrix::from_vec(1, relative.len(), relative.clone());
+        shaped("fit_error", &relative, 1, self.outputs)?;
+        shaped("fit_error", residuals, residuals.rows(), self.outputs)?;
+        Ok(self)
+    }
+
+    /// The means and the derivatives by these parameters, or by all, at a point; `None` where the emulator answers them
+    /// one by one only.
+    fn both(
+        &self,
+        point: &[f64],
+        parameters: Option<&[usize]>,
+    ) -> Result<Option<(Vec<f64>, Matrix)>, Refusal> {
+        let Some(ask) = self.object.functions.mean_and_jacobian else { return Ok(None) };
+        let (this, at, mut mean) =
+            (self.object.this, Numbers::row(point), vec![f64::NAN; self.outputs]);
+        let (first, columns) =
+            parameters.map_or((std::ptr::null(), point.len()), |some| (some.as_ptr(), some.len()));
+        let what = "mean_and_jacobian";
+        let means = mean.as_mut_ptr();
+        let slopes = self.object.ask_numbers(what, self.outputs * columns, |to, a| {
+            // SAFETY: the function belongs to the emulator; the buffers hold `outputs` and `outputs x parameters` numbers,
+            // and the parameters are there until it returns.
+            unsafe { ask(this, at, first, columns, means, to, a) }
+        })?;
+        let Some(slopes) = slopes else { return Ok(None) };
+        numbers_only(what, &mean)?;
+        Ok(Some((mean, Matrix::from_vec(self.outputs, columns, slopes))))
     }
 
     fn view(&self) -> Result<Option<LinearView>, Refusal> {
@@ -202,6 +271,20 @@ impl Forward for LoadedEmulator {
         });
         let matrix = values.map(|values| Matrix::from_vec(self.outputs, point.len(), values));
         self.object.or_fault(matrix, || Matrix::zeros(self.outputs, point.len()))
+    }
+
+    fn mean_and_jacobian(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
+        self.object.or_fault(self.both(point, None), || None).unwrap_or_else(|| {
+            let mean = self.mean(&Matrix::from_vec(1, point.len(), point.to_vec()));
+            (mean.into_vec(), self.jacobian(point))
+        })
+    }
+
+    fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
+        self.object.or_fault(self.both(point, Some(parameters)), || None).unwrap_or_else(|| {
+            let (mean, jacobian) = self.mean_and_jacobian(point);
+            (mean, jacobian.select_columns(parameters))
+        })
     }
 
     fn linear(&self) -> Option<&dyn Linear> {

@@ -24,5 +24,8 @@ functions! {
         may check(plugin: *mut c_void, context: Text, answer: *const Answer) -> i32;
         /// The same against the machine: files, commands. Nothing is changed.
         may environment(plugin: *mut c_void, context: Text, answer: *const Answer) -> i32;
+        /// The revision of the plugin, a number from 1 that its author raises whenever what it computes changes; 1 where
+        /// it is null. Since version 1.1.
+        may revision() -> u32;
     }
 }

@@ -46,6 +46,13 @@ record! {
         common: *const CommonErrorView,
         /// How many there are.
         common_count: usize,
+        /// The standard deviation of the noise of each value, where the data state it: `replicates x outputs`, a row of
+        /// NaN for a replicate that states none, zero where nothing was measured; no rows where no replicate states
+        /// any. Since version 1.1.
+        sd: Numbers,
+        /// The covariance of the noise of one complete measurement, `outputs x outputs`, where the data state it; no rows
+        /// where they do not. Since version 1.1.
+        covariance: Numbers,
     }
 }
 
@@ -129,5 +136,13 @@ functions! {
         /// one row, and a second one with the times over which correlations along the last axis fall by a
         /// factor e, where values are not independent. `ABSENT` where the noise is unknown.
         may stated_noise(plugin: *mut c_void, layout: Text, response: Numbers, answer: *const Answer) -> i32;
+        /// The likelihood of a part of the known data, some of whose values are missing, under the law that stands for
+        /// all of them: what is estimated from the replicates is estimated from all. Of `part` only the data count.
+        /// Hyperparameters keep their names; one that belongs to missing values alone may be gone. `ABSENT` where there
+        /// is no such form. Since version 1.1.
+        may likelihood_of_part(plugin: *mut c_void, known: *const Known, part: *const Known, out: *mut Likelihood, answer: *const Answer) -> i32;
+        /// Writes 1 where the likelihood uses the noise that the data state (`sd` and `covariance` of what is known), 0
+        /// where not; where it does not, or is null, such data are refused. Since version 1.1.
+        may takes_stated_noise(plugin: *mut c_void, takes: *mut u8, answer: *const Answer) -> i32;
     }
 }

@@ -38,7 +38,7 @@ pub use reader::ReaderFunctions;
 pub use sampler::{Plan, SamplerFunctions, State, Target, TargetFunctions};
 pub use shape::{Field, Shape, Table, Type, copied, read, whole};
 pub use surrogate::{
-    Emulator, EmulatorFunctions, Progress, ProgressFunctions, SurrogateFunctions, Training,
+    Emulator, EmulatorFunctions, Progress, ProgressFunctions, Summand, SurrogateFunctions, Training,
 };
 
 /// Everything that crosses the boundary, in the order in which C must see it.
@@ -76,6 +76,7 @@ pub fn shapes() -> Vec<Shape> {
         Training::SHAPE,
         EmulatorFunctions::SHAPE,
         Emulator::SHAPE,
+        Summand::SHAPE,
         SurrogateFunctions::SHAPE,
         Host::SHAPE,
         Entry::SHAPE,

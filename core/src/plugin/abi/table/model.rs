@@ -42,5 +42,9 @@ functions! {
         /// they are not known. Without a call (no row of inputs, `jacobian` null) nothing is written: whether there are
         /// derivatives is the question.
         may jacobian(plugin: *mut c_void, calls: *const Calls, jacobian: *mut f64, answer: *const Answer) -> i32;
+        /// The response of one call, as `predict` gives it, and its derivatives, as `jacobian` gives them, from one run;
+        /// `ABSENT` where that costs no less than asking for each. `valid` and the text are as those of `predict` for this
+        /// call. Since version 1.1.
+        may with_response(plugin: *mut c_void, calls: *const Calls, response: *mut f64, jacobian: *mut f64, valid: *mut u8, answer: *const Answer) -> i32;
     }
 }

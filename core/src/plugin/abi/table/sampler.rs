@@ -94,5 +94,19 @@ functions! {
         may notes(plugin: *mut c_void, state: *const State, answer: *const Answer) -> i32;
         /// Answers what is worth telling of the method, a JSON list of `{"name", "value"}`.
         may facts(plugin: *mut c_void, answer: *const Answer) -> i32;
+        /// Writes 1 where the chains begin at the starting points that they are given, as they do where it is null; 0 for
+        /// a method that draws its own from the prior. Since version 1.1.
+        may uses_starts(plugin: *mut c_void, uses: *mut u8, answer: *const Answer) -> i32;
+        /// Answers where the chains start when the study does not say: `map` (about the maximum of the posterior density,
+        /// as where it is null), `prior` or `sobol`. Since version 1.1.
+        may start_where(plugin: *mut c_void, answer: *const Answer) -> i32;
+        /// Writes 1 where the points of each step are draws, so that a run may end after any number of steps past the
+        /// warm-up; 0, or null, where they are not. Since version 1.1.
+        may steps_are_draws(plugin: *mut c_void, draws: *mut u8, answer: *const Answer) -> i32;
+        /// Answers what there is to tell of the last step of each chain beside its point: a JSON list of `{"name", "kind"}`
+        /// with the kind `flag` (0 or 1), `count` or `number`, and a matrix `statistics x chains`, NaN before the first
+        /// step. The same statistics in the same order of every state; `ABSENT` where there are none. Since version
+        /// 1.1.
+        may statistics(plugin: *mut c_void, state: *const State, answer: *const Answer) -> i32;
     }
 }

@@ -63,6 +63,10 @@ functions! {
         may sensitivity(emulator: *mut c_void, answer: *const Answer) -> i32;
         /// Answers what is worth telling, a JSON list of `{"name", "value"}`.
         may facts(emulator: *mut c_void, answer: *const Answer) -> i32;
+        /// The means at one point, and the derivatives of each output (rows) by `count` parameters (columns), given by their
+        /// numbers from zero; by all, in order, where `parameters` is null. What `mean` and `jacobian` answer, where that
+        /// costs less together. Since version 1.1.
+        may mean_and_jacobian(emulator: *mut c_void, point: Numbers, parameters: *const usize, count: usize, mean: *mut f64, jacobian: *mut f64, answer: *const Answer) -> i32;
     }
 }
 
@@ -82,6 +86,16 @@ record! {
     }
 }
 
+record! {
+    /// A part of a sum of emulators.
+    Summand {
+        /// What `save` of an emulator answered.
+        bytes: Text,
+        /// One weight an output.
+        weights: Numbers,
+    }
+}
+
 functions! {
     /// Fits emulators to simulation runs.
     SurrogateFunctions {
@@ -89,5 +103,9 @@ functions! {
         must fit(plugin: *mut c_void, training: *const Training, key: Key, progress: *const Progress, out: *mut Emulator, answer: *const Answer) -> i32;
         /// An emulator from what `save` answered.
         must load(plugin: *mut c_void, bytes: Text, out: *mut Emulator, answer: *const Answer) -> i32;
+        /// The sum of `count` emulators that this surrogate fitted, each output of each times its weight, plus an offset for
+        /// each output (one row), as one emulator of the same form: it is asked for the response and its sensitivity
+        /// only. `ABSENT` where the method has no such form, or these emulators do not go together. Since version 1.1.
+        may sum(plugin: *mut c_void, parts: *const Summand, count: usize, offset: Numbers, out: *mut Emulator, answer: *const Answer) -> i32;
     }
 }

@@ -8,6 +8,7 @@ mod harvest;
 mod model;
 mod options;
 mod reader;
+mod statistic;
 mod training;
 
 pub use complaint::Complaint;
@@ -17,5 +18,6 @@ pub use effect::{EffectAbout, OwnedSituation};
 pub use harvest::HarvestAbout;
 pub use model::{CallSaid, CallsAbout, ResponseAbout, SignatureAbout};
 pub use options::{json_of_node, json_of_table, node_of_json, table_of_json};
-pub use reader::{ContentsAbout, EnsembleAbout, FailureAbout, OwnedSource};
+pub use reader::{ContentsAbout, EnsembleAbout, FailureAbout, MeasuredAbout, OwnedSource};
+pub use statistic::StatisticAbout;
 pub use training::TrainingAbout;

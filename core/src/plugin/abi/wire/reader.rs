@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::data::table::Column;
-use crate::data::{FailedRun, Layout, Parameter, Table, Unit};
+use crate::data::{FailedRun, Layout, Measurements, Parameter, Table, Unit};
 use crate::linalg::Matrix;
 use crate::plugin::reader::{
     Contents, EnsembleSource, GridSource, MeasurementSource, ReadError, Variable,
@@ -102,6 +102,45 @@ pub struct EnsembleAbout {
     pub valid: Vec<bool>,
     /// Runs that were left out.
     pub failed: Vec<FailedRun>,
+}
+
+/// What measurements say beside their numbers.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum MeasuredAbout {
+    /// The names of the replicates; the data do not state their noise.
+    Names(Vec<String>),
+    /// The same where the data state it.
+    Stated {
+        /// The names of the replicates.
+        replicates: Vec<String>,
+        /// Whether standard deviations follow the values.
+        #[serde(default)]
+        sd: bool,
+        /// Whether a covariance follows those.
+        #[serde(default)]
+        covariance: bool,
+    },
+}
+
+impl MeasuredAbout {
+    /// What is said of measurements.
+    pub fn of(measurements: &Measurements) -> Self {
+        let replicates = measurements.replicates.iter().map(|r| r.name.clone()).collect();
+        let sd = measurements.replicates.iter().any(|r| r.sd.is_some());
+        match (sd, measurements.covariance.is_some()) {
+            (false, false) => Self::Names(replicates),
+            (sd, covariance) => Self::Stated { replicates, sd, covariance },
+        }
+    }
+
+    /// The names of the replicates, and whether standard deviations and a covariance follow the values.
+    pub fn parts(self) -> (Vec<String>, bool, bool) {
+        match self {
+            Self::Names(replicates) => (replicates, false, false),
+            Self::Stated { replicates, sd, covariance } => (replicates, sd, covariance),
+        }
+    }
 }
 
 /// Why a file cannot be read.

@@ -35,10 +35,14 @@ impl<'a> OwnedKnown<'a> {
             // SAFETY: one mark a value.
             unsafe { std::slice::from_raw_parts(known.measured, count) }
         };
+        // SAFETY: as the caller promises.
+        let (sd, covariance) = unsafe { stated(known, &values)? };
         let row = |(i, name): (usize, String)| {
             let marks = &measured[i * values.columns()..];
             let value = |(&y, &mark): (&f64, &u8)| (mark != 0).then_some(y);
-            Replicate::new(name, values.row(i).iter().zip(marks).map(value).collect())
+            let values = values.row(i).iter().zip(marks).map(value).collect();
+            let sd = sd.as_ref().map(|sd| sd.row(i)).filter(|sd| !sd.iter().all(|sd| sd.is_nan()));
+            Replicate { name, values, sd: sd.map(<[f64]>::to_vec) }
         };
         if replicates.len() != values.rows() || measured.len() != count {
             return Err(Refusal::stop("the replicates have not as many names as values"));
@@ -46,7 +50,12 @@ impl<'a> OwnedKnown<'a> {
         let replicates = replicates.into_iter().enumerate().map(row).collect();
         // SAFETY: as the caller promises.
         let common = unsafe { common(known)? };
-        Ok(Self { data: Measurements::new(layout, replicates), common, known, functions })
+        Ok(Self { data: Measurements { layout, replicates, covariance }, common, known, functions })
+    }
+
+    /// The measurements.
+    pub fn data(&self) -> &Measurements {
+        &self.data
     }
 
     /// Looks at it as discrepancies do.
@@ -62,6 +71,25 @@ impl<'a> OwnedKnown<'a> {
         let [slopes] = reply.matrices()?;
         Ok(slopes)
     }
+}
+
+/// Copies the noise that the data state: standard deviations and a covariance.
+///
+/// # Safety
+/// All that the struct points to is there.
+unsafe fn stated(
+    known: &table::Known,
+    values: &Matrix,
+) -> Result<(Option<Matrix>, Option<Matrix>), Refusal> {
+    // SAFETY: as the caller promises.
+    let (sd, covariance) = unsafe { (known.sd.matrix()?, known.covariance.matrix()?) };
+    let (replicates, outputs) = (values.rows(), values.columns());
+    let fits = |of: &Matrix, rows| of.rows() == 0 || (of.rows(), of.columns()) == (rows, outputs);
+    if !fits(&sd, replicates) || !fits(&covariance, outputs) {
+        return Err(Refusal::stop("the stated noise is not that of the values"));
+    }
+    let some = |of: Matrix| (of.rows() > 0).then_some(of);
+    Ok((some(sd), some(covariance)))
 }
 
 /// Copies the common errors.

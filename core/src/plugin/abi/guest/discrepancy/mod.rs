@@ -9,17 +9,19 @@ use std::sync::Arc;
 
 use super::component::{Authored, Components, Export};
 use crate::linalg::Matrix;
+use crate::plugin;
 use crate::plugin::abi::Refusal;
-use crate::plugin::abi::guard::{begin, guard, object};
+use crate::plugin::abi::guard::{begin, guard, mark, object};
 use crate::plugin::abi::table::{
     Answer, ComponentFunctions, DiscrepancyFunctions, Known, Likelihood, Numbers, Text,
 };
 use crate::plugin::discrepancy::Discrepancy;
 use crate::plugin::fault::Fault;
+use known::OwnedKnown;
 
-impl<T: Discrepancy + Authored> Export<T> for dyn Discrepancy {
+impl<T: Discrepancy + Authored, const REVISION: u32> Export<T, REVISION> for dyn Discrepancy {
     const FUNCTIONS: *const c_void = std::ptr::from_ref(Functions::<T>::TABLE).cast();
-    const COMPONENT: *const ComponentFunctions = Components::<T>::FUNCTIONS;
+    const COMPONENT: *const ComponentFunctions = Components::<T, REVISION>::FUNCTIONS;
 }
 
 struct Functions<T>(std::marker::PhantomData<T>);
@@ -29,6 +31,8 @@ impl<T: Discrepancy + Authored> Functions<T> {
         size: size_of::<DiscrepancyFunctions>(),
         likelihood: Some(likelihood::<T>),
         stated_noise: Some(stated_noise::<T>),
+        likelihood_of_part: Some(likelihood_of_part::<T>),
+        takes_stated_noise: Some(takes_stated_noise::<T>),
     };
 }
 
@@ -66,15 +70,50 @@ unsafe extern "C" fn likelihood<T: Discrepancy + Authored>(
 ) -> i32 {
     guard(answer, |_| {
         // SAFETY: the plugin that `create` made, and what is known is there for the time of the call.
-        let (plugin, known) = unsafe { (object::<T>(plugin), known::OwnedKnown::read(&*known)?) };
+        let (plugin, known) = unsafe { (object::<T>(plugin), OwnedKnown::read(&*known)?) };
         let own = known.with(|known| plugin.likelihood(known))?;
-        let (size, likelihood) = (size_of::<Likelihood>(), begin(Guest::new(own, fault())));
         // SAFETY: the caller gives a place for one likelihood.
-        unsafe {
-            *made = Likelihood { size, likelihood, functions: &raw const likelihood::FUNCTIONS }
-        };
+        unsafe { *made = handed(own) };
         Ok(())
     })
+}
+
+/// Hands a likelihood over.
+fn handed(own: Box<dyn plugin::Likelihood>) -> Likelihood {
+    Likelihood {
+        size: size_of::<Likelihood>(),
+        likelihood: begin(Guest::new(own, fault())),
+        functions: &raw const likelihood::FUNCTIONS,
+    }
+}
+
+unsafe extern "C" fn likelihood_of_part<T: Discrepancy + Authored>(
+    plugin: *mut c_void,
+    known: *const Known,
+    part: *const Known,
+    made: *mut Likelihood,
+    answer: *const Answer,
+) -> i32 {
+    guard(answer, |_| {
+        // SAFETY: as in `likelihood`; the part is there for the time of the call too.
+        let (plugin, known, part) = unsafe {
+            let (known, part) = (OwnedKnown::read(&*known)?, OwnedKnown::read(&*part)?);
+            (object::<T>(plugin), known, part)
+        };
+        let own = known.with(|known| plugin.likelihood_of_part(known, part.data()))?;
+        // SAFETY: the caller gives a place for one likelihood.
+        unsafe { *made = handed(own.ok_or_else(Refusal::absent)?) };
+        Ok(())
+    })
+}
+
+unsafe extern "C" fn takes_stated_noise<T: Discrepancy + Authored>(
+    plugin: *mut c_void,
+    takes: *mut u8,
+    answer: *const Answer,
+) -> i32 {
+    // SAFETY: the plugin that `create` made, and a place for one mark.
+    unsafe { mark(takes, answer, || object::<T>(plugin).takes_stated_noise()) }
 }
 
 unsafe extern "C" fn stated_noise<T: Discrepancy + Authored>(

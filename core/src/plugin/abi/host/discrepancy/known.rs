@@ -2,6 +2,7 @@
 
 use std::ffi::c_void;
 
+use crate::data::Replicate;
 use crate::linalg::Matrix;
 use crate::plugin::abi::Refusal;
 use crate::plugin::abi::guard::{guard, object};
@@ -15,6 +16,10 @@ pub(super) struct HandedKnown<'a> {
     about: String,
     values: Matrix,
     measured: Vec<u8>,
+    /// The standard deviations that the replicates state; no rows where none does.
+    sd: Matrix,
+    /// The covariance that the data state; no rows where they do not.
+    covariance: Matrix,
 }
 
 static FUNCTIONS: KnownFunctions =
@@ -27,6 +32,25 @@ unsafe extern "C" fn slopes(known: *mut c_void, answer: *const Answer) -> i32 {
         out.numbers(&(known.known.slopes)()?);
         Ok(())
     })
+}
+
+/// The standard deviations that replicates state, a row of NaN where one states none; no rows where none does.
+fn stated(replicates: &[Replicate], outputs: usize) -> Result<Matrix, Refusal> {
+    let mut all = Matrix::zeros(0, outputs);
+    if replicates.iter().all(|replicate| replicate.sd.is_none()) {
+        return Ok(all);
+    }
+    let none = vec![f64::NAN; outputs];
+    for Replicate { name, sd, .. } in replicates {
+        let row = sd.as_ref().unwrap_or(&none);
+        if row.len() != outputs {
+            let found = row.len();
+            let message = format!("replicate `{name}` states the noise of {found} values");
+            return Err(Refusal::stop(format!("{message}, and the response has {outputs}")));
+        }
+        all.push_row(row);
+    }
+    Ok(all)
 }
 
 impl<'a> HandedKnown<'a> {
@@ -52,6 +76,8 @@ impl<'a> HandedKnown<'a> {
             about: serde_json::to_string(&about)?,
             values: Matrix::from_vec(replicates.len(), outputs, values),
             measured: all().map(|value| u8::from(value.is_some())).collect(),
+            sd: stated(replicates, outputs)?,
+            covariance: known.data.covariance.clone().unwrap_or_else(|| Matrix::zeros(0, outputs)),
         })
     }
 
@@ -76,6 +102,8 @@ impl<'a> HandedKnown<'a> {
             measured: self.measured.as_ptr(),
             common: common.as_ptr(),
             common_count: common.len(),
+            sd: Numbers::of(&self.sd),
+            covariance: Numbers::of(&self.covariance),
         };
         call(&raw const known)
     }

@@ -76,14 +76,14 @@ impl LoadedLikelihood {
         let new = |(replicate, row): (&Replicate, &[f64])| {
             let value = |(old, &new): (&Option<f64>, &f64)| old.map(|_| new);
             let values = replicate.values.iter().zip(row).map(value).collect();
-            Replicate::new(replicate.name.clone(), values)
+            Replicate { values, ..replicate.clone() }
         };
         let replicates: Vec<Replicate> =
             self.data.replicates.iter().zip(values.iter_rows()).map(new).collect();
         let measured: Vec<f64> =
             replicates.iter().flat_map(|r| r.values.iter().flatten().copied()).collect();
         numbers_only("simulate", &measured)?;
-        Ok(Measurements::new(self.data.layout.clone(), replicates))
+        Ok(self.data.with_replicates(replicates))
     }
 
     fn left(&self, response: &[f64], hyper: &[f64]) -> Result<Option<Vec<f64>>, Refusal> {

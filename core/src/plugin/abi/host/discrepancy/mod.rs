@@ -7,7 +7,7 @@ mod likelihood;
 use super::Plugin;
 use super::object::{Object, finite_only, numbers_only, shaped};
 use super::plugin::optional;
-use crate::data::Layout;
+use crate::data::{Layout, Measurements};
 use crate::plugin::Likelihood;
 use crate::plugin::abi::Refusal;
 use crate::plugin::abi::table::{self, DiscrepancyFunctions, Numbers, Text};
@@ -16,14 +16,15 @@ use crate::run::Stop;
 use known::HandedKnown;
 use likelihood::LoadedLikelihood;
 
+/// A place for a likelihood.
+fn nothing() -> table::Likelihood {
+    table::Likelihood { size: 0, likelihood: std::ptr::null_mut(), functions: std::ptr::null() }
+}
+
 impl Plugin<DiscrepancyFunctions> {
     fn made(&self, known: &Known<'_>) -> Result<LoadedLikelihood, Refusal> {
         let handed = HandedKnown::of(known)?;
-        let mut made = table::Likelihood {
-            size: 0,
-            likelihood: std::ptr::null_mut(),
-            functions: std::ptr::null(),
-        };
+        let mut made = nothing();
         handed.with(|known| {
             let (ask, this, to) =
                 (self.object.functions.likelihood, self.object.this, &raw mut made);
@@ -31,12 +32,41 @@ impl Plugin<DiscrepancyFunctions> {
             self.object
                 .demand("likelihood", |a| optional(ask, |f| unsafe { f(this, known, to, a) }))
         })?;
+        self.taken(&made, known.data)
+    }
+
+    fn made_of_part(
+        &self,
+        known: &Known<'_>,
+        part: &Measurements,
+    ) -> Result<Option<LoadedLikelihood>, Refusal> {
+        let Some(ask) = self.object.functions.likelihood_of_part else { return Ok(None) };
+        let of_part = Known { data: part, ..*known };
+        let (whole, less) = (HandedKnown::of(known)?, HandedKnown::of(&of_part)?);
+        let mut made = nothing();
+        let (this, to) = (self.object.this, &raw mut made);
+        let call = |whole, less, a| {
+            // SAFETY: as in `made`; the part is there until it returns too.
+            unsafe { ask(this, whole, less, to, a) }
+        };
+        let reply = whole.with(|whole| {
+            less.with(|less| self.object.ask("likelihood_of_part", |a| call(whole, less, a)))
+        })?;
+        reply.map(|_| self.taken(&made, part)).transpose()
+    }
+
+    /// The likelihood that a call made.
+    fn taken(
+        &self,
+        made: &table::Likelihood,
+        data: &Measurements,
+    ) -> Result<LoadedLikelihood, Refusal> {
         let (what, fault) = ("likelihood", self.object.fault().clone());
         // SAFETY: whoever made the likelihood gave it over with its table, a constant.
         let object = unsafe {
             Object::made(what, made.likelihood, made.functions, |table| table.destroy, fault)?
         };
-        LoadedLikelihood::new(object, known.data)
+        LoadedLikelihood::new(object, data)
     }
 
     fn noise(&self, layout: &Layout, response: &[f64]) -> Result<Option<StatedNoise>, Refusal> {
@@ -67,6 +97,22 @@ impl Plugin<DiscrepancyFunctions> {
 impl Discrepancy for Plugin<DiscrepancyFunctions> {
     fn likelihood(&self, known: &Known<'_>) -> Result<Box<dyn Likelihood>, Stop> {
         Ok(Box::new(self.object.or_stop(self.made(known))?))
+    }
+
+    fn likelihood_of_part(
+        &self,
+        known: &Known<'_>,
+        part: &Measurements,
+    ) -> Result<Option<Box<dyn Likelihood>>, Stop> {
+        let made = self.object.or_stop(self.made_of_part(known, part))?;
+        Ok(made.map(|made| -> Box<dyn Likelihood> { Box::new(made) }))
+    }
+
+    fn takes_stated_noise(&self) -> bool {
+        let (ask, this) = (self.object.functions.takes_stated_noise, self.object.this);
+        // SAFETY: the function belongs to the plugin, and the place for the mark is there until it returns.
+        let call = |to, a| optional(ask, |f| unsafe { f(this, to, a) });
+        self.object.or_fault(self.object.mark("takes_stated_noise", false, call), || false)
     }
 
     fn stated_noise(&self, layout: &Layout, response: &[f64]) -> Option<StatedNoise> {
