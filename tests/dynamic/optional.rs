@@ -101,9 +101,9 @@ fn what_a_sampler_says_of_its_starts_and_draws_is_checked() {
             "nowhere",
             "STARTS_NOWHERE",
             starts,
-            "`start_where` answers `nowhere`, expected `map`, `prior` or `sobol`",
+            "`start_where` answers no start: unknown variant `nowhere`, expected one of `map`, `prior`",
         ),
-        ("unsaid", "STARTS_UNSAID", starts, "`start_where` answers ``, expected `map`"),
+        ("unsaid", "STARTS_UNSAID", starts, "`start_where` answers no start: unknown variant ``"),
         ("odd_draws", "ODD_DRAWS", draws, "`steps_are_draws` gives 9 as mark 1 of 1"),
         ("draws_stop", "DRAWS_STOP", draws, "draws or not"),
     ] {

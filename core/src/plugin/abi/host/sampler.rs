@@ -162,10 +162,8 @@ impl Plugin<SamplerFunctions> {
         let call = |a| optional(ask, |f| unsafe { f(this, a) });
         let Some(reply) = self.object.ask("start_where", call)? else { return Ok(Start::Map) };
         let text = reply.string();
-        serde_json::from_value(text.as_str().into()).map_err(|_| {
-            let expected = "expected `map`, `prior` or `sobol`";
-            Refusal::stop(format!("`start_where` answers `{text}`, {expected}"))
-        })
+        serde_json::from_value(text.as_str().into())
+            .map_err(|error| Refusal::stop(format!("`start_where` answers no start: {error}")))
     }
 
     fn told(&self, state: &State) -> Result<Vec<Statistic>, Refusal> {
