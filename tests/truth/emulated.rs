@@ -116,9 +116,9 @@ fn calibrations(
     for i in 0..truths {
         let truth = [random.uniform(), random.uniform(), random.uniform()];
         let values = model(truth).iter().map(|y| Some(y + sd * random.normal())).collect();
-        let replicates = vec![Replicate { name: "1".into(), values }];
+        let replicates = vec![Replicate::new("1", values)];
         let layout = study.layouts.blocks[0].clone();
-        let data = Observations { blocks: vec![Measurements { layout, replicates }] };
+        let data = Observations { blocks: vec![Measurements::new(layout, replicates)] };
         let measured = learned.data.value.measured.as_mut().unwrap();
         (measured.read, measured.used, measured.likelihood) = (data.clone(), data.clone(), data);
         let known = learned.known();
@@ -126,7 +126,7 @@ fn calibrations(
         let posterior = parts.posterior(&study, &known);
         let folder = format!("truth-{i}");
         let kept =
-            calibrate::draw(&study, &posterior, &folder, &folder, &mut run, &Silent).unwrap();
+            calibrate::draw(&study, &posterior, None, &folder, &folder, &mut run, &Silent).unwrap();
         let draws = kept.value.draws.from_step(200);
         for (k, truth) in truth.iter().enumerate() {
             let sorted = moments::sorted(&draws.pooled(k));
@@ -141,9 +141,9 @@ fn calibrations(
     found
 }
 
-/// Over 60 truths, of which about half are within a tenth of an edge in some parameter.
+/// Over 40 truths, of which about half are within a tenth of an edge in some parameter.
 fn holds_the_truth(surrogate: &str) {
-    let truths = 60;
+    let truths = 40;
     let found = calibrations(front, surrogate, "", truths, 0.02);
     for (level, held) in [0.5, 0.9, 0.95_f64].iter().zip(&found.held) {
         let share = held.iter().filter(|h| **h).count() as f64 / held.len() as f64;

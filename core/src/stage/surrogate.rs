@@ -225,17 +225,15 @@ fn fit(
         facts: emulator.facts(),
     };
     let runs = emulator_error::Runs { points: &points, responses: &responses };
-    let refitted = Curves::refitted(runs, |kept, left| {
-        lesson.learn(&points, &responses, kept, left, &Silent)
-    });
+    let refitted =
+        Curves::refitted(runs, |kept, left| lesson.learn(&points, &responses, kept, left, &Silent));
     let curves = refitted.unwrap_or_else(|| Curves {
         points: points.clone(),
         errors: left_out.clone(),
         stated: None,
     });
     let stated = emulator.variance(&test_points);
-    let validated =
-        Curves { points: test_points.clone(), errors: held_out.clone(), stated };
+    let validated = Curves { points: test_points.clone(), errors: held_out.clone(), stated };
     let curves = curves.with(validated);
     let samples = stacked(&left_out, &held_out);
     let sample_points = stacked(&points, &test_points);
@@ -268,9 +266,8 @@ impl Lesson<'_> {
             responses: &responses.select_rows(kept),
         };
         let cheap = data.cheaper.as_ref().map(|cheap| {
-            let known = |point: &[f64]| {
-                left.iter().any(|&i| low_fidelity::is_same(points.row(i), point))
-            };
+            let known =
+                |point: &[f64]| left.iter().any(|&i| low_fidelity::is_same(points.row(i), point));
             let rows: Vec<usize> =
                 (0..cheap.points.rows()).filter(|&i| !known(cheap.points.row(i))).collect();
             (used.points(&cheap.points.select_rows(&rows)), cheap.responses.select_rows(&rows))

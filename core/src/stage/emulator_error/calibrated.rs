@@ -57,8 +57,7 @@ impl<'a> Judged<'a> {
             thinned(measured.len(), OUTPUTS).into_iter().map(|k| measured[k]).collect();
         let share = outputs.len() as f64 / measured.len().max(1) as f64;
         let noise: Vec<f64> = outputs.iter().map(|&j| (share * noise[j]).sqrt()).collect();
-        let mut judged =
-            Self { curves, size, places, outputs, noise, white: Matrix::zeros(0, 0) };
+        let mut judged = Self { curves, size, places, outputs, noise, white: Matrix::zeros(0, 0) };
         judged.white = judged.whitened(shapes);
         judged
     }

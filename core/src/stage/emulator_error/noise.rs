@@ -36,7 +36,8 @@ pub fn of_mean(
         } else {
             let left = measured().map(|j| (own[j].mean - part[j]).powi(2)).sum::<f64>() / count;
             let runs = errors.rows().max(1) as f64;
-            let of_emulator = measured().map(|j| square(range.start + j) / runs).sum::<f64>() / count;
+            let of_emulator =
+                measured().map(|j| square(range.start + j) / runs).sum::<f64>() / count;
             (left - of_emulator).max(LEAST * left)
         };
         let variance = |j: usize| {

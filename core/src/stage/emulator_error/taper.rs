@@ -74,11 +74,8 @@ impl Places {
         let largest = eigen.values.last().copied().unwrap_or(0.0);
         let floor = if least.is_finite() { SEEN * least } else { 0.0 };
         let floor = floor.min(0.1 * largest).max(1e-9 * largest);
-        let kept: Vec<usize> = (0..few.len())
-            .rev()
-            .take(RANK)
-            .filter(|&k| eigen.values[k] > floor)
-            .collect();
+        let kept: Vec<usize> =
+            (0..few.len()).rev().take(RANK).filter(|&k| eigen.values[k] > floor).collect();
         let directions = Matrix::from_fn(few.len(), kept.len(), |i, k| {
             eigen.vectors[(i, kept[k])] / eigen.values[kept[k]].sqrt()
         });

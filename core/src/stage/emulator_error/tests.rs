@@ -51,10 +51,8 @@ fn the_variance_is_that_of_universal_kriging() {
 
 fn layouts(outputs: usize) -> Layouts {
     let grid: Vec<f64> = (0..outputs).map(|i| i as f64).collect();
-    let axes = vec![
-        Axis::labels("sensor", ["a", "b"]),
-        Axis::grid("time", grid, Unit::dimensionless()),
-    ];
+    let axes =
+        vec![Axis::labels("sensor", ["a", "b"]), Axis::grid("time", grid, Unit::dimensionless())];
     let layout = Layout { name: "y".into(), unit: Unit::dimensionless(), axes };
     Layouts::of_scenarios([("", layout)])
 }
