@@ -3,6 +3,8 @@
 
 #[path = "truth/calibration.rs"]
 mod calibration;
+#[path = "truth/emulated.rs"]
+mod emulated;
 #[path = "truth/posteriordb/mod.rs"]
 mod posteriordb;
 #[path = "truth/posteriors.rs"]

@@ -17,7 +17,7 @@ pub fn of(
     emulator: &Matrix,
     variance: f64,
 ) -> String {
-    let whole = numerics.common_error(section).factor;
+    let whole = numerics.error_samples(section).factor;
     let (runs, outputs) = (truths.rows(), truths.columns());
     let d = numerics.points.columns();
     let (mut squares, mut widths) = (vec![Vec::new(); d], vec![Vec::new(); d]);

@@ -33,13 +33,18 @@ pub fn points(
 
 /// The derivative of each output by each parameter at [`point`], per standard deviation of the prior.
 pub fn slopes(study: &Study, data: &Observations, forward: &dyn Forward) -> Result<Matrix, Stop> {
-    let jacobian = forward.jacobian(&point(study, data, forward)?);
+    Ok(standard_slopes(study, forward, &point(study, data, forward)?))
+}
+
+/// The derivative of each output by each parameter at a point, per standard deviation of the prior.
+pub fn standard_slopes(study: &Study, forward: &dyn Forward, point: &[f64]) -> Matrix {
+    let jacobian = forward.jacobian(point);
     let sd: Vec<f64> = study.parameters.iter().map(|p| scale(&p.prior)).collect();
-    Ok(Matrix::from_fn(jacobian.rows(), jacobian.columns(), |i, j| jacobian[(i, j)] * sd[j]))
+    Matrix::from_fn(jacobian.rows(), jacobian.columns(), |i, j| jacobian[(i, j)] * sd[j])
 }
 
 /// The standard deviation of a law, or a quarter of the range of its middle 95 % where it has none.
-fn scale(law: &Distribution) -> f64 {
+pub fn scale(law: &Distribution) -> f64 {
     let sd = law.variance().sqrt();
     if sd.is_finite() { sd } else { 0.25 * (law.quantile(0.975) - law.quantile(0.025)) }
 }

@@ -162,7 +162,7 @@ fn at(
 }
 
 /// Whether two points are one, but for what is lost when numbers are written with nine digits.
-fn is_same(a: &[f64], b: &[f64]) -> bool {
+pub fn is_same(a: &[f64], b: &[f64]) -> bool {
     a.iter().zip(b).all(|(x, y)| (x - y).abs() <= 1e-9 * x.abs().max(y.abs()))
 }
 

@@ -10,6 +10,7 @@ pub mod curves;
 pub mod derived;
 pub mod design;
 pub mod direct;
+pub mod emulator_error;
 pub mod evidence;
 pub mod fidelity;
 pub mod gap;

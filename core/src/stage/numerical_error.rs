@@ -10,19 +10,20 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::data::{Ensemble, Parameter};
+use crate::data::{Ensemble, Observations, Parameter};
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::math::moments;
 use crate::plugin::discrepancy::CommonError;
 use crate::plugin::surrogate::FitError;
-use crate::plugin::{Emulator, Fact};
+use crate::plugin::{Emulator, Fact, Forward};
 use crate::run::arrays::{self, Array};
 use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
 use crate::study::Study;
 use crate::study::fidelity::NumericalError as Asked;
 use crate::study::file::NumericalErrorSection;
 
+use super::emulator_error::{self, Curves};
 use super::fidelity::{Combined, Coverage, Difference, Lesson, Rule, Source, Verdict, cover};
 use super::idle::Used;
 use super::read::{self, Data, Runs};
@@ -89,25 +90,43 @@ impl Artifact for NumericalError {
 }
 
 impl NumericalError {
-    /// The covariance of what is not known of the numerical error, `whole` being the whole error over a difference.
+    /// The covariance of what is not known of the numerical error, as these data meet it
+    /// ([`emulator_error`]).
+    pub fn common_error(
+        &self,
+        study: &Study,
+        section: &NumericalErrorSection,
+        data: &Observations,
+        forward: &dyn Forward,
+    ) -> Result<CommonError, Stop> {
+        let (errors, beyond) = self.unknown(section);
+        let curves = Curves { points: self.points.clone(), errors, stated: None };
+        let own = emulator_error::factor(study, &curves, data, forward)?;
+        Ok(common(joined(&own, &over_root(&beyond))))
+    }
+
+    /// Samples of what is not known, one a column, over the root of their number.
+    pub fn error_samples(&self, section: &NumericalErrorSection) -> CommonError {
+        let (errors, beyond) = self.unknown(section);
+        common(joined(&over_root(&errors), &over_root(&beyond)))
+    }
+
+    /// Curves of what is not known, one a row, `whole` being the whole error over a difference.
     ///
-    /// Where the differences are predicted it is `whole` times the errors of the prediction at runs left out, and
-    /// the share `extrapolation` of what lies beyond the finer runs; elsewhere `whole` times the differences, their mean square
-    /// about zero, since all of them may lie on one side.
-    pub fn common_error(&self, section: &NumericalErrorSection) -> CommonError {
+    /// Where the differences are predicted they are `whole` times the errors of the prediction at runs left out, and
+    /// the share `extrapolation` of what lies beyond the finer runs; elsewhere `whole` times the differences, whose mean
+    /// square is about zero, since all of them may lie on one side.
+    fn unknown(&self, section: &NumericalErrorSection) -> (Matrix, Matrix) {
         let d = &self.differences;
         let (runs, outputs) = (d.rows(), d.columns());
-        let ([whole, share], root) = (section.scales(), (runs as f64).sqrt());
+        let [whole, share] = section.scales();
         let predicted = |j: usize| self.prediction.as_ref().is_some_and(|p| p.corrects(j));
+        let known = self.prediction.as_ref().map_or(d, |prediction| &prediction.residuals);
+        let errors = Matrix::from_fn(runs, outputs, |i, j| whole * known[(i, j)]);
         let beyond = if (0..outputs).any(predicted) { (whole - 1.0) * share } else { 0.0 };
-        let columns = if beyond > 0.0 { 2 * runs } else { runs };
-        let factor = Matrix::from_fn(outputs, columns, |j, k| match &self.prediction {
-            Some(_) if k >= runs && !predicted(j) => 0.0,
-            Some(_) if k >= runs => beyond * d[(k - runs, j)] / root,
-            Some(prediction) => whole * prediction.residuals[(k, j)] / root,
-            None => whole * d[(k, j)] / root,
-        });
-        CommonError { origin: "numerics".to_owned(), factor, predictive: true }
+        let rows = if beyond > 0.0 { runs } else { 0 };
+        let extrapolated = |i: usize, j: usize| if predicted(j) { beyond * d[(i, j)] } else { 0.0 };
+        (errors, Matrix::from_fn(rows, outputs, extrapolated))
     }
 
     /// The study's emulator with the predicted numerical error added; `None` where none is predicted.
@@ -153,6 +172,23 @@ impl NumericalError {
     pub fn rms(&self) -> f64 {
         rms(&self.differences)
     }
+}
+
+fn common(factor: Matrix) -> CommonError {
+    CommonError { origin: "numerics".to_owned(), factor, predictive: true }
+}
+
+/// Curves as columns, over the root of their number.
+fn over_root(curves: &Matrix) -> Matrix {
+    let root = (curves.rows() as f64).sqrt();
+    Matrix::from_fn(curves.columns(), curves.rows(), |j, k| curves[(k, j)] / root)
+}
+
+/// The columns of two matrices.
+fn joined(a: &Matrix, b: &Matrix) -> Matrix {
+    Matrix::from_fn(a.rows(), a.columns() + b.columns(), |j, k| {
+        if k < a.columns() { a[(j, k)] } else { b[(j, k - a.columns())] }
+    })
 }
 
 fn rms(matrix: &Matrix) -> f64 {

@@ -6,15 +6,16 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use crate::data::{Ensemble, Parameter};
-use crate::linalg::{self, Matrix};
+use crate::linalg::Matrix;
 use crate::plugin::discrepancy::CommonError;
 use crate::plugin::surrogate::Training;
 use crate::plugin::{Emulator, Fact};
 use crate::run::arrays::{self, Array};
-use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Stop, files};
+use crate::run::{Artifact, Kept, Observer, Progress, RunDirectory, Silent, Stop, files};
 use crate::study::Study;
 use crate::study::file::InvalidRuns;
 
+use super::emulator_error::{self, Curves, rows_near_prior};
 use super::idle::Used;
 use super::low_fidelity;
 use super::read::Data;
@@ -31,6 +32,9 @@ pub struct Fitted {
     pub samples: Matrix,
     /// The parameters of those runs.
     pub sample_points: Matrix,
+    /// The errors that the likelihood allows for: at training runs those of emulators that were fitted without the run, where
+    /// that is feasible, else the same.
+    pub curves: Curves,
 }
 
 /// Errors of an emulator.
@@ -63,21 +67,32 @@ impl Artifact for Fitted {
     fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
         files::write_atomic(&folder.join("emulator.bin"), &self.bytes)?;
         files::write_json(&folder.join("errors.json"), &self.errors)?;
-        let arrays = [
+        let curves = &self.curves;
+        let mut arrays = vec![
             Array::matrix("samples", "run", "output", &self.samples),
             Array::matrix("points", "run", "parameter", &self.sample_points),
+            Array::matrix("left_out", "run", "output", &curves.errors),
         ];
+        let stated = curves.stated.as_ref();
+        arrays.extend(stated.map(|s| Array::matrix("left_out_variance", "run", "output", s)));
         arrays::write(&folder.join("errors.nc"), &[], &arrays)?;
         Ok(["emulator.bin", "errors.json", "errors.nc"].map(str::to_owned).to_vec())
     }
 
     fn load(folder: &Path) -> Result<Self, Stop> {
         let path = folder.join("errors.nc");
+        let sample_points = arrays::read(&path, "points")?.into_matrix();
+        let curves = Curves {
+            points: sample_points.clone(),
+            errors: arrays::read(&path, "left_out")?.into_matrix(),
+            stated: arrays::read(&path, "left_out_variance").ok().map(Array::into_matrix),
+        };
         Ok(Self {
             bytes: files::read(&folder.join("emulator.bin"))?,
             errors: files::read_json(&folder.join("errors.json"))?,
             samples: arrays::read(&path, "samples")?.into_matrix(),
-            sample_points: arrays::read(&path, "points")?.into_matrix(),
+            sample_points,
+            curves,
         })
     }
 }
@@ -187,18 +202,9 @@ fn fit(
     let ensemble = data.runs()?;
     let points = ensemble.points.select_rows(&fitting.training);
     let responses = ensemble.responses.select_rows(&fitting.training);
-    let runs = Training {
-        parameters: &used.parameters(fitting.parameters),
-        layouts: &study.layouts,
-        points: &used.points(&points),
-        responses: &responses,
-    };
-    let progress = Progress::new(observer);
-    let cheap = data.cheaper.as_ref().map(|cheap| (used.points(&cheap.points), &cheap.responses));
-    let cheap = cheap.as_ref().map(|(points, responses)| (points, *responses));
-    let wide = used.parameters(&study.parameters);
-    let emulator = low_fidelity::fit(study, &runs, cheap, &wide, &progress)?;
-    let emulator = used.clone().widen(emulator);
+    let lesson = Lesson { study, data, fitting, used };
+    let rows: Vec<usize> = (0..points.rows()).collect();
+    let emulator = lesson.learn(&points, &responses, &rows, &[], observer)?;
     let test_points = ensemble.points.select_rows(&fitting.validation);
     let simulated = ensemble.responses.select_rows(&fitting.validation);
     let emulated = emulator.mean(&test_points);
@@ -218,9 +224,60 @@ fn fit(
         inflation: inflation(&*emulator, &test_points, &held_out),
         facts: emulator.facts(),
     };
+    let runs = emulator_error::Runs { points: &points, responses: &responses };
+    let refitted =
+        Curves::refitted(runs, |kept, left| lesson.learn(&points, &responses, kept, left, &Silent));
+    let curves = refitted.unwrap_or_else(|| Curves {
+        points: points.clone(),
+        errors: left_out.clone(),
+        stated: None,
+    });
+    let stated = emulator.variance(&test_points);
+    let validated = Curves { points: test_points.clone(), errors: held_out.clone(), stated };
+    let curves = curves.with(validated);
     let samples = stacked(&left_out, &held_out);
     let sample_points = stacked(&points, &test_points);
-    Ok(Fitted { bytes: emulator.save()?, errors, samples, sample_points })
+    Ok(Fitted { bytes: emulator.save()?, errors, samples, sample_points, curves })
+}
+
+/// What an emulator of the study is fitted to.
+struct Lesson<'a> {
+    study: &'a Study,
+    data: &'a Data,
+    fitting: &'a Fitting<'a>,
+    used: &'a Used,
+}
+
+impl Lesson<'_> {
+    /// The emulator of some of these runs. Cheaper runs at the parameters of those that are left out are left out too.
+    fn learn(
+        &self,
+        points: &Matrix,
+        responses: &Matrix,
+        kept: &[usize],
+        left: &[usize],
+        observer: &dyn Observer,
+    ) -> Result<Box<dyn Emulator>, Stop> {
+        let Self { study, data, fitting, used } = *self;
+        let runs = Training {
+            parameters: &used.parameters(fitting.parameters),
+            layouts: &study.layouts,
+            points: &used.points(&points.select_rows(kept)),
+            responses: &responses.select_rows(kept),
+        };
+        let cheap = data.cheaper.as_ref().map(|cheap| {
+            let known =
+                |point: &[f64]| left.iter().any(|&i| low_fidelity::is_same(points.row(i), point));
+            let rows: Vec<usize> =
+                (0..cheap.points.rows()).filter(|&i| !known(cheap.points.row(i))).collect();
+            (used.points(&cheap.points.select_rows(&rows)), cheap.responses.select_rows(&rows))
+        });
+        let cheap = cheap.as_ref().map(|(points, responses)| (points, responses));
+        let wide = used.parameters(&study.parameters);
+        let progress = Progress::new(observer);
+        let emulator = low_fidelity::fit(study, &runs, cheap, &wide, &progress)?;
+        Ok(used.clone().widen(emulator))
+    }
 }
 
 fn inflation(emulator: &dyn Emulator, points: &Matrix, errors: &Matrix) -> Option<f64> {
@@ -287,23 +344,14 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
     if count > 0.0 { sum / count } else { 0.0 }
 }
 
-/// How many runs inside the prior are enough to learn the emulator's error from them alone.
-const ENOUGH: usize = 50;
-
 impl Fitted {
     /// The errors at the runs inside the prior's support, or at all runs when those are fewer than fifty.
     pub fn errors_near_prior(&self, study: &Study) -> Matrix {
-        let inside = |point: &[f64]| {
-            let prior = study.parameters.iter().zip(point);
-            prior.into_iter().all(|(p, &x)| p.prior.log_density(x).is_finite())
-        };
-        let near: Vec<usize> =
-            (0..self.samples.rows()).filter(|&i| inside(self.sample_points.row(i))).collect();
-        if near.len() >= ENOUGH { self.samples.select_rows(&near) } else { self.samples.clone() }
+        self.samples.select_rows(&rows_near_prior(study, &self.sample_points))
     }
 
     /// The emulator's errors near the prior as samples: one a column, over the root of their number. They have the size that an
-    /// emulator states of itself, as in [`Fitted::covariance`].
+    /// emulator states of itself at the point where the data are fitted best.
     pub fn error_samples(&self, study: &Study, stated: Option<&[f64]>) -> CommonError {
         let mut errors = self.errors_near_prior(study);
         if let Some(stated) = stated {
@@ -313,33 +361,6 @@ impl Fitted {
         let factor =
             Matrix::from_fn(errors.columns(), errors.rows(), |i, k| errors[(k, i)] / scale);
         CommonError { origin: "emulator".to_owned(), factor, predictive: true }
-    }
-
-    /// The covariance of the emulator's error as a low-rank factor that carries 99.9 % of its variance.
-    ///
-    /// Each run's error curve is one sample of the error, which is common to all replicates and correlated
-    /// between outputs; the covariance is their mean square about zero. An emulator that knows its own variance
-    /// passes it as `stated`, at the point where the data are fitted best: then the runs tell how the
-    /// errors of the outputs go together, and the variance how large they are there.
-    pub fn covariance(&self, study: &Study, stated: Option<&[f64]>) -> Result<CommonError, Stop> {
-        let mut errors = self.errors_near_prior(study);
-        if let Some(stated) = stated {
-            rescale(&mut errors, stated, self.errors.inflation.map_or(1.0, |r| r.max(1.0)));
-        }
-        let svd = linalg::thin_svd(&errors)
-            .map_err(|e| Stop::new(format!("the covariance of the emulator's error: {e}")))?;
-        let total: f64 = svd.values.iter().map(|s| s * s).sum();
-        let mut sum = 0.0;
-        let rank = svd.values.iter().take_while(|&s| {
-            let before = sum;
-            sum += s * s;
-            before < 0.999 * total
-        });
-        let rank = rank.count();
-        let scale = (errors.rows() as f64).sqrt();
-        let factor =
-            Matrix::from_fn(errors.columns(), rank, |i, k| svd.v[(i, k)] * svd.values[k] / scale);
-        Ok(CommonError { origin: "emulator".to_owned(), factor, predictive: true })
     }
 }
 

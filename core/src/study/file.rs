@@ -233,8 +233,8 @@ impl Refine {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct DiscrepancyKeys {
-    /// Whether the emulator's own error is part of the likelihood: a covariance estimated from the leave-one-out
-    /// errors, common to all replicates and correlated between outputs.
+    /// Whether the emulator's own error is part of the likelihood: a covariance, common to all replicates and correlated
+    /// between outputs, estimated from its errors at runs that were left out of the fit.
     pub emulator_error: bool,
     /// Whether what the points of a replicate share (its gain, its timing) is part of the likelihood: a covariance
     /// of the mean curve estimated from the replicates. Without it all points count as independent.

@@ -278,7 +278,7 @@ impl<'a> Base<'a> {
             all.push(fitted.value.error_samples(study, stated.as_deref()));
         }
         if let (Some(kept), Some(section)) = (known.numerics, &study.numerical_error) {
-            all.push(kept.value.common_error(&section.written));
+            all.push(kept.value.error_samples(&section.written));
         }
         all.extend(wide.iter().flat_map(|wide| wide.common.iter().cloned()));
         Ok(all)

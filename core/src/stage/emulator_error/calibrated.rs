@@ -1,0 +1,192 @@
+//! By what the covariance of the error is enlarged until the shifts of the parameters have the size that it states.
+
+use crate::linalg::vector::dot;
+use crate::linalg::{Cholesky, Matrix, multiply_transposed, transposed_multiply};
+
+use super::size::Size;
+use super::taper::Places;
+use super::{Curves, ranges, thinned};
+
+/// So many outputs stand for all, and so many curves.
+const OUTPUTS: usize = 100;
+const CURVES: usize = 100;
+
+/// Up to this number of curves each is left out alone, beyond it in ten parts.
+const ALONE: usize = 30;
+const PARTS: usize = 10;
+
+/// The factors between which the right one is looked for.
+const FACTORS: [f64; 9] = [1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0, 8.0];
+
+/// With fewer curves nothing can be left out.
+const FEWEST: usize = 4;
+
+/// Some outputs and curves, in units of the noise of the data.
+pub struct Judged<'a> {
+    curves: &'a Curves,
+    size: &'a Size,
+    places: &'a Places,
+    outputs: Vec<usize>,
+    /// The root of the variance of what was measured, by chosen output.
+    noise: Vec<f64>,
+    /// The curves divided by their sizes and the noise, at the chosen outputs.
+    white: Matrix,
+}
+
+/// An estimate of the parameters, in widths of their priors, from data with noise of unit variance and an error.
+pub struct Estimate {
+    /// Its covariance as the likelihood states it.
+    pub precision: Cholesky,
+    /// What the data are multiplied by, `parameters x outputs`.
+    pub gain: Matrix,
+}
+
+impl<'a> Judged<'a> {
+    /// `shapes` are the curves divided by their sizes, `noise` the variances of what was measured, NaN where nothing was.
+    ///
+    /// Fewer outputs tell less than all: their noise is so much smaller.
+    pub fn of(
+        curves: &'a Curves,
+        shapes: &Matrix,
+        size: &'a Size,
+        places: &'a Places,
+        noise: &[f64],
+    ) -> Self {
+        let measured: Vec<usize> = (0..noise.len()).filter(|&j| !noise[j].is_nan()).collect();
+        let outputs: Vec<usize> =
+            thinned(measured.len(), OUTPUTS).into_iter().map(|k| measured[k]).collect();
+        let share = outputs.len() as f64 / measured.len().max(1) as f64;
+        let noise: Vec<f64> = outputs.iter().map(|&j| (share * noise[j]).sqrt()).collect();
+        let mut judged = Self { curves, size, places, outputs, noise, white: Matrix::zeros(0, 0) };
+        judged.white = judged.whitened(shapes);
+        judged
+    }
+
+    fn whitened(&self, curves: &Matrix) -> Matrix {
+        Matrix::from_fn(curves.rows(), self.outputs.len(), |i, k| {
+            curves[(i, self.outputs[k])] / self.noise[k]
+        })
+    }
+
+    /// The derivatives by the parameters at the chosen outputs.
+    pub fn slopes(&self, slopes: &Matrix) -> Matrix {
+        Matrix::from_fn(self.outputs.len(), slopes.columns(), |k, p| {
+            slopes[(self.outputs[k], p)] / self.noise[k]
+        })
+    }
+
+    /// The damped mean square of curves at the chosen outputs.
+    pub fn covariance(&self, curves: &Matrix) -> Matrix {
+        self.damped(&self.whitened(curves))
+    }
+
+    fn damped(&self, white: &Matrix) -> Matrix {
+        let products = transposed_multiply(white, white);
+        let count = white.rows().max(1) as f64;
+        Matrix::from_fn(self.outputs.len(), self.outputs.len(), |i, j| {
+            products[(i, j)] / count * self.places.damping(self.outputs[i], self.outputs[j])
+        })
+    }
+
+    /// The factor on the error at which the mean square of the shifts of the parameters, over their covariance in the posterior, is
+    /// one: each curve with the noise is the difference between the data and the emulator of a run, whose parameters are
+    /// the truth; the other curves tell the covariance. The truth may be anywhere, and emulators are worst at the edges of their
+    /// runs: where the half of the runs that is nearest to them asks for a larger factor, it is theirs. `slopes` gives the
+    /// derivatives of the outputs by the parameters, in widths of their priors.
+    ///
+    /// Few curves know the covariance of as many parameters badly: for that the factor is enlarged by
+    /// `sqrt((n - 1) / (n - p - 2))` (Hartlap, Simon and Schneider, Astronomy and Astrophysics 464 (2007) 399; Sellentin and
+    /// Heavens, Monthly Notices of the Royal Astronomical Society 456 (2016) L132).
+    pub fn factor(&self, slopes: &dyn Fn(&[f64]) -> Matrix) -> f64 {
+        let (curves, parameters) = (self.white.rows(), self.curves.points.columns());
+        if curves < 2 || self.white.as_slice().iter().all(|e| *e == 0.0) {
+            return 1.0;
+        }
+        let few = (curves as f64 - 1.0) / (curves as f64 - parameters as f64 - 2.0).max(1.0);
+        let own = if curves < FEWEST { 1.0 } else { self.enlarged(slopes) };
+        own * few.sqrt()
+    }
+
+    fn enlarged(&self, slopes: &dyn Fn(&[f64]) -> Matrix) -> f64 {
+        let count = self.white.rows();
+        let parts = if count <= ALONE { count } else { PARTS };
+        let judged = thinned(count, CURVES);
+        let slopes: Vec<Matrix> =
+            judged.iter().map(|&i| self.slopes(&slopes(self.curves.points.row(i)))).collect();
+        let mut squares = vec![[0.0; FACTORS.len()]; judged.len()];
+        for part in 0..parts {
+            let others: Vec<usize> = (0..count).filter(|i| i % parts != part).collect();
+            let shape = self.damped(&self.white.select_rows(&others));
+            for (k, &i) in judged.iter().enumerate().filter(|(_, i)| *i % parts == part) {
+                squares[k] = FACTORS.map(|factor| self.square(i, &shape, factor, &slopes[k]));
+            }
+        }
+        let outer = outer(&self.curves.points.select_rows(&judged));
+        let near_edges = outer.iter().map(|&k| squares[k]).collect::<Vec<_>>();
+        crossing(&means(&squares)).max(crossing(&means(&near_edges)))
+    }
+
+    /// The expected square of the shift that a curve causes under a covariance times the square of a factor.
+    fn square(&self, curve: usize, shape: &Matrix, factor: f64, slopes: &Matrix) -> f64 {
+        let size = self.size.at_curves[curve];
+        let error: Vec<f64> = self.white.row(curve).iter().map(|e| e * size).collect();
+        Estimate::of(shape, (factor * size).powi(2), slopes)
+            .map_or(0.0, |estimate| estimate.square(&error))
+    }
+}
+
+/// The half of some points with a coordinate nearest to an end of its range.
+fn outer(points: &Matrix) -> Vec<usize> {
+    let ranges = ranges(points);
+    let off = |i: usize| {
+        let each = points.row(i).iter().zip(&ranges);
+        each.map(|(x, (low, high))| ((x - low) / (high - low) - 0.5).abs()).fold(0.0, f64::max)
+    };
+    let mut order: Vec<usize> = (0..points.rows()).collect();
+    order.sort_by(|&a, &b| off(b).total_cmp(&off(a)));
+    order.truncate(points.rows().div_ceil(2));
+    order.sort_unstable();
+    order
+}
+
+fn means(squares: &[[f64; FACTORS.len()]]) -> [f64; FACTORS.len()] {
+    std::array::from_fn(|f| squares.iter().map(|s| s[f]).sum::<f64>() / squares.len().max(1) as f64)
+}
+
+/// Where the mean square falls to one, between the factors that were tried.
+fn crossing(means: &[f64; FACTORS.len()]) -> f64 {
+    let Some(after) = means.iter().position(|square| *square <= 1.0) else {
+        return FACTORS[FACTORS.len() - 1];
+    };
+    let Some(before) = after.checked_sub(1) else { return FACTORS[0] };
+    let share = (means[before] - 1.0) / (means[before] - means[after]);
+    FACTORS[before] + share * (FACTORS[after] - FACTORS[before])
+}
+
+impl Estimate {
+    /// By generalised least squares with the prior, under an error of a covariance times a number; `None` where that is no covariance.
+    pub fn of(covariance: &Matrix, scale: f64, slopes: &Matrix) -> Option<Self> {
+        let whole = Matrix::from_fn(covariance.rows(), covariance.columns(), |i, j| {
+            scale * covariance[(i, j)] + f64::from(u8::from(i == j))
+        });
+        let solved = Cholesky::new(&whole).ok()?.solve_matrix(slopes);
+        let mut precision = transposed_multiply(slopes, &solved);
+        (0..precision.rows()).for_each(|k| precision[(k, k)] += 1.0);
+        let precision = Cholesky::new(&precision).ok()?;
+        let gain = multiply_transposed(&precision.inverse(), &solved);
+        Some(Self { precision, gain })
+    }
+
+    /// The expected square of the shift that an error and the noise cause, over its covariance and the number of parameters.
+    fn square(&self, error: &[f64]) -> f64 {
+        // With precision L L' the square of a shift d is |L' d|^2.
+        let half = |shift: &[f64]| {
+            let lower = self.precision.lower();
+            let turned = |k: usize| (k..shift.len()).map(|i| lower[(i, k)] * shift[i]).sum::<f64>();
+            (0..shift.len()).map(|k| turned(k).powi(2)).sum::<f64>()
+        };
+        let shift: Vec<f64> = self.gain.iter_rows().map(|row| dot(row, error)).collect();
+        let of_noise: f64 = (0..self.gain.columns()).map(|j| half(&self.gain.column(j))).sum();
+        (half(&shift) + of_noise) / shift.len().max(1) as f64
+    }
+}

@@ -1,0 +1,80 @@
+//! Where the data put the parameters, before the error is known well.
+
+use crate::linalg::vector::dot;
+use crate::linalg::{Cholesky, Matrix, multiply, multiply_transposed};
+use crate::math::random::normal;
+use crate::plugin::Forward;
+use crate::run::Stop;
+use crate::stage::{best_fit, stream};
+use crate::study::Study;
+
+use super::calibrated::{Estimate, Judged};
+use super::size::Size;
+
+/// So many points stand for where the parameters may be.
+const POINTS: usize = 64;
+
+/// The normal law of the least-squares estimate about its best fit.
+pub struct Pilot<'a> {
+    pub study: &'a Study,
+    pub forward: &'a dyn Forward,
+    /// The best fit.
+    pub best: &'a [f64],
+    /// The derivatives of the outputs there, by parameter in widths of the prior.
+    pub slopes: &'a Matrix,
+}
+
+impl Pilot<'_> {
+    /// The root mean square size of the error over the law, for an error of this covariance at the judged outputs.
+    ///
+    /// The estimate is that of ordinary least squares, whose covariance `G (I + S) G'` holds whatever its weights: it trusts no
+    /// direction more for what `S` says.
+    pub fn size(&self, judged: &Judged<'_>, even: &Matrix, size: &Size) -> Result<f64, Stop> {
+        let points = self.points(judged, even)?;
+        let values = size.values(self.forward, &points).unwrap_or_default();
+        let finite: Vec<f64> = values.into_iter().filter(|s| s.is_finite()).collect();
+        let square = finite.iter().map(|s| s * s).sum::<f64>() / finite.len().max(1) as f64;
+        Ok(if square > 0.0 { square.sqrt() } else { 1.0 })
+    }
+
+    /// Points inside the prior's support, the best fit first.
+    fn points(&self, judged: &Judged<'_>, even: &Matrix) -> Result<Matrix, Stop> {
+        let slopes = judged.slopes(self.slopes);
+        let mut points = Matrix::from_rows(self.best.len(), [self.best]);
+        let none = Matrix::zeros(even.rows(), even.rows());
+        let Some(estimate) = Estimate::of(&none, 1.0, &slopes) else { return Ok(points) };
+        let gain = &estimate.gain;
+        let own = multiply_transposed(gain, gain);
+        let of_error = multiply_transposed(&multiply(gain, even), gain);
+        let covariance = Matrix::from_fn(own.rows(), own.columns(), |i, j| {
+            let least = if i == j { 1e-12 } else { 0.0 };
+            own[(i, j)] + of_error[(i, j)] + least
+        });
+        let Ok(root) = Cholesky::new(&covariance) else { return Ok(points) };
+        let widths: Vec<f64> =
+            self.study.parameters.iter().map(|p| best_fit::scale(&p.prior)).collect();
+        let mut rng = stream(self.study, "emulator-error").generator();
+        for _ in 0..20 * POINTS {
+            let white: Vec<f64> = self.best.iter().map(|_| normal(&mut rng)).collect();
+            let moved = (0..white.len()).map(|k| dot(&root.lower().row(k)[..=k], &white[..=k]));
+            let point: Vec<f64> = self
+                .best
+                .iter()
+                .zip(moved)
+                .zip(&widths)
+                .zip(&self.study.parameters)
+                .map(|(((best, moved), width), p)| {
+                    let x = best + moved * width;
+                    if p.prior.log_density(x).is_finite() { x } else { f64::NAN }
+                })
+                .collect();
+            if point.iter().all(|x| x.is_finite()) {
+                points.push_row(&point);
+            }
+            if points.rows() == POINTS {
+                break;
+            }
+        }
+        Ok(points)
+    }
+}
