@@ -352,7 +352,7 @@ fn focused_shifts_over_what_is_allowed() {
         println!("{}: {}", fact.name, fact.value);
     }
     let variance = *calibrated.outcome.map.last().unwrap() / 18.0;
-    let emulator = learned.fitted.value.covariance(&study, None).unwrap().factor;
+    let emulator = learned.fitted.value.error_samples(&study, None).factor;
     let numerics = &learned.numerics.as_ref().unwrap().value;
     let truths = &finest.numerics.as_ref().unwrap().value.differences;
     let section = &study.numerical_error.as_ref().unwrap().written;

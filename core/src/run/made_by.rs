@@ -182,7 +182,7 @@ mod tests {
             ("1-design", Depends::OnNothing),
             ("2-simulate-finer", Depends::OnRevisions(1)),
             ("5-refine-2-simulate", Depends::OnRevisions(1)),
-            ("7-gap-read-surrogate", Depends::OnVersion(1)),
+            ("7-gap-read-surrogate", Depends::OnVersion(2)),
             ("6-unheard_of", Depends::OnVersion(1)),
         ] {
             assert_eq!(depends(folder), on, "{folder}");

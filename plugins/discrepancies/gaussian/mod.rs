@@ -105,6 +105,9 @@ impl Discrepancy for Gaussian {
         part: &Measurements,
     ) -> Result<Option<Box<dyn Likelihood>>, Stop> {
         let known_part = Known { data: part, ..*known };
+        if stated::is_needed(self, known.data) {
+            return Ok(Some(Box::new(StatedLikelihood::new(self, &known_part)?)));
+        }
         let likelihood = GaussianLikelihood::under(self, &known_part, known.data)?;
         Ok(Some(Box::new(likelihood)))
     }

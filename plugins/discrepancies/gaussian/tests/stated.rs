@@ -98,6 +98,22 @@ fn equals_the_normal_density_written_out() {
     }
 }
 
+/// What is left when a replicate is taken away has the same law.
+#[test]
+fn a_part_has_the_density_written_out() {
+    let error = [common(5)];
+    let response: Vec<f64> = (0..OUTPUTS).map(|i| 0.1 * i as f64).collect();
+    for whole in [with_sigma(9, false), with_sigma(9, true), with_covariance(9)] {
+        let chosen: Gaussian = options("gaussian", FIXED).unwrap();
+        let mut part = whole.clone();
+        part.replicates[1].values.fill(None);
+        let known = Known::without_slopes(&whole, &error);
+        let likelihood = chosen.likelihood_of_part(&known, &part).unwrap().unwrap();
+        let expected = written_out(&part, &error, &response, (1.0, 0.4));
+        close(likelihood.log_likelihood(&response, &[]), expected, 1e-10);
+    }
+}
+
 /// Each value given all others, by leaving it out of the data.
 #[test]
 fn values_left_out_have_their_conditional_densities() {
