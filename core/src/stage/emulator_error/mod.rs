@@ -66,13 +66,12 @@ pub fn factor(
     let judged = Judged::of(curves, &shapes, &size, &places, &noise);
     let slopes = |point: &[f64]| best_fit::standard_slopes(study, forward, point);
     let factor = judged.factor(&slopes);
-    let there = match size.varies() {
-        true => {
-            let even = judged.covariance(&curves.errors);
-            let slopes = slopes(&best);
-            Pilot { study, forward, best: &best, slopes: &slopes }.size(&judged, &even, &size)?
-        }
-        false => 1.0,
+    let there = if size.varies() {
+        let even = judged.covariance(&curves.errors);
+        let slopes = slopes(&best);
+        Pilot { study, forward, best: &best, slopes: &slopes }.size(&judged, &even, &size)
+    } else {
+        1.0
     };
     places.factor(&scaled(&shapes, there * factor), &noise)
 }

@@ -4,7 +4,6 @@ use crate::linalg::vector::dot;
 use crate::linalg::{Cholesky, Matrix, multiply, multiply_transposed};
 use crate::math::random::normal;
 use crate::plugin::Forward;
-use crate::run::Stop;
 use crate::stage::{best_fit, stream};
 use crate::study::Study;
 
@@ -29,20 +28,20 @@ impl Pilot<'_> {
     ///
     /// The estimate is that of ordinary least squares, whose covariance `G (I + S) G'` holds whatever its weights: it trusts no
     /// direction more for what `S` says.
-    pub fn size(&self, judged: &Judged<'_>, even: &Matrix, size: &Size) -> Result<f64, Stop> {
-        let points = self.points(judged, even)?;
+    pub fn size(&self, judged: &Judged<'_>, even: &Matrix, size: &Size) -> f64 {
+        let points = self.points(judged, even);
         let values = size.values(self.forward, &points).unwrap_or_default();
         let finite: Vec<f64> = values.into_iter().filter(|s| s.is_finite()).collect();
         let square = finite.iter().map(|s| s * s).sum::<f64>() / finite.len().max(1) as f64;
-        Ok(if square > 0.0 { square.sqrt() } else { 1.0 })
+        if square > 0.0 { square.sqrt() } else { 1.0 }
     }
 
     /// Points inside the prior's support, the best fit first.
-    fn points(&self, judged: &Judged<'_>, even: &Matrix) -> Result<Matrix, Stop> {
+    fn points(&self, judged: &Judged<'_>, even: &Matrix) -> Matrix {
         let slopes = judged.slopes(self.slopes);
         let mut points = Matrix::from_rows(self.best.len(), [self.best]);
         let none = Matrix::zeros(even.rows(), even.rows());
-        let Some(estimate) = Estimate::of(&none, 1.0, &slopes) else { return Ok(points) };
+        let Some(estimate) = Estimate::of(&none, 1.0, &slopes) else { return points };
         let gain = &estimate.gain;
         let own = multiply_transposed(gain, gain);
         let of_error = multiply_transposed(&multiply(gain, even), gain);
@@ -50,7 +49,7 @@ impl Pilot<'_> {
             let least = if i == j { 1e-12 } else { 0.0 };
             own[(i, j)] + of_error[(i, j)] + least
         });
-        let Ok(root) = Cholesky::new(&covariance) else { return Ok(points) };
+        let Ok(root) = Cholesky::new(&covariance) else { return points };
         let widths: Vec<f64> =
             self.study.parameters.iter().map(|p| best_fit::scale(&p.prior)).collect();
         let mut rng = stream(self.study, "emulator-error").generator();
@@ -75,6 +74,6 @@ impl Pilot<'_> {
                 break;
             }
         }
-        Ok(points)
+        points
     }
 }

@@ -147,7 +147,9 @@ fn sizes(errors: &Matrix) -> Vec<f64> {
         };
         sizes = errors.iter_rows().map(|row| square(row).sqrt()).collect();
         let least = 1e-3 * sizes.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-        sizes.iter_mut().for_each(|q| *q = q.max(least));
+        for q in &mut sizes {
+            *q = q.max(least);
+        }
     }
     let logs: Vec<f64> = sizes.iter().map(|q| q.ln()).collect();
     let level = mean(&logs).exp();
