@@ -1,7 +1,7 @@
 //! Intervals of calibrations through an emulator of few runs hold the truth, at the edges of the prior too.
 //!
 //! Truths are drawn from the prior, and data are the model in closed form with independent noise; random numbers are those of
-//! SplitMix64 (Steele, Lea and Flood, OOPSLA 2014) and Box and Muller, so that nothing of what makes the data is the engine's. The
+//! `SplitMix64` (Steele, Lea and Flood, OOPSLA 2014) and Box and Muller, so that nothing of what makes the data is the engine's. The
 //! bounds are the nominal share less 2.58 standard errors of a binomial count over the truths.
 
 use std::fmt::Write as _;
