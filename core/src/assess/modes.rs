@@ -50,13 +50,17 @@ pub fn unvisited(below: &[f64], modes: usize) -> Option<Finding> {
         return None;
     }
     let severity = if nearest < CLOSE { Severity::Failure } else { Severity::Reservation };
+    let highest = if nearest > 0.0 {
+        format!("the highest is {} below the best in log density", short(nearest))
+    } else {
+        String::from("the best of all is one of them")
+    };
     let message = format!(
-        "{} of {} of the posterior density {} no draw; the highest is {} below the best in log density: \
-         its share of the posterior is unknown, and all intervals leave it out",
+        "{} of {} of the posterior density {} no draw; {highest}: its share of the posterior is unknown, and all \
+         intervals leave it out",
         below.len(),
         count(modes, "local maximum").replace("maximums", "maxima"),
-        if below.len() == 1 { "has" } else { "have" },
-        short(nearest)
+        if below.len() == 1 { "has" } else { "have" }
     );
     Some(Finding::new((CODE, ""), (nearest, BELOW), severity, message, START))
 }

@@ -3,15 +3,18 @@
 use crate::linalg::Matrix;
 use crate::math::distribution::Distribution;
 use crate::math::random::Stream;
+use crate::math::special::ln_gamma;
 use crate::math::{optimise, sobol};
 use crate::plugin::Target;
 use crate::posterior::Posterior;
 use crate::run::Stop;
 
 /// Number of prior draws among which the starting points of the optimiser are chosen.
-const CANDIDATES: usize = 400;
-/// Number of starting points of the optimiser.
-const STARTS: usize = 12;
+const CANDIDATES: usize = 1000;
+/// So many of the best candidates are starting points, whatever is near them.
+const BEST: usize = 4;
+/// The most starting points of the optimiser.
+const STARTS: usize = 16;
 
 /// The local maxima of the posterior density in natural units, best first.
 pub(super) fn maxima(
@@ -29,21 +32,47 @@ pub(super) fn maxima(
         candidates.row_mut(i)[d..].copy_from_slice(&hyper);
     }
     let density = mode.log_density(&candidates);
-    let mut order: Vec<usize> = (0..CANDIDATES).filter(|&i| density[i].is_finite()).collect();
-    if order.is_empty() {
+    if density.iter().all(|value| !value.is_finite()) {
         return Err(Stop::new("the posterior density is zero at every point tried in the prior")
             .help("check the priors and the units of the measurements"));
     }
-    order.sort_by(|&a, &b| density[b].total_cmp(&density[a]).then(a.cmp(&b)));
-    // Half of the starts are the best candidates, half are spread over the others.
-    let (best, rest) = order.split_at((STARTS / 2).min(order.len()));
-    let spread = rest.iter().step_by((rest.len() / (STARTS / 2)).max(1)).take(STARTS / 2);
-    let chosen: Vec<usize> = best.iter().chain(spread).copied().collect();
+    let chosen = peaks(&candidates, d, &density);
     let maxima = optimise::maximise(&mode, &candidates.select_rows(&chosen));
     if maxima.is_empty() {
         return Err(Stop::new("no maximum of the posterior density was found"));
     }
     Ok(maxima)
+}
+
+/// The best candidates, and those that have no better one near them, the best first: the starting points of multi-level single
+/// linkage (Rinnooy Kan and Timmer, Mathematical Programming 39 (1987) 57), of which each basin of some size has one.
+///
+/// Candidates are near each other within the critical distance of that method for points that fill the unit cube evenly, as their ranks in the
+/// first `d` coordinates do: `(Gamma(1 + d / 2) 4 ln(n) / n)^(1 / d) / sqrt(pi)`.
+fn peaks(candidates: &Matrix, d: usize, density: &[f64]) -> Vec<usize> {
+    let n = candidates.rows();
+    let mut order: Vec<usize> = (0..n).filter(|&i| density[i].is_finite()).collect();
+    order.sort_by(|&a, &b| density[b].total_cmp(&density[a]).then(a.cmp(&b)));
+    let ranks: Vec<Vec<f64>> = (0..d).map(|j| shares(&candidates.column(j))).collect();
+    let (n, half) = (n as f64, 0.5 * d as f64);
+    let volume = ln_gamma(1.0 + half) + (4.0 * n.ln() / n).ln();
+    let near = (volume / d as f64).exp() / std::f64::consts::PI.sqrt();
+    let distance = |a: usize, b: usize| ranks.iter().map(|u| (u[a] - u[b]).powi(2)).sum::<f64>();
+    let is_peak = |place: usize| {
+        order[..place].iter().all(|&better| distance(better, order[place]) > near * near)
+    };
+    (0..order.len()).filter(|&p| p < BEST || is_peak(p)).take(STARTS).map(|p| order[p]).collect()
+}
+
+/// The share of the values below each.
+fn shares(values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    let mut shares = vec![0.0; values.len()];
+    for (rank, &i) in order.iter().enumerate() {
+        shares[i] = (rank as f64 + 0.5) / values.len() as f64;
+    }
+    shares
 }
 
 /// The first points of a sequence at which the density is above zero: `more` gives the sequence piece by piece.
@@ -87,4 +116,34 @@ pub(super) fn sobol(posterior: &Posterior<'_>, from: usize, count: usize) -> Res
         posterior.coordinates(&natural)
     };
     Ok(Matrix::from_rows(priors.len(), (from..from + count).map(point)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::uniform;
+
+    /// Each of two cones has a start, though all of the best candidates are in the first and the second has a twentieth of the
+    /// cube; candidates where the density is zero are none.
+    #[test]
+    fn every_basin_of_some_size_has_a_start() {
+        for d in [2, 4, 6] {
+            let mut rng = Stream::root(d as u64).generator();
+            let points = Matrix::from_fn(CANDIDATES, d, |_, _| uniform(&mut rng));
+            let second = 0.05_f64.powf(1.0 / d as f64);
+            let from = |x: &[f64], at: f64| x.iter().map(|x| (x - at).powi(2)).sum::<f64>().sqrt();
+            let is_second = |x: &[f64]| x.iter().all(|x| *x < second);
+            let density = |x: &[f64]| match is_second(x) {
+                true => -100.0 - from(x, 0.5 * second),
+                false if x[0] > 0.98 => f64::NEG_INFINITY,
+                false => -from(x, 0.7),
+            };
+            let density: Vec<f64> = points.iter_rows().map(density).collect();
+            let chosen = peaks(&points, d, &density);
+            assert!(chosen.len() <= STARTS && chosen.iter().all(|&i| density[i].is_finite()));
+            let best = density.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            assert_eq!(density[chosen[0]].to_bits(), best.to_bits());
+            assert!(chosen.iter().any(|&i| is_second(points.row(i))), "{d}: {chosen:?}");
+        }
+    }
 }

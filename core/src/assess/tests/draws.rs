@@ -51,6 +51,9 @@ fn eight_of_ten_parameters_at_bounds_are_a_failure_at_any_bound() {
 #[test]
 fn modes_without_draws() {
     assert_eq!(modes::unvisited(&[], 2), None);
+    let best = modes::unvisited(&[0.0], 2);
+    has(best.as_ref(), "unvisited_mode", Severity::Failure);
+    assert!(best.unwrap().message.contains("the best of all is one of them"));
     has(modes::unvisited(&[0.7], 2).as_ref(), "unvisited_mode", Severity::Failure);
     has(modes::unvisited(&[4.0, 5.0], 3).as_ref(), "unvisited_mode", Severity::Reservation);
     assert_eq!(modes::unreached(0.1), None);

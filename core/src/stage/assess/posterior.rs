@@ -84,8 +84,10 @@ fn unvisited(draws: &Draws, outcome: &Outcome) -> Option<Finding> {
             visited[nearest] = true;
         }
     }
-    let missed = outcome.other_maxima.iter().zip(&visited[1..]).filter(|(_, visited)| !**visited);
-    let below: Vec<f64> = missed.map(|((_, value), _)| outcome.map_log_density - value).collect();
+    let values = std::iter::once(outcome.map_log_density)
+        .chain(outcome.other_maxima.iter().map(|(_, value)| *value));
+    let missed = values.zip(&visited).filter(|(_, visited)| !**visited);
+    let below: Vec<f64> = missed.map(|(value, _)| outcome.map_log_density - value).collect();
     modes::unvisited(&below, all.len())
 }
 
