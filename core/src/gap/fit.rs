@@ -2,6 +2,9 @@
 //!
 //! Levenberg and Marquardt's method on whitened residuals with rows for the prior (Nocedal and Wright, Numerical
 //! Optimization, 2nd ed., section 10.3), inside the bounds of the priors.
+//!
+//! An unknown with a log-uniform prior is searched in its logarithm, where the prior is flat: in the unknown itself the
+//! density grows as `1/x` toward the lower bound, and one step in units of the prior's width ends at a bound.
 
 use super::system::{Linearised, System};
 use super::whitener::Whitener;
@@ -112,12 +115,33 @@ fn curvature(prior: &Distribution, x: f64) -> f64 {
     if curvature.is_finite() { curvature.max(0.0) } else { 0.0 }
 }
 
-/// The best fit to the means, from a start.
+/// Whether an unknown is searched in its logarithm.
+fn in_logarithm(prior: &Distribution) -> bool {
+    matches!(prior, Distribution::LogUniform(_))
+}
+
+/// The width of a prior in the coordinate in which its unknown is searched.
+fn width(prior: &Distribution) -> f64 {
+    match *prior {
+        // The standard deviation of the uniform logarithm.
+        Distribution::LogUniform([low, high]) => (high.ln() - low.ln()) / 12.0_f64.sqrt(),
+        _ => 1.0 / precision(prior).sqrt(),
+    }
+}
+
+/// The log of the derivatives of the unknowns by the coordinates in which they are searched.
+fn log_slope(priors: &[Distribution], point: &[f64]) -> f64 {
+    let searched = priors.iter().zip(point).filter(|(prior, _)| in_logarithm(prior));
+    searched.map(|(_, x)| x.ln()).sum()
+}
+
+/// The best fit to the means, from a start: the largest density per unit of the coordinates that are searched.
 pub fn fit(system: &System<'_>, whitener: &Whitener, means: &[f64], start: &[f64]) -> Fit {
-    let bounds = inner(&system.bounds());
+    let bounds = inner(&system.bounds(), system.priors());
     let start: Vec<f64> =
         start.iter().zip(&bounds).map(|(x, (low, high))| x.clamp(*low, *high)).collect();
     let mut best = at(system, whitener, means, &start);
+    let merit = |log_density: f64, point: &[f64]| log_density + log_slope(system.priors(), point);
     let mut damping = 1e-3;
     for _ in 0..STEPS {
         let mut improved = None;
@@ -127,7 +151,7 @@ pub fn fit(system: &System<'_>, whitener: &Whitener, means: &[f64], start: &[f64
                 break;
             }
             let density = log_density(system, whitener, means, &point);
-            if density > best.log_density {
+            if merit(density, &point) > merit(best.log_density, &best.at.point) {
                 improved = Some(point);
                 break;
             }
@@ -136,7 +160,8 @@ pub fn fit(system: &System<'_>, whitener: &Whitener, means: &[f64], start: &[f64
         let Some(point) = improved else { break };
         damping = (damping * 0.1).max(1e-12);
         let next = at(system, whitener, means, &point);
-        let gain = next.log_density - best.log_density;
+        let gain =
+            merit(next.log_density, &next.at.point) - merit(best.log_density, &best.at.point);
         best = next;
         if gain < GAIN {
             break;
@@ -153,17 +178,25 @@ pub fn fit_from(
     starts: &[Vec<f64>],
 ) -> Option<Fit> {
     let fits = starts.iter().map(|start| fit(system, whitener, means, start));
+    let merit = |fit: &Fit| fit.log_density + log_slope(system.priors(), &fit.at.point);
     fits.filter(|fit| fit.log_density.is_finite())
-        .reduce(|best, next| if next.log_density > best.log_density + GAIN { next } else { best })
+        .reduce(|best, next| if merit(&next) > merit(&best) + GAIN { next } else { best })
 }
 
 /// Bounds a hair inside, where densities are finite.
-fn inner(bounds: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    let inset = |&(low, high): &(f64, f64)| {
+fn inner(bounds: &[(f64, f64)], priors: &[Distribution]) -> Vec<(f64, f64)> {
+    let inset = |(&(low, high), prior): (&(f64, f64), &Distribution)| {
         let width = high - low;
-        if width.is_finite() { (low + 1e-9 * width, high - 1e-9 * width) } else { (low, high) }
+        if in_logarithm(prior) {
+            // A share of the width would cut off decades.
+            (low * (1.0 + 1e-9), high * (1.0 - 1e-9))
+        } else if width.is_finite() {
+            (low + 1e-9 * width, high - 1e-9 * width)
+        } else {
+            (low, high)
+        }
     };
-    bounds.iter().map(inset).collect()
+    bounds.iter().zip(priors).map(inset).collect()
 }
 
 fn residual(means: &[f64], response: &[f64]) -> Vec<f64> {
@@ -189,17 +222,24 @@ pub fn at(system: &System<'_>, whitener: &Whitener, means: &[f64], point: &[f64]
         if finite { log_prior - 0.5 * dot(&residual, &residual) } else { f64::NEG_INFINITY };
     let priors = system.priors();
     let prior_curvature = priors.iter().zip(point).map(|(p, &x)| curvature(p, x)).collect();
-    let prior_precision = priors.iter().map(precision).collect();
+    // A log-uniform prior has its width in the logarithm, whatever the size of the unknown.
+    let own_precision = |(prior, x): (&Distribution, &f64)| {
+        if in_logarithm(prior) { (x * width(prior)).powi(-2) } else { precision(prior) }
+    };
+    let prior_precision = priors.iter().zip(point).map(own_precision).collect();
     let slopes = whitener.whiten_rows(&at.tangents);
     Fit { at, residual, slopes, prior_curvature, prior_precision, log_density, log_prior }
 }
 
-/// The next point: a damped step of Gauss and Newton in units of the priors' widths, along the free unknowns.
+/// The next point: a damped step of Gauss and Newton in units of the priors' widths, along the free unknowns. An unknown
+/// that is searched in its logarithm moves by one width of its prior at most.
 fn step(system: &System<'_>, here: &Fit, damping: f64, bounds: &[(f64, f64)]) -> Vec<f64> {
     let point = &here.at.point;
+    let priors = system.priors();
     let mut gradient = multiply_vector(&here.slopes, &here.residual);
-    for (g, (prior, &x)) in gradient.iter_mut().zip(system.priors().iter().zip(point)) {
-        *g += prior.log_density_derivative(x);
+    for (g, (prior, &x)) in gradient.iter_mut().zip(priors.iter().zip(point)) {
+        // The slope of a flat prior in the logarithm is none: `-1/x`, and `1/x` of the logarithm's own slope.
+        *g += if in_logarithm(prior) { 0.0 } else { prior.log_density_derivative(x) };
     }
     let blocked = |j: usize| {
         let (low, high) = bounds[j];
@@ -207,18 +247,28 @@ fn step(system: &System<'_>, here: &Fit, damping: f64, bounds: &[(f64, f64)]) ->
     };
     let free: Vec<usize> = (0..point.len()).filter(|&j| !blocked(j)).collect();
     let hessian = here.hessian();
-    let width: Vec<f64> = system.priors().iter().map(|p| 1.0 / precision(p).sqrt()).collect();
+    // The change of each unknown per width of its prior.
+    let unit: Vec<f64> = priors
+        .iter()
+        .zip(point)
+        .map(|(prior, x)| width(prior) * if in_logarithm(prior) { *x } else { 1.0 })
+        .collect();
     let reduced = Matrix::from_fn(free.len(), free.len(), |a, b| {
         let (i, j) = (free[a], free[b]);
-        let value = width[i] * hessian[(i, j)] * width[j];
+        let value = unit[i] * hessian[(i, j)] * unit[j];
         if a == b { value * (1.0 + damping) + 1e-12 + damping } else { value }
     });
     let Ok(factor) = Cholesky::new(&reduced) else { return point.clone() };
-    let mut shift: Vec<f64> = free.iter().map(|&j| gradient[j] * width[j]).collect();
+    let mut shift: Vec<f64> = free.iter().map(|&j| gradient[j] * unit[j]).collect();
     factor.solve(&mut shift);
     let mut next = point.clone();
     for (&j, s) in free.iter().zip(&shift) {
-        next[j] = (point[j] + s * width[j]).clamp(bounds[j].0, bounds[j].1);
+        let moved = if in_logarithm(&priors[j]) {
+            point[j] * (s.clamp(-1.0, 1.0) * width(&priors[j])).exp()
+        } else {
+            point[j] + s * unit[j]
+        };
+        next[j] = moved.clamp(bounds[j].0, bounds[j].1);
     }
     next
 }

@@ -154,3 +154,64 @@ fn a_gap_that_closes_is_proven() {
     let back = prove(&experiment, &white(), &truth, &wrong).unwrap();
     assert!(!back.shrank && back.all.upper < 0.0, "{back:?}");
 }
+
+/// `y = a exp(-b t)`.
+struct Decay;
+
+fn decay(a: f64, b: f64) -> Vec<f64> {
+    (0..TIMES).map(|t| a * (-b * t as f64).exp()).collect()
+}
+
+impl Forward for Decay {
+    fn dimension(&self) -> usize {
+        2
+    }
+    fn outputs(&self) -> usize {
+        TIMES
+    }
+    fn mean(&self, points: &Matrix) -> Matrix {
+        Matrix::from_rows(TIMES, points.iter_rows().map(|p| decay(p[0], p[1])))
+    }
+    fn jacobian(&self, point: &[f64]) -> Matrix {
+        Matrix::from_fn(TIMES, 2, |i, j| {
+            let t = i as f64;
+            let e = (-point[1] * t).exp();
+            if j == 0 { e } else { -point[0] * t * e }
+        })
+    }
+}
+
+/// Noise-free data are fitted exactly, however many decades a log-uniform prior spans and wherever the search starts. Steps
+/// in the unknown itself ended at the lower bound, where the density per unit grows as its reciprocal.
+#[test]
+fn unknowns_of_many_decades_are_found() {
+    let layouts = layouts();
+    let mut parameters = parameters();
+    for (bounds, truth) in [([1e-6, 1e3], 0.1), ([1e-4, 1e2], 0.5), ([1e-9, 10.0], 0.02)] {
+        for p in &mut parameters {
+            p.prior = Distribution::LogUniform(bounds);
+            p.design = p.prior.clone();
+        }
+        parameters[0].prior = Distribution::LogUniform([1e-3, 1e4]);
+        let curve = decay(20.0, truth);
+        let replicate = |r: usize| Replicate {
+            name: r.to_string(),
+            values: curve.iter().map(|y| Some(*y)).collect(),
+            sd: None,
+        };
+        let layout = layouts.blocks[0].clone();
+        let replicates = (0..REPLICATES).map(replicate).collect();
+        let exact = Measurements { layout, replicates, covariance: None };
+        let measured = exact.into();
+        let experiment = Experiment::new(&layouts, &parameters, &Decay, &measured);
+        let (_, means) = experiment.means();
+        let whitener = Whitener::new(&experiment, &white(), &means);
+        let system = System::new(&experiment, Vec::new());
+        for start in [[1.0, truth * 0.1], [100.0, truth * 3.0], [0.01, truth * 0.01]] {
+            let found = fit(&system, &whitener, &means, &start);
+            let rate = found.at.point[1] / truth;
+            let sd = found.sd()[1] / truth;
+            assert!((rate - 1.0).abs() < 0.05 * sd.max(1e-3), "{bounds:?} {start:?}: {found:?}");
+        }
+    }
+}

@@ -1,5 +1,7 @@
 //! The verdict: nothing, a name, a class of names, something without a name, or nothing that could be seen.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use serde::{Deserialize, Serialize};
 
 use super::look::{Found, Look, Options};
@@ -172,12 +174,35 @@ fn doubts(
     } else if found.last.p[0] <= options.naming && found.chosen.len() >= options.most {
         reasons.push(format!("more than {} effects would be needed", options.most));
     }
+    if let Some((place, count)) = crowded(found) {
+        reasons.push(format!(
+            "{count} effects act on {place} alone: what one sensor shows, together they may fit without being any of them"
+        ));
+    }
     if let Some(closed) = less_than_half {
         reasons.push(format!(
             "the effects that explain most close {:.0} % of the excess misfit",
             100.0 * closed.max(0.0)
         ));
     }
+}
+
+/// The sensor on which alone several of the effects act, with their number, where there are other sensors.
+fn crowded(found: &Found<'_>) -> Option<(String, usize)> {
+    let experiment = found.system.experiment;
+    let mut counts: BTreeMap<&[(String, String)], usize> = BTreeMap::new();
+    for effect in &found.system.effects {
+        let acted =
+            experiment.curves.iter().filter(|c| effect.acts[c.outputs.clone()].contains(&true));
+        let sensors: BTreeSet<_> = acted.map(|curve| curve.labels.as_slice()).collect();
+        if let [sensor] = Vec::from_iter(sensors)[..] {
+            *counts.entry(sensor).or_default() += 1;
+        }
+    }
+    let (sensor, count) = counts.into_iter().find(|(_, count)| *count > 1)?;
+    let has_others = experiment.curves.iter().any(|curve| curve.labels != sensor);
+    let name = sensor.iter().map(|(_, label)| label.as_str()).collect::<Vec<_>>().join(" ");
+    has_others.then_some((name, count))
 }
 
 /// Adds the next type to those that are alone in their class; whether all have company then.
