@@ -78,3 +78,22 @@ fn comments_are_taken_off_and_put_back() {
     assert_eq!(said, "first\n\n  | x\n");
     assert_eq!(format!("{study}{}", comments(&said)), text);
 }
+
+#[test]
+fn a_margin_widens_the_design_of_bounded_priors() {
+    let text = fs::read_to_string(folder().join("design_margin.toml")).unwrap();
+    let (study, _) = split(&text);
+    let share = "prior = { beta = [2.0, 2.0] }";
+    for (prior, design) in [
+        ("{ normal = [0.0, 1.0] }", "Normal([0.0, 1.0])"),
+        ("{ log_uniform = [1.0, 100.0] }", "LogUniform([0.630957"),
+        ("{ beta = [2.0, 2.0] }\ndesign = { uniform = [0.0, 1.0] }", "Uniform([0.0, 1.0])"),
+    ] {
+        let text = study.replace(share, &format!("prior = {prior}"));
+        let checked = load_text(Path::new("margin.toml"), &text, &[]);
+        let parameters = checked.study.expect("a study without faults").parameters;
+        assert_eq!(format!("{:?}", parameters[0].design), "Uniform([0.8, 3.2])");
+        let said = format!("{:?}", parameters[1].design);
+        assert!(said.starts_with(design), "{prior}: {said}");
+    }
+}

@@ -8,6 +8,7 @@ const OUTSIDE: &str = "runs_outside_design";
 const INVALID: &str = "runs_invalid";
 const FAILED: &str = "failed_runs";
 const IDLE: &str = "idle_parameter";
+const EDGE: &str = "no_margin";
 
 /// So many runs for each parameter are a rule of thumb for an emulator (Loeppky, Sacks and Welch, Technometrics 51
 /// (2009) 366).
@@ -19,6 +20,12 @@ const NEGLIGIBLE: f64 = 0.1;
 const SPARSE: f64 = 2.5;
 /// The share of draws beyond all runs that is a reservation, and a failure.
 const BEYOND: (f64, f64) = (0.05, 0.5);
+/// How near to the end of the runs, as a share of their range, draws lie at their edge, and how far runs reach beyond the prior
+/// where they have a margin.
+pub const AT_EDGE: (f64, f64) = (0.1, 0.03);
+/// The share of draws at an edge of the runs that is told, where the emulator's error moves estimates by so many posterior
+/// standard deviations.
+const EDGE_SHARE: (f64, f64) = (0.5, 0.3);
 /// The share of runs inside the prior that the model calls invalid: a reservation.
 const INVALID_SHARE: f64 = 0.05;
 /// The share of failed runs that is a reservation, and a failure.
@@ -31,6 +38,8 @@ const NARROW_PRIOR: &str =
 const CORRECT_DESIGN: &str = "correct the `design` of the parameters or the table of runs";
 const VALIDITY: &str = "narrow `design` and `prior` to where the model holds";
 const REPEAT: &str = "look at why they failed and make them again: `lacuna campaign retry RUN`";
+const MARGIN: &str = "let the runs reach beyond the prior where the model has answers there: `[design] margin = 0.1`, or a wider \
+                      `design` of the parameter; where it has none, add runs near the posterior with `[surrogate] refine`";
 const REMOVE: &str = "take the parameter out of the study, or connect it with the model";
 
 /// See [`super::rules`].
@@ -93,6 +102,22 @@ pub fn rules() -> Vec<Rule> {
             action: REPEAT,
         },
         Rule {
+            code: EDGE,
+            looks_at: format!(
+                "the share of draws within {} of the range of the training runs from its end, where the runs end with the \
+                 prior (reach less than {} of their range beyond it), by parameter",
+                percent(AT_EDGE.0),
+                percent(AT_EDGE.1)
+            ),
+            threshold: format!(
+                "{}: note; silent where the emulator's error moves no estimate by {} sd",
+                percent(EDGE_SHARE.0),
+                EDGE_SHARE.1
+            ),
+            why: "an emulator is worst at the edge of its runs, and what is known of its error there comes from few runs",
+            action: MARGIN,
+        },
+        Rule {
             code: IDLE,
             looks_at: "parameters on which no response depends".to_owned(),
             threshold: "any: reservation".to_owned(),
@@ -138,6 +163,21 @@ pub fn extrapolated(name: &str, share: f64, (low, high): (f64, f64)) -> Option<F
         short(high)
     );
     Some(Finding::new((FEW, name), (share, BEYOND.0), severity, message, NARROW_PRIOR))
+}
+
+/// The share of draws at an edge of the runs beyond which none reach although the prior ends there; `shift` as in
+/// [`few_in_prior`].
+pub fn no_margin(name: &str, share: f64, end: f64, shift: Option<f64>) -> Option<Finding> {
+    if share < EDGE_SHARE.0 || shift.is_none_or(|shift| shift < EDGE_SHARE.1) {
+        return None;
+    }
+    let message = format!(
+        "{} of the posterior lie at the end of the training runs, {}, which is that of the prior: an emulator is worst at the \
+         edge of its runs",
+        percent(share),
+        short(end)
+    );
+    Some(Finding::new((EDGE, name), (share, EDGE_SHARE.0), Severity::Note, message, MARGIN))
 }
 
 /// The distance from the posterior to its nearest training runs over what is usual between runs; `shift` as in

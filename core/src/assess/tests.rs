@@ -78,6 +78,10 @@ fn invalid_failed_and_allowed_runs() {
     let dropped = runs::Invalid { trained: false, ..sns };
     has(runs::invalid(&dropped).as_ref(), "runs_invalid", Severity::Note);
     assert_eq!(runs::invalid(&runs::Invalid { all: (0, 603), ..sns }), None);
+    has(runs::no_margin("x", 0.7, 2.5, Some(0.6)).as_ref(), "no_margin", Severity::Note);
+    assert_eq!(runs::no_margin("x", 0.7, 2.5, Some(0.1)), None, "the emulator is good there");
+    assert_eq!(runs::no_margin("x", 0.2, 2.5, Some(0.6)), None, "the posterior is elsewhere");
+    assert_eq!(runs::no_margin("x", 0.7, 2.5, None), None, "nothing is known of the error");
     assert_eq!((runs::failed(0, 10), runs::outside_design(0, 10, &[])), (None, None));
     let outside = runs::outside_design(3, 10, &["x".to_owned()]);
     has(outside.as_ref(), "runs_outside_design", Severity::Reservation);

@@ -92,6 +92,11 @@ pub struct DesignKeys {
     /// makes of runs made by hand, or the folder `2-simulate` of another run directory.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub imports: Vec<PathBuf>,
+    /// By which share of its range each uniform or log-uniform prior is widened on either side to make the design of a parameter
+    /// that gives none: an emulator is worst at the edge of its runs, and with a margin that edge is beyond the prior. The model must
+    /// have answers there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub margin: Option<Positive>,
 }
 
 impl DesignKeys {
@@ -233,7 +238,7 @@ impl Refine {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct DiscrepancyKeys {
-    /// Whether the emulator's own error is part of the likelihood: a covariance, common to all replicates and correlated
+    /// Makes the emulator's own error a part of the likelihood: a covariance, common to all replicates and correlated
     /// between outputs, estimated from its errors at runs that were left out of the fit.
     pub emulator_error: bool,
     /// Whether what the points of a replicate share (its gain, its timing) is part of the likelihood: a covariance

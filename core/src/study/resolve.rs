@@ -283,7 +283,7 @@ fn structure(
     let before = problems.len();
     let target = chosen(root, "target", None, problems);
     let model = chosen(root, "model", None, problems);
-    let design = chosen(root, "design", None, problems);
+    let design: Option<Section<dyn Design, DesignKeys>> = chosen(root, "design", None, problems);
     let executor = chosen_or(root, "executor", "local", problems);
     let simulations = chosen(root, "simulations", None, problems);
     let measurements = chosen(root, "measurements", None, problems);
@@ -309,7 +309,8 @@ fn structure(
         _ => None,
     };
     let (scenarios, sections) = scenarios?;
-    let (parameters, unknowns) = unknowns(&parameters?, &scenarios, root, problems);
+    let margin = design.as_ref().and_then(|design| design.common.margin);
+    let (parameters, unknowns) = unknowns(&parameters?, &scenarios, margin, root, problems);
     if problems.len() > before {
         return None;
     }

@@ -3,8 +3,10 @@
 use super::Problems;
 use super::file::ParameterSection;
 use super::node::Node;
+use super::values::Positive;
 use super::{Complaints, nearest};
 use crate::data::{Parameter, Scenario};
+use crate::math::distribution::Distribution;
 
 /// What a parameter of a study stands for.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -26,6 +28,7 @@ impl Unknown {
 pub(super) fn unknowns(
     sections: &[ParameterSection],
     scenarios: &[Scenario],
+    margin: Option<Positive>,
     root: &Node,
     problems: &mut Problems,
 ) -> (Vec<Parameter>, Vec<Unknown>) {
@@ -40,7 +43,10 @@ pub(super) fn unknowns(
             symbol: full(section.symbol.as_deref().unwrap_or(&name)),
             name: full(&name),
             unit: section.unit.clone(),
-            design: section.design.clone().unwrap_or_else(|| section.prior.clone()),
+            design: section.design.clone().unwrap_or_else(|| match margin {
+                Some(margin) => widened(&section.prior, margin.get()),
+                None => section.prior.clone(),
+            }),
             prior: section.prior.clone(),
             reference: section.reference,
         });
@@ -49,6 +55,14 @@ pub(super) fn unknowns(
     let named: Vec<&str> =
         scenarios.iter().map(|s| s.name.as_str()).filter(|name| !name.is_empty()).collect();
     for section in sections {
+        if margin.is_some() && section.design.is_none() && !reaches_out(&section.prior) {
+            let mut complaints = Complaints::new(root, problems);
+            let (name, law) = (&section.name, section.prior.name());
+            complaints
+                .at(&format!("parameter.{name}.prior"))
+                .say(format!("`[design] margin` cannot widen the {law} prior of `{name}`"))
+                .expected("a uniform or log-uniform prior, or a `design` of the parameter's own");
+        }
         let Some(scenario) = &section.scenario else {
             add(section, None);
             continue;
@@ -76,4 +90,23 @@ pub(super) fn unknowns(
         }
     }
     (parameters, unknowns)
+}
+
+/// A bounded law over a wider range; another law, whose runs reach as far as its tails, is its own design.
+fn widened(prior: &Distribution, margin: f64) -> Distribution {
+    let wider = |low: f64, high: f64| [low - margin * (high - low), high + margin * (high - low)];
+    match *prior {
+        Distribution::Uniform([low, high]) => Distribution::Uniform(wider(low, high)),
+        Distribution::LogUniform([low, high]) => {
+            Distribution::LogUniform(wider(low.ln(), high.ln()).map(f64::exp))
+        }
+        ref other => other.clone(),
+    }
+}
+
+/// Whether runs of a law can reach beyond where it is: its range can be widened, or it has none on one side at least.
+fn reaches_out(prior: &Distribution) -> bool {
+    let (low, high) = prior.support();
+    let boxed = matches!(prior, Distribution::Uniform(_) | Distribution::LogUniform(_));
+    boxed || !(low.is_finite() && high.is_finite())
 }

@@ -26,6 +26,7 @@ pub(super) fn findings(
     if let Some(ensemble) = &known.data.value.ensemble {
         found.extend(few(study, known, calibrated, shift));
         found.extend(beyond(study, known, calibrated));
+        found.extend(at_edge(study, known, calibrated, shift));
         found.extend(sparse(study, known, calibrated, shift));
         found.extend(of_design(study, ensemble));
         found.extend(invalid(study, ensemble));
@@ -111,6 +112,36 @@ fn beyond(study: &Study, known: &Known<'_>, calibrated: Option<&Calibrated>) -> 
         check::extrapolated(&parameter.name, count as f64 / values.len() as f64, (low, high))
     };
     study.parameters.iter().enumerate().filter_map(one).collect()
+}
+
+/// Draws at an end of the runs, where those reach no farther than the prior.
+fn at_edge(
+    study: &Study,
+    known: &Known<'_>,
+    calibrated: Option<&Calibrated>,
+    shift: Option<f64>,
+) -> Vec<Finding> {
+    let (Some(points), Some(calibrated)) = (training(known), calibrated) else { return Vec::new() };
+    let draws = calibrated.draws.from_step(calibrated.outcome.burn_in);
+    let (near, beyond) = check::AT_EDGE;
+    let one = |(j, parameter): (usize, &crate::data::Parameter)| -> Vec<Finding> {
+        let column = points.column(j);
+        let low = column.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let range = high - low;
+        let (first, last) = parameter.prior.support();
+        let values = draws.pooled(j);
+        // How far a value lies inside the end of the runs, for both ends, and how far the prior's end does.
+        let ends = [(low, 1.0, first - low), (high, -1.0, high - last)];
+        let told =
+            ends.iter().filter(|(.., margin)| *margin < beyond * range && margin.is_finite());
+        let finding = |&(end, inward, _): &(f64, f64, f64)| {
+            let count = values.iter().filter(|&&x| inward * (x - end) < near * range).count();
+            check::no_margin(&parameter.name, count as f64 / values.len() as f64, end, shift)
+        };
+        told.filter_map(finding).collect()
+    };
+    study.parameters.iter().enumerate().flat_map(one).collect()
 }
 
 fn of_design(study: &Study, ensemble: &Ensemble) -> Option<Finding> {
