@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
@@ -70,6 +71,7 @@ impl<'a> Prepared<'a> {
             region: None,
             refinement: None,
             trial: None,
+            common: OnceLock::new(),
         }
     }
 }

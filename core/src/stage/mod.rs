@@ -37,12 +37,16 @@ pub mod surrogate;
 pub mod target;
 pub mod validate;
 
+use crate::data::Observations;
 use crate::math::random::Stream;
+use crate::plugin::discrepancy::CommonError;
 use crate::plugin::{Emulator, Forward};
 use crate::report::findings::Findings;
 use crate::run::{Kept, Listener, Observer, RunDirectory, Stop, files};
 use crate::study::Study;
+use crate::study::file::DiscrepancyKeys;
 use serde_json::json;
+use std::sync::OnceLock;
 
 use calibrate::Calibrated;
 use evidence::Weighed;
@@ -232,6 +236,31 @@ pub struct Known<'a> {
     pub refinement: Option<&'a Refinement>,
     /// Which trial the data are of, where they were made and not measured.
     pub trial: Option<Trial>,
+    /// The errors of emulator and numerics as these data meet them, once they have been asked for.
+    common: OnceLock<Vec<CommonError>>,
+}
+
+impl Known<'_> {
+    /// The errors of emulator and numerics for which the study's likelihood allows, as its data meet them.
+    fn common_errors(
+        &self,
+        study: &Study,
+        keys: &DiscrepancyKeys,
+        data: &Observations,
+    ) -> Result<Vec<CommonError>, Stop> {
+        if let Some(common) = self.common.get() {
+            return Ok(common.clone());
+        }
+        let mut common = Vec::new();
+        if let (Some(fitted), true) = (self.fitted, keys.emulator_error) {
+            common.push(emulator_error::common_error(study, &fitted.value, data, self.forward)?);
+        }
+        if let (Some(kept), Some(section)) = (self.numerics, &study.numerical_error) {
+            let error = kept.value.common_error(study, &section.written, data, self.forward)?;
+            common.push(error);
+        }
+        Ok(self.common.get_or_init(|| common).clone())
+    }
 }
 
 /// One of many calibrations of data that were made: it has random numbers of its own.
@@ -312,6 +341,7 @@ impl Learned {
             region: self.region.as_deref(),
             refinement: self.refinement.as_ref(),
             trial: self.trial,
+            common: OnceLock::new(),
         }
     }
 }

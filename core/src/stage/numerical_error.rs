@@ -113,7 +113,7 @@ impl NumericalError {
 
     /// Curves of what is not known, one a row, `whole` being the whole error over a difference.
     ///
-    /// Where the differences are predicted they are `whole` times the errors of the prediction at runs left out, and
+    /// Predicted differences leave `whole` times the errors of the prediction at runs left out, and
     /// the share `extrapolation` of what lies beyond the finer runs; elsewhere `whole` times the differences, whose mean
     /// square is about zero, since all of them may lie on one side.
     fn unknown(&self, section: &NumericalErrorSection) -> (Matrix, Matrix) {

@@ -85,7 +85,7 @@ impl Artifact for Fitted {
         let curves = Curves {
             points: sample_points.clone(),
             errors: arrays::read(&path, "left_out")?.into_matrix(),
-            stated: arrays::read(&path, "left_out_variance").ok().map(Array::into_matrix),
+            stated: arrays::read_some(&path, "left_out_variance")?.map(Array::into_matrix),
         };
         Ok(Self {
             bytes: files::read(&folder.join("emulator.bin"))?,
@@ -202,9 +202,9 @@ fn fit(
     let ensemble = data.runs()?;
     let points = ensemble.points.select_rows(&fitting.training);
     let responses = ensemble.responses.select_rows(&fitting.training);
-    let lesson = Lesson { study, data, fitting, used };
+    let fit = Fit { study, data, fitting, used };
     let rows: Vec<usize> = (0..points.rows()).collect();
-    let emulator = lesson.learn(&points, &responses, &rows, &[], observer)?;
+    let emulator = fit.emulator(&points, &responses, &rows, &[], observer)?;
     let test_points = ensemble.points.select_rows(&fitting.validation);
     let simulated = ensemble.responses.select_rows(&fitting.validation);
     let emulated = emulator.mean(&test_points);
@@ -212,7 +212,7 @@ fn fit(
     let left_out = corrected(&*emulator, &responses);
     let judged = if held_out.rows() > 0 { &held_out } else { &left_out };
     let loo_by_output = emulator.fit_error().relative.clone();
-    let errors = Errors {
+    let mut errors = Errors {
         training: fitting.training.len(),
         validation: fitting.validation.len(),
         mae: mean(judged.as_slice().iter().map(|e| e.abs())),
@@ -225,8 +225,15 @@ fn fit(
         facts: emulator.facts(),
     };
     let runs = emulator_error::Runs { points: &points, responses: &responses };
-    let refitted =
-        Curves::refitted(runs, |kept, left| lesson.learn(&points, &responses, kept, left, &Silent));
+    let again =
+        Curves::refitted(runs, |kept, left| fit.emulator(&points, &responses, kept, left, &Silent));
+    let refitted = again.unwrap_or_else(|stop| {
+        let why = format!(
+            "by the leave-one-out formula, since a fit to nine tenths of the runs failed: {stop}"
+        );
+        errors.facts.push(Fact::new("errors at runs left out", why));
+        None
+    });
     let curves = refitted.unwrap_or_else(|| Curves {
         points: points.clone(),
         errors: left_out.clone(),
@@ -240,17 +247,17 @@ fn fit(
     Ok(Fitted { bytes: emulator.save()?, errors, samples, sample_points, curves })
 }
 
-/// What an emulator of the study is fitted to.
-struct Lesson<'a> {
+/// The runs and settings that an emulator of the study is fitted to.
+struct Fit<'a> {
     study: &'a Study,
     data: &'a Data,
     fitting: &'a Fitting<'a>,
     used: &'a Used,
 }
 
-impl Lesson<'_> {
+impl Fit<'_> {
     /// The emulator of some of these runs. Cheaper runs at the parameters of those that are left out are left out too.
-    fn learn(
+    fn emulator(
         &self,
         points: &Matrix,
         responses: &Matrix,

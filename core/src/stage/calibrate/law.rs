@@ -9,7 +9,7 @@ use crate::plugin::discrepancy::{self, CommonError};
 use crate::plugin::{Discrepancy, Forward, Likelihood};
 use crate::run::Stop;
 use crate::stage::read::Measured;
-use crate::stage::{Known, best_fit, common_error, emulator_error};
+use crate::stage::{Known, best_fit, common_error};
 use crate::study::Study;
 
 /// See the module.
@@ -29,14 +29,7 @@ impl<'a> Law<'a> {
     pub fn of(study: &'a Study, measured: &'a Measured, known: &Known<'a>) -> Result<Self, Stop> {
         let section =
             study.discrepancy.as_ref().ok_or_else(|| Stop::new("the study has no discrepancy"))?;
-        let (mut common, data) = (Vec::new(), &measured.likelihood);
-        if let (Some(fitted), true) = (known.fitted, section.common.emulator_error) {
-            common.push(emulator_error::common_error(study, &fitted.value, data, known.forward)?);
-        }
-        if let (Some(kept), Some(section)) = (known.numerics, &study.numerical_error) {
-            let error = kept.value.common_error(study, &section.written, data, known.forward)?;
-            common.push(error);
-        }
+        let common = known.common_errors(study, &section.common, &measured.likelihood)?;
         let replicates = section.common.replicate_error.then_some(&measured.used);
         Ok(Self { replicates, common, ..Self::bare(study, &measured.likelihood, known.forward)? })
     }

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::Path;
+use std::sync::OnceLock;
 
 use serde_json::json;
 
@@ -119,7 +120,7 @@ fn calibrated(
             refine::stage(study, learned, directory, &Silent)?.1
         }
         _ => {
-            let known = Known { data: &data, trial, ..known };
+            let known = Known { data: &data, trial, common: OnceLock::new(), ..known };
             calibrate::stage(study, &known, "5-calibrate", directory, &Silent)?
         }
     };

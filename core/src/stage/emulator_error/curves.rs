@@ -39,21 +39,25 @@ impl Curves {
     /// The errors that emulators make at training runs which they were fitted without, ten parts of the runs in turn: principal
     /// components, terms and length scales are then chosen without the run, which the leave-one-out
     /// formulas do not do. `fit` fits to some of the runs and is told the rows of those that are left out. `None` for many
-    /// runs, or where so few of them are not enough for a fit.
+    /// runs.
+    ///
+    /// # Errors
+    ///
+    /// What `fit` says where so few runs are not enough for it; errors that are not finite.
     pub fn refitted(
         runs: Runs<'_>,
         mut fit: impl FnMut(&[usize], &[usize]) -> Result<Box<dyn Emulator>, Stop>,
-    ) -> Option<Self> {
+    ) -> Result<Option<Self>, Stop> {
         let count = runs.points.rows();
         if !(3..=REFITTED).contains(&count) {
-            return None;
+            return Ok(None);
         }
         let mut errors = Matrix::zeros(count, runs.responses.columns());
         let mut stated: Option<Matrix> = Some(errors.clone());
         for part in 0..PARTS.min(count) {
             let (left, kept): (Vec<usize>, Vec<usize>) =
                 (0..count).partition(|i| i % PARTS.min(count) == part);
-            let emulator = fit(&kept, &left).ok()?;
+            let emulator = fit(&kept, &left)?;
             let points = runs.points.select_rows(&left);
             let mean = emulator.mean(&points);
             let variance = emulator.variance(&points);
@@ -68,8 +72,12 @@ impl Curves {
                 all
             });
         }
-        let finite = errors.as_slice().iter().all(|e| e.is_finite());
-        finite.then(|| Self { points: runs.points.clone(), errors, stated })
+        if errors.as_slice().iter().any(|e| !e.is_finite()) {
+            return Err(Stop::new(
+                "an emulator gives no finite response at a run that was left out",
+            ));
+        }
+        Ok(Some(Self { points: runs.points.clone(), errors, stated }))
     }
 
     /// These and others.

@@ -1,6 +1,6 @@
 //! The error of the emulator as a covariance of the mean curve, of a size at which calibrations hold.
 //!
-//! What is known are error curves `e_i` at runs that the emulator had not seen ([`Curves`]). From them:
+//! The covariance is estimated from error curves `e_i` at runs that the emulator had not seen ([`Curves`]), in three steps:
 //!
 //! - their **size** `s(x)` relative to the mean, where the emulator or the number of runs tells it ([`size`]); the
 //!   covariance has the mean square size over where the data put the parameters ([`pilot`]);
@@ -9,10 +9,10 @@
 //!   (covariance taper: Houtekamer and Mitchell, Monthly Weather Review 129 (2001) 123; [`taper`]);
 //! - a **factor**: generalised least squares finds the directions in which a covariance understates the error, whatever its
 //!   shape. So each run is taken for the truth and left out of `S`, and the covariance is enlarged until the parameters
-//!   move by what the posterior says ([`calibrated`]).
+//!   move by what the posterior says ([`factor`]).
 
-mod calibrated;
 mod curves;
+mod factor;
 mod kriging;
 mod noise;
 mod pilot;
@@ -30,8 +30,8 @@ use crate::study::Study;
 
 use super::best_fit;
 use super::surrogate::Fitted;
-use calibrated::Judged;
 pub use curves::{Curves, Runs, rows_near_prior};
+use factor::Shifts;
 use pilot::Pilot;
 use size::Size;
 use taper::Places;
@@ -63,13 +63,13 @@ pub fn factor(
     let noise = noise::of_mean(study, data, forward, &best, &curves.errors)?;
     let places = Places::of(&study.layouts);
     let shapes = size.without(&curves.errors);
-    let judged = Judged::of(curves, &shapes, &size, &places, &noise);
+    let shifts = Shifts::of(curves, &shapes, &size, &places, &noise);
     let slopes = |point: &[f64]| best_fit::standard_slopes(study, forward, point);
-    let factor = judged.factor(&slopes);
+    let factor = shifts.factor(&slopes);
     let there = if size.varies() {
-        let even = judged.covariance(&curves.errors);
+        let even = shifts.covariance(&curves.errors);
         let slopes = slopes(&best);
-        Pilot { study, forward, best: &best, slopes: &slopes }.size(&judged, &even, &size)
+        Pilot { study, forward, best: &best, slopes: &slopes }.size(&shifts, &even, &size)
     } else {
         1.0
     };

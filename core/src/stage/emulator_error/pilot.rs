@@ -1,4 +1,4 @@
-//! Where the data put the parameters, before the error is known well.
+//! A normal law of the parameters given the data, before the error is known well.
 
 use crate::linalg::vector::dot;
 use crate::linalg::{Cholesky, Matrix, multiply, multiply_transposed};
@@ -7,7 +7,7 @@ use crate::plugin::Forward;
 use crate::stage::{best_fit, stream};
 use crate::study::Study;
 
-use super::calibrated::{Estimate, Judged};
+use super::factor::{Estimate, Shifts};
 use super::size::Size;
 
 /// So many points stand for where the parameters may be.
@@ -24,21 +24,20 @@ pub struct Pilot<'a> {
 }
 
 impl Pilot<'_> {
-    /// The root mean square size of the error over the law, for an error of this covariance at the judged outputs.
+    /// The root mean square size of the error over the law, for an error of this covariance at the chosen outputs.
     ///
     /// The estimate is that of ordinary least squares, whose covariance `G (I + S) G'` holds whatever its weights: it trusts no
     /// direction more for what `S` says.
-    pub fn size(&self, judged: &Judged<'_>, even: &Matrix, size: &Size) -> f64 {
-        let points = self.points(judged, even);
-        let values = size.values(self.forward, &points).unwrap_or_default();
-        let finite: Vec<f64> = values.into_iter().filter(|s| s.is_finite()).collect();
-        let square = finite.iter().map(|s| s * s).sum::<f64>() / finite.len().max(1) as f64;
-        if square > 0.0 { square.sqrt() } else { 1.0 }
+    pub fn size(&self, shifts: &Shifts<'_>, even: &Matrix, size: &Size) -> f64 {
+        let points = self.points(shifts, even);
+        // An emulator that states no variance there has the size of its curves.
+        let values = size.values(self.forward, &points).unwrap_or_else(|| size.at_curves.clone());
+        root_mean_square(&values).or_else(|| root_mean_square(&size.at_curves)).unwrap_or(1.0)
     }
 
     /// Points inside the prior's support, the best fit first.
-    fn points(&self, judged: &Judged<'_>, even: &Matrix) -> Matrix {
-        let slopes = judged.slopes(self.slopes);
+    fn points(&self, shifts: &Shifts<'_>, even: &Matrix) -> Matrix {
+        let slopes = shifts.slopes(self.slopes);
         let mut points = Matrix::from_rows(self.best.len(), [self.best]);
         let none = Matrix::zeros(even.rows(), even.rows());
         let Some(estimate) = Estimate::of(&none, 1.0, &slopes) else { return points };
@@ -76,4 +75,11 @@ impl Pilot<'_> {
         }
         points
     }
+}
+
+/// Of the finite values; `None` where none of them is above zero.
+fn root_mean_square(values: &[f64]) -> Option<f64> {
+    let squares: Vec<f64> = values.iter().filter(|s| s.is_finite()).map(|s| s * s).collect();
+    let square = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
+    (square > 0.0).then(|| square.sqrt())
 }

@@ -41,7 +41,7 @@ pub struct Size {
 
 #[derive(Debug, Clone)]
 enum Law {
-    /// The same everywhere.
+    /// One size for all points.
     Constant,
     /// Of the stated variance, with the scale of each output.
     Stated(Vec<f64>),
@@ -98,7 +98,7 @@ impl Size {
         (value, Self { law, level, exponent, centre, at_curves })
     }
 
-    /// Whether it is not the same everywhere.
+    /// True where the size depends on the parameters.
     pub fn varies(&self) -> bool {
         !matches!(self.law, Law::Constant)
     }

@@ -9,7 +9,7 @@ use super::thinned;
 /// The length over which correlations are damped, as a share of an axis.
 const LENGTH: f64 = 0.15;
 
-/// What is left of a correlation between two labels of an axis, or two blocks of scenarios.
+/// The damping of a correlation between two labels of an axis, or two blocks of scenarios.
 const APART: f64 = 0.7;
 
 /// The covariance of so many outputs is decomposed, and what it says is extended to the others.
@@ -19,7 +19,7 @@ const OUTPUTS: usize = 1000;
 const RANK: usize = 100;
 const SEEN: f64 = 0.01;
 
-/// Where each output is: its block, and along each axis a share of it or a label.
+/// The place of each output: its block, and along each axis a share of it or a label.
 pub struct Places {
     all: Vec<(usize, Vec<(f64, usize)>)>,
 }

@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used)]
 
-use super::calibrated::Judged;
 use super::curves::{Curves, Runs};
+use super::factor::Shifts;
 use super::kriging::Kriging;
 use super::size::Size;
 use super::taper::Places;
@@ -116,7 +116,7 @@ fn factor_of(known: &Curves, noise: f64, slopes: &Matrix) -> f64 {
     let (places, size) = (Places::of(&layouts), Size::learned(known));
     let shapes = size.without(&known.errors);
     let noise = vec![noise; known.errors.columns()];
-    Judged::of(known, &shapes, &size, &places, &noise).factor(&|_| slopes.clone())
+    Shifts::of(known, &shapes, &size, &places, &noise).factor(&|_| slopes.clone())
 }
 
 /// Errors that are independent are what the damped covariance says they are: no factor is needed but the one for few curves, here
@@ -141,7 +141,7 @@ fn errors_that_the_taper_understates_are_enlarged() {
     assert!(factor > 1.3, "{factor}");
 }
 
-/// The same response everywhere.
+/// An emulator of one response for all points.
 struct Mean(Vec<f64>, FitError);
 
 mod of_the_others {
@@ -193,14 +193,15 @@ mod of_the_others {
             assert_eq!(kept.len() + left.len(), 25);
             Ok(Box::new(Mean((0..3).map(|j| mean(kept, j)).collect(), FitError::default())))
         });
-        let found = found.unwrap();
+        let found = found.unwrap().unwrap();
         let others: Vec<usize> = (0..25).filter(|i| i % 10 != 4).collect();
         for j in 0..3 {
             let expected = known[(14, j)] - mean(&others, j);
             assert!((found.errors[(14, j)] - expected).abs() < 1e-14);
         }
         assert_eq!(found.stated, None);
-        // Where so few runs are not enough, nothing is known in this way.
-        assert_eq!(Curves::refitted(runs, |_, _| Err(Stop::new("too few"))), None);
+        // Where so few runs are not enough, nothing is known in this way, and the reason is told.
+        let failed = Curves::refitted(runs, |_, _| Err(Stop::new("too few")));
+        assert_eq!(failed.unwrap_err().to_string(), "too few");
     }
 }

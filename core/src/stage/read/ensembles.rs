@@ -18,7 +18,7 @@ use crate::stage::simulate::{Simulated, inside};
 pub struct Runs<'a> {
     /// The folder of the stage that made them.
     pub folder: &'a Path,
-    /// What it made.
+    /// The record of the runs and their outcomes.
     pub made: &'a Simulated,
 }
 
@@ -27,7 +27,7 @@ pub fn ensemble(study: &Study, runs: Option<Runs<'_>>) -> Result<Ensemble, Stop>
     ensemble_of(study, &study.parameters, runs)
 }
 
-/// The same of runs that the study's model made, some of which may have failed, as far as a reader allows it. A reader of
+/// The ensemble of runs that the study's model made, some of which may have failed, as far as a reader allows it. A reader of
 /// tables that were made before is not asked: it does not know these runs.
 pub fn ensemble_with_failed(study: &Study, runs: Runs<'_>) -> Result<Ensemble, Stop> {
     let reader = study.simulations.as_ref().filter(|_| study.design.is_some());
@@ -40,7 +40,7 @@ pub fn ensemble_with_failed(study: &Study, runs: Runs<'_>) -> Result<Ensemble, S
     })
 }
 
-/// The same of runs of other parameters.
+/// The ensemble of runs of other parameters.
 pub fn ensemble_of(
     study: &Study,
     parameters: &[Parameter],
@@ -50,7 +50,7 @@ pub fn ensemble_of(
     ensemble_through(study, parameters, reader, runs)
 }
 
-/// The same through another reader than the study's.
+/// The ensemble through another reader than the study's.
 pub fn ensemble_through(
     study: &Study,
     parameters: &[Parameter],

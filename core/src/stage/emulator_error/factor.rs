@@ -1,4 +1,4 @@
-//! By what the covariance of the error is enlarged until the shifts of the parameters have the size that it states.
+//! The factor on the error at which the shifts of the parameters have the size that its covariance states.
 
 use crate::linalg::vector::dot;
 use crate::linalg::{Cholesky, Matrix, multiply_transposed, transposed_multiply};
@@ -22,7 +22,7 @@ const FACTORS: [f64; 9] = [1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0, 8.0];
 const FEWEST: usize = 4;
 
 /// Some outputs and curves, in units of the noise of the data.
-pub struct Judged<'a> {
+pub struct Shifts<'a> {
     curves: &'a Curves,
     size: &'a Size,
     places: &'a Places,
@@ -35,13 +35,13 @@ pub struct Judged<'a> {
 
 /// An estimate of the parameters, in widths of their priors, from data with noise of unit variance and an error.
 pub struct Estimate {
-    /// Its covariance as the likelihood states it.
+    /// The inverse of the covariance that the likelihood states.
     pub precision: Cholesky,
-    /// What the data are multiplied by, `parameters x outputs`.
+    /// The estimate's derivative by the data, `parameters x outputs`.
     pub gain: Matrix,
 }
 
-impl<'a> Judged<'a> {
+impl<'a> Shifts<'a> {
     /// `shapes` are the curves divided by their sizes, `noise` the variances of what was measured, NaN where nothing was.
     ///
     /// Fewer outputs tell less than all: their noise is so much smaller.
@@ -126,12 +126,13 @@ impl<'a> Judged<'a> {
         crossing(&means(&squares)).max(crossing(&means(&near_edges)))
     }
 
-    /// The expected square of the shift that a curve causes under a covariance times the square of a factor.
+    /// The expected square of the shift that a curve causes under a covariance times the square of a factor; NaN where the
+    /// emulator has no slope at its run.
     fn square(&self, curve: usize, shape: &Matrix, factor: f64, slopes: &Matrix) -> f64 {
         let size = self.size.at_curves[curve];
         let error: Vec<f64> = self.white.row(curve).iter().map(|e| e * size).collect();
         Estimate::of(shape, (factor * size).powi(2), slopes)
-            .map_or(0.0, |estimate| estimate.square(&error))
+            .map_or(f64::NAN, |estimate| estimate.square(&error))
     }
 }
 
@@ -149,14 +150,20 @@ fn outer(points: &Matrix) -> Vec<usize> {
     order
 }
 
+/// The mean square for each factor over the curves that have one.
 fn means(squares: &[[f64; FACTORS.len()]]) -> [f64; FACTORS.len()] {
-    std::array::from_fn(|f| squares.iter().map(|s| s[f]).sum::<f64>() / squares.len().max(1) as f64)
+    std::array::from_fn(|f| {
+        let known: Vec<f64> = squares.iter().map(|s| s[f]).filter(|s| s.is_finite()).collect();
+        known.iter().sum::<f64>() / known.len().max(1) as f64
+    })
 }
 
-/// Where the mean square falls to one, between the factors that were tried.
+/// The factor at which the mean square falls to one: interpolated between those that were tried; beyond them the square falls with
+/// that of the factor, as it does where the error is large beside the noise.
 fn crossing(means: &[f64; FACTORS.len()]) -> f64 {
     let Some(after) = means.iter().position(|square| *square <= 1.0) else {
-        return FACTORS[FACTORS.len() - 1];
+        let last = FACTORS.len() - 1;
+        return FACTORS[last] * means[last].sqrt();
     };
     let Some(before) = after.checked_sub(1) else { return FACTORS[0] };
     let share = (means[before] - 1.0) / (means[before] - means[after]);
@@ -188,5 +195,26 @@ impl Estimate {
         let shift: Vec<f64> = self.gain.iter_rows().map(|row| dot(row, error)).collect();
         let of_noise: f64 = (0..self.gain.columns()).map(|j| half(&self.gain.column(j))).sum();
         (half(&shift) + of_noise) / shift.len().max(1) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The mean square of an error that is `a` times as large as stated, without noise, is `(a / factor)^2`: the factor is `a`,
+    /// exactly at and beyond the factors that are tried.
+    #[test]
+    fn the_factor_is_by_what_the_error_is_larger() {
+        for (larger, found) in [(0.5, 1.0), (1.5, 1.5), (4.0, 4.0), (20.0, 20.0)] {
+            let factor: f64 = crossing(&FACTORS.map(|f| f64::powi(larger / f, 2)));
+            assert!((factor - found).abs() < 1e-12, "{larger}: {factor}");
+        }
+    }
+
+    #[test]
+    fn curves_without_a_slope_have_no_say() {
+        let squares = [[4.0; FACTORS.len()], [f64::NAN; FACTORS.len()], [2.0; FACTORS.len()]];
+        assert_eq!(means(&squares).map(f64::to_bits), [3.0_f64.to_bits(); FACTORS.len()]);
     }
 }
