@@ -1,4 +1,4 @@
-//! What a plugin need not do crosses too, where it does it: a twin does it with the same bits.
+//! Optional methods of plugins cross the boundary too: a twin in a library gives the same bits.
 
 use lacuna::data::{Axis, Layout, Layouts, Measurements, Parameter, Replicate, Scenario, Unit};
 use lacuna::linalg::Matrix;
@@ -93,7 +93,7 @@ fn data() -> Measurements {
     Measurements::new(layout(), replicates)
 }
 
-/// The same, where the second replicate states no noise, or all do.
+/// Data of which the second replicate states no noise, or all do.
 fn with_sd(all: bool) -> Measurements {
     let mut data = data();
     for (r, replicate) in data.replicates.iter_mut().enumerate() {
@@ -111,7 +111,7 @@ fn with_covariance() -> Measurements {
     Measurements { covariance: Some(covariance), ..data() }
 }
 
-/// What a likelihood says of a response: its value, its derivatives, what it left out, data that it makes, and facts.
+/// All answers of a likelihood to a response: its value, its derivatives, what it left out, data that it makes, and facts.
 fn told(likelihood: &dyn Likelihood) -> (Vec<u64>, Vec<Measurements>, String) {
     let response: Vec<f64> = (0..OUTPUTS).map(|i| (1.1 * i as f64).sin()).collect();
     let hyper: Vec<f64> = likelihood.hyperparameters().iter().map(|h| h.start).collect();
@@ -307,7 +307,7 @@ fn a_response_with_its_derivatives_is_the_same() {
     assert_eq!(own, other);
 }
 
-/// What an emulator says at a point, alone and together with its derivatives.
+/// All answers of an emulator at a point, alone and together with its derivatives.
 fn said(emulator: &dyn Emulator) -> Vec<u64> {
     let point = [0.3, 1.2];
     let (mean, jacobian) = emulator.mean_and_jacobian(&point);

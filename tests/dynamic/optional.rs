@@ -17,7 +17,13 @@ use lacuna::study::file::Start;
 use super::hostile::{data, likelihood, misbehaving as discrepancy};
 use super::unruly::{Flat, fitted, misbehaving};
 
-/// What was appended in version 1.1 is not there in a library of version 1.0, whatever stands behind its tables.
+/// The error has these words and the file of the library.
+fn is_told(error: &impl std::fmt::Display, library: &str, words: &str) {
+    let said = error.to_string();
+    assert!(said.contains(words) && said.contains(&format!("lib{library}.so")), "{said}");
+}
+
+/// Functions appended in version 1.1 are not there in a library of version 1.0, whatever stands behind its tables.
 #[test]
 fn a_library_of_the_first_version_does_what_it_did() {
     let part = |built: &Built<dyn Discrepancy>| {
@@ -164,11 +170,7 @@ fn a_response_with_its_derivatives_is_checked() {
                 assert_eq!(slopes, Matrix::from_vec(1, 3, vec![2.0; 3]));
             }
             (Some(Err(error)), Some(Err(expected))) => {
-                let said = error.to_string();
-                assert!(
-                    said.contains(expected) && said.contains(&format!("lib{name}.so")),
-                    "{said}"
-                );
+                is_told(&error, name, expected);
             }
             (found, _) => panic!("{name}: {found:?}"),
         }
@@ -292,11 +294,7 @@ fn noise_that_a_reader_states_is_checked() {
                 assert_eq!(read.covariance, Some(covariance));
             }
             (Err(error), Err(expected)) => {
-                let said = error.to_string();
-                assert!(
-                    said.contains(expected) && said.contains(&format!("lib{name}.so")),
-                    "{said}"
-                );
+                is_told(&error, name, expected);
             }
             (found, _) => panic!("{name}: {found:?}"),
         }

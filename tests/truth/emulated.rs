@@ -60,7 +60,7 @@ fn quadratic([a, b, c]: [f64; 3]) -> Vec<f64> {
     (0..OUTPUTS).map(|i| value(i as f64 / (OUTPUTS - 1) as f64)).collect()
 }
 
-/// What calibrations found: whether intervals of 50, 90 and 95 % hold each parameter, and its standard deviation.
+/// The result of calibrations: for each parameter, if intervals of 50, 90 and 95 % hold it, and its standard deviation.
 struct Found {
     held: [Vec<bool>; 3],
     widths: Vec<f64>,

@@ -79,19 +79,26 @@ fn encode(
 
 /// Reads one array of a file that [`write`] made.
 pub fn read(path: &Path, name: &str) -> Result<Array, Stop> {
-    let fail = |error: String| Stop::new(format!("cannot read {}: {error}", path.display()));
+    let missing = || failed(path, &format!("no variable `{name}`"));
+    read_some(path, name)?.ok_or_else(missing)
+}
+
+/// The array of this name; `None` where the file has none.
+pub fn read_some(path: &Path, name: &str) -> Result<Option<Array>, Stop> {
+    let fail = |error: String| failed(path, &error);
     let file = NcFile::open(path).map_err(|error| fail(error.to_string()))?;
     let variables = file.variables().map_err(|error| fail(error.to_string()))?;
-    let variable = variables
-        .iter()
-        .find(|v| v.name() == name)
-        .ok_or_else(|| fail(format!("no variable `{name}`")))?;
+    let Some(variable) = variables.iter().find(|v| v.name() == name) else { return Ok(None) };
     let dimensions: Vec<(String, usize)> =
         variable.dimensions().iter().map(|d| (d.name.clone(), d.size as usize)).collect();
     let values = file.read_variable_as_f64(name).map_err(|error| fail(error.to_string()))?;
     let values = values.iter().copied().collect();
     let unit = variable.attribute("units").and_then(|attribute| attribute.value.as_string());
-    Ok(Array { name: name.to_owned(), dimensions, values, unit })
+    Ok(Some(Array { name: name.to_owned(), dimensions, values, unit }))
+}
+
+fn failed(path: &Path, error: &str) -> Stop {
+    Stop::new(format!("cannot read {}: {error}", path.display()))
 }
 
 /// Writes one run's response as `NAME.nc`: a variable with the response's name on the axes of the layout, their

@@ -84,7 +84,7 @@ impl Discrepancy for Absent {
         Err(stop())
     }
 
-    /// Whether it does is not known, so that data that state their noise are right.
+    /// A library that is not loaded cannot be asked, so that data that state their noise are right.
     fn takes_stated_noise(&self) -> bool {
         true
     }

@@ -98,7 +98,7 @@ fn equals_the_normal_density_written_out() {
     }
 }
 
-/// What is left when a replicate is taken away has the same law.
+/// The data without a replicate keep the law of all data.
 #[test]
 fn a_part_has_the_density_written_out() {
     let error = [common(5)];

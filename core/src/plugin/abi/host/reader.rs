@@ -143,7 +143,7 @@ impl Plugin<ReaderFunctions> {
     }
 }
 
-/// Whether a replicate states no standard deviations.
+/// True for a replicate without stated standard deviations.
 fn states_nothing(sd: &[f64]) -> bool {
     sd.iter().all(|sd| sd.is_nan())
 }

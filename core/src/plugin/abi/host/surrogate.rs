@@ -172,7 +172,7 @@ impl LoadedEmulator {
         Ok(Self { linear: OnceLock::new(), object, dimension, outputs, fit_error })
     }
 
-    /// The same, if its errors are of the shape of its outputs.
+    /// An emulator whose errors are of the shape of its outputs; else an error.
     fn judged(self) -> Result<Self, Refusal> {
         let FitError { relative, residuals } = &self.fit_error;
         let relative = Matrix::from_vec(1, relative.len(), relative.clone());

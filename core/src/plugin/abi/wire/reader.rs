@@ -104,27 +104,27 @@ pub struct EnsembleAbout {
     pub failed: Vec<FailedRun>,
 }
 
-/// What measurements say beside their numbers.
+/// The part of measurements that is no number: names and marks.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum MeasuredAbout {
     /// The names of the replicates; the data do not state their noise.
     Names(Vec<String>),
-    /// The same where the data state it.
+    /// The stated noise, where the data state it.
     Stated {
         /// The names of the replicates.
         replicates: Vec<String>,
-        /// Whether standard deviations follow the values.
+        /// True where standard deviations follow the values.
         #[serde(default)]
         sd: bool,
-        /// Whether a covariance follows those.
+        /// True where a covariance follows those.
         #[serde(default)]
         covariance: bool,
     },
 }
 
 impl MeasuredAbout {
-    /// What is said of measurements.
+    /// The names and marks of measurements.
     pub fn of(measurements: &Measurements) -> Self {
         let replicates = measurements.replicates.iter().map(|r| r.name.clone()).collect();
         let sd = measurements.replicates.iter().any(|r| r.sd.is_some());

@@ -1,4 +1,4 @@
-//! What samplers tell of a step, beside the numbers.
+//! Names and kinds of the statistics that a sampler tells of each step.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,9 +8,9 @@ use crate::data::statistics::Kind;
 /// A statistic without its values.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StatisticAbout {
-    /// Its name.
+    /// The name of the statistic.
     pub name: String,
-    /// What kind of number it is.
+    /// The kind of its numbers.
     pub kind: Kind,
 }
 
