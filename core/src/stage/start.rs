@@ -123,8 +123,8 @@ mod tests {
     use super::*;
     use crate::math::random::uniform;
 
-    /// Each of two cones has a start, though all of the best candidates are in the first and the second has a twentieth of the
-    /// cube; candidates where the density is zero are none.
+    /// Each of two cones has a start, though the second is lower and has a twentieth of the cube; candidates where the density is zero
+    /// are none.
     #[test]
     fn every_basin_of_some_size_has_a_start() {
         for d in [2, 4, 6] {
@@ -134,9 +134,9 @@ mod tests {
             let from = |x: &[f64], at: f64| x.iter().map(|x| (x - at).powi(2)).sum::<f64>().sqrt();
             let is_second = |x: &[f64]| x.iter().all(|x| *x < second);
             let density = |x: &[f64]| match is_second(x) {
-                true => -100.0 - from(x, 0.5 * second),
+                true => -0.1 - from(x, 0.5 * second),
                 false if x[0] > 0.98 => f64::NEG_INFINITY,
-                false => -from(x, 0.7),
+                false => -2.0 * from(x, 0.7),
             };
             let density: Vec<f64> = points.iter_rows().map(density).collect();
             let chosen = peaks(&points, d, &density);

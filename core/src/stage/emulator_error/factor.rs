@@ -1,18 +1,21 @@
 //! The factor on the error at which the shifts of the parameters have the size that its covariance states.
 
+use rayon::prelude::*;
+
 use crate::linalg::vector::dot;
-use crate::linalg::{Cholesky, Matrix, multiply_transposed, transposed_multiply};
+use crate::linalg::{Cholesky, Matrix, multiply_transposed, symmetric_eigen, transposed_multiply};
 
 use super::size::Size;
-use super::taper::Places;
+use super::taper::{Places, RANK};
 use super::{Curves, ranges, thinned};
 
-/// So many outputs stand for all, and so many curves.
-const OUTPUTS: usize = 100;
+/// So many outputs stand for all, and so many curves. The more outputs, the more directions there are in which an estimate trusts
+/// the covariance: of the founding study a hundred outputs ask for a factor of 1.2, three hundred for 1.8, all thousand for 3.7.
+const OUTPUTS: usize = 1000;
 const CURVES: usize = 100;
 
-/// Up to this number of curves each is left out alone, beyond it in ten parts.
-const ALONE: usize = 30;
+/// Up to this number of curves of no more outputs than that each is left out alone, beyond it in ten parts.
+const ALONE: (usize, usize) = (30, 300);
 const PARTS: usize = 10;
 
 /// The factors between which the right one is looked for.
@@ -109,30 +112,61 @@ impl<'a> Shifts<'a> {
 
     fn enlarged(&self, slopes: &dyn Fn(&[f64]) -> Matrix) -> f64 {
         let count = self.white.rows();
-        let parts = if count <= ALONE { count } else { PARTS };
+        let is_alone = count <= ALONE.0 && self.outputs.len() <= ALONE.1;
+        let parts = if is_alone { count } else { PARTS };
         let judged = thinned(count, CURVES);
         let slopes: Vec<Matrix> =
             judged.iter().map(|&i| self.slopes(&slopes(self.curves.points.row(i)))).collect();
-        let mut squares = vec![[0.0; FACTORS.len()]; judged.len()];
-        for part in 0..parts {
-            let others: Vec<usize> = (0..count).filter(|i| i % parts != part).collect();
-            let shape = self.damped(&self.white.select_rows(&others));
-            for (k, &i) in judged.iter().enumerate().filter(|(_, i)| *i % parts == part) {
-                squares[k] = FACTORS.map(|factor| self.square(i, &shape, factor, &slopes[k]));
+        let of_part = |part: usize| -> Vec<(usize, [f64; FACTORS.len()])> {
+            let mine: Vec<usize> =
+                (0..judged.len()).filter(|&k| judged[k] % parts == part).collect();
+            if mine.is_empty() {
+                return Vec::new();
             }
-        }
+            let others: Vec<usize> = (0..count).filter(|i| i % parts != part).collect();
+            let axes = Axes::of(&self.damped(&self.white.select_rows(&others)));
+            mine.into_iter().map(|k| (k, self.squares(judged[k], &axes, &slopes[k]))).collect()
+        };
+        let mut squares = vec![[f64::NAN; FACTORS.len()]; judged.len()];
+        let found: Vec<_> = (0..parts).into_par_iter().flat_map_iter(of_part).collect();
+        found.into_iter().for_each(|(k, own)| squares[k] = own);
         let outer = outer(&self.curves.points.select_rows(&judged));
         let near_edges = outer.iter().map(|&k| squares[k]).collect::<Vec<_>>();
         crossing(&means(&squares)).max(crossing(&means(&near_edges)))
     }
 
-    /// The expected square of the shift that a curve causes under a covariance times the square of a factor; NaN where the
-    /// emulator has no slope at its run.
-    fn square(&self, curve: usize, shape: &Matrix, factor: f64, slopes: &Matrix) -> f64 {
+    /// For each factor the expected square of the shift that a curve causes under a covariance times the square of the factor; NaN
+    /// where the emulator has no slope at its run, or the covariance no axes.
+    fn squares(&self, curve: usize, axes: &Option<Axes>, slopes: &Matrix) -> [f64; FACTORS.len()] {
+        let Some(axes) = axes else { return [f64::NAN; FACTORS.len()] };
         let size = self.size.at_curves[curve];
         let error: Vec<f64> = self.white.row(curve).iter().map(|e| e * size).collect();
-        Estimate::of(shape, (factor * size).powi(2), slopes)
-            .map_or(f64::NAN, |estimate| estimate.square(&error))
+        let slopes = transposed_multiply(&axes.vectors, slopes);
+        let error = transposed_multiply(&axes.vectors, &Matrix::from_vec(error.len(), 1, error));
+        FACTORS.map(|factor| {
+            Estimate::of(&axes.variances, (factor * size).powi(2), &slopes)
+                .map_or(f64::NAN, |estimate| estimate.square(error.as_slice()))
+        })
+    }
+}
+
+/// The axes of a covariance.
+struct Axes {
+    /// The variance along each.
+    variances: Vec<f64>,
+    /// One axis a column.
+    vectors: Matrix,
+}
+
+impl Axes {
+    fn of(covariance: &Matrix) -> Option<Self> {
+        let eigen = symmetric_eigen(covariance).ok()?;
+        // The largest are the last; the covariance in the likelihood has no others. Rounding leaves values of either sign
+        // where there are none.
+        let first = eigen.values.len().saturating_sub(RANK);
+        let kept = |(k, v): (usize, &f64)| if k < first { 0.0 } else { v.max(0.0) };
+        let variances = eigen.values.iter().enumerate().map(kept).collect();
+        Some(Self { variances, vectors: eigen.vectors })
     }
 }
 
@@ -171,12 +205,12 @@ fn crossing(means: &[f64; FACTORS.len()]) -> f64 {
 }
 
 impl Estimate {
-    /// By generalised least squares with the prior, under an error of a covariance times a number; `None` where that is no covariance.
-    pub fn of(covariance: &Matrix, scale: f64, slopes: &Matrix) -> Option<Self> {
-        let whole = Matrix::from_fn(covariance.rows(), covariance.columns(), |i, j| {
-            scale * covariance[(i, j)] + f64::from(u8::from(i == j))
+    /// By generalised least squares with the prior, under an error whose variance along each axis of the data is a number times that given;
+    /// `slopes` are along the same axes. `None` where the slopes have no value.
+    pub fn of(variances: &[f64], scale: f64, slopes: &Matrix) -> Option<Self> {
+        let solved = Matrix::from_fn(slopes.rows(), slopes.columns(), |i, j| {
+            slopes[(i, j)] / (1.0 + scale * variances[i])
         });
-        let solved = Cholesky::new(&whole).ok()?.solve_matrix(slopes);
         let mut precision = transposed_multiply(slopes, &solved);
         (0..precision.rows()).for_each(|k| precision[(k, k)] += 1.0);
         let precision = Cholesky::new(&precision).ok()?;

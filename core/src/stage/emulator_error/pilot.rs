@@ -39,8 +39,9 @@ impl Pilot<'_> {
     fn points(&self, shifts: &Shifts<'_>, even: &Matrix) -> Matrix {
         let slopes = shifts.slopes(self.slopes);
         let mut points = Matrix::from_rows(self.best.len(), [self.best]);
-        let none = Matrix::zeros(even.rows(), even.rows());
-        let Some(estimate) = Estimate::of(&none, 1.0, &slopes) else { return points };
+        let Some(estimate) = Estimate::of(&vec![0.0; even.rows()], 1.0, &slopes) else {
+            return points;
+        };
         let gain = &estimate.gain;
         let own = multiply_transposed(gain, gain);
         let of_error = multiply_transposed(&multiply(gain, even), gain);

@@ -15,8 +15,10 @@ const APART: f64 = 0.7;
 /// The covariance of so many outputs is decomposed, and what it says is extended to the others.
 const OUTPUTS: usize = 1000;
 
-/// The largest rank of the covariance; directions of a variance below this share of the least noise are left out.
-const RANK: usize = 100;
+/// The largest rank of the covariance: along all other directions the emulator counts as exact, and estimates trust them. A hundred of
+/// a thousand directions may hold nearly all of the variance, and an estimate from the rest is as sure as if there were no error.
+pub const RANK: usize = 500;
+/// Directions of a variance below this share of the least noise are left out.
 const SEEN: f64 = 0.01;
 
 /// The place of each output: its block, and along each axis a share of it or a label.
