@@ -125,11 +125,15 @@ impl<'a> Shifts<'a> {
             }
             let others: Vec<usize> = (0..count).filter(|i| i % parts != part).collect();
             let axes = Axes::of(&self.damped(&self.white.select_rows(&others)));
-            mine.into_iter().map(|k| (k, self.squares(judged[k], &axes, &slopes[k]))).collect()
+            mine.into_iter()
+                .map(|k| (k, self.squares(judged[k], axes.as_ref(), &slopes[k])))
+                .collect()
         };
         let mut squares = vec![[f64::NAN; FACTORS.len()]; judged.len()];
         let found: Vec<_> = (0..parts).into_par_iter().flat_map_iter(of_part).collect();
-        found.into_iter().for_each(|(k, own)| squares[k] = own);
+        for (k, own) in found {
+            squares[k] = own;
+        }
         let outer = outer(&self.curves.points.select_rows(&judged));
         let near_edges = outer.iter().map(|&k| squares[k]).collect::<Vec<_>>();
         crossing(&means(&squares)).max(crossing(&means(&near_edges)))
@@ -137,7 +141,7 @@ impl<'a> Shifts<'a> {
 
     /// For each factor the expected square of the shift that a curve causes under a covariance times the square of the factor; NaN
     /// where the emulator has no slope at its run, or the covariance no axes.
-    fn squares(&self, curve: usize, axes: &Option<Axes>, slopes: &Matrix) -> [f64; FACTORS.len()] {
+    fn squares(&self, curve: usize, axes: Option<&Axes>, slopes: &Matrix) -> [f64; FACTORS.len()] {
         let Some(axes) = axes else { return [f64::NAN; FACTORS.len()] };
         let size = self.size.at_curves[curve];
         let error: Vec<f64> = self.white.row(curve).iter().map(|e| e * size).collect();
