@@ -1,6 +1,6 @@
 """How often the intervals of `lacuna coverage` hold the truth, over several designs.
 
-    python bench/coverage.py [--lacuna PATH] [--out FOLDER] [--designs 8] [--truths 25] [CASE ...]
+    python bench/coverage.py [--lacuna PATH] [--out FOLDER] [--designs 8] [--truths 25] [--margin 0] [CASE ...]
 
 A case is STUDY:SURROGATE:RUNS with a study of `bench/coverage`, a surrogate of the list below and the number of simulation runs.
 Left out: all cases of the table in docs/coverage.md. Every design has truths and data of its own; the model itself is calibrated to the
@@ -75,7 +75,10 @@ def row(options, case):
         priors = [p["prior"]["uniform"] for p in tomllib.load(file)["parameter"]]
     held, edge, within, expected, errors, widths, seconds, truths, failed = [], [], [], [], [], [], 0.0, 0, 0
     for seed in range(1, options.designs + 1):
-        emulated, took = counted(options, study, SURROGATES[kind] + [f"design.runs={runs}"], case.replace(":", "-"), seed)
+        settings, name = SURROGATES[kind] + [f"design.runs={runs}"], case.replace(":", "-")
+        if options.margin > 0:
+            settings, name = settings + [f"design.margin={options.margin}"], f"{name}-margin-{options.margin}"
+        emulated, took = counted(options, study, settings, name, seed)
         exact = cases(counted(options, study, EXACT, f"{study}-exact", seed)[0])
         seconds += took
         truths += options.truths
@@ -105,6 +108,7 @@ def main():
     parser.add_argument("--out", default="target/coverage")
     parser.add_argument("--designs", type=int, default=8)
     parser.add_argument("--truths", type=int, default=25)
+    parser.add_argument("--margin", type=float, default=0.0, help="of the design beyond the prior")
     parser.add_argument("cases", nargs="*", default=CASES)
     options = parser.parse_args()
     bands = [band(options.designs * options.truths, p) for p in (0.5, 0.9, 0.95)]
