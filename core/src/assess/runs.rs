@@ -172,8 +172,8 @@ pub fn no_margin(name: &str, share: f64, end: f64, shift: Option<f64>) -> Option
         return None;
     }
     let message = format!(
-        "{} of the posterior lie at the end of the training runs, {}, which is that of the prior: an emulator is worst at the \
-         edge of its runs",
+        "{} of the posterior lie at the end of the training runs, {}, and no run is beyond the prior there: an emulator is \
+         worst at the edge of its runs",
         percent(share),
         short(end)
     );

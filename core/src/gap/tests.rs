@@ -18,14 +18,16 @@ const TIMES: usize = 12;
 const REPLICATES: usize = 5;
 const NOISE: f64 = 0.3;
 
-/// `y = a + b t`.
-struct Line;
+/// A response of two parameters at a time, with its slopes.
+struct Curve(fn([f64; 2], f64) -> (f64, [f64; 2]));
 
-fn line(a: f64, b: f64) -> Vec<f64> {
-    (0..TIMES).map(|t| a + b * t as f64).collect()
+impl Curve {
+    fn at(&self, point: &[f64], i: usize) -> (f64, [f64; 2]) {
+        self.0([point[0], point[1]], i as f64)
+    }
 }
 
-impl Forward for Line {
+impl Forward for Curve {
     fn dimension(&self) -> usize {
         2
     }
@@ -33,11 +35,25 @@ impl Forward for Line {
         TIMES
     }
     fn mean(&self, points: &Matrix) -> Matrix {
-        Matrix::from_rows(TIMES, points.iter_rows().map(|p| line(p[0], p[1])))
+        let response = |p: &[f64]| (0..TIMES).map(|i| self.at(p, i).0).collect::<Vec<_>>();
+        Matrix::from_rows(TIMES, points.iter_rows().map(response))
     }
-    fn jacobian(&self, _: &[f64]) -> Matrix {
-        Matrix::from_fn(TIMES, 2, |i, j| if j == 0 { 1.0 } else { i as f64 })
+    fn jacobian(&self, point: &[f64]) -> Matrix {
+        Matrix::from_fn(TIMES, 2, |i, j| self.at(point, i).1[j])
     }
+}
+
+/// `y = a + b t`.
+const LINE: Curve = Curve(|[a, b], t| (a + b * t, [1.0, t]));
+
+/// `y = a exp(-b t)`.
+const DECAY: Curve = Curve(|[a, b], t| {
+    let e = (-b * t).exp();
+    (a * e, [e, -a * t * e])
+});
+
+fn line(a: f64, b: f64) -> Vec<f64> {
+    (0..TIMES).map(|t| a + b * t as f64).collect()
 }
 
 fn layouts() -> Layouts {
@@ -93,7 +109,7 @@ fn data(seed: u64, truth: &[f64], count: usize) -> Measurements {
 fn a_line_is_fitted_and_weighed_as_its_closed_form() {
     let (layouts, parameters) = (layouts(), parameters());
     let measured = data(7, &line(1.0, -0.4), REPLICATES).into();
-    let experiment = Experiment::new(&layouts, &parameters, &Line, &measured);
+    let experiment = Experiment::new(&layouts, &parameters, &LINE, &measured);
     let (_, means) = experiment.means();
     let whitener = Whitener::new(&experiment, &white(), &means);
     let system = System::new(&experiment, Vec::new());
@@ -132,7 +148,7 @@ fn a_gap_that_closes_is_proven() {
     let (layouts, parameters, count) = (layouts(), parameters(), 40);
     let truth = line(1.0, -0.4);
     let held_out = data(8, &truth, count).into();
-    let experiment = Experiment::new(&layouts, &parameters, &Line, &held_out);
+    let experiment = Experiment::new(&layouts, &parameters, &LINE, &held_out);
     let wrong: Vec<f64> = truth.iter().map(|y| y + NOISE).collect();
     let proof = prove(&experiment, &white(), &wrong, &truth).unwrap();
     let bound = 4.0 * (2.0 / (count * TIMES) as f64).sqrt();
@@ -155,32 +171,6 @@ fn a_gap_that_closes_is_proven() {
     assert!(!back.shrank && back.all.upper < 0.0, "{back:?}");
 }
 
-/// `y = a exp(-b t)`.
-struct Decay;
-
-fn decay(a: f64, b: f64) -> Vec<f64> {
-    (0..TIMES).map(|t| a * (-b * t as f64).exp()).collect()
-}
-
-impl Forward for Decay {
-    fn dimension(&self) -> usize {
-        2
-    }
-    fn outputs(&self) -> usize {
-        TIMES
-    }
-    fn mean(&self, points: &Matrix) -> Matrix {
-        Matrix::from_rows(TIMES, points.iter_rows().map(|p| decay(p[0], p[1])))
-    }
-    fn jacobian(&self, point: &[f64]) -> Matrix {
-        Matrix::from_fn(TIMES, 2, |i, j| {
-            let t = i as f64;
-            let e = (-point[1] * t).exp();
-            if j == 0 { e } else { -point[0] * t * e }
-        })
-    }
-}
-
 /// Noise-free data are fitted exactly, however many decades a log-uniform prior spans and wherever the search starts. Steps
 /// in the unknown itself ended at the lower bound, where the density per unit grows as its reciprocal.
 #[test]
@@ -193,7 +183,7 @@ fn unknowns_of_many_decades_are_found() {
             p.design = p.prior.clone();
         }
         parameters[0].prior = Distribution::LogUniform([1e-3, 1e4]);
-        let curve = decay(20.0, truth);
+        let curve: Vec<f64> = (0..TIMES).map(|i| 20.0 * (-truth * i as f64).exp()).collect();
         let replicate = |r: usize| Replicate {
             name: r.to_string(),
             values: curve.iter().map(|y| Some(*y)).collect(),
@@ -203,7 +193,7 @@ fn unknowns_of_many_decades_are_found() {
         let replicates = (0..REPLICATES).map(replicate).collect();
         let exact = Measurements { layout, replicates, covariance: None };
         let measured = exact.into();
-        let experiment = Experiment::new(&layouts, &parameters, &Decay, &measured);
+        let experiment = Experiment::new(&layouts, &parameters, &DECAY, &measured);
         let (_, means) = experiment.means();
         let whitener = Whitener::new(&experiment, &white(), &means);
         let system = System::new(&experiment, Vec::new());

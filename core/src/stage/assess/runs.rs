@@ -3,7 +3,7 @@
 use crate::assess::Finding;
 use crate::assess::runs::{self as check, Invalid};
 use crate::assess::suspicious::{self, Suspect, values};
-use crate::data::Ensemble;
+use crate::data::{Ensemble, Parameter};
 use crate::linalg::Matrix;
 use crate::math::moments;
 use crate::run::Stop;
@@ -56,7 +56,7 @@ fn few(
 ) -> Option<Finding> {
     calibrated?;
     let points = training(known)?;
-    let middle = |p: &crate::data::Parameter| (p.prior.quantile(0.005), p.prior.quantile(0.995));
+    let middle = |p: &Parameter| (p.prior.quantile(0.005), p.prior.quantile(0.995));
     let whole = || study.parameters.iter().map(middle).collect();
     let intervals: Vec<(f64, f64)> = known.region.map_or_else(whole, <[_]>::to_vec);
     let inside = |point: &&[f64]| {
@@ -98,20 +98,35 @@ fn sparse(
     check::sparse(ratio, shift)
 }
 
-/// Draws beyond all training runs, and a step between runs more.
-fn beyond(study: &Study, known: &Known<'_>, calibrated: Option<&Calibrated>) -> Vec<Finding> {
+/// What a check says of each parameter: of its prior, the range of its training runs with their number, and its draws.
+fn by_parameter(
+    study: &Study,
+    known: &Known<'_>,
+    calibrated: Option<&Calibrated>,
+    check: impl Fn(&Parameter, (f64, f64, usize), &[f64]) -> Vec<Finding>,
+) -> Vec<Finding> {
     let (Some(points), Some(calibrated)) = (training(known), calibrated) else { return Vec::new() };
     let draws = calibrated.draws.from_step(calibrated.outcome.burn_in);
-    let one = |(j, parameter): (usize, &crate::data::Parameter)| {
+    let one = |(j, parameter): (usize, &Parameter)| {
         let column = points.column(j);
         let low = column.iter().copied().fold(f64::INFINITY, f64::min);
         let high = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let step = (high - low) / column.len() as f64;
-        let values = draws.pooled(j);
-        let count = values.iter().filter(|&&x| x < low - step || x > high + step).count();
-        check::extrapolated(&parameter.name, count as f64 / values.len() as f64, (low, high))
+        check(parameter, (low, high, column.len()), &draws.pooled(j))
     };
-    study.parameters.iter().enumerate().filter_map(one).collect()
+    study.parameters.iter().enumerate().flat_map(one).collect()
+}
+
+fn share(values: &[f64], is: impl Fn(f64) -> bool) -> f64 {
+    values.iter().filter(|&&x| is(x)).count() as f64 / values.len() as f64
+}
+
+/// Draws beyond all training runs, and a step between runs more.
+fn beyond(study: &Study, known: &Known<'_>, calibrated: Option<&Calibrated>) -> Vec<Finding> {
+    by_parameter(study, known, calibrated, |parameter, (low, high, runs), draws| {
+        let step = (high - low) / runs as f64;
+        let outside = share(draws, |x| x < low - step || x > high + step);
+        check::extrapolated(&parameter.name, outside, (low, high)).into_iter().collect()
+    })
 }
 
 /// Draws at an end of the runs, where those reach no farther than the prior.
@@ -121,27 +136,19 @@ fn at_edge(
     calibrated: Option<&Calibrated>,
     shift: Option<f64>,
 ) -> Vec<Finding> {
-    let (Some(points), Some(calibrated)) = (training(known), calibrated) else { return Vec::new() };
-    let draws = calibrated.draws.from_step(calibrated.outcome.burn_in);
-    let (near, beyond) = check::AT_EDGE;
-    let one = |(j, parameter): (usize, &crate::data::Parameter)| -> Vec<Finding> {
-        let column = points.column(j);
-        let low = column.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let (near, margin) = check::AT_EDGE;
+    by_parameter(study, known, calibrated, |parameter, (low, high, _), draws| {
         let range = high - low;
         let (first, last) = parameter.prior.support();
-        let values = draws.pooled(j);
-        // How far a value lies inside the end of the runs, for both ends, and how far the prior's end does.
+        // Each end of the runs, the direction inward, and how far the runs reach beyond the prior.
         let ends = [(low, 1.0, first - low), (high, -1.0, high - last)];
-        let told =
-            ends.iter().filter(|(.., margin)| *margin < beyond * range && margin.is_finite());
+        let without = ends.iter().filter(|(.., own)| own.is_finite() && *own < margin * range);
         let finding = |&(end, inward, _): &(f64, f64, f64)| {
-            let count = values.iter().filter(|&&x| inward * (x - end) < near * range).count();
-            check::no_margin(&parameter.name, count as f64 / values.len() as f64, end, shift)
+            let there = share(draws, |x| inward * (x - end) < near * range);
+            check::no_margin(&parameter.name, there, end, shift)
         };
-        told.filter_map(finding).collect()
-    };
-    study.parameters.iter().enumerate().flat_map(one).collect()
+        without.filter_map(finding).collect()
+    })
 }
 
 fn of_design(study: &Study, ensemble: &Ensemble) -> Option<Finding> {
