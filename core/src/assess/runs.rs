@@ -31,8 +31,8 @@ const INVALID_SHARE: f64 = 0.05;
 /// The share of failed runs that is a reservation, and a failure.
 const FAILED_SHARE: (f64, f64) = (0.1, 0.5);
 
-const MORE_RUNS: &str = "narrow the `design` to the `prior`, or add runs near the posterior with \
-                         `[surrogate] refine`";
+const MORE_RUNS: &str = "raise `[design] runs`, narrow a `design` that is much wider than the `prior`, or add runs near \
+                         the posterior with `[surrogate] refine`";
 const NARROW_PRIOR: &str =
     "make runs on the whole `prior`, a margin beyond it included, or narrow the `prior`";
 const CORRECT_DESIGN: &str = "correct the `design` of the parameters or the table of runs";
