@@ -20,11 +20,11 @@ pub const STAGES: [(&str, Depends); 13] = [
     ("calibrate", Depends::OnVersion(4)),
     ("evidence", Depends::OnVersion(2)),
     ("validate", Depends::OnVersion(2)),
-    ("assess", Depends::OnVersion(2)),
+    ("assess", Depends::OnVersion(3)),
     ("gap", Depends::OnVersion(2)),
     ("show", Depends::OnVersion(1)),
     ("power", Depends::OnVersion(1)),
-    ("coverage", Depends::OnVersion(1)),
+    ("coverage", Depends::OnVersion(2)),
 ];
 
 /// What the artifacts of a stage depend on besides its inputs; the number is the stage's revision.
