@@ -32,7 +32,7 @@ pub struct Manner {
 /// Whose noise the data have that are made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Whose {
-    /// Residuals of the study's replicates about their mean, drawn again: whole replicates, no law assumed.
+    /// Residuals of the study's replicates about their mean: whole replicates, each with a random sign.
     Replicates,
     /// The discrepancy at draws of the study's own posterior.
     Posterior,

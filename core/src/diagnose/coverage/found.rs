@@ -8,8 +8,8 @@ use super::Tally;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Noise {
-    /// The residuals of the study's replicates about their mean, whole replicates drawn with replacement: nothing is assumed
-    /// of their law, and nothing of the model's form is in them.
+    /// The residuals of the study's replicates about their mean, whole replicates with random signs: nothing is assumed
+    /// of their law but that it is symmetric, and nothing of the model's form is in them.
     Replicates,
     /// The discrepancy at draws of the study's own posterior.
     Posterior,

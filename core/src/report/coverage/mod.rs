@@ -35,7 +35,7 @@ fn said(found: &Coverage) -> Vec<String> {
         Source::HeldBack => "simulation runs that were held back from the emulator",
     };
     let noise = match found.noise {
-        Noise::Replicates => "noise: residuals of the study's replicates, drawn again",
+        Noise::Replicates => "noise: residuals of the study's replicates, each with a random sign",
         Noise::Posterior => "noise: the discrepancy at draws of the study's own posterior",
         Noise::Prior => "noise: the discrepancy with unknowns drawn from their priors",
     };

@@ -187,7 +187,7 @@ fn coordinates(
         prior: h.prior.clone(),
         of_prior: i < effects || noise == Noise::Prior,
     });
-    // Replicates that are drawn again have no unknown of the discrepancy's.
+    // Residuals of replicates have no unknown of the discrepancy's.
     let known = if noise == Noise::Replicates { effects } else { effects + own };
     parameters.chain(hyper.take(known)).collect()
 }

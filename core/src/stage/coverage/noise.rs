@@ -1,6 +1,6 @@
 //! Data of a truth: its response with noise, on the layout and with the replicates and gaps of the measurements.
 
-use crate::data::{Measurements, Observations, Replicate};
+use crate::data::{Measurements, Observations};
 use crate::math::random::{Stream, below};
 use crate::plugin::Forward;
 use crate::run::Stop;
@@ -32,55 +32,48 @@ pub fn of_discrepancy(
     Ok(Observations { blocks: parts.likelihood().simulate(response, hyper, stream) })
 }
 
-/// Fewer replicates than this have no residuals that could be drawn again.
+/// Values of fewer replicates than this have no residuals that could be taken again.
 const FEWEST: usize = 3;
 
-/// Data about a response with residuals of the measurements: for each replicate those of one drawn at random among all that
-/// measured what it did. They are about the mean of the replicates, and larger by the root of n / (n - 1).
+/// Data about a response with the residuals of the measurements, each replicate's with a random sign: the wild bootstrap (Liu,
+/// Annals of Statistics 16 (1988) 1696). The residuals are about the mean of the replicates, and larger by the root of
+/// n / (n - 1).
+///
+/// All points of a replicate keep their correlations, and the law of its residuals its shape as far as it is symmetric. Replicates
+/// that are drawn with replacement have copies among them, from which a study could not learn what the points of
+/// one share.
 pub fn of_replicates(
     data: &Observations,
     response: &[f64],
     stream: &Stream,
 ) -> Result<Observations, Stop> {
+    let least = fewest(data);
+    if least < FEWEST {
+        return Err(Stop::new(format!(
+            "a value has {least} replicates, and {FEWEST} are the fewest whose residuals can be taken again"
+        ))
+        .help("`--noise posterior` takes the noise from the discrepancy"));
+    }
     let mut blocks = Vec::new();
     for (k, (block, range)) in data.blocks.iter().zip(data.layouts().ranges()).enumerate() {
-        blocks.push(redrawn(block, &response[range], &stream.at(k as u64))?);
+        blocks.push(signed(block, &response[range], &stream.at(k as u64)));
     }
     Ok(Observations { blocks })
 }
 
-fn redrawn(data: &Measurements, response: &[f64], stream: &Stream) -> Result<Measurements, Stop> {
+fn signed(data: &Measurements, response: &[f64], stream: &Stream) -> Measurements {
     let summaries = data.summaries();
     let mut made = data.clone();
     for (r, replicate) in made.replicates.iter_mut().enumerate() {
-        if replicate.values.iter().all(Option::is_none) {
-            continue;
-        }
-        let donors: Vec<&Replicate> =
-            data.replicates.iter().filter(|donor| covers(donor, &data.replicates[r])).collect();
-        if donors.len() < FEWEST {
-            return Err(Stop::new(format!(
-                "{} replicates measured what `{}` did, and {FEWEST} are the fewest whose residuals can be drawn again",
-                donors.len(),
-                replicate.name
-            ))
-            .help("`--noise posterior` takes the noise from the discrepancy"));
-        }
-        let donor = donors[below(&mut stream.at(r as u64).generator(), donors.len())];
+        let is_turned = below(&mut stream.at(r as u64).generator(), 2) == 0;
+        let sign = if is_turned { -1.0 } else { 1.0 };
         for (i, value) in replicate.values.iter_mut().enumerate() {
             let count = summaries[i].count as f64;
-            let scale = (count / (count - 1.0)).sqrt();
-            *value =
-                value.and(donor.values[i]).map(|y| response[i] + scale * (y - summaries[i].mean));
+            let scale = sign * (count / (count - 1.0)).sqrt();
+            *value = value.map(|y| response[i] + scale * (y - summaries[i].mean));
         }
     }
-    Ok(made)
-}
-
-/// Whether one measured all that another did.
-fn covers(donor: &Replicate, replicate: &Replicate) -> bool {
-    let pairs = donor.values.iter().zip(&replicate.values);
-    pairs.into_iter().all(|(donor, value)| value.is_none() || donor.is_some())
+    made
 }
 
 /// The fewest replicates of any measured value.
@@ -98,8 +91,8 @@ pub fn scatter(data: &Observations) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::{Axis, Layout, Unit};
-    use crate::math::moments::{mean, variance};
+    use crate::data::{Axis, Layout, Replicate, Unit};
+    use crate::math::moments::mean;
     use crate::math::random::normal;
 
     fn data(replicates: usize) -> Observations {
@@ -118,13 +111,13 @@ mod tests {
         Measurements::new(layout, (0..replicates).map(one).collect()).into()
     }
 
-    /// Curves that differ by one random factor: curves drawn again differ by it too, so that all their values are
-    /// proportional, have the variance of the replicates, and the gaps that were there.
+    /// Curves that differ by one random factor: the new ones differ by it too, so that all their values are proportional, and have
+    /// the gaps that were there. The mean of n has the variance of the replicates over n, by its definition.
     #[test]
     fn residuals_keep_their_correlation_their_variance_and_the_gaps() {
         let data = data(12);
         let response = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
-        let mut first = Vec::new();
+        let mut means = Vec::new();
         for k in 0..500 {
             let made = of_replicates(&data, &response, &Stream::root(9).at(k)).unwrap();
             for (new, old) in made.blocks[0].replicates.iter().zip(&data.blocks[0].replicates) {
@@ -133,20 +126,21 @@ mod tests {
                 let [a, b] = [0, 1].map(|i| new.values[i].unwrap() - response[i]);
                 assert!((b - 2.0 * a).abs() < 1e-12);
             }
-            first.push(made.blocks[0].replicates[0].values[0].unwrap() - 1.0);
+            means.push(made.summaries()[0].mean - response[0]);
         }
-        let expected = data.summaries()[0].sd().unwrap().powi(2);
-        let found = variance(&first);
-        // The relative error of a variance of 500 numbers, allowing for twice the kurtosis of a normal law.
+        let expected = data.summaries()[0].sd().unwrap().powi(2) / 12.0;
+        let squares: Vec<f64> = means.iter().map(|m| m * m).collect();
+        // The relative error of the mean square of 500 numbers of a law that is no wider than a normal one.
+        let found = mean(&squares);
         assert!(
-            (found / expected - 1.0).abs() < 4.0 * (4.0 / 500.0_f64).sqrt(),
+            (found / expected - 1.0).abs() < 4.0 * (2.0 / 500.0_f64).sqrt(),
             "{found} {expected}"
         );
-        assert!(mean(&first).abs() < 4.0 * (expected / 500.0).sqrt());
+        assert!(mean(&means).abs() < 4.0 * (expected / 500.0).sqrt());
     }
 
     #[test]
-    fn two_replicates_have_no_residuals_to_draw() {
+    fn two_replicates_have_no_residuals_to_take_again() {
         let stop = of_replicates(&data(2), &[0.0; 6], &Stream::root(1)).unwrap_err();
         assert!(stop.message.contains("the fewest"), "{stop}");
     }
