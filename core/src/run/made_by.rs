@@ -17,7 +17,7 @@ pub const STAGES: [(&str, Depends); 13] = [
     ("read", Depends::OnVersion(1)),
     ("error", Depends::OnVersion(2)),
     ("surrogate", Depends::OnVersion(2)),
-    ("calibrate", Depends::OnVersion(4)),
+    ("calibrate", Depends::OnVersion(5)),
     ("evidence", Depends::OnVersion(2)),
     ("validate", Depends::OnVersion(2)),
     ("assess", Depends::OnVersion(3)),

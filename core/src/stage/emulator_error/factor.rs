@@ -6,7 +6,7 @@ use crate::linalg::vector::dot;
 use crate::linalg::{Cholesky, Matrix, multiply_transposed, symmetric_eigen, transposed_multiply};
 
 use super::size::Size;
-use super::taper::{Places, RANK};
+use super::taper::Places;
 use super::{Curves, ranges, thinned};
 
 /// So many outputs stand for all, and so many curves. The more outputs, the more directions there are in which an estimate trusts
@@ -165,11 +165,8 @@ struct Axes {
 impl Axes {
     fn of(covariance: &Matrix) -> Option<Self> {
         let eigen = symmetric_eigen(covariance).ok()?;
-        // The largest are the last; the covariance in the likelihood has no others. Rounding leaves values of either sign
-        // where there are none.
-        let first = eigen.values.len().saturating_sub(RANK);
-        let kept = |(k, v): (usize, &f64)| if k < first { 0.0 } else { v.max(0.0) };
-        let variances = eigen.values.iter().enumerate().map(kept).collect();
+        // Rounding leaves values of either sign where there are none.
+        let variances = eigen.values.iter().map(|v| v.max(0.0)).collect();
         Some(Self { variances, vectors: eigen.vectors })
     }
 }

@@ -15,10 +15,9 @@ const APART: f64 = 0.7;
 /// The covariance of so many outputs is decomposed, and what it says is extended to the others.
 const OUTPUTS: usize = 1000;
 
-/// The largest rank of the covariance: along all other directions the emulator counts as exact, and estimates trust them. A hundred of
-/// a thousand directions may hold nearly all of the variance, and an estimate from the rest is as sure as if there were no error.
-pub const RANK: usize = 500;
-/// Directions of a variance below this share of the least noise are left out.
+/// Directions of a variance below this share of the least noise are left out, and no others: along directions that it lacks the emulator
+/// counts as exact, and estimates trust them. A hundred of a thousand directions may hold nearly all of the variance, and an
+/// estimate from the rest is as sure as if there were no error.
 const SEEN: f64 = 0.01;
 
 /// The place of each output: its block, and along each axis a share of it or a label.
@@ -76,8 +75,7 @@ impl Places {
         let largest = eigen.values.last().copied().unwrap_or(0.0);
         let floor = if least.is_finite() { SEEN * least } else { 0.0 };
         let floor = floor.min(0.1 * largest).max(1e-9 * largest);
-        let kept: Vec<usize> =
-            (0..few.len()).rev().take(RANK).filter(|&k| eigen.values[k] > floor).collect();
+        let kept: Vec<usize> = (0..few.len()).rev().filter(|&k| eigen.values[k] > floor).collect();
         let directions = Matrix::from_fn(few.len(), kept.len(), |i, k| {
             eigen.vectors[(i, kept[k])] / eigen.values[kept[k]].sqrt()
         });

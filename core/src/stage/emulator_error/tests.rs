@@ -111,6 +111,26 @@ fn correlations_are_damped_and_variances_kept() {
     }
 }
 
+/// What a covariance leaves out of the elementwise product by its definition is below the noise along every direction, and so in
+/// every element: an estimate finds the directions along which an emulator counts as exact.
+#[test]
+fn no_direction_above_the_noise_is_left_out() {
+    let (outputs, noise) = (600, 1e-2);
+    let known = curves(40, outputs, |_| 1.0);
+    let places = Places::of(&layouts(outputs / 2));
+    let factor = places.factor(&known.errors, &vec![noise; outputs]).unwrap();
+    let found = multiply_transposed(&factor, &factor);
+    for i in (0..outputs).step_by(7) {
+        for j in (0..outputs).step_by(11) {
+            let product: f64 =
+                known.errors.iter_rows().map(|curve| curve[i] * curve[j]).sum::<f64>() / 40.0;
+            let expected = product * places.damping(i, j);
+            let difference = found[(i, j)] - expected;
+            assert!(difference.abs() < 0.1 * noise, "{i} {j}: {difference}");
+        }
+    }
+}
+
 fn factor_of(known: &Curves, noise: f64, slopes: &Matrix) -> f64 {
     let layouts = layouts(known.errors.columns() / 2);
     let (places, size) = (Places::of(&layouts), Size::learned(known));
