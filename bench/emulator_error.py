@@ -11,6 +11,7 @@ loo       mean square of the curves
 damped    the same, correlations damped
 factor    the same, enlarged until left-out runs shift their parameters by what the posterior says
 data      the same, its size where the data put the parameters (Gaussian processes, or 50 curves)
+near      the same, the factor that of runs as far from the edges as the data put the parameters
 varying   the same, its size a function of the parameters in the likelihood, with its determinant
 unknown   the same, its size integrated out under a log-normal law of the scatter that the curves show
 """
@@ -202,8 +203,8 @@ class Size:
         return np.exp(self.slope * (np.log(self.law(u)) - self.centre))
 
 
-def factor(shapes, sizes, x, jacobians, errors, noise, damp):
-    """The factor on the error, see the statistics of the documentation."""
+def shifts(shapes, sizes, jacobians, errors, noise, damp):
+    """The expected squares of the shifts that left-out runs cause, by factor and run."""
     n, m = errors.shape
     part = np.arange(n) % (n if n <= 30 else 10)
     squares = np.zeros((len(FACTORS), n))
@@ -216,13 +217,25 @@ def factor(shapes, sizes, x, jacobians, errors, noise, damp):
             gain = np.linalg.solve(precision, solved.T)
             shift = gain @ errors[i]
             squares[f, i] = (shift @ precision @ shift + np.trace(precision @ gain @ gain.T) * noise) / 3
-    off = abs(x - 0.5).max(1)
+    return squares
 
-    def crossing(means):
-        return 1.0 if means[0] <= 1 else np.interp(-1, -np.minimum.accumulate(means), FACTORS)
 
+def crossing(means):
+    return 1.0 if means[0] <= 1 else np.interp(-1, -np.minimum.accumulate(means), FACTORS)
+
+
+def largest(squares, x):
+    """The factor that all runs ask for, or the half that is nearest to the edges."""
+    off, n = abs(x - 0.5).max(1), len(x)
     found = max(crossing(squares.mean(1)), crossing(squares[:, off >= np.median(off)].mean(1)))
     return found * np.sqrt((n - 1) / (n - 5))
+
+
+def local(squares, x, there):
+    """The factor of runs as far from the edges as some points, see the statistics of the documentation."""
+    off, n = abs(x - 0.5).max(1), len(x)
+    nearest = np.argsort(abs(off - abs(there - 0.5).max(1)[:, None]), axis=1, kind="stable")[:, : max(n // 4, min(n, 12))]
+    return crossing(squares[:, nearest.ravel()].mean(1)) * np.sqrt((n - 1) / (n - 5))
 
 
 class Law:
@@ -309,8 +322,9 @@ def count(model, kind, runs):
         plain = errors.T @ errors / runs
         size = Size(x, errors, stated, emulator)
         shapes = errors / size.at_runs[:, None]
-        even = factor(errors, np.ones(runs), x, jacobians, errors, noise, damp) ** 2
-        sized = factor(shapes, size.at_runs, x, jacobians, errors, noise, damp) ** 2
+        even = largest(shifts(errors, np.ones(runs), jacobians, errors, noise, damp), x) ** 2
+        squares = shifts(shapes, size.at_runs, jacobians, errors, noise, damp)
+        sized = largest(squares, x) ** 2
         shape = shapes.T @ shapes / runs * damp
         laws = {
             "loo": Law(plain, noise),
@@ -323,17 +337,19 @@ def count(model, kind, runs):
         pool = rng.random((3000, 3))
         means = emulator(pool)
 
-        def own(curve):
+        def own(curve, is_local):
             best = pool[np.argmin(((curve - means) ** 2).sum(1))]
             there = where(best, slopes(emulator, best[None])[0], plain * damp, noise, rng)
-            law = Law(sized * (size(there) ** 2).mean() * shape, noise)
+            scale = local(squares, x, there) ** 2 if is_local else sized
+            law = Law(scale * (size(there) ** 2).mean() * shape, noise)
             return draws(emulator, law, curve[None], rng)[0]
 
-        found["data"] = np.array([own(curve) for curve in data])
+        found["data"] = np.array([own(curve, False) for curve in data])
+        found["near"] = np.array([own(curve, True) for curve in data])
         for name, sample in found.items():
             ranks.setdefault(name, []).append((sample < truths[:, None]).mean(1))
             widths.setdefault(name, []).append(sample.std(1) / exact)
-    for name in ("loo", "damped", "factor", "data", "varying", "unknown"):
+    for name in ("loo", "damped", "factor", "data", "near", "varying", "unknown"):
         centred = 2 * abs(np.concatenate(ranks[name]) - 0.5)
         shares = [100 * (centred < level).mean() for level in (0.5, 0.9, 0.95)]
         edges = 100 * (centred[::2] < 0.95).mean()
