@@ -20,7 +20,7 @@ pub struct Manner {
     /// The number of truths; 200 when left out.
     #[arg(long, value_name = "N")]
     count: Option<std::num::NonZeroUsize>,
-    /// The noise of the data that are made. Left out: that of the replicates where every measured value has five, else
+    /// The noise of the data that are made. Left out: that of the replicates where every measured value has ten, else
     /// that of the posterior.
     #[arg(long, value_name = "WHOSE", value_enum)]
     noise: Option<Whose>,

@@ -63,14 +63,15 @@ fn a_posterior_in_closed_form_is_nominal() {
 fn noise_that_is_stated_too_small_is_found_in_the_replicates() {
     let folder = study(1.5);
     let out = folder.path().join("out");
-    let found = count(folder.path(), &out, &[], &asked(100, None)).unwrap();
-    assert_eq!(found.noise, Noise::Replicates);
+    let found = count(folder.path(), &out, &[], &asked(100, Some(Noise::Replicates))).unwrap();
     assert_eq!(found.tally.verdict.word, Word::TooNarrow, "{}", found.tally.verdict.text);
     // 2 Phi(1.96 / 3) - 1, within four standard errors, the two unknowns counted as one.
     let share = found.tally.overall.as_ref().unwrap().levels[2].share;
     assert!((share - 0.486).abs() < 4.0 * (0.25_f64 / 100.0).sqrt(), "{share}");
     assert!((found.noise_ratio.unwrap() - 1.0).abs() < 0.15, "{found:?}");
-    let stated = count(folder.path(), &out, &[], &asked(40, Some(Noise::Posterior))).unwrap();
+    let stated = count(folder.path(), &out, &[], &asked(40, None)).unwrap();
+    // Eight replicates are too few to be the noise unless they are asked for.
+    assert_eq!(stated.noise, Noise::Posterior);
     assert_ne!(stated.tally.verdict.word, Word::TooNarrow);
     assert!((stated.noise_ratio.unwrap() - 1.0 / 3.0).abs() < 0.05, "{stated:?}");
     let text = lacuna::report::coverage_text(&stated);
@@ -155,7 +156,8 @@ fn what_cannot_be_counted_is_refused() {
     let data = line::replicates([0.4, -0.3], 0.5, 1, &mut noise::Source::new(5));
     fs::write(folder.path().join("line.csv"), line::table(&data)).unwrap();
     let error = stop(&["sampler.steps=200"], &asked(3, Some(Noise::Replicates)));
-    assert!(error.contains("the fewest"), "{error}");
+    assert!(error.contains("has 1 replicate, and 3 are the fewest"), "{error}");
+    assert!(error.contains("the value at t 1 s"), "{error}");
 }
 
 /// A model that answers on one side of the prior only: truths without a response are told and counted nowhere.

@@ -23,7 +23,8 @@ const MORE_RUNS: &str = "add runs near the posterior: `[surrogate] refine = { ru
 const ALLOW: &str =
     "allow for it: `[discrepancy] emulator_error = true`, and add runs near the posterior";
 const FINER: &str = "use a finer mesh for the runs inside the prior, or repeat more of them in \
-                     `[numerical_error]`";
+                     `[numerical_error]`; of few, `surrogate = { use = \"gaussian_process\" }` there often \
+                     predicts more";
 const ROUNDS: &str = "allow more `rounds` in `[surrogate] refine`";
 
 /// See [`super::rules`].

@@ -42,7 +42,7 @@ impl Caption {
         html! {
             (paragraph(&self.shows))
             @if !self.whose.is_empty() { " " b { "Whose distribution: " } (self.whose) }
-            @if !self.look.is_empty() { " " b { "Look for: " } (self.look) }
+            @if !self.look.is_empty() { " " b { "Look for: " } (paragraph(&self.look)) }
         }
     }
 }

@@ -20,7 +20,7 @@ pub const STAGES: [(&str, Depends); 13] = [
     ("calibrate", Depends::OnVersion(5)),
     ("evidence", Depends::OnVersion(2)),
     ("validate", Depends::OnVersion(2)),
-    ("assess", Depends::OnVersion(3)),
+    ("assess", Depends::OnVersion(4)),
     ("gap", Depends::OnVersion(2)),
     ("show", Depends::OnVersion(1)),
     ("power", Depends::OnVersion(1)),

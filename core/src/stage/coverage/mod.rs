@@ -42,7 +42,9 @@ pub const COUNT: usize = 200;
 /// The number of truths of a first look.
 pub const QUICK: usize = 40;
 /// From so many replicates of every measured value on their residuals are the noise, where nothing else is asked.
-const ENOUGH: usize = 5;
+///
+/// Along one direction n replicates know the variance of their noise to `sqrt(2 / (n - 1))`: ten to 47 %.
+const ENOUGH: usize = 10;
 
 /// The cases as they are kept.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

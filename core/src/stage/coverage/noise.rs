@@ -47,10 +47,14 @@ pub fn of_replicates(
     response: &[f64],
     stream: &Stream,
 ) -> Result<Observations, Stop> {
-    let least = fewest(data);
-    if least < FEWEST {
+    let summaries = data.summaries();
+    let few = summaries.iter().position(|s| (1..FEWEST).contains(&s.count));
+    if let Some(output) = few {
+        let count = summaries[output].count;
+        let plural = if count == 1 { "" } else { "s" };
         return Err(Stop::new(format!(
-            "a value has {least} replicates, and {FEWEST} are the fewest whose residuals can be taken again"
+            "the value at {} has {count} replicate{plural}, and {FEWEST} are the fewest whose residuals can be taken again",
+            data.layouts().describe(output)
         ))
         .help("`--noise posterior` takes the noise from the discrepancy"));
     }
