@@ -180,6 +180,22 @@ fn a_model_that_lacks_something_is_not_trusted() {
     assert!(assessment.of_code("predictive_check").count() > 0, "{:#?}", assessment.findings);
 }
 
+/// The same beside an emulator of degree two, whose error is five times the noise: estimates allow for two and a half times as much, but
+/// what data are expected to be does not, and so the swing does not pass for the emulator's error.
+#[test]
+fn a_bad_emulator_does_not_hide_what_the_model_lacks() {
+    let settings = ["surrogate.training=24", "surrogate.degree=2"];
+    let misfit = |folder: &TempDir| {
+        let assessment = assess(folder.path(), &settings);
+        let found = assessment.of_code("predictive_check").find(|f| f.place == "misfit");
+        found.map(|f| f.severity)
+    };
+    let folder = quick::tables();
+    assert_eq!(misfit(&folder), None);
+    change(folder.path(), "measured.csv", "", |y, i| y + 0.25 * ((i % 20) as f64 / 3.0).sin());
+    assert_eq!(misfit(&folder), Some(Severity::Failure));
+}
+
 #[test]
 fn an_emulator_that_is_too_coarse_is_not_trusted() {
     let folder = quick::tables();

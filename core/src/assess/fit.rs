@@ -1,5 +1,7 @@
 //! The calibrated model against the data.
 
+use crate::math::moments::{mean, variance};
+
 use super::words::{percent, short};
 use super::{Finding, Rule, Severity};
 
@@ -19,8 +21,12 @@ const ACCURATE: (f64, f64) = (0.7, 0.4);
 const P: f64 = 0.01;
 /// How many standard errors above one the mean square misfit over that of the replicates' mean may be.
 const ERRORS: f64 = 5.0;
-/// How many times larger than expected the misfit must be to be a failure: twice in standard deviations.
+/// How many times larger than expected the misfit must be to be a failure: twice in standard deviations; or, where chance is out of
+/// the question, 1.4 times, with which 95 % intervals hold 83 %.
 const MISFIT: f64 = 4.0;
+const CERTAIN: f64 = 2.0;
+/// So many standard deviations of the logarithms of the simulated misfits are out of the question.
+const CHANCE: f64 = 4.0;
 
 const START_AGAIN: &str =
     "look at the emulator near both points: the model was run there; add runs between them";
@@ -56,7 +62,8 @@ pub fn rules() -> Vec<Rule> {
                 .to_owned(),
             threshold: format!(
                 "band: below {}: reservation, {}: failure; interval: below {}: reservation, {}: failure; p below \
-                 {P}: reservation, with a misfit {MISFIT} times as large as expected: failure; F more than {ERRORS} standard errors above 1, and above \
+                 {P}: reservation, with a misfit {MISFIT} times as large as expected, or {CERTAIN} times and {CHANCE} standard \
+                 deviations of its logarithm: failure; F more than {ERRORS} standard errors above 1, and above \
                  that of all simulated data: reservation",
                 percent(COVERED.0),
                 percent(COVERED.1),
@@ -159,7 +166,9 @@ pub fn misfit(observed: f64, simulated: &[f64]) -> Option<Finding> {
     let mut sorted = simulated.to_vec();
     sorted.sort_by(f64::total_cmp);
     let ratio = observed / sorted[sorted.len() / 2];
-    let severity = if ratio < MISFIT { Severity::Reservation } else { Severity::Failure };
+    let is_certain = ratio >= CERTAIN && beyond(observed, simulated) >= CHANCE;
+    let is_failure = ratio >= MISFIT || is_certain;
+    let severity = if is_failure { Severity::Failure } else { Severity::Reservation };
     let message = format!(
         "the misfit of the replicates' mean is {} times as large (mean square) as in data simulated from the \
          calibrated study, which reach it with probability {} or less",
@@ -167,6 +176,12 @@ pub fn misfit(observed: f64, simulated: &[f64]) -> Option<Finding> {
         short(p)
     );
     Some(Finding::new((PREDICTIVE, "misfit"), (p, P), severity, message, GAP))
+}
+
+/// How many standard deviations of its logarithm a positive number is above others.
+fn beyond(observed: f64, others: &[f64]) -> f64 {
+    let logs: Vec<f64> = others.iter().map(|s| s.ln()).collect();
+    (observed.ln() - mean(&logs)) / variance(&logs).sqrt()
 }
 
 /// The mean square of the replicates' mean about the calibrated model over its variance by the replicates' scatter, `f`,

@@ -19,7 +19,7 @@ pub const STAGES: [(&str, Depends); 13] = [
     ("surrogate", Depends::OnVersion(2)),
     ("calibrate", Depends::OnVersion(5)),
     ("evidence", Depends::OnVersion(2)),
-    ("validate", Depends::OnVersion(2)),
+    ("validate", Depends::OnVersion(3)),
     ("assess", Depends::OnVersion(4)),
     ("gap", Depends::OnVersion(2)),
     ("show", Depends::OnVersion(1)),

@@ -92,6 +92,20 @@ impl Parts {
         Self::with(study, &Law::of(study, measured, known)?)
     }
 
+    /// The same likelihood with errors of emulator and numerics as large as they are themselves, for predictions: that of
+    /// [`Self::of`] enlarges them for the sake of the estimates. A discrepancy that samples these errors has them as unknowns, of
+    /// the size at which they were sampled.
+    pub fn predicting(study: &Study, measured: &Measured, known: &Known<'_>) -> Result<Self, Stop> {
+        let parts = Self::with(study, &Law::predicting(study, measured, known)?)?;
+        let bare = Self::bare(study, &measured.likelihood, known.forward)?;
+        let unknowns = |parts: &Self| parts.likelihood.hyperparameters().len();
+        if unknowns(&parts) == unknowns(&bare) {
+            Ok(parts)
+        } else {
+            Self::of(study, measured, known)
+        }
+    }
+
     /// The likelihood of data without any common error: what the discrepancy alone says of them.
     pub fn bare(study: &Study, data: &Observations, forward: &dyn Forward) -> Result<Self, Stop> {
         Self::with(study, &Law::bare(study, data, forward)?)

@@ -1,8 +1,25 @@
-//! Errors that all replicates share, as they enter the covariance of the mean curve.
+//! Errors that all replicates share.
 
 use crate::data::Measurements;
 use crate::linalg::Matrix;
 use crate::plugin::discrepancy::CommonError;
+
+/// An error of emulator or numerics, in two sizes.
+#[derive(Debug, Clone)]
+pub struct Allowance {
+    /// As the likelihood allows for it: enlarged until left-out errors move estimates by what a posterior says.
+    pub estimates: CommonError,
+    /// As large as the left-out errors are themselves: what predictions of data have of it.
+    pub predictions: CommonError,
+}
+
+impl Allowance {
+    /// Both sizes of an error that all data share.
+    pub fn new(origin: &str, [estimates, predictions]: [Matrix; 2]) -> Self {
+        let error = |factor| CommonError { origin: origin.to_owned(), factor, predictive: true };
+        Self { estimates: error(estimates), predictions: error(predictions) }
+    }
+}
 
 /// The error of the replicates' mean curve, from the replicates themselves; `None` below three replicates.
 ///

@@ -71,7 +71,7 @@ impl<'a> Prepared<'a> {
             region: None,
             refinement: None,
             trial: None,
-            common: OnceLock::new(),
+            allowances: OnceLock::new(),
         }
     }
 }

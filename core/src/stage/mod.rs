@@ -39,7 +39,6 @@ pub mod validate;
 
 use crate::data::Observations;
 use crate::math::random::Stream;
-use crate::plugin::discrepancy::CommonError;
 use crate::plugin::{Emulator, Forward};
 use crate::report::findings::Findings;
 use crate::run::{Kept, Listener, Observer, RunDirectory, Stop, files};
@@ -49,6 +48,7 @@ use serde_json::json;
 use std::sync::OnceLock;
 
 use calibrate::Calibrated;
+use common_error::Allowance;
 use evidence::Weighed;
 use numerical_error::NumericalError;
 use predictions::Predicting;
@@ -237,29 +237,28 @@ pub struct Known<'a> {
     /// Which trial the data are of, where they were made and not measured.
     pub trial: Option<Trial>,
     /// The errors of emulator and numerics as these data meet them, once they have been asked for.
-    common: OnceLock<Vec<CommonError>>,
+    allowances: OnceLock<Vec<Allowance>>,
 }
 
 impl Known<'_> {
     /// The errors of emulator and numerics for which the study's likelihood allows, as its data meet them.
-    fn common_errors(
+    fn allowances(
         &self,
         study: &Study,
         keys: &DiscrepancyKeys,
         data: &Observations,
-    ) -> Result<Vec<CommonError>, Stop> {
-        if let Some(common) = self.common.get() {
-            return Ok(common.clone());
+    ) -> Result<&[Allowance], Stop> {
+        if let Some(found) = self.allowances.get() {
+            return Ok(found);
         }
-        let mut common = Vec::new();
+        let mut found = Vec::new();
         if let (Some(fitted), true) = (self.fitted, keys.emulator_error) {
-            common.push(emulator_error::common_error(study, &fitted.value, data, self.forward)?);
+            found.push(emulator_error::allowance(study, &fitted.value, data, self.forward)?);
         }
         if let (Some(kept), Some(section)) = (self.numerics, &study.numerical_error) {
-            let error = kept.value.common_error(study, &section.written, data, self.forward)?;
-            common.push(error);
+            found.push(kept.value.allowance(study, &section.written, data, self.forward)?);
         }
-        Ok(self.common.get_or_init(|| common).clone())
+        Ok(self.allowances.get_or_init(|| found))
     }
 }
 
@@ -341,7 +340,7 @@ impl Learned {
             region: self.region.as_deref(),
             refinement: self.refinement.as_ref(),
             trial: self.trial,
-            common: OnceLock::new(),
+            allowances: OnceLock::new(),
         }
     }
 }

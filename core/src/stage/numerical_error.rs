@@ -23,6 +23,7 @@ use crate::study::Study;
 use crate::study::fidelity::NumericalError as Asked;
 use crate::study::file::NumericalErrorSection;
 
+use super::common_error::Allowance;
 use super::emulator_error::{self, Curves};
 use super::fidelity::{Combined, Coverage, Difference, Lesson, Rule, Source, Verdict, cover};
 use super::idle::Used;
@@ -51,6 +52,7 @@ struct Readable {
     prediction: Option<Vec<Verdict>>,
 }
 
+const ORIGIN: &str = "numerics";
 const FILE: &str = "differences.nc";
 const PREDICTION: &str = "prediction.bin";
 const READABLE: &str = "prediction.json";
@@ -92,23 +94,25 @@ impl Artifact for NumericalError {
 impl NumericalError {
     /// The covariance of what is not known of the numerical error, as these data meet it
     /// ([`emulator_error`]).
-    pub fn common_error(
+    pub fn allowance(
         &self,
         study: &Study,
         section: &NumericalErrorSection,
         data: &Observations,
         forward: &dyn Forward,
-    ) -> Result<CommonError, Stop> {
+    ) -> Result<Allowance, Stop> {
         let (errors, beyond) = self.unknown(section);
         let curves = Curves { points: self.points.clone(), errors, stated: None };
-        let own = emulator_error::factor(study, &curves, data, forward)?;
-        Ok(common(joined(&own, &over_root(&beyond))))
+        let factors = emulator_error::factors(study, &curves, data, forward)?;
+        let beyond = over_root(&beyond);
+        Ok(Allowance::new(ORIGIN, factors.map(|own| joined(&own, &beyond))))
     }
 
     /// Samples of what is not known, one a column, over the root of their number.
     pub fn error_samples(&self, section: &NumericalErrorSection) -> CommonError {
         let (errors, beyond) = self.unknown(section);
-        common(joined(&over_root(&errors), &over_root(&beyond)))
+        let factor = joined(&over_root(&errors), &over_root(&beyond));
+        CommonError { origin: ORIGIN.to_owned(), factor, predictive: true }
     }
 
     /// Curves of what is not known, one a row, `whole` being the whole error over a difference.
@@ -172,10 +176,6 @@ impl NumericalError {
     pub fn rms(&self) -> f64 {
         rms(&self.differences)
     }
-}
-
-fn common(factor: Matrix) -> CommonError {
-    CommonError { origin: "numerics".to_owned(), factor, predictive: true }
 }
 
 /// Curves as columns, over the root of their number.

@@ -73,7 +73,7 @@ pub fn stage(
     let cases = 1 + u64::from(study.validate.against.is_some());
     observer.begin("validate", "run", cases + study.validate.emulator_check as u64);
     let kept = run.keep("6-validate", &inputs, observer, |_| {
-        let parts = Parts::of(study, measured, known)?;
+        let parts = Parts::predicting(study, measured, known)?;
         let work = Work {
             study,
             measured,

@@ -132,6 +132,11 @@ fn a_model_that_could_not_have_made_the_data() {
     let alarms = (0..100).filter(|_| fit::misfit(expected(), &simulated).is_some()).count();
     assert!(alarms <= 5, "{alarms} of 100, where 1 is expected");
     has(fit::misfit(25.0, &simulated).as_ref(), "predictive_check", Severity::Failure);
+    // The logarithm of a mean square of fifty has the standard deviation 0.2: 2.5 times is 4.6 of them, of ten (0.47) 1.9.
+    has(fit::misfit(2.6, &simulated).as_ref(), "predictive_check", Severity::Failure);
+    let mut few = || (0..10).map(|_| normal(&mut rng).powi(2)).sum::<f64>() / 10.0;
+    let of_few: Vec<f64> = (0..200).map(|_| few()).collect();
+    has(fit::misfit(3.5, &of_few).as_ref(), "predictive_check", Severity::Reservation);
 }
 
 #[test]

@@ -30,8 +30,9 @@ fn trusted(unreliable: usize, limit: f64) -> String {
     match unreliable {
         0 => String::from("all estimates are reliable"),
         bad => format!(
-            "{} estimates have k-hat above {}: do not rely on it",
+            "{} {} k-hat above {}: do not rely on it",
             count(bad),
+            if bad == 1 { "estimate has" } else { "estimates have" },
             (100.0 * limit).round() / 100.0
         ),
     }

@@ -110,7 +110,7 @@ fn simulated(judged: &Judged<'_>) -> Vec<Finding> {
     let one = |i: usize| {
         let response = &responses[i];
         let random: Stream = random.at(i as u64);
-        let data = judged.likelihood.simulate(response, judged.hyper(points.row(i)), &random);
+        let data = judged.predictive.simulate(response, judged.hyper(points.row(i)), &random);
         let data = Observations { blocks: data };
         let time = (i < CORRELATED).then(|| look.time(&data, response)).flatten();
         (look.misfit(&data, response), time, look.against_scatter(&data, response))

@@ -82,7 +82,9 @@ fn assess(study: &Study, all: &Artifacts<'_>) -> Result<Assessment, Stop> {
         let errors = match (calibrated, &known.data.value.measured) {
             (Some(calibrated), Some(measured)) => {
                 let parts = Parts::of(study, measured, known)?;
-                let judged = Judged::of(study, known, calibrated, measured, parts.likelihood());
+                let predictive = Parts::predicting(study, measured, known)?;
+                let likelihoods = [parts.likelihood(), predictive.likelihood()];
+                let judged = Judged::of(study, known, calibrated, measured, likelihoods);
                 findings.extend(fit::findings(&judged, all));
                 let errors = errors::of(&judged, all);
                 findings.extend(errors.findings.iter().cloned());
@@ -113,6 +115,8 @@ struct Judged<'a> {
     calibrated: &'a Calibrated,
     measured: &'a Measured,
     likelihood: &'a dyn Likelihood,
+    /// What makes new data.
+    predictive: &'a dyn Likelihood,
     /// The response at the MAP, effects included.
     response: Vec<f64>,
 }
@@ -123,10 +127,11 @@ impl<'a> Judged<'a> {
         known: &'a Known<'a>,
         calibrated: &'a Calibrated,
         measured: &'a Measured,
-        likelihood: &'a dyn Likelihood,
+        [likelihood, predictive]: [&'a dyn Likelihood; 2],
     ) -> Self {
+        let response = Vec::new();
         let mut judged =
-            Self { study, known, calibrated, measured, likelihood, response: Vec::new() };
+            Self { study, known, calibrated, measured, likelihood, predictive, response };
         let map = calibrated.outcome.map.clone();
         judged.response = judged.responses(&Matrix::from_vec(1, map.len(), map)).remove(0);
         judged
@@ -144,7 +149,7 @@ impl<'a> Judged<'a> {
     /// The variance of a new replicate at the MAP, one an output.
     fn variance(&self) -> Vec<f64> {
         let parts =
-            self.likelihood.predictive(&self.response, self.hyper(&self.calibrated.outcome.map));
+            self.predictive.predictive(&self.response, self.hyper(&self.calibrated.outcome.map));
         let sum = |j: usize| parts.iter().filter_map(|part| part.variance.get(j)).sum();
         (0..self.response.len()).map(sum).collect()
     }

@@ -8,6 +8,7 @@ use crate::linalg::Matrix;
 use crate::plugin::discrepancy::{self, CommonError};
 use crate::plugin::{Discrepancy, Forward, Likelihood};
 use crate::run::Stop;
+use crate::stage::common_error::Allowance;
 use crate::stage::read::Measured;
 use crate::stage::{Known, best_fit, common_error};
 use crate::study::Study;
@@ -25,11 +26,30 @@ pub struct Law<'a> {
 }
 
 impl<'a> Law<'a> {
-    /// That of the study's measurements, with the common errors that the study wants.
+    /// That of the study's measurements, with the common errors that the study wants, as estimates allow for them.
     pub fn of(study: &'a Study, measured: &'a Measured, known: &Known<'a>) -> Result<Self, Stop> {
+        Self::with(study, measured, known, |error| &error.estimates)
+    }
+
+    /// The same with errors as large as they are themselves: what predicts data.
+    pub fn predicting(
+        study: &'a Study,
+        measured: &'a Measured,
+        known: &Known<'a>,
+    ) -> Result<Self, Stop> {
+        Self::with(study, measured, known, |error| &error.predictions)
+    }
+
+    fn with(
+        study: &'a Study,
+        measured: &'a Measured,
+        known: &Known<'a>,
+        size: fn(&Allowance) -> &CommonError,
+    ) -> Result<Self, Stop> {
         let section =
             study.discrepancy.as_ref().ok_or_else(|| Stop::new("the study has no discrepancy"))?;
-        let common = known.common_errors(study, &section.common, &measured.likelihood)?;
+        let errors = known.allowances(study, &section.common, &measured.likelihood)?;
+        let common = errors.iter().map(|error| size(error).clone()).collect();
         let replicates = section.common.replicate_error.then_some(&measured.used);
         Ok(Self { replicates, common, ..Self::bare(study, &measured.likelihood, known.forward)? })
     }

@@ -120,7 +120,7 @@ fn calibrated(
             refine::stage(study, learned, directory, &Silent)?.1
         }
         _ => {
-            let known = Known { data: &data, trial, common: OnceLock::new(), ..known };
+            let known = Known { data: &data, trial, allowances: OnceLock::new(), ..known };
             calibrate::stage(study, &known, "5-calibrate", directory, &Silent)?
         }
     };

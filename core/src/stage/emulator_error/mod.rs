@@ -24,11 +24,11 @@ mod tests;
 use crate::data::Observations;
 use crate::linalg::Matrix;
 use crate::plugin::Forward;
-use crate::plugin::discrepancy::CommonError;
 use crate::run::Stop;
 use crate::study::Study;
 
 use super::best_fit;
+use super::common_error::Allowance;
 use super::surrogate::Fitted;
 pub use curves::{Curves, Runs, rows_near_prior};
 use factor::Shifts;
@@ -37,27 +37,24 @@ use size::Size;
 use taper::Places;
 
 /// The error of a fitted emulator as these data meet it.
-pub fn common_error(
+pub fn allowance(
     study: &Study,
     fitted: &Fitted,
     data: &Observations,
     forward: &dyn Forward,
-) -> Result<CommonError, Stop> {
+) -> Result<Allowance, Stop> {
     let curves = fitted.curves.near_prior(study);
-    Ok(CommonError {
-        origin: "emulator".to_owned(),
-        factor: factor(study, &curves, data, forward)?,
-        predictive: true,
-    })
+    Ok(Allowance::new("emulator", factors(study, &curves, data, forward)?))
 }
 
-/// The covariance of an error of which some curves are known, as a factor of low rank, `outputs x rank`.
-pub fn factor(
+/// The covariance of an error of which some curves are known, as factors of low rank, `outputs x rank`: enlarged by the factor
+/// that estimates ask for, and of the size of the curves.
+pub fn factors(
     study: &Study,
     curves: &Curves,
     data: &Observations,
     forward: &dyn Forward,
-) -> Result<Matrix, Stop> {
+) -> Result<[Matrix; 2], Stop> {
     let best = best_fit::point(study, data, forward)?;
     let size = Size::learned(curves);
     let noise = noise::of_mean(study, data, forward, &best, &curves.errors)?;
@@ -73,7 +70,9 @@ pub fn factor(
     } else {
         1.0
     };
-    places.factor(&scaled(&shapes, there * factor), &noise)
+    let enlarged = places.factor(&scaled(&shapes, there * factor), &noise)?;
+    let own = scaled(&enlarged, 1.0 / factor);
+    Ok([enlarged, own])
 }
 
 fn scaled(matrix: &Matrix, factor: f64) -> Matrix {

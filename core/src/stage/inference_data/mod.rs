@@ -20,6 +20,7 @@ use super::evidence::Weighed;
 use super::predictions::Predicting;
 use super::validate::Validated;
 use super::{Known, derived};
+use predicted::Predictor;
 
 /// The file, in the run directory.
 const NAME: &str = "posterior.nc";
@@ -28,7 +29,7 @@ const NAME: &str = "posterior.nc";
 const MARKER: &str = "posterior.json";
 
 /// To be raised when the same artifacts give another file.
-const REVISION: u32 = 1;
+const REVISION: u32 = 2;
 
 /// What a file was made of.
 #[derive(PartialEq, Serialize, Deserialize)]
@@ -60,6 +61,7 @@ pub fn stage(
     let Some(measured) = &known.data.value.measured else { return Ok(()) };
     write(study, all, run, || {
         let parts = Parts::of(study, measured, known)?;
+        let predictive = Parts::predicting(study, measured, known)?;
         let posterior = parts.posterior(study, known);
         let predicting = Predicting {
             forward: known.forward,
@@ -67,7 +69,8 @@ pub fn stage(
             law: Law::of(study, measured, known)?,
             data: &measured.likelihood,
         };
-        encode(study, all, &posterior, Some(&predicting))
+        let makes = predictive.likelihood();
+        encode(study, all, &posterior, Some(&Predictor { densities: predicting, makes }))
     })
 }
 
@@ -118,7 +121,7 @@ fn encode(
     study: &Study,
     all: &Finished<'_>,
     posterior: &Posterior<'_>,
-    predicting: Option<&Predicting<'_>>,
+    predictor: Option<&Predictor<'_>>,
 ) -> Result<Vec<u8>, Stop> {
     let calibrated = &all.calibrated.value;
     let given = groups::Given {
@@ -126,12 +129,12 @@ fn encode(
         calibrated: &derived::extended(study, calibrated),
         weighed: all.weighed.map(|kept| &kept.value),
         validated: all.validated.map(|kept| &kept.value),
-        data: predicting.map(|p| p.data),
-        from_posterior: match predicting {
+        data: predictor.map(|p| p.densities.data),
+        from_posterior: match predictor {
             Some(p) => predicted::from_posterior(study, p, calibrated)?,
             None => None,
         },
-        from_prior: predicted::from_prior(study, posterior, predicting)?,
+        from_prior: predicted::from_prior(study, posterior, predictor)?,
     };
     given.encode().map_err(|error| Stop::new(format!("cannot write {NAME}: {error}")))
 }

@@ -5,13 +5,21 @@ use rayon::prelude::*;
 use crate::data::Measurements;
 use crate::linalg::Matrix;
 use crate::math::random::Stream;
-use crate::plugin::Target;
+use crate::plugin::{Likelihood, Target};
 use crate::posterior::Posterior;
 use crate::run::Stop;
 use crate::stage::calibrate::Calibrated;
 use crate::stage::predictions::{self, Chosen, Predicting};
 use crate::stage::{predict, stream};
 use crate::study::Study;
+
+/// What says how probable the measured data are, and what makes new ones.
+pub struct Predictor<'a> {
+    /// The densities of the measured data.
+    pub densities: Predicting<'a>,
+    /// What makes data about a response.
+    pub makes: &'a dyn Likelihood,
+}
 
 /// Draws from the prior, in natural units, one a row.
 pub struct FromPrior {
@@ -37,17 +45,18 @@ pub struct FromPosterior {
 /// Predictions at draws of the posterior; `None` where they are too many to be written.
 pub fn from_posterior(
     study: &Study,
-    p: &Predicting<'_>,
+    p: &Predictor<'_>,
     calibrated: &Calibrated,
 ) -> Result<Option<FromPosterior>, Stop> {
-    let chosen = Chosen::of(calibrated, p.data.count());
+    let chosen = Chosen::of(calibrated, p.densities.data.count());
     if !chosen.written || chosen.points.rows() == 0 {
         return Ok(None);
     }
-    let held = predictions::responses(study, p, &chosen);
-    let log_likelihood = predictions::pointwise(study, p, &chosen, held.as_deref());
-    let responses = held.unwrap_or_else(|| predict::responses(study, p.forward, &chosen.points));
-    if let Some(reason) = p.forward.failure() {
+    let held = predictions::responses(study, &p.densities, &chosen);
+    let log_likelihood = predictions::pointwise(study, &p.densities, &chosen, held.as_deref());
+    let responses =
+        held.unwrap_or_else(|| predict::responses(study, p.densities.forward, &chosen.points));
+    if let Some(reason) = p.densities.forward.failure() {
         return Err(Stop::new(reason));
     }
     let random = stream(study, "posterior_predictive");
@@ -59,17 +68,17 @@ pub fn from_posterior(
 pub fn from_prior(
     study: &Study,
     posterior: &Posterior<'_>,
-    p: Option<&Predicting<'_>>,
+    p: Option<&Predictor<'_>>,
 ) -> Result<FromPrior, Stop> {
     let random = stream(study, "prior");
     let coordinates = posterior.prior_draws(PRIOR, &random);
     let natural = coordinates.iter_rows().map(|row| posterior.natural(row));
     let points = Matrix::from_rows(coordinates.columns(), natural);
     let Some(p) = p else { return Ok(FromPrior { points, data: None }) };
-    let count = predictions::from_prior(p.data.count()).min(points.rows());
+    let count = predictions::from_prior(p.densities.data.count()).min(points.rows());
     let first = points.select_rows(&(0..count).collect::<Vec<_>>());
-    let responses = predict::responses(study, p.forward, &first);
-    if let Some(reason) = p.forward.failure() {
+    let responses = predict::responses(study, p.densities.forward, &first);
+    if let Some(reason) = p.densities.forward.failure() {
         return Err(Stop::new(reason));
     }
     let answered: Vec<usize> =
@@ -82,16 +91,16 @@ pub fn from_prior(
 
 /// One set of data a row, in the order of the measured ones.
 fn simulated(
-    p: &Predicting<'_>,
+    p: &Predictor<'_>,
     responses: &[Vec<f64>],
     points: &Matrix,
     random: &Stream,
 ) -> Matrix {
-    let (own, count) = (p.likelihood.hyperparameters().len(), p.data.count());
+    let (own, count) = (p.makes.hyperparameters().len(), p.densities.data.count());
     let one = |(i, response): (usize, &Vec<f64>)| -> Vec<f64> {
         let point = points.row(i);
         let hyper = &point[point.len() - own..];
-        let blocks = p.likelihood.simulate(response, hyper, &random.named("data").at(i as u64));
+        let blocks = p.makes.simulate(response, hyper, &random.named("data").at(i as u64));
         let values = |block: &Measurements| -> Vec<f64> {
             block.replicates.iter().flat_map(|r| r.values.iter().flatten()).copied().collect()
         };
