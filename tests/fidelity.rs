@@ -3,9 +3,6 @@
 //!
 //! `fidelity/peer.json` holds designs, truths and the errors of a peer; `fidelity/peer.py` made it and names the sources.
 
-#[path = "fidelity/shifts.rs"]
-mod shifts;
-
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -322,45 +319,4 @@ fn a_coarse_solution_is_corrected() {
     assert!(ignored < 40, "{ignored}");
     assert!(held >= 52, "{held}");
     assert!(width < wide, "{width} {wide}");
-}
-
-/// How far the mesh's error moves the best fit of `configs/sns/focused.toml`, over what its covariance allows:
-/// `cargo test -p lacuna-tests --test all fidelity::focused -- --ignored --nocapture` (some minutes, two runs of the study).
-///
-/// Each of the repeated runs is a truth once, with the mesh of the data (three times finer) as the truth and the model
-/// linearised there; its error, and all that was learned from it, is left out of the covariance and of the prediction.
-#[test]
-#[ignore = "two runs of the founding study"]
-fn focused_shifts_over_what_is_allowed() {
-    let path = quick::root().join("configs/sns/focused.toml");
-    let folder = tempfile::tempdir().unwrap();
-    let ran = |settings: &[&str]| {
-        let study = quick::load(&path, settings);
-        let mut run = RunDirectory::open(folder.path()).unwrap();
-        let (learned, calibrated) = stage::learn(&study, &mut run, &Silent).unwrap();
-        (study, learned, calibrated.unwrap().value)
-    };
-    let runs = std::env::var("LACUNA_FINER_RUNS").unwrap_or_else(|_| "40".to_owned());
-    let runs = format!("numerical_error.runs={runs}");
-    let short = [runs.as_str(), "sampler.steps=400"];
-    let truth = "numerical_error.model={ numerics = { mesh = [60, 270] } }";
-    let (_, finest, _) = ran(&[short[0], short[1], truth, "numerical_error.predict=false"]);
-    let predictor = std::env::var("LACUNA_PREDICTOR").unwrap_or_else(|_| "polynomial_chaos".into());
-    let surrogate = format!("numerical_error.surrogate={{ use = \"{predictor}\" }}");
-    let (study, learned, calibrated) = ran(&[short[0], short[1], &surrogate]);
-    for fact in learned.numerics.as_ref().unwrap().value.facts("strain") {
-        println!("{}: {}", fact.name, fact.value);
-    }
-    let variance = *calibrated.outcome.map.last().unwrap() / 18.0;
-    let emulator = learned.fitted.value.error_samples(&study, None).factor;
-    let numerics = &learned.numerics.as_ref().unwrap().value;
-    let truths = &finest.numerics.as_ref().unwrap().value.differences;
-    let section = &study.numerical_error.as_ref().unwrap().written;
-    let predicted = shifts::of(&learned, truths, numerics, section, &emulator, variance);
-    let mut constant = numerics.clone();
-    constant.prediction = None;
-    let noise = shifts::of(&learned, truths, &constant, section, &emulator, variance);
-    for (name, found) in [("predicted", predicted), ("noise about zero", noise)] {
-        println!("{name}: {found}");
-    }
 }

@@ -35,10 +35,11 @@ pub fn rules() -> Vec<Rule> {
     vec![Rule {
         code: CODE,
         looks_at: "each run's jack-knife residual, scaled by its leverage, over the root mean square of those of all \
-                   other runs; of polynomials of the parameters and of the emulator; the same value by value"
+                   other runs; of polynomials of the parameters and of the emulator, its errors relative to what it states \
+                   of them; the same value by value"
             .to_owned(),
         threshold: format!(
-            "{SCORE}: reservation, at most {} runs or {} of them; single values of a curve: {}, at most {}",
+            "{SCORE}: reservation, at most {} runs or {} of them; single values of a curve: {}, at most {} and one a run",
             MOST.0,
             percent(MOST.1),
             values::SCORE,
@@ -63,9 +64,18 @@ pub struct Suspect {
     pub parameter: Option<(usize, f64)>,
 }
 
-/// The suspicious runs among runs at points of the unit cube, the most suspicious first; `left_out` holds the emulator's
-/// leave-one-out residuals, `runs x outputs`.
-pub fn suspects(points: &Matrix, responses: &Matrix, left_out: Option<&Matrix>) -> Vec<Suspect> {
+/// The emulator's errors at runs left out.
+#[derive(Debug, Clone)]
+pub struct LeftOut {
+    /// Response minus emulator, `runs x outputs`.
+    pub errors: Matrix,
+    /// How large the emulator expects its error to be at each run, relative to the others; ones where it does not say. An emulator far from
+    /// other runs may be far off without any wrong number.
+    pub sizes: Vec<f64>,
+}
+
+/// The suspicious runs among runs at points of the unit cube, the most suspicious first.
+pub fn suspects(points: &Matrix, responses: &Matrix, left_out: Option<&LeftOut>) -> Vec<Suspect> {
     if points.rows() < FEWEST {
         return Vec::new();
     }
@@ -91,18 +101,18 @@ pub fn suspects(points: &Matrix, responses: &Matrix, left_out: Option<&Matrix>) 
 fn worst(
     points: &Matrix,
     responses: &Matrix,
-    left_out: Option<&Matrix>,
+    left_out: Option<&LeftOut>,
     kept: &[usize],
 ) -> Option<(usize, f64)> {
     let (points, responses) = (points.select_rows(kept), responses.select_rows(kept));
     let fit = Fit::best(&points, &responses)?;
     let sizes = sizes(&responses);
     let mut scores = scores(&fit.residuals, &fit.leverage, &sizes);
-    if let Some(errors) = left_out {
+    if let Some(LeftOut { errors, sizes: expected }) = left_out {
         // The emulator was fitted with all runs, so that only the first is judged by it.
         if kept.len() == errors.rows() {
             let scaled = Matrix::from_fn(errors.rows(), errors.columns(), |i, j| {
-                errors[(i, j)] * (1.0 - fit.leverage[i])
+                errors[(i, j)] / expected[i] * (1.0 - fit.leverage[i])
             });
             let emulator = self::scores(&scaled, &fit.leverage, &sizes);
             for (score, other) in scores.iter_mut().zip(emulator) {

@@ -1,6 +1,6 @@
 //! Single values of a curve that look like typing errors: a run that is sound but for one output.
 
-use super::{Fit, ROUNDING, sizes};
+use super::{Fit, LeftOut, ROUNDING, sizes};
 use crate::assess::words::short;
 use crate::assess::{Finding, Severity};
 use crate::linalg::Matrix;
@@ -24,18 +24,19 @@ pub struct Value {
 }
 
 /// The suspicious values of runs at points of the unit cube; `left_out` as in [`super::suspects`].
-pub fn values(points: &Matrix, responses: &Matrix, left_out: Option<&Matrix>) -> Vec<Value> {
+pub fn values(points: &Matrix, responses: &Matrix, left_out: Option<&LeftOut>) -> Vec<Value> {
     let Some(fit) = Fit::best(points, responses) else { return Vec::new() };
     let sizes = sizes(responses);
     let alone = |i: usize| (1.0 - fit.leverage[i]).max(1e-6);
     let mut found: Vec<Value> = Vec::new();
     for (j, &size) in sizes.iter().enumerate().filter(|(_, size)| **size > 0.0) {
         let own: Vec<f64> = (0..points.rows()).map(|i| fit.residuals[(i, j)] / alone(i)).collect();
-        let emulator = left_out.map(|errors| errors.column(j));
+        let ones = vec![1.0; points.rows()];
+        let emulator = left_out.map(|all| (all.errors.column(j), &all.sizes));
         let mut worst: Option<Value> = None;
         // The emulator comes last: what it expects is better known than what a polynomial does.
-        for errors in std::iter::once(own).chain(emulator) {
-            let square = |i: usize| errors[i] * errors[i] * alone(i);
+        for (errors, expected) in std::iter::once((own, &ones)).chain(emulator) {
+            let square = |i: usize| (errors[i] / expected[i]).powi(2) * alone(i);
             let total: f64 = (0..errors.len()).map(square).sum();
             let others = (errors.len() - 1) as f64;
             for i in 0..errors.len() {
@@ -52,7 +53,9 @@ pub fn values(points: &Matrix, responses: &Matrix, left_out: Option<&Matrix>) ->
             return Vec::new();
         }
     }
-    found
+    // Several in one run are how the run goes.
+    let of_run = |run: usize| found.iter().filter(|value| value.run == run).count();
+    found.iter().filter(|value| of_run(value.run) == 1).cloned().collect()
 }
 
 /// A suspicious value in words.

@@ -1,8 +1,8 @@
 //! Typing errors among runs, and sound runs.
 
 use super::*;
-use crate::assess::suspicious::suspects;
 use crate::assess::suspicious::values::values;
+use crate::assess::suspicious::{LeftOut, suspects};
 
 type Function = fn(&[f64], f64) -> f64;
 
@@ -136,9 +136,22 @@ fn a_single_wrong_value_is_found_in_its_curve() {
 fn the_emulator_tells_too() {
     let (points, responses) = self::runs(FUNCTIONS[2], 40, 1, 3);
     let mut rng = Stream::root(4).generator();
-    let mut left_out = Matrix::from_fn(40, 1, |_, _| 1e-3 * normal(&mut rng));
+    let errors = Matrix::from_fn(40, 1, |_, _| 1e-3 * normal(&mut rng));
+    let mut left_out = LeftOut { errors, sizes: vec![1.0; 40] };
     assert_eq!(suspects(&points, &responses, Some(&left_out)), []);
-    left_out[(7, 0)] = 0.05;
+    left_out.errors[(7, 0)] = 0.05;
     let found = suspects(&points, &responses, Some(&left_out));
     assert_eq!(found.iter().map(|s| s.run).collect::<Vec<_>>(), [7]);
+    // Where the emulator says that it knows little, the same error is none that astonishes.
+    left_out.sizes[7] = 20.0;
+    assert_eq!(suspects(&points, &responses, Some(&left_out)), []);
+}
+
+/// Two values of one run far off, as where a cavity closes in it alone, are no typing errors.
+#[test]
+fn several_values_of_one_run_are_its_shape() {
+    let (points, mut responses) = self::runs(FUNCTIONS[3], 150, 20, 2);
+    responses[(11, 6)] *= 10.0;
+    responses[(11, 9)] *= 10.0;
+    assert_eq!(values(&points, &responses, None), []);
 }

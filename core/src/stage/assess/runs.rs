@@ -2,14 +2,14 @@
 
 use crate::assess::Finding;
 use crate::assess::runs::{self as check, Invalid};
-use crate::assess::suspicious::{self, Suspect, values};
+use crate::assess::suspicious::{self, LeftOut, Suspect, values};
 use crate::data::{Ensemble, Parameter};
 use crate::linalg::Matrix;
 use crate::math::moments;
 use crate::run::Stop;
 use crate::stage::calibrate::Calibrated;
 use crate::stage::read::outside;
-use crate::stage::surrogate::Fitting;
+use crate::stage::surrogate::{Fitted, Fitting};
 use crate::stage::{Known, idle};
 use crate::study::Study;
 use crate::study::file::InvalidRuns;
@@ -199,7 +199,7 @@ fn suspicious(study: &Study, known: &Known<'_>, ensemble: &Ensemble) -> Result<V
     let points = Matrix::from_fn(raw.rows(), raw.columns(), |i, j| scale.unit(j, raw[(i, j)]));
     let left_out = known.refinement.is_none().then(|| {
         let own: Vec<usize> = (0..rows.len()).collect();
-        fitted.value.samples.select_rows(&own).select_columns(&columns)
+        left_out(&fitted.value, &own, &columns)
     });
     let suspects = suspicious::suspects(&points, &responses, left_out.as_ref());
     let told = |suspect: &Suspect| {
@@ -223,6 +223,25 @@ fn suspicious(study: &Study, known: &Known<'_>, ensemble: &Ensemble) -> Result<V
         values::suspicious(&ensemble.runs[row], &place, number, value)
     }));
     Ok(found)
+}
+
+/// The emulator's errors at its training runs, each left out: by a fit without it where the emulator states how large they may be.
+fn left_out(fitted: &Fitted, runs: &[usize], outputs: &[usize]) -> LeftOut {
+    let Some(stated) = &fitted.curves.stated else {
+        let errors = fitted.samples.select_rows(runs).select_columns(outputs);
+        return LeftOut { errors, sizes: vec![1.0; runs.len()] };
+    };
+    let errors = fitted.curves.errors.select_rows(runs).select_columns(outputs);
+    let variances = stated.select_rows(runs).select_columns(outputs);
+    let of_output = |j: usize| moments::mean(&variances.column(j));
+    let means: Vec<f64> = (0..outputs.len()).map(of_output).collect();
+    let relative = |row: &[f64]| {
+        let each = row.iter().zip(&means).filter(|(_, mean)| **mean > 0.0);
+        let ratios: Vec<f64> = each.map(|(v, mean)| v / mean).collect();
+        if ratios.is_empty() { 1.0 } else { moments::mean(&ratios).sqrt().max(1e-3) }
+    };
+    let sizes = variances.iter_rows().map(relative).collect();
+    LeftOut { errors, sizes }
 }
 
 /// From natural values to the unit interval: by the design's law, or by the range of the runs where these go beyond it.
