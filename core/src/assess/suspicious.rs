@@ -39,7 +39,7 @@ pub fn rules() -> Vec<Rule> {
                    of them; the same value by value"
             .to_owned(),
         threshold: format!(
-            "{SCORE}: reservation, at most {} runs or {} of them; single values of a curve: {}, at most {} and one a run",
+            "{SCORE}: reservation, at most {} runs or {} of them; single values of a curve: {}, at most {}, one a run and none beside",
             MOST.0,
             percent(MOST.1),
             values::SCORE,

@@ -23,32 +23,17 @@ pub struct Value {
     pub expected: f64,
 }
 
+/// A single wrong value stands alone: its neighbours on the curve are less than this share as far off. A run that goes its own way for a
+/// while is off at several.
+const ALONE: f64 = 1.0 / 3.0;
+
 /// The suspicious values of runs at points of the unit cube; `left_out` as in [`super::suspects`].
 pub fn values(points: &Matrix, responses: &Matrix, left_out: Option<&LeftOut>) -> Vec<Value> {
     let Some(fit) = Fit::best(points, responses) else { return Vec::new() };
-    let sizes = sizes(responses);
-    let alone = |i: usize| (1.0 - fit.leverage[i]).max(1e-6);
+    let judges = Judges { fit, responses, left_out, sizes: sizes(responses) };
     let mut found: Vec<Value> = Vec::new();
-    for (j, &size) in sizes.iter().enumerate().filter(|(_, size)| **size > 0.0) {
-        let own: Vec<f64> = (0..points.rows()).map(|i| fit.residuals[(i, j)] / alone(i)).collect();
-        let ones = vec![1.0; points.rows()];
-        let emulator = left_out.map(|all| (all.errors.column(j), &all.sizes));
-        let mut worst: Option<Value> = None;
-        // The emulator comes last: what it expects is better known than what a polynomial does.
-        for (errors, expected) in std::iter::once((own, &ones)).chain(emulator) {
-            let square = |i: usize| (errors[i] / expected[i]).powi(2) * alone(i);
-            let total: f64 = (0..errors.len()).map(square).sum();
-            let others = (errors.len() - 1) as f64;
-            for i in 0..errors.len() {
-                let rest = ((total - square(i)) / others).max((ROUNDING * size).powi(2));
-                let score = (square(i) / rest).sqrt();
-                if score > SCORE && worst.as_ref().is_none_or(|w| score > w.score) {
-                    let expected = responses[(i, j)] - errors[i];
-                    worst = Some(Value { run: i, output: j, score, expected });
-                }
-            }
-        }
-        found.extend(worst);
+    for j in 0..responses.columns() {
+        found.extend(judges.worst(j).filter(|value| judges.is_alone(value)));
         if found.len() > MOST {
             return Vec::new();
         }
@@ -56,6 +41,58 @@ pub fn values(points: &Matrix, responses: &Matrix, left_out: Option<&LeftOut>) -
     // Several in one run are how the run goes.
     let of_run = |run: usize| found.iter().filter(|value| value.run == run).count();
     found.iter().filter(|value| of_run(value.run) == 1).cloned().collect()
+}
+
+/// Who judges single values.
+struct Judges<'a> {
+    fit: Fit,
+    responses: &'a Matrix,
+    left_out: Option<&'a LeftOut>,
+    sizes: Vec<f64>,
+}
+
+impl Judges<'_> {
+    /// The errors at an output by the polynomials and, last, by the emulator, whose expectation is better known; with the score of each run.
+    fn of_output(&self, j: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
+        let runs = self.responses.rows();
+        let alone = |i: usize| (1.0 - self.fit.leverage[i]).max(1e-6);
+        let own: Vec<f64> = (0..runs).map(|i| self.fit.residuals[(i, j)] / alone(i)).collect();
+        let emulator = self.left_out.map(|all| (all.errors.column(j), all.sizes.clone()));
+        let scored = |(errors, expected): (Vec<f64>, Vec<f64>)| {
+            let square = |i: usize| (errors[i] / expected[i]).powi(2) * alone(i);
+            let total: f64 = (0..runs).map(square).sum();
+            let floor = (ROUNDING * self.sizes[j]).powi(2);
+            let rest = |i: usize| ((total - square(i)) / (runs - 1) as f64).max(floor);
+            let scores = (0..runs).map(|i| (square(i) / rest(i)).sqrt()).collect();
+            (errors, scores)
+        };
+        std::iter::once((own, vec![1.0; runs])).chain(emulator).map(scored).collect()
+    }
+
+    /// The most suspicious value of an output, if any is.
+    fn worst(&self, j: usize) -> Option<Value> {
+        if self.sizes[j] <= 0.0 {
+            return None;
+        }
+        let mut worst: Option<Value> = None;
+        for (errors, scores) in self.of_output(j) {
+            for (i, &score) in scores.iter().enumerate() {
+                if score > SCORE && worst.as_ref().is_none_or(|w| score > w.score) {
+                    let expected = self.responses[(i, j)] - errors[i];
+                    worst = Some(Value { run: i, output: j, score, expected });
+                }
+            }
+        }
+        worst
+    }
+
+    /// Whether the run is not off at the outputs beside.
+    fn is_alone(&self, value: &Value) -> bool {
+        let beside = [value.output.checked_sub(1), Some(value.output + 1)];
+        let there = beside.into_iter().flatten().filter(|&j| j < self.sizes.len());
+        let scores = there.filter(|&j| self.sizes[j] > 0.0).flat_map(|j| self.of_output(j));
+        scores.into_iter().all(|(_, scores)| scores[value.run] < ALONE * value.score)
+    }
 }
 
 /// A suspicious value in words.
