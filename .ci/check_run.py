@@ -9,10 +9,13 @@ import matplotlib
 
 matplotlib.use("Agg")
 import arviz  # noqa: E402  the figures need no screen
+import jsonschema  # noqa: E402
 
 run = Path(sys.argv[1])
 summary = json.loads((run / "summary.json").read_text())
 assert summary["schema"] == 1, summary["schema"]
+schema = Path(__file__).resolve().parent.parent / "docs" / "summary.schema.json"
+jsonschema.validate(summary, json.loads(schema.read_text()), jsonschema.Draft202012Validator)
 data = arviz.from_netcdf(run / "posterior.nc")
 GROUPS = ("posterior", "sample_stats", "observed_data", "log_likelihood", "log_likelihood_by_curve",
           "posterior_predictive", "prior", "prior_predictive", "constant_data")

@@ -1,13 +1,13 @@
-"""How often the intervals of `lacuna coverage` hold the truth, over several designs.
+"""Coverage of the intervals of `lacuna coverage`, over several designs.
 
     python bench/coverage.py [--lacuna PATH] [--out FOLDER] [--designs 8] [--truths 25] [--margin 0] [CASE ...]
 
-A case is STUDY:SURROGATE:RUNS with a study of `bench/coverage`, a surrogate of the list below and the number of simulation runs.
-Left out: all cases of the table in docs/coverage.md. Every design has truths and data of its own; the model itself is calibrated to the
-same data. Prints for every case the shares of truths that central intervals of 50, 90 and 95 % hold, those of 95 % at an edge of the prior
-(what a right posterior would hold in brackets) and elsewhere, the largest error in posterior standard deviations, the median over cases of
-the posterior standard deviation over that of the model itself, and the seconds a truth. First the bands that hold the shares of right
-intervals with 99 %, for the number of truths of one unknown. Needs Python alone; what is finished is not made again.
+A case is STUDY:SURROGATE:RUNS with a study of `bench/coverage`, a surrogate of the list below and the number of simulation runs;
+without cases, all those of the table in docs/coverage.md are run. Every design has its own truths and data; the model itself is calibrated
+to the same data. Prints for every case the coverage of the central intervals of 50, 90 and 95 %, that of the 95 % interval at an edge of
+the prior (in brackets the expected coverage of a correct posterior) and elsewhere, the largest error in posterior standard deviations, the
+median over cases of the ratio of the posterior standard deviation to that of the model itself, and the seconds per truth. Before these, the
+99 % bands of the coverage of correct intervals, for the number of truths of one unknown. Needs only Python; finished cases are reused.
 """
 
 import argparse
@@ -31,7 +31,7 @@ EXACT = ["design=false", "surrogate=false"]
 
 
 def counted(options, study, settings, name, seed):
-    """The cases of one design, and the seconds that they took."""
+    """Cases of one design, and their run time in seconds."""
     folder = os.path.join(options.out, name, str(seed))
     took = os.path.join(folder, "seconds")
     if not os.path.exists(took):
@@ -49,7 +49,7 @@ def counted(options, study, settings, name, seed):
 
 
 def band(n, p):
-    """The shares between which that of n independent truths is with 99 %."""
+    """99 % band, in per cent, of the coverage of n independent truths by intervals of probability p."""
     log = lambda k: math.lgamma(n + 1) - math.lgamma(k + 1) - math.lgamma(n - k + 1) + k * math.log(p) + (n - k) * math.log(1 - p)
     low, below = 0, math.exp(log(0))
     while below < 0.005:
@@ -63,13 +63,13 @@ def band(n, p):
 
 
 def cases(found):
-    """By number: the unknowns of the study's parameters, for calibrations that gave a posterior."""
+    """Unknowns of the study's parameters by case number, for calibrations that gave a posterior."""
     ended = {case["case"]["number"]: case["case"]["ended"] for case in found}
     return {number: e["calibrated"]["unknowns"] for number, e in ended.items() if "calibrated" in e}
 
 
 def row(options, case):
-    """The line of one case."""
+    """Computes the line of one case."""
     study, kind, runs = case.split(":")
     with open(os.path.join(HERE, f"{study}.toml"), "rb") as file:
         priors = [p["prior"]["uniform"] for p in tomllib.load(file)["parameter"]]

@@ -1,19 +1,19 @@
-"""How often intervals hold the truth under several covariances of an emulator's error, apart from the engine.
+"""Coverage of intervals for several covariances of an emulator's error, computed independently of the engine.
 
     python bench/emulator_error.py [MODEL:SURROGATE:RUNS ...]
 
-Needs numpy, scipy and scikit-learn. Models of three parameters on the unit cube, five Latin hypercubes each, 40 truths a design of
-which half are put into an outer tenth of one parameter; the noise of the mean curve is known. Prints the shares of truths that
-central intervals of 50, 90 and 95 % hold, the last at the edges too, and the median of the posterior standard deviation over that of a
-calibration with the model itself. Covariances, by name:
+Needs numpy, scipy and scikit-learn. Models of three parameters on the unit cube, five Latin hypercubes each, 40 truths per design,
+half of them in an outer tenth of one parameter; the noise of the mean curve is known. Prints the coverage of central intervals of
+50, 90 and 95 %, the last at the edges too, and the median ratio of the posterior standard deviation to that of a calibration with
+the model itself. Covariances, by name:
 
 loo       mean square of the curves
-damped    the same, correlations damped
-factor    the same, enlarged until left-out runs shift their parameters by what the posterior says
-data      the same, its size where the data put the parameters (Gaussian processes, or 50 curves)
-near      the same, the factor that of runs as far from the edges as the data put the parameters
-varying   the same, its size a function of the parameters in the likelihood, with its determinant
-unknown   the same, its size integrated out under a log-normal law of the scatter that the curves show
+damped    loo with damped correlations
+factor    damped, enlarged until left-out runs shift their parameters by the amount the posterior predicts
+data      like factor, with its size at the parameters indicated by the data (Gaussian processes, or 50 curves)
+near      like data, with the factor from runs as far from the edges as the parameters indicated by the data
+varying   like factor, with its size a function of the parameters in the likelihood, including its determinant
+unknown   like factor, with its size integrated out under a log-normal law with the scatter of the curves
 """
 
 import itertools
@@ -59,7 +59,7 @@ MODELS = {"oscillator": (oscillator, 0.02, 5, 1), "reactions": (reactions, 0.01,
 
 
 class Expansion:
-    """Legendre polynomials of a total degree by least angle regression, each output by itself."""
+    """Legendre polynomials up to a total degree by least-angle regression, each output separately."""
 
     def __init__(self, x, y, degree):
         self.degree, n = degree, len(x)
@@ -98,7 +98,7 @@ class Expansion:
 
 
 class Process:
-    """Principal components, a Gaussian process each."""
+    """Principal components, with one Gaussian process each."""
 
     def __init__(self, x, y):
         self.mean = y.mean(0)
@@ -126,7 +126,7 @@ def fitted(kind, x, y):
 
 
 def left_out(kind, x, y):
-    """Errors and stated variances at runs left out of the fit in ten parts."""
+    """Errors and stated variances of ten-fold cross-validation at the left-out runs."""
     errors, stated, part = np.zeros_like(y), np.zeros_like(y), np.arange(len(x)) % 10
     for k in range(10):
         own = part == k
@@ -155,7 +155,7 @@ def matern(d):
 
 
 class Distance:
-    """The variance of a process of unit variance that is known at the runs, with an unknown mean."""
+    """Variance of a process of unit prior variance conditioned on the runs, with an unknown mean."""
 
     def __init__(self, x, length):
         self.x, self.length = x, length
@@ -204,7 +204,7 @@ class Size:
 
 
 def shifts(shapes, sizes, jacobians, errors, noise, damp):
-    """The expected squares of the shifts that left-out runs cause, by factor and run."""
+    """Expected squared shifts caused by left-out runs, by factor and run."""
     n, m = errors.shape
     part = np.arange(n) % (n if n <= 30 else 10)
     squares = np.zeros((len(FACTORS), n))
@@ -225,21 +225,21 @@ def crossing(means):
 
 
 def largest(squares, x):
-    """The factor that all runs ask for, or the half that is nearest to the edges."""
+    """Factor required by all runs, or by the half of them nearest to the edges."""
     off, n = abs(x - 0.5).max(1), len(x)
     found = max(crossing(squares.mean(1)), crossing(squares[:, off >= np.median(off)].mean(1)))
     return found * np.sqrt((n - 1) / (n - 5))
 
 
 def local(squares, x, there):
-    """The factor of runs as far from the edges as some points, see the statistics of the documentation."""
+    """Factor required by runs as far from the edges as the given points; see the documentation on statistics."""
     off, n = abs(x - 0.5).max(1), len(x)
     nearest = np.argsort(abs(off - abs(there - 0.5).max(1)[:, None]), axis=1, kind="stable")[:, : max(n // 4, min(n, 12))]
     return crossing(squares[:, nearest.ravel()].mean(1)) * np.sqrt((n - 1) / (n - 5))
 
 
 class Law:
-    """Data about a response: independent noise and an error of a covariance times the square of a size."""
+    """Data around a response: independent noise and an error with the given covariance times the square of a size."""
 
     def __init__(self, covariance, noise, size=None, scatter=0.0):
         values, self.directions = np.linalg.eigh(covariance)
@@ -261,7 +261,7 @@ class Law:
 
 
 def draws(emulator, law, data, rng, walkers=48, steps=240):
-    """Ensembles of stretch and difference moves in the unit cube, one a data set, all at once."""
+    """Ensembles with stretch and difference moves in the unit cube, one per data set, run together."""
     count, half = len(data), walkers // 2
     pool = rng.random((3000, 3))
     means, sizes = emulator(pool), law.size(pool)
@@ -299,7 +299,7 @@ def draws(emulator, law, data, rng, walkers=48, steps=240):
 
 
 def where(best, jacobian, covariance, noise, rng):
-    """Points of the normal law of the least-squares estimate, inside the cube."""
+    """Draws from the normal distribution of the least-squares estimate, inside the cube."""
     gain = np.linalg.solve(jacobian.T @ jacobian / noise + 12 * np.eye(3), jacobian.T / noise)
     root = np.linalg.cholesky(gain @ (covariance + noise * np.eye(len(covariance))) @ gain.T + 1e-12 * np.eye(3))
     points = best + rng.standard_normal((1280, 3)) @ root.T

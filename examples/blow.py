@@ -1,4 +1,4 @@
-"""The data of configs/composed: a gauge that lags behind a mass on a spring, which is hit by a blow.
+"""Makes the data of configs/composed: a gauge that lags behind a mass on a spring, which is struck.
 
 Run: python3 examples/blow.py configs/composed
 """

@@ -1,9 +1,9 @@
 //! Makes the tables of `configs/borehole`: `cargo run --release -p lacuna-examples --bin borehole_data`.
 //!
 //! The flow of water through a borehole between two aquifers (Harper and Gupta, *Sensitivity/uncertainty analysis of a
-//! borehole scenario*, BMI/ONWI-516, 1983), with their laws of the eight parameters; years are turned into days. A
-//! pumping test is simulated: the flow is measured at the original radius and after reaming the hole to twice, four and
-//! eight times that, each with the upper aquifer as it is and drawn down by 75 and 150 m.
+//! borehole scenario*, BMI/ONWI-516, 1983), with their distributions of the eight parameters; years are converted to
+//! days. A pumping test is simulated: the flow is measured at the original radius and after reaming the hole to twice,
+//! four and eight times that, each with the upper aquifer as it is and drawn down by 75 and 150 m.
 
 use std::error::Error;
 use std::fmt::Write as _;
@@ -17,15 +17,15 @@ use lacuna_plugins::designs::sobol::Sobol;
 const SEED: u64 = 19_830_516;
 const RUNS: usize = 200;
 const REPLICATES: usize = 6;
-/// Times the original radius.
+/// Radii in units of the original radius.
 const REAMED: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
-/// By how much the upper aquifer is drawn down, m.
+/// Drawdown of the upper aquifer, m.
 const DRAWDOWN: [f64; 3] = [0.0, 75.0, 150.0];
-/// Standard deviation of a measured flow, as a share of the flow with the aquifer as it is.
+/// Standard deviation of a measured flow, as a fraction of the flow without drawdown.
 const NOISE: f64 = 0.01;
 const DAYS: f64 = 365.25;
 
-/// Name, unit, law, and the true value of each parameter.
+/// Name, unit, distribution and true value of each parameter.
 fn parameters() -> [(&'static str, &'static str, Distribution, f64); 8] {
     let yearly = |low: f64, high: f64| Distribution::Uniform([low / DAYS, high / DAYS]);
     [
@@ -40,7 +40,7 @@ fn parameters() -> [(&'static str, &'static str, Distribution, f64); 8] {
     ]
 }
 
-/// The flow in m3/d.
+/// Flow in m3/d.
 fn flow(parameters: &[f64], reamed: f64, drawdown: f64) -> f64 {
     let &[radius, influence, upper, upper_head, lower, lower_head, length, conductivity] =
         parameters
@@ -64,7 +64,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut responses = "run,reamed,drawdown [m],flow [m3/d]\n".to_owned();
     for i in 0..RUNS {
         let laws = parameters.iter().map(|(_, _, law, _)| law);
-        // What is written is what is simulated.
+        // Simulate the numbers as written, so that the table is exact.
         let point: Result<Vec<f64>, _> = laws
             .zip(cube.row(i))
             .map(|(law, u)| format!("{:.6e}", law.quantile(*u)).parse())

@@ -1,16 +1,18 @@
-//! A plugin outside the tree: a sampler, and the program that runs a study with it.
+//! A plugin outside the source tree: a sampler, and the program that runs a study with it.
 
 use std::error::Error;
 use std::path::Path;
 
-use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, below, normal, permutation, uniform};
 use lacuna::plugin::sampler::{Plan, State};
 use lacuna::plugin::{Component, Context, Sampler, Target};
-use lacuna::report::summary_text;
-use lacuna::run::{RunDirectory, Silent, Stop};
-use lacuna::study::{Complaints, resolve};
-// The other plugins; without this line the linker leaves them out.
+use lacuna::run::{Silent, Stop};
+use lacuna::text::Complaints;
+use lacuna_engine::report::summary_text;
+use lacuna_engine::study::resolve;
+use lacuna_linalg::Matrix;
+use lacuna_run::RunDirectory;
+// The other plugins; without this line the linker omits them.
 use lacuna_plugins as _;
 use rand::Rng;
 use schemars::JsonSchema;
@@ -18,17 +20,17 @@ use serde::{Deserialize, Serialize};
 
 /// Difference walk: many walkers, each of which jumps by the difference between two others.
 ///
-/// The jumps take the shape of the ensemble, so that nothing has to be tuned to the scales and
-/// correlations of the unknowns.
+/// The jumps have the shape of the ensemble, so that no tuning to the scales and correlations of the unknowns is
+/// needed.
 ///
-/// Reference: ter Braak, Statistics and Computing 16 (2006) 239. The built-in `affine_invariant_ensemble` has
-/// the same as one of its moves.
+/// Reference: ter Braak, Statistics and Computing 16 (2006) 239. The built-in `affine_invariant_ensemble` has this move
+/// as one of several.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DifferenceWalk {
-    /// The number of walkers: at least four times the number of unknowns.
+    /// Number of walkers, at least four times the number of unknowns.
     pub walkers: usize,
-    /// The number of steps of each walker.
+    /// Number of steps of each walker.
     pub steps: usize,
 }
 
@@ -70,7 +72,7 @@ impl Sampler for DifferenceWalk {
         Ok(State { points, log_density, accepted, evaluations: count as u64, memory })
     }
 
-    /// Each half of the walkers moves by differences within the other half, which stands still.
+    /// Each half of the walkers moves by differences within the other half, which is fixed meanwhile.
     fn step(&self, target: &dyn Target, state: &mut State, stream: &Stream) -> Result<(), Stop> {
         let mut rng = stream.generator();
         state.accepted.fill(false);
@@ -96,7 +98,7 @@ fn jump(
         let first = below(rng, others.len());
         let second = (first + 1 + below(rng, others.len() - 1)) % others.len();
         let [a, b] = [first, second].map(|k| state.points.row(others[k]));
-        // A length that varies a little keeps the jumps off a lattice.
+        // A slightly random length keeps the jumps from being confined to a lattice.
         let length = scale * (1.0 + 0.1 * normal(rng));
         for ((x, a), b) in points.row_mut(i).iter_mut().zip(a).zip(b) {
             *x += length * (a - b);
@@ -121,7 +123,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let complaints = checked.complaints();
     let study = checked.study.ok_or(complaints)?;
     let mut run = RunDirectory::open(&Path::new("runs").join(&study.name))?;
-    let findings = lacuna::stage::run(&study, &mut run, &Silent)?;
+    let findings = lacuna_engine::pipeline::run(&study, &mut run, &Silent)?;
     println!("{}", summary_text(&findings));
     Ok(())
 }
@@ -129,5 +131,5 @@ fn main() -> Result<(), Box<dyn Error>> {
 #[test]
 fn keeps_the_contract_of_samplers() {
     let sampler = DifferenceWalk::default();
-    assert_eq!(lacuna::contract::sampler("difference_walk", &sampler), Ok(()));
+    assert_eq!(lacuna_contract::sampler("difference_walk", &sampler), Ok(()));
 }

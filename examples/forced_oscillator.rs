@@ -1,8 +1,8 @@
-//! Makes the data of `configs/forced_oscillator`: `cargo run --release -p lacuna-examples --bin forced_oscillator`, with
-//! the number of points of the longer record and another folder behind `--`, if wanted.
+//! Makes the data of `configs/forced_oscillator`: `cargo run --release -p lacuna-examples --bin forced_oscillator`,
+//! with optional arguments after `--`: the number of points of the longer record and another folder.
 //!
-//! A mass on a spring and a damper under a measured force. The force is straight between its samples, so that the motion
-//! between two of them is known in closed form: no integrator has a part in these data.
+//! A mass on a spring and a damper under a measured force. The force is linear between its samples, so the motion
+//! between two samples is known in closed form, and no integrator is involved.
 
 use std::error::Error;
 use std::fmt::Write as _;
@@ -11,20 +11,20 @@ use std::path::Path;
 use lacuna::math::random::{Stream, normal};
 
 const SEED: u64 = 20_261_122;
-/// kg, kg/s, N/m.
+/// True values in kg, kg/s, N/m.
 const TRUTH: Oscillator = Oscillator { mass: 2.0, damping: 1.6, stiffness: 80.0 };
 /// Standard deviation of the noise, mm.
 const NOISE: f64 = 0.5;
-/// Points of the longer record.
+/// Number of points of the longer record.
 const POINTS: usize = 20_000;
 
-/// How a record was taken; times in seconds.
+/// Settings of a record; times in seconds.
 struct Record {
     name: &'static str,
-    /// Its points as a share of those of the longest.
+    /// Number of points as a fraction of that of the longest record.
     share: f64,
     interval: f64,
-    /// Interval of the force's samples, its standard deviation in newtons and the time over which it forgets.
+    /// Sampling interval of the force in s, its standard deviation in N, and its correlation time in s.
     force: (f64, f64, f64),
 }
 
@@ -40,8 +40,8 @@ struct Oscillator {
 }
 
 impl Oscillator {
-    /// Position and speed a while after the force was `force` and began to change by `slope`: the straight solution
-    /// `(F - c s / k) / k` and a decaying vibration around it.
+    /// Position and velocity a time `while_` after the force was `force` and began to change at the rate `slope`: the
+    /// linear particular solution `(F - c s / k) / k` plus a decaying vibration.
     fn after(&self, [x, v]: [f64; 2], force: f64, slope: f64, while_: f64) -> [f64; 2] {
         let Self { mass, damping, stiffness } = self;
         let straight = |t: f64| (force + slope * t - damping * slope / stiffness) / stiffness;
@@ -55,7 +55,7 @@ impl Oscillator {
         [fade * (a * cos + b * sin) + straight(while_), fade * turned + speed]
     }
 
-    /// The positions at rising times after rest at time zero, where the force has its first sample.
+    /// Positions at increasing times after rest at time zero, when the force has its first sample.
     fn positions(&self, interval: f64, force: &[f64], times: &[f64]) -> Vec<f64> {
         let (mut state, mut piece) = ([0.0, 0.0], 0);
         let slope = |piece: usize| (force[piece + 1] - force[piece]) / interval;
@@ -72,7 +72,7 @@ impl Oscillator {
     }
 }
 
-/// A force that forgets: each sample is a share of the last and a normal number, as the file has it.
+/// An autoregressive force: each sample is a multiple of the last one plus a normal number, rounded as in the file.
 fn force(count: usize, (interval, sd, memory): (f64, f64, f64), stream: &Stream) -> Vec<f64> {
     let mut rng = stream.generator();
     let share = (-interval / memory).exp();

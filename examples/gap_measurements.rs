@@ -1,9 +1,10 @@
 //! Makes the measured data of `configs/sns-gap`: `cargo run --release -p lacuna-examples --bin gap_measurements`.
 //!
-//! The strain measured at the SNS target with helium is not public. These curves come from the stand-in with over-damped
-//! bubbles, stratified, on a mesh three times as fine in each direction as the study's: physics that the study's model
-//! holds fixed at none. Pulses differ by gain, offset and timing, common and of each gauge, and by noise with memory.
-//! Everything that was chosen is written to `measurements.json` beside the data: the answer key, which no study reads.
+//! The strain measured at the SNS target with helium is not public. These curves come from the stand-in model with
+//! over-damped bubbles, stratified, on a mesh three times as fine in each direction as the study's: physics that the
+//! study's model fixes at zero. Pulses differ by gain, offset and timing, common to all gauges and of each gauge, and
+//! by autocorrelated noise. All chosen values are written to `measurements.json` beside the data: the answer key, which
+//! no study reads.
 
 mod pulses;
 
@@ -13,15 +14,16 @@ use std::path::Path;
 
 use lacuna::math::random::{Stream, normal};
 use lacuna_plugins::models::mercury_target::{Cells, Gas, Mercury, Sampling, Settings, Target};
-use pulses::{Jitter, STEP, at, times};
 use serde_json::json;
+
+use pulses::{Jitter, STEP, at, times};
 
 const SEED: u64 = 20_240_917;
 const PULSES: u64 = 16;
 const JITTER: Jitter = Jitter { gain: [0.015, 0.015], shift: [5e-7, 5e-7] };
-/// Standard deviation of the offset of each gauge from pulse to pulse, microstrain.
+/// Standard deviation of the offset of each gauge between pulses, microstrain.
 const OFFSET: f64 = 2.0;
-/// Correlation of the noise of neighbouring values.
+/// Correlation between the noise of neighbouring values.
 const MEMORY: f64 = 0.4;
 /// Gauge and standard deviation of its noise in microstrain, as in `configs/sns`.
 const GAUGES: [(&str, f64); 10] = [

@@ -1,9 +1,8 @@
-//! Makes the measured data of `configs/sns-helium`:
-//! `cargo run --release -p lacuna-examples --bin helium_measurements`.
+//! Makes the measured data of `configs/sns-helium`: `cargo run --release -p lacuna-examples --bin helium_measurements`.
 //!
-//! The strain measured at the SNS target with helium is not public. These curves come from the stand-in with
+//! The strain measured at the SNS target with helium is not public. These curves come from the stand-in model with
 //! over-damped bubbles on a mesh three times as fine in each direction as the study's, at values chosen here, with a
-//! scatter from pulse to pulse: gain and timing jitter, and white noise. Everything that was chosen is written to
+//! scatter between pulses: gain and timing jitter, and white noise. All chosen values are written to
 //! `measurements.json` beside the data; no study reads it.
 
 mod pulses;
@@ -14,19 +13,20 @@ use std::path::Path;
 
 use lacuna::math::random::{Stream, normal};
 use lacuna_plugins::models::mercury_target::{Cells, Gas, Mercury, Sampling, Settings, Target};
-use pulses::{Jitter, STEP, at, times};
 use serde_json::json;
+
+use pulses::{Jitter, STEP, at, times};
 
 const SEED: u64 = 20_230_511;
 const PULSES: u64 = 10;
 const JITTER: Jitter = Jitter { gain: [0.01, 0.02], shift: [5e-7, 5e-7] };
 /// Standard deviation of the noise, microstrain.
 const NOISE: f64 = 8.0;
-/// Damping of all motion, 1/s.
+/// Damping rate of all motion, 1/s.
 const DAMPING: f64 = 180.0;
 /// Energy of the pulse relative to the default.
 const PULSE_ENERGY: f64 = 1.03;
-/// Standard deviation of the beam, m.
+/// Standard deviation of the beam profile, m.
 const BEAM_WIDTH: f64 = 0.0332;
 
 fn main() -> Result<(), Box<dyn Error>> {

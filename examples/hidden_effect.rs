@@ -1,7 +1,7 @@
 //! Makes the measured data of `configs/hidden_effect`: `cargo run --release -p lacuna-examples --bin hidden_effect`.
 //!
-//! A chain of two masses with an effect that its model lacks, integrated and changed at ten times the sampling by code
-//! that shares nothing with the engine; twelve replicates with correlated noise under each condition.
+//! A chain of two masses with an effect that its model lacks, integrated and modified at ten times the sampling rate by
+//! code that shares nothing with the engine; twelve replicates with correlated noise under each condition.
 
 use std::error::Error;
 use std::fmt::Write as _;

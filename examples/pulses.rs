@@ -1,40 +1,39 @@
-//! Records of one simulated pulse as ten gauges might have measured it many times: what the programs that make the data
-//! of `configs/sns` and `configs/sns-helium` have in common.
-
-use rand::Rng;
+//! Records of one simulated pulse as ten gauges might have measured it many times: code shared by the programs that
+//! make the data of `configs/sns` and `configs/sns-helium`.
 
 use lacuna::math::random::normal;
+use rand::Rng;
 
-/// Sampling of the simulated truth, s: fine enough to shift curves by a fraction of a microsecond.
+/// Sampling interval of the simulated truth, s: fine enough to shift curves by a fraction of a microsecond.
 pub const STEP: f64 = 1e-6;
 
 /// Gain and timing jitter.
 pub struct Jitter {
-    /// Relative standard deviation of the gain, common to all gauges of a pulse and of each gauge.
+    /// Relative standard deviation of the gain: common to all gauges of a pulse, and of each gauge.
     pub gain: [f64; 2],
-    /// Standard deviation of the shift in time, s, common and of each gauge.
+    /// Standard deviation of the shift in time, s: common to all gauges of a pulse, and of each gauge.
     pub shift: [f64; 2],
 }
 
 impl Jitter {
-    /// What all gauges of a pulse have in common: a relative gain and a shift.
+    /// Relative gain and shift common to all gauges of a pulse.
     pub fn common(&self, rng: &mut impl Rng) -> [f64; 2] {
         [self.gain[0] * normal(rng), self.shift[0] * normal(rng)]
     }
 
-    /// The gain, as a factor, and the shift of one gauge.
+    /// Gain, as a factor, and shift of one gauge.
     pub fn own(&self, [gain, shift]: [f64; 2], rng: &mut impl Rng) -> [f64; 2] {
         let gain = 1.0 + gain + self.gain[1] * normal(rng);
         [gain, shift + self.shift[1] * normal(rng)]
     }
 }
 
-/// The times of the measurements: 10 us to 1 ms.
+/// Times of the measurements: 10 us to 1 ms.
 pub fn times() -> impl Iterator<Item = f64> {
     (1..=100).map(|t| f64::from(t) * 1e-5)
 }
 
-/// The simulated strain at a time, by linear interpolation; zero before the pulse.
+/// Simulated strain at a time, by linear interpolation; zero before the pulse.
 pub fn at(trace: &[f64], time: f64) -> f64 {
     let place = time / STEP - 1.0;
     if place < 0.0 {

@@ -1,27 +1,27 @@
-//! `shot_noise`: noise of counts.
+//! `shot_noise`: counting noise.
 
 use std::f64::consts::TAU;
 
 use lacuna::data::Measurements;
-use lacuna::linalg::vector::dot;
-use lacuna::linalg::{self, Cholesky, Matrix};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::discrepancy::{CommonError, Known, VariancePart};
 use lacuna::plugin::{Component, Context, Discrepancy, Hyperparameter, Likelihood};
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
+use lacuna_linalg::vector::dot;
+use lacuna_linalg::{Cholesky, Matrix};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Shot noise: normal differences whose variance grows with the response, as that of counted photons, ions or pulses does.
+/// Shot noise: normal noise whose variance grows with the response, as for counted photons, ions or pulses.
 ///
 /// ```text
 /// variance = gain · (response + background)
 /// ```
 ///
-/// The gain is what one count adds to the reading, and unknown. Below some twenty counts the law is not normal, and where
-/// the noise does not vanish with the signal, `multiplicative_gaussian` with its floor is the better one.
+/// The gain, the reading per count, is unknown. Below about twenty counts the distribution is not normal, and if the
+/// noise does not vanish with the signal, `multiplicative_gaussian` with its floor is better.
 ///
 /// Reference: Janesick, Photon Transfer (2007), chapter 5.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -29,7 +29,8 @@ use serde::{Deserialize, Serialize};
 pub struct ShotNoise {
     /// Prior of the gain, in the unit of the response, such as `{ half_normal = 2 }`.
     pub gain: Distribution,
-    /// What is counted beside the signal and taken off the reading, such as dark counts, in the unit of the response.
+    /// Background that is counted and then subtracted from the reading, such as dark counts, in the unit of the
+    /// response.
     #[serde(default)]
     pub background: f64,
 }
@@ -95,8 +96,8 @@ impl Discrepancy for ShotNoise {
     }
 }
 
-/// The likelihood in counts `n`, means and scatters `S` of the measured outputs. With the variances `v`, the common errors
-/// `F z`, `z` standard normal, and `e = mean - response - F z`,
+/// The likelihood as a function of counts `n`, means and scatters `S` of the measured outputs. With the variances `v`,
+/// the common errors `F z`, `z` standard normal, and `e = mean - response - F z`,
 ///
 /// ```text
 /// -2 log L = Σ [n log(2 pi v) + (S + n e²) / v] + |z|² + log det C,   C = I + F' (n/v) F
@@ -112,16 +113,16 @@ struct Counts {
     count: Vec<f64>,
     mean: Vec<f64>,
     scatter: Vec<f64>,
-    /// The factors of all common errors side by side, of all outputs.
+    /// Factors of all common errors side by side, for all outputs.
     factor: Matrix,
 }
 
-/// The parts of the likelihood at one response and one gain, by measured output.
+/// Parts of the likelihood at one response and one gain, by measured output.
 struct Solved {
     log_likelihood: f64,
     variance: Vec<f64>,
     error: Vec<f64>,
-    /// `f' C⁻¹ f`: how well the common error of the output is known.
+    /// `f' C⁻¹ f`: the posterior variance of the common error of the output.
     spread: Vec<f64>,
 }
 
@@ -130,7 +131,7 @@ impl Counts {
         gain * (y + self.background)
     }
 
-    /// `None` where a variance would not be above zero: there the likelihood is zero.
+    /// The parts of the likelihood; `None` if a variance would not be positive, where the likelihood is zero.
     fn solve(&self, response: &[f64], gain: f64) -> Option<Solved> {
         let own = self.factor.select_rows(&self.measured);
         let variance: Vec<f64> =
@@ -141,13 +142,13 @@ impl Counts {
         let weight: Vec<f64> = self.count.iter().zip(&variance).map(|(n, v)| n / v).collect();
         let scaled =
             Matrix::from_fn(own.rows(), own.columns(), |k, j| weight[k].sqrt() * own[(k, j)]);
-        let mut capacitance = linalg::gram(&scaled);
+        let mut capacitance = lacuna_linalg::gram(&scaled);
         (0..own.columns()).for_each(|j| capacitance[(j, j)] += 1.0);
         let capacitance = Cholesky::new(&capacitance).ok()?;
         let residual = self.measured.iter().zip(&self.mean).map(|(&i, mean)| mean - response[i]);
         let mut error: Vec<f64> = residual.collect();
         let pull: Vec<f64> = error.iter().zip(&weight).map(|(e, w)| w * e).collect();
-        let mut z = linalg::transposed_multiply_vector(&own, &pull);
+        let mut z = lacuna_linalg::transposed_multiply_vector(&own, &pull);
         capacitance.solve(&mut z);
         let (mut spread, mut twice) = (Vec::new(), dot(&z, &z) + capacitance.log_determinant());
         for (k, f) in own.iter_rows().enumerate() {
@@ -169,7 +170,7 @@ impl Likelihood for Counts {
         self.solve(response, hyper[0]).map_or(f64::NEG_INFINITY, |solved| solved.log_likelihood)
     }
 
-    /// The response acts on the mean and on the variance.
+    /// The response enters both the mean and the variance.
     fn gradient(&self, response: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let (mut by_response, mut by_gain) = (vec![0.0; response.len()], 0.0);
         let Some(solved) = self.solve(response, hyper[0]) else {
@@ -220,6 +221,6 @@ mod tests {
     #[test]
     fn it_keeps_the_contract() {
         let plugin = ShotNoise { gain: Distribution::HalfNormal(0.1), background: 0.01 };
-        assert_eq!(lacuna::contract::discrepancy("shot_noise", &plugin), Ok(()));
+        assert_eq!(lacuna_contract::discrepancy("shot_noise", &plugin), Ok(()));
     }
 }

@@ -1,10 +1,10 @@
 //! Makes the measured data of `configs/sns`: `cargo run --release -p lacuna-examples --bin sns_measurements`.
 //!
-//! The strain measured at the SNS target is not public. These curves come from the stand-in model
-//! `mercury_target` on a mesh three times as fine in each direction as the study's, at the founding paper's MAP
-//! (arXiv 2202.03959), with the scatter from pulse to pulse that the paper describes: gain and timing jitter,
-//! noise, larger for U and C and small for G and M, and a few curves of white noise. Everything that
-//! was chosen is written to `measurements.json` beside the data; no study reads it.
+//! The strain measured at the SNS target is not public. These curves come from the stand-in model `mercury_target` on a
+//! mesh three times as fine in each direction as the study's, at the founding paper's MAP (arXiv 2202.03959), with the
+//! scatter between pulses that the paper describes: gain and timing jitter, noise, larger for U and C and small for G
+//! and M, and a few curves of white noise. All chosen values are written to `measurements.json` beside the data; no
+//! study reads it.
 
 mod pulses;
 
@@ -14,12 +14,13 @@ use std::path::Path;
 
 use lacuna::math::random::{Stream, normal};
 use lacuna_plugins::models::mercury_target::{Cells, Mercury, Sampling, Settings, simulate};
-use pulses::{Jitter, STEP, at, times};
 use serde_json::json;
+
+use pulses::{Jitter, STEP, at, times};
 
 const SEED: u64 = 1_004_056;
 const JITTER: Jitter = Jitter { gain: [0.02, 0.03], shift: [1.0e-6, 1.0e-6] };
-/// Gauge, number of sound curves, standard deviation of the noise in microstrain.
+/// Gauge, number of intact curves, standard deviation of the noise in microstrain.
 const GAUGES: [(&str, usize, f64); 10] = [
     ("B", 20, 16.0),
     ("C", 20, 26.0),

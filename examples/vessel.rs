@@ -1,9 +1,8 @@
-//! A small solver of its own command line, driven as Sierra is: `vessel DECK` reads an input deck and writes an
-//! Exodus II history file. The study `configs/external` calibrates it through a template of the deck.
+//! A small solver with its own command line, driven like Sierra: `vessel DECK` reads an input deck and writes an Exodus
+//! II history file. The study `configs/external` calibrates it through a template of the deck.
 //!
-//! The mechanics are those of the stand-in `mercury_target`. A deck has blocks (`begin … end`) of lines
-//! `name = value`; `$` and `#` begin comments. The exit code is 0 when all went well, 1 when the simulation
-//! failed, 2 when the deck is wrong.
+//! The mechanics are those of the stand-in `mercury_target`. A deck has blocks (`begin … end`) of lines `name = value`;
+//! `$` and `#` begin comments. The exit code is 0 on success, 1 if the simulation failed, 2 if the deck is wrong.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -32,7 +31,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// What went wrong, and the exit code that says so.
+/// Error message and exit code of a failure.
 struct Failure {
     text: String,
     code: u8,
@@ -68,7 +67,7 @@ fn run(path: &Path) -> Result<(), Failure> {
         .map_err(|text| Failure { text, code: 1 })
 }
 
-/// The strains in microstrain, as the deck's units have them.
+/// Writes the strains in microstrain, the unit of the deck.
 fn write(path: &Path, deck: &str, settings: &Settings, outcome: Outcome) -> Result<(), String> {
     let names = settings.gauges.0.iter().map(|gauge| format!("strain_{}", gauge.name)).collect();
     let micro = |strains: &Vec<f64>| strains.iter().map(|strain| 1e6 * strain).collect();

@@ -1,4 +1,4 @@
-//! The components that a study can name: one folder a kind, one file a plugin.
+//! Components that a study can choose by name: one folder per kind, one file or folder per plugin.
 
 pub mod designs;
 pub mod discrepancies;

@@ -1,38 +1,38 @@
-//! Bad input that only shows when a study runs: the exact message, and nothing lost.
+//! Bad input that is detected only when a study runs: the exact message, and no loss of results.
 //!
-//! What is wrong with a study itself is in `problems/`.
+//! Faults of a study itself are in `problems/`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-use lacuna::run::RunDirectory;
 use lacuna_plugins::readers::sierra::write::{History, Origin, write_history};
+use lacuna_run::RunDirectory;
 use tempfile::TempDir;
 
 use crate::quick::{self, replace};
 
-/// A message with the path of a folder taken out.
+/// A message with the path of a folder removed.
 fn without(folder: &Path, text: &str) -> String {
     text.replace(&folder.display().to_string(), "DIR")
 }
 
-/// Why a study stops.
+/// Message with which a study stops.
 fn stop(folder: &Path, settings: &[&str]) -> String {
     let stopped = quick::run(&folder.join("study.toml"), settings, &folder.join("run"));
     without(folder, &stopped.err().expect("the study stops").to_string())
 }
 
-/// What is complained about before a study runs.
+/// Problems reported before a study runs.
 fn complaints(folder: &Path, settings: &[&str]) -> String {
     let settings: Vec<String> = settings.iter().map(ToString::to_string).collect();
-    let checked = lacuna::study::resolve::load(&folder.join("study.toml"), &settings);
+    let checked = lacuna_engine::study::resolve::load(&folder.join("study.toml"), &settings);
     assert!(checked.study.is_none(), "the study is accepted");
     without(folder, &checked.complaints())
 }
 
-/// The runs of the small study, made once.
+/// Runs of the small study, made once.
 fn runs() -> &'static Path {
     static RUNS: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
     let (_, path) = RUNS.get_or_init(|| {
@@ -73,11 +73,11 @@ const ALLOW_FAILED: &str =
 fn failed(count: usize, allowed: usize, named: &[(&str, &str)]) -> String {
     let named: String = named.iter().map(|(run, why)| format!("\n  `{run}`: {why}")).collect();
     format!(
-        "DIR/runs/runs.csv: {count} of 40 runs cannot be used, {allowed} may fail:{named}\n{ALLOW_FAILED}"
+        "DIR/runs/runs.csv: {count} of 40 runs cannot be used, and {allowed} may be left out:{named}\n{ALLOW_FAILED}"
     )
 }
 
-/// Cuts a file off after its first half.
+/// Truncates a file to its first half.
 fn truncate(path: &Path) {
     let bytes = fs::read(path).unwrap();
     fs::write(path, &bytes[..bytes.len() / 2]).unwrap();
@@ -164,7 +164,7 @@ fn a_sensor_missing_from_a_run_is_named() {
 fn a_run_that_ends_too_early_is_named() {
     let folder = imported();
     let longer = "response.axes.time.last=3e-4";
-    // Measurements as short as the runs would be refused first.
+    // Measurements as short as the runs would be rejected first.
     let without = ["measurements=false", "discrepancy=false", "sampler=false", "validate=false"];
     let settings = [&[longer, "response.axes.time.count=30"][..], &without].concat();
     let found = stop(folder.path(), &settings);
@@ -208,7 +208,7 @@ fn numbers_that_are_none_are_refused_in_measurements() {
     with("lost");
     let expected = format!("{place}: expected a number, found `lost`");
     assert_eq!(stop(folder.path(), &[]), expected);
-    // A blank or NaN is a value that was not measured: it is counted as missing, not as a number.
+    // A blank or NaN is a missing value: it is counted as missing, not as a number.
     let count = |value: &str| {
         with(value);
         let out = folder.path().join("run");
@@ -233,7 +233,7 @@ fn numbers_that_are_none_make_a_run_fail() {
         let (rest, _) = line.rsplit_once(',').unwrap();
         fs::write(&data, text.replace(line, &format!("{rest},{value}"))).unwrap();
         let expected = format!(
-            "DIR/runs.csv: 1 of 80 runs cannot be used, 0 may fail:\n  `r02`: DIR/responses.csv: {reason}\n{ALLOW_FAILED}"
+            "DIR/runs.csv: 1 of 80 runs cannot be used, and 0 may be left out:\n  `r02`: DIR/responses.csv: {reason}\n{ALLOW_FAILED}"
         );
         assert_eq!(stop(folder.path(), &[]), expected);
     }
@@ -305,7 +305,7 @@ impl Drop for Mounted {
     }
 }
 
-/// Changes one bit in the middle of a file.
+/// Flips one bit in the middle of a file.
 fn flip(path: &Path) {
     let mut bytes = fs::read(path).unwrap();
     let middle = bytes.len() / 2;
@@ -327,17 +327,17 @@ fn a_damaged_artifact_is_made_again_with_a_warning() {
         (
             "4-surrogate/emulator.bin",
             &["4-surrogate"][..],
-            "DIR/4-surrogate/emulator.bin is missing or not as it was written; making it again",
+            "DIR/4-surrogate/emulator.bin is missing or has changed; the stage is repeated",
         ),
         (
             "5-calibrate/draws.nc",
             &["5-calibrate"],
-            "DIR/5-calibrate/draws.nc is missing or not as it was written; making it again",
+            "DIR/5-calibrate/draws.nc is missing or has changed; the stage is repeated",
         ),
         (
             "2-simulate/run004.h",
             &["2-simulate"],
-            "result files in DIR/2-simulate are missing or not as they were written (1 of 40); making them again",
+            "result files in DIR/2-simulate are missing or have changed (1 of 40); the runs are repeated",
         ),
     ] {
         flip(&out.join(file));
@@ -372,7 +372,7 @@ fn a_folder_that_is_no_run_directory_is_refused() {
         let expected = "error: DIR is no run directory: it has no resolved.toml\n";
         assert_eq!((code, &without(folder.path(), &text)[..]), (Some(2), expected));
     }
-    // The folder is left as it was.
+    // The folder is unchanged.
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 

@@ -1,13 +1,12 @@
-//! Studies whose models are commands and Python functions, from nothing to their posteriors.
+//! Studies whose models are commands and Python functions, from an empty folder to their posteriors.
 
-use std::fs;
 use std::path::{Path, PathBuf};
-use std::thread;
 use std::time::{Duration, Instant};
+use std::{fs, thread};
 
 use crate::quick::{self, replace};
 
-/// Whether there is Python; `LACUNA_REQUIRE_PYTHON=1` makes its absence a failure.
+/// Returns true if there is Python; `LACUNA_REQUIRE_PYTHON=1` makes its absence a failure.
 pub fn there_is_python() -> bool {
     let there = std::process::Command::new("python3").arg("--version").output().is_ok();
     let required = std::env::var_os("LACUNA_REQUIRE_PYTHON").is_some_and(|value| value == "1");
@@ -18,7 +17,7 @@ pub fn there_is_python() -> bool {
     there
 }
 
-/// Runs a shipped study short; its posterior must hold the truth that its references are.
+/// Runs a shipped study with few steps; its posterior must contain the truth given by its references.
 fn finds_its_truth(study: &str, settings: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("run");
@@ -53,7 +52,7 @@ fn a_python_function_finds_its_truth() {
 fn a_study_for_abaqus_is_sound_but_for_the_command() {
     let path = quick::root().join("configs/abaqus/study.toml");
     let arguments = ["model.command=[\"abaqus-that-is-not-there\", \"job=beam\"]".to_owned()];
-    let checked = lacuna::study::resolve::load(&path, &arguments);
+    let checked = lacuna_engine::study::resolve::load(&path, &arguments);
     let expected = "\
 --set: there is no file `abaqus-that-is-not-there` in the folders of `PATH`: the command is not there
   |
@@ -100,7 +99,7 @@ use = \"polynomial_chaos\"
 degree = 2
 ";
 
-/// A folder with that study and some files.
+/// A folder with this study and some files.
 fn line(model: &str, files: &[(&str, &str)]) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let study = folder.path().join("study.toml");
@@ -168,7 +167,7 @@ def simulate(a, b):
     assert!(ran.is_ok_and(|ran| ran.made.contains(&"4-surrogate".to_owned())));
 }
 
-/// Whether a process with this text in its command line is running.
+/// Returns true if a process with this text in its command line is running.
 fn running(text: &str) -> bool {
     let processes = fs::read_dir("/proc").into_iter().flatten().flatten();
     let mut commands = processes.map(|process| fs::read(process.path().join("cmdline")));
@@ -186,7 +185,7 @@ fn within(seconds: u64, mut is_so: impl FnMut() -> bool) -> bool {
     false
 }
 
-/// Kills a study as it runs; its model must have written a file `begun` and be named by the study's folder.
+/// Kills a running study; its model must have written a file `begun` and be identified by the study's folder.
 fn leaves_nothing_behind(folder: &Path, study: &Path, mark: &str) {
     let mut command = quick::command();
     command.arg("run").arg(study).arg("--out").arg(folder.join("run"));

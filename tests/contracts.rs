@@ -1,7 +1,7 @@
-//! Every registered plugin does what its kind demands: a listed plugin is a tested plugin.
+//! Every registered plugin fulfils the contract of its kind: a listed plugin is a tested plugin.
 //!
-//! Plugins are built from their names and options as a study builds them. A plugin that the tables below do not
-//! list is tested with its defaults; one that needs options, or deserves several, has an entry there.
+//! Plugins are built from their names and options as a study builds them. A plugin that the tables below do not list is
+//! tested with its defaults; one that needs options, or is worth testing with several, has an entry there.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 #[path = "contracts/effects.rs"]
@@ -25,29 +25,29 @@ mod walk_through;
 
 use std::path::{Path, PathBuf};
 
-use lacuna::contract::{self, Sample};
 use lacuna::data::{Axis, Layout, Parameter, Unit};
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::model::Response;
 use lacuna::plugin::registry::{self, Kind};
 use lacuna::plugin::{Density, Design, Discrepancy, Reader, Sampler, Surrogate, Term};
-use lacuna::run::write_response;
+use lacuna_contract::Sample;
+use lacuna_run::write_response;
 // Without this line the linker leaves the plugins out.
 use lacuna_plugins as _;
 
-/// Plugins of a kind with the options, as TOML, under which each is tested; the others are tested with their defaults.
+/// Plugins of a kind with the options, as TOML, with which each is tested; the others are tested with their defaults.
 type Table = [(&'static str, &'static [&'static str])];
 
 /// One plugin with one set of options.
 struct Case<'a> {
     plugin: &'static str,
-    /// The plugin's name with its options, for messages.
+    /// Name of the plugin with its options, for messages.
     label: String,
     /// An empty folder.
     scratch: &'a Path,
 }
 
-/// The registered plugins of a kind, each with the options under which it is tested.
+/// Registered plugins of a kind, each with the options with which it is tested.
 fn cases<K: Kind + ?Sized>(table: &Table) -> Vec<(&'static str, &'static [&'static str])> {
     let registered: Vec<&str> = registry::entries::<K>().iter().map(|entry| entry.name).collect();
     let gone: Vec<&str> =
@@ -62,7 +62,7 @@ fn cases<K: Kind + ?Sized>(table: &Table) -> Vec<(&'static str, &'static [&'stat
     registered.into_iter().map(|name| (name, options(name).unwrap_or(&[""]))).collect()
 }
 
-/// A plugin from its name and options.
+/// A plugin built from its name and options.
 fn built<K: Kind + ?Sized>(plugin: &str, options: &str) -> Box<K> {
     let built = registry::from_text::<K>(plugin, options).unwrap_or_else(|error| {
         let help = format!(
@@ -75,7 +75,7 @@ fn built<K: Kind + ?Sized>(plugin: &str, options: &str) -> Box<K> {
     built.plugin
 }
 
-/// Puts every plugin of a kind through its suite.
+/// Runs every plugin of a kind through its suite.
 fn all<K: Kind + ?Sized>(table: &Table, suite: impl Fn(&Case<'_>, &K) -> Result<(), Vec<String>>) {
     let mut breaches = Vec::new();
     for (plugin, all_options) in cases::<K>(table) {
@@ -131,7 +131,7 @@ fn designs() {
         ("random", &[""]),
         ("sobol", &["", "scramble = \"none\""]),
     ];
-    all::<dyn Design>(table, |case, design| contract::design(&case.label, design));
+    all::<dyn Design>(table, |case, design| lacuna_contract::design(&case.label, design));
 }
 
 #[test]
@@ -150,7 +150,7 @@ fn terms() {
         ("radiation", &["ambient = \"293 {K}\""]),
         ("relaxation", &["toward = \"1\""]),
     ];
-    all::<dyn Term>(table, |case, term| contract::term(&case.label, term));
+    all::<dyn Term>(table, |case, term| lacuna_contract::term(&case.label, term));
 }
 
 #[test]
@@ -185,7 +185,7 @@ fn surrogates() {
             ],
         ),
     ];
-    all::<dyn Surrogate>(table, |case, plugin| contract::surrogate(&case.label, plugin));
+    all::<dyn Surrogate>(table, |case, plugin| lacuna_contract::surrogate(&case.label, plugin));
 }
 
 #[test]
@@ -230,16 +230,16 @@ fn discrepancies() {
         ("gaussian", gaussian),
         ("gaussian_process", gaussian_process),
         ("multiplicative_gaussian", multiplicative_gaussian),
-        // Of the walk-through of CONTRIBUTING.md.
+        // Example of CONTRIBUTING.md.
         ("shot_noise", &["gain = { half_normal = 0.1 }"]),
         ("student_t", student_t),
     ];
-    all::<dyn Discrepancy>(table, |case, plugin| contract::discrepancy(&case.label, plugin));
+    all::<dyn Discrepancy>(table, |case, plugin| lacuna_contract::discrepancy(&case.label, plugin));
 }
 
 #[test]
 fn samplers() {
-    // With fewer steps the suite's own Monte Carlo error is too rough to judge by.
+    // With fewer steps the Monte Carlo error of the suite itself is too large for a test.
     let table: &Table = &[
         (
             "adaptive_metropolis",
@@ -272,7 +272,7 @@ fn samplers() {
         ),
         ("variational", &["", "refine = false"]),
     ];
-    all::<dyn Sampler>(table, |case, plugin| contract::sampler(&case.label, plugin));
+    all::<dyn Sampler>(table, |case, plugin| lacuna_contract::sampler(&case.label, plugin));
 }
 
 #[test]
@@ -292,10 +292,12 @@ fn targets() {
              where = { z = 'hypot(intercept, sigma) - atan2(sigma, slope)' }",
         ],
     )];
-    all::<dyn Density>(table, |case, plugin| contract::density(&case.label, plugin, &parameters));
+    all::<dyn Density>(table, |case, plugin| {
+        lacuna_contract::density(&case.label, plugin, &parameters)
+    });
 }
 
-/// Two gauges at one hundred times, as `samples/base.csv` holds them in microstrain.
+/// Two gauges at one hundred times, as in `samples/base.csv`, in microstrain.
 fn layout() -> Layout {
     let times = (1..=100).map(|i| f64::from(i) * 1e-5).collect();
     Layout {
@@ -323,7 +325,7 @@ fn strain() -> Vec<f64> {
     [b, c].concat()
 }
 
-/// The same signals in the formats of a reader.
+/// The signals of `base.csv` in the formats of a reader.
 fn sound_files(name: &str, reader: &dyn Reader, folder: &Path) -> Vec<Sample> {
     let (layout, values) = (layout(), strain());
     let sample = |file: PathBuf, tolerance: f64| Sample {
@@ -338,11 +340,12 @@ fn sound_files(name: &str, reader: &dyn Reader, folder: &Path) -> Vec<Sample> {
             let file = write_response(folder, "sound", &layout, &response).unwrap();
             vec![sample(folder.join(file), 0.0)]
         }
-        // `base.csv` holds the signals to a thousandth of a microstrain, the other files all digits.
+        // `base.csv` holds the signals to a thousandth of a microstrain, the other files to all digits.
         "sierra" => ["hist_cdf2.h", "hist_cdf5.h", "hist_nc4.h", "hb_spyhis.txt"]
             .map(|file| sample(samples().join(file), 1e-5))
             .to_vec(),
-        // A long table, which readers that are not listed have to read too: as `csv`, or as what a skeleton calls it.
+        // A table in long form, which readers that are not listed must read too: as `csv`, or under the name in a
+        // skeleton.
         _ => {
             let row = |(i, y): (usize, &f64)| {
                 let place = layout.place(i);
@@ -369,7 +372,7 @@ fn readers() {
         let judge = |sample: &Sample| {
             let name = sample.file.file_name().unwrap_or_default().display();
             let label = format!("{} on {name}", case.label);
-            contract::reader(&label, reader, sample, case.scratch).err().unwrap_or_default()
+            lacuna_contract::reader(&label, reader, sample, case.scratch).err().unwrap_or_default()
         };
         let breaches: Vec<String> = samples.iter().flat_map(judge).collect();
         if breaches.is_empty() { Ok(()) } else { Err(breaches) }

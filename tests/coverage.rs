@@ -1,10 +1,3 @@
-//! Whether what is printed as an uncertainty is one: `lacuna coverage`, and the standing gate.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+//! Coverage of printed uncertainties: `lacuna coverage`, and the gate.
 
-#[path = "coverage/verb.rs"]
 mod verb;
-
-#[allow(dead_code, reason = "the tests of the whole use the rest")]
-mod quick;
-
-mod gate;

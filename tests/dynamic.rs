@@ -1,5 +1,5 @@
-//! Plugins in libraries that are loaded: they do what those that are linked do, to the bit, and a library that is broken
-//! is an error that names it.
+//! Plugins in loaded libraries: they give the same bits as linked plugins, and a broken library gives an error that
+//! names it.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 #[path = "dynamic/command.rs"]
@@ -37,23 +37,25 @@ mod written;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use lacuna::plugin::abi::library::{self, Library};
-// Without these lines the linker leaves the plugins out, and cargo the library.
+use lacuna::plugin::Library;
+use lacuna_engine::host::library;
+// Without these lines the linker omits the plugins, and cargo the library.
 use lacuna_plugins as _;
 use lacuna_twin as _;
 
-/// How libraries are built outside of this workspace: all in one way, so that they share what is compiled; the engine in
-/// them with less optimisation than in the program, because the boundary has to hold between such builds.
+/// Profile for libraries that are built outside this workspace: the same for all, so that they share compiled crates;
+/// the engine in them is less optimised than in the program, because the interface must hold between such builds.
 fn with_profile() -> impl Iterator<Item = &'static str> {
     let settings = [
-        "profile.dev.debug=\"line-tables-only\"",
         "profile.dev.package.lacuna-linalg.opt-level=3",
-        "profile.dev.package.lacuna-core.opt-level=0",
+        "profile.dev.package.lacuna-base.opt-level=0",
+        "profile.dev.package.lacuna-api.opt-level=0",
+        "profile.dev.package.lacuna-abi.opt-level=0",
     ];
     settings.into_iter().flat_map(|setting| ["--config", setting])
 }
 
-/// The library of twins, which was built beside this test.
+/// Path of the library of twins, which was built together with this test.
 fn twin_path() -> PathBuf {
     let test = std::env::current_exe().unwrap();
     let prefix = std::env::consts::DLL_PREFIX;

@@ -1,13 +1,13 @@
-//! A study with effects against a closed form.
+//! A study with effects compared with a closed form.
 
 use std::fs;
 use std::path::Path;
 
 use crate::quick;
 
-/// The truth behind the measurements: the height, and at the far sensor a gain and a delay.
+/// True values of the measurements: height, and gain and delay of the far sensor.
 const TRUTH: [f64; 3] = [2.0, 1.08, 0.137];
-/// The priors' means and standard deviations.
+/// Means and standard deviations of the priors.
 const PRIORS: [(f64, f64); 3] = [(2.5, 1.0), (1.0, 0.1), (0.0, 0.2)];
 const NOISE: f64 = 0.05;
 
@@ -19,7 +19,7 @@ fn times() -> impl Iterator<Item = f64> {
     (0..61).map(|i| 0.1 * f64::from(i))
 }
 
-/// The inverse of a symmetric matrix of three rows, by cofactors.
+/// Inverse of a symmetric 3 x 3 matrix, by cofactors.
 fn inverse(m: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     let minor = |i: usize, j: usize| {
         let (a, b, c, d) = ((i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3);
@@ -29,9 +29,9 @@ fn inverse(m: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| minor(j, i) / determinant))
 }
 
-/// Mean and standard deviation of each unknown under the model linearised at the truth, which the measurements are
-/// without any noise: with `P` the precision of the priors and `J` the derivatives, `V = (J'J / s² + P)⁻¹`, and
-/// the mean is the truth plus `V P (m - truth)` for priors of mean `m`.
+/// Mean and standard deviation of each unknown for the model linearised at the truth, which the noise-free measurements
+/// equal: with `P` the precision of the priors and `J` the derivatives, `V = (J'J / s² + P)⁻¹`, and the mean is the
+/// truth plus `V P (m - truth)` for priors of mean `m`.
 fn closed_form() -> [(f64, f64); 3] {
     let [height, gain, delay] = TRUTH;
     let near = times().map(|t| [bump(t, 2.0), 0.0, 0.0]);
@@ -71,8 +71,8 @@ fn write_measurements(path: &Path) {
     fs::write(path, text).unwrap();
 }
 
-/// The sampled means lie within four Monte Carlo errors of the closed form, beside a tenth of a standard deviation for
-/// what is not linear and for the spline of the delay; the standard deviations within 10 %.
+/// The sampled means are within four Monte Carlo errors of the closed form, plus a tenth of a standard deviation for
+/// nonlinearity and for the spline of the delay; the standard deviations within 10 %.
 #[test]
 fn a_gain_and_a_delay_are_found_with_the_parameter() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! Measured drops of eleven balls from a bridge, each its own record: free fall with one gravity, against linear least
-//! squares. The files are those of de Silva, Higdon, Brunton and Kutz, Frontiers in AI 3 (2020) 25.
+//! Measured drops of eleven balls from a bridge, each with its own record: free fall with common gravity, compared with
+//! linear least squares. The files are those of de Silva, Higdon, Brunton and Kutz, Frontiers in AI 3 (2020) 25.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -11,7 +11,7 @@ use crate::worked::is_normal;
 /// Times and heights of one drop.
 type Drop = (Vec<f64>, Vec<f64>);
 
-/// Mean and standard deviation of the priors of gravity, height and velocity, and the noise; SI.
+/// Mean and standard deviation of the priors of gravity, height and velocity, and the noise, in SI units.
 const GRAVITY: [f64; 2] = [9.0, 2.0];
 const HEIGHT: [f64; 2] = [40.0, 10.0];
 const VELOCITY: [f64; 2] = [0.0, 3.0];
@@ -79,14 +79,14 @@ fn study(drops: &BTreeMap<String, Drop>) -> String {
     text
 }
 
-/// Solves two equations in two unknowns with a symmetric matrix `[a, b; b, c]`.
+/// Solves two equations in two unknowns with the symmetric matrix `[a, b; b, c]`.
 fn solve([a, b, c]: [f64; 3], [x, y]: [f64; 2]) -> [f64; 2] {
     let determinant = a * c - b * b;
     [(c * x - b * y) / determinant, (a * y - b * x) / determinant]
 }
 
-/// The normal posterior of `y = h + v t - g t²/2 + e`: with the precision of gravity after height and velocity of each
-/// drop have been eliminated (Schur complement), then of these given gravity.
+/// Normal posterior of `y = h + v t - g t²/2 + e`: the precision of gravity after elimination of height and velocity of
+/// each drop (Schur complement), then these given gravity.
 fn closed_form(drops: &BTreeMap<String, Drop>) -> Vec<(String, f64, f64)> {
     let weight = NOISE.powi(-2);
     let precision = |[_, sd]: [f64; 2]| sd.powi(-2);

@@ -1,15 +1,15 @@
-//! Faulty tables: what `check` says of each is what `run` stops with, and names file and line.
+//! Faulty tables: `check` reports each fault with file and line, and `run` stops with the same message.
 //!
-//! Each case changes one file of the study that `lacuna new study` writes, as people change theirs.
+//! Each case changes one file of the study that `lacuna new study` writes, as users do.
 
 use std::fs;
 use std::path::Path;
 
-use lacuna::stage::contents;
+use lacuna_engine::stage::contents;
 
 use crate::quick::{self, replace};
 
-/// What `check` says of the files of a study, with its folder taken out; the run has to stop with the same words.
+/// The report of `check` on the files of a study, without its folder; the run must stop with the same text.
 fn said(folder: &Path, settings: &[&str]) -> String {
     let file = folder.join("study.toml");
     let study = quick::load(&file, settings);
@@ -24,7 +24,7 @@ fn said(folder: &Path, settings: &[&str]) -> String {
     text.replace(&format!("{}/", folder.display()), "")
 }
 
-/// Changes a file by its lines, counted from one.
+/// Edits one line of a file, counted from one.
 fn edit(path: &Path, line: usize, change: impl Fn(&str) -> String) {
     let text = fs::read_to_string(path).unwrap();
     let lines = text.lines().enumerate();
@@ -33,7 +33,7 @@ fn edit(path: &Path, line: usize, change: impl Fn(&str) -> String) {
     fs::write(path, new.join("\n") + "\n").unwrap();
 }
 
-/// A field of a line replaced.
+/// Replaces a field of a line.
 fn field(number: usize, new: &str) -> impl Fn(&str) -> String + '_ {
     move |line| {
         let mut cells: Vec<&str> = line.split(',').collect();
@@ -51,7 +51,8 @@ fn faults_of_measurements_are_told_with_file_and_line() {
     let place = |line: usize, column: usize, name: &str| {
         format!("measured.csv, line {line}, column {column} (`{name}`): ")
     };
-    let point = "\nhelp: decimals follow a point, not a comma; a text with a comma needs quotes";
+    let point =
+        "\nhelp: write decimals after a point, not a comma, and put a text with a comma in quotes";
     for (line, change, expected) in [
         (1, whole("replicate,time [s],displ [mm]"),
             "measured.csv: has no column `displacement`; it has `replicate`, `time`, `displ`".to_owned()),
@@ -162,7 +163,7 @@ fn faults_of_runs_and_responses_are_told() {
     assert_eq!(
         change("responses.csv", 3, &field(2, "")),
         format!(
-            "runs.csv: 1 of 80 runs cannot be used, 0 may fail:\n  \
+            "runs.csv: 1 of 80 runs cannot be used, and 0 may be left out:\n  \
              `r01`: DIR/responses.csv: 1 of 20 values are missing, first at time 0.1 s{help}"
         )
         .replace("DIR/", "")
@@ -179,7 +180,7 @@ fn faults_of_runs_and_responses_are_told() {
     assert_eq!(
         said(folder.path(), &[]),
         format!(
-            "runs.csv: 1 of 80 runs cannot be used, 0 may fail:\n  `r07`: responses.csv: has no row of it{help}"
+            "runs.csv: 1 of 80 runs cannot be used, and 0 may be left out:\n  `r07`: responses.csv: has no row for this run{help}"
         )
     );
 }
@@ -248,7 +249,7 @@ fn faults_of_stated_noise_are_told() {
     let text = said(with("0.02").path(), &other);
     assert!(text.starts_with("the measurements state their own noise (`sigma` or `covariance`), which the discrepancy `autoregressive` cannot use"), "{text}");
     let added = said(with("0.02").path(), &["measurements.added_curves=[mean]"]);
-    assert!(added.contains("nothing states that of `added_curves`"), "{added}");
+    assert!(added.contains("the noise of `added_curves` is not stated"), "{added}");
     let square = |entry: &dyn Fn(usize, usize) -> f64, size: usize| {
         let row = |i| (0..size).map(|j| entry(i, j).to_string()).collect::<Vec<_>>().join(",");
         (0..size).map(row).collect::<Vec<_>>().join("\n") + "\n"
@@ -267,12 +268,12 @@ fn faults_of_stated_noise_are_told() {
                 },
                 20,
             ),
-            "covariance.csv: the covariance of time 0.1 s with time 0.05 s is 2e-1 in row 2, and 1e-1 in row 1: it has to be symmetric",
+            "covariance.csv: the covariance of time 0.1 s with time 0.05 s is 2e-1 in row 2, and 1e-1 in row 1: the matrix must be symmetric",
         ),
         (
             square(&|_, _| 1.0, 20),
-            "covariance.csv: the covariance is not positive definite: in row 2, time 0.1 s, the variance 1e0 leaves 0e0 beside \
-             what the rows before it explain",
+            "covariance.csv: the covariance is not positive definite: in row 2, time 0.1 s, the variance 1e0 minus \
+             the part that the rows above determine is 0e0",
         ),
         ("1,x\n".to_owned(), "covariance.csv, line 1: expected a number, found `x`"),
         (String::new(), "covariance.csv: is empty: expected a square of numbers"),
@@ -289,7 +290,8 @@ fn faults_of_stated_noise_are_told() {
     assert_eq!(said(folder.path(), &["measurements.mask=mask.csv"]), expected);
 }
 
-/// What is no fault: other line ends, a byte order mark, no final line end, gaps, other separators.
+/// Variants that are not faults: other line endings, a byte order mark, no final line ending, missing values, other
+/// separators.
 #[test]
 fn sound_tables_of_any_form_are_read_alike() {
     let text = fs::read_to_string(quick::root().join("cli/src/new/measured.csv")).unwrap();
@@ -317,7 +319,7 @@ fn sound_tables_of_any_form_are_read_alike() {
     assert_eq!(read(text.replace(',', "\t").as_bytes()), whole);
     assert_eq!(read(format!("# by hand\n{text}").as_bytes()), whole);
     assert_eq!(read(text.replace("\n1,", "\n 1 , ").as_bytes()), whole);
-    // A replicate with gaps: a blank, a NaN, a row that is not there, a mask.
+    // A replicate with missing values: a blank, a NaN, an absent row, a mask.
     let first = "\n1,0.15,-0.16660";
     let gap = read(text.replace(first, "\n1,0.15,").as_bytes());
     assert_eq!(gap.count(), whole.count() - 1);
@@ -355,7 +357,7 @@ fn a_table_without_replicates_is_one_curve() {
     let expected = "measured.csv, line 22, column 2 (`displacement`): a second value for time 0.1 s; the first is in line 3\n\
                     help: a column `replicate` tells repeated measurements apart";
     assert_eq!(said(folder.path(), &[]), expected);
-    // A misspelt column is no curve without replicates.
+    // A misspelt column is not taken for a curve without replicates.
     replace(&data, "time [s]", "pulse,time [s]");
     assert!(said(folder.path(), &[]).contains("expected 3 fields as in the first line, found 2"));
 }

@@ -1,17 +1,20 @@
-//! Ensembles of different cost: errors on published test functions beside a peer's, closed forms, and a coarse solution whose
-//! error is known.
+//! Ensembles of different cost: errors on published test functions compared with another program, closed forms, and a
+//! coarse solution whose error is known.
 //!
-//! `fidelity/peer.json` holds designs, truths and the errors of a peer; `fidelity/peer.py` made it and names the sources.
+//! `fidelity/peer.json` holds designs, truths and the errors of the other program; `fidelity/peer.py` made it and names
+//! the sources.
 
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use lacuna::linalg::Matrix;
 use lacuna::math::moments;
 use lacuna::math::random::{Stream, normal, uniform};
-use lacuna::run::{RunDirectory, Silent};
-use lacuna::stage::{self, Learned};
+use lacuna::run::Silent;
+use lacuna_engine::pipeline;
+use lacuna_engine::stage::emulated::Emulated;
+use lacuna_linalg::Matrix;
+use lacuna_run::RunDirectory;
 use serde::Deserialize;
 
 use crate::quick;
@@ -27,7 +30,7 @@ struct Case {
     name: String,
     cheap: Runs,
     fine: Runs,
-    /// Fine runs that cost as much as both ensembles together.
+    /// Fine runs alone that cost as much as both ensembles together.
     alone: Runs,
     fresh: Runs,
     smt: Peer,
@@ -39,7 +42,7 @@ struct Runs {
     values: Vec<f64>,
 }
 
-/// Root mean square errors over the standard deviation of the truth.
+/// Root mean square errors divided by the standard deviation of the truth.
 #[derive(Deserialize)]
 struct Peer {
     mfk: f64,
@@ -66,7 +69,7 @@ impl Runs {
     }
 }
 
-/// A study of finished runs in tables.
+/// A study of finished runs given in tables.
 fn of_tables(dimension: usize, own: &str, cheap: Option<&str>, surrogate: &str) -> String {
     let mut text = String::from("[study]\ntitle = \"two ensembles\"\nseed = 3\n");
     for j in 0..dimension {
@@ -86,16 +89,16 @@ fn of_tables(dimension: usize, own: &str, cheap: Option<&str>, surrogate: &str) 
     text
 }
 
-fn learned(folder: &Path, name: &str, text: &str) -> Learned {
+fn learned(folder: &Path, name: &str, text: &str) -> Emulated {
     let path = folder.join(format!("{name}.toml"));
     fs::write(&path, text).unwrap();
     let study = quick::load(&path, &[]);
     let mut run = RunDirectory::open(&folder.join(format!("run-{name}"))).unwrap();
-    stage::learn(&study, &mut run, &Silent).unwrap().0
+    pipeline::calibrate_emulated(&study, &mut run, &Silent).unwrap().0
 }
 
-/// The error at fresh points over the standard deviation of the truth.
-fn error(learned: &Learned, fresh: &Runs) -> f64 {
+/// Root mean square error at new points divided by the standard deviation of the truth.
+fn error(learned: &Emulated, fresh: &Runs) -> f64 {
     let points = Matrix::from_rows(fresh.points[0].len(), &fresh.points);
     let emulated = learned.emulator.mean(&points).into_vec();
     let squares: Vec<f64> =
@@ -111,7 +114,8 @@ const SURROGATES: [(&str, &str); 3] = [
     ("polynomial_chaos_kriging", "use = \"polynomial_chaos_kriging\""),
 ];
 
-/// Errors of one surrogate: of both ensembles, of fine runs of the same cost alone, of the same fine runs alone.
+/// Errors of one surrogate: with both ensembles, with fine runs of the same total cost alone, with the same fine runs
+/// alone.
 fn errors(case: &Case, surrogate: &str) -> [f64; 3] {
     let folder = tempfile::tempdir().unwrap();
     let d = case.fine.points[0].len();
@@ -125,11 +129,12 @@ fn errors(case: &Case, surrogate: &str) -> [f64; 3] {
     [of("both", "fine", Some("cheap")), of("alone", "alone", None), of("same", "fine", None)]
 }
 
-/// The table of docs/surrogates.md: `cargo test -p lacuna-tests --test all fidelity::published -- --nocapture`.
+/// The table of docs/surrogates.md: `cargo test --workspace --test all -- --nocapture fidelity::published`.
 ///
-/// Two ensembles must beat fine runs of the same cost, a fine run counted as ten cheap ones, for each function and surrogate;
-/// where cheap runs are of no use they must be as good as the fine runs that they hold. The peer is another program with
-/// other hyperparameters: the Gaussian process must have errors of its order, at most five times as large.
+/// Two ensembles must beat fine runs of the same cost, with one fine run costing as much as ten cheap ones, for each
+/// function and surrogate; if cheap runs are useless the result must be as good as with their fine runs alone. The
+/// other program has other hyperparameters: the Gaussian process must have errors of the same order, at most five times
+/// as large.
 #[test]
 fn published_functions_are_learned_from_cheap_runs() {
     let (table, mut wrong) = (table(), Vec::new());
@@ -146,7 +151,8 @@ fn published_functions_are_learned_from_cheap_runs() {
                 case.name, case.smt.mfk, case.smt.krg
             );
             let limit = match (case.name.as_str(), name) {
-                // Fine runs alone are so accurate that the cheap ones are no help, as for the peer; or are they a hindrance.
+                // Fine runs alone are so accurate that the cheap ones do not help, as in the other program, or are
+                // misleading.
                 ("misleading" | "park_a", _) => same + 1e-12,
                 // Eleven runs are too few for polynomials of this function, cheap or fine.
                 ("forrester", "polynomial_chaos") => same,
@@ -161,7 +167,7 @@ fn published_functions_are_learned_from_cheap_runs() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// A cheap response without any relation is not used, and the report says so.
+/// A cheap response unrelated to the fine one is not used, and the report says so.
 #[test]
 fn a_misleading_ensemble_is_left_out() {
     let table = table();
@@ -180,9 +186,10 @@ fn a_misleading_ensemble_is_left_out() {
     assert!(said.value.ends_with(", used"), "{said:?}");
 }
 
-/// `c = x0^2 + x0 x1` and `y = 1.7 c + 0.3 - 0.4 x0`: the factor and both polynomials are found exactly, and so are the mean
-/// and Sobol' indices, which are integrals by hand: with uniform `x` the parts of `y` are `a(x0) = 1.7 x0^2 + 0.45 x0 + 0.3`
-/// (the product's mean over `x1` included), `b(x1) = 0.85 (x1 - 1/2)` and `1.7 (x0 - 1/2) (x1 - 1/2)`.
+/// `c = x0^2 + x0 x1` and `y = 1.7 c + 0.3 - 0.4 x0`: the factor and both polynomials are found exactly, and so are the
+/// mean and Sobol' indices, which are integrals in closed form: with uniform `x` the parts of `y` are
+/// `a(x0) = 1.7 x0^2 + 0.45 x0 + 0.3` (including the product's mean over `x1`), `b(x1) = 0.85 (x1 - 1/2)` and
+/// `1.7 (x0 - 1/2) (x1 - 1/2)`.
 #[test]
 fn two_levels_of_polynomials_are_exact() {
     let cheap = |x: &[f64]| x[0] * x[0] + x[0] * x[1];
@@ -221,8 +228,8 @@ fn two_levels_of_polynomials_are_exact() {
     assert!((indices.outputs.first[(0, 1)] - second / whole).abs() < 1e-9);
 }
 
-/// Exponential decay by backward Euler's method in steps of 0.2, whose solution is `a (1 + 0.2 r)^(-t / 0.2)` in closed form
-/// and always above `a exp(-r t)`; the finer runs take steps of 0.1.
+/// Exponential decay by the backward Euler method in steps of 0.2, whose solution is `a (1 + 0.2 r)^(-t / 0.2)` in
+/// closed form and always above `a exp(-r t)`; the finer runs take steps of 0.1.
 const DECAY: &str = r#"
 [study]
 title = "decay in coarse steps"
@@ -266,7 +273,7 @@ runs = 16
 model = { fixed = { step = 0.1 } }
 ";
 
-/// Whether the 95 % intervals of both parameters hold the truth, and how wide they are.
+/// Number of 95 % intervals of both parameters that contain the truth, and the sum of their widths.
 fn intervals(folder: &Path, name: &str, text: &str, truths: &[[f64; 2]]) -> (usize, f64) {
     let path = folder.join(format!("{name}.toml"));
     fs::write(&path, text).unwrap();
@@ -284,7 +291,8 @@ fn intervals(folder: &Path, name: &str, text: &str, truths: &[[f64; 2]]) -> (usi
         fs::write(folder.join("measured.csv"), rows).unwrap();
         let study = quick::load(&path, &[]);
         let mut run = RunDirectory::open(&folder.join(format!("run-{name}"))).unwrap();
-        let calibrated = stage::learn(&study, &mut run, &Silent).unwrap().1.unwrap().value;
+        let calibrated =
+            pipeline::calibrate_emulated(&study, &mut run, &Silent).unwrap().1.unwrap().value;
         let draws = calibrated.draws.from_step(calibrated.outcome.burn_in);
         for (j, truth) in [amplitude, rate].into_iter().enumerate() {
             let sorted = moments::sorted(&draws.pooled(j));
@@ -296,11 +304,11 @@ fn intervals(folder: &Path, name: &str, text: &str, truths: &[[f64; 2]]) -> (usi
     (held, width)
 }
 
-/// The truth lies inside the 95 % intervals when the error of the steps is predicted, too seldom without it, and the
-/// intervals are narrower than those of an error of unknown sign.
+/// The 95 % intervals contain the truth if the discretisation error is predicted, too rarely without it, and are
+/// narrower than those for an error of unknown sign.
 ///
-/// Thirty truths from the prior, two parameters each: a method that is right holds at least 52 of 60 (the lower end of the
-/// binomial 99 % interval at 0.95); intervals may be too wide, since what is extrapolated has an uncertainty.
+/// Thirty truths from the prior, two parameters each: a correct method covers at least 52 of 60 (lower end of the
+/// binomial 99 % interval at 0.95); intervals may be too wide, since the extrapolation is uncertain.
 #[test]
 fn a_coarse_solution_is_corrected() {
     let mut rng = Stream::root(77).generator();
@@ -315,7 +323,7 @@ fn a_coarse_solution_is_corrected() {
     println!(
         "of 60: {ignored} ignored, {held} predicted, {constant} as noise; width {width} {wide}"
     );
-    // Far below the 52; the amplitude, which the steps leave as it is, holds it up.
+    // Far below 52; the amplitude, which the discretisation does not affect, keeps the count from being lower.
     assert!(ignored < 40, "{ignored}");
     assert!(held >= 52, "{held}");
     assert!(width < wide, "{width} {wide}");

@@ -1,12 +1,12 @@
-//! The study of a measured force with its records cut short, against the exact motion under a force of straight pieces.
+//! The study of a measured force with shortened records, compared with the exact motion under a piecewise linear force.
 
 use std::path::Path;
 
 use crate::quick;
 
-/// Points of the records that are kept.
+/// Number of points of the records that are kept.
 const KEPT: [(&str, usize); 2] = [("weak", 300), ("strong", 200)];
-/// Of the measurements, mm.
+/// Standard deviation of the measurement noise, mm.
 const NOISE: f64 = 0.5;
 
 struct Record {
@@ -21,7 +21,7 @@ fn column(text: &str, column: usize) -> Vec<f64> {
     text.lines().skip(1).map(cell).collect()
 }
 
-/// Copies the study with its first points only.
+/// Copies the study with only the first points of its records.
 fn cut(from: &Path, to: &Path) -> Vec<Record> {
     std::fs::copy(from.join("study.toml"), to.join("study.toml")).unwrap();
     let head = |file: String, lines: usize| {
@@ -32,7 +32,7 @@ fn cut(from: &Path, to: &Path) -> Vec<Record> {
     };
     let record = |(name, points): (&str, usize)| {
         let measured = head(format!("position-{name}.csv"), points);
-        // The force is known a little longer than the motion.
+        // The force is known slightly longer than the motion.
         let force = head(format!("force-{name}.csv"), 2 * points);
         let (at, force) = (column(&force, 0), column(&force, 1));
         Record { at, force, times: column(&measured, 1), measured: column(&measured, 2) }
@@ -40,7 +40,8 @@ fn cut(from: &Path, to: &Path) -> Vec<Record> {
     KEPT.into_iter().map(record).collect()
 }
 
-/// `m x'' + c x' + k x = F(t)` from rest, in mm: on each piece of the force `x = p + q τ + e^(-δτ) (a cos ωτ + b sin ωτ)`.
+/// `m x'' + c x' + k x = F(t)` from rest, in mm: on each linear piece of the force
+/// `x = p + q τ + e^(-δτ) (a cos ωτ + b sin ωτ)`.
 fn motion([mass, damping, stiffness]: [f64; 3], record: &Record) -> Vec<f64> {
     let decay = 0.5 * damping / mass;
     let omega = (stiffness / mass - decay * decay).sqrt();
@@ -81,7 +82,7 @@ fn slopes(point: [f64; 3], records: &[Record]) -> [Vec<f64>; 3] {
     })
 }
 
-/// The inverse of a symmetric matrix, by cofactors.
+/// Inverse of a symmetric 3 x 3 matrix, by cofactors.
 fn inverse(m: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     let cofactor = |i: usize, j: usize| {
         let ([a, b], [c, d]) = ([(i + 1) % 3, (i + 2) % 3], [(j + 1) % 3, (j + 2) % 3]);
@@ -91,7 +92,7 @@ fn inverse(m: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     std::array::from_fn(|i| std::array::from_fn(|j| cofactor(j, i) / determinant))
 }
 
-/// The best fit by Gauss and Newton, and the covariance there.
+/// Best fit by the Gauss-Newton method, and its covariance.
 fn least_squares(records: &[Record]) -> ([f64; 3], [[f64; 3]; 3]) {
     let mut point = [2.0, 1.6, 80.0];
     let mut covariance = [[0.0; 3]; 3];
@@ -130,8 +131,8 @@ fn a_measured_force_drives_the_motion() {
     for (i, name) in ["mass", "damping", "stiffness"].into_iter().enumerate() {
         let number = |key: &str| found["parameters"][name][key].as_f64().unwrap();
         let sd = covariance[i][i].sqrt();
-        // The optimum is that of the exact motion; mean and deviation are within the Monte Carlo error of some 400
-        // draws and within what a posterior that is not quite normal adds, about the relative deviation.
+        // The optimum is that of the exact motion; mean and standard deviation are within the Monte Carlo error of some
+        // 400 draws plus the non-normality of the posterior, which is of the order of the relative deviation.
         assert!(
             (number("map") - best[i]).abs() < 0.01 * sd,
             "{name}: {} {}",

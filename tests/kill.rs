@@ -1,4 +1,4 @@
-//! A study that is killed goes on where it was, and ends with the bits it would have had.
+//! A killed study continues where it stopped, and ends with the bits of an uninterrupted run.
 
 use std::fs;
 use std::path::Path;
@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use crate::quick;
 
-/// Slow enough to be killed in the middle: runs of several milliseconds one after the other, and a sampler that
-/// writes its state (first after a tenth of a second) before it ends.
+/// Slow enough to be killed in progress: runs of several milliseconds one after the other, and a sampler that writes
+/// its state (first after a tenth of a second) before it ends.
 const SETTINGS: [&str; 5] = [
     "model.numerics.mesh=\"default\"",
     "sampler.walkers=60",
@@ -30,7 +30,7 @@ fn resume(out: &Path) -> Command {
     command
 }
 
-/// Starts a command and sends it SIGKILL as soon as `now` says so.
+/// Starts a command and sends it SIGKILL as soon as `now` returns true.
 fn kill_when(command: &mut Command, now: impl Fn() -> bool) {
     let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     let begun = Instant::now();
@@ -53,7 +53,7 @@ fn lines(path: &Path) -> usize {
     fs::read_to_string(path).map_or(0, |text| text.lines().count())
 }
 
-/// After how many steps the state of the sampler was written last.
+/// Number of steps at which the state of the sampler was last written.
 fn step(calibrate: &Path) -> u64 {
     let text = fs::read_to_string(calibrate.join("state.json")).unwrap_or_default();
     let state: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
@@ -76,7 +76,7 @@ fn a_killed_study_ends_with_the_bits_it_would_have_had() {
     let drawn = || fs::metadata(calibrate.join("draws.bin")).map_or(0, |m| m.len());
     kill_when(&mut resume(&broken), || drawn() > 0);
     assert!(!calibrate.join("stage.json").exists());
-    // A checkpoint that the next attempt writes is one that the attempt after it goes on from.
+    // A checkpoint that one attempt writes is where the next one continues.
     let before = step(&calibrate);
     kill_when(&mut resume(&broken), || step(&calibrate) > before);
     assert!(!calibrate.join("stage.json").exists());
@@ -86,12 +86,12 @@ fn a_killed_study_ends_with_the_bits_it_would_have_had() {
     let (code, text) = quick::said(&mut start(folder.path(), &whole));
     assert_eq!(code, Some(0), "{text}");
     assert_eq!(quick::results(&broken), quick::results(&whole));
-    // Nothing was lost: the first run is the one that was made before the first kill.
+    // Nothing was lost: the first run is the one made before the first kill.
     let kept = fs::metadata(broken.join("2-simulate/run001.h")).unwrap().modified().unwrap();
     assert_eq!(kept, first_run);
 }
 
-/// The power of a small study, 70 cases.
+/// Power analysis of a small study, 70 cases.
 fn power(folder: &Path, out: &Path) -> Command {
     let mut command = quick::command();
     command.args(["power", "--quick", "--threads", "1", "--out"]).arg(out);
@@ -109,7 +109,7 @@ fn a_killed_power_goes_on_with_the_cases_it_has() {
     kill_when(&mut power(folder.path(), &broken), || lines(&cases(&broken)) >= 5);
     let kept = fs::read_to_string(cases(&broken)).unwrap();
     assert!(kept.lines().count() < 70 && rates(&broken).is_err());
-    // A kill may come in the middle of a line.
+    // A kill may occur in the middle of a line.
     let (before, _) = kept.trim_end().rsplit_once('\n').unwrap();
     let cut = &kept[..before.len() + 20];
     fs::write(cases(&broken), cut).unwrap();
@@ -127,6 +127,6 @@ fn a_killed_power_goes_on_with_the_cases_it_has() {
         lines.sort();
         lines
     };
-    // Each case stands there once.
+    // Each case is present exactly once.
     assert_eq!(sorted(&all), sorted(&fs::read_to_string(cases(&whole)).unwrap()));
 }

@@ -1,5 +1,5 @@
-//! Predictions of left-out data and curves by whole runs, against the predictions of posteriors without them: a level with a
-//! normal prior and normal noise, for which every posterior has a closed form.
+//! Leave-one-out predictions of data and curves by complete runs, compared with predictions of posteriors without them:
+//! a level with a normal prior and normal noise, for which every posterior has a closed form.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -12,13 +12,13 @@ use crate::quick;
 const PRIOR: [f64; 2] = [1.0, 2.0];
 /// The variance of the noise.
 const VARIANCE: f64 = 0.25;
-/// The time over which the noise of the second study is correlated.
+/// Correlation time of the noise in the second study.
 const TIME: f64 = 3.0;
 
-/// A value with its replicate and its time.
+/// Replicate, time and value.
 pub type Datum = (usize, f64, f64);
 
-/// Noise from a generator of its own (Lehmer's, with the normal law by twelve uniform numbers).
+/// Noise from a separate generator (Lehmer's, with normal numbers as sums of twelve uniform ones).
 fn noise(state: &mut u64) -> f64 {
     let mut sum = -6.0;
     for _ in 0..12 {
@@ -28,7 +28,7 @@ fn noise(state: &mut u64) -> f64 {
     sum
 }
 
-/// Replicates of six values about a level of two; with gaps, the third one has only four.
+/// Replicates of six values around a level of two; with `gaps`, the third one has only four.
 pub fn data(replicates: usize, gaps: bool) -> Vec<Datum> {
     let mut state = 20_240_117;
     let mut data = Vec::new();
@@ -43,7 +43,7 @@ pub fn data(replicates: usize, gaps: bool) -> Vec<Datum> {
     data
 }
 
-/// A study of these data, in a folder of its own.
+/// A study of these data, in its own folder.
 pub fn study(data: &[Datum], discrepancy: &str, steps: usize) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let text = format!(
@@ -85,20 +85,20 @@ pub fn study(data: &[Datum], discrepancy: &str, steps: usize) -> (TempDir, PathB
     (folder, path)
 }
 
-/// Independent noise of known variance.
+/// Discrepancy: independent noise of known variance.
 pub fn independent() -> String {
     format!("use = \"gaussian\"\nvariance = {{ known = {VARIANCE:?} }}")
 }
 
-/// Noise whose correlation falls off along a replicate.
+/// Discrepancy: noise whose correlation decays along a replicate.
 fn correlated() -> String {
     format!(
         "use = \"autoregressive\"\nvariance = {{ known = {VARIANCE:?} }}\ncorrelation_time = {{ known = {TIME:?} }}"
     )
 }
 
-/// The log density of data, the level integrated out: normal about the prior mean, with the covariance of the noise and of
-/// the level. `time` is that of the noise's correlation, zero for none.
+/// Log density of data with the level integrated out: normal around the prior mean, with the covariance of noise and
+/// level. `time` is the correlation time of the noise, zero for independent noise.
 fn log_density(data: &[Datum], time: f64) -> f64 {
     let n = data.len();
     let covariance = |a: &Datum, b: &Datum| {
@@ -107,7 +107,7 @@ fn log_density(data: &[Datum], time: f64) -> f64 {
         let noise = if time > 0.0 { (-gap / time).exp() } else { f64::from(u8::from(gap == 0.0)) };
         PRIOR[1] * PRIOR[1] + VARIANCE * same * noise
     };
-    // Cholesky's factor row by row, and the residual solved along with it.
+    // Cholesky factor row by row, solving for the whitened residual along the way.
     let mut factor = vec![vec![0.0; n]; n];
     let mut solved = vec![0.0; n];
     let mut twice = n as f64 * std::f64::consts::TAU.ln();
@@ -124,7 +124,7 @@ fn log_density(data: &[Datum], time: f64) -> f64 {
     -0.5 * twice
 }
 
-/// The sum over all parts of the log density of a part given the rest.
+/// Sum over all parts of the log density of a part given the rest.
 fn left_out(data: &[Datum], time: f64, parts: usize, part: impl Fn(usize, &Datum) -> usize) -> f64 {
     let whole = log_density(data, time);
     let rest = |p: usize| -> Vec<Datum> {
@@ -148,8 +148,8 @@ fn data_and_curves_are_predicted_as_by_posteriors_without_them() {
         let summary = quick::summary(&out);
         let exact = left_out(&data, time, data.len(), |i, _| i);
         let exact_curves = left_out(&data, time, 10, |_, datum| datum.0);
-        // A thousand draws of one unknown: the weights of a curve, a tenth of the data, have a coefficient of variation of
-        // about 0.5, and each of ten curves an error of about 0.5 / sqrt(1000).
+        // A thousand draws of one unknown: the importance weights of a curve, a tenth of the data, have a coefficient
+        // of variation of about 0.5, and each of ten curves an error of about 0.5 / sqrt(1000).
         let (found, curves) = (number(&summary, "/loo/elpd"), number(&summary, "/loo/curves/elpd"));
         assert!((found - exact).abs() < 0.05, "{time}: {found} and {exact}");
         assert!((curves - exact_curves).abs() < 0.2, "{time}: {curves} and {exact_curves}");
@@ -191,7 +191,7 @@ fn the_file_of_draws_is_written_again_only_when_it_has_to_be() {
     let before = written();
     run(&[]);
     assert_eq!(written(), before);
-    // Another title is another file; the first one comes back bit for bit, and so does one that was damaged.
+    // Another title gives another file; the first one is restored bit for bit, and so is a damaged one.
     run(&["study.title=\"Another\""]);
     assert_ne!(file(&out), first);
     run(&[]);

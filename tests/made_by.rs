@@ -1,4 +1,4 @@
-//! What another version of the program made: what is taken of it, what is made again, and what is said of both.
+//! Results made by another version of the program: which are reused, which are repeated, and the messages about both.
 
 use std::fs;
 
@@ -19,16 +19,16 @@ fn another_version_takes_the_runs_and_makes_the_rest_again() {
     let later = run("0.1.0");
     let again = ["3-read", "4-surrogate", "5-calibrate", "6-evidence", "6-validate", "6-assess"];
     assert_eq!(later.made, again);
-    // A line for each stage: two are taken, six made again.
+    // One line per stage: two are reused, six repeated.
     let taken = ["1-design", "2-simulate"]
-        .map(|stage| format!("`{stage}` is taken as lacuna 0.0.9 made it"));
+        .map(|stage| format!("`{stage}` is reused as made by lacuna 0.0.9"));
     assert_eq!(later.notes[..2], taken);
     assert_eq!(later.notes.len(), 8, "{:?}", later.notes);
     for (stage, note) in again.iter().zip(&later.notes[2..]) {
-        assert!(note.starts_with(&format!("`{stage}` is made again: ")), "{note}");
+        assert!(note.starts_with(&format!("`{stage}` is repeated: ")), "{note}");
         assert!(note.contains("lacuna 0.0.9"), "{note}");
     }
-    // The numbers are the same ones: only what made them is another.
+    // The numbers are the same; only the version that made them differs.
     let mut second = quick::results(&out);
     let summary = |results: &mut std::collections::BTreeMap<String, String>| {
         results.remove("summary.json").unwrap()
@@ -50,12 +50,12 @@ fn another_version_takes_the_runs_and_makes_the_rest_again() {
     assert_eq!(stages[4]["made_by"]["lacuna"], "0.1.0");
     let report = fs::read_to_string(out.join("report.html")).unwrap();
     assert!(report.contains("by lacuna 0.0.9"), "the report names no other version");
-    // Nothing is lost: the older version finds all of its own.
+    // Nothing is lost: the older version finds all its own results.
     assert_eq!(run("0.0.9").made, [""; 0]);
     assert_eq!(run("0.1.0").made, [""; 0]);
 }
 
-/// A chain is never half by one program and half by another.
+/// A chain is never made partly by one version and partly by another.
 #[test]
 fn an_unfinished_chain_of_another_version_is_begun_anew() {
     let folder = quick::simulated();
@@ -66,7 +66,7 @@ fn an_unfinished_chain_of_another_version_is_begun_anew() {
     let checkpoint: Value = serde_json::from_slice(&state).unwrap();
     let inputs = fs::read_to_string(stage.join("inputs.sha256")).unwrap();
     assert_eq!(checkpoint["inputs"], inputs.trim());
-    // What stands for a chain of another program under this one's inputs: its state is not taken.
+    // Simulates a chain of another version under the inputs of this one: its state must not be used.
     let whole = quick::results(&out);
     let mut foreign = checkpoint;
     foreign["inputs"] = "another".into();

@@ -1,16 +1,22 @@
-//! Tests of the whole, in one binary.
+//! Integration tests, in one binary: it is linked once, and its tests share the cores until the last one ends. The tests that
+//! register plugins (`contracts.rs`) or load libraries of them (`dynamic.rs`) have binaries of their own, because the
+//! registry is that of a process.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 mod assess;
 mod bad_input;
 mod campaign;
 mod commands;
+mod coverage;
+mod dependencies;
 mod docs;
 mod effects;
 mod falling_balls;
 mod faulty_tables;
 mod fidelity;
 mod forced_oscillator;
+mod gap;
+mod gate;
 mod kill;
 mod left_out;
 mod made_by;
@@ -20,11 +26,13 @@ mod quick;
 mod readme;
 mod refused;
 mod revisions;
+mod schema;
 mod skeletons;
 mod slurm;
 mod stated_noise;
 mod studies;
 mod tidy;
+mod truth;
 mod um_bridge;
 mod what_people_bring;
 mod worked;

@@ -1,16 +1,16 @@
-//! Wrong studies and what is said about them.
+//! Wrong studies and the problems reported for them.
 //!
-//! Each file of `problems/` is a study that is wrong, followed by the expected complaints in lines
-//! that begin with `#!`. `LACUNA_BLESS=1` writes what is said now in their place.
+//! Each file of `problems/` is a wrong study, followed by the expected problems in lines that begin with `#!`.
+//! `LACUNA_BLESS=1` replaces these lines by the present output.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use lacuna::study::resolve::load_text;
+use lacuna_engine::study::resolve::load_text;
 // Without this line the linker leaves the plugins out.
 use lacuna_plugins as _;
 
-/// What `lacuna check` says about a study; `name` is its path from the folder of the tests.
+/// Output of `lacuna check` for a study; `name` is its path from the folder of the tests.
 fn check_text(name: &str, text: &str) -> String {
     let checked = load_text(Path::new(name), text, &[]);
     checked.problems.render(&checked.sources)
@@ -20,7 +20,7 @@ fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("problems")
 }
 
-/// Every study of the folder, sorted by name.
+/// All studies of the folder, sorted by name.
 fn studies() -> Vec<PathBuf> {
     let entries = fs::read_dir(folder()).expect("the folder of wrong studies");
     let mut paths: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
@@ -29,7 +29,7 @@ fn studies() -> Vec<PathBuf> {
     paths
 }
 
-/// The study, and the complaints in the comments at its end.
+/// The study, and the expected problems in the comments at its end.
 fn split(text: &str) -> (&str, String) {
     let is_comment = |line: &&str| line.starts_with("#!");
     let comments: usize =
@@ -40,7 +40,7 @@ fn split(text: &str) -> (&str, String) {
     (study, comments.lines().map(line).collect())
 }
 
-/// Complaints as the comments at the end of a study.
+/// Problems formatted as comments at the end of a study.
 fn comments(said: &str) -> String {
     let comment = |line: &str| if line.is_empty() { "#!\n".into() } else { format!("#! {line}\n") };
     said.lines().map(comment).collect()

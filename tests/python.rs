@@ -1,6 +1,6 @@
-//! What is written opens in the tools of others: `arviz` reads the posterior, `netCDF4` the run files.
+//! Files can be opened with standard tools: `arviz` reads the posterior, `netCDF4` the run files.
 //!
-//! `LACUNA_PYTHON` names an interpreter that has both; without it the tests say that they are skipped, unless
+//! `LACUNA_PYTHON` names an interpreter that has both; without it the tests report that they are skipped, unless
 //! `LACUNA_REQUIRE_PYTHON=1` makes that a failure.
 
 use std::ffi::OsString;
@@ -9,7 +9,7 @@ use std::process::Command;
 
 use crate::{left_out, quick};
 
-/// The interpreter that has these packages; `None` when there is none and none is required.
+/// The interpreter that has these packages; `None` if there is none and none is required.
 pub fn interpreter(packages: &str) -> Option<OsString> {
     let required = std::env::var_os("LACUNA_REQUIRE_PYTHON").is_some_and(|value| value == "1");
     let python = std::env::var_os("LACUNA_PYTHON");
@@ -20,7 +20,7 @@ pub fn interpreter(packages: &str) -> Option<OsString> {
     python
 }
 
-/// What a script prints, as JSON; `None` when there is no interpreter and none is required.
+/// Output of a script as JSON; `None` if there is no interpreter and none is required.
 fn python(script: &str, arguments: &[&Path]) -> Option<serde_json::Value> {
     let python = interpreter("arviz and netCDF4")?;
     let output = Command::new(python).arg("-c").arg(script).args(arguments).output().unwrap();
@@ -30,7 +30,7 @@ fn python(script: &str, arguments: &[&Path]) -> Option<serde_json::Value> {
     Some(serde_json::from_str(text.lines().last().unwrap()).unwrap())
 }
 
-/// Mean and standard deviation of each variable, as arviz computes them, and the shapes of all groups.
+/// Mean and standard deviation of each variable as computed by arviz, and the shapes of all groups.
 const ARVIZ: &str = r"
 import json, sys
 import arviz as az
@@ -74,7 +74,7 @@ fn arviz_reads_the_posterior() {
     }
 }
 
-/// What ArviZ makes of a run and of another of the same data, every function that needs more than draws included.
+/// Applies ArviZ to a run and to another one of the same data, including every function that needs more than draws.
 const WHOLE: &str = r"
 import json, sys, warnings
 import matplotlib
@@ -120,7 +120,7 @@ print(json.dumps({
 }))
 ";
 
-/// One study twice, the second with too little noise, and what `arviz` says of both.
+/// Runs a study twice, the second time with too small a noise, and compares both with `arviz`.
 fn weighed(gaps: bool, steps: usize) -> Option<(serde_json::Value, [serde_json::Value; 2])> {
     let data = left_out::data(8, gaps);
     let (folder, path) = left_out::study(&data, &left_out::independent(), steps);
@@ -144,7 +144,8 @@ fn agree(found: &serde_json::Value, ours: &serde_json::Value) {
 
 #[test]
 fn arviz_judges_predictions_as_we_do() {
-    // All 1000 draws are in the file: nothing has to be told. With gaps the data are one after another.
+    // All 1000 draws are in the file, so no option is needed. With missing values the data are stored one after
+    // another.
     for gaps in [false, true] {
         let Some((found, [ours, other])) = weighed(gaps, 550) else { return };
         agree(&found["loo"], &ours["loo"]);
@@ -169,7 +170,7 @@ fn arviz_judges_predictions_as_we_do() {
             coordinates.contains(if gaps { "datum_time" } else { "\"time\"" }),
             "{coordinates}"
         );
-        // About a level of 2 with noise of variance 0.25; from the prior with the variance 4 + 0.25, of 500 draws.
+        // Around a level of 2 with noise of variance 0.25; from the prior with variance 4 + 0.25, for 500 draws.
         let pair = |key: &str| [0, 1].map(|i| found[key][i].as_f64().unwrap());
         let [mean, sd] = pair("predictive");
         assert!((mean - 2.0).abs() < 0.3 && (sd - 0.5).abs() < 0.03, "{mean} {sd}");
@@ -181,7 +182,7 @@ fn arviz_judges_predictions_as_we_do() {
 
 #[test]
 fn arviz_finds_what_a_hamiltonian_sampler_tells() {
-    // 4000 draws, of which 1000 are predicted at.
+    // 4000 draws, of which 1000 are used for predictions.
     let Some((found, [ours, _])) = weighed(false, 1300) else { return };
     agree(&found["told_efficiency"], &ours["loo"]);
     let stats =
@@ -193,8 +194,8 @@ fn arviz_finds_what_a_hamiltonian_sampler_tells() {
     }
     assert_eq!(found["diverging"], 0);
     for bfmi in found["bfmi"].as_array().unwrap() {
-        // A normal law in one dimension: the energy is half a chi-squared number of two degrees of freedom, and each new
-        // momentum changes half of it (Betancourt, arXiv 1604.00695): about one.
+        // For a normal distribution in one dimension the energy is half a chi-squared variable with two degrees of
+        // freedom, and each new momentum changes half of it (Betancourt, arXiv 1604.00695): BFMI is about one.
         assert!((0.6..1.6).contains(&bfmi.as_f64().unwrap()), "{bfmi}");
     }
     // One unknown has a mean kinetic energy of one half.
@@ -206,7 +207,7 @@ fn arviz_finds_what_a_hamiltonian_sampler_tells() {
     assert_eq!(found["constants"], serde_json::json!(["level_reference"]));
 }
 
-/// The times and the last value of every global variable of an Exodus history file, by the variables' names.
+/// Times and last value of every global variable of an Exodus history file, by variable name.
 const NETCDF4: &str = r"
 import json, sys
 import netCDF4
@@ -226,7 +227,7 @@ fn netcdf4_reads_the_run_files() {
     let out = folder.path().join("run");
     let ran = quick::run(&folder.path().join("study.toml"), &["sampler.steps=20"], &out);
     ran.unwrap_or_else(|stop| panic!("{stop}"));
-    let read = lacuna::run::arrays::read(&out.join("3-read/ensemble.nc"), "responses").unwrap();
+    let read = lacuna_run::arrays::read(&out.join("3-read/ensemble.nc"), "responses").unwrap();
     let ours = &read.values[..60];
     let Some(found) = python(NETCDF4, &[&out.join("2-simulate/run001.h")]) else { return };
     let times: Vec<f64> = serde_json::from_value(found["times"].clone()).unwrap();

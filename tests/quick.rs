@@ -1,4 +1,4 @@
-//! Studies that are small enough for tests, and what running them leaves behind.
+//! Studies small enough for tests, and inspection of their run directories.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -6,20 +6,25 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::{Mutex, OnceLock};
 
-use lacuna::report::findings::Findings;
-use lacuna::run::{Observer, RunDirectory, Stop, files};
-use lacuna::stage;
-use lacuna::study::{Study, resolve};
+use lacuna::run::{Observer, Stop, files};
+use lacuna_engine::pipeline;
+use lacuna_engine::report::findings::Findings;
+use lacuna_engine::study::{Study, resolve};
+use lacuna_run::RunDirectory;
 // Without this line the linker leaves the plugins out.
 use lacuna_plugins as _;
 use tempfile::TempDir;
+
+#[path = "quick/described.rs"]
+#[allow(dead_code, reason = "other tests use the rest")]
+pub mod described;
 
 pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// A folder with the study in which the stand-in is simulated on a coarse mesh: 40 runs, three sensors,
-/// twenty times, and the founding study's measurements of them.
+/// A folder with the study in which the stand-in model is simulated on a coarse mesh: 40 runs, three sensors, twenty
+/// times, and the founding study's measurements for them.
 pub fn simulated() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("quick/study.toml");
@@ -46,7 +51,7 @@ pub fn tables() -> TempDir {
     folder
 }
 
-/// Changes a file of a study by replacing some text that must be there.
+/// Replaces a text that must be present in a file of a study.
 pub fn replace(path: &Path, old: &str, new: &str) {
     let text = fs::read_to_string(path).unwrap();
     assert!(text.contains(old), "{} has no `{old}`", path.display());
@@ -60,7 +65,7 @@ pub fn load(path: &Path, settings: &[&str]) -> Study {
     checked.study.unwrap_or_else(|| panic!("{complaints}"))
 }
 
-/// Notes which stages begin and what is said to the user.
+/// Records which stages begin and what is reported to the user.
 #[derive(Default)]
 pub struct Watch {
     pub warnings: Mutex<Vec<String>>,
@@ -79,13 +84,13 @@ impl Observer for Watch {
     }
 }
 
-/// What a run through the library gives.
+/// Outcome of a run through the library.
 pub struct Ran {
     pub findings: Findings,
-    /// The stages that were made and not taken from what is kept.
+    /// Stages that were made and not reused.
     pub made: Vec<String>,
     pub warnings: Vec<String>,
-    /// What is said of other versions' results.
+    /// Messages about results of other versions.
     pub notes: Vec<String>,
 }
 
@@ -94,14 +99,14 @@ pub fn run(path: &Path, settings: &[&str], out: &Path) -> Result<Ran, Stop> {
     run_as(env!("CARGO_PKG_VERSION"), path, settings, out)
 }
 
-/// The same as another version of the program.
+/// Like [`run`], as another version of the program.
 pub fn run_as(version: &str, path: &Path, settings: &[&str], out: &Path) -> Result<Ran, Stop> {
     let study = load(path, settings);
     let before = finished(out);
     let watch = Watch::default();
     let mut directory = RunDirectory::open(out)?;
     directory.pretend(version);
-    let findings = stage::run(&study, &mut directory, &watch)?;
+    let findings = pipeline::run(&study, &mut directory, &watch)?;
     let made = directory
         .records()
         .iter()
@@ -111,7 +116,7 @@ pub fn run_as(version: &str, path: &Path, settings: &[&str], out: &Path) -> Resu
     Ok(Ran { findings, made, warnings, notes })
 }
 
-/// Every record of a finished stage that a run directory keeps, set aside or not.
+/// Every record of a finished stage in a run directory, in place or moved aside.
 fn finished(out: &Path) -> Vec<(String, String, u64)> {
     let mut found = Vec::new();
     for folder in [out.to_owned(), out.join(".kept")] {
@@ -127,8 +132,7 @@ fn finished(out: &Path) -> Vec<(String, String, u64)> {
     found
 }
 
-/// The files that hold results, by their paths from the run directory, with their hashes; times, which differ
-/// from run to run, are taken out.
+/// Hashes of the result files, by path from the run directory; times, which differ from run to run, are removed.
 pub fn results(out: &Path) -> BTreeMap<String, String> {
     let mut found = BTreeMap::new();
     for entry in fs::read_dir(out).unwrap() {
@@ -139,12 +143,12 @@ pub fn results(out: &Path) -> BTreeMap<String, String> {
         }
         for entry in fs::read_dir(&folder).unwrap() {
             let path = entry.unwrap().path();
-            // What executors note for themselves.
+            // Notes that executors keep for themselves.
             if path.file_name().is_some_and(|name| name == "campaign") {
                 continue;
             }
             let file = path.file_name().unwrap().to_string_lossy().into_owned();
-            // Checkpoints and records, not results.
+            // Checkpoints and records are not results.
             let skipped = ["stage.json", "seconds.csv", "seconds", "progress.jsonl", "state.json"];
             if !skipped.contains(&file.as_str()) {
                 found.insert(format!("{name}/{file}"), files::hash_file(&path).unwrap());
@@ -157,20 +161,21 @@ pub fn results(out: &Path) -> BTreeMap<String, String> {
     }
     let mut summary = summary(out);
     summary.as_object_mut().unwrap().remove("seconds");
-    // Where runs were made is no result.
+    // The executor does not affect the results.
     summary["components"].as_object_mut().unwrap().remove("executor");
     found.insert("summary.json".to_owned(), summary.to_string());
     found
 }
 
+/// The summary of a run, every key of which is in the schema.
 pub fn summary(out: &Path) -> serde_json::Value {
-    files::read_json(&out.join("summary.json")).unwrap()
+    described::described(files::read_json(&out.join("summary.json")).unwrap())
 }
 
-/// A program of the workspace, built with the tests' profile, and as part of the workspace: alone its package would need
-/// other features of what is below, and one more build of everything.
+/// A program of the workspace, built with the tests' profile as part of the workspace: alone, its package would need
+/// other features of its dependencies, and rebuild everything.
 pub fn program(name: &str) -> PathBuf {
-    // The test is `target/<profile>/deps/all-…`.
+    // The path of the test is `target/<profile>/deps/all-…`.
     let test = std::env::current_exe().unwrap();
     let profile = test.parent().unwrap().parent().unwrap();
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
@@ -192,7 +197,7 @@ pub fn command() -> Command {
     command
 }
 
-/// What a finished command said: exit code and standard error.
+/// Exit code and standard error of a finished command.
 pub fn said(command: &mut Command) -> (Option<i32>, String) {
     let output = command.output().unwrap();
     (output.status.code(), String::from_utf8(output.stderr).unwrap())

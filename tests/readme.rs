@@ -1,7 +1,8 @@
-//! READMEs of examples as a newcomer follows them: in a copy of the folder, command by command.
+//! Follows the READMEs of examples as a newcomer would: in a copy of the folder, command by command.
 //!
-//! A block `sh` is done line by line. A block `text` behind it is what its last command prints, `…` for what differs from
-//! machine to machine; when it begins with `error` the command ends with code 1, as no other does.
+//! A block `sh` is executed line by line. A block `text` after it is the expected output of its last command, with `…`
+//! for anything that differs from machine to machine; if it begins with `error` the command must end with code 1, which
+//! no other command may.
 
 use std::ffi::OsString;
 use std::fs;
@@ -13,13 +14,13 @@ use tempfile::TempDir;
 use crate::docs::markdown::Page;
 use crate::quick;
 
-/// Folders of the project, copied to a place outside of it, and the page that is followed there.
+/// Folders of the project, copied to a place outside it, and the page that is followed there.
 pub struct Walk {
     copy: TempDir,
     page: PathBuf,
-    /// The folder in which the commands are given, from that of the copy.
+    /// Folder in which the commands are given, relative to the copy.
     place: PathBuf,
-    /// Folders in which programs are looked for before those of `PATH`.
+    /// Folders that are searched for programs before those of `PATH`.
     pub programs: Vec<PathBuf>,
     pub variables: Vec<(&'static str, OsString)>,
     /// Programs that the page leaves running.
@@ -30,7 +31,7 @@ fn copy(from: &Path, to: &Path) {
     fs::create_dir_all(to).unwrap();
     for entry in fs::read_dir(from).unwrap() {
         let (path, name) = entry.map(|entry| (entry.path(), entry.file_name())).unwrap();
-        // What somebody's own walk has left there.
+        // Leftovers of somebody's own run of the example.
         if ["runs", "__pycache__"].iter().any(|own| name == *own) {
             continue;
         }
@@ -43,7 +44,8 @@ fn copy(from: &Path, to: &Path) {
 }
 
 impl Walk {
-    /// Copies folders; the first has the page, `place` is where its commands are given. Programs are those of the tests.
+    /// Copies folders; the first contains the page, `place` is the folder in which its commands are given. Programs are
+    /// those of the tests.
     pub fn begin(folders: &[&str], place: &str) -> Self {
         let to = tempfile::tempdir().unwrap();
         for folder in folders {
@@ -59,7 +61,7 @@ impl Walk {
         Self { copy: to, page, place: place.into(), programs, variables, started }
     }
 
-    /// A path as the commands have it.
+    /// A path as the commands see it.
     pub fn path(&self, path: &str) -> PathBuf {
         self.copy.path().join(&self.place).join(path)
     }
@@ -74,7 +76,7 @@ impl Walk {
         command
     }
 
-    /// Gives a command, and returns what it prints; it must end with this code.
+    /// Runs a command that must end with this code, and returns its output.
     pub fn give(&mut self, line: &str, code: i32) -> String {
         if let Some(line) = line.strip_suffix(" &") {
             let mut command = self.command(&format!("exec {line}"));
@@ -116,7 +118,7 @@ impl Walk {
     }
 }
 
-/// Whether two lines are the same but for what `…` stands for.
+/// Returns true if two lines are equal except for the text that `…` replaces.
 fn like(line: &str, wanted: &str) -> bool {
     let Some((first, rest)) = wanted.split_once('…') else { return line == wanted };
     let Some(after) = line.strip_prefix(first) else { return false };

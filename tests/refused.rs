@@ -1,15 +1,15 @@
-//! What a study must not do before it runs, and what it must survive: names that are paths, sizes that no machine has,
-//! programs that `check` would start, posteriors that are narrow or lie in a corner.
+//! Actions that a study must not take before it runs, and conditions that it must survive: names that are paths, sizes
+//! that no machine can hold, programs that `check` would start, posteriors that are narrow or lie in a corner.
 
 use std::fs;
 use std::path::Path;
 use std::time::Instant;
 
-use lacuna::study::resolve::{Use, load_for, load_text};
+use lacuna_engine::study::resolve::{Use, load_for, load_text};
 
 use crate::quick;
 
-/// What is complained about in a study that the skeleton makes, with one text replaced by another.
+/// Problems of the study of the skeleton with one text replaced by another.
 fn said(old: &str, new: &str) -> String {
     let folder = quick::tables();
     let path = folder.path().join("study.toml");
@@ -33,7 +33,7 @@ fn names_that_become_files_are_no_paths() {
     assert!(!text.contains("panicked"), "{text}");
 }
 
-/// Each size of a study that makes its runs, set to what no machine holds.
+/// Each size of a study that makes its runs, set to a value that exceeds any machine's memory.
 #[test]
 fn impossible_sizes_are_refused_where_they_stand() {
     let folder = quick::simulated();
@@ -56,7 +56,7 @@ fn impossible_sizes_are_refused_where_they_stand() {
         ("sampler.walkers=1000000000000", "sampler.walkers", "is no possible size"),
         ("sampler.walkers=2000000000", "sampler.walkers", "the draws need"),
         ("surrogate.degree=1000000000000", "surrogate.degree", "is no possible size"),
-        ("surrogate.degree=1000000", "surrogate.degree", "are no range"),
+        ("surrogate.degree=1000000", "surrogate.degree", "must be an increasing range"),
         ("response.axes.time.count=1000000000000", "response.axes.time", "needs 8.0 TB of memory"),
         ("response.axes.time.count=9223372036854775807", "response.axes.time", "of memory"),
         ("validate.emulator_check=1000000000000", "validate.emulator_check", "the runs need"),
@@ -69,14 +69,14 @@ fn impossible_sizes_are_refused_where_they_stand() {
         assert!(text.contains(what), "{setting}: {text}");
         let last = key.rsplit('.').next().unwrap();
         assert!(text.contains(last), "{setting}: {text}");
-        let bounded = text.contains("expected") || text.contains("between 1 and 1000");
+        let bounded = text.contains("expected") || text.contains("from 1 to 1000");
         assert!(what.is_empty() || bounded, "{setting}: {text}");
     }
     let many: Vec<String> =
         ["use=nested", "live=2000000000"].map(|s| format!("sampler.{s}")).into();
     let text = complaints(&many.iter().map(String::as_str).collect::<Vec<_>>());
     assert!(text.contains("the draws need"), "{text}");
-    // As many halvings as one likes: the run ends by itself, and no step is a draw.
+    // The number of halvings may be arbitrarily large: the run ends by itself, and steps are not draws.
     let fine = complaints(&["sampler.use=nested", "sampler.halvings=1000000000"]);
     assert!(!fine.contains("memory"), "{fine}");
 }
@@ -113,7 +113,7 @@ fn check_starts_no_program_that_a_study_names() {
     assert!(trace.exists(), "the interpreter of this test leaves no trace");
 }
 
-/// A truth of 1e9 known to about 0.1: the case in which the report never ended.
+/// A truth of 1e9 known to about 0.1, for which the report must still be written.
 #[test]
 fn a_posterior_that_is_narrow_against_its_mean_has_a_report() {
     let folder = tempfile::tempdir().unwrap();
@@ -129,15 +129,15 @@ fn a_posterior_that_is_narrow_against_its_mean_has_a_report() {
     quick::run(&path, &[], &out).unwrap_or_else(|stop| panic!("{stop}"));
     assert!(begun.elapsed().as_secs_f64() < 60.0, "{:?}", begun.elapsed());
     let found = &quick::summary(&out)["parameters"]["frequency"];
-    // The closed form: a normal law of mean 1e9 and variance 1 / sum(t^2).
+    // Closed form: a normal posterior with mean 1e9 and variance 1 / sum(t^2).
     let exact = 1.0 / 30.0_f64.sqrt();
     let [mean, sd] = ["mean", "sd"].map(|key| found[key].as_f64().unwrap());
     assert!((sd / exact - 1.0).abs() < 0.2, "{sd} {exact}");
     assert!((mean - 1e9).abs() < 0.3 * exact, "{mean}");
 }
 
-/// Independent exponential laws within bounds: a corner of many, with a mean in closed form. Methods of every kind start
-/// there, those too that make their own starting points.
+/// Independent exponential distributions within bounds: a mode in a corner of many dimensions, with a mean in closed
+/// form. Methods of every kind start there, including those that draw their own starting points.
 #[test]
 fn a_mode_in_a_corner_stops_no_sampler() {
     let folder = tempfile::tempdir().unwrap();
@@ -164,7 +164,7 @@ fn a_mode_in_a_corner_stops_no_sampler() {
                  log_density = \"-({})\"\n[sampler]\n{sampler}\n",
                 terms.join(" + ")
             );
-            // In ten coordinates that many live points are too few for the mean of each.
+            // In ten coordinates this number of live points is too small for the mean of each.
             if active == 10 && sampler.contains("nested") {
                 continue;
             }
@@ -175,7 +175,7 @@ fn a_mode_in_a_corner_stops_no_sampler() {
             let summary = quick::summary(&out);
             for (j, name) in names.iter().enumerate() {
                 let rate = 20.0 + 10.0 * j as f64;
-                // The mean of an exponential law on (0, 1): 1 / rate - 1 / (exp(rate) - 1).
+                // Mean of an exponential distribution truncated to (0, 1): 1 / rate - 1 / (exp(rate) - 1).
                 let exact = 1.0 / rate - 1.0 / rate.exp_m1();
                 let found = &summary["parameters"][name];
                 let [mean, sd, size] =

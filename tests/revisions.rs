@@ -1,8 +1,8 @@
-//! Whoever changes what a stage or plugin computes raises its revision: small artifacts of each are computed and compared
-//! with the hashes in `revisions/golden.json`, where the revision stands beside them.
+//! A change of the results of a stage or plugin requires a new revision: small artifacts of each are computed and
+//! compared with the hashes in `revisions/golden.json`, which records the revision beside them.
 //!
-//! `LACUNA_BLESS=1` writes the file anew; it refuses a hash that has changed while its revision has not. Hashes hold on one
-//! kind of machine, which the file names: on others the test says that it compares nothing.
+//! `LACUNA_BLESS=1` writes the file; it refuses a hash that has changed while its revision has not. Hashes are valid on
+//! one kind of machine, which the file names: on others the test reports that it compares nothing.
 
 mod artifacts;
 mod stages;
@@ -10,11 +10,11 @@ mod stages;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use lacuna::linalg::Matrix;
 use lacuna::run::files;
+use lacuna_linalg::Matrix;
 use serde::{Deserialize, Serialize};
 
-/// What was computed, with the revision that computed it.
+/// Hash of a result, with the revision that computed it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Made {
     revision: u32,
@@ -23,13 +23,14 @@ struct Made {
 
 #[derive(Debug, Default, Serialize, Deserialize)]
 struct Golden {
-    /// The kind of machine on which all of it was computed.
+    /// Kind of machine on which all hashes were computed.
     machine: String,
     plugins: BTreeMap<String, Made>,
     stages: BTreeMap<String, Made>,
 }
 
-/// The kind of this machine: the instructions that the linear algebra chooses among decide the last bits.
+/// Kind of this machine: the instruction sets from which the linear algebra chooses, because they determine the last
+/// bits.
 fn machine() -> String {
     let mut machine = format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS);
     #[cfg(target_arch = "x86_64")]
@@ -49,7 +50,7 @@ fn path() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("revisions/golden.json")
 }
 
-/// Numbers that are hashed to the bit.
+/// Numbers that are hashed bit for bit.
 #[derive(Default)]
 struct Bits(Vec<u8>);
 
@@ -74,7 +75,7 @@ impl Bits {
     }
 }
 
-/// What is wrong with the revisions, in lines; `found` belongs to them if nothing is.
+/// Violations of the revision rule, one per line; `found` becomes valid if there are none.
 fn judge(what: &str, golden: &BTreeMap<String, Made>, found: &BTreeMap<String, Made>) -> String {
     let mut wrong = String::new();
     for (name, made) in found {
@@ -112,7 +113,7 @@ fn numbers_that_change_have_a_new_revision() {
         return;
     }
     let found = Golden { machine: machine(), plugins: artifacts::all(), stages: stages::all() };
-    // On another kind of machine all hashes are others, and a change cannot be seen.
+    // On another kind of machine all hashes differ, and a change cannot be detected.
     let comparable = golden.machine == found.machine;
     let wrong = judge("plugin", &golden.plugins, &found.plugins)
         + &judge("stage", &golden.stages, &found.stages);

@@ -1,4 +1,4 @@
-//! `lacuna new plugin`: what it writes is what is compiled and tested, in its place, with another name.
+//! `lacuna new plugin`: its output is the tested skeleton, in the right place, with another name.
 
 use std::fs;
 use std::path::Path;
@@ -23,7 +23,7 @@ const KINDS: [(&str, &str); 10] = [
     ("term", "terms"),
 ];
 
-/// The skeleton of a kind as `trial_KIND`.
+/// The skeleton of a kind, named `trial_KIND`.
 fn trial(kind: &str) -> (String, String) {
     let template = root().join(format!("cli/src/new/plugin/{kind}.rs"));
     let of_code = format!("Trial{}{}", kind[..1].to_uppercase(), &kind[1..]);
@@ -32,7 +32,7 @@ fn trial(kind: &str) -> (String, String) {
     (text.replace("Skeleton", &of_code).replace("skeleton", &name), name)
 }
 
-/// A folder with as much of the source as the command looks at.
+/// A folder with the part of the source that the command looks at.
 fn source() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let copy = |file: &str| {
@@ -47,7 +47,7 @@ fn source() -> TempDir {
     folder
 }
 
-/// Asks for a plugin in a folder; the exit code, and what is said.
+/// Requests a plugin in a folder; returns the exit code and the output.
 fn ask(folder: &Path, words: &[&str]) -> (Option<i32>, String) {
     let mut lacuna = command();
     said(lacuna.args(["new", "plugin"]).args(words).current_dir(folder))
@@ -60,7 +60,7 @@ fn a_skeleton_of_each_kind_is_the_one_that_is_tested_under_another_name() {
     let tree = source();
     for (kind, kinds) in KINDS {
         let (text, name) = trial(kind);
-        // Anywhere in the tree will do.
+        // Any folder of the tree must do.
         let output = command()
             .args(["new", "plugin", kind, &name])
             .current_dir(tree.path().join("plugins").join(kinds))
@@ -93,7 +93,7 @@ fn what_cannot_be_written_is_refused_and_nothing_is_changed() {
             &["sampler", "Walk"][..],
             "error: `Walk` is no name of a plugin\nhelp: names are small letters",
         ),
-        (&["sampler", "loop"], "error: `loop` is a word of Rust"),
+        (&["sampler", "loop"], "error: `loop` is a keyword of Rust"),
         (&["sampler", "state"], "error: the type of `state` would be called `State`"),
         (&["sampler", "metropolis"], "error: there is a sampler `metropolis` already"),
         (&["sampler", "moves"], "has no place for the module `moves`"),
@@ -140,12 +140,12 @@ fn a_library_is_the_same_plugin_with_the_crates_that_it_needs() {
     assert_eq!(manifest["lib"]["crate-type"][0].as_str(), Some("cdylib"));
     let crates: Vec<&String> = manifest["dependencies"].as_table().unwrap().keys().collect();
     assert_eq!(crates, ["lacuna-plugin", "schemars", "serde", "serde_json"]);
-    // The folder is in no source: the SDK is that of the source from which the command was built.
+    // The folder is not inside a source tree: the SDK is that of the source from which the command was built.
     let sdk = manifest["dependencies"]["lacuna-plugin"]["path"].as_str().unwrap();
     assert_eq!(Path::new(sdk), root().join("sdk").canonicalize().unwrap());
 }
 
-/// Copies a folder without what is built there, and without the results of runs.
+/// Copies a folder without build products and results of runs.
 fn copy(from: &Path, to: &Path) {
     fs::create_dir_all(to).unwrap();
     let built = from.join("Cargo.lock").exists();
@@ -162,7 +162,7 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// Runs cargo in a copy of the source; what it printed.
+/// Runs cargo in a copy of the source and returns its output.
 fn cargo(tree: &Path, bless: bool, words: &[&str]) -> String {
     let begun = std::time::Instant::now();
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
@@ -177,10 +177,10 @@ fn cargo(tree: &Path, bless: bool, words: &[&str]) -> String {
     out
 }
 
-/// With `LACUNA_SKELETONS=1`: the whole way in a copy of the source. Nothing but the command touches it; then the
-/// plugins' own tests, the contracts, the generated pages and the rules of the source have to hold.
+/// With `LACUNA_SKELETONS=1`: the whole procedure in a copy of the source. Only the command changes it; then the
+/// plugins' own tests, the contracts, the generated pages and the rules of the source must pass.
 ///
-/// It builds in `target/skeletons`, from nothing the first time.
+/// It builds in `target/skeletons`, from scratch the first time.
 #[test]
 fn a_source_with_a_new_plugin_of_each_kind_passes_its_tests() {
     if std::env::var_os("LACUNA_SKELETONS").is_none_or(|value| value != "1") {

@@ -4,12 +4,12 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use lacuna::linalg::{Cholesky, Matrix};
 use lacuna::math::random::{Stream, normal};
+use lacuna_linalg::{Cholesky, Matrix};
 
 use crate::quick;
 
-/// A straight line that the model is, `a + b t` at ten times, with normal priors of standard deviation 3.
+/// A straight line `a + b t` at ten times as the model, with normal priors of standard deviation 3.
 const STUDY: &str = "\
 [study]
 name = \"line\"
@@ -52,8 +52,8 @@ fn time(i: usize) -> f64 {
     0.1 * (i + 1) as f64
 }
 
-/// Posterior mean and standard deviation of `a` and `b`, and the share of each in the Monte Carlo error: the precision
-/// `X'S^-1 X + I / 9` with the covariance `S` of the values.
+/// Posterior mean and standard deviation of `a` and `b`: the precision is `X'S^-1 X + I / 9`, with `S` the covariance
+/// of the values.
 fn closed_form(y: &[f64], covariance: &Matrix) -> ([f64; 2], [f64; 2]) {
     let white = Cholesky::new(covariance).unwrap();
     let x = white.whiten_matrix(&Matrix::from_fn(
@@ -63,17 +63,17 @@ fn closed_form(y: &[f64], covariance: &Matrix) -> ([f64; 2], [f64; 2]) {
     ));
     let mut z = y.to_vec();
     white.whiten(&mut z);
-    let mut precision = lacuna::linalg::gram(&x);
+    let mut precision = lacuna_linalg::gram(&x);
     (0..2).for_each(|j| precision[(j, j)] += 1.0 / 9.0);
     let precision = Cholesky::new(&precision).unwrap();
-    let mut mean = lacuna::linalg::transposed_multiply_vector(&x, &z);
+    let mut mean = lacuna_linalg::transposed_multiply_vector(&x, &z);
     precision.solve(&mut mean);
     let inverse = precision.inverse();
     ([mean[0], mean[1]], [0, 1].map(|j| inverse[(j, j)].sqrt()))
 }
 
-/// The posterior of a study in a folder has this mean, to four Monte Carlo errors of 2000 effective draws, and this
-/// standard deviation, to four of theirs.
+/// Checks the posterior of a study in a folder: the mean to four Monte Carlo errors of 2000 effective draws, the
+/// standard deviation to four of its own.
 fn has(folder: &Path, settings: &[&str], (mean, sd): ([f64; 2], [f64; 2])) {
     let out = folder.join("run");
     quick::run(&folder.join("study.toml"), settings, &out).unwrap_or_else(|stop| panic!("{stop}"));
@@ -93,7 +93,7 @@ fn has(folder: &Path, settings: &[&str], (mean, sd): ([f64; 2], [f64; 2])) {
     }
 }
 
-/// Values about `1 + 2 t` with this noise.
+/// Values around `1 + 2 t` with this noise.
 fn made(noise: &Matrix, seed: u64) -> Vec<f64> {
     let mut rng = Stream::root(seed).generator();
     let z: Vec<f64> = (0..TIMES).map(|_| normal(&mut rng)).collect();
@@ -119,17 +119,17 @@ fn a_column_sigma_weighs_the_values() {
     }
     let folder = study(&table);
     has(folder.path(), &[], closed_form(&y, &noise));
-    // Known noise on top of the stated.
+    // Known noise in addition to the stated noise.
     let added =
         Matrix::from_fn(TIMES, TIMES, |i, j| noise[(i, j)] + if i == j { 0.04 } else { 0.0 });
     has(folder.path(), &["discrepancy.variance={ known = 0.04 }"], closed_form(&y, &added));
-    // Three of the values left out by a mask.
+    // Three of the values removed by a mask.
     let kept: Vec<usize> = (0..TIMES).filter(|i| ![2, 3, 7].contains(i)).collect();
     let mask: String =
         (0..TIMES).map(|i| format!("{},{}\n", time(i), u8::from(!kept.contains(&i)))).collect();
     fs::write(folder.path().join("mask.csv"), format!("time [s],mask\n{mask}")).unwrap();
     let wide = Matrix::from_fn(TIMES, TIMES, |i, j| {
-        // A value without weight is as good as none.
+        // A value without weight is equivalent to a missing one.
         noise[(i, j)] + if i == j && !kept.contains(&i) { 1e12 } else { 0.0 }
     });
     has(folder.path(), &["measurements.mask=mask.csv"], closed_form(&y, &wide));

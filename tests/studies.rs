@@ -1,4 +1,4 @@
-//! A small study from nothing to its report, and again: the same bits, whatever is kept, on any number of threads.
+//! A small study from nothing to its report, and again: the same bits, whatever is reused, on any number of threads.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -44,7 +44,7 @@ fn a_study_runs_from_nothing_to_its_report() {
     check_manifest(&out);
 }
 
-/// The keys of `summary.json`, as section 5 of the design demands them.
+/// Checks that `summary.json` has the documented keys.
 fn check_summary(out: &Path) {
     let summary = quick::summary(out);
     assert_eq!(summary["schema"], 1);
@@ -106,7 +106,7 @@ fn the_resolved_study_gives_the_same_bits_in_another_directory() {
     let second = folder.path().join("elsewhere/second");
     quick::run(&resolved, &[], &second).unwrap_or_else(|stop| panic!("{stop}"));
     assert_eq!(quick::results(&second), quick::results(&first));
-    // It resolves to itself.
+    // The resolved study resolves to itself.
     let text = |path: &Path| fs::read_to_string(path.join("resolved.toml")).unwrap();
     assert_eq!(text(&second), text(&first));
 }
@@ -132,7 +132,7 @@ fn what_is_kept_is_taken_and_only_what_depends_on_a_change_is_made_again() {
     let changed = quick::results(&out);
     assert_ne!(changed["5-calibrate/draws.nc"], first["5-calibrate/draws.nc"]);
     assert_eq!(changed["4-surrogate/emulator.bin"], first["4-surrogate/emulator.bin"]);
-    // Back, and forth: nothing is made twice.
+    // Switching back and forth: nothing is made twice.
     assert_eq!(run(folder.path(), &[], "run").made, [""; 0]);
     assert_eq!(quick::results(&out), first);
     assert_eq!(run(folder.path(), &longer, "run").made, [""; 0]);
@@ -144,9 +144,9 @@ fn what_is_kept_is_taken_and_only_what_depends_on_a_change_is_made_again() {
         run(folder.path(), &["validate.emulator_check=1"], "run").made,
         ["6-validate", "6-assess"]
     );
-    // A word that no result depends on.
+    // A title that no result depends on.
     assert_eq!(run(folder.path(), &["study.title=\"Another title\""], "run").made, [""; 0]);
-    // Another measurement: the runs stay.
+    // Another measurement: the runs are kept.
     let data = folder.path().join("strain.csv");
     let text = fs::read_to_string(&data).unwrap();
     let (rest, _) = text.trim_end().rsplit_once(',').unwrap();
@@ -167,7 +167,7 @@ fn results_do_not_depend_on_the_number_of_threads() {
     };
     let one = on("1");
     assert_eq!(on("2"), one);
-    // The library in a pool of its own gives what the command gives.
+    // The library in its own thread pool gives the results of the command.
     let out = folder.path().join("pool");
     let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
     let ran = pool.install(|| quick::run(&folder.path().join("study.toml"), &[], &out));
@@ -209,11 +209,11 @@ fn shipped_studies_are_sound_and_have_run_directories_of_their_own() {
     for path in studies(&quick::root().join("configs")) {
         let folder = path.parent().and_then(Path::file_name).unwrap_or_default();
         let study = match folder.to_str() {
-            // Its server must be there.
+            // The server of this study must be running.
             Some("um_bridge") => {
                 rod::serving(&Rod::default(), |url| quick::load(&path, &[&rod::setting(url)]))
             }
-            // Not every machine has ABAQUS.
+            // ABAQUS is not installed on every machine.
             Some("abaqus") => quick::load(&path, &["model.command=[\"sh\"]"]),
             _ => quick::load(&path, &[]),
         };
@@ -225,7 +225,7 @@ fn shipped_studies_are_sound_and_have_run_directories_of_their_own() {
     assert!(names.len() >= 17, "{names:?}");
 }
 
-/// The quick study in the place of the focused one, and the shipped variants of that in their folders.
+/// The quick study in place of the focused one, and the shipped variants of that in their folders.
 fn variants(kind: &str) -> (tempfile::TempDir, Vec<PathBuf>) {
     let folder = quick::simulated();
     fs::rename(folder.path().join("study.toml"), folder.path().join("focused.toml")).unwrap();
@@ -245,7 +245,7 @@ fn each_variant_runs(kind: &str, count: usize, made: &[&str]) {
     let out = folder.path().join("run");
     quick::run(&folder.path().join("focused.toml"), &[], &out).unwrap();
     for path in paths {
-        let sampler = quick::load(&path, &[]).sampler.unwrap().built.name;
+        let sampler = quick::load(&path, &[]).plugins.sampler.unwrap().built.name;
         let short: &[&str] = match sampler {
             "variational" => &["sampler.iterations=50", "sampler.draws=200"],
             _ => &["sampler.steps=60"],
@@ -266,7 +266,7 @@ fn every_shipped_surrogate_runs_on_the_runs_that_are_there() {
     each_variant_runs("surrogates", 3, &STAGES[3..]);
 }
 
-/// The posterior and the evidence in closed form of `configs/target/regression.toml`, as its README has them.
+/// Posterior and evidence of `configs/target/regression.toml` in closed form, as stated in its README.
 #[test]
 fn a_regression_has_the_evidence_that_it_must_have() {
     let folder = tempfile::tempdir().unwrap();
@@ -288,7 +288,7 @@ fn a_regression_has_the_evidence_that_it_must_have() {
     }
 }
 
-/// The truth behind `configs/borehole/measurements.csv` is in `examples/borehole_data.rs` and the study's references.
+/// The truth of `configs/borehole/measurements.csv` is in `examples/borehole_data.rs` and in the study's references.
 #[test]
 fn the_borehole_study_finds_its_truth() {
     let folder = tempfile::tempdir().unwrap();
@@ -305,7 +305,8 @@ fn the_borehole_study_finds_its_truth() {
     }
 }
 
-/// What the data say nothing of keeps its prior, uniform from -0.5 to 0.5, whatever chance the design holds.
+/// A parameter about which the data say nothing keeps its prior, uniform from -0.5 to 0.5, whatever correlations the
+/// design has by chance.
 #[test]
 fn a_parameter_that_the_model_does_not_use_keeps_its_prior() {
     let folder = quick::simulated();
@@ -323,13 +324,13 @@ fn a_parameter_that_the_model_does_not_use_keeps_its_prior() {
     let (size, sd) = (number("void_gradient", "ess_bulk"), 1.0 / 12_f64.sqrt());
     assert!(size > 200.0 && number("void_gradient", "mean").abs() < 4.0 * sd / size.sqrt());
     assert!((number("void_gradient", "sd") / sd - 1.0).abs() < 4.0 / (2.0 * size).sqrt());
-    // A kept emulator is taken up again with the parameter that it does not have.
+    // A kept emulator is reused together with the parameter that it does not have.
     let again = quick::run(&path, &settings, &out).unwrap_or_else(|stop| panic!("{stop}"));
     assert_eq!(again.made, [""; 0]);
     assert!(summary["sobol"].is_null() || summary["sobol"].to_string().contains("void_gradient"));
 }
 
-/// Each of the three studies differs from the others in the model's name and its own, and runs as it is.
+/// The three studies differ from each other only in the names of model and study, and each runs as it is.
 #[test]
 fn the_helium_study_runs_with_each_of_its_models() {
     let short = [

@@ -1,50 +1,38 @@
-//! The source keeps to the house rules that a compiler does not check.
+//! Rules of the source that a compiler does not check.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::PathBuf;
 
 use crate::quick::root;
 
-/// Lines of the longest file.
+/// Largest number of lines of a file.
 const LIMIT: usize = 400;
 
-/// Words that make a line that is not finished.
+/// Words that mark unfinished work.
 const UNFINISHED: [&str; 5] = ["TODO", "FIXME", "XXX", "todo!(", "unimplemented!("];
 
-/// Beginnings of paths on somebody's machine.
+/// Beginnings of paths on a particular machine.
 const MACHINE: [&str; 6] = ["/home/", "/Users/", "/root/", "/work/", "/tmp/", "C:\\"];
 
-/// Modules of the core from the top down: each may use those beside and below it.
-///
-/// A study chooses plugins and plugins complain about their part of a study; both stop with what a run
-/// says, and expressions guess at names as a study does: these four are one layer.
-const LAYERS: [&[&str]; 11] = [
-    &["compare", "serve", "campaign"],
-    &["stage"],
-    &["contract"],
-    &["report"],
-    &["diagnose", "assess"],
-    &["gap"],
-    &["posterior"],
-    &["plugin", "study", "run", "expression", "work"],
-    &["data"],
-    &["math"],
-    &["linalg"],
-];
-
-/// Uses that go up a layer, with the reason.
-const UPWARD: [(&str, &str, &str); 3] = [
-    ("math/transform", "plugin", "what changes its coordinates is a `Target` too"),
-    (
-        "math/optimise",
-        "plugin",
-        "what is maximised is a `Target`, the density that samplers draw from",
-    ),
-    ("math/optimise", "run", "a density without a maximum stops the run"),
+/// Crates of this project that each crate may depend on.
+const ARROWS: [(&str, &[&str]); 12] = [
+    ("core/base", &[]),
+    ("core/linalg", &["lacuna-base"]),
+    ("core/optimise", &["lacuna-base", "lacuna-linalg"]),
+    ("core/api", &["lacuna-base"]),
+    ("core/abi", &["lacuna"]),
+    ("core/run", &["lacuna"]),
+    ("core/engine", &["lacuna", "lacuna-abi", "lacuna-linalg", "lacuna-optimise", "lacuna-run"]),
+    ("core/contract", &["lacuna", "lacuna-linalg", "lacuna-run"]),
+    ("sdk", &["lacuna", "lacuna-abi", "lacuna-linalg"]),
+    ("um_bridge", &[]),
+    ("plugins", &["lacuna", "lacuna-linalg", "lacuna-optimise", "lacuna-run", "lacuna-um-bridge"]),
+    ("cli", &["lacuna", "lacuna-engine", "lacuna-plugins", "lacuna-run", "lacuna-um-bridge"]),
 ];
 
 struct Source {
-    /// From the root of the project, with forward slashes.
+    /// Path from the root of the project, with forward slashes.
     name: String,
     text: String,
 }
@@ -56,7 +44,7 @@ impl Source {
             || self.name.ends_with("/tests.rs")
     }
 
-    /// The lines of the program itself with their numbers: no comments, nothing after `#[cfg(test)]` blocks begin.
+    /// Lines of code with their numbers: without comments, up to the first `#[cfg(test)]` block.
     fn program(&self) -> impl Iterator<Item = (usize, &str)> {
         let in_tests = self.text.find("#[cfg(test)]\nmod tests {").unwrap_or(self.text.len());
         let lines = self.text[..in_tests].lines().enumerate().map(|(i, line)| (i + 1, line));
@@ -131,7 +119,9 @@ fn nothing_is_unfinished_or_of_one_machine() {
 fn nothing_is_unsafe() {
     let mut found = Vec::new();
     let boundary = |source: &&Source| {
-        source.name.starts_with("core/src/plugin/abi/") || source.name == "sdk/src/lib.rs"
+        ["core/abi/", "core/engine/src/host/", "sdk/src/"]
+            .iter()
+            .any(|folder| source.name.starts_with(folder))
     };
     for source in rust().iter().filter(|source| !boundary(source)) {
         for (i, line) in source.program() {
@@ -141,10 +131,10 @@ fn nothing_is_unsafe() {
             }
         }
     }
-    none(&found, "`unsafe` outside `core/src/plugin/abi` and the macro of the SDK");
+    none(&found, "`unsafe` outside `core/abi`, `core/engine/src/host` and the SDK");
 }
 
-/// The names after `dependencies]` of a manifest.
+/// Names of the dependencies of a manifest.
 fn dependencies(krate: &str) -> Vec<String> {
     let path = root().join(krate).join("Cargo.toml");
     let manifest: toml::Table = fs::read_to_string(path).unwrap().parse().unwrap();
@@ -153,62 +143,130 @@ fn dependencies(krate: &str) -> Vec<String> {
 }
 
 #[test]
-fn crates_depend_one_way() {
-    for (krate, above) in [
-        ("core/linalg", &["lacuna", "lacuna-plugins", "lacuna-cli"][..]),
-        ("core", &["lacuna-plugins", "lacuna-cli"]),
-        ("plugins", &["lacuna-cli"]),
-    ] {
-        let found = dependencies(krate);
-        let wrong: Vec<&String> = found.iter().filter(|d| above.contains(&d.as_str())).collect();
+fn crates_use_those_below_them_alone() {
+    for (krate, below) in ARROWS {
+        let own = |name: &String| name == "lacuna" || name.starts_with("lacuna-");
+        let found: Vec<String> = dependencies(krate).into_iter().filter(own).collect();
+        let wrong: Vec<&String> = found.iter().filter(|d| !below.contains(&d.as_str())).collect();
         assert!(wrong.is_empty(), "{krate} depends on {wrong:?}");
     }
+    // The crates of a plugin library build without the engine, and without faer unless it is requested.
+    let sdk: toml::Table =
+        fs::read_to_string(root().join("sdk/Cargo.toml")).unwrap().parse().unwrap();
+    assert_eq!(sdk["dependencies"]["lacuna-linalg"]["optional"].as_bool(), Some(true));
 }
 
-/// The modules of the core that a line uses.
-fn used(line: &str) -> impl Iterator<Item = &str> {
-    line.split("crate::")
-        .skip(1)
-        .filter_map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_').next())
+/// Names directly below a module, such as `crate::`, that a file uses.
+fn used(source: &Source, module: &str) -> Vec<String> {
+    let text: String = source.program().map(|(_, line)| format!("{line}\n")).collect();
+    let word = |rest: &str| {
+        let end = rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len());
+        rest[..end].to_owned()
+    };
+    let names = |rest: &str| match rest.strip_prefix('{') {
+        Some(list) => {
+            let end = list.find('}').unwrap_or(list.len());
+            list[..end].split(',').map(|name| word(name.trim())).collect()
+        }
+        None => vec![word(rest)],
+    };
+    text.split(module).skip(1).flat_map(names).collect()
+}
+
+/// Dependencies between the modules of a crate, by the module that uses the others. A name that the root of the crate
+/// re-exports stands for its module.
+fn uses(krate: &str) -> BTreeMap<String, BTreeSet<String>> {
+    let folder = format!("{krate}/src/");
+    let root = fs::read_to_string(root().join(&folder).join("lib.rs")).unwrap();
+    let exports = root.lines().filter_map(|line| line.strip_prefix("pub use ")?.split_once("::"));
+    let module_of = |name: String| {
+        let words = |text: &str| text.split(['{', '}', ',', ';', ' ']).any(|word| word == name);
+        let found = exports.clone().find(|(_, exported)| words(exported));
+        found.map_or(name.clone(), |(module, _)| module.to_owned())
+    };
+    let mut all: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for source in sources(&[&folder], "rs").iter().filter(|source| !source.is_test()) {
+        let inside = source.name.strip_prefix(&folder).unwrap();
+        let module = inside.split(['/', '.']).next().unwrap().to_owned();
+        let others =
+            used(source, "crate::").into_iter().map(module_of).filter(|other| *other != module);
+        let others: Vec<String> = others.collect();
+        all.entry(module).or_default().extend(others);
+    }
+    all.remove("lib");
+    all
+}
+
+/// Circles among modules: repeatedly removes a module that uses none of the remaining ones; a circle is never removed.
+fn circles(mut left: BTreeMap<String, BTreeSet<String>>) -> BTreeMap<String, BTreeSet<String>> {
+    while let Some(bottom) =
+        left.iter().find(|(_, others)| !others.iter().any(|o| left.contains_key(o)))
+    {
+        let bottom = bottom.0.clone();
+        left.remove(&bottom);
+    }
+    left
 }
 
 #[test]
-fn modules_of_the_core_depend_one_way() {
-    let rank = |module: &str| LAYERS.iter().position(|layer| layer.contains(&module));
-    let mut found = Vec::new();
-    for source in sources(&["core/src"], "rs").iter().filter(|source| !source.is_test()) {
-        let inside = source.name.strip_prefix("core/src/").unwrap();
-        let module = inside.split(['/', '.']).next().unwrap();
-        if module == "lib" {
-            continue;
-        }
-        let own = rank(module).unwrap_or_else(|| panic!("`{module}` is in no layer"));
-        for (i, line) in source.program() {
-            for other in used(line) {
-                let allowed =
-                    UPWARD.iter().any(|(from, to, _)| inside.starts_with(from) && *to == other);
-                if rank(other).is_some_and(|other| other < own) && !allowed {
-                    found.push(format!("{}:{i}: {}", source.name, line.trim()));
-                }
-            }
-        }
+fn modules_of_a_crate_use_each_other_one_way() {
+    for krate in ARROWS.iter().map(|(krate, _)| krate).filter(|krate| krate.starts_with("core/")) {
+        let left = circles(uses(krate));
+        assert!(left.is_empty(), "modules of {krate} that use each other in a circle: {left:?}");
     }
-    none(&found, "uses that go up a layer");
 }
 
-/// Words of the engine's own that are also the name of a plugin.
-const WORDS: [(&str, &str); 6] = [
-    // The executor of a study that chooses none.
-    ("core/src/study/resolve.rs", "local"),
-    // The indices.
-    ("core/src/report/summary/mod.rs", "sobol"),
-    // What the parameters do from condition to condition.
-    ("core/src/report/summary/gap.rs", "drift"),
-    // The replicates' own.
-    ("core/src/report/section/gap/tables.rs", "offset"),
-    // The distribution.
-    ("core/src/math/distribution/mod.rs", "student_t"),
-    ("core/src/math/distribution/written.rs", "student_t"),
+#[test]
+fn parts_of_the_gap_workflow_use_each_other_one_way() {
+    let folder = "core/engine/src/gap/";
+    let mut parts: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for source in sources(&[folder], "rs").iter().filter(|source| !source.is_test()) {
+        let inside: Vec<&str> = source.name[folder.len()..].split(['/', '.']).collect();
+        let part = inside[0].to_owned();
+        // The module itself, and the experiments that tests make.
+        if ["mod", "testing"].contains(&inside[0]) {
+            continue;
+        }
+        let mut others = used(source, "crate::gap::");
+        if inside.len() == 2 || inside[1] == "mod" {
+            others.extend(used(source, "super::"));
+        }
+        parts.entry(part.clone()).or_default().extend(others.into_iter().filter(|o| *o != part));
+    }
+    assert!(parts.len() > 10, "{parts:?}");
+    let left = circles(parts);
+    assert!(left.is_empty(), "parts of the gap that use each other in a circle: {left:?}");
+}
+
+/// A doc comment begins with its subject: words such as these begin a riddle.
+#[test]
+fn doc_comments_begin_with_their_subject() {
+    let riddles = ["What", "Where", "Whether", "Its"];
+    let mut wrong = Vec::new();
+    for source in sources(&["core", "plugins", "cli", "sdk", "um_bridge", "tests", "bench"], "rs") {
+        let mut in_comment = false;
+        for (i, line) in source.text.lines().enumerate() {
+            let line = line.trim_start();
+            let text = line.strip_prefix("///").or_else(|| line.strip_prefix("//!"));
+            let first = text.and_then(|text| text.split_whitespace().next()).unwrap_or_default();
+            if text.is_some() && !in_comment && riddles.contains(&first) {
+                wrong.push(format!("{}:{}: {line}", source.name, i + 1));
+            }
+            in_comment = text.is_some();
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Words of the engine that are also names of plugins.
+const WORDS: [(&str, &str); 4] = [
+    // The default executor.
+    ("core/engine/src/study/table.rs", "local"),
+    // Offsets of replicates.
+    ("core/engine/src/gap/report/tables.rs", "offset"),
+    // Distribution.
+    ("core/base/src/math/distribution/mod.rs", "student_t"),
+    ("core/base/src/math/distribution/written.rs", "student_t"),
 ];
 
 #[test]
@@ -218,7 +276,7 @@ fn the_core_names_no_plugin() {
         kinds.iter().flat_map(|kind| kind.plugins()).map(|plugin| plugin.name).collect();
     assert!(names.len() > 8, "{names:?}");
     let mut found = Vec::new();
-    for source in sources(&["core/src"], "rs").iter().filter(|source| !source.is_test()) {
+    for source in sources(&["core"], "rs").iter().filter(|source| !source.is_test()) {
         for (i, line) in source.program() {
             let quoted =
                 |name: &str| ["\"", "`"].iter().any(|q| line.contains(&format!("{q}{name}{q}")));

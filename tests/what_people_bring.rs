@@ -1,13 +1,13 @@
-//! What new users do with studies: take sections out, leave names out, use names from elsewhere, inherit readers.
+//! Typical changes of new users to studies: sections removed, names left out, names from elsewhere, inherited readers.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use lacuna::study::resolve;
+use lacuna_engine::study::resolve;
 
 use crate::quick::{self, replace};
 
-/// A study of `a + b t` by a command that counts how often it is called, without measurements.
+/// A study of `a + b t` without measurements, whose model is a command that counts its calls.
 const STUDY: &str = "\
 [study]
 title = \"A line\"
@@ -68,7 +68,7 @@ fn a_campaign_stops_when_its_first_run_fails_and_none_may() {
     let stop = quick::run(&path, &[], &out).err().expect("the study stops").to_string();
     assert!(
         stop.starts_with(
-            "the first run, `run001`, failed, and no run may fail; the others are not made: "
+            "the first run, `run001`, failed, and no run may fail, so the others are not made: "
         ),
         "{stop}"
     );
@@ -76,7 +76,7 @@ fn a_campaign_stops_when_its_first_run_fails_and_none_may() {
     assert!(stop.contains("0 of 20 runs"), "{stop}");
     // The thread may have begun the next ones.
     assert!(calls(folder.path()) <= 5, "{}", calls(folder.path()));
-    // Where some may fail, all are tried, and a run that fails later costs itself only.
+    // If some runs may fail, all are tried, and a run that fails later affects only itself.
     let path = line(folder.path(), &format!("test $3 = run001 && exit 3\n{SOUND}"));
     fs::remove_file(folder.path().join("calls")).unwrap();
     let settings = ["simulations.use=netcdf", "simulations.allow_failed=1"];
@@ -94,7 +94,7 @@ fn a_campaign_stops_when_its_first_run_fails_and_none_may() {
     assert_eq!(calls(folder.path()), 20);
 }
 
-/// An inherited reader is for what the simulator of the other study wrote.
+/// An inherited reader is meant for the output of the other study's simulator.
 #[test]
 fn results_that_lacuna_wrote_are_read_whatever_reader_is_named() {
     let folder = tempfile::tempdir().unwrap();
@@ -129,15 +129,21 @@ fn a_section_that_is_false_is_taken_out() {
         resolve::load(&path, &[])
     };
     let whole = load("").study.unwrap();
-    assert!(whole.numerical_error.is_some() && whole.measurements.unwrap().common.screen.is_some());
+    assert!(
+        whole.numerical_error.is_some()
+            && whole.plugins.measurements.unwrap().common.screen.is_some()
+    );
     let less = load("numerical_error = false\n[measurements]\nscreen = false\n");
     let less = less.study.unwrap_or_else(|| panic!("the study has problems"));
-    assert!(less.numerical_error.is_none() && less.measurements.unwrap().common.screen.is_none());
+    assert!(
+        less.numerical_error.is_none()
+            && less.plugins.measurements.unwrap().common.screen.is_none()
+    );
     assert!(!less.resolved.contains_key("numerical_error"));
-    // A chain may bring it back, and the command line may take it out.
+    // A further study may bring the section back, and the command line may remove it.
     let set = resolve::load(&base, &["numerical_error=false".to_owned()]).study.unwrap();
     assert!(set.numerical_error.is_none());
-    // What a study needs cannot be taken out, and a misspelt section is no section.
+    // A required section cannot be removed, and a misspelt section is an error.
     let said = load("response = false\n").complaints();
     assert!(said.contains("the study has no `[response]`"), "{said}");
     let said = load("numerical_eror = false\n").complaints();
@@ -171,7 +177,7 @@ fn names_from_elsewhere_are_answered() {
     assert!(said.contains("did you mean `latin_hypercube`?"), "{said}");
 }
 
-/// The aliases of plugins of one kind: each of one plugin, and the name of none.
+/// An alias belongs to one plugin of its kind and is not the name of any.
 #[test]
 fn aliases_are_of_one_plugin() {
     use lacuna::plugin::registry::{Kind, entries};
@@ -210,14 +216,14 @@ fn studies_without_names_do_not_share_a_run_directory() {
     let of = |name: &str| folder.path().join(name).display().to_string();
     run("a/study.toml");
     run("b/study.toml");
-    // Again, in any order, each finds its own.
+    // Repeated, in any order, each finds its own directory.
     run("b/study.toml");
     run("a/study.toml");
     assert_eq!((belongs("study"), belongs("b-study")), (of("a/study.toml"), of("b/study.toml")));
     let all = fs::read_dir(folder.path().join("runs")).unwrap().count();
     assert_eq!(all, 2);
     assert_eq!((calls(&folder.path().join("a")), calls(&folder.path().join("b"))), (20, 20));
-    // A name that is written is taken as it is; one that is inherited is another's.
+    // A name that is written out is used as it is; an inherited one belongs to the other study.
     let text = fs::read_to_string(folder.path().join("a/study.toml")).unwrap();
     fs::write(
         folder.path().join("a/study.toml"),

@@ -1,4 +1,4 @@
-//! Worked studies of cheap models, run as they are shipped, against closed forms.
+//! Shipped studies of cheap models, run as they are, compared with closed forms.
 
 use std::path::Path;
 
@@ -6,14 +6,14 @@ use serde_json::Value;
 
 use crate::quick;
 
-/// Runs a study of `configs`; its summary.
+/// Runs a study of `configs` and returns its summary.
 fn summary(study: &str, settings: &[&str], out: &Path) -> Value {
     let path = quick::root().join("configs").join(study);
     quick::run(&path, settings, out).unwrap_or_else(|stop| panic!("{stop}"));
     quick::summary(out)
 }
 
-/// Means and standard deviations of a normal posterior within four Monte Carlo errors, which are `sd / √n` and
+/// Checks means and standard deviations of a normal posterior to four Monte Carlo errors, which are `sd / √n` and
 /// `sd / √2n` for `n` independent draws.
 pub fn is_normal(summary: &Value, exact: &[(&str, f64, f64)]) {
     assert_eq!(summary["converged"], true, "{}", summary["verdict"]);
@@ -45,8 +45,9 @@ const RECORDS: [(&str, f64, f64); 8] = [
 ];
 const RECORDS_EVIDENCE: f64 = 736.335_411;
 
-/// The posterior of `y = X θ + e` with `e ~ N(0, s²)` and `θ ~ N(m, S)`: `V = (S⁻¹ + X'X/s²)⁻¹` and `V (S⁻¹ m + X'y/s²)`;
-/// the evidence is `N(y; X m, X S X' + s²)`. Computed with `numpy` from the tables of the studies.
+/// The posterior of `y = X θ + e` with `e ~ N(0, s²)` and `θ ~ N(m, S)`: `V = (S⁻¹ + X'X/s²)⁻¹` and
+/// `V (S⁻¹ m + X'y/s²)`; the evidence is `N(y; X m, X S X' + s²)`. Computed with `numpy` from the tables of the
+/// studies.
 #[test]
 fn records_of_different_lengths_have_the_posterior_of_the_closed_form() {
     let folder = tempfile::tempdir().unwrap();
@@ -55,8 +56,8 @@ fn records_of_different_lengths_have_the_posterior_of_the_closed_form() {
     has_evidence(&found, RECORDS_EVIDENCE);
     assert_eq!(found["data"]["count"], 243);
     assert!(found["surrogate"].is_null() && found["runs"].is_null());
-    // asin(resistance / gravity) in degrees, to first order about the means: the relative deviations are 0.4 % and
-    // 1.1 %, with the correlation 0.887.
+    // asin(resistance / gravity) in degrees, to first order about the means: the relative standard deviations are 0.4 %
+    // and 1.1 %, with correlation 0.887.
     let angle = &found["parameters"]["resting_angle"];
     assert_eq!((angle["role"].as_str(), angle["unit"].as_str()), (Some("derived"), Some("deg")));
     let ratio: f64 = 0.342_941 / 9.759_317;
@@ -88,7 +89,7 @@ fn records_with_a_surrogate_have_the_same_posterior() {
     assert_eq!(found["runs"]["used"], 64);
 }
 
-/// The closed form stands in the README of the study.
+/// The closed form is in the README of the study.
 #[test]
 fn a_line_of_equations_has_the_posterior_of_the_closed_form() {
     let folder = tempfile::tempdir().unwrap();
@@ -97,7 +98,7 @@ fn a_line_of_equations_has_the_posterior_of_the_closed_form() {
     has_evidence(&found, 2.465);
 }
 
-/// `Σ x y / Σ x²` with the standard deviation `0.01 / √Σ x²` (README of the study): the paper's bias.
+/// `Σ x y / Σ x²` with standard deviation `0.01 / √Σ x²` (README of the study): the bias described in the paper.
 #[test]
 fn the_simple_machine_is_precise_and_wrong() {
     let folder = tempfile::tempdir().unwrap();
@@ -122,7 +123,7 @@ fn an_oscillator_of_equations_finds_its_truth() {
 const CHAIN: [(&str, f64); 4] =
     [("peak", 40.0), ("stiffness", 90.0), ("damping", 1.5), ("lag", 0.06)];
 
-/// The data were made by `examples/blow.py` with the load of the first study; the second swaps that part.
+/// The data were made by `examples/blow.py` with the load of the first study; the second study replaces that part.
 #[test]
 fn a_chain_finds_its_truth_and_the_evidence_tells_its_load_from_another() {
     let short = ["design.runs=400", "sampler.warm_up=200", "sampler.steps=300"];
@@ -138,8 +139,8 @@ fn a_chain_finds_its_truth_and_the_evidence_tells_its_load_from_another() {
     assert!(evidence(&right) - evidence(&wrong) > 100.0);
 }
 
-/// A command in place of a formula: a part with another `use` is called and gives what it did; its model's options,
-/// `output` too, are its own.
+/// A command in place of a formula: a part with another `use` is called and gives the same result; the options of its
+/// model, including `output`, belong to it.
 #[test]
 fn a_part_of_a_chain_is_swapped_by_its_use() {
     let path = quick::root().join("configs/composed/study.toml");

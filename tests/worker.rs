@@ -1,17 +1,18 @@
-//! The program that executors start in the tests of their contract: it knows the model of the suite.
+//! The program that executors start in the tests of their contract; it contains the model of the suite.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use lacuna::contract::Line;
 use lacuna::plugin::Model;
-use lacuna::work::{Assignment, Limits, work};
+use lacuna_contract::Line;
+use lacuna_engine::host::library;
+use lacuna_run::work::{Assignment, Limits, work};
 // The other models.
 use lacuna_plugins as _;
 
 lacuna::register!(Model, "contract_line", Line);
 
-/// `worker work ORDER [--task K] [--parallel N]`
+/// Usage: `worker work ORDER [--task K] [--parallel N]`.
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().collect();
     let after = |flag: &str| {
@@ -25,7 +26,7 @@ fn main() -> ExitCode {
         parallel: after("--parallel").unwrap_or(1),
         limits: Limits::default(),
     };
-    match work(&assignment, &mut std::io::stdin().lock(), &mut std::io::stdout()) {
+    match work(&assignment, &library::load, &mut std::io::stdin().lock(), &mut std::io::stdout()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(stop) => {
             eprintln!("{stop}");

@@ -1,4 +1,4 @@
-"""What the peers' jobs share: the problem that `peers problem` wrote, the clock, the basis, the figures.
+"""Code shared by the peers' jobs: the problem that `peers problem` wrote, the clock, the basis, the output.
 
 Every job is called as `python JOB.py FOLDER` and writes `FOLDER/PEER_JOB.json`. Seconds are processor time of
 all threads of this process, as on Lacuna's side.
@@ -18,13 +18,13 @@ LOW, HIGH = np.array(HEADER["ranges"]).T
 
 
 def array(name, columns=None):
-    """An array of the problem; `columns` for those that are not in its header."""
+    """Reads an array of the problem; `columns` is needed for arrays that are not in its header."""
     shape = HEADER["shapes"][name] if columns is None else (-1, columns)
     return np.fromfile(FOLDER / f"{name}.f64", "<f8").reshape(shape)
 
 
 def write(name, **figures):
-    """Writes the figures of a job with the versions that made them."""
+    """Writes the results of a job with the versions of the packages that made them."""
     figures["load"] = os.getloadavg()[0]
     text = json.dumps(figures, indent=2, default=float)
     (FOLDER / f"{name}.json").write_text(text)
@@ -32,19 +32,19 @@ def write(name, **figures):
 
 
 def timed(call):
-    """What a call returns, and its processor time."""
+    """Result of a call, and its processor time in seconds."""
     begun = time.process_time()
     value = call()
     return value, time.process_time() - begun
 
 
 def standard(points):
-    """Points in [-1, 1]."""
+    """Points scaled to [-1, 1]."""
     return (2.0 * points - (LOW + HIGH)) / (HIGH - LOW)
 
 
 def root_mean_square(residuals):
-    """Of each column."""
+    """Root mean square of each column."""
     return np.sqrt(np.mean(residuals**2, axis=0))
 
 
@@ -57,7 +57,7 @@ class Basis:
         self.norms = np.sqrt(2.0 * np.arange(self.degree + 1) + 1.0)
 
     def __call__(self, points):
-        """The terms at each point, `terms x points`: whole rows are copied and multiplied."""
+        """Terms at each point, `terms x points`: whole rows are copied and multiplied."""
         z = standard(points).T
         table = np.empty((self.degree + 1, *z.shape))
         table[0] = 1.0
@@ -72,7 +72,7 @@ class Basis:
 
 
 def total_degree(dimension, degree):
-    """All exponents up to a total degree, lower degrees first."""
+    """All exponents up to a total degree, in order of the degree."""
     grid = np.indices([degree + 1] * dimension).reshape(dimension, -1).T
     sums = grid.sum(axis=1)
     kept = grid[sums <= degree]

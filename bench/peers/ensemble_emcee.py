@@ -1,6 +1,6 @@
 """emcee's ensemble: 120 walkers, 1200 steps, from Lacuna's starting points, densities of half the walkers at once.
 
-Both the density by sufficient statistics and the one with a hand-made QR reduction; the walk alone is timed. The
+Runs both the density by sufficient statistics and the one with a hand-made QR reduction; only the sampling is timed. The
 densities at the starting points are compared with Lacuna's.
 """
 
@@ -15,7 +15,7 @@ STEPS = 1200
 
 
 def walk(emulator, squares):
-    """One run and its figures."""
+    """One run and its results."""
     starts = array(f"{emulator}_start", 4)
     theirs = array(f"{emulator}_start_log_density", 1)[:, 0]
     density = Posterior(HEADER, emulator, squares)

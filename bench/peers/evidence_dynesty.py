@@ -1,6 +1,6 @@
 """The evidence by dynesty: 500 live points, random walks, until 0.1 of the logarithm remains.
 
-The density is the one with the QR reduction; dynesty asks for one point at a time. The emulator is the
+The density is the one with the QR reduction; dynesty evaluates one point at a time. The emulator is the
 smaller one, of degree 10.
 """
 
@@ -23,7 +23,7 @@ def log_likelihood(natural):
 
 
 def transform(unit):
-    """From the unit cube to the prior."""
+    """Maps the unit cube to the prior."""
     variance = max(density.scale * ndtri(0.5 + 0.5 * unit[3]), 1e-300)
     return np.append(LOW + unit[:3] * (HIGH - LOW), variance)
 

@@ -1,8 +1,8 @@
 """Sparse expansions by OpenTURNS: least-angle regression and the corrected leave-one-out error.
 
 OpenTURNS has no search over degrees. Degree 10 is fitted with the decomposition it takes by default (SVD) and with
-Cholesky's, the fastest of its three; degree 20 with Cholesky's. It shares nothing between outputs, so that a
-few of them tell the time of all.
+Cholesky's, the fastest of its three; degree 20 with Cholesky's. It shares nothing between outputs, so that the
+time of all follows from that of a few.
 """
 
 import numpy as np
@@ -26,7 +26,7 @@ basis = ot.OrthogonalProductPolynomialFactory([ot.LegendreFactory()] * len(LOW),
 
 
 def fit(output, size):
-    """The expansion of one output among so many terms."""
+    """Expansion of one output, selected from the given number of terms."""
     selection = ot.LeastSquaresMetaModelSelectionFactory(ot.LARS(), ot.CorrectedLeaveOneOut())
     algorithm = ot.FunctionalChaosAlgorithm(
         points,
@@ -40,7 +40,7 @@ def fit(output, size):
 
 
 def case(degree, decomposition, outputs):
-    """The figures of one way to fit."""
+    """Results of one fitting method."""
     ot.ResourceMap.SetAsString("LeastSquaresMetaModelSelection-DecompositionMethod", decomposition)
     size = enumeration.getBasisSizeFromTotalDegree(degree)
     fits, seconds = timed(lambda: [fit(output, size) for output in outputs])

@@ -3,8 +3,8 @@
 Least-angle regression ranks the terms of a degree, at most 220 of them; each set of first terms is fitted by
 least squares and judged by its leave-one-out error times the factor of Chapelle, Vapnik and Bengio (2002),
 `N / (N - P) (1 + tr (Psi' Psi)^-1)`. An output is done when two degrees in a row were worse than its best one.
-The QR grows by one column a term (Gram-Schmidt, done twice), so that a whole path costs one factorisation.
-Every fiftieth output is fitted; the bases of all degrees are made beforehand and not counted.
+The QR grows by one column per term (Gram-Schmidt, done twice), so that a whole path costs one factorisation.
+Every fiftieth output is fitted; the bases of all degrees are computed beforehand and not timed.
 """
 
 import numpy as np
@@ -26,7 +26,7 @@ runs = len(points)
 
 
 def standardised(columns):
-    """Columns of mean zero and length one."""
+    """Columns shifted to mean zero and scaled to length one."""
     centred = columns - columns.mean(axis=0)
     return centred / np.linalg.norm(centred, axis=0)
 
@@ -35,7 +35,7 @@ REGRESSORS = np.asfortranarray(standardised(design[:, 1:]))
 
 
 def path_errors(order, y):
-    """The corrected leave-one-out error of each set of first terms."""
+    """Corrected leave-one-out error of each leading set of terms."""
     q = np.empty((runs, len(order)), order="F")
     inverse = np.zeros((len(order), len(order)))
     residual, leverage, trace = y.copy(), np.zeros(runs), 0.0

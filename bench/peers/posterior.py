@@ -1,9 +1,9 @@
 """The log posterior in NumPy, for many points at once: Lacuna's coefficients, its priors, its coordinates.
 
-Coordinates are the three parameters and the logarithm of the variance, whose Jacobian the density carries.
+Coordinates are the three parameters and the logarithm of the variance, whose Jacobian the density includes.
 `sufficient` uses count, mean and scatter of the curves of each output; `reduced` further replaces the residual of
 the mean curve, `mean - C' psi`, by the triangular factor of `[C' mean]`, which has as many rows as terms, and
-then leaves out the directions in it that are below round-off.
+then omits the directions that are below round-off.
 """
 
 import numpy as np
@@ -43,7 +43,7 @@ class Posterior:
         return np.einsum("ij,ij->i", difference, difference)
 
     def __call__(self, coordinates):
-        """The log density at each row."""
+        """Log density at each row."""
         points, logs = coordinates[:, :3], coordinates[:, 3]
         density = np.full(len(points), -np.inf)
         inside = np.all((points >= LOW) & (points <= HIGH), axis=1)

@@ -1,4 +1,4 @@
-"""The ratios beside the goals, from the figures of all jobs: `python table.py FOLDER`."""
+"""Table of measured ratios and goals, from the results of all jobs: `python table.py FOLDER`."""
 
 import json
 
@@ -10,20 +10,20 @@ ROWS = [["job", "peer", "peer, CPU s", "Lacuna, CPU s", "ratio", "goal", ""]]
 
 
 def figures(name):
-    """What a job wrote; nothing when it has not run."""
+    """Results that a job wrote; `None` if it has not run."""
     path = FOLDER / f"{name}.json"
     return json.loads(path.read_text()) if path.exists() else None
 
 
 def row(job, peer, theirs, ours, goal, scale=1.0):
-    """A line with the ratio of two times, the second one scaled to equal error."""
+    """Line with the ratio of two times, the second scaled to equal error."""
     ratio = theirs / (ours * scale)
     verdict = "met" if ratio >= goal else "**missed**"
     ROWS.append([job, peer, f"{theirs:.3g}", f"{ours:.3g}", f"{ratio:.3g}", f">= {goal}", verdict])
 
 
 def compare_errors(job, peer, theirs, ours):
-    """A line with the means of two errors."""
+    """Line with the means of two errors."""
     theirs, ours = np.mean(theirs), np.mean(ours)
     verdict = "met" if ours <= theirs else "**missed**"
     goal = "no worse"

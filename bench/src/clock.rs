@@ -1,9 +1,8 @@
-//! Processor time: on a machine that does other things too, the only clock that tells about the program.
+//! Processor time: the only reliable clock on a machine that also runs other programs.
 
-use std::fs;
-use std::io;
+use std::{fs, io};
 
-/// The processor time of all threads so far, as Linux tells it.
+/// Processor time of all threads so far, in seconds, as reported by Linux.
 pub fn processor_seconds() -> io::Result<f64> {
     let mut nanoseconds = 0.0;
     for task in fs::read_dir("/proc/self/task")? {
@@ -15,20 +14,20 @@ pub fn processor_seconds() -> io::Result<f64> {
     Ok(nanoseconds / 1e9)
 }
 
-/// What a call returns, and its processor time.
+/// Result of a call, and its processor time in seconds.
 pub fn timed<T>(call: impl FnOnce() -> T) -> io::Result<(T, f64)> {
     let begun = processor_seconds()?;
     let value = call();
     Ok((value, processor_seconds()? - begun))
 }
 
-/// The processor time of a short call: the least of several means, since other programs only add.
+/// Processor time of a short call, in seconds: the smallest of several means, because other programs can only add time.
 pub fn per_call(mut call: impl FnMut()) -> io::Result<f64> {
     let (mut calls, mut least) = (1, f64::INFINITY);
     let mut repeats = 0;
     while repeats < 5 {
         let ((), seconds) = timed(|| (0..calls).for_each(|_| call()))?;
-        // The system counts in steps of milliseconds.
+        // The system counts in milliseconds.
         if seconds < 0.2 {
             calls *= 2;
         } else {

@@ -1,3 +1,3 @@
-//! What the benches share.
+//! Code shared by the benchmarks.
 
 pub mod clock;

@@ -1,66 +1,67 @@
-//! `campaign`: the runs of a run directory.
+//! Command `campaign`: the runs of a run directory.
 
 use std::path::{Path, PathBuf};
 
-use lacuna::campaign;
 use lacuna::plugin::Reader;
 use lacuna::plugin::registry::from_text;
-use lacuna::run::{RunDirectory, Stop};
-use lacuna::study::resolve::Use;
+use lacuna::run::Stop;
+use lacuna_engine::campaign;
+use lacuna_engine::study::resolve::Use;
+use lacuna_run::RunDirectory;
 
 use crate::progress::Terminal;
 use crate::study::kept_study_for;
-use crate::{Failure, print};
+use crate::{misuse, print};
 
-/// What is done with the runs.
+/// Operation on the runs.
 #[derive(clap::Subcommand)]
 pub enum Campaign {
-    /// Show where each run is, with reasons.
+    /// Show the state of each run, with reasons
     Status {
         /// The run directory.
         run: PathBuf,
-        /// Show the runs that are done too.
+        /// Include the runs that are done
         #[arg(long)]
         all: bool,
         /// Print JSON.
         #[arg(long)]
         json: bool,
     },
-    /// Make the runs that failed or are missing, and nothing else.
+    /// Repeat the runs that failed or are missing, and nothing else
     Retry {
         /// The run directory.
         run: PathBuf,
     },
-    /// End all jobs that run or wait on the cluster.
+    /// Cancel all jobs that run or are queued on the cluster
     Cancel {
         /// The run directory.
         run: PathBuf,
     },
-    /// Add runs to the design without moving those that are there.
+    /// Add runs to the design; existing points are kept
     Extend {
         /// The run directory.
         run: PathBuf,
-        /// How many runs are added.
+        /// Number of runs to add
         #[arg(long, value_name = "N")]
         runs: std::num::NonZeroUsize,
     },
-    /// Take in finished runs that were made by hand.
+    /// Import finished runs that were made by hand
     Import {
         /// The run directory.
         run: PathBuf,
-        /// CSV with the columns `run`, `file` and one a parameter.
+        /// CSV file with the columns `run`, `file` and one per parameter
         table: PathBuf,
-        /// The reader of the files; when left out, that of the study's `[simulations]`.
+        /// Reader of the files (default: that of the study's `[simulations]`)
         #[arg(long, value_name = "NAME")]
         reader: Option<String>,
-        /// An option of the reader, such as `variable="strain_{sensor}"`; may be given more than once.
+        /// Option of the reader, such as `variable="strain_{sensor}"`; may be repeated
         #[arg(long = "option", value_name = "KEY=VALUE", requires = "reader")]
         options: Vec<String>,
     },
 }
 
-/// `lacuna campaign …`
-pub fn campaign(what: &Campaign) -> Result<(), Failure> {
+/// Runs `lacuna campaign …`.
+pub fn campaign(what: &Campaign) -> anyhow::Result<()> {
     match what {
         Campaign::Status { run, all, json } => status(run, *all, *json),
         Campaign::Retry { run } => retry(run),
@@ -72,7 +73,7 @@ pub fn campaign(what: &Campaign) -> Result<(), Failure> {
     }
 }
 
-fn status(folder: &Path, all: bool, json: bool) -> Result<(), Failure> {
+fn status(folder: &Path, all: bool, json: bool) -> anyhow::Result<()> {
     let study = kept_study_for(folder, Use::Look)?;
     let executor = study.executor.as_ref().map(|section| &*section.built.plugin);
     let status = campaign::status(folder, executor, RunDirectory::is_busy(folder))?;
@@ -86,30 +87,30 @@ fn status(folder: &Path, all: bool, json: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-fn retry(folder: &Path) -> Result<(), Failure> {
+fn retry(folder: &Path) -> anyhow::Result<()> {
     let study = kept_study_for(folder, Use::Run)?;
     let mut run = RunDirectory::open(folder)?;
     let failed = campaign::retry(&study, &mut run, &Terminal::new())?;
     if failed > 0 {
         let plural = if failed == 1 { "run has" } else { "runs have" };
         let stop = Stop::new(format!("{failed} {plural} failed again"));
-        let help = format!("`lacuna campaign status {}` says why", folder.display());
+        let help = format!("`lacuna campaign status {}` shows why", folder.display());
         return Err(stop.help(help).into());
     }
-    print(&format!("all runs are done; `lacuna resume {}` goes on with them", folder.display()));
+    print(&format!("all runs are done; `lacuna resume {}` continues with them", folder.display()));
     Ok(())
 }
 
-fn cancel(folder: &Path) -> Result<(), Failure> {
+fn cancel(folder: &Path) -> anyhow::Result<()> {
     let study = kept_study_for(folder, Use::Look)?;
     let executor = study.executor.as_ref().ok_or_else(|| Stop::new("the study has no executor"))?;
     let stopped = campaign::cancel(folder, &*executor.built.plugin)?;
     if stopped == 0 {
-        print("no job of this campaign runs or waits");
+        print("no job of this campaign is running or queued");
         return Ok(());
     }
     let help = if RunDirectory::is_busy(folder) {
-        "the process that waits for them will say that they were cancelled".to_owned()
+        "the waiting process will report them as cancelled".to_owned()
     } else {
         format!("`lacuna resume {}` submits them again", folder.display())
     };
@@ -117,7 +118,7 @@ fn cancel(folder: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-fn extend(folder: &Path, runs: usize) -> Result<(), Failure> {
+fn extend(folder: &Path, runs: usize) -> anyhow::Result<()> {
     let run = RunDirectory::open(folder)?;
     let grown = campaign::extend(&run, runs)?;
     let folder = folder.display();
@@ -134,15 +135,15 @@ fn import(
     table: &Path,
     reader: Option<&str>,
     options: &[String],
-) -> Result<(), Failure> {
+) -> anyhow::Result<()> {
     let study = kept_study_for(folder, Use::Look)?;
     let run = RunDirectory::open(folder)?;
     let reader = reader.map(|name| from_text::<dyn Reader>(name, &options.join("\n")));
-    let reader = reader.transpose().map_err(Failure::wrong)?;
+    let reader = reader.transpose().map_err(misuse)?;
     let plugin = reader.as_ref().map(|built| &*built.plugin);
     let taken = campaign::import(&study, &run, table, plugin)?;
     print(&format!(
-        "{} runs taken into {}; `lacuna resume {}` uses them",
+        "{} runs imported into {}; `lacuna resume {}` uses them",
         taken.runs.len(),
         taken.folder.display(),
         folder.display()

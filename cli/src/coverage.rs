@@ -1,52 +1,52 @@
-//! `coverage`: how often the intervals of a study hold the truth.
+//! Command `coverage`: how often the intervals of a study contain the truth.
 
 use std::path::Path;
 
 use lacuna::diagnose::coverage::Noise;
-use lacuna::report::coverage_text;
-use lacuna::run::RunDirectory;
-use lacuna::stage::coverage::{self, Asked, COUNT, FOLDER, QUICK};
+use lacuna_engine::coverage::{self, Asked, COUNT, QUICK};
+use lacuna_engine::report::coverage_text;
+use lacuna_run::{RunDirectory, Stage};
 
+use crate::print;
 use crate::progress::Terminal;
 use crate::study::{Settings, folder, load};
-use crate::{Failure, print};
 
-/// What is counted.
+/// Options of the count.
 #[derive(clap::Args)]
 pub struct Manner {
-    /// A first look: 40 truths, and chains of half their length where a sampler's steps are draws.
+    /// Quick look: 40 truths, and chains of half length for samplers whose steps are draws
     #[arg(long)]
     quick: bool,
-    /// The number of truths; 200 when left out.
+    /// Number of truths (default: 200)
     #[arg(long, value_name = "N")]
     count: Option<std::num::NonZeroUsize>,
-    /// The noise of the data that are made. Left out: that of the replicates where every measured value has ten, else
-    /// that of the posterior.
+    /// Noise of the generated data
+    /// (default: that of the replicates if every measured value has ten, otherwise that of the posterior)
     #[arg(long, value_name = "WHOSE", value_enum)]
     noise: Option<Whose>,
-    /// Take simulation runs as truths, held back from the emulator, although the model could be run.
+    /// Use simulation runs held out from the emulator as truths, even if the model can be run
     #[arg(long)]
     from_runs: bool,
 }
 
-/// Whose noise the data have that are made.
+/// Source of the noise in the generated data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Whose {
-    /// Residuals of the study's replicates about their mean: whole replicates, each with a random sign.
+    /// Residuals of the study's replicates about their mean: whole replicates, each with a random sign
     Replicates,
-    /// The discrepancy at draws of the study's own posterior.
+    /// The discrepancy at draws from the study's own posterior
     Posterior,
-    /// The discrepancy with unknowns drawn from their priors.
+    /// The discrepancy with unknowns drawn from their priors
     Prior,
 }
 
-/// `lacuna coverage STUDY`
+/// Runs `lacuna coverage STUDY`.
 pub fn coverage(
     path: &Path,
     settings: &Settings,
     out: Option<&Path>,
     manner: &Manner,
-) -> Result<(), Failure> {
+) -> anyhow::Result<()> {
     let study = load(path, settings)?;
     let root = folder(&study, out);
     let mut run = RunDirectory::open(&root)?;
@@ -65,6 +65,9 @@ pub fn coverage(
     print("");
     print(coverage_text(&found).trim_end());
     print("");
-    print(&format!("page: {}", root.join(FOLDER).join("coverage.html").display()));
+    print(&format!(
+        "page: {}",
+        root.join(Stage::Coverage.folder().name()).join("coverage.html").display()
+    ));
     Ok(())
 }

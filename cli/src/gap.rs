@@ -1,49 +1,50 @@
-//! `gap`: where data and model disagree, what is missing, and the study that has it.
+//! Commands `gap` and `power`: where data and model disagree, which physics is missing, and the study that includes it.
 
 use std::io::{BufRead as _, IsTerminal as _, Write as _};
 use std::path::Path;
 
-use lacuna::gap::account::{Account, Addition};
-use lacuna::gap::name::Word;
-use lacuna::gap::power::Amount;
-use lacuna::report::findings::{Findings, GapFindings};
-use lacuna::report::{gap_text, power_text};
-use lacuna::run::{RunDirectory, Stop};
-use lacuna::stage;
-use lacuna::stage::gap::add::{Begun, add};
+use lacuna::run::Stop;
+use lacuna_engine::augment::{Begun, add};
+use lacuna_engine::gap::power::PowerDesign;
+use lacuna_engine::gap::result::{AddedEffect, GapResult};
+use lacuna_engine::gap::search::VerdictKind;
+use lacuna_engine::pipeline;
+use lacuna_engine::report::findings::{Findings, GapFindings};
+use lacuna_engine::report::{gap_text, power_text};
+use lacuna_run::RunDirectory;
 
 use crate::progress::Terminal;
 use crate::study::{Settings, Trust, folder, load, print_summary};
-use crate::{Failure, print};
+use crate::{misuse, print};
 
-/// What is done with what was found.
+/// Treatment of the effects that were found.
 #[derive(clap::Args)]
 pub struct Manner {
-    /// Report what is missing, and write and run nothing.
+    /// Report what is missing without writing or running anything
     #[arg(long, conflicts_with = "interactive")]
     dry_run: bool,
-    /// Ask before an effect is added.
+    /// Ask before each effect is added
     #[arg(long)]
     interactive: bool,
 }
 
-/// `lacuna gap STUDY`
+/// Runs `lacuna gap STUDY`.
 pub fn gap(
     path: &Path,
     settings: &Settings,
     out: Option<&Path>,
     manner: &Manner,
     trust: Trust,
-) -> Result<(), Failure> {
+) -> anyhow::Result<()> {
     if manner.interactive && !std::io::stdin().is_terminal() {
         let text = "error: `--interactive` asks at a terminal, and there is none; `--dry-run` only reports";
-        return Err(Failure::wrong(text));
+        return Err(misuse(text));
     }
     let study = load(path, settings)?;
     let root = folder(&study, out);
     let mut run = RunDirectory::open(&root)?;
     let terminal = Terminal::new();
-    let findings = stage::find_gap(&study, &mut run, &terminal)?;
+    let findings = pipeline::find_gap(&study, &mut run, &terminal)?;
     let report = |root: &Path| print(&format!("report: {}", root.join("report.html").display()));
     let gap = found(&findings)?;
     print("");
@@ -51,57 +52,57 @@ pub fn gap(
     print("");
     print(gap_text(&findings).trim_end());
     print("");
-    let wanted = wanted(&gap.account, manner)?;
+    let wanted = wanted(&gap.result, manner)?;
     if wanted.additions.is_empty() {
         report(&root);
         return trust.demand(&findings.assessment);
     }
-    let gap = GapFindings { account: wanted, ..gap.clone() };
+    let gap = GapFindings { result: wanted, ..gap.clone() };
     let set = settings.set();
     let begun =
         Begun { study: &study, path, folder: out, settings: &set, findings: &findings, gap: &gap };
     let (added, with) = add(&begun, &run, &terminal)?;
-    // The report of the study tells what became of it.
-    let findings = stage::find_gap(&study, &mut run, &terminal)?;
+    // The gap stage is repeated because the report of the study shows whether the added effects helped.
+    let findings = pipeline::find_gap(&study, &mut run, &terminal)?;
     print("");
     print_summary(&with);
     print("");
     print(gap_text(&findings).trim_end());
     print("");
-    print(&format!("study with what was missing: {}", added.study.display()));
+    print(&format!("study with the added effects: {}", added.study.display()));
     report(&added.run);
     report(&root);
     trust.demand(&with.assessment)
 }
 
-/// `lacuna power STUDY`
+/// Runs `lacuna power STUDY`.
 pub fn power(
     path: &Path,
     settings: &Settings,
     out: Option<&Path>,
     quick: bool,
-) -> Result<(), Failure> {
+) -> anyhow::Result<()> {
     let study = load(path, settings)?;
     let mut run = RunDirectory::open(&folder(&study, out))?;
-    let (amount, simulations) =
-        if quick { (Amount::quick(), Some(QUICK)) } else { (Amount::thorough(), None) };
-    let rates = stage::power::power(&study, &amount, simulations, &mut run, &Terminal::new())?;
+    let (design, simulations) =
+        if quick { (PowerDesign::quick(), Some(QUICK)) } else { (PowerDesign::thorough(), None) };
+    let rates = pipeline::power(&study, &design, simulations, &mut run, &Terminal::new())?;
     print("");
     print(power_text(&rates).trim_end());
     Ok(())
 }
 
-/// Simulations of the nulls in a quick look.
+/// Number of simulations of each null distribution in a quick look.
 const QUICK: usize = 99;
 
 fn found(findings: &Findings) -> Result<&GapFindings, Stop> {
     findings.gap.as_ref().ok_or_else(|| Stop::new("the search found nothing to report"))
 }
 
-/// The account with the effects that are to be added; none where they are no name.
-fn wanted(account: &Account, manner: &Manner) -> Result<Account, Failure> {
-    let mut wanted = account.clone();
-    if manner.dry_run || !matches!(account.verdict.word, Word::Named | Word::Class) {
+/// The result with the effects to be added; none if they have no name.
+fn wanted(result: &GapResult, manner: &Manner) -> anyhow::Result<GapResult> {
+    let mut wanted = result.clone();
+    if manner.dry_run || !matches!(result.verdict.word, VerdictKind::Named | VerdictKind::Class) {
         wanted.additions.clear();
     }
     if manner.interactive {
@@ -110,7 +111,7 @@ fn wanted(account: &Account, manner: &Manner) -> Result<Account, Failure> {
             if is_wanted(&addition)? {
                 kept.push(addition);
             } else if addition.model {
-                // What was found with it was found with no other.
+                // Later effects were found in the presence of this one and have no support without it.
                 break;
             }
         }
@@ -119,7 +120,7 @@ fn wanted(account: &Account, manner: &Manner) -> Result<Account, Failure> {
     Ok(wanted)
 }
 
-fn is_wanted(addition: &Addition) -> Result<bool, Failure> {
+fn is_wanted(addition: &AddedEffect) -> anyhow::Result<bool> {
     let places: Vec<String> = addition.on.values().map(|labels| labels.join(", ")).collect();
     let on = if places.is_empty() { String::new() } else { format!(" on {}", places.join("; ")) };
     let mut out = std::io::stderr();

@@ -1,27 +1,26 @@
-//! `inspect`: what a reader sees in a file.
+//! Command `inspect`: the contents of a file as a reader sees them.
 
 use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
 use lacuna::data::Table;
-use lacuna::plugin::Reader;
 use lacuna::plugin::reader::{Contents, Variable};
-use lacuna::plugin::registry;
+use lacuna::plugin::{Reader, registry};
 use lacuna::run::{Stop, files};
-use lacuna::study::nearest::nearest;
+use lacuna::text::nearest::nearest;
 
 use crate::study::Libraries;
-use crate::{Failure, plugins, print};
+use crate::{misuse, plugins, print};
 
-/// `lacuna inspect FILE`
+/// Runs `lacuna inspect FILE`.
 pub fn inspect(
     path: &Path,
     reader: Option<&str>,
     variable: Option<&str>,
     csv: Option<&Path>,
     libraries: &Libraries,
-) -> Result<(), Failure> {
+) -> anyhow::Result<()> {
     plugins::load(libraries)?;
     let (name, reader) = choose(path, reader)?;
     let contents = reader.inspect(path).map_err(Stop::from)?;
@@ -44,11 +43,11 @@ pub fn inspect(
     Ok(())
 }
 
-fn choose(path: &Path, wanted: Option<&str>) -> Result<(&'static str, Box<dyn Reader>), Failure> {
+fn choose(path: &Path, wanted: Option<&str>) -> anyhow::Result<(&'static str, Box<dyn Reader>)> {
     if let Some(name) = wanted {
         let entry = registry::find::<dyn Reader>(name).map_err(|problem| {
             let expected = problem.expected.clone().unwrap_or_default();
-            Failure::wrong(format!("error: {}: expected {expected}", problem.message))
+            misuse(format!("error: {}: expected {expected}", problem.message))
         })?;
         return Ok((entry.name, build(entry.name)?));
     }
@@ -56,7 +55,7 @@ fn choose(path: &Path, wanted: Option<&str>) -> Result<(&'static str, Box<dyn Re
     let read = File::open(path).and_then(|file| file.take(4096).read_to_end(&mut head));
     read.map_err(|error| files::cannot_read(path, &error))?;
     for entry in registry::entries::<dyn Reader>() {
-        // A reader that has to be told something knows no file by itself.
+        // A reader with required options cannot recognise files by itself.
         let Ok(reader) = build(entry.name) else { continue };
         if reader.recognises(path, &head) {
             return Ok((entry.name, reader));
@@ -66,8 +65,8 @@ fn choose(path: &Path, wanted: Option<&str>) -> Result<(&'static str, Box<dyn Re
     Err(stop.help("name one with `--reader`; `lacuna plugins reader` lists them").into())
 }
 
-fn build(name: &str) -> Result<Box<dyn Reader>, Failure> {
-    let built = registry::from_text::<dyn Reader>(name, "").map_err(Failure::wrong)?;
+fn build(name: &str) -> anyhow::Result<Box<dyn Reader>> {
+    let built = registry::from_text::<dyn Reader>(name, "").map_err(misuse)?;
     Ok(built.plugin)
 }
 
@@ -100,14 +99,14 @@ fn row(variable: &Variable) -> [String; 5] {
     ]
 }
 
-fn no_variable(path: &Path, name: &str, contents: &Contents) -> Failure {
+fn no_variable(path: &Path, name: &str, contents: &Contents) -> anyhow::Error {
     let names = || contents.variables.iter().map(|v| v.name.as_str());
     let near = nearest(name, names())
         .map_or(String::new(), |near| format!("\nhelp: did you mean `{near}`?"));
-    Failure::wrong(format!("error: {} has no variable `{name}`{near}", path.display()))
+    misuse(format!("error: {} has no variable `{name}`{near}", path.display()))
 }
 
-fn write_csv(variables: &[&Variable], out: &Path) -> Result<(), Failure> {
+fn write_csv(variables: &[&Variable], out: &Path) -> anyhow::Result<()> {
     let text: Vec<String> = variables.iter().map(|v| csv(&v.signals)).collect();
     let text = text.join("\n");
     if out == Path::new("-") {

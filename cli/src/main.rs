@@ -17,7 +17,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-// The plugins register themselves; naming their crate links it.
+// The plugins register themselves; naming their crate makes the linker include it.
 use lacuna_plugins as _;
 
 /// Lacuna closes the gap between simulation and measurement.
@@ -30,39 +30,40 @@ use lacuna_plugins as _;
 struct Arguments {
     #[command(subcommand)]
     verb: Verb,
-    /// Number of threads; all cores when left out. It changes the time and nothing else.
+    /// Number of threads (default: all cores); affects the run time, not the results
     #[arg(long, global = true, value_name = "N")]
     threads: Option<std::num::NonZeroUsize>,
 }
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Run all stages of a study and write its report.
+    /// Run all stages of a study and write its report
     Run {
-        /// The study file.
+        /// Study file
         study: PathBuf,
         #[command(flatten)]
         settings: study::Settings,
-        /// The run directory; `runs/<study name>` when left out.
+        /// Run directory (default: `runs/<study name>`)
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
         #[command(flatten)]
         trust: study::Trust,
     },
-    /// Check a study and list every problem at once, with line and caret.
+    /// Check a study and list all problems at once, with line and caret
     Check {
-        /// The study file.
+        /// Study file
         study: PathBuf,
         #[command(flatten)]
         settings: study::Settings,
     },
-    /// Find what a study's model misses, write the study that has it, and show whether the gap shrank.
+    /// Find physics that is missing in a study's model, write the study that includes it, and test whether the gap
+    /// shrinks
     Gap {
-        /// The study file.
+        /// Study file
         study: PathBuf,
         #[command(flatten)]
         settings: study::Settings,
-        /// The run directory; `runs/<study name>` when left out. The study with the effects runs beside it.
+        /// Run directory (default: `runs/<study name>`); the study with the effects runs beside it
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
         #[command(flatten)]
@@ -70,106 +71,110 @@ enum Verb {
         #[command(flatten)]
         trust: study::Trust,
     },
-    /// Plant every effect in a study's own noise: what `lacuna gap` would find there, how small, and how often it errs.
+    /// Estimate the power of `lacuna gap`: plant every effect in a study's own noise and count what is found, how
+    /// small, and how often wrongly
     Power {
-        /// The study file.
+        /// Study file
         study: PathBuf,
         #[command(flatten)]
         settings: study::Settings,
-        /// The run directory; `runs/<study name>` when left out.
+        /// Run directory (default: `runs/<study name>`)
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
-        /// Fewer cases and simulations, for a first look.
+        /// Quick look with fewer cases and simulations
         #[arg(long)]
         quick: bool,
     },
-    /// Count how often a study's intervals hold the truth: truths from the prior, data made of them, each calibrated.
+    /// Count how often a study's intervals contain the truth, by calibrating data generated at truths from the prior
     Coverage {
-        /// The study file.
+        /// Study file
         study: PathBuf,
         #[command(flatten)]
         settings: study::Settings,
-        /// The run directory; `runs/<study name>` when left out.
+        /// Run directory (default: `runs/<study name>`)
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
         #[command(flatten)]
         manner: coverage::Manner,
     },
-    /// Go on with a run that was interrupted, from its directory.
+    /// Continue an interrupted run from its directory
     Resume {
-        /// The run directory.
+        /// Run directory
         run: PathBuf,
         #[command(flatten)]
         trust: study::Trust,
     },
-    /// Write the report of a finished run again.
+    /// Write the report of a finished run again
     Report {
-        /// The run directory.
+        /// Run directory
         run: PathBuf,
         #[command(flatten)]
         trust: study::Trust,
     },
-    /// Put finished runs side by side: posteriors, errors, evidences, predictions.
+    /// Compare finished runs: posteriors, errors, evidences, predictions
     Compare {
-        /// The run directories, two or more.
+        /// Run directories, two or more
         #[arg(required = true, num_args = 2.., value_name = "RUN")]
         runs: Vec<PathBuf>,
-        /// Print JSON.
+        /// Print JSON
         #[arg(long)]
         json: bool,
     },
-    /// List the plugins that a study can name, with their options, defaults and references.
+    /// List the plugins that a study can name, with their options, defaults and references
     Plugins {
-        /// A kind, such as `surrogate`, or one plugin, such as `surrogate.polynomial_chaos`.
+        /// A kind, such as `surrogate`, or one plugin, such as `surrogate.polynomial_chaos`
         name: Option<String>,
-        /// Print Markdown.
+        /// Print Markdown
         #[arg(long)]
         markdown: bool,
         #[command(flatten)]
         libraries: study::Libraries,
     },
-    /// Print the JSON Schema of the study language, for editors.
+    /// Print the JSON Schema of the study language, for editors, or of `summary.json`, for scripts
     Schema {
+        /// The file that the schema describes.
+        #[arg(default_value = "study")]
+        of: plugins::Described,
         #[command(flatten)]
         libraries: study::Libraries,
     },
-    /// Show what a reader sees in a file: variables, axes, units, steps.
+    /// Show the contents of a file as a reader sees them: variables, axes, units, steps
     Inspect {
-        /// The file.
+        /// File to inspect
         file: PathBuf,
-        /// Show this variable alone; with `--csv`, write its signals.
+        /// Show only this variable; with `--csv`, write its signals
         #[arg(long, value_name = "NAME")]
         variable: Option<String>,
-        /// Write the variable's signals as CSV to this file, or to the terminal with `-`.
+        /// Write the variable's signals as CSV to this file, or to the terminal with `-`
         #[arg(long, value_name = "OUT", requires = "variable")]
         csv: Option<PathBuf>,
-        /// The reader to use; the first that recognises the file when left out.
+        /// Reader to use (default: the first that recognises the file)
         #[arg(long, value_name = "NAME")]
         reader: Option<String>,
         #[command(flatten)]
         libraries: study::Libraries,
     },
-    /// Serve a study's model, emulator and posterior over UM-Bridge, until Ctrl-C.
+    /// Serve a study's model, emulator and posterior over UM-Bridge, until Ctrl-C
     Serve {
-        /// The study file.
+        /// Study file
         study: PathBuf,
         #[command(flatten)]
         settings: study::Settings,
-        /// The run directory; `runs/<study name>` when left out. Emulator and posterior are those of its finished run.
+        /// Run directory (default: `runs/<study name>`); emulator and posterior are those of its finished run
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
         #[command(flatten)]
         place: serve::Place,
     },
-    /// The simulation runs of a run directory: where they are, those that failed again, more of them.
+    /// Manage the simulation runs of a run directory: show their state, repeat failed ones, add more
     Campaign {
         #[command(subcommand)]
         what: campaign::Campaign,
     },
-    /// Make runs of an order: what executors start in other processes and on other machines.
+    /// Make runs of an order; executors start this in other processes and on other machines
     #[command(hide = true)]
     Work(work::Work),
-    /// Write the skeleton of something new.
+    /// Write the skeleton of a study or a plugin
     New {
         #[command(subcommand)]
         what: new::What,
@@ -179,7 +184,7 @@ enum Verb {
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     if let Some(threads) = arguments.threads {
-        // Only this line ever builds the pool, so that it cannot be there already.
+        // Only this line ever builds the pool, so it cannot fail because a pool already exists.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global();
     }
     let result = match arguments.verb {
@@ -202,7 +207,7 @@ fn main() -> ExitCode {
         Verb::Plugins { name, markdown, libraries } => {
             plugins::list(name.as_deref(), markdown, &libraries)
         }
-        Verb::Schema { libraries } => plugins::schema(&libraries),
+        Verb::Schema { of, libraries } => plugins::schema(of, &libraries),
         Verb::Inspect { file, variable, csv, reader, libraries } => {
             let (reader, variable) = (reader.as_deref(), variable.as_deref());
             inspect::inspect(&file, reader, variable, csv.as_deref(), &libraries)
@@ -216,33 +221,39 @@ fn main() -> ExitCode {
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            eprintln!("{}", failure.text.trim_end());
-            ExitCode::from(failure.code)
+        Err(error) => {
+            let (text, code) = told(&error);
+            eprintln!("{}", text.trim_end());
+            ExitCode::from(code)
         }
     }
 }
 
-/// A command that did not do what it was asked.
-struct Failure {
-    text: String,
-    /// 1: a run stopped; 2: the study or the arguments are wrong; 3: the result is not trusted, under `--strict`.
-    code: u8,
+/// Error: the study or the arguments are wrong; holds the complete text, as shown.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct Misuse(String);
+
+/// Error: the result is not trusted, under `--strict`.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct Untrusted(String);
+
+/// The error for a wrong study or wrong arguments.
+fn misuse(text: impl Into<String>) -> anyhow::Error {
+    Misuse(text.into()).into()
 }
 
-impl From<lacuna::run::Stop> for Failure {
-    fn from(stop: lacuna::run::Stop) -> Self {
-        Self { text: format!("error: {stop}"), code: 1 }
+/// Text and exit code of a command that failed: 1 if a run stopped, 2 if the study or the arguments are wrong, 3 if the
+/// result is not trusted.
+fn told(error: &anyhow::Error) -> (String, u8) {
+    if let Some(Misuse(text)) = error.downcast_ref() {
+        return (text.clone(), 2);
     }
+    (format!("error: {error:#}"), if error.is::<Untrusted>() { 3 } else { 1 })
 }
 
-impl Failure {
-    fn wrong(text: impl Into<String>) -> Self {
-        Self { text: text.into(), code: 2 }
-    }
-}
-
-/// Prints a line; a reader that stopped reading (a closed pipe) is no error.
+/// Prints a line; a closed pipe is not an error.
 fn print(text: &str) {
     use std::io::Write as _;
     let _ = writeln!(std::io::stdout(), "{text}");

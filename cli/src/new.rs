@@ -1,4 +1,4 @@
-//! `new`: skeletons.
+//! Command `new`: skeletons of studies and plugins.
 
 mod library;
 mod plugin;
@@ -10,34 +10,32 @@ mod tree;
 
 use std::path::PathBuf;
 
-use crate::Failure;
-
-/// What can be made new.
+/// Type of skeleton.
 #[derive(clap::Subcommand)]
 pub enum What {
-    /// A folder with a study that runs as it stands: `NAME/study.toml` and its measured data.
+    /// A folder with a study that runs as it is: `NAME/study.toml`, its measured data, and the schema for editors
     Study {
-        /// The folder to make.
+        /// Folder to create
         name: PathBuf,
     },
-    /// A plugin that works as it stands: one file in Lacuna's source, or a library of its own.
+    /// A plugin that works as it is: one file in Lacuna's source, or a library of its own
     Plugin {
-        /// The kind, such as `sampler`.
+        /// Kind, such as `sampler`
         kind: String,
-        /// The name by which a study will choose it, such as `random_walk`.
+        /// Name by which a study chooses the plugin, such as `random_walk`
         name: String,
-        /// Make a library in this folder, outside Lacuna's source; a study loads it with `[plugins]`.
+        /// Create a library in this folder, outside Lacuna's source; a study loads it with `[plugins]`
         #[arg(long, value_name = "FOLDER")]
         library: Option<PathBuf>,
-        /// Lacuna's source, which holds the SDK of the library; when left out, that around the current folder or the one
-        /// that this program was built from.
+        /// Lacuna's source, which contains the SDK of the library
+        /// (default: the source around the current folder, or the one that this program was built from)
         #[arg(long, value_name = "FOLDER", requires = "library")]
         source: Option<PathBuf>,
     },
 }
 
-/// `lacuna new …`
-pub fn write(what: &What) -> Result<(), Failure> {
+/// Runs `lacuna new …`.
+pub fn write(what: &What) -> anyhow::Result<()> {
     match what {
         What::Study { name } => study::write(name),
         What::Plugin { kind, name, library, source } => {

@@ -1,19 +1,20 @@
-//! `plugins` and `schema`.
+//! Commands `plugins` and `schema`.
 
-use lacuna::plugin::abi::library::{self, Library};
+use lacuna::plugin::Library;
 use lacuna::plugin::registry::{self, KindEntry, Listing};
-use lacuna::study::language;
-use lacuna::study::libraries::Seen;
-use lacuna::study::nearest::{nearest, one_of};
+use lacuna::text::nearest::{nearest, one_of};
+use lacuna_engine::host::library;
+use lacuna_engine::study::language;
+use lacuna_engine::study::libraries::Seen;
 
 use crate::study::Libraries;
-use crate::{Failure, print};
+use crate::{misuse, print};
 
-/// `lacuna plugins [KIND[.NAME]]`
-pub fn list(name: Option<&str>, markdown: bool, libraries: &Libraries) -> Result<(), Failure> {
+/// Runs `lacuna plugins [KIND[.NAME]]`.
+pub fn list(name: Option<&str>, markdown: bool, libraries: &Libraries) -> anyhow::Result<()> {
     load(libraries)?;
     if let Some(problem) = registry::audit().first() {
-        return Err(Failure::wrong(format!("error: {}", problem.message)));
+        return Err(misuse(format!("error: {}", problem.message)));
     }
     let kinds = registry::kinds();
     match name.map(|name| name.split_once('.').map_or((name, None), |(k, n)| (k, Some(n)))) {
@@ -32,18 +33,18 @@ pub fn list(name: Option<&str>, markdown: bool, libraries: &Libraries) -> Result
     Ok(())
 }
 
-fn find_kind<'a>(kinds: &[&'a KindEntry], name: &str) -> Result<&'a KindEntry, Failure> {
+fn find_kind<'a>(kinds: &[&'a KindEntry], name: &str) -> anyhow::Result<&'a KindEntry> {
     let names = || kinds.iter().map(|kind| kind.name);
     let found = kinds.iter().find(|kind| kind.name == name).copied();
     found.ok_or_else(|| unknown("kind", name, nearest(name, names()), &one_of(names())))
 }
 
-fn unknown(what: &str, name: &str, near: Option<&str>, known: &str) -> Failure {
+fn unknown(what: &str, name: &str, near: Option<&str>, known: &str) -> anyhow::Error {
     let help = near.map_or(String::new(), |near| format!("\nhelp: did you mean `{near}`?"));
-    Failure::wrong(format!("error: there is no {what} `{name}`: expected {known}{help}"))
+    misuse(format!("error: there is no {what} `{name}`: expected {known}{help}"))
 }
 
-/// A kind with one line a plugin.
+/// Prints a kind with one line per plugin.
 fn overview(kind: &KindEntry) {
     let sections: Vec<String> = kind.sections.iter().map(|s| format!("[{s}]")).collect();
     print(&format!("{}  {}", kind.name, sections.join(" ")));
@@ -53,22 +54,34 @@ fn overview(kind: &KindEntry) {
     }
     for plugin in plugins {
         let title = plugin.manual().map(|manual| manual.title).unwrap_or_default();
-        let lines = wrapped(&title, LINE - COLUMN);
-        let first = lines.first().cloned().unwrap_or_default();
-        print(&format!("  {:<1$}{first}", plugin.name, COLUMN - 2));
-        let library = plugin.library.map(origin);
-        let origin = library.iter().flat_map(|origin| wrapped(origin, LINE - COLUMN));
-        for line in lines.into_iter().skip(1).chain(origin) {
-            print(&format!("{:COLUMN$}{line}", ""));
+        for line in entry(plugin.name, &title, plugin.library.map(origin).as_deref()) {
+            print(&line);
         }
     }
 }
 
-/// The longest line of the list, and where the second column begins.
+/// Lines of one plugin: the name, and beside it (below it, if the name is too long) title and origin.
+fn entry(name: &str, title: &str, origin: Option<&str>) -> Vec<String> {
+    let texts = [Some(title), origin].into_iter().flatten();
+    let mut lines: Vec<String> = texts
+        .flat_map(|text| wrapped(text, LINE - COLUMN))
+        .map(|line| format!("{:COLUMN$}{line}", ""))
+        .collect();
+    let name = format!("  {name}");
+    match lines.first_mut() {
+        Some(first) if name.chars().count() < COLUMN => {
+            *first = format!("{name:<COLUMN$}{}", first.trim_start());
+        }
+        _ => lines.insert(0, name),
+    }
+    lines
+}
+
+/// Longest line of the list, in characters, and start of its second column.
 const LINE: usize = 100;
 const COLUMN: usize = 30;
 
-/// Words on lines of at most `width` characters.
+/// Wraps words to lines of at most `width` characters.
 fn wrapped(text: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
@@ -92,24 +105,24 @@ fn manual(listing: &Listing, markdown: bool) {
     }
 }
 
-/// Where a plugin comes from that is no part of the program.
+/// Origin of a plugin that is not built in.
 fn origin(library: &Library) -> String {
     let Library { path, sha256, name, version, abi: (major, minor), .. } = library;
     format!("from {} ({name} {version}, abi {major}.{minor}, sha256 {sha256})", path.display())
 }
 
-/// Loads the libraries that the command line names.
-pub fn load(libraries: &Libraries) -> Result<(), Failure> {
+/// Loads the libraries named on the command line.
+pub fn load(libraries: &Libraries) -> anyhow::Result<()> {
     for path in &libraries.files {
         library::load(path, None).map_err(|reason| {
             let path = path.display();
-            Failure::wrong(format!("error: the library of plugins {path} cannot be used: {reason}"))
+            misuse(format!("error: the library of plugins {path} cannot be used: {reason}"))
         })?;
     }
     Ok(())
 }
 
-/// What a study would load, as its file shows it.
+/// The libraries that a study would load, as its file lists them.
 pub fn would_load(seen: &Seen) -> String {
     let path = seen.path.display();
     let sha256 = &seen.sha256;
@@ -127,9 +140,36 @@ pub fn would_load(seen: &Seen) -> String {
     }
 }
 
-/// `lacuna schema`
-pub fn schema(libraries: &Libraries) -> Result<(), Failure> {
+/// A file that a JSON Schema describes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Described {
+    /// A study, with the options of all installed plugins.
+    Study,
+    /// `summary.json` of a run.
+    Summary,
+}
+
+/// Runs `lacuna schema [study|summary]`.
+pub fn schema(of: Described, libraries: &Libraries) -> anyhow::Result<()> {
     load(libraries)?;
-    print(&format!("{:#}", language::schema()));
+    let schema = match of {
+        Described::Study => language::schema_text(),
+        Described::Summary => format!("{:#}", lacuna_engine::report::schema()),
+    };
+    print(schema.trim_end());
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::entry;
+
+    #[test]
+    fn a_name_that_is_too_long_stands_on_a_line_of_its_own() {
+        assert_eq!(entry("gain", "A gain.", None), [format!("  gain{:24}A gain.", "")]);
+        let long = "a".repeat(28);
+        let beside = format!("{:30}A gain.", "");
+        assert_eq!(entry(&long, "A gain.", None), [format!("  {long}"), beside]);
+        assert_eq!(entry("bare", "", None), ["  bare"]);
+    }
 }

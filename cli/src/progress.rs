@@ -1,4 +1,4 @@
-//! Progress on the terminal: a bar a stage, or plain lines when the output is no terminal.
+//! Progress on the terminal: one bar per stage, or plain lines if the output is not a terminal.
 
 use std::io::IsTerminal as _;
 use std::sync::Mutex;
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 use lacuna::run::Observer;
 
-/// How often a plain line is printed.
+/// Interval between plain lines.
 const INTERVAL: Duration = Duration::from_secs(10);
 
 /// Shows the progress of a run on standard error.
@@ -22,25 +22,25 @@ struct Current {
     total: u64,
     bar: Option<ProgressBar>,
     begun: Instant,
-    /// What was done when the first report came: taken from an earlier run, not made now.
+    /// Number of units done at the first report: taken from an earlier run, so they do not count for the rate.
     first: Option<u64>,
     spoken: Instant,
 }
 
 impl Terminal {
-    /// Nothing shown yet.
+    /// A display that shows nothing yet.
     pub fn new() -> Self {
         let interactive = std::io::stderr().is_terminal();
         Self { interactive, current: Mutex::new(None) }
     }
 
     fn with<R>(&self, act: impl FnOnce(&mut Option<Current>) -> R) -> R {
-        // A thread that panicked while it reported progress spoils nothing here.
+        // A thread that panicked while it reported progress leaves the state usable, so a poisoned lock is accepted.
         let mut current = self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         act(&mut current)
     }
 
-    /// Prints a line beside the bar.
+    /// Prints a line above the bar.
     fn say(&self, text: &str) {
         self.with(|slot| match slot.as_ref().and_then(|current| current.bar.as_ref()) {
             Some(bar) => bar.println(text),
@@ -116,7 +116,7 @@ fn plain_line(current: &Current, first: u64, done: u64) -> String {
         return format!("{stage}: {done}/{total} {unit}s");
     }
     if done > *total {
-        // A run that goes on until it has enough draws does not know when that is.
+        // A run that continues until it has enough draws has no known total.
         return format!("{stage}: {done} {unit}s, {rate:.1} {unit}s/s");
     }
     let left = (total - done) as f64 / rate;

@@ -1,39 +1,39 @@
-//! `serve`: a study's functions as UM-Bridge models.
+//! Command `serve`: a study's functions as UM-Bridge models.
 
 use std::net::IpAddr;
 use std::path::Path;
 
 use lacuna::plugin::model::EvalError;
 use lacuna::run::Stop;
-use lacuna::serve::{Derivatives, Function, curvature, finished, functions};
-use lacuna::study::resolve::Use;
+use lacuna_engine::serve::{Derivatives, Function, curvature, finished, functions};
+use lacuna_engine::study::resolve::Use;
 use lacuna_um_bridge::protocol::{Config, Fault, INTERNAL_ERROR, INVALID_INPUT, Support};
 use lacuna_um_bridge::{Model, Server};
 
+use crate::print;
 use crate::progress::Terminal;
 use crate::study::{Settings, folder, load, load_for};
-use crate::{Failure, print};
 
-/// Where the server listens.
+/// Address at which the server listens.
 #[derive(clap::Args)]
 pub struct Place {
-    /// The port; 0 takes any that is free and says which.
+    /// Port; 0 takes any free port and prints it
     #[arg(long, value_name = "N", default_value_t = 4242)]
     port: u16,
-    /// The address to listen at; `0.0.0.0` lets other machines ask too.
+    /// Address to listen at; `0.0.0.0` makes the server available to other machines
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
     host: IpAddr,
 }
 
-/// `lacuna serve STUDY`
+/// Runs `lacuna serve STUDY`.
 pub fn serve(
     path: &Path,
     settings: &Settings,
     out: Option<&Path>,
     place: &Place,
-) -> Result<(), Failure> {
+) -> anyhow::Result<()> {
     let study = load_for(path, settings, Use::Look)?;
-    // First of all, because a port that is taken should not be found out after everything else.
+    // The port is bound first, so that an occupied port is reported before any expensive work.
     let server = Server::bind(place.host, place.port).map_err(|error| {
         let Place { host, port } = place;
         Stop::new(format!("cannot listen at {host}, port {port}: {error}"))
@@ -42,7 +42,7 @@ pub fn serve(
     let directory = folder(&study, out);
     let run = finished(&study, &directory)?;
     if run.is_none() || (study.surrogate.is_none() && study.target.is_none()) {
-        // Then the model will be asked, so that it has to be there.
+        // In these cases the model itself will be evaluated, so it must be available.
         load(path, settings)?;
     }
     if run.is_none() && out.is_some() {
@@ -69,7 +69,7 @@ pub fn serve(
     Ok(())
 }
 
-/// One line about a function.
+/// Description of a function, in one line.
 fn described(function: &dyn Function) -> String {
     let variables: Vec<String> =
         function.variables().iter().map(|v| format!("{} [{}]", v.name, v.unit)).collect();
@@ -84,7 +84,7 @@ fn described(function: &dyn Function) -> String {
     format!("`{}`: {} -> {outputs}{parts}", function.name(), variables.join(", "))
 }
 
-/// A function as a model of one input and one output vector.
+/// A function as a UM-Bridge model with one input and one output vector.
 struct Bridged<'a>(&'a dyn Function);
 
 impl Bridged<'_> {
@@ -94,7 +94,7 @@ impl Bridged<'_> {
     }
 }
 
-/// A question that has no answer, or a model that has none any more.
+/// Fault for an evaluation that failed, or for a model that can no longer answer.
 fn fault(error: EvalError) -> Fault {
     match error {
         EvalError::Rejected(reason) => Fault::new(INVALID_INPUT, reason),
@@ -102,10 +102,10 @@ fn fault(error: EvalError) -> Fault {
     }
 }
 
-/// The setting by which one scenario is asked for.
+/// Setting by which a client requests one scenario.
 const SCENARIO: &str = "scenario";
 
-/// The number of the scenario that the settings ask for, the only thing that can be set.
+/// Index of the scenario that the settings request; no other setting is allowed.
 fn scenario(function: &dyn Function, config: &Config) -> Result<Option<usize>, Fault> {
     let wrong = |text: String| Err(Fault::new(INVALID_INPUT, text));
     let known = function.scenarios();
@@ -165,7 +165,7 @@ impl Model for Bridged<'_> {
     ) -> Result<Vec<f64>, Fault> {
         let scenario = scenario(self.0, config)?;
         let jacobian = self.derivatives()?.jacobian(&input[0], scenario).map_err(fault)?;
-        Ok(lacuna::linalg::transposed_multiply_vector(&jacobian, sens))
+        Ok(lacuna::matrix::transposed_multiply_vector(&jacobian, sens))
     }
 
     fn apply_jacobian(
@@ -178,7 +178,7 @@ impl Model for Bridged<'_> {
     ) -> Result<Vec<f64>, Fault> {
         let scenario = scenario(self.0, config)?;
         let jacobian = self.derivatives()?.jacobian(&input[0], scenario).map_err(fault)?;
-        Ok(lacuna::linalg::multiply_vector(&jacobian, vec))
+        Ok(lacuna::matrix::multiply_vector(&jacobian, vec))
     }
 
     fn apply_hessian(

@@ -1,24 +1,27 @@
-//! `run`, `check`, `resume`, `report`, `compare`.
+//! Commands `run`, `check`, `resume`, `report`, `compare`.
 
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
-use lacuna::assess::{Assessment, Level};
-use lacuna::compare::{self, Finished};
-use lacuna::report::findings::Findings;
-use lacuna::report::summary_text;
-use lacuna::run::{RunDirectory, Stop, files};
-use lacuna::stage;
-use lacuna::study::resolve::{self, Use};
-use lacuna::study::{Checked, Study, emit};
+use lacuna::run::{Stop, files};
+use lacuna::text::emit;
+use lacuna_engine::assess::{Assessment, Level};
+use lacuna_engine::compare::{self, Finished};
+use lacuna_engine::pipeline;
+use lacuna_engine::report::findings::Findings;
+use lacuna_engine::report::summary_text;
+use lacuna_engine::stage;
+use lacuna_engine::study::resolve::{self, Use};
+use lacuna_engine::study::{Checked, Study};
+use lacuna_run::RunDirectory;
 
 use crate::progress::Terminal;
-use crate::{Failure, plugins, print};
+use crate::{Untrusted, misuse, plugins, print};
 
 /// Keys set on the command line.
 #[derive(clap::Args)]
 pub struct Settings {
-    /// Set a key of the study, such as `sampler.steps=200`; may be given more than once.
+    /// Set a key of the study, such as `sampler.steps=200`; may be repeated
     #[arg(long = "set", value_name = "PATH=VALUE")]
     set: Vec<String>,
     #[command(flatten)]
@@ -28,13 +31,13 @@ pub struct Settings {
 /// Libraries of plugins named on the command line.
 #[derive(clap::Args)]
 pub struct Libraries {
-    /// Load a library of plugins beside those of the study: its code runs; may be given more than once.
+    /// Load a library of plugins in addition to those of the study; this executes its code; may be repeated
     #[arg(long = "plugin", value_name = "PATH")]
     pub files: Vec<PathBuf>,
 }
 
 impl Settings {
-    /// What was set, the libraries included: they are those of `[plugins]`.
+    /// Settings of the command line, with the libraries as those of `[plugins]`.
     pub fn set(&self) -> Vec<String> {
         let absolute = |file: &PathBuf| std::path::absolute(file).unwrap_or_else(|_| file.clone());
         let load = |file: &PathBuf| {
@@ -44,40 +47,43 @@ impl Settings {
     }
 }
 
-/// What is done about a verdict.
+/// Reaction to the verdict on a result.
 #[derive(Clone, Copy, clap::Args)]
 pub struct Trust {
-    /// Exit with code 3 unless the result is trusted without reservations.
+    /// Exit with code 3 unless the result is trusted without reservations
     #[arg(long)]
     strict: bool,
 }
 
 impl Trust {
-    /// A failure where the study asked for trust and there is none.
-    pub fn demand(self, assessment: &Assessment) -> Result<(), Failure> {
+    /// Checks the verdict.
+    ///
+    /// # Errors
+    /// Under `--strict`, if the result is not trusted.
+    pub fn demand(self, assessment: &Assessment) -> anyhow::Result<()> {
         if !self.strict || assessment.level == Level::Trusted {
             return Ok(());
         }
-        Err(Failure { text: format!("error: {} (`--strict`)", assessment.line()), code: 3 })
+        Err(Untrusted(format!("{} (`--strict`)", assessment.line())).into())
     }
 }
 
-/// `lacuna run STUDY`
+/// Runs `lacuna run STUDY`.
 pub fn run(
     path: &Path,
     settings: &Settings,
     out: Option<&Path>,
     trust: Trust,
-) -> Result<(), Failure> {
+) -> anyhow::Result<()> {
     let study = load(path, settings)?;
     execute(&study, &folder(&study, out), false, trust)
 }
 
-/// The run directory of a study: the one that is asked for, else `runs/<study name>`.
+/// The run directory of a study: the requested one, otherwise `runs/<study name>`.
 ///
-/// A study that gives itself no name has that of its file or of the study that it extends, which others may have too, as
-/// `a/study.toml` and `b/study.toml` do. Where that directory belongs to another file that is still there, it is named
-/// after the file, after folder and file, or has a number behind it.
+/// A study without a name takes that of its file or of the study that it extends, which is not unique, as for
+/// `a/study.toml` and `b/study.toml`. If that directory belongs to another file that still exists, the directory is
+/// named after the file, after folder and file, or with a number appended.
 pub fn folder(study: &Study, out: Option<&Path>) -> PathBuf {
     if let Some(out) = out {
         return out.to_owned();
@@ -104,8 +110,8 @@ pub fn folder(study: &Study, out: Option<&Path>) -> PathBuf {
     folders().find(is_own).or_else(|| folders().find(is_free)).unwrap_or_else(|| runs.join(long))
 }
 
-/// `lacuna check STUDY`
-pub fn check(path: &Path, settings: &Settings) -> Result<(), Failure> {
+/// Runs `lacuna check STUDY`.
+pub fn check(path: &Path, settings: &Settings) -> anyhow::Result<()> {
     let checked = resolve::load_for(path, &settings.set(), Use::Check);
     for library in &checked.libraries {
         print(&plugins::would_load(library));
@@ -117,9 +123,7 @@ pub fn check(path: &Path, settings: &Settings) -> Result<(), Failure> {
         let plural = if wrong.len() == 1 { "" } else { "s" };
         let (count, files) = (wrong.len(), path.display());
         let text = texts.join("\n\n");
-        return Err(Failure::wrong(format!(
-            "{text}\n\n{count} problem{plural} in the files of {files}"
-        )));
+        return Err(misuse(format!("{text}\n\n{count} problem{plural} in the files of {files}")));
     }
     let response = match &study.target {
         Some(_) => String::new(),
@@ -130,13 +134,13 @@ pub fn check(path: &Path, settings: &Settings) -> Result<(), Failure> {
     Ok(())
 }
 
-/// `lacuna resume RUN`
-pub fn resume(folder: &Path, trust: Trust) -> Result<(), Failure> {
+/// Runs `lacuna resume RUN`.
+pub fn resume(folder: &Path, trust: Trust) -> anyhow::Result<()> {
     execute(&kept_study(folder)?, folder, is_finished(folder), trust)
 }
 
-/// `lacuna report RUN`
-pub fn report(folder: &Path, trust: Trust) -> Result<(), Failure> {
+/// Runs `lacuna report RUN`.
+pub fn report(folder: &Path, trust: Trust) -> anyhow::Result<()> {
     let study = kept_study(folder)?;
     if !is_finished(folder) {
         let stop = Stop::new(format!("the run in {} is not finished", folder.display()));
@@ -147,8 +151,8 @@ pub fn report(folder: &Path, trust: Trust) -> Result<(), Failure> {
     execute(&study, folder, true, trust)
 }
 
-/// Prints finished runs side by side.
-pub fn compare(folders: &[PathBuf], json: bool) -> Result<(), Failure> {
+/// Prints a comparison of finished runs.
+pub fn compare(folders: &[PathBuf], json: bool) -> anyhow::Result<()> {
     let runs: Result<Vec<Finished>, Stop> = folders.iter().map(|f| Finished::read(f)).collect();
     let comparison = compare::compare(&runs?);
     if json {
@@ -161,39 +165,42 @@ pub fn compare(folders: &[PathBuf], json: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The study in a file, if nothing is wrong with it.
-pub fn load(path: &Path, settings: &Settings) -> Result<Study, Failure> {
+/// Loads the study in a file.
+///
+/// # Errors
+/// If it has problems: all of them.
+pub fn load(path: &Path, settings: &Settings) -> anyhow::Result<Study> {
     load_for(path, settings, Use::Run)
 }
 
-/// The same for some use.
-pub fn load_for(path: &Path, settings: &Settings, purpose: Use) -> Result<Study, Failure> {
+/// Like [`load`], for the given purpose.
+pub fn load_for(path: &Path, settings: &Settings, purpose: Use) -> anyhow::Result<Study> {
     sound(resolve::load_for(path, &settings.set(), purpose), path)
 }
 
-/// The study, if nothing is wrong with it.
-fn sound(checked: Checked, path: &Path) -> Result<Study, Failure> {
+/// The study, if it has no problems.
+fn sound(checked: Checked, path: &Path) -> anyhow::Result<Study> {
     let complaints = checked.complaints();
     checked.study.ok_or_else(|| {
         let count = checked.problems.sorted().len();
         let plural = if count == 1 { "" } else { "s" };
-        Failure::wrong(format!("{complaints}\n{count} problem{plural} in {}", path.display()))
+        misuse(format!("{complaints}\n{count} problem{plural} in {}", path.display()))
     })
 }
 
-/// The study of a run directory: as it was resolved, so that `--set` arguments count.
-fn kept_study(folder: &Path) -> Result<Study, Failure> {
+/// The study of a run directory as it was resolved, so that `--set` arguments are included.
+fn kept_study(folder: &Path) -> anyhow::Result<Study> {
     let purpose = if is_finished(folder) { Use::Look } else { Use::Run };
     kept_study_for(folder, purpose)
 }
 
-/// The same for some use.
-pub fn kept_study_for(folder: &Path, purpose: Use) -> Result<Study, Failure> {
+/// Like [`kept_study`], for the given purpose.
+pub fn kept_study_for(folder: &Path, purpose: Use) -> anyhow::Result<Study> {
     let resolved = folder.join("resolved.toml");
     if !resolved.exists() {
         let text =
             format!("error: {} is no run directory: it has no resolved.toml", folder.display());
-        return Err(Failure::wrong(text));
+        return Err(misuse(text));
     }
     let mut study = sound(resolve::load_for(&resolved, &[], purpose), &resolved)?;
     let written: PathBuf = folder.join("study.toml");
@@ -205,7 +212,7 @@ fn is_finished(folder: &Path) -> bool {
     folder.join("manifest.json").exists()
 }
 
-/// The closing summary, its first line in the colour of the verdict where a terminal shows colours.
+/// Prints the closing summary; on a colour terminal its first line has the colour of the verdict.
 pub fn print_summary(findings: &Findings) {
     let text = summary_text(findings);
     let (first, rest) = text.trim_end().split_once('\n').unwrap_or((text.trim_end(), ""));
@@ -226,14 +233,14 @@ fn coloured(line: &str, level: Level) -> String {
     format!("\u{1b}[1;{colour}m{line}\u{1b}[0m")
 }
 
-/// Runs all stages; a run that is only looked at is taken whatever version made it.
-fn execute(study: &Study, folder: &Path, look: bool, trust: Trust) -> Result<(), Failure> {
+/// Runs all stages; with `look`, results are reused whatever version made them.
+fn execute(study: &Study, folder: &Path, look: bool, trust: Trust) -> anyhow::Result<()> {
     let mut run = RunDirectory::open(folder)?;
     if look {
         run.look();
     }
     let terminal = Terminal::new();
-    let findings = stage::run(study, &mut run, &terminal)?;
+    let findings = pipeline::run(study, &mut run, &terminal)?;
     print("");
     print_summary(&findings);
     print("");

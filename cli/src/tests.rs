@@ -1,4 +1,4 @@
-//! Commands quoted in the documentation are commands of this program.
+//! Commands quoted in the documentation are valid commands of this program.
 
 #![allow(clippy::unwrap_used)]
 
@@ -9,7 +9,7 @@ use clap::{CommandFactory as _, Parser as _};
 
 use crate::Arguments;
 
-/// Every page of the documentation.
+/// All pages of the documentation.
 fn pages() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let mut folders = vec![root.clone(), root.join("docs"), root.join("docs/reference")];
@@ -23,8 +23,8 @@ fn pages() -> Vec<PathBuf> {
     pages
 }
 
-/// The commands on a line: what begins with `lacuna` on a line of its own or between backticks, and what cargo
-/// runs.
+/// The commands on a line: text that begins with `lacuna` on a line of its own or between backticks, and `cargo run`
+/// commands.
 fn commands(line: &str) -> Vec<String> {
     const CARGO: &str = "-p lacuna-cli -- ";
     let line = line.split(" # ").next().unwrap_or(line);
@@ -36,7 +36,7 @@ fn commands(line: &str) -> Vec<String> {
     all.filter_map(|text| text.strip_prefix("lacuna ")).map(str::to_owned).collect()
 }
 
-/// The words of a command, as a shell takes them apart.
+/// Splits a command into words, as a shell does.
 fn words(command: &str) -> Vec<String> {
     let (mut words, mut quote) = (vec![String::new()], None);
     for c in command.chars() {

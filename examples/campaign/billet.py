@@ -1,4 +1,4 @@
-"""A round steel billet that cools in air: a simulator as others are, a program with an input deck.
+"""A round steel billet that cools in air: a typical simulator, a program with an input deck.
 
     python3 billet.py billet.deck
 
@@ -7,9 +7,9 @@ Heat flows to the surface by conduction and leaves it by radiation and convectio
     c dT/dt = 1/r d/dr (k r dT/dr)                                              inside, c per volume,
     -k dT/dr = e s (T^4 - A^4) + h (T - A)                                      at the surface, A the air's temperature.
 
-Finite volumes along the radius, backward Euler in time. The law at the surface is not linear: each step repeats a linear
-solution until the surface's temperature stands still, and ends the program with code 3 when it does not within
-`iterations`. Units: m, kg, s, K, W. The deck has one `name = value` a line; `include FILE` reads more of them.
+Finite volumes along the radius, backward Euler in time. The boundary condition is nonlinear: each step iterates a linear
+solution until the surface temperature has converged, and ends the program with code 3 if that takes more than
+`iterations`. Units: m, kg, s, K, W. The deck has one `name = value` per line; `include FILE` reads another deck.
 """
 
 import os
@@ -24,7 +24,7 @@ PLACES = {"axis": 0.0, "half": 0.5, "skin": 0.95}
 
 
 def entries(path):
-    """What a deck and all that it includes set."""
+    """Settings of a deck and of all decks that it includes."""
     found = {}
     with open(path, encoding="utf-8") as lines:
         for number, line in enumerate(lines, 1):
@@ -41,7 +41,7 @@ def entries(path):
 
 
 def read(path):
-    """A whole deck."""
+    """A complete deck."""
     deck = entries(path)
     missing = [name for name in NAMES if name not in deck]
     if missing:
@@ -63,7 +63,7 @@ def tridiagonal(lower, diagonal, upper, right):
 
 
 class Billet:
-    """The temperatures of the cells, from the axis to the surface, and the system of equations of one step."""
+    """Temperatures of the cells, from the axis to the surface, and the system of equations of one step."""
 
     def __init__(self, deck):
         self.deck = deck
@@ -105,7 +105,7 @@ class Billet:
         sys.exit(3)
 
     def at(self, share):
-        """The temperature at a share of the radius, between the middles of the cells."""
+        """Temperature at a fraction of the radius, interpolated between the centres of the cells."""
         place = share * len(self.temperatures) - 0.5
         i = min(max(int(place), 0), len(self.temperatures) - 2)
         a, b = self.temperatures[i : i + 2]
@@ -113,7 +113,7 @@ class Billet:
 
 
 def simulate(deck, every=300.0):
-    """Yields the time and the temperature at each place, every so many seconds."""
+    """Yields the time and the temperature at each position, every `every` seconds."""
     billet = Billet(deck)
     steps = round(every / deck["step"])
     for number in range(1, round(deck["end"] / deck["step"]) + 1):

@@ -19,7 +19,7 @@ YEARS = 5  # of which one value is the mean: the swings that the other planets c
 
 
 def heliocentric(days):
-    """Places (km) and velocities (km/s) of Mercury from the sun, in the ecliptic of J2000."""
+    """Positions (km) and velocities (km/s) of Mercury relative to the sun, in the ecliptic of J2000."""
     ephemeris = Ephemeris(de421)
     both = [ephemeris.position_and_velocity(body, days) for body in ("mercury", "sun")]
     place, velocity = both[0][0] - both[1][0], (both[0][1] - both[1][1]) / DAY
@@ -29,7 +29,7 @@ def heliocentric(days):
 
 
 def perihelion(place, velocity):
-    """How far the perihelion has turned in the plane of the orbit (arcseconds), of the vectors of momentum and eccentricity."""
+    """Rotation of the perihelion in the plane of the orbit (arcseconds), from the angular momentum and eccentricity vectors."""
     momentum = numpy.cross(place, velocity, axis=0)
     distance = numpy.linalg.norm(place, axis=0)
     eccentric = numpy.cross(velocity, momentum, axis=0) / SUN - place / distance

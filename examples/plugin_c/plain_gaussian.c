@@ -1,5 +1,5 @@
-/* A discrepancy in C: independent normal differences of one unknown variance, with the errors that all replicates
- * share.
+/* A discrepancy in C: independent normal noise with one unknown variance, with the errors common to all
+ * replicates.
  *
  * With n_i measured values of output i, their mean y_i and the response m, the variance v, and the common errors
  * F z (z standard normal), let e_i = y_i - m_i, A = I + F' N F / v and w = A^-1 F' N e / v (Woodbury). Then
@@ -30,7 +30,7 @@ static int32_t answer_text(const LacunaAnswer *answer, const char *text)
     return refuse(answer, LACUNA_OK, text);
 }
 
-/* The text after `"key":` in JSON that a program wrote; NULL when there is no such key. */
+/* The text after `"key":` in machine-written JSON; NULL if there is no such key. */
 static const char *value_of(const char *json, const char *key)
 {
     char quoted[64];
@@ -98,7 +98,7 @@ typedef struct {
     double scale, count, scatter;
     double *number, *mean;  /* of the measured values of each output */
     double *factor;         /* outputs x rank */
-    double *predictive;     /* the variance of the common errors that a new replicate has, one an output */
+    double *predictive;     /* the variance of the common errors that a new replicate has, one per output */
     size_t *added;          /* 1 for the columns of the factor that a new replicate has */
     char unit[64];
 } Likelihood;
@@ -116,7 +116,7 @@ static void end_likelihood(void *object)
     }
 }
 
-/* The lower Cholesky factor of a positive definite matrix, in its place. */
+/* The lower Cholesky factor of a positive definite matrix, in place. */
 static void cholesky(double *a, size_t n)
 {
     size_t i, j, k;
@@ -133,7 +133,7 @@ static void cholesky(double *a, size_t n)
     }
 }
 
-/* Solves L L' x = b in the place of b. */
+/* Solves L L' x = b in place of b. */
 static void solve(const double *l, size_t n, double *b)
 {
     size_t i, k;
@@ -151,7 +151,7 @@ static void solve(const double *l, size_t n, double *b)
     }
 }
 
-/* What both the value and its derivatives need at one response and variance. */
+/* Quantities for the value and its derivatives at one response and variance. */
 typedef struct {
     double *a;      /* the factor of A */
     double *w;
@@ -306,7 +306,7 @@ static int32_t predictive(void *object, LacunaNumbers response, LacunaNumbers hy
     return answer_text(answer, "[\"discrepancy\",\"common\"]");
 }
 
-/* SplitMix64 and the method of Box and Muller: enough for an example. */
+/* SplitMix64 and the Box-Muller method: sufficient for an example. */
 static double uniform(uint64_t *state)
 {
     uint64_t z = *state += UINT64_C(0x9e3779b97f4a7c15);
@@ -349,10 +349,10 @@ static int32_t simulate(void *object, LacunaNumbers response, LacunaNumbers hype
 
 static const LacunaLikelihoodFunctions likelihood_functions = {
     sizeof(LacunaLikelihoodFunctions), end_likelihood, hyperparameters, log_likelihood, gradient, predictive, simulate,
-    NULL, NULL, NULL
+    NULL, NULL, NULL, NULL
 };
 
-/* Counts, means and scatter of the measured values; 0 where one is no number. */
+/* Counts, means and scatter of the measured values; returns 0 if one is not a number. */
 static int summarise(Likelihood *l, const LacunaKnown *known)
 {
     size_t i, k;
@@ -381,7 +381,7 @@ static int summarise(Likelihood *l, const LacunaKnown *known)
     return 1;
 }
 
-/* Puts the common errors side by side; 0 where one is of another shape. */
+/* Puts the common errors side by side; returns 0 if one has another shape. */
 static int gather(Likelihood *l, const LacunaKnown *known)
 {
     size_t c, i, j, at = 0;
@@ -402,7 +402,7 @@ static int gather(Likelihood *l, const LacunaKnown *known)
     return 1;
 }
 
-/* The squared unit of the response: the first "unit" of the layout is its own. */
+/* The squared unit of the response: the first "unit" of the layout is that of the response. */
 static void read_unit(Likelihood *l, LacunaText about)
 {
     char *text = copy_of(about);

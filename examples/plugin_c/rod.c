@@ -5,9 +5,9 @@
  *
  *     du/dt = a d2u/dx2 - b u,    u(0, t) = u(L, t) = 0,    u(x, 0) = T sin(pi x / L) + T/2 sin(3 pi x / L)
  *
- * on cells of equal length, step by step forward in time. Such steps are stable while 4 a dt / dx^2 + b dt <= 2: else the
- * simulator refuses the run, as codes of this kind do. The exact answer is the sum of the two sines, the one with k
- * half-waves having fallen by exp(-(a (k pi / L)^2 + b) t).
+ * on cells of equal length, by explicit time steps. They are stable if 4 a dt / dx^2 + b dt <= 2; otherwise the simulator
+ * rejects the run, as codes of this kind do. The exact solution is the sum of the two sines, the one with k half-waves
+ * multiplied by exp(-(a (k pi / L)^2 + b) t).
  */
 #include "lacuna_plugin.h"
 
@@ -39,7 +39,7 @@ static char *copy_of(LacunaText text)
     return copy;
 }
 
-/* What follows a piece of JSON that a program wrote; NULL when it is not there. */
+/* The text after a piece of JSON; NULL if the piece is not present. */
 static const char *after(const char *json, const char *piece)
 {
     const char *at = json == NULL ? NULL : strstr(json, piece);
@@ -68,7 +68,7 @@ static int32_t schema(const LacunaAnswer *answer)
         "cells.\"}}}");
 }
 
-/* Reads a number above zero where the options have the key; 0 when it is something else. */
+/* Reads a positive number if the options have the key; returns 0 if the value is anything else. */
 static int number(const char *options, const char *key, double *value)
 {
     char quoted[32], *end;
@@ -132,9 +132,9 @@ static int32_t options(void *plugin, const LacunaAnswer *answer)
     return say(answer, LACUNA_OK, text);
 }
 
-/* ---- where and when ---- */
+/* ---- positions and times ---- */
 
-/* The numbers of an axis in a layout; they are in `unit`. NULL where there is no such axis. */
+/* The numbers of an axis in a layout, which are in `unit`; NULL if there is no such axis. */
 static double *axis(const char *layout, const char *name, const char *unit, size_t *count)
 {
     char piece[64];
@@ -171,7 +171,7 @@ static void end_asked(Asked *asked)
     free(asked->t);
 }
 
-/* What is asked for: positions, and at each of them times that go up. Else the reason why that cannot be answered. */
+/* The requested positions and, at each of them, increasing times; or the reason why the request is rejected. */
 static const char *begin_asked(const char *json, const Rod *rod, Asked *asked)
 {
     const char *layout = after(json, "\"layout\":");
@@ -226,7 +226,7 @@ static int32_t signature(void *plugin, LacunaText context, const LacunaAnswer *a
         "\"description\":\"how fast heat leaks out of it\"}],\"resamples\":true}");
 }
 
-/* Goes on by a time in steps of equal length, none longer than the option says. */
+/* Advances by a time in steps of equal length, none longer than the option allows. */
 static void go_on(const Rod *rod, double a, double b, double time, double *u, double *next)
 {
     const double dx = rod->length / (double)rod->cells;
@@ -241,7 +241,7 @@ static void go_on(const Rod *rod, double a, double b, double time, double *u, do
     }
 }
 
-/* One run; `u` and `next` have a place for each end of a cell. The response goes position by position. */
+/* One run; `u` and `next` have one entry per end of a cell. The response is ordered by position, then by time. */
 static void simulate(const Rod *rod, const Asked *asked, double a, double b, double *u, double *next, double *response)
 {
     double now = 0.0;
@@ -263,7 +263,7 @@ static void simulate(const Rod *rod, const Asked *asked, double a, double b, dou
     }
 }
 
-/* Why there is no run with these inputs; empty where there is one. */
+/* The reason why these inputs are rejected; empty if they are accepted. */
 static void refusal(const Rod *rod, double a, double b, char *reason, size_t size)
 {
     const double dx = rod->length / (double)rod->cells;
@@ -276,7 +276,7 @@ static void refusal(const Rod *rod, double a, double b, char *reason, size_t siz
     }
 }
 
-/* All runs of a batch; what is said of them is a list with `null` for each that went well. */
+/* All runs of a batch; the messages are a list with `null` for each successful run. */
 static int32_t predict(void *plugin, const LacunaCalls *calls, double *responses, int32_t *statuses, uint8_t *valid,
                        const LacunaAnswer *answer)
 {
@@ -318,7 +318,7 @@ static int32_t predict(void *plugin, const LacunaCalls *calls, double *responses
     return status;
 }
 
-/* Texts are read once a batch, not once a run. */
+/* Texts are parsed once per batch, not once per run. */
 static size_t batch(void *plugin)
 {
     (void)plugin;

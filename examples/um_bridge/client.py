@@ -1,10 +1,10 @@
-"""A client of `lacuna serve`: the posterior's maximum and its Gaussian approximation, with nothing of Lacuna installed.
+"""A client of `lacuna serve`: the posterior's maximum and its Gaussian approximation, without an installation of Lacuna.
 
     lacuna run configs/um_bridge/study.toml
     lacuna serve configs/um_bridge/study.toml --port 4243
     python examples/um_bridge/client.py http://localhost:4243 -18.4 0.0019 0.06
 
-The start is one number for each unknown, in the order in which `lacuna serve` lists them. Prints one line of JSON: the
+The start is one number per unknown, in the order in which `lacuna serve` lists them. Prints one line of JSON: the
 point, and the standard deviations that the curvature gives there.
 """
 
@@ -26,7 +26,7 @@ def hessian(model, point):
 
 
 def ascent(gradient, hessian):
-    """Newton's step, uphill in every direction of curvature, each unknown in its own scale."""
+    """Newton step, uphill in every direction of curvature, with each unknown in its own scale."""
     scale = 1 / np.sqrt(np.abs(np.diag(hessian)))
     curvature, axes = np.linalg.eigh(hessian * np.outer(scale, scale))
     return scale * (axes @ ((axes.T @ (scale * gradient)) / np.abs(curvature)))

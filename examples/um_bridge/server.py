@@ -34,7 +34,7 @@ def temperature(inputs, positions):
 
 
 class Rod(umbridge.Model):
-    """From the heat flux with the coefficient of heat transfer, and the conductivity, to the temperatures."""
+    """Maps the heat flux with the coefficient of heat transfer, and the conductivity, to the temperatures."""
 
     def __init__(self):
         super().__init__("rod")

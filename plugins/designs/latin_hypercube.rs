@@ -1,47 +1,48 @@
 //! `latin_hypercube`: one point in each of N slices of every axis.
 
 use lacuna::data::Parameter;
-use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, below, permutation, uniform};
 use lacuna::plugin::{Component, Design};
 use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
 use rand::Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Latin hypercube: every axis is cut into as many equal slices as there are runs, and each slice holds
-/// exactly one run.
+/// Latin hypercube: every axis is divided into as many equal slices as there are runs, and each slice holds exactly
+/// one run.
 ///
-/// `optimise = "maximin"` exchanges coordinates between runs so that the closest pair lies as far apart
-/// as possible; `optimise = "correlation"` exchanges them so that the columns are as
-/// uncorrelated as possible. Both keep the Latin property.
+/// `optimise = "maximin"` exchanges coordinates between runs so that the closest pair is as far apart as possible;
+/// `optimise = "correlation"` exchanges them so that the columns are as uncorrelated as possible. Both keep the Latin
+/// property.
 ///
-/// A design that is extended keeps its points: every axis is cut anew into as many slices as there are then runs, and the new
-/// runs take slices that are empty. With twice as many runs each slice holds exactly one again; with another number some
-/// slices may hold two old runs, and as many stay empty.
+/// Extending a design keeps its points: every axis is divided again into as many slices as there are then runs, and
+/// the new runs take empty slices. If the number of runs doubles, each slice again holds exactly one run; otherwise
+/// some slices may hold two old runs, and as many stay empty.
 ///
 /// References: M. D. `McKay`, Beckman, Conover, Technometrics 21 (1979) 239; Morris and Mitchell, J. Stat. Plan.
 /// Inference 43 (1995) 381 (the criterion `phi_p`); Iman and Conover, Commun. Stat. B 11 (1982) 311.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LatinHypercube {
-    /// What the order of the slices is chosen for.
+    /// Criterion that the exchanges optimise.
     pub optimise: Optimise,
-    /// Number of exchanges tried by `maximin` and `correlation`, per run.
+    /// Number of exchanges tried per run, with `maximin` and `correlation`. More exchanges improve the criterion and
+    /// take longer.
     pub exchanges: usize,
-    /// Whether each point lies at the centre of its slices instead of at a random place in them.
+    /// If true, each point lies at the centre of its slices; if false, at a random position inside them.
     pub centred: bool,
 }
 
-/// What a Latin hypercube is optimised for.
+/// Criterion that a Latin hypercube optimises.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Optimise {
-    /// Nothing: a plain random Latin hypercube.
+    /// No criterion: a plain random Latin hypercube.
     None,
-    /// A large distance between the closest runs.
+    /// Maximum distance between the closest runs, which fills the space evenly.
     Maximin,
-    /// Small correlations between the columns.
+    /// Minimum correlations between the columns, which separates the effects of the parameters.
     Correlation,
 }
 
@@ -99,7 +100,7 @@ impl LatinHypercube {
         points
     }
 
-    /// Points in slices of the finer grid that no known point is in.
+    /// Returns points in slices of the finer grid that hold no known point.
     fn fill(&self, known: &Matrix, count: usize, stream: &Stream) -> Matrix {
         let all = known.rows() + count;
         let mut points = Matrix::zeros(count, known.columns());
@@ -110,7 +111,7 @@ impl LatinHypercube {
                 empty[((x * all as f64) as usize).min(all - 1)] = false;
             }
             let empty: Vec<usize> = (0..all).filter(|&slice| empty[slice]).collect();
-            // There are at least as many as new points; which are left empty is left to chance.
+            // There are at least as many empty slices as new points; which of them stay empty is random.
             let order = permutation(&mut rng, empty.len());
             for (i, place) in order.into_iter().take(count).enumerate() {
                 let inside = if self.centred { 0.5 } else { uniform(&mut rng) };
@@ -120,9 +121,9 @@ impl LatinHypercube {
         points
     }
 
-    /// Exchanges that lower Morris and Mitchell's criterion `phi_p = (sum d_ij^-p)^(1/p)`, p = 15, on
-    /// the sum of `d^-p` itself, which changes only in the terms of the two runs concerned. Runs before `first`
-    /// stay where they are.
+    /// Exchanges coordinates to lower Morris and Mitchell's criterion `phi_p = (sum d_ij^-p)^(1/p)` with p = 15. It
+    /// compares `sum d^-p`, in which an exchange changes only the terms of the two runs concerned. Runs before
+    /// `first` are kept.
     fn maximin(&self, points: &mut Matrix, first: usize, rng: &mut impl Rng) {
         let (count, dimension) = (points.rows() - first, points.columns());
         if count < 2 || points.rows() < 3 || dimension == 0 {
@@ -139,7 +140,8 @@ impl LatinHypercube {
         }
     }
 
-    /// Exchanges that lower the sum of squared correlations between the columns.
+    /// Exchanges coordinates to lower the sum of squared correlations between the columns. Runs before `first` are
+    /// kept.
     fn decorrelate(&self, points: &mut Matrix, first: usize, rng: &mut impl Rng) {
         let (count, dimension) = (points.rows() - first, points.columns());
         if count < 2 || points.rows() < 3 || dimension < 2 {
@@ -160,7 +162,7 @@ impl LatinHypercube {
     }
 }
 
-/// Two of the `count` runs from `first` on.
+/// Draws two distinct runs among the `count` runs from `first` on.
 fn pair(rng: &mut impl Rng, first: usize, count: usize) -> (usize, usize) {
     let a = below(rng, count);
     let b = (a + 1 + below(rng, count - 1)) % count;
@@ -173,7 +175,7 @@ fn swap(points: &mut Matrix, a: usize, b: usize, j: usize) {
     points[(b, j)] = kept;
 }
 
-/// The sum of `d^-15` over all pairs that contain run `a` or run `b`.
+/// Returns the sum of `d^-15` over all pairs that contain run `a` or run `b`.
 fn crowding(points: &Matrix, a: usize, b: usize) -> f64 {
     let around = |centre: usize| {
         let others = (0..points.rows()).filter(|&i| i != centre && (centre == a || i != a));
@@ -186,7 +188,7 @@ fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| (x - y).powi(2)).sum()
 }
 
-/// Centred cross products of the columns, kept up to date through exchanges.
+/// Centred cross products of the columns, updated at each exchange.
 struct Products {
     mean: Vec<f64>,
     cross: Matrix,
@@ -203,14 +205,14 @@ impl Products {
         Self { mean, cross }
     }
 
-    /// The sum of squared correlations of column `j` with the others.
+    /// Returns the sum of squared correlations of column `j` with the others.
     fn column_badness(&self, j: usize) -> f64 {
         let others = (0..self.mean.len()).filter(|&k| k != j);
         others.map(|k| self.cross[(j, k)].powi(2) / (self.cross[(j, j)] * self.cross[(k, k)])).sum()
     }
 
-    /// Exchanging entry `j` of runs `a` and `b` changes each product with column `k` by
-    /// `-(x_aj - x_bj)(x_ak - x_bk)`.
+    /// Updates the products for an exchange of entry `j` of runs `a` and `b`, which changes the product with column
+    /// `k` by `-(x_aj - x_bj)(x_ak - x_bk)`.
     fn exchange(&mut self, points: &Matrix, a: usize, b: usize, j: usize) {
         let step = points[(a, j)] - points[(b, j)];
         for k in (0..self.mean.len()).filter(|&k| k != j) {

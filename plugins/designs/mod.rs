@@ -1,16 +1,17 @@
-//! Designs: where the simulator is run.
+//! Designs: the points of parameter space at which the simulator is run.
 
 pub mod latin_hypercube;
 pub mod quadrature;
 pub mod random;
 pub mod sobol;
 
-use lacuna::linalg::Matrix;
 use lacuna::math::random::Stream;
 use lacuna::plugin::Design;
 use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
 
-/// The next points of a design whose longer ones begin with the shorter.
+/// Returns the next `count` points (`count x d`, in the unit cube) of a design whose longer versions begin with the
+/// shorter ones.
 fn next_of_sequence(
     design: &dyn Design,
     known: &Matrix,

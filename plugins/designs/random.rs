@@ -1,17 +1,17 @@
 //! `random`: independent uniform points.
 
 use lacuna::data::Parameter;
-use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::{Component, Design};
 use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Independent points, uniform in the unit cube (plain Monte Carlo).
 ///
-/// The simplest design, and the one whose statistics are easiest; a Latin hypercube or a Sobol'
-/// sequence covers the space better with the same number of runs.
+/// The simplest design, with the simplest statistics; a Latin hypercube or a Sobol' sequence covers the space better
+/// with the same number of runs.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Random {}
@@ -23,7 +23,7 @@ impl Design for Random {
         Ok(Matrix::from_rows(
             dimension,
             (0..count).map(|i| {
-                // One stream a point, so that a longer design begins with the shorter one.
+                // One stream per point, so that a longer design begins with the shorter one.
                 let mut rng = stream.at(i as u64).generator();
                 (0..dimension).map(|_| uniform(&mut rng)).collect::<Vec<f64>>()
             }),

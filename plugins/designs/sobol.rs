@@ -1,37 +1,38 @@
 //! `sobol`: a low-discrepancy sequence.
 
 use lacuna::data::Parameter;
-use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, uniform};
 use lacuna::math::sobol::{self, LARGEST_DIMENSION};
 use lacuna::plugin::{Component, Context, Design};
 use lacuna::run::Stop;
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
+use lacuna_linalg::Matrix;
 use rand::Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Sobol' sequence with the direction numbers of Joe and Kuo, for up to 128 parameters.
 ///
-/// Points fill the space evenly, best when their number is a power of two, and a longer design begins with the
+/// The points fill the space evenly, best if their number is a power of two, and a longer design begins with the
 /// shorter one. Scrambling keeps the evenness and makes averages unbiased.
 ///
-/// References: Joe and Kuo, SIAM J. Sci. Comput. 30 (2008) 2635; Owen, J. Complexity 14 (1998) 466; the
-/// hash-based nested scrambling is that of Laine and Karras, Computer Graphics Forum 30 (2011) 1227.
+/// References: Joe and Kuo, SIAM J. Sci. Comput. 30 (2008) 2635; Owen, J. Complexity 14 (1998) 466; the hash-based
+/// nested scrambling is that of Laine and Karras, Computer Graphics Forum 30 (2011) 1227.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Sobol {
-    /// How the digits are scrambled.
+    /// Scrambling of the binary digits.
     pub scramble: Scramble,
 }
 
-/// How a sequence is scrambled.
+/// Scrambling of the binary digits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Scramble {
-    /// Nested uniform scrambling of the binary digits (Owen).
+    /// Nested uniform scrambling (Owen): random points that are as even as the sequence itself, with unbiased
+    /// averages.
     Owen,
-    /// None: the sequence itself without its first point, which is the corner of the cube.
+    /// No randomisation: the sequence without its first point, which is the corner of the cube.
     None,
 }
 
@@ -59,12 +60,12 @@ impl Design for Sobol {
     fn points(&self, count: usize, dimension: usize, stream: &Stream) -> Result<Matrix, Stop> {
         if dimension > LARGEST_DIMENSION {
             return Err(Stop::new(format!(
-                "a Sobol' sequence of {dimension} dimensions is not known"
+                "Sobol' sequences have at most {LARGEST_DIMENSION} dimensions, not {dimension}"
             )));
         }
         let skipped = u32::from(self.scramble == Scramble::None);
         if u32::try_from(count).is_err() {
-            return Err(Stop::new(format!("a Sobol' sequence has no {count} points")));
+            return Err(Stop::new(format!("a Sobol' sequence has fewer than {count} points")));
         }
         let mut points = Matrix::zeros(count, dimension);
         for j in 0..dimension {
@@ -122,13 +123,13 @@ mod tests {
         assert_eq!(columns, FAR);
     }
 
-    /// Point 1000 in dimensions 1, 2, 3, 51, 101 and 128.
+    /// Reference values of point 1000 in dimensions 1, 2, 3, 51, 101 and 128.
     #[expect(clippy::unreadable_literal, reason = "digits as scipy prints them")]
     const FAR: [f64; 6] =
         [0.2197265625, 0.0966796875, 0.5185546875, 0.3525390625, 0.7685546875, 0.5439453125];
 
-    /// A scrambled net keeps its property: of 2^m points of a one-dimensional projection, one lies in each of
-    /// 2^m equal slices.
+    /// Scrambling preserves the net property: of 2^m points, a one-dimensional projection has one in each of 2^m
+    /// equal slices.
     #[test]
     fn scrambling_keeps_one_point_in_every_slice() {
         let points = design(Scramble::Owen, 256, 6);

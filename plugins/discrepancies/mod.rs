@@ -1,4 +1,4 @@
-//! Discrepancies: the statistical model of what separates model and data.
+//! Discrepancies: statistical models of the difference between data and model.
 
 pub mod autoregressive;
 pub mod common;

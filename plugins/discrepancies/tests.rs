@@ -1,4 +1,4 @@
-//! The noise that discrepancies state.
+//! Tests of the noise that discrepancies state.
 #![allow(clippy::unwrap_used)]
 
 use lacuna::plugin::discrepancy::Known;
@@ -6,8 +6,8 @@ use lacuna::plugin::{Discrepancy, registry};
 
 use super::common::testing::{OUTPUTS, data, layout};
 
-/// Where nothing is unknown and nothing shared, the noise that is stated is what the likelihood says of a new replicate; where
-/// something is unknown none is stated.
+/// If nothing is unknown and nothing is shared, the stated noise is the likelihood's variance of a new replicate; if
+/// something is unknown, no noise is stated.
 #[test]
 fn stated_noise_is_that_of_a_new_replicate() {
     let response: Vec<f64> = (0..OUTPUTS).map(|i| 1.0 + 0.3 * i as f64).collect();

@@ -1,36 +1,39 @@
-//! `crosstalk`: another sensor in this one's curve.
+//! `crosstalk`: a part of another sensor's signal.
 
 use lacuna::data::layouts::SCENARIO;
 use lacuna::data::{Coordinates, Layout};
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::effect::{Description, Reach, Situation};
-use lacuna::plugin::{Component, Context, Effect, Hyperparameter};
-use lacuna::study::problem::Complaints;
+use lacuna::matrix::Matrix;
+use lacuna::plugin::effect::{
+    CurveEffect, Description, Form, Measure, Reach, Situation, Unknown, propose,
+};
+use lacuna::plugin::{Context, Effect};
+use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
-use super::common::{Along, Measure, Row, Unknown, check, parameters, propose, signs};
+use super::common::{Along, Row};
 
-/// Crosstalk: a part of one sensor's signal is in the curves of others.
+/// Crosstalk: a fraction of one sensor's signal appears in the curves of others.
 ///
-/// Cables run side by side, channels of an amplifier share a supply, a gauge feels strain across its direction.
+/// Typical causes: parallel cables, amplifier channels that share a supply, a gauge that is sensitive to transverse
+/// strain.
 ///
 /// ```text
 /// y → y + share · y of the sensor `from`
 /// ```
 ///
-/// It acts on all other sensors, or on those of `on`; the source itself stays. It is easily confused with `gain`:
-/// sensors that see nearly the same signal cannot tell them apart.
+/// It acts on all other sensors, or on those of `on`; the source itself is unchanged. It is easily confused with
+/// `gain`: sensors that measure nearly the same signal cannot distinguish the two.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Crosstalk {
-    /// Prior of the share, from -1 to 1; by default 0.1 about zero.
+    /// Prior of the fraction, from -1 to 1. Default: mean 0 and standard deviation 0.1.
     pub share: Distribution,
-    /// The sensor whose signal is seen: a label of `axis`.
+    /// Sensor whose signal appears in the others: a label of `axis`.
     pub from: String,
-    /// The axis of the sensors.
+    /// Name of the axis of the sensors.
     pub axis: String,
 }
 
@@ -42,18 +45,8 @@ impl Default for Crosstalk {
 }
 
 impl Crosstalk {
-    fn unknowns(&self) -> [Unknown<'_>; 1] {
-        [Unknown {
-            name: "share",
-            symbol: "a",
-            measure: Measure::Number,
-            prior: Some(&self.share),
-            limits: (-1.0, 1.0),
-            example: "{ truncated_normal = [0, 0.1, -1, 1] }",
-        }]
-    }
-
-    /// The axis, and what each place of it shows.
+    /// The axis and the weights of each of its places, with the weight `own` of its own signal and `share` of the
+    /// source's.
     fn rows<'a>(
         &self,
         layout: &'a Layout,
@@ -69,57 +62,41 @@ impl Crosstalk {
     }
 }
 
-impl Component for Crosstalk {
-    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        if let Some(along) = Along::check(context.layout, &self.axis, complaints) {
-            along.check_label("from", &self.from, complaints);
-        }
-        check(&self.unknowns(), context.layout, complaints);
-    }
-}
+impl CurveEffect for Crosstalk {
+    const FORM: Form = Form::Linear;
 
-impl Effect for Crosstalk {
     fn describe(&self) -> Description {
         let of = if self.from.is_empty() { "another sensor" } else { self.from.as_str() };
-        Description {
-            title: format!("crosstalk: {of} in this curve"),
-            formula: format!("y + share · y of {of}"),
-            source: "standard: coupling of channels".into(),
-        }
+        Description::new(
+            &format!("crosstalk: {of} in this curve"),
+            &format!("y + share · y of {of}"),
+            "standard: coupling of channels",
+        )
     }
 
-    fn parameters(&self, layout: &Layout) -> Vec<Hyperparameter> {
-        parameters(&self.unknowns(), layout)
+    fn unknowns(&self) -> Vec<Unknown<'_>> {
+        vec![
+            Unknown::new(
+                "share",
+                "a",
+                Measure::Number,
+                &self.share,
+                "{ truncated_normal = [0, 0.1, -1, 1] }",
+            )
+            .within(-1.0, 1.0),
+        ]
     }
 
-    fn absent(&self, _: &Layout) -> Vec<f64> {
-        vec![0.0]
-    }
-
-    fn apply(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
+    fn formula(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
         let rows = self.rows(layout, 1.0, values[0]);
         rows.map_or_else(|| response.to_vec(), |(along, rows)| along.combine(response, &rows))
     }
 
-    fn by_parameters(&self, layout: &Layout, response: &[f64], _: &[f64]) -> Matrix {
+    fn slopes(&self, layout: &Layout, response: &[f64], _: &[f64]) -> Matrix {
         let slopes = self.rows(layout, 0.0, 1.0);
         let slopes = slopes.map(|(along, rows)| along.combine_slopes(response, &rows));
         let slopes = slopes.unwrap_or_else(|| vec![0.0; response.len()]);
         Matrix::from_vec(response.len(), 1, slopes)
-    }
-
-    fn push_forward(
-        &self,
-        layout: &Layout,
-        _: &[f64],
-        values: &[f64],
-        tangent: &[f64],
-    ) -> Vec<f64> {
-        self.apply(layout, tangent, values)
-    }
-
-    fn starts(&self, _: &Layout, _: &Situation<'_>) -> Vec<Vec<f64>> {
-        signs(Some(&self.share), 0.0).into_iter().map(|a| vec![a]).collect()
     }
 
     fn proposals(&self, situation: &Situation<'_>) -> Vec<Table> {
@@ -143,6 +120,12 @@ impl Effect for Crosstalk {
 
     fn reach(&self) -> Reach {
         Reach::Single
+    }
+
+    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        if let Some(along) = Along::check(context.layout, &self.axis, complaints) {
+            along.check_label("from", &self.from, complaints);
+        }
     }
 }
 

@@ -1,104 +1,68 @@
-//! `damping`: losses that the model leaves out.
+//! `damping`: losses that the model omits.
 
 use lacuna::data::Layout;
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::effect::{Description, Situation};
-use lacuna::plugin::{Component, Context, Effect, Hyperparameter};
-use lacuna::study::problem::Complaints;
+use lacuna::matrix::Matrix;
+use lacuna::plugin::Effect;
+use lacuna::plugin::effect::{
+    CurveEffect, Description, Form, Measure, Situation, Span, Unknown, each_curve, grid, propose,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{Measure, Span, Unknown, check, each_curve, grid, parameters, propose, signs};
-
-/// Damping: what moves dies away faster than the model says.
+/// Damping: motion decays faster than the model predicts.
 ///
-/// Friction in joints, the material itself, what surrounds the structure.
+/// Typical causes: friction in joints, internal friction of the material, the surrounding medium.
 ///
 /// ```text
 /// y → y · exp(-rate · (t - t0))
 /// ```
 ///
-/// with `t0` the first time of the curve: losses before the record are a `gain`. One rate for all frequencies is
-/// the damping that is in proportion to the mass; a mode of angular frequency ω and damping ratio ζ has the rate ζ
-/// ω.
+/// with `t0` the first time of the curve; losses before the record act as a `gain`. One rate for all frequencies
+/// corresponds to mass-proportional damping; a mode of angular frequency ω and damping ratio ζ decays at the rate ζ ω.
 ///
-/// It is easily confused with `gain` on short records, with `low_pass` and `gas_attenuation`, which take the fast
-/// part first.
+/// It is easily confused with `gain` on short records, and with `low_pass` and `gas_attenuation`, which attenuate high
+/// frequencies first.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Damping {
-    /// Prior of the rate, in the inverse unit of the last axis, not below zero.
+    /// Prior of the decay rate, in the inverse unit of the last axis, zero or positive.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate: Option<Distribution>,
 }
 
-impl Damping {
-    fn unknowns(&self) -> [Unknown<'_>; 1] {
-        [Unknown {
-            name: "rate",
-            symbol: "β",
-            measure: Measure::PerAxis,
-            prior: self.rate.as_ref(),
-            limits: (0.0, f64::INFINITY),
-            example: "{ half_normal = 500 }",
-        }]
-    }
-}
+impl CurveEffect for Damping {
+    const FORM: Form = Form::Linear;
 
-impl Component for Damping {
-    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        Span::check(context.layout, complaints);
-        check(&self.unknowns(), context.layout, complaints);
-    }
-}
-
-impl Effect for Damping {
     fn describe(&self) -> Description {
-        Description {
-            title: "damping: losses that the model leaves out".into(),
-            formula: "y · exp(-rate · (t - t0))".into(),
-            source: "standard: viscous damping, as in Meirovitch, Fundamentals of Vibrations"
-                .into(),
-        }
+        Description::new(
+            "damping: losses that the model leaves out",
+            "y · exp(-rate · (t - t0))",
+            "standard: viscous damping, as in Meirovitch, Fundamentals of Vibrations",
+        )
     }
 
-    fn parameters(&self, layout: &Layout) -> Vec<Hyperparameter> {
-        parameters(&self.unknowns(), layout)
+    fn unknowns(&self) -> Vec<Unknown<'_>> {
+        vec![
+            Unknown::new("rate", "β", Measure::PerAxis, &self.rate, "{ half_normal = 500 }")
+                .not_negative(),
+        ]
     }
 
-    fn absent(&self, _: &Layout) -> Vec<f64> {
-        vec![0.0]
-    }
-
-    fn apply(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
+    fn formula(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
         let at = grid(layout);
         let left: Vec<f64> = at.iter().map(|t| (-values[0] * (t - at[0])).exp()).collect();
         response.iter().zip(left.iter().cycle()).map(|(y, left)| y * left).collect()
     }
 
-    fn by_parameters(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Matrix {
+    fn slopes(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Matrix {
         let at = grid(layout);
-        let after = self.apply(layout, response, values);
+        let after = self.formula(layout, response, values);
         let slopes = each_curve(layout, &after, |y, out| {
             out.iter_mut().zip(y).zip(at).for_each(|((out, y), t)| *out = -(t - at[0]) * y);
         });
         Matrix::from_vec(response.len(), 1, slopes)
-    }
-
-    fn push_forward(
-        &self,
-        layout: &Layout,
-        _: &[f64],
-        values: &[f64],
-        tangent: &[f64],
-    ) -> Vec<f64> {
-        self.apply(layout, tangent, values)
-    }
-
-    fn starts(&self, _: &Layout, _: &Situation<'_>) -> Vec<Vec<f64>> {
-        signs(self.rate.as_ref(), 0.0).into_iter().map(|rate| vec![rate]).collect()
     }
 
     fn proposals(&self, situation: &Situation<'_>) -> Vec<Table> {

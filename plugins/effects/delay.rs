@@ -1,79 +1,56 @@
 //! `delay`: a wrong zero of time.
 
 use lacuna::data::Layout;
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::effect::{Description, Situation};
-use lacuna::plugin::{Component, Context, Effect, Hyperparameter};
-use lacuna::study::problem::Complaints;
+use lacuna::matrix::Matrix;
+use lacuna::plugin::Effect;
+use lacuna::plugin::effect::{
+    CurveEffect, Description, Form, Measure, Situation, Span, Unknown, apart, each_curve, propose,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{
-    Knots, Measure, Span, Unknown, apart, check, each_curve, parameters, propose, shifted,
-};
+use super::common::{Knots, shifted};
 
-/// A delay: each curve comes later, or earlier, than it should.
+/// A delay: each curve is shifted in time, later or earlier.
 ///
-/// The clock of the recorder and that of the model do not begin together: trigger, cables, filters of the recorder, a
-/// pulse that arrives later than assumed.
+/// The recorder and the model have different zeros of time because of the trigger, cables, filters of the recorder, or
+/// a pulse that arrives later than assumed.
 ///
 /// ```text
 /// y(t) → y(t - time)
 /// ```
 ///
-/// Between its points a curve is a cubic spline; a sine of eight points a period is met within 0.2 %. Before its
-/// first point and after its last a curve is at rest, with the first and the last value.
+/// Between its points a curve is interpolated by a cubic spline, which reproduces a sine with eight points per period
+/// within 0.2 %. Before its first point and after its last a curve is constant, equal to its first and its last value.
 ///
-/// It is easily confused with `low_pass`, which delays slow signals by its time constant (only what rises fast
-/// tells them apart), and with a wrong speed of waves, which delays far sensors more than near ones.
+/// It is easily confused with `low_pass`, which delays slow signals by its time constant (only fast changes distinguish
+/// the two), and with a wrong wave speed, which delays distant sensors more than near ones.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Delay {
-    /// Prior of the delay, in the unit of the last axis; below zero the curve comes earlier.
+    /// Prior of the delay, in the unit of the last axis; a negative delay shifts the curve to earlier times.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<Distribution>,
 }
 
-impl Delay {
-    fn unknowns(&self) -> [Unknown<'_>; 1] {
-        [Unknown {
-            name: "time",
-            symbol: "τ",
-            measure: Measure::Axis,
-            prior: self.time.as_ref(),
-            limits: (f64::NEG_INFINITY, f64::INFINITY),
-            example: "{ normal = [0, 1e-5] }",
-        }]
-    }
-}
+impl CurveEffect for Delay {
+    const FORM: Form = Form::Linear;
 
-impl Component for Delay {
-    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        Span::check(context.layout, complaints);
-        check(&self.unknowns(), context.layout, complaints);
-    }
-}
-
-impl Effect for Delay {
     fn describe(&self) -> Description {
-        Description {
-            title: "a delay: a wrong zero of time".into(),
-            formula: "y(t - time)".into(),
-            source: "standard: trigger and transport delay".into(),
-        }
+        Description::new(
+            "a delay: a wrong zero of time",
+            "y(t - time)",
+            "standard: trigger and transport delay",
+        )
     }
 
-    fn parameters(&self, layout: &Layout) -> Vec<Hyperparameter> {
-        parameters(&self.unknowns(), layout)
+    fn unknowns(&self) -> Vec<Unknown<'_>> {
+        vec![Unknown::new("time", "τ", Measure::Axis, &self.time, "{ normal = [0, 1e-5] }")]
     }
 
-    fn absent(&self, _: &Layout) -> Vec<f64> {
-        vec![0.0]
-    }
-
-    fn apply(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
+    fn formula(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
         if values[0] == 0.0 {
             return response.to_vec();
         }
@@ -83,7 +60,7 @@ impl Effect for Delay {
         })
     }
 
-    fn by_parameters(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Matrix {
+    fn slopes(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Matrix {
         let knots = Knots::of(layout);
         let slopes = each_curve(layout, response, |y, out| {
             shifted(&knots, y, &knots.slopes(y), values[0], |i, _, slope| out[i] = -slope);
@@ -91,21 +68,11 @@ impl Effect for Delay {
         Matrix::from_vec(response.len(), 1, slopes)
     }
 
-    fn push_forward(
-        &self,
-        layout: &Layout,
-        _: &[f64],
-        values: &[f64],
-        tangent: &[f64],
-    ) -> Vec<f64> {
-        self.apply(layout, tangent, values)
-    }
-
-    fn starts(&self, layout: &Layout, _: &Situation<'_>) -> Vec<Vec<f64>> {
+    fn sizes(&self, layout: &Layout, _: &Situation<'_>) -> Vec<f64> {
         let Some(span) = Span::of(layout) else { return Vec::new() };
         let far = 0.9 * span.duration();
         let times = apart(self.time.as_ref(), (-far, far), 0.5 * span.step, 150);
-        times.into_iter().filter(|time| *time != 0.0).map(|time| vec![time]).collect()
+        times.into_iter().filter(|time| *time != 0.0).collect()
     }
 
     fn proposals(&self, situation: &Situation<'_>) -> Vec<Table> {

@@ -1,41 +1,39 @@
-//! `echo`: a reflection that the model leaves out.
+//! `echo`: a reflection that the model omits.
 
 use lacuna::data::Layout;
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::effect::{Description, Situation};
-use lacuna::plugin::{Component, Context, Effect, Hyperparameter};
-use lacuna::study::problem::Complaints;
+use lacuna::matrix::Matrix;
+use lacuna::plugin::Effect;
+use lacuna::plugin::effect::{
+    CurveEffect, Description, Form, Measure, Situation, Span, Unknown, apart, each_curve, propose,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{
-    Knots, Measure, Span, Unknown, all, apart, check, each_curve, parameters, propose, shifted,
-    signs,
-};
+use super::common::{Knots, shifted};
 
-/// An echo: the signal arrives a second time, later and weaker, or upside down.
+/// An echo: the signal arrives a second time, delayed and attenuated, possibly with the opposite sign.
 ///
-/// A wave is reflected at a boundary that the model takes for open, or takes another way in the structure. A free
-/// end returns strain with the other sign, a fixed end with the same.
+/// A wave is reflected at a boundary that the model treats as open, or travels along a second path in the structure. A
+/// free end reflects strain with the opposite sign, a fixed end with the same sign.
 ///
 /// ```text
 /// y(t) → y(t) + strength · (y(t - lag) - y(t0))
 /// ```
 ///
-/// The first value of the curve, at `t0`, is that of rest, so that nothing arrives before the lag. Between its
-/// points a curve is a spline.
+/// The first value of the curve, at `t0`, is the state of rest, so that nothing arrives before the lag. Between its
+/// points a curve is interpolated by a spline.
 ///
-/// It is easily confused with `resonance` where the signal rings itself, with `secondary_pulse`, and with
-/// `low_pass` for lags of a few steps.
+/// It is easily confused with `resonance` if the signal itself oscillates, with `secondary_pulse`, and with `low_pass`
+/// for lags of a few time steps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Echo {
-    /// Prior of the strength, from -1 to 1: an echo is not louder than the call. By default 0.2 about zero: steel
-    /// against mercury reflects 0.4 of a pressure wave, and most ways back lose more.
+    /// Prior of the strength (reflected over incident amplitude), from -1 to 1. Default: mean 0, scale 0.2; an
+    /// interface between steel and mercury reflects 0.4 of a pressure wave, and most paths lose more.
     pub strength: Distribution,
-    /// Prior of the time after which it arrives, in the unit of the last axis, not below zero.
+    /// Prior of the lag, in the unit of the last axis, zero or positive.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lag: Option<Distribution>,
 }
@@ -46,56 +44,27 @@ impl Default for Echo {
     }
 }
 
-impl Echo {
-    fn unknowns(&self) -> [Unknown<'_>; 2] {
-        [
-            Unknown {
-                name: "strength",
-                symbol: "a",
-                measure: Measure::Number,
-                prior: Some(&self.strength),
-                limits: (-1.0, 1.0),
-                example: "{ uniform = [-1, 1] }",
-            },
-            Unknown {
-                name: "lag",
-                symbol: "τ",
-                measure: Measure::Axis,
-                prior: self.lag.as_ref(),
-                limits: (0.0, f64::INFINITY),
-                example: "{ uniform = [1e-5, 8e-4] }",
-            },
+impl CurveEffect for Echo {
+    const FORM: Form = Form::Linear;
+
+    fn describe(&self) -> Description {
+        Description::new(
+            "an echo: a reflection that the model leaves out",
+            "y(t) + strength · (y(t - lag) - y(t0))",
+            "standard: reflection at a boundary",
+        )
+    }
+
+    fn unknowns(&self) -> Vec<Unknown<'_>> {
+        vec![
+            Unknown::new("strength", "a", Measure::Number, &self.strength, "{ uniform = [-1, 1] }")
+                .within(-1.0, 1.0),
+            Unknown::new("lag", "τ", Measure::Axis, &self.lag, "{ uniform = [1e-5, 8e-4] }")
+                .not_negative(),
         ]
     }
-}
 
-impl Component for Echo {
-    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        Span::check(context.layout, complaints);
-        check(&self.unknowns(), context.layout, complaints);
-    }
-}
-
-impl Effect for Echo {
-    fn describe(&self) -> Description {
-        Description {
-            title: "an echo: a reflection that the model leaves out".into(),
-            formula: "y(t) + strength · (y(t - lag) - y(t0))".into(),
-            source: "standard: reflection at a boundary".into(),
-        }
-    }
-
-    fn parameters(&self, layout: &Layout) -> Vec<Hyperparameter> {
-        parameters(&self.unknowns(), layout)
-    }
-
-    fn absent(&self, layout: &Layout) -> Vec<f64> {
-        let mut values: Vec<f64> = self.parameters(layout).iter().map(|own| own.start).collect();
-        values[0] = 0.0;
-        values
-    }
-
-    fn apply(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
+    fn formula(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
         let knots = Knots::of(layout);
         each_curve(layout, response, |y, out| {
             shifted(&knots, y, &knots.slopes(y), values[1], |i, late, _| {
@@ -104,7 +73,7 @@ impl Effect for Echo {
         })
     }
 
-    fn by_parameters(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Matrix {
+    fn slopes(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Matrix {
         let knots = Knots::of(layout);
         let mut both = Matrix::zeros(response.len(), 2);
         let mut rows = both.as_mut_slice().chunks_mut(2 * knots.at.len());
@@ -118,21 +87,10 @@ impl Effect for Echo {
         both
     }
 
-    fn push_forward(
-        &self,
-        layout: &Layout,
-        _: &[f64],
-        values: &[f64],
-        tangent: &[f64],
-    ) -> Vec<f64> {
-        self.apply(layout, tangent, values)
-    }
-
-    fn starts(&self, layout: &Layout, _: &Situation<'_>) -> Vec<Vec<f64>> {
-        let Some(span) = Span::of(layout) else { return Vec::new() };
+    fn indices(&self, layout: &Layout) -> Option<Vec<Vec<f64>>> {
+        let span = Span::of(layout)?;
         let range = (0.5 * span.step, span.duration() - 0.5 * span.step);
-        let lags = apart(self.lag.as_ref(), range, span.step, 90);
-        all(&[signs(Some(&self.strength), 0.0), lags])
+        Some(vec![apart(self.lag.as_ref(), range, span.step, 90)])
     }
 
     fn proposals(&self, situation: &Situation<'_>) -> Vec<Table> {

@@ -4,18 +4,16 @@ use std::sync::OnceLock;
 
 use lacuna::data::{Layout, Unit};
 use lacuna::expression::{Evaluator, Fault, Program, Scope};
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::effect::{Description, Situation};
+use lacuna::plugin::effect::{Description, Situation, all, grid, propose, signs, spaced};
 use lacuna::plugin::{Component, Context, Effect, Hyperparameter};
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
+use lacuna_linalg::Matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
-use super::common::{all, grid, propose, signs, spaced};
-
-/// An effect of your own: a formula for what becomes of each value of the response.
+/// A user-defined effect: a formula that is applied to each value of the response.
 ///
 /// ```toml
 /// [[effect]]
@@ -28,20 +26,20 @@ use super::common::{all, grid, propose, signs, spaced};
 /// ]
 /// ```
 ///
-/// In the formula `y` is a value of the response in its unit, `t` its place on the last axis (its time) in the unit
-/// of that, and the other names are the effect's parameters. The language is that of all expressions in a study;
-/// derivatives are exact.
+/// In the formula `y` is a value of the response in its unit, `t` its coordinate on the last axis (its time) in the
+/// unit of that axis, and the other names are the effect's parameters. The language is that of all expressions in a
+/// study; derivatives are exact.
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Expression {
-    /// The formula, such as `"y + size * sin(2 * pi * frequency * t)"`.
+    /// Formula of the changed response, such as `"y + size * sin(2 * pi * frequency * t)"`.
     pub formula: String,
-    /// The unknowns of the formula. The first is the size of the effect: there is a value of it, `absent`, with
-    /// which the formula is `y`, whatever the others are.
+    /// Unknowns of the formula. The first is the size of the effect: if it has the value `absent`, the formula must
+    /// equal `y` for all values of the others.
     pub parameters: Vec<Own>,
-    /// The value of the first parameter with which there is no effect.
+    /// Value of the first parameter at which the effect is absent.
     pub absent: f64,
-    /// What it is, in plain words, for the report.
+    /// Title of the effect in plain words, for the report.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub title: String,
     #[serde(skip)]
@@ -52,11 +50,11 @@ pub struct Expression {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Own {
-    /// Its name in the formula.
+    /// Name of the unknown in the formula.
     pub name: String,
-    /// Its prior.
+    /// Prior distribution of the unknown, in `unit`.
     pub prior: Distribution,
-    /// The unit of its values; the formula sees the number.
+    /// Unit of the unknown; the formula uses the number in this unit. Default: dimensionless.
     #[serde(default)]
     pub unit: Unit,
 }
@@ -92,12 +90,12 @@ impl Expression {
         Ok(program)
     }
 
-    /// The formula; none where it is wrong, which the check says.
+    /// Compiled formula; `None` if it has errors, which the check reports.
     fn program(&self) -> Option<&Program> {
         self.compiled.get_or_init(|| self.compile().ok()).as_ref()
     }
 
-    /// Calls `each` for every value of a response with the formula at it.
+    /// Calls `each` for every value of a response, with the formula evaluated there.
     fn walk(
         &self,
         layout: &Layout,
@@ -119,7 +117,7 @@ impl Expression {
         values.first().is_none_or(|size| *size == self.absent)
     }
 
-    /// Complains of a formula that is not `y` without the effect.
+    /// Reports a formula that differs from `y` when the effect is absent.
     fn check_absent(&self, layout: &Layout, complaints: &mut Complaints<'_>) {
         let mut values: Vec<f64> = self.parameters.iter().map(|p| p.prior.quantile(0.4)).collect();
         values[0] = self.absent;
@@ -259,7 +257,7 @@ impl Effect for Expression {
         all(&columns)
     }
 
-    /// Itself, where a study gives it a formula.
+    /// The effect itself, if the study gives it a formula.
     fn proposals(&self, _: &Situation<'_>) -> Vec<Table> {
         if self.formula.is_empty() || self.parameters.is_empty() {
             return Vec::new();
@@ -286,7 +284,7 @@ lacuna::register!(Effect, "expression", Expression);
 mod tests {
     use super::super::common::testing::{curve, effect, even};
 
-    /// The same effect as a formula and as a plugin.
+    /// An effect written as a formula and the plugin of the same effect.
     #[test]
     fn a_formula_is_the_plugin_of_that_formula() {
         let formula = "formula = \"y + size * exp(-t / decay)\"\nparameters = [\n\

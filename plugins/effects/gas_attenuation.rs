@@ -1,38 +1,37 @@
-//! `gas_attenuation`: a part of the signal that passes through gas.
+//! `gas_attenuation`: attenuation of a part of the signal by gas bubbles.
 
 use lacuna::data::Layout;
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::effect::{Description, Reach, Situation};
-use lacuna::plugin::{Component, Context, Effect, Hyperparameter};
-use lacuna::study::problem::Complaints;
+use lacuna::matrix::Matrix;
+use lacuna::plugin::Effect;
+use lacuna::plugin::effect::{
+    CurveEffect, Description, Form, Measure, Reach, Situation, Span, Unknown, each_curve, grid,
+    propose, spaced_by_ratio,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{
-    Filter, Knots, Measure, Span, Unknown, all, check, each_curve, grid, parameters, propose,
-    signs, spaced_by_ratio,
-};
+use super::common::{Filter, Knots};
 
-/// Gas attenuation: a share of the signal loses its fast part, as waves do in a liquid with bubbles.
+/// Gas attenuation: a fraction of the signal loses its high frequencies, like waves in a bubbly liquid.
 ///
 /// ```text
 /// y → (1 - share) · y + share · z,     relaxation_time · z'(t) = y(t) - z(t)
 /// ```
 ///
-/// Bubbles give way to slow pressure and take the fast part of it. In the mercury target of the SNS gas takes 25 to
-/// 75 % of the strain (Materials & Design (2022) 110937); this is how it looks at a sensor, not how it comes about: for
-/// that swap the model (`mercury_target_equilibrium_gas`). The lag is solved as in `low_pass`.
+/// Bubbles follow slow changes of pressure and attenuate fast ones. In the mercury target of the SNS gas reduces the
+/// strain by 25 to 75 % (Materials & Design (2022) 110937). The effect describes the change at a sensor, not the
+/// mechanism: for that, replace the model (`mercury_target_equilibrium_gas`). The lag is solved as in `low_pass`.
 ///
-/// It is easily confused with `gain` (relaxation time far above the record), with `low_pass` (share of one) and
-/// `damping`.
+/// It is easily confused with `gain` (relaxation time far above the length of the record), with `low_pass` (fraction of
+/// one) and with `damping`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GasAttenuation {
-    /// Prior of the share that is attenuated, from 0 to 1; by default any is as likely.
+    /// Prior of the attenuated fraction of the signal, from 0 to 1. Default: uniform.
     pub share: Distribution,
-    /// Prior of the relaxation time, in the unit of the last axis, not below zero.
+    /// Prior of the relaxation time, in the unit of the last axis, zero or positive.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relaxation_time: Option<Distribution>,
 }
@@ -43,69 +42,46 @@ impl Default for GasAttenuation {
     }
 }
 
-impl GasAttenuation {
-    fn unknowns(&self) -> [Unknown<'_>; 2] {
-        [
-            Unknown {
-                name: "share",
-                symbol: "A",
-                measure: Measure::Number,
-                prior: Some(&self.share),
-                limits: (0.0, 1.0),
-                example: "{ uniform = [0, 1] }",
-            },
-            Unknown {
-                name: "relaxation_time",
-                symbol: "τ",
-                measure: Measure::Axis,
-                prior: self.relaxation_time.as_ref(),
-                limits: (0.0, f64::INFINITY),
-                example: "{ log_uniform = [1e-6, 1e-4] }",
-            },
-        ]
-    }
-}
-
-/// What a first-order lag makes of a response.
+/// Response after a first-order lag with the time constant `time`.
 fn lagged(layout: &Layout, response: &[f64], time: f64) -> Vec<f64> {
     let Some(filter) = Filter::new(grid(layout), time) else { return response.to_vec() };
     let knots = Knots::of(layout);
     each_curve(layout, response, |y, out| filter.answer(&knots, y, out))
 }
 
-impl Component for GasAttenuation {
-    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        Span::check(context.layout, complaints);
-        check(&self.unknowns(), context.layout, complaints);
-    }
-}
+impl CurveEffect for GasAttenuation {
+    const FORM: Form = Form::Linear;
 
-impl Effect for GasAttenuation {
     fn describe(&self) -> Description {
-        Description {
-            title: "gas attenuation: a part of the signal passes through gas".into(),
-            formula: "(1 - share) · y + share · z with relaxation_time · z' = y - z".into(),
-            source: "standard: relaxation; the share by McClintock et al., Materials & Design (2022) 110937".into(),
-        }
+        Description::new(
+            "gas attenuation: a part of the signal passes through gas",
+            "(1 - share) · y + share · z with relaxation_time · z' = y - z",
+            "standard: relaxation; the share by McClintock et al., Materials & Design (2022) 110937",
+        )
     }
 
-    fn parameters(&self, layout: &Layout) -> Vec<Hyperparameter> {
-        parameters(&self.unknowns(), layout)
+    fn unknowns(&self) -> Vec<Unknown<'_>> {
+        vec![
+            Unknown::new("share", "A", Measure::Number, &self.share, "{ uniform = [0, 1] }")
+                .within(0.0, 1.0),
+            Unknown::new(
+                "relaxation_time",
+                "τ",
+                Measure::Axis,
+                &self.relaxation_time,
+                "{ log_uniform = [1e-6, 1e-4] }",
+            )
+            .not_negative(),
+        ]
     }
 
-    fn absent(&self, layout: &Layout) -> Vec<f64> {
-        let mut values: Vec<f64> = self.parameters(layout).iter().map(|own| own.start).collect();
-        values[0] = 0.0;
-        values
-    }
-
-    fn apply(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
+    fn formula(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
         let filtered = lagged(layout, response, values[1]);
         let mix = |(y, z): (&f64, f64)| (1.0 - values[0]) * y + values[0] * z;
         response.iter().zip(filtered).map(mix).collect()
     }
 
-    fn by_parameters(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Matrix {
+    fn slopes(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Matrix {
         let filtered = lagged(layout, response, values[1]);
         let slopes = Filter::slopes(layout, values[1], response, &filtered);
         Matrix::from_fn(response.len(), 2, |i, j| match j {
@@ -114,25 +90,14 @@ impl Effect for GasAttenuation {
         })
     }
 
-    fn push_forward(
-        &self,
-        layout: &Layout,
-        _: &[f64],
-        values: &[f64],
-        tangent: &[f64],
-    ) -> Vec<f64> {
-        self.apply(layout, tangent, values)
-    }
-
-    /// Gas in the liquid is between the source and every sensor.
+    /// All curves together, since the gas lies between the source and every sensor.
     fn reach(&self) -> Reach {
         Reach::Whole
     }
 
-    fn starts(&self, layout: &Layout, _: &Situation<'_>) -> Vec<Vec<f64>> {
+    fn indices(&self, layout: &Layout) -> Option<Vec<Vec<f64>>> {
         let range = Span::of(layout).map_or((1e-3, 1.0), |s| (0.2 * s.step, s.duration()));
-        let times = spaced_by_ratio(self.relaxation_time.as_ref(), range, 12);
-        all(&[signs(Some(&self.share), 0.0), times])
+        Some(vec![spaced_by_ratio(self.relaxation_time.as_ref(), range, 12)])
     }
 
     fn proposals(&self, situation: &Situation<'_>) -> Vec<Table> {

@@ -1,70 +1,45 @@
-//! `level_jumps`: a level that jumps and stays.
+//! `level_jumps`: a lasting jump of the level.
 
 use lacuna::data::Layout;
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::effect::{Description, Situation};
-use lacuna::plugin::{Component, Context, Effect, Hyperparameter};
-use lacuna::study::problem::Complaints;
+use lacuna::matrix::Matrix;
+use lacuna::plugin::Effect;
+use lacuna::plugin::effect::{
+    CurveEffect, Description, Form, Measure, Situation, Span, Unknown, added, added_slopes, apart,
+    grid, propose,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{
-    Measure, Span, Unknown, added, added_slopes, all, apart, check, grid, parameters, propose,
-    signs,
-};
-
-/// A jump of the level: from some time on a curve is higher or lower by a number.
+/// A jump of the level: a constant added to a curve from some time on.
 ///
-/// An interferometer loses count of its fringes, a gauge comes loose, an amplifier changes its range. Several jumps
-/// are several effects.
+/// Typical causes: an interferometer that miscounts fringes, a gauge that comes loose, an amplifier that changes its
+/// range. Use one effect for each jump.
 ///
 /// ```text
 /// y → y + size from time on
 /// ```
 ///
-/// A jump between two points of the grid is seen at the second; the step between them is rounded off over their
-/// distance, so that the time has a slope for those who search along it. The time is known no better than the grid.
+/// A jump between two points of the grid is seen at the second. The step between them is smoothed over their distance,
+/// so that the response has a derivative with respect to the time, which gradient-based fits need. The time is
+/// determined no better than to the grid spacing.
 ///
-/// It is easily confused with `offset` near the first time and `secondary_pulse` near the last. Jumps of an
-/// interferometer are whole multiples of one size.
+/// It is easily confused with `offset` near the first time and with `secondary_pulse` near the last. Jumps of an
+/// interferometer are integer multiples of one size.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LevelJumps {
-    /// Prior of the height, in the unit of the response, of either sign.
+    /// Prior of the height of the jump, in the unit of the response; either sign.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size: Option<Distribution>,
-    /// Prior of the time, in the unit of the last axis.
+    /// Prior of the time of the jump, in the unit of the last axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<Distribution>,
 }
 
-impl LevelJumps {
-    fn unknowns(&self) -> [Unknown<'_>; 2] {
-        [
-            Unknown {
-                name: "size",
-                symbol: "b",
-                measure: Measure::Response,
-                prior: self.size.as_ref(),
-                limits: (f64::NEG_INFINITY, f64::INFINITY),
-                example: "{ normal = [0, 1e-4] }",
-            },
-            Unknown {
-                name: "time",
-                symbol: "t1",
-                measure: Measure::Axis,
-                prior: self.time.as_ref(),
-                limits: (f64::NEG_INFINITY, f64::INFINITY),
-                example: "{ uniform = [1e-5, 1e-3] }",
-            },
-        ]
-    }
-}
-
-/// How far a jump has been passed at a point of the grid, from 0 to 1, and the length over which that happens: the
-/// distance to the point on the other side of the jump.
+/// Fraction of a jump that is completed at a point of the grid, from 0 to 1, and the width over which the jump is
+/// smoothed: the distance to the point on the other side of it.
 fn passed(at: &[f64], i: usize, time: f64) -> (f64, f64) {
     let since = at[i] - time;
     let before = if i > 0 { Some(at[i] - at[i - 1]) } else { None };
@@ -74,33 +49,25 @@ fn passed(at: &[f64], i: usize, time: f64) -> (f64, f64) {
     ((since / width + 0.5).clamp(0.0, 1.0), width)
 }
 
-impl Component for LevelJumps {
-    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        Span::check(context.layout, complaints);
-        check(&self.unknowns(), context.layout, complaints);
-    }
-}
+impl CurveEffect for LevelJumps {
+    const FORM: Form = Form::Additive;
 
-impl Effect for LevelJumps {
     fn describe(&self) -> Description {
-        Description {
-            title: "a jump: a level that jumps and stays".into(),
-            formula: "y + size from time on".into(),
-            source: "standard: fringe-count error of an interferometer".into(),
-        }
+        Description::new(
+            "a jump: a level that jumps and stays",
+            "y + size from time on",
+            "standard: fringe-count error of an interferometer",
+        )
     }
 
-    fn parameters(&self, layout: &Layout) -> Vec<Hyperparameter> {
-        parameters(&self.unknowns(), layout)
+    fn unknowns(&self) -> Vec<Unknown<'_>> {
+        vec![
+            Unknown::new("size", "b", Measure::Response, &self.size, "{ normal = [0, 1e-4] }"),
+            Unknown::new("time", "t1", Measure::Axis, &self.time, "{ uniform = [1e-5, 1e-3] }"),
+        ]
     }
 
-    fn absent(&self, layout: &Layout) -> Vec<f64> {
-        let mut values: Vec<f64> = self.parameters(layout).iter().map(|own| own.start).collect();
-        values[0] = 0.0;
-        values
-    }
-
-    fn apply(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
+    fn formula(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
         let at = grid(layout);
         added(layout, response, values[0], |i| {
             let x = passed(at, i, values[1]).0;
@@ -108,7 +75,7 @@ impl Effect for LevelJumps {
         })
     }
 
-    fn by_parameters(&self, layout: &Layout, _: &[f64], values: &[f64]) -> Matrix {
+    fn slopes(&self, layout: &Layout, _: &[f64], values: &[f64]) -> Matrix {
         let at = grid(layout);
         added_slopes(layout, 2, |i, row| {
             let (x, width) = passed(at, i, values[1]);
@@ -117,14 +84,9 @@ impl Effect for LevelJumps {
         })
     }
 
-    fn push_forward(&self, _: &Layout, _: &[f64], _: &[f64], tangent: &[f64]) -> Vec<f64> {
-        tangent.to_vec()
-    }
-
-    fn starts(&self, layout: &Layout, _: &Situation<'_>) -> Vec<Vec<f64>> {
-        let Some(span) = Span::of(layout) else { return Vec::new() };
-        let times = apart(self.time.as_ref(), (span.first, span.last), span.step, 95);
-        all(&[signs(self.size.as_ref(), 0.0), times])
+    fn indices(&self, layout: &Layout) -> Option<Vec<Vec<f64>>> {
+        let span = Span::of(layout)?;
+        Some(vec![apart(self.time.as_ref(), (span.first, span.last), span.step, 95)])
     }
 
     fn proposals(&self, situation: &Situation<'_>) -> Vec<Table> {

@@ -1,103 +1,76 @@
-//! `low_pass`: a chain that answers late.
+//! `low_pass`: a measuring chain with a first-order lag.
 
 use lacuna::data::Layout;
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::effect::{Description, Situation};
-use lacuna::plugin::{Component, Context, Effect, Hyperparameter};
-use lacuna::study::problem::Complaints;
+use lacuna::matrix::Matrix;
+use lacuna::plugin::Effect;
+use lacuna::plugin::effect::{
+    CurveEffect, Description, Form, Measure, Situation, Span, Unknown, each_curve, grid, propose,
+    spaced_by_ratio,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{
-    Filter, Knots, Measure, Span, Unknown, check, each_curve, grid, parameters, propose,
-    spaced_by_ratio,
-};
+use super::common::{Filter, Knots};
 
-/// A first-order lag: the sensor, its cable or its amplifier follows fast changes late and in part.
+/// A first-order lag: the sensor, its cable or its amplifier follows fast changes late and attenuated.
 ///
 /// ```text
 /// time_constant · z'(t) = y(t) - z(t),     y → z
 /// ```
 ///
-/// A sine of angular frequency ω shrinks by `1 / sqrt(1 + ω² time_constant²)` and comes late by the angle `atan(ω
-/// time_constant)`; the cut-off frequency is `1 / (2 π time_constant)`. The equation is solved exactly for the
-/// spline through the points of a curve, from rest at its first value.
+/// The amplitude of a sine of angular frequency ω is multiplied by `1 / sqrt(1 + ω² time_constant²)` and its phase is
+/// delayed by `atan(ω time_constant)`; the cut-off frequency is `1 / (2 π time_constant)`. The equation is solved
+/// exactly for the spline through the points of a curve, from rest at its first value.
 ///
-/// It is easily confused with `delay`: slow signals come late by the time constant and are not rounded.
+/// It is easily confused with `delay`: slow signals are delayed by the time constant without a change of shape.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LowPass {
-    /// Prior of the time constant, in the unit of the last axis, not below zero.
+    /// Prior of the time constant, in the unit of the last axis, zero or positive; zero is no lag.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_constant: Option<Distribution>,
 }
 
-impl LowPass {
-    fn unknowns(&self) -> [Unknown<'_>; 1] {
-        [Unknown {
-            name: "time_constant",
-            symbol: "τ",
-            measure: Measure::Axis,
-            prior: self.time_constant.as_ref(),
-            limits: (0.0, f64::INFINITY),
-            example: "{ half_normal = 1e-5 }",
-        }]
-    }
-}
+impl CurveEffect for LowPass {
+    const FORM: Form = Form::Linear;
 
-impl Component for LowPass {
-    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        Span::check(context.layout, complaints);
-        check(&self.unknowns(), context.layout, complaints);
-    }
-}
-
-impl Effect for LowPass {
     fn describe(&self) -> Description {
-        Description {
-            title: "a first-order lag: a chain that answers late".into(),
-            formula: "z with time_constant · z' = y - z".into(),
-            source:
-                "standard: first-order system, as in Oppenheim and Willsky, Signals and Systems"
-                    .into(),
-        }
+        Description::new(
+            "a first-order lag: a chain that answers late",
+            "z with time_constant · z' = y - z",
+            "standard: first-order system, as in Oppenheim and Willsky, Signals and Systems",
+        )
     }
 
-    fn parameters(&self, layout: &Layout) -> Vec<Hyperparameter> {
-        parameters(&self.unknowns(), layout)
+    fn unknowns(&self) -> Vec<Unknown<'_>> {
+        vec![
+            Unknown::new(
+                "time_constant",
+                "τ",
+                Measure::Axis,
+                &self.time_constant,
+                "{ half_normal = 1e-5 }",
+            )
+            .not_negative(),
+        ]
     }
 
-    fn absent(&self, _: &Layout) -> Vec<f64> {
-        vec![0.0]
-    }
-
-    fn apply(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
+    fn formula(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
         let Some(filter) = Filter::new(grid(layout), values[0]) else { return response.to_vec() };
         let knots = Knots::of(layout);
         each_curve(layout, response, |y, out| filter.answer(&knots, y, out))
     }
 
-    fn by_parameters(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Matrix {
-        let after = self.apply(layout, response, values);
+    fn slopes(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Matrix {
+        let after = self.formula(layout, response, values);
         Matrix::from_vec(response.len(), 1, Filter::slopes(layout, values[0], response, &after))
     }
 
-    fn push_forward(
-        &self,
-        layout: &Layout,
-        _: &[f64],
-        values: &[f64],
-        tangent: &[f64],
-    ) -> Vec<f64> {
-        self.apply(layout, tangent, values)
-    }
-
-    fn starts(&self, layout: &Layout, _: &Situation<'_>) -> Vec<Vec<f64>> {
+    fn sizes(&self, layout: &Layout, _: &Situation<'_>) -> Vec<f64> {
         let range = Span::of(layout).map_or((1e-3, 1.0), |s| (0.2 * s.step, 0.5 * s.duration()));
-        let constants = spaced_by_ratio(self.time_constant.as_ref(), range, 8);
-        constants.into_iter().map(|t| vec![t]).collect()
+        spaced_by_ratio(self.time_constant.as_ref(), range, 8)
     }
 
     fn proposals(&self, situation: &Situation<'_>) -> Vec<Table> {

@@ -1,44 +1,47 @@
-//! `misalignment`: a sensor that points another way.
+//! `misalignment`: a rotated sensor.
 
 use std::collections::BTreeMap;
 
 use lacuna::data::{Layout, Unit};
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::effect::{Description, Reach, Situation};
-use lacuna::plugin::{Component, Context, Effect, Hyperparameter};
-use lacuna::study::problem::Complaints;
+use lacuna::matrix::Matrix;
+use lacuna::plugin::effect::{
+    CurveEffect, Description, Form, Measure, Reach, Situation, Unknown, propose,
+};
+use lacuna::plugin::{Context, Effect};
+use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
-use super::common::{Along, Measure, Row, Unknown, check, parameters, propose, signs};
+use super::common::{Along, Row};
 
-/// Misalignment: a strain gauge is turned by an angle from the direction that the model assumes.
+/// Misalignment: a strain gauge is rotated by an angle from the direction that the model assumes.
 ///
-/// It then shows a part of the strain across its direction and of the shear:
+/// It then also measures a part of the transverse strain and of the shear strain:
 ///
 /// ```text
 /// y → cos² angle · y + sin² angle · y across + sin angle · cos angle · shear
 /// ```
 ///
-/// `other` says which sensor shows the strain at the same place across the direction, and `shear` which shows the
-/// shear (as an angle, twice the tensor's component), where there is any. Without shear both signs of the angle are
-/// alike and small angles cannot be seen: the change is of second order.
+/// `other` names the sensor that measures the transverse strain at the same place, and `shear` the sensor that measures
+/// the shear strain there, if any (engineering shear strain, twice the tensor component). Without shear strain both
+/// signs of the angle are equivalent and small angles cannot be detected: the change is of second order.
 ///
-/// It is easily confused with `gain` where both strains have one shape, and with `crosstalk`.
+/// It is easily confused with `gain` if both strains have the same time history, and with `crosstalk`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Misalignment {
-    /// Prior of the angle, in degrees. By default 3 degrees about zero, as gauges are laid by hand.
+    /// Prior of the angle, in degrees. Default: mean 0 and standard deviation 3 degrees, typical of gauges applied by
+    /// hand.
     pub angle: Distribution,
-    /// For each sensor that may be turned the sensor that shows the strain across, such as `{ R = "V" }`.
+    /// Sensor that measures the transverse strain, for each sensor that may be rotated, such as `{ R = "V" }`.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub other: BTreeMap<String, String>,
-    /// For each sensor that may be turned the sensor that shows the shear; none where left out.
+    /// Sensor that measures the shear strain, for each sensor that may be rotated. Default: no shear strain.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub shear: BTreeMap<String, String>,
-    /// The axis of the sensors.
+    /// Name of the axis of the sensors.
     pub axis: String,
 }
 
@@ -54,17 +57,6 @@ impl Default for Misalignment {
 }
 
 impl Misalignment {
-    fn unknowns(&self) -> [Unknown<'_>; 1] {
-        [Unknown {
-            name: "angle",
-            symbol: "α",
-            measure: Measure::In(Unit::parse("deg").unwrap_or_default()),
-            prior: Some(&self.angle),
-            limits: (f64::NEG_INFINITY, f64::INFINITY),
-            example: "{ normal = [0, 3] }",
-        }]
-    }
-
     /// The axis, and what each place of it shows with these weights of its own strain, that across and the shear.
     fn rows<'a>(
         &self,
@@ -84,76 +76,40 @@ impl Misalignment {
     }
 }
 
-impl Component for Misalignment {
-    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        check(&self.unknowns(), context.layout, complaints);
-        let Some(along) = Along::check(context.layout, &self.axis, complaints) else { return };
-        if self.other.is_empty() {
-            complaints.at("other").say("missing key `other`").expected(
-                "which sensor shows the strain across which, such as `other = { R = \"V\" }`",
-            );
-        }
-        for (key, table) in [("other", &self.other), ("shear", &self.shear)] {
-            for (label, of) in table {
-                let path = format!("{key}.{label}");
-                along.check_label(&path, label, complaints);
-                along.check_label(&path, of, complaints);
-            }
-        }
-        for label in self.shear.keys().filter(|label| !self.other.contains_key(*label)) {
-            complaints
-                .at(&format!("shear.{label}"))
-                .say(format!("`{label}` has a shear and no strain across"))
-                .help(format!("say in `other` which sensor is across `{label}`"));
-        }
-    }
-}
+impl CurveEffect for Misalignment {
+    const FORM: Form = Form::Linear;
 
-impl Effect for Misalignment {
     fn describe(&self) -> Description {
-        Description {
-            title: "misalignment: a sensor that points another way".into(),
-            formula: "cos² angle · y + sin² angle · y across + sin angle · cos angle · shear".into(),
-            source: "standard: transformation of strain, as in Timoshenko and Goodier, Theory of Elasticity"
-                .into(),
-        }
+        Description::new(
+            "misalignment: a sensor that points another way",
+            "cos² angle · y + sin² angle · y across + sin angle · cos angle · shear",
+            "standard: transformation of strain, as in Timoshenko and Goodier, Theory of Elasticity",
+        )
     }
 
-    fn parameters(&self, layout: &Layout) -> Vec<Hyperparameter> {
-        parameters(&self.unknowns(), layout)
+    fn unknowns(&self) -> Vec<Unknown<'_>> {
+        vec![Unknown::new(
+            "angle",
+            "α",
+            Measure::In(Unit::parse("deg").unwrap_or_default()),
+            &self.angle,
+            "{ normal = [0, 3] }",
+        )]
     }
 
-    fn absent(&self, _: &Layout) -> Vec<f64> {
-        vec![0.0]
-    }
-
-    fn apply(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
+    fn formula(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
         let (sin, cos) = values[0].to_radians().sin_cos();
         let rows = self.rows(layout, [cos * cos, sin * sin, sin * cos]);
         rows.map_or_else(|| response.to_vec(), |(along, rows)| along.combine(response, &rows))
     }
 
-    fn by_parameters(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Matrix {
+    fn slopes(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Matrix {
         let (sin, cos) = (2.0 * values[0].to_radians()).sin_cos();
         let slopes = [-sin, sin, cos].map(f64::to_radians);
         let slopes = self.rows(layout, slopes);
         let slopes = slopes.map(|(along, rows)| along.combine_slopes(response, &rows));
         let slopes = slopes.unwrap_or_else(|| vec![0.0; response.len()]);
         Matrix::from_vec(response.len(), 1, slopes)
-    }
-
-    fn push_forward(
-        &self,
-        layout: &Layout,
-        _: &[f64],
-        values: &[f64],
-        tangent: &[f64],
-    ) -> Vec<f64> {
-        self.apply(layout, tangent, values)
-    }
-
-    fn starts(&self, _: &Layout, _: &Situation<'_>) -> Vec<Vec<f64>> {
-        signs(Some(&self.angle), 0.0).into_iter().map(|angle| vec![angle]).collect()
     }
 
     /// None for sensors of which nothing is known: which are at one place, no data say.
@@ -174,6 +130,28 @@ impl Effect for Misalignment {
 
     fn reach(&self) -> Reach {
         Reach::Single
+    }
+
+    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        let Some(along) = Along::check(context.layout, &self.axis, complaints) else { return };
+        if self.other.is_empty() {
+            complaints.at("other").say("missing key `other`").expected(
+                "which sensor shows the strain across which, such as `other = { R = \"V\" }`",
+            );
+        }
+        for (key, table) in [("other", &self.other), ("shear", &self.shear)] {
+            for (label, of) in table {
+                let path = format!("{key}.{label}");
+                along.check_label(&path, label, complaints);
+                along.check_label(&path, of, complaints);
+            }
+        }
+        for label in self.shear.keys().filter(|label| !self.other.contains_key(*label)) {
+            complaints
+                .at(&format!("shear.{label}"))
+                .say(format!("`{label}` has a shear and no strain across"))
+                .help(format!("say in `other` which sensor is across `{label}`"));
+        }
     }
 }
 

@@ -1,45 +1,46 @@
-//! `misplacement`: a sensor that is not where it should be.
+//! `misplacement`: a sensor at a wrong position.
 
 use std::collections::BTreeMap;
 
 use lacuna::data::{Layout, Unit};
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::effect::{Description, Reach, Situation};
-use lacuna::plugin::{Component, Context, Effect, Hyperparameter};
-use lacuna::study::problem::Complaints;
+use lacuna::matrix::Matrix;
+use lacuna::plugin::effect::{CurveEffect, Description, Form, Measure, Reach, Situation, Unknown};
+use lacuna::plugin::{Context, Effect};
+use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{Along, Line, Measure, Stations, Unknown, check, lagrange, parameters, signs};
+use super::common::{Along, Line, Stations, lagrange};
 
-/// Misplacement: a sensor stands beside the place that the model assumes.
+/// Misplacement: a sensor is not at the position that the model assumes.
 ///
 /// ```text
 /// y(x) → y(x + distance)
 /// ```
 ///
-/// What the response is beside the place is read from its neighbours on a line: from the parabola through the place
-/// and the two next to it, or at an end of the line through the last three (a straight line where there are two
-/// places only). That is good for distances well below those between the places, and for a response that is smooth
+/// The response next to the position is interpolated from its neighbours on a line: by the parabola through the place
+/// and its two neighbours, or at an end of the line through the last three (by a straight line if there are only two
+/// places). This is accurate for distances well below the spacing of the places and for a response that varies smoothly
 /// along the line.
 ///
-/// It is easily confused with `gain` where the response falls off evenly along the line, with `gauge_length`, and
-/// with `delay` where waves run along it.
+/// It is easily confused with `gain` if the response decreases evenly along the line, with `gauge_length`, and with
+/// `delay` if waves travel along the line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Misplacement {
-    /// Prior of the distance, in the unit of `positions`, positive towards larger coordinates.
+    /// Prior of the displacement, in the unit of `positions`, positive towards larger coordinates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distance: Option<Distribution>,
-    /// The axis along which the response changes: one of labels, whose `positions` are given, or of numbers.
+    /// Name of the axis along which the response varies: an axis of labels, whose `positions` must be given, or an axis
+    /// of numbers.
     pub axis: String,
-    /// Where the labels of the axis stand on a line, such as `{ A = 0.10, B = 0.15 }`; what is not on the line is
-    /// left out, and stays as it is.
+    /// Coordinates of the axis labels on a line, such as `{ A = 0.10, B = 0.15 }`, in `unit`. Labels that are not
+    /// listed are not on the line and remain unchanged.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub positions: BTreeMap<String, f64>,
-    /// The unit of `positions`; that of an axis of numbers is its own.
+    /// Unit of `positions`; an axis of numbers has its own unit.
     pub unit: Unit,
 }
 
@@ -51,78 +52,48 @@ impl Default for Misplacement {
 }
 
 impl Misplacement {
-    fn unknowns(&self, layout: &Layout) -> [Unknown<'_>; 1] {
-        [Unknown {
-            name: "distance",
-            symbol: "d",
-            measure: Measure::In(self.line().unit(layout)),
-            prior: self.distance.as_ref(),
-            limits: (f64::NEG_INFINITY, f64::INFINITY),
-            example: "{ normal = [0, 0.005] }",
-        }]
-    }
-
     fn line(&self) -> Line<'_> {
         Line { axis: &self.axis, positions: &self.positions, unit: &self.unit }
     }
 }
 
-/// The weights of places nearby, at `nodes`, in what a place at `x` shows.
+/// Weights of the neighbouring places at `nodes` in the value that a sensor at `x`, displaced by `value`, shows.
 fn weights(nodes: &[f64], x: f64, value: f64) -> [f64; 3] {
     lagrange(nodes, x + value)[0]
 }
 
-/// Their derivatives by the unknown.
+/// Derivatives of [`weights`] with respect to the displacement.
 fn slopes(nodes: &[f64], x: f64, value: f64) -> [f64; 3] {
     lagrange(nodes, x + value)[1]
 }
 
-impl Component for Misplacement {
-    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        if let Some(along) = Along::check(context.layout, &self.axis, complaints) {
-            Stations::check(&along, &self.positions, 2, complaints);
-        }
-        check(&self.unknowns(context.layout), context.layout, complaints);
-    }
-}
+impl CurveEffect for Misplacement {
+    const FORM: Form = Form::Linear;
 
-impl Effect for Misplacement {
     fn describe(&self) -> Description {
-        Description {
-            title: "misplacement: a sensor that is not where it should be".into(),
-            formula: "y(x + distance)".into(),
-            source: "standard: interpolation in space (Lagrange)".into(),
-        }
+        Description::new(
+            "misplacement: a sensor that is not where it should be",
+            "y(x + distance)",
+            "standard: interpolation in space (Lagrange)",
+        )
     }
 
-    fn parameters(&self, layout: &Layout) -> Vec<Hyperparameter> {
-        parameters(&self.unknowns(layout), layout)
+    fn unknowns(&self) -> Vec<Unknown<'_>> {
+        vec![Unknown::new(
+            "distance",
+            "d",
+            Measure::Along(self.axis.clone(), self.unit.clone()),
+            &self.distance,
+            "{ normal = [0, 0.005] }",
+        )]
     }
 
-    fn absent(&self, _: &Layout) -> Vec<f64> {
-        vec![0.0]
-    }
-
-    fn apply(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
+    fn formula(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
         self.line().combined(layout, response, |nodes, x| weights(nodes, x, values[0]))
     }
 
-    fn by_parameters(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Matrix {
+    fn slopes(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Matrix {
         self.line().combined_slopes(layout, response, |nodes, x| slopes(nodes, x, values[0]))
-    }
-
-    fn push_forward(
-        &self,
-        layout: &Layout,
-        _: &[f64],
-        values: &[f64],
-        tangent: &[f64],
-    ) -> Vec<f64> {
-        self.apply(layout, tangent, values)
-    }
-
-    fn starts(&self, _: &Layout, _: &Situation<'_>) -> Vec<Vec<f64>> {
-        signs(self.distance.as_ref(), 0.0).into_iter().map(|x| vec![x]).collect()
     }
 
     fn proposals(&self, situation: &Situation<'_>) -> Vec<Table> {
@@ -132,6 +103,12 @@ impl Effect for Misplacement {
 
     fn reach(&self) -> Reach {
         Reach::Single
+    }
+
+    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
+        if let Some(along) = Along::check(context.layout, &self.axis, complaints) {
+            Stations::check(&along, &self.positions, 2, complaints);
+        }
     }
 }
 

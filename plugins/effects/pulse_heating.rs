@@ -1,101 +1,76 @@
-//! `pulse_heating`: heat of the pulse in the structure.
+//! `pulse_heating`: thermal expansion of the structure after the pulse.
 
 use lacuna::data::Layout;
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::effect::{Description, Situation};
-use lacuna::plugin::{Component, Context, Effect, Hyperparameter};
-use lacuna::study::problem::Complaints;
+use lacuna::matrix::Matrix;
+use lacuna::plugin::Effect;
+use lacuna::plugin::effect::{
+    CurveEffect, Description, Form, Measure, Situation, Span, Unknown, added, added_slopes, grid,
+    propose, spaced_by_ratio,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{
-    Measure, Span, Unknown, added, added_slopes, all, check, grid, parameters, propose, signs,
-    spaced_by_ratio,
-};
-
-/// Pulse heating: the structure itself is warmed by the pulse and stays longer.
+/// Pulse heating: the structure is heated by the pulse and expands.
 ///
-/// The part that carries the sensor takes up heat at once; strain of the order of the thermal expansion appears
-/// within a time of conduction and decays only long after the record.
+/// The part to which the sensor is attached absorbs heat immediately; a strain of the order of the thermal expansion
+/// develops within a heat conduction time and decays only long after the record.
 ///
 /// ```text
 /// y → y + rise · (1 - exp(-(t - start) / time_constant)) from start on
 /// ```
 ///
-/// It is easily confused with `offset` (a time constant below a step) and `drift` (one far above the record).
+/// It is easily confused with `offset` (time constant below a time step) and `drift` (time constant far above the
+/// length of the record).
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PulseHeating {
-    /// Prior of the value it tends to, in the unit of the response, not below zero: what is warmed grows.
+    /// Prior of the final value, in the unit of the response, zero or positive, since heated material expands.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rise: Option<Distribution>,
-    /// Prior of the time in which it comes about, in the unit of the last axis, above zero.
+    /// Prior of the time constant, in the unit of the last axis, above zero.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_constant: Option<Distribution>,
-    /// The time at which it begins, in the unit of the last axis; the first time of each curve when left out.
+    /// Time at which the heating begins, in the unit of the last axis. Default: the first time of each curve.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub start: Option<f64>,
 }
 
-impl PulseHeating {
-    fn unknowns(&self) -> [Unknown<'_>; 2] {
-        [
-            Unknown {
-                name: "rise",
-                symbol: "b",
-                measure: Measure::Response,
-                prior: self.rise.as_ref(),
-                limits: (0.0, f64::INFINITY),
-                example: "{ half_normal = 2e-5 }",
-            },
-            Unknown {
-                name: "time_constant",
-                symbol: "τ",
-                measure: Measure::Axis,
-                prior: self.time_constant.as_ref(),
-                limits: (0.0, f64::INFINITY),
-                example: "{ log_uniform = [1e-5, 1e-3] }",
-            },
+impl CurveEffect for PulseHeating {
+    const FORM: Form = Form::Additive;
+
+    fn describe(&self) -> Description {
+        Description::new(
+            "pulse heating: heat of the pulse in the structure",
+            "y + rise · (1 - exp(-(t - start) / time_constant))",
+            "standard: heat taken up at a constant rate of exchange",
+        )
+    }
+
+    fn unknowns(&self) -> Vec<Unknown<'_>> {
+        vec![
+            Unknown::new("rise", "b", Measure::Response, &self.rise, "{ half_normal = 2e-5 }")
+                .not_negative(),
+            Unknown::new(
+                "time_constant",
+                "τ",
+                Measure::Axis,
+                &self.time_constant,
+                "{ log_uniform = [1e-5, 1e-3] }",
+            )
+            .not_negative(),
         ]
     }
-}
 
-impl Component for PulseHeating {
-    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        Span::check(context.layout, complaints);
-        check(&self.unknowns(), context.layout, complaints);
-    }
-}
-
-impl Effect for PulseHeating {
-    fn describe(&self) -> Description {
-        Description {
-            title: "pulse heating: heat of the pulse in the structure".into(),
-            formula: "y + rise · (1 - exp(-(t - start) / time_constant))".into(),
-            source: "standard: heat taken up at a constant rate of exchange".into(),
-        }
-    }
-
-    fn parameters(&self, layout: &Layout) -> Vec<Hyperparameter> {
-        parameters(&self.unknowns(), layout)
-    }
-
-    fn absent(&self, layout: &Layout) -> Vec<f64> {
-        let mut values: Vec<f64> = self.parameters(layout).iter().map(|own| own.start).collect();
-        values[0] = 0.0;
-        values
-    }
-
-    fn apply(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
+    fn formula(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
         let at = grid(layout);
         let start = self.start.unwrap_or(at[0]);
         let shape = |t: f64| if t < start { 0.0 } else { -(-(t - start) / values[1]).exp_m1() };
         added(layout, response, values[0], |i| shape(at[i]))
     }
 
-    fn by_parameters(&self, layout: &Layout, _: &[f64], values: &[f64]) -> Matrix {
+    fn slopes(&self, layout: &Layout, _: &[f64], values: &[f64]) -> Matrix {
         let at = grid(layout);
         let start = self.start.unwrap_or(at[0]);
         added_slopes(layout, 2, |i, row| {
@@ -107,14 +82,9 @@ impl Effect for PulseHeating {
         })
     }
 
-    fn push_forward(&self, _: &Layout, _: &[f64], _: &[f64], tangent: &[f64]) -> Vec<f64> {
-        tangent.to_vec()
-    }
-
-    fn starts(&self, layout: &Layout, _: &Situation<'_>) -> Vec<Vec<f64>> {
+    fn indices(&self, layout: &Layout) -> Option<Vec<Vec<f64>>> {
         let range = Span::of(layout).map_or((1e-3, 1.0), |s| (0.3 * s.step, 2.0 * s.duration()));
-        let times = spaced_by_ratio(self.time_constant.as_ref(), range, 10);
-        all(&[signs(self.rise.as_ref(), 0.0), times])
+        Some(vec![spaced_by_ratio(self.time_constant.as_ref(), range, 10)])
     }
 
     fn proposals(&self, situation: &Situation<'_>) -> Vec<Table> {
@@ -136,7 +106,7 @@ lacuna::register!(Effect, "pulse_heating", PulseHeating);
 mod tests {
     use super::super::common::testing::{curve, effect, even};
 
-    /// What is missing to the end falls by the same factor in equal times (Newton's law of cooling).
+    /// The difference to the final value decreases by the same factor in equal times (Newton's law of cooling).
     #[test]
     fn it_tends_to_its_end() {
         let options = "rise = { half_normal = 1 }\ntime_constant = { half_normal = 1 }";

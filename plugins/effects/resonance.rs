@@ -1,48 +1,45 @@
-//! `resonance`: a vibration of its own.
+//! `resonance`: a decaying vibration that the model lacks.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use lacuna::data::Layout;
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::effect::{Description, Situation};
-use lacuna::plugin::{Component, Context, Effect, Hyperparameter};
-use lacuna::study::problem::Complaints;
+use lacuna::matrix::Matrix;
+use lacuna::plugin::Effect;
+use lacuna::plugin::effect::{
+    CurveEffect, Description, Form, Measure, Situation, Span, Unknown, added, added_slopes, apart,
+    grid, propose,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{
-    Measure, Span, Unknown, added, added_slopes, all, apart, check, grid, parameters, propose,
-    signs,
-};
-
-/// A resonance: a vibration that dies away, added to each curve.
+/// A resonance: a decaying vibration added to each curve.
 ///
-/// The structure still rings from the pulse before, or a part that the model does not have rings by itself.
+/// Typical causes: the structure still vibrates from the previous pulse, or a part that the model lacks vibrates at its
+/// own frequency.
 ///
 /// ```text
 /// y → y + amplitude · exp(-damping · ω · (t - t0)) · sin(ω · (t - t0) + phase),     ω = 2 π frequency
 /// ```
 ///
-/// with `t0` the first time of the curve. The amplitude has either sign and the phase lies in half a circle, so
-/// that each vibration is written in one way only.
+/// with `t0` the first time of the curve. The amplitude may have either sign and the phase is restricted to half a
+/// circle, so that each vibration is represented only once.
 ///
-/// It is easily confused with `echo` where the signal rings itself, and for low frequencies with `offset` and
-/// `drift`.
+/// It is easily confused with `echo` if the signal itself oscillates, and at low frequencies with `offset` and `drift`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Resonance {
-    /// Prior of the amplitude, in the unit of the response, of either sign.
+    /// Prior of the amplitude, in the unit of the response; either sign.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub amplitude: Option<Distribution>,
-    /// Prior of the frequency, in the inverse unit of the last axis, not below zero.
+    /// Prior of the frequency, in the inverse unit of the last axis, zero or positive.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frequency: Option<Distribution>,
-    /// Prior of the damping ratio, a number not below zero. By default of the order of 1 %: steel structures have
+    /// Prior of the damping ratio, dimensionless, zero or positive. Default: of the order of 1 %; steel structures have
     /// 0.2 to 3 %.
     pub damping: Distribution,
-    /// Prior of the phase in radians, from -π/2 to π/2 by default.
+    /// Prior of the phase, in radians. Default: uniform from -π/2 to π/2.
     pub phase: Distribution,
 }
 
@@ -57,73 +54,41 @@ impl Default for Resonance {
     }
 }
 
-impl Resonance {
-    fn unknowns(&self) -> [Unknown<'_>; 4] {
-        [
-            Unknown {
-                name: "amplitude",
-                symbol: "A",
-                measure: Measure::Response,
-                prior: self.amplitude.as_ref(),
-                limits: (f64::NEG_INFINITY, f64::INFINITY),
-                example: "{ normal = [0, 1e-5] }",
-            },
-            Unknown {
-                name: "frequency",
-                symbol: "f",
-                measure: Measure::PerAxis,
-                prior: self.frequency.as_ref(),
-                limits: (0.0, f64::INFINITY),
-                example: "{ uniform = [1e3, 2e4] }",
-            },
-            Unknown {
-                name: "damping",
-                symbol: "ζ",
-                measure: Measure::Number,
-                prior: Some(&self.damping),
-                limits: (0.0, f64::INFINITY),
-                example: "{ half_normal = 0.01 }",
-            },
-            Unknown {
-                name: "phase",
-                symbol: "φ",
-                measure: Measure::Number,
-                prior: Some(&self.phase),
-                limits: (f64::NEG_INFINITY, f64::INFINITY),
-                example: "{ uniform = [-1.5, 1.5] }",
-            },
+impl CurveEffect for Resonance {
+    const FORM: Form = Form::Additive;
+
+    fn describe(&self) -> Description {
+        Description::new(
+            "a resonance: a vibration of its own",
+            "y + amplitude · exp(-damping · ω · u) · sin(ω · u + phase), u = t - t0",
+            "standard: free vibration, as in Meirovitch, Fundamentals of Vibrations",
+        )
+    }
+
+    fn unknowns(&self) -> Vec<Unknown<'_>> {
+        vec![
+            Unknown::new(
+                "amplitude",
+                "A",
+                Measure::Response,
+                &self.amplitude,
+                "{ normal = [0, 1e-5] }",
+            ),
+            Unknown::new(
+                "frequency",
+                "f",
+                Measure::PerAxis,
+                &self.frequency,
+                "{ uniform = [1e3, 2e4] }",
+            )
+            .not_negative(),
+            Unknown::new("damping", "ζ", Measure::Number, &self.damping, "{ half_normal = 0.01 }")
+                .not_negative(),
+            Unknown::new("phase", "φ", Measure::Number, &self.phase, "{ uniform = [-1.5, 1.5] }"),
         ]
     }
-}
 
-impl Component for Resonance {
-    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        Span::check(context.layout, complaints);
-        check(&self.unknowns(), context.layout, complaints);
-    }
-}
-
-impl Effect for Resonance {
-    fn describe(&self) -> Description {
-        Description {
-            title: "a resonance: a vibration of its own".into(),
-            formula: "y + amplitude · exp(-damping · ω · u) · sin(ω · u + phase), u = t - t0"
-                .into(),
-            source: "standard: free vibration, as in Meirovitch, Fundamentals of Vibrations".into(),
-        }
-    }
-
-    fn parameters(&self, layout: &Layout) -> Vec<Hyperparameter> {
-        parameters(&self.unknowns(), layout)
-    }
-
-    fn absent(&self, layout: &Layout) -> Vec<f64> {
-        let mut values: Vec<f64> = self.parameters(layout).iter().map(|own| own.start).collect();
-        values[0] = 0.0;
-        values
-    }
-
-    fn apply(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
+    fn formula(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
         let at = grid(layout);
         let omega = TAU * values[1];
         added(layout, response, values[0], |i| {
@@ -132,7 +97,7 @@ impl Effect for Resonance {
         })
     }
 
-    fn by_parameters(&self, layout: &Layout, _: &[f64], values: &[f64]) -> Matrix {
+    fn slopes(&self, layout: &Layout, _: &[f64], values: &[f64]) -> Matrix {
         let at = grid(layout);
         added_slopes(layout, 4, |i, row| {
             let time = at[i] - at[0];
@@ -146,17 +111,12 @@ impl Effect for Resonance {
         })
     }
 
-    fn push_forward(&self, _: &Layout, _: &[f64], _: &[f64], tangent: &[f64]) -> Vec<f64> {
-        tangent.to_vec()
-    }
-
-    fn starts(&self, layout: &Layout, _: &Situation<'_>) -> Vec<Vec<f64>> {
-        let Some(span) = Span::of(layout) else { return Vec::new() };
+    fn indices(&self, layout: &Layout) -> Option<Vec<Vec<f64>>> {
+        let span = Span::of(layout)?;
         // The peak of a vibration is as wide as one over the duration: two starts to each half of it.
         let width = 1.0 / span.duration();
         let range = (0.25 * width, 0.5 / span.step);
-        all(&[
-            signs(self.amplitude.as_ref(), 0.0),
+        Some(vec![
             apart(self.frequency.as_ref(), range, 0.25 * width, 95),
             vec![self.damping.quantile(0.5)],
             vec![self.phase.quantile(0.5)],

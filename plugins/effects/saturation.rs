@@ -1,49 +1,36 @@
 //! `saturation`: a sensor at its limit.
 
 use lacuna::data::Layout;
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::effect::{Description, Situation};
-use lacuna::plugin::{Component, Context, Effect, Hyperparameter};
-use lacuna::study::problem::Complaints;
+use lacuna::matrix::Matrix;
+use lacuna::plugin::effect::{
+    CurveEffect, Description, Form, Measure, Situation, Unknown, propose, spaced_by_ratio,
+};
+use lacuna::plugin::{Context, Effect};
+use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{Measure, Unknown, check, parameters, propose, spaced_by_ratio};
-
-/// Saturation: large values come out smaller than they are.
+/// Saturation: large values are measured smaller than they are.
 ///
-/// The amplifier or the sensor is driven towards its limit, or the material yields.
+/// Typical causes: the amplifier or the sensor is driven towards its limit, or the material yields.
 ///
 /// ```text
 /// y → limit · tanh(y / limit),     inverse_limit = 1 / limit
 /// ```
 ///
-/// Small values stay; no value passes the limit. Around zero the change is of second order in the inverse limit, as
-/// a distant limit cannot be seen.
+/// Small values are unchanged and no value exceeds the limit. Around zero the change is of second order in the inverse
+/// limit, so that a limit far above the values cannot be detected.
 ///
-/// It is easily confused with `gain` where all values are of one size, and with `damping` where the first are the
+/// It is easily confused with `gain` if all values are of similar size, and with `damping` if the first values are the
 /// largest.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Saturation {
-    /// Prior of one over the limit, in the inverse unit of the response, not below zero.
+    /// Prior of the inverse limit, in the inverse unit of the response, zero or positive; zero is no saturation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub inverse_limit: Option<Distribution>,
-}
-
-impl Saturation {
-    fn unknowns(&self) -> [Unknown<'_>; 1] {
-        [Unknown {
-            name: "inverse_limit",
-            symbol: "1/L",
-            measure: Measure::PerResponse,
-            prior: self.inverse_limit.as_ref(),
-            limits: (0.0, f64::INFINITY),
-            example: "{ half_normal = 1e4 }",
-        }]
-    }
 }
 
 /// `tanh(x) / x`.
@@ -51,7 +38,7 @@ fn shrink(x: f64) -> f64 {
     if x.abs() < 1e-3 { 1.0 - x * x * (1.0 / 3.0 - x * x * 2.0 / 15.0) } else { x.tanh() / x }
 }
 
-/// Its derivative by `x`; by its series where the formula loses digits.
+/// Derivative of [`shrink`] with respect to `x`, by its series where the closed form suffers from cancellation.
 fn shrink_slope(x: f64) -> f64 {
     if x.abs() < 0.02 {
         let square = x * x;
@@ -61,59 +48,55 @@ fn shrink_slope(x: f64) -> f64 {
     }
 }
 
-impl Component for Saturation {
-    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        check(&self.unknowns(), context.layout, complaints);
-    }
-}
+impl CurveEffect for Saturation {
+    const FORM: Form = Form::Nonlinear;
 
-impl Effect for Saturation {
     fn describe(&self) -> Description {
-        Description {
-            title: "saturation: a sensor at its limit".into(),
-            formula: "limit · tanh(y / limit)".into(),
-            source: "standard: smooth saturation".into(),
-        }
+        Description::new(
+            "saturation: a sensor at its limit",
+            "limit · tanh(y / limit)",
+            "standard: smooth saturation",
+        )
     }
 
-    fn parameters(&self, layout: &Layout) -> Vec<Hyperparameter> {
-        parameters(&self.unknowns(), layout)
+    fn unknowns(&self) -> Vec<Unknown<'_>> {
+        vec![
+            Unknown::new(
+                "inverse_limit",
+                "1/L",
+                Measure::PerResponse,
+                &self.inverse_limit,
+                "{ half_normal = 1e4 }",
+            )
+            .not_negative(),
+        ]
     }
 
-    fn absent(&self, _: &Layout) -> Vec<f64> {
-        vec![0.0]
-    }
-
-    fn apply(&self, _: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
+    fn formula(&self, _: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
         response.iter().map(|y| y * shrink(values[0] * y)).collect()
     }
 
-    fn by_parameters(&self, _: &Layout, response: &[f64], values: &[f64]) -> Matrix {
+    fn slopes(&self, _: &Layout, response: &[f64], values: &[f64]) -> Matrix {
         let slope = |y: &f64| y * y * shrink_slope(values[0] * y);
         Matrix::from_vec(response.len(), 1, response.iter().map(slope).collect())
     }
 
-    fn push_forward(
-        &self,
-        _: &Layout,
-        response: &[f64],
-        values: &[f64],
-        tangent: &[f64],
-    ) -> Vec<f64> {
+    fn along(&self, _: &Layout, response: &[f64], values: &[f64], tangent: &[f64]) -> Vec<f64> {
         let slope = |y: f64| (values[0] * y).cosh().powi(-2);
         response.iter().zip(tangent).map(|(y, v)| v * slope(*y)).collect()
     }
 
-    fn starts(&self, _: &Layout, situation: &Situation<'_>) -> Vec<Vec<f64>> {
+    fn sizes(&self, _: &Layout, situation: &Situation<'_>) -> Vec<f64> {
         let unit = 1.0 / situation.scale();
-        let limits = spaced_by_ratio(self.inverse_limit.as_ref(), (0.05 * unit, 3.0 * unit), 6);
-        limits.into_iter().map(|limit| vec![limit]).collect()
+        spaced_by_ratio(self.inverse_limit.as_ref(), (0.05 * unit, 3.0 * unit), 6)
     }
 
     fn proposals(&self, situation: &Situation<'_>) -> Vec<Table> {
         let unit = 1.0 / situation.scale();
         vec![propose(&[("inverse_limit", Distribution::HalfNormal(0.3 * unit))])]
     }
+
+    fn check(&self, _: &Context<'_>, _: &mut Complaints<'_>) {}
 }
 
 lacuna::register!(Effect, "saturation", Saturation);

@@ -1,103 +1,74 @@
-//! `secondary_pulse`: a second push.
+//! `secondary_pulse`: a later pulse of the excitation.
 
 use lacuna::data::Layout;
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::effect::{Description, Situation};
-use lacuna::plugin::{Component, Context, Effect, Hyperparameter};
-use lacuna::study::problem::Complaints;
+use lacuna::matrix::Matrix;
+use lacuna::plugin::Effect;
+use lacuna::plugin::effect::{
+    CurveEffect, Description, Form, Measure, Situation, Span, Unknown, added, added_slopes, apart,
+    grid, propose, spaced_by_ratio,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{
-    Measure, Span, Unknown, added, added_slopes, all, apart, check, grid, parameters, propose,
-    signs, spaced_by_ratio,
-};
-
-/// A secondary pulse: a smooth bump at a later time, in all curves alike.
+/// A secondary pulse: a Gaussian pulse at a later time, added to all curves alike.
 ///
-/// Cavities collapse, a valve closes, the source gives a second pulse.
+/// Typical causes: collapsing cavities, a closing valve, a second pulse of the source.
 ///
 /// ```text
 /// y → y + amplitude · exp(-(t - time)² / (2 width²))
 /// ```
 ///
-/// It is easily confused with `echo` where the signal is one pulse itself, and with `level_jumps` where it ends
-/// after the record.
+/// It is easily confused with `echo` if the signal itself is a single pulse, and with `level_jumps` if it ends after
+/// the record.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SecondaryPulse {
-    /// Prior of the height, in the unit of the response, of either sign.
+    /// Prior of the peak height, in the unit of the response; either sign.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub amplitude: Option<Distribution>,
-    /// Prior of the time of its peak, in the unit of the last axis.
+    /// Prior of the time of the peak, in the unit of the last axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<Distribution>,
-    /// Prior of its width, in the unit of the last axis, above zero: 0.6 of the height is left at this distance
-    /// from the peak.
+    /// Prior of the width (standard deviation of the Gaussian), in the unit of the last axis, above zero.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub width: Option<Distribution>,
 }
 
-impl SecondaryPulse {
-    fn unknowns(&self) -> [Unknown<'_>; 3] {
-        [
-            Unknown {
-                name: "amplitude",
-                symbol: "A",
-                measure: Measure::Response,
-                prior: self.amplitude.as_ref(),
-                limits: (f64::NEG_INFINITY, f64::INFINITY),
-                example: "{ normal = [0, 1e-4] }",
-            },
-            Unknown {
-                name: "time",
-                symbol: "t2",
-                measure: Measure::Axis,
-                prior: self.time.as_ref(),
-                limits: (f64::NEG_INFINITY, f64::INFINITY),
-                example: "{ uniform = [3e-4, 8e-4] }",
-            },
-            Unknown {
-                name: "width",
-                symbol: "w",
-                measure: Measure::Axis,
-                prior: self.width.as_ref(),
-                limits: (0.0, f64::INFINITY),
-                example: "{ log_uniform = [1e-5, 1e-4] }",
-            },
+impl CurveEffect for SecondaryPulse {
+    const FORM: Form = Form::Additive;
+
+    fn describe(&self) -> Description {
+        Description::new(
+            "a secondary pulse: a second push",
+            "y + amplitude · exp(-(t - time)² / (2 width²))",
+            "standard: a bump of normal shape",
+        )
+    }
+
+    fn unknowns(&self) -> Vec<Unknown<'_>> {
+        vec![
+            Unknown::new(
+                "amplitude",
+                "A",
+                Measure::Response,
+                &self.amplitude,
+                "{ normal = [0, 1e-4] }",
+            ),
+            Unknown::new("time", "t2", Measure::Axis, &self.time, "{ uniform = [3e-4, 8e-4] }"),
+            Unknown::new(
+                "width",
+                "w",
+                Measure::Axis,
+                &self.width,
+                "{ log_uniform = [1e-5, 1e-4] }",
+            )
+            .not_negative(),
         ]
     }
-}
 
-impl Component for SecondaryPulse {
-    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        Span::check(context.layout, complaints);
-        check(&self.unknowns(), context.layout, complaints);
-    }
-}
-
-impl Effect for SecondaryPulse {
-    fn describe(&self) -> Description {
-        Description {
-            title: "a secondary pulse: a second push".into(),
-            formula: "y + amplitude · exp(-(t - time)² / (2 width²))".into(),
-            source: "standard: a bump of normal shape".into(),
-        }
-    }
-
-    fn parameters(&self, layout: &Layout) -> Vec<Hyperparameter> {
-        parameters(&self.unknowns(), layout)
-    }
-
-    fn absent(&self, layout: &Layout) -> Vec<f64> {
-        let mut values: Vec<f64> = self.parameters(layout).iter().map(|own| own.start).collect();
-        values[0] = 0.0;
-        values
-    }
-
-    fn apply(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
+    fn formula(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
         let at = grid(layout);
         added(layout, response, values[0], |i| {
             let u = (at[i] - values[1]) / values[2];
@@ -105,7 +76,7 @@ impl Effect for SecondaryPulse {
         })
     }
 
-    fn by_parameters(&self, layout: &Layout, _: &[f64], values: &[f64]) -> Matrix {
+    fn slopes(&self, layout: &Layout, _: &[f64], values: &[f64]) -> Matrix {
         let at = grid(layout);
         added_slopes(layout, 3, |i, row| {
             let u = (at[i] - values[1]) / values[2];
@@ -115,16 +86,12 @@ impl Effect for SecondaryPulse {
         })
     }
 
-    fn push_forward(&self, _: &Layout, _: &[f64], _: &[f64], tangent: &[f64]) -> Vec<f64> {
-        tangent.to_vec()
-    }
-
-    fn starts(&self, layout: &Layout, _: &Situation<'_>) -> Vec<Vec<f64>> {
-        let Some(span) = Span::of(layout) else { return Vec::new() };
+    fn indices(&self, layout: &Layout) -> Option<Vec<Vec<f64>>> {
+        let span = Span::of(layout)?;
         let range = (0.5 * span.step, 0.3 * span.duration());
         let widths = spaced_by_ratio(self.width.as_ref(), range, 2);
         let times = apart(self.time.as_ref(), (span.first, span.last), widths[0], 45);
-        all(&[signs(self.amplitude.as_ref(), 0.0), times, widths])
+        Some(vec![times, widths])
     }
 
     fn proposals(&self, situation: &Situation<'_>) -> Vec<Table> {

@@ -1,57 +1,44 @@
-//! `timing_jitter`: replicates that begin at random.
+//! `timing_jitter`: random delays of the replicates.
 
 use lacuna::data::Layout;
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::effect::{Description, Situation};
-use lacuna::plugin::{Component, Context, Effect, Hyperparameter};
-use lacuna::study::problem::Complaints;
+use lacuna::matrix::Matrix;
+use lacuna::plugin::Effect;
+use lacuna::plugin::effect::{
+    CurveEffect, Description, Form, Measure, Situation, Span, Unknown, each_curve, propose,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{
-    Knots, Measure, Span, Unknown, check, each_curve, parameters, propose, shifted, signs,
-};
+use super::common::{Knots, shifted};
 
-/// Jitter of the timing: replicates begin at random, and their mean is a blurred curve.
+/// Timing jitter: the replicates have random delays, so that their mean is a blurred curve.
 ///
-/// Each replicate has a delay of its own, normal about zero with the standard deviation `deviation`. What they have
-/// in common is then the mean over the delays, with every fast change rounded off; a sine of angular frequency ω
-/// shrinks by `exp(-ω² deviation² / 2)`.
+/// The delay of each replicate is normally distributed with mean zero and standard deviation `deviation`. The mean over
+/// the delays smooths every fast change; the amplitude of a sine of angular frequency ω is multiplied by
+/// `exp(-ω² deviation² / 2)`.
 ///
 /// ```text
 /// y(t) → mean of y(t - deviation · z) over normal z
 /// ```
 ///
-/// The mean is a sum over fifteen delays. Curves are splines between their points, and at rest before the first and
-/// after the last. Around zero the change is of second order: a small jitter cannot be seen.
+/// The mean is computed as a sum over fifteen delays. Curves are interpolated by splines between their points and
+/// constant before the first and after the last. Around zero the change is of second order, so that a small jitter
+/// cannot be detected.
 ///
-/// It is easily confused with `low_pass`, which delays as well, with `gauge_length`, and with noise that is larger
-/// where the curve is steep, which jitter also makes.
+/// It is easily confused with `low_pass`, which also delays, with `gauge_length`, and with noise that is larger where
+/// the curve is steep, which jitter causes as well.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TimingJitter {
-    /// Prior of the standard deviation of the delays, in the unit of the last axis, not below zero.
+    /// Prior of the standard deviation of the delays, in the unit of the last axis, zero or positive.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub deviation: Option<Distribution>,
 }
 
-impl TimingJitter {
-    fn unknowns(&self) -> [Unknown<'_>; 1] {
-        [Unknown {
-            name: "deviation",
-            symbol: "σ",
-            measure: Measure::Axis,
-            prior: self.deviation.as_ref(),
-            limits: (0.0, f64::INFINITY),
-            example: "{ half_normal = 1e-5 }",
-        }]
-    }
-}
-
-/// Nodes and weights of a mean over the standard normal law: the trapezoidal rule, whose error for smooth functions
-/// is that of its ends, 2e-7 (Trefethen and Weideman, SIAM Review 56 (2014) 385).
+/// Nodes and weights of a mean over the standard normal distribution by the trapezoidal rule, whose error for smooth
+/// functions is the truncation error at its ends, 2e-7 (Trefethen and Weideman, SIAM Review 56 (2014) 385).
 fn nodes() -> impl Iterator<Item = (f64, f64)> {
     let node = |k: i32| 0.75 * f64::from(k);
     let density = |z: f64| (-0.5 * z * z).exp();
@@ -59,32 +46,31 @@ fn nodes() -> impl Iterator<Item = (f64, f64)> {
     (-7..=7).map(move |k| (node(k), density(node(k)) / total))
 }
 
-impl Component for TimingJitter {
-    fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        Span::check(context.layout, complaints);
-        check(&self.unknowns(), context.layout, complaints);
-    }
-}
+impl CurveEffect for TimingJitter {
+    const FORM: Form = Form::Linear;
 
-impl Effect for TimingJitter {
     fn describe(&self) -> Description {
-        Description {
-            title: "jitter of the timing: replicates that begin at random".into(),
-            formula: "mean of y(t - deviation · z) over normal z".into(),
-            source: "standard: mean of signals with jitter, which passes exp(-ω² deviation² / 2)"
-                .into(),
-        }
+        Description::new(
+            "jitter of the timing: replicates that begin at random",
+            "mean of y(t - deviation · z) over normal z",
+            "standard: mean of signals with jitter, which passes exp(-ω² deviation² / 2)",
+        )
     }
 
-    fn parameters(&self, layout: &Layout) -> Vec<Hyperparameter> {
-        parameters(&self.unknowns(), layout)
+    fn unknowns(&self) -> Vec<Unknown<'_>> {
+        vec![
+            Unknown::new(
+                "deviation",
+                "σ",
+                Measure::Axis,
+                &self.deviation,
+                "{ half_normal = 1e-5 }",
+            )
+            .not_negative(),
+        ]
     }
 
-    fn absent(&self, _: &Layout) -> Vec<f64> {
-        vec![0.0]
-    }
-
-    fn apply(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
+    fn formula(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Vec<f64> {
         if values[0] == 0.0 {
             return response.to_vec();
         }
@@ -98,7 +84,7 @@ impl Effect for TimingJitter {
         })
     }
 
-    fn by_parameters(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Matrix {
+    fn slopes(&self, layout: &Layout, response: &[f64], values: &[f64]) -> Matrix {
         let knots = Knots::of(layout);
         let by_deviation = each_curve(layout, response, |y, out| {
             let slopes = knots.slopes(y);
@@ -108,20 +94,6 @@ impl Effect for TimingJitter {
             }
         });
         Matrix::from_vec(response.len(), 1, by_deviation)
-    }
-
-    fn push_forward(
-        &self,
-        layout: &Layout,
-        _: &[f64],
-        values: &[f64],
-        tangent: &[f64],
-    ) -> Vec<f64> {
-        self.apply(layout, tangent, values)
-    }
-
-    fn starts(&self, _: &Layout, _: &Situation<'_>) -> Vec<Vec<f64>> {
-        signs(self.deviation.as_ref(), 0.0).into_iter().map(|s| vec![s]).collect()
     }
 
     fn proposals(&self, situation: &Situation<'_>) -> Vec<Table> {

@@ -1,13 +1,13 @@
-//! Amounts of memory and time as people write them: `2 GB`, `25 h`.
+//! Amounts of memory and time with units, as people write them: `2 GB`, `25 h`.
 
 use std::fmt::{self, Display};
 
-use lacuna::study::values::Unfit;
+use lacuna::text::values::Unfit;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, Deserializer};
 use serde::{Deserialize, Serialize};
 
-/// An amount of memory, such as `2 GB`.
+/// Amount of memory, such as `2 GB`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(transparent)]
 pub struct Memory {
@@ -30,20 +30,20 @@ const BYTES: [(&str, f64); 9] = [
 const MEMORY: &str = "an amount such as `2 GB` or `512 MiB`";
 
 impl Memory {
-    /// Reads an amount.
+    /// Parses an amount, a number with a unit from B to TiB; fails on anything else.
     pub fn parse(text: &str) -> Result<Self, Unfit> {
         let unfit = || Unfit::new(MEMORY, format!("`{text}`"));
         let bytes = scaled(text, &BYTES).filter(|b| *b >= 1.0 && *b < 1e18).ok_or_else(unfit)?;
         Ok(Self { text: text.to_owned(), bytes: bytes.ceil() as u64 })
     }
 
-    /// In bytes.
+    /// Returns the amount in bytes.
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 }
 
-/// A length of time, such as `25 h` or `1-01:00:00`.
+/// A duration, such as `25 h` or `1-01:00:00`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(transparent)]
 pub struct Span {
@@ -63,7 +63,7 @@ const SECONDS: [(&str, f64); 6] = [
 const SPAN: &str = "a time such as `25 h`, `90 min` or `1-01:00:00`";
 
 impl Span {
-    /// Reads a time: a number with `s`, `min`, `h` or `d`, or days, hours, minutes and seconds as `D-HH:MM:SS`.
+    /// Parses a duration: a number with `s`, `min`, `h` or `d`, or days, hours, minutes and seconds as `D-HH:MM:SS`.
     pub fn parse(text: &str) -> Result<Self, Unfit> {
         let unfit = || Unfit::new(SPAN, format!("`{text}`"));
         let seconds = scaled(text, &SECONDS).or_else(|| clock(text));
@@ -71,20 +71,20 @@ impl Span {
         Ok(Self { text: text.to_owned(), seconds })
     }
 
-    /// In seconds.
+    /// Returns the duration in seconds.
     pub fn seconds(&self) -> f64 {
         self.seconds
     }
 }
 
-/// A number of seconds as `D-HH:MM:SS`.
+/// Formats a number of seconds as `D-HH:MM:SS`, rounded up.
 pub fn as_clock(seconds: f64) -> String {
     let whole = seconds.ceil() as u64;
     let (days, hours) = (whole / 86_400, whole / 3600 % 24);
     format!("{days}-{hours:02}:{:02}:{:02}", whole / 60 % 60, whole % 60)
 }
 
-/// A number with one of some units.
+/// Parses a number with one of the given units.
 fn scaled(text: &str, units: &[(&str, f64)]) -> Option<f64> {
     let text = text.trim();
     let split = text.find(|c: char| c.is_alphabetic())?;
@@ -93,7 +93,7 @@ fn scaled(text: &str, units: &[(&str, f64)]) -> Option<f64> {
     number.trim().parse::<f64>().ok().map(|number| number * factor).filter(|x| x.is_finite())
 }
 
-/// `D-HH:MM:SS` or `HH:MM:SS`.
+/// Parses `D-HH:MM:SS` or `HH:MM:SS`; returns seconds.
 fn clock(text: &str) -> Option<f64> {
     let (days, rest) = text.split_once('-').unwrap_or(("0", text));
     let parts: Vec<u32> = rest.split(':').map(str::parse).collect::<Result<_, _>>().ok()?;

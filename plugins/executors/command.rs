@@ -4,12 +4,12 @@ use std::process::{Command, ExitStatus, Stdio};
 
 use lacuna::run::{Stop, files};
 
-/// What a command prints; an error with its own words when it fails.
+/// Runs a command and returns its standard output; if it fails, the error contains its standard error.
 pub fn said(program: &str, arguments: &[&str]) -> Result<String, Stop> {
     said_without(program, arguments, |_| false)
 }
 
-/// The same, when some variables of the environment are hidden from it.
+/// Like [`said`], with some variables removed from the environment of the command.
 pub fn said_without(
     program: &str,
     arguments: &[&str],
@@ -17,7 +17,7 @@ pub fn said_without(
 ) -> Result<String, Stop> {
     let mut command = Command::new(program);
     command.args(arguments).stdin(Stdio::null());
-    // Formats and filters of the user's own would change the answers.
+    // The user's own formats and filters would change the output.
     let changes_answers = |name: &str| {
         ["SQUEUE_", "SACCT_", "SCANCEL_"].iter().any(|start| name.starts_with(start))
             || name == "SLURM_TIME_FORMAT"

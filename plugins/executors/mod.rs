@@ -1,4 +1,4 @@
-//! Executors: where many model evaluations run.
+//! Executors: the machines on which model evaluations run.
 
 mod amount;
 mod cluster;

@@ -1,14 +1,14 @@
-//! The program that makes runs in another process.
+//! The `lacuna` program that makes runs in another process.
 
 use std::path::{Path, PathBuf};
 
 use lacuna::run::Stop;
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
 
 use crate::models::process;
 
-/// The file that `program` means: a path from the study's folder, a name that is looked up in `PATH`, or, when it is
-/// left out, the program that runs now.
+/// Resolves `program`: a path relative to the study's folder, a name in `PATH`, or, if it is not given, the running
+/// program.
 pub fn program(given: Option<&Path>, study: &Path) -> Result<PathBuf, Stop> {
     let Some(given) = given else {
         return std::env::current_exe()
@@ -21,7 +21,7 @@ pub fn program(given: Option<&Path>, study: &Path) -> Result<PathBuf, Stop> {
     })
 }
 
-/// The same for other machines: they may have a path from the root that this one has not.
+/// Like [`program`], for other machines: an absolute path is accepted as it is, because it may exist only there.
 pub fn on_nodes(given: Option<&Path>, study: &Path) -> Result<PathBuf, Stop> {
     match given {
         Some(path) if path.is_absolute() => Ok(path.to_owned()),
@@ -29,7 +29,7 @@ pub fn on_nodes(given: Option<&Path>, study: &Path) -> Result<PathBuf, Stop> {
     }
 }
 
-/// Complains of a program that is not there.
+/// Reports a program that does not exist.
 pub fn check(found: Result<PathBuf, Stop>, complaints: &mut Complaints<'_>) {
     if let Err(stop) = found {
         complaints

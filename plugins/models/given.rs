@@ -1,15 +1,16 @@
-//! Models that take whatever a study gives: commands and functions of the user's own.
+//! Models that take whatever inputs a study gives: the user's own commands and functions.
 
 use std::collections::BTreeMap;
 
 use lacuna::data::{Axis, Coordinates, Layout, Scenario, Unit};
 use lacuna::plugin::model::{Call, EvalError, Input, Response, Signature};
 use lacuna::plugin::{Context, Fact};
-use lacuna::study::nearest::nearest;
-use lacuna::study::problem::Complaints;
+use lacuna::text::nearest::nearest;
+use lacuna::text::problem::Complaints;
 use serde_json::{Map, Value, json};
 
-/// The study's own inputs and layout; an input is taken in the unit that `units` names, else in the study's.
+/// Returns the signature made of the study's own inputs and layout; an input has the unit given in `units`, else that
+/// of the study.
 pub fn signature(context: &Context<'_>, units: &BTreeMap<String, Unit>) -> Signature {
     let input = |given: &lacuna::plugin::Given| {
         let unit = units.get(&given.name).or(given.unit.as_ref());
@@ -28,7 +29,7 @@ pub fn signature(context: &Context<'_>, units: &BTreeMap<String, Unit>) -> Signa
     }
 }
 
-/// Complains of units for inputs that the study does not give.
+/// Reports units for inputs that the study does not give.
 pub fn check_units(
     units: &BTreeMap<String, Unit>,
     context: &Context<'_>,
@@ -46,7 +47,7 @@ pub fn check_units(
     }
 }
 
-/// What the study gives, for a message.
+/// Formats the inputs of a study for a message.
 pub fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
     let names: Vec<&str> = names.collect();
     match names[..] {
@@ -56,7 +57,7 @@ pub fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
     }
 }
 
-/// Refuses a call whose inputs are not one finite number a name.
+/// Fails unless a call has one finite number for each name.
 pub fn sound(call: &Call<'_>) -> Result<(), EvalError> {
     let (names, inputs) = (call.names.len(), call.inputs.len());
     if names != inputs {
@@ -68,7 +69,7 @@ pub fn sound(call: &Call<'_>) -> Result<(), EvalError> {
     }
 }
 
-/// A response of one finite value a place.
+/// Builds a response from values in the order of the layout; fails if their number is wrong or one is not finite.
 pub fn response(
     values: Vec<f64>,
     layout: &Layout,
@@ -89,7 +90,7 @@ pub fn response(
     }
 }
 
-/// A layout as a document: `name`, `unit`, and `axes`, each with `name` and either `labels` or `values`
+/// Converts a layout to a JSON document: `name`, `unit`, and `axes`, each with `name` and either `labels` or `values`
 /// and `unit`.
 pub fn layout_document(layout: &Layout) -> Value {
     let axis = |axis: &Axis| match &axis.coordinates {
@@ -102,8 +103,8 @@ pub fn layout_document(layout: &Layout) -> Value {
     json!({ "name": layout.name, "unit": layout.unit.as_str(), "axes": axes })
 }
 
-/// A scenario as a document: `name`, `values` by name, and `functions`, each with `at`, `at_unit`, `values`
-/// and `unit`.
+/// Converts a scenario to a JSON document: `name`, `values` by name, and `functions`, each with `at`, `at_unit`,
+/// `values` and `unit`.
 pub fn scenario_document(scenario: &Scenario) -> Value {
     let values: Map<String, Value> =
         scenario.values.iter().map(|given| (given.name.clone(), json!(given.value))).collect();

@@ -1,4 +1,4 @@
-//! Simulators a study can name.
+//! Simulators that a study can choose by name.
 
 pub mod composed;
 pub mod equations;

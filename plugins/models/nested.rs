@@ -1,28 +1,28 @@
-//! A section inside a model's options that names a plugin of its own: a part of a chain, the reader of a command's
+//! A section inside a model's options that chooses a plugin of its own: a part of a chain, the reader of a command's
 //! output.
 
 use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use lacuna::plugin::abi::Library;
 use lacuna::plugin::registry::{Kind, Section, section};
-use lacuna::plugin::{Component, Fault};
-use lacuna::study::problem::{Complaints, Problem, Problems};
-use lacuna::study::read::read;
-use lacuna::study::{Node, Place, Sources, emit};
+use lacuna::plugin::{Component, Library};
+use lacuna::run::Fault;
+use lacuna::text::problem::{Complaints, Problem, Problems};
+use lacuna::text::read::read;
+use lacuna::text::{Node, Place, Sources, emit};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// A plugin of the kind `K` with the keys `C` beside its options, as a study writes it. What is wrong with its options
-/// is kept for the check of the model, which alone can say where they stand.
+/// A plugin of the kind `K` with the keys `C` next to its options, as written in a study. Errors of its options are
+/// kept for the check of the model, which alone knows their position.
 pub struct Nested<K: ?Sized, C> {
     written: toml::Table,
     section: Result<Section<K, C>, Vec<Problem>>,
 }
 
 impl<K: Kind + ?Sized, C: DeserializeOwned> Nested<K, C> {
-    /// The section with these entries.
+    /// Builds the section from these entries.
     pub fn of(written: toml::Table) -> Self {
         let mut problems = Problems::new();
         let section = decode(&written, &mut problems);
@@ -31,24 +31,24 @@ impl<K: Kind + ?Sized, C: DeserializeOwned> Nested<K, C> {
 }
 
 impl<K: ?Sized, C> Nested<K, C> {
-    /// The plugin and the keys beside it, or what is wrong with them.
+    /// Returns the plugin and the keys next to it, or the errors of its options.
     pub fn section(&self) -> Result<&Section<K, C>, &[Problem]> {
         self.section.as_ref().map_err(Vec::as_slice)
     }
 }
 
 impl<K: Component + Kind + ?Sized, C> Nested<K, C> {
-    /// Where the plugin says that it can answer no more.
+    /// Returns the faults of the plugin's libraries that have stopped answering.
     pub fn faults(&self) -> Vec<Arc<Fault>> {
         self.section().map_or_else(|_| Vec::new(), |section| section.built.plugin.faults())
     }
 
-    /// The libraries that the plugin needs.
+    /// Returns the libraries that the plugin needs.
     pub fn libraries(&self) -> Vec<&'static Library> {
         self.section().map_or_else(|_| Vec::new(), |section| section.built.libraries())
     }
 
-    /// The revisions of the plugin and of those that it asks.
+    /// Returns the revisions of the plugin and of those that it uses.
     pub fn revisions(&self) -> BTreeMap<String, u32> {
         self.section().map_or_else(|_| BTreeMap::new(), |section| section.built.revisions())
     }
@@ -75,7 +75,7 @@ fn owned(problems: &Problems) -> Vec<Problem> {
     problems.sorted().into_iter().cloned().collect()
 }
 
-/// What a nested plugin complains of, by paths in its own options.
+/// Collects the problems that a nested plugin reports, with paths in its own options.
 pub fn complaints(look: impl FnOnce(&mut Complaints<'_>)) -> Vec<Problem> {
     let (mut problems, mut sources) = (Problems::new(), Sources::default());
     let options = Node::table(Place::whole(sources.add_argument("options", String::new())));
@@ -83,8 +83,8 @@ pub fn complaints(look: impl FnOnce(&mut Complaints<'_>)) -> Vec<Problem> {
     owned(&problems)
 }
 
-/// Repeats complaints about a nested section at the `place` where it stands in the model's options; `who` leads each
-/// of them.
+/// Repeats problems of a nested section at its position `place` in the model's options; each message begins with
+/// `who`.
 pub fn pass_on(place: &str, who: &str, problems: &[Problem], complaints: &mut Complaints<'_>) {
     for problem in problems {
         let path = format!("{place}.{}", problem.path);

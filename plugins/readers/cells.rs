@@ -1,4 +1,4 @@
-//! Which value of the response a text means: a sensor's label, a time on the grid.
+//! Matching of texts and numbers in a file to values of the response: a sensor's label, a time on the grid.
 
 use lacuna::data::{Axis, Coordinates, Layout, Unit};
 use lacuna::plugin::reader::ReadError;
@@ -6,14 +6,14 @@ use lacuna::plugin::reader::ReadError;
 use super::listed;
 use super::sheet::{Conversion, Record, Sheet};
 
-/// A coordinate belongs to a place on a grid if it is within this fraction of the grid's smallest
-/// spacing: room for the digits that a file does not print, and for nothing else.
+/// Largest distance of a coordinate from its grid value, as a fraction of the grid's smallest spacing: it allows for
+/// digits that a file does not print, and for nothing else.
 const CLOSE: f64 = 1e-4;
 
-/// Numbers that differ by less than this fraction are the same number, computed in two ways.
+/// Relative difference below which two numbers are taken as the same number, computed in two ways.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// Place of a number on a numeric axis.
+/// Returns the index of a number on a numeric axis; `None` if it is not on the grid.
 pub fn on_grid(values: &[f64], x: f64) -> Option<usize> {
     let after = values.partition_point(|&v| v < x);
     let candidates = [after.checked_sub(1), Some(after)];
@@ -23,7 +23,7 @@ pub fn on_grid(values: &[f64], x: f64) -> Option<usize> {
         .filter(|&i| i < values.len())
         .min_by(|&a, &b| (values[a] - x).abs().total_cmp(&(values[b] - x).abs()))?;
     let distance = (values[nearest] - x).abs();
-    // The smallest spacing is sought among all: of long records only where rounding does not decide.
+    // The smallest spacing is a search over all values, which is skipped if the value matches up to rounding.
     if distance <= ROUNDING * x.abs() {
         return Some(nearest);
     }
@@ -32,7 +32,7 @@ pub fn on_grid(values: &[f64], x: f64) -> Option<usize> {
     (distance <= CLOSE * spacing).then_some(nearest)
 }
 
-/// Place on an axis of a text as a file has it.
+/// Returns the index on an axis of a text from a file; `convert` changes its unit. The error describes the mismatch.
 pub fn on_axis(
     axis: &Axis,
     text: &str,
@@ -58,11 +58,11 @@ pub fn on_axis(
     }
 }
 
-/// The columns of a long table that say where a value belongs, and the column of the value.
+/// Columns of a long table that locate a value, and the column of the value.
 pub struct LongColumns<'a> {
     layout: &'a Layout,
     axes: Vec<(usize, Option<Conversion>)>,
-    /// The column of the response.
+    /// Index of the response's column.
     pub value: usize,
     conversion: Conversion,
 }
@@ -80,7 +80,7 @@ impl<'a> LongColumns<'a> {
         }
     }
 
-    /// Only those that say where something belongs, which stands in the column `value`.
+    /// Finds only the columns that locate a value; `value` is the column of the value itself.
     pub fn places(sheet: &Sheet, layout: &'a Layout, value: usize) -> Result<Self, ReadError> {
         let conversion = Conversion::none(&layout.unit);
         Ok(Self { layout, axes: Self::axes(sheet, layout)?, value, conversion })
@@ -102,17 +102,17 @@ impl<'a> LongColumns<'a> {
         ReadError::of_all(wrong).map_or(Ok(columns), Err)
     }
 
-    /// How the values' unit changes.
+    /// Returns the unit conversion of the values.
     pub fn conversion(&self) -> &Conversion {
         &self.conversion
     }
 
-    /// Whether a column is one of these.
+    /// Returns true if a column is one of these.
     pub fn has(&self, column: usize) -> bool {
         self.value == column || self.axes.iter().any(|(c, _)| *c == column)
     }
 
-    /// The flat index of a record's value.
+    /// Returns the flat index of a record's value in the layout.
     pub fn place(&self, sheet: &Sheet, record: &Record) -> Result<usize, ReadError> {
         let mut place = Vec::with_capacity(self.axes.len());
         for (axis, (column, conversion)) in self.layout.axes.iter().zip(&self.axes) {
@@ -124,15 +124,15 @@ impl<'a> LongColumns<'a> {
         Ok(self.layout.index(&place))
     }
 
-    /// A record's value in the response's unit; `None` if it is missing.
+    /// Returns a record's value in the response's unit; `None` if it is missing.
     pub fn number(&self, sheet: &Sheet, record: &Record) -> Result<Option<f64>, ReadError> {
         Ok(sheet.number(record, self.value)?.and_then(|x| self.conversion.apply(x)))
     }
 }
 
-/// Labels and places of an axis as a file gives them, turned into places of the response's axis.
+/// Converts the coordinates of a file's numeric axis to indices on the response's axis.
 ///
-/// `numbers` are the file's coordinates on a numeric axis in `unit`.
+/// `numbers` are the coordinates in `unit`; without a unit they are taken to be in that of the axis.
 pub fn grid_places(
     axis: &Axis,
     numbers: &[f64],
@@ -152,7 +152,7 @@ pub fn grid_places(
     numbers.iter().map(|x| on_axis(axis, &x.to_string(), convert)).collect()
 }
 
-/// The value that the heading of a wide table means: `B 1e-5`, or `B:1e-5`.
+/// Returns the flat index that a heading of a wide table stands for, such as `B 1e-5` or `B:1e-5`.
 pub fn headed_place(layout: &Layout, heading: &str) -> Result<usize, String> {
     if layout.axes.is_empty() {
         let expected = &layout.name;
@@ -163,7 +163,7 @@ pub fn headed_place(layout: &Layout, heading: &str) -> Result<usize, String> {
         };
     }
     let parts: Vec<&str> = match layout.axes.len() {
-        // A single axis takes the heading whole: labels may contain blanks.
+        // With a single axis the heading is not split, because labels may contain blanks.
         1 => vec![heading],
         _ => heading.split([' ', ':', ';', '|', '@']).filter(|part| !part.is_empty()).collect(),
     };

@@ -1,18 +1,19 @@
-//! Whether a table was cut off while it was written.
+//! Detection of tables that were cut off while they were written.
 //!
-//! A program that is killed leaves a file that ends anywhere. A line with too few fields shows it; a line that is cut
-//! inside its last field does not, and reads as another number. What tells is that it has no line end, and that the
-//! field is shorter than those above it: most programs write a column with as many decimals, or as many significant
-//! digits, in every line.
+//! A program that is killed may leave a file that ends anywhere. A line with too few fields shows it; a line cut
+//! inside its last field does not, and reads as another number. Two signs reveal it: the line has no line end, and
+//! the field is shorter than those above it, because most programs write a column with the same number of decimals,
+//! or of significant digits, in every line.
 
-/// How many fields above are needed to know what a column looks like.
+/// Minimum number of fields above that show the form of a column.
 const FEWEST: usize = 2;
 
-/// Where digits vary from line to line (trailing zeros are not written), so many fewer than nearly all others are no
-/// coincidence.
+/// Number of missing digits that cannot be a coincidence if the digits vary from line to line (because trailing zeros
+/// are not written).
 const MARGIN: usize = 2;
 
-/// Says why the last field of a line without a line end seems to be cut, given the fields above it in the same column.
+/// Describes why the last field of a line without a line end seems to be cut, given the fields above it in the same
+/// column; `None` if it does not.
 pub fn cut<'a>(last: &str, above: impl Iterator<Item = &'a str>) -> Option<String> {
     let above: Vec<&str> = above.collect();
     if above.len() < FEWEST || above.contains(&last) {
@@ -27,7 +28,7 @@ pub fn cut<'a>(last: &str, above: impl Iterator<Item = &'a str>) -> Option<Strin
         let longer = above.iter().find(|cell| cell.starts_with(last))?;
         return Some(format!("its last field `{last}` is the beginning of `{longer}` above it"));
     };
-    // A zero is often written shorter than other numbers.
+    // Zero is often written shorter than other numbers.
     let mut shapes: Vec<Shape> = above.iter().filter_map(|cell| Shape::of(cell)).collect();
     shapes.retain(|shape| shape.size > 0.0);
     if shapes.len() < FEWEST {
@@ -36,17 +37,17 @@ pub fn cut<'a>(last: &str, above: impl Iterator<Item = &'a str>) -> Option<Strin
     own.cut_from(last, &shapes)
 }
 
-/// How a number is written.
+/// Form in which a number is written.
 struct Shape {
     decimals: usize,
     significant: usize,
-    /// The digits of the exponent; zero without one.
+    /// Number of digits of the exponent; 0 without an exponent.
     exponent: usize,
     size: f64,
 }
 
 impl Shape {
-    /// `None` for a text that is no number.
+    /// Returns the form of a number; `None` for a text that is not a number.
     fn of(text: &str) -> Option<Self> {
         let size = text.parse::<f64>().ok().filter(|x| x.is_finite())?.abs();
         let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, ""));
@@ -69,7 +70,7 @@ impl Shape {
                 counted(exponents.low, "digit")
             ));
         }
-        // An exponent may be lost with all its digits.
+        // The exponent may have been lost with all its digits.
         let largest = others.iter().map(|shape| shape.size).fold(0.0, f64::max);
         if exponents.high > self.exponent && self.size > 10.0 * largest {
             return Some(format!(
@@ -77,7 +78,7 @@ impl Shape {
                  as large as the largest of them, {largest:e}"
             ));
         }
-        // Programs keep the number of decimals or that of significant digits: the one that varies less.
+        // Programs keep either the number of decimals or that of significant digits: the one that varies less.
         let decimals = least(others, |shape| shape.decimals);
         let significant = least(others, |shape| shape.significant);
         let spread = |range: &Range| range.high - range.low;
@@ -97,7 +98,7 @@ impl Shape {
     }
 }
 
-/// Between what numbers nearly all lie: all but a hundredth at the lower end.
+/// Range that contains nearly all values: the lowest hundredth is ignored.
 struct Range {
     low: usize,
     high: usize,
@@ -139,17 +140,17 @@ mod tests {
         for (last, expected) in [("don", true), ("", true), ("done", false), ("lost", false)] {
             assert_eq!(is_cut(last, &above), expected, "{last}");
         }
-        // Whole numbers of equal length, and of any.
+        // Whole numbers of equal and of varying length.
         assert!(is_cut("10", &["101", "102", "103"]));
         assert!(!is_cut("8", &["9", "10", "11"]));
-        // Too few lines to know.
+        // Too few lines to judge.
         assert!(!is_cut("0.5", &["0.25"]));
     }
 
-    /// Numbers written with as many digits as they need (Rust writes the shortest text that reads back as the same
-    /// number), and numbers rounded to five decimals whose trailing zeros are not written, in files of fifty lines:
-    /// whole files are refused in less than one case of a hundred; of all cuts those that are not seen and change the
-    /// number by more than a hundredth of the column's standard deviation are less than one of a hundred.
+    /// Files of fifty lines with numbers written with as many digits as needed (Rust writes the shortest text that
+    /// reads back as the same number), or rounded to five decimals without trailing zeros: complete files are refused
+    /// in less than one case in a hundred; of all cuts, those that are not detected and change the number by more
+    /// than a hundredth of the column's standard deviation are less than one in a hundred.
     #[test]
     fn whole_files_of_any_form_pass() {
         for rounded in [false, true] {

@@ -1,15 +1,16 @@
-//! All that is wrong with a file, to be told at once.
+//! All errors of a file, to be reported together.
 
 use lacuna::plugin::reader::ReadError;
 
-/// How many different errors of a file are told.
+/// Maximum number of different errors reported for a file.
 const TOLD: usize = 20;
 
-/// Errors of one file, in the order of its lines. Each message is told once, with how many more lines it is true of.
+/// Errors of one file, in the order of its lines. Each message is reported once, with the number of further lines to
+/// which it applies.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Faults {
     found: Vec<Fault>,
-    /// How many are not told.
+    /// Number of errors that are not reported.
     untold: usize,
 }
 
@@ -17,17 +18,17 @@ pub struct Faults {
 struct Fault {
     line: usize,
     error: ReadError,
-    /// In how many further lines.
+    /// Number of further lines with the same message.
     again: usize,
 }
 
 impl Faults {
-    /// Whether nothing is wrong.
+    /// Returns true if there are no errors.
     pub fn is_empty(&self) -> bool {
         self.found.is_empty()
     }
 
-    /// Notes an error in a line; zero for one about the whole file.
+    /// Adds an error of a line; line 0 stands for the whole file.
     pub fn note(&mut self, line: usize, error: ReadError) {
         let same = |known: &&mut Fault| known.line > 0 && known.error.message == error.message;
         if let Some(known) = self.found.iter_mut().find(same) {
@@ -39,18 +40,18 @@ impl Faults {
         }
     }
 
-    /// What was read, or what is wrong.
+    /// Returns the value that was read, or adds its error.
     pub fn take<T>(&mut self, line: usize, read: Result<T, ReadError>) -> Option<T> {
         read.map_err(|error| self.note(line, error)).ok()
     }
 
-    /// Adds the errors of another look at the same file.
+    /// Adds the errors of another pass over the same file.
     pub fn add(&mut self, other: Self) {
         self.found.extend(other.found);
         self.untold += other.untold;
     }
 
-    /// The value, if nothing is wrong.
+    /// Returns the value if there are no errors, otherwise all errors as one.
     pub fn or<T>(mut self, value: T) -> Result<T, ReadError> {
         self.found.sort_by_key(|fault| fault.line);
         let Some(last) = self.found.last_mut() else { return Ok(value) };

@@ -12,7 +12,7 @@ pub mod scenario;
 pub mod sheet;
 pub mod sierra;
 
-/// Shows names to a user: all of a short list, the beginning of a long one.
+/// Formats names for a message: all of a short list, the beginning of a long one.
 pub(crate) fn listed<S: AsRef<str>>(names: &[S]) -> String {
     const SHOWN: usize = 12;
     let mut text: Vec<String> =

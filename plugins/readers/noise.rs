@@ -1,28 +1,28 @@
-//! What a table says of its own noise: standard deviations, a covariance, and which values are left out.
+//! Noise stated by a table: standard deviations, a covariance, and masked values.
 
 use std::path::Path;
 
 use csv::{ReaderBuilder, Trim};
 use lacuna::data::{Layout, Measurements};
-use lacuna::linalg::Matrix;
 use lacuna::plugin::reader::ReadError;
+use lacuna_linalg::Matrix;
 
 use super::cells::{LongColumns, headed_place};
 use super::faults::Faults;
 use super::netcdf;
 use super::sheet::{Record, Sheet, delimiter};
 
-/// The column of the names of repeated measurements.
+/// Name of the column with the names of repeated measurements.
 pub const REPLICATE: &str = "replicate";
-/// The column, or the variable, of standard deviations.
+/// Name of the column or variable with standard deviations.
 pub const SIGMA: &str = "sigma";
-/// The column, or the variable, that is 1 where a value is left out.
+/// Name of the column or variable that is 1 for a masked value.
 pub const MASK: &str = "mask";
 
-/// By how much a covariance may differ from its transpose, as a share of the product of standard deviations.
+/// Largest difference of a covariance from its transpose, relative to the product of the standard deviations.
 const SYMMETRY: f64 = 1e-8;
 
-/// Whether a cell of a mask leaves its value out.
+/// Returns true if a cell of a mask excludes its value.
 pub fn left_out(sheet: &Sheet, record: &Record, column: usize) -> Result<bool, ReadError> {
     match record.cells[column].to_ascii_lowercase().as_str() {
         "1" | "1.0" | "true" => Ok(true),
@@ -34,7 +34,7 @@ pub fn left_out(sheet: &Sheet, record: &Record, column: usize) -> Result<bool, R
     }
 }
 
-/// Leaves out what a table of the axes, of `replicate` where it has that column, and of `mask` says.
+/// Excludes the values that a mask table marks: its columns are the axes, `mask`, and optionally `replicate`.
 pub fn apply_mask(path: &Path, layout: &Layout, data: &mut Measurements) -> Result<(), ReadError> {
     let (sheet, mut faults) = Sheet::open(path)?;
     let mask = sheet.column(MASK)?;
@@ -62,10 +62,12 @@ pub fn apply_mask(path: &Path, layout: &Layout, data: &mut Measurements) -> Resu
     faults.or(())
 }
 
-/// The covariance of the noise of one curve, on the layout: `outputs x outputs`, zero where the file says nothing.
+/// Reads the covariance of the noise of one curve (`outputs x outputs`, on the layout); outputs that the file does
+/// not contain have zeros.
 ///
-/// A netCDF file holds it in the variable `covariance` over two dimensions, a text file as a square of numbers. Rows and
-/// columns follow the layout, the last axis fastest, or the headings of the columns.
+/// A netCDF file holds it in the variable `covariance` over two dimensions, a text file as a square of numbers. Rows
+/// and columns follow the layout, the last axis fastest, or the headings of the columns. Fails if it is not symmetric
+/// or not positive definite.
 pub fn covariance(path: &Path, layout: &Layout) -> Result<Matrix, ReadError> {
     let square = match path.extension().and_then(|e| e.to_str()) {
         Some("nc" | "nc4" | "cdf" | "h5") => netcdf::square(path, "covariance", layout)?,
@@ -83,11 +85,11 @@ pub fn covariance(path: &Path, layout: &Layout) -> Result<Matrix, ReadError> {
     Ok(whole)
 }
 
-/// A square of numbers, and the output that each row and column is of.
+/// A square of numbers, and the output of each row and column.
 pub struct Square {
-    /// The outputs.
+    /// Flat index of the output of each row and column.
     pub places: Vec<usize>,
-    /// The numbers.
+    /// Elements of the matrix.
     pub values: Matrix,
 }
 
@@ -173,7 +175,7 @@ fn symmetric(path: &Path, layout: &Layout, square: &Square) -> Result<(), ReadEr
             if (a - b).abs() > SYMMETRY * scale {
                 let [row, column] = [i, j].map(|k| layout.describe(places[k]));
                 let text = format!(
-                    "the covariance of {row} with {column} is {a:e} in row {}, and {b:e} in row {}: it has to be \
+                    "the covariance of {row} with {column} is {a:e} in row {}, and {b:e} in row {}: the matrix must be \
                      symmetric",
                     i + 1,
                     j + 1
@@ -185,7 +187,7 @@ fn symmetric(path: &Path, layout: &Layout, square: &Square) -> Result<(), ReadEr
     Ok(())
 }
 
-/// By Cholesky's factorisation, whose pivots are the variances of each output given those before it.
+/// By Cholesky factorisation, whose pivots are the variances of each output given those before it.
 fn positive_definite(path: &Path, layout: &Layout, square: &Square) -> Result<(), ReadError> {
     let n = square.places.len();
     let mut lower = Matrix::zeros(n, n);
@@ -198,12 +200,12 @@ fn positive_definite(path: &Path, layout: &Layout, square: &Square) -> Result<()
                 lower[(i, j)] = rest / lower[(j, j)];
                 continue;
             }
-            // What rounding leaves of a variance is none.
+            // A pivot of the size of rounding errors counts as zero.
             if rest.is_nan() || rest <= 1e-14 * square.values[(i, i)].abs() {
                 let place = layout.describe(square.places[i]);
                 let text = format!(
-                    "the covariance is not positive definite: in row {}, {place}, the variance {:e} leaves {rest:e} \
-                     beside what the rows before it explain",
+                    "the covariance is not positive definite: in row {}, {place}, the variance {:e} minus \
+                     the part that the rows above determine is {rest:e}",
                     i + 1,
                     square.values[(i, i)]
                 );

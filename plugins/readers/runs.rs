@@ -1,12 +1,12 @@
-//! Simulation runs: the table of their parameters, and the ensemble that they make.
+//! Simulation runs: the table of their parameters, and the ensemble built from them.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use lacuna::data::{Ensemble, FailedRun, Parameter};
-use lacuna::linalg::Matrix;
 use lacuna::plugin::reader::{EnsembleSource, ReadError, scenario_path};
-use lacuna::study::values::Unfit;
+use lacuna::text::values::Unfit;
+use lacuna_linalg::Matrix;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::de::{self, Deserializer};
@@ -14,12 +14,12 @@ use serde::{Deserialize, Serialize};
 
 use super::sheet::{Conversion, Record, Sheet};
 
-/// The table of runs that the simulate stage writes.
+/// Name of the table of runs that the simulate stage writes.
 const SIMULATED: &str = "runs.csv";
-/// How many failed runs an error names.
+/// Maximum number of failed runs named in an error.
 const NAMED: usize = 10;
 
-/// How many runs may be left out: below 1 a fraction of them, from 1 on a count.
+/// Number of runs that may be left out: a fraction if below 1, a count from 1 on.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 #[serde(transparent)]
 pub struct AllowFailed(#[schemars(range(min = 0.0))] f64);
@@ -34,7 +34,7 @@ impl AllowFailed {
         }
     }
 
-    /// How many of a number of runs.
+    /// Returns the number of runs that may be left out of `runs`.
     pub fn of(self, runs: usize) -> usize {
         if self.0 < 1.0 { (self.0 * runs as f64) as usize } else { self.0 as usize }
     }
@@ -46,22 +46,23 @@ impl<'de> Deserialize<'de> for AllowFailed {
     }
 }
 
-/// One run of the table.
+/// Row of the table that describes one run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
-    /// Its name.
+    /// Name of the run.
     pub name: String,
-    /// Its result file, where the table names one.
+    /// Result file, if the table names one.
     pub file: Option<PathBuf>,
-    /// Why it failed, where the table says so.
+    /// Reason for the failure, if the table states one.
     pub failure: Option<String>,
-    /// Whether it stayed inside the model's range of validity.
+    /// True if the run stayed inside the model's range of validity.
     pub valid: bool,
-    /// Its parameters, in the order and the units of the study.
+    /// Parameters, in the order and the units of the study.
     pub point: Vec<f64>,
 }
 
-/// The table that a reader's options name, or else the one that the simulate stage wrote.
+/// Returns the path of the table that a reader's options name, or else of the one that the simulate stage wrote;
+/// fails if there is neither.
 pub fn table_path(
     source: &EnsembleSource<'_>,
     named: Option<&Path>,
@@ -75,8 +76,8 @@ pub fn table_path(
     }
 }
 
-/// Reads a table with the columns `run` and one a parameter, and `file`, `status`, `valid` and
-/// `reason` where it has them. Relative files start at the table's folder.
+/// Reads a table with the columns `run` and one per parameter, and optionally `file`, `status`, `valid` and `reason`.
+/// Relative paths start at the table's folder.
 pub fn read_runs(path: &Path, parameters: &[Parameter]) -> Result<Vec<Run>, ReadError> {
     let (sheet, mut faults) = Sheet::open(path)?;
     let run = faults.take(sheet.heading_line, sheet.column("run"));
@@ -123,7 +124,7 @@ pub fn read_runs(path: &Path, parameters: &[Parameter]) -> Result<Vec<Run>, Read
 
 fn parameter_column(sheet: &Sheet, p: &Parameter) -> Result<(usize, Conversion), ReadError> {
     let column = sheet.column(&p.name)?;
-    // `height[A]` is the parameter of scenario `A`, not one in amperes.
+    // `height[A]` is the parameter of scenario `A`, not a parameter in amperes.
     let of_scenario = p.name.ends_with(']') && sheet.headings[column].text == p.name;
     let conversion =
         if of_scenario { Conversion::none(&p.unit) } else { sheet.conversion(column, &p.unit)? };
@@ -147,7 +148,7 @@ fn cell<'a>(sheet: &Sheet, record: &'a Record, name: &str) -> Option<&'a str> {
     sheet.find(name).map(|column| &record.cells[column])
 }
 
-/// Whether a cell has the first of two words; so it is where the column or the word is missing.
+/// Returns true if a cell holds the first of two words; also if the column or the word is missing.
 fn word(sheet: &Sheet, record: &Record, name: &str, words: [&str; 2]) -> Result<bool, ReadError> {
     let Some(column) = sheet.find(name) else { return Ok(true) };
     let found = &record.cells[column];
@@ -169,8 +170,8 @@ fn failure(sheet: &Sheet, record: &Record) -> Result<Option<String>, ReadError> 
     Ok(Some(if reason.is_empty() { "failed".to_owned() } else { reason.to_owned() }))
 }
 
-/// Puts the responses of runs together. Runs that the table calls failed, and runs whose response
-/// cannot be read, are listed and left out if there are no more than allowed.
+/// Assembles the responses of the runs. Runs that the table marks as failed, and runs whose response cannot be read,
+/// are listed and left out; fails if there are more than allowed.
 pub fn ensemble(
     source: &EnsembleSource<'_>,
     table: &Path,
@@ -215,12 +216,14 @@ fn too_many(table: &Path, failed: &[FailedRun], runs: usize, allowed: usize) -> 
         failed.iter().take(NAMED).map(|f| format!("\n  `{}`: {}", f.run, f.reason)).collect();
     let more = count.saturating_sub(NAMED);
     let rest = if more > 0 { format!("\n  and {more} more") } else { String::new() };
-    let text = format!("{count} of {runs} runs cannot be used, {allowed} may fail:{named}{rest}");
+    let text = format!(
+        "{count} of {runs} runs cannot be used, and {allowed} may be left out:{named}{rest}"
+    );
     ReadError::new(table, text)
         .help("`allow_failed` says how many runs may be left out, as a count or a fraction")
 }
 
-/// First complaint about a response that is not finite.
+/// Fails at the first value of a response that is not finite.
 pub fn finite(path: &Path, source: &lacuna::data::Layout, values: &[f64]) -> Result<(), ReadError> {
     match values.iter().position(|y| !y.is_finite()) {
         None => Ok(()),
@@ -231,7 +234,7 @@ pub fn finite(path: &Path, source: &lacuna::data::Layout, values: &[f64]) -> Res
     }
 }
 
-/// The result files that a table names, as far as it can be read.
+/// Returns the result files that a table names; none if the table cannot be read.
 pub fn named_files(table: &Path) -> Vec<PathBuf> {
     let runs = read_runs(table, &[]).unwrap_or_default();
     runs.into_iter().filter_map(|run| run.file).collect()

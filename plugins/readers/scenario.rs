@@ -5,21 +5,21 @@ use std::path::Path;
 use lacuna::data::layouts::SCENARIO;
 use lacuna::plugin::Context;
 use lacuna::plugin::reader::{ReadError, scenario_path};
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
 
 use super::faults::Faults;
 use super::listed;
 use super::sheet::Sheet;
 
-/// What stands in a path for the name of a scenario.
+/// Placeholder for the name of a scenario in a path.
 pub const PLACE: &str = "{scenario}";
 
-/// Whether a path has another file for each scenario.
+/// Returns true if each scenario has its own file.
 pub fn each_has_its_file(path: &Path) -> bool {
     path.to_str().is_some_and(|text| text.contains(PLACE))
 }
 
-/// Complains about files of the options that are not there, for each scenario.
+/// Reports files named in the options that do not exist, for each scenario.
 pub fn check_files<'p>(
     paths: impl IntoIterator<Item = (&'p str, Option<&'p Path>)>,
     context: &Context<'_>,
@@ -39,8 +39,9 @@ pub fn check_files<'p>(
     }
 }
 
-/// Reads the rows of a table that belong to a scenario: all of a file of its own, else those with its name in the
-/// column `scenario`. A study without scenarios takes all rows, and no such column unless it is ignored.
+/// Reads the rows of a table that belong to a scenario: all rows of a file of its own, otherwise those with its name
+/// in the column `scenario`. In a study without scenarios all rows are read, and such a column is an error unless it
+/// is ignored.
 pub fn sheet(
     directory: &Path,
     path: &Path,

@@ -1,4 +1,4 @@
-//! A CSV file as a sheet: headings with units, records that know their line.
+//! A CSV file as a sheet: headings with units, and records with their line numbers.
 
 use std::path::{Path, PathBuf};
 
@@ -9,63 +9,63 @@ use lacuna::plugin::reader::ReadError;
 use super::faults::Faults;
 use super::{ending, listed};
 
-/// The heading of a column: `time [s]`.
+/// Heading of a column, such as `time [s]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Heading {
-    /// The whole heading.
+    /// Complete heading with unit.
     pub text: String,
-    /// The name, without the unit.
+    /// Name, without the unit.
     pub name: String,
-    /// The unit in brackets.
+    /// Unit in brackets.
     pub unit: Option<Unit>,
 }
 
 /// A row below the headings.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Record {
-    /// Its line in the file, counted from 1.
+    /// Line in the file, counted from 1.
     pub line: usize,
-    /// Its cells, without blanks around them.
+    /// Cells, without surrounding blanks.
     pub cells: StringRecord,
 }
 
 /// A CSV file in memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sheet {
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// The columns.
+    /// Headings of the columns.
     pub headings: Vec<Heading>,
-    /// The line of the headings, counted from 1.
+    /// Line of the headings, counted from 1.
     pub heading_line: usize,
-    /// The rows.
+    /// Rows below the headings.
     pub records: Vec<Record>,
 }
 
 impl Sheet {
-    /// Reads a file. Fields are separated by commas, or by semicolons or tabs if the first line
-    /// has no comma; lines that start with `#` are comments.
+    /// Reads a file. Fields are separated by commas, or by semicolons or tabs if the first line has no comma; lines
+    /// that start with `#` are comments.
     pub fn read(path: &Path) -> Result<Self, ReadError> {
         let bytes = std::fs::read(path)
             .map_err(|e| ReadError::new(path, format!("cannot be opened: {e}")))?;
         Self::parse(path, &bytes)
     }
 
-    /// Reads the bytes of a file; `path` only names them in messages.
+    /// Parses the bytes of a file; `path` is only used in messages.
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, ReadError> {
         let (sheet, faults) = Self::scan(path, bytes)?;
         faults.or(sheet)
     }
 
-    /// Opens a file for [`Sheet::scan`].
+    /// Opens a file and scans it like [`Sheet::scan`].
     pub fn open(path: &Path) -> Result<(Self, Faults), ReadError> {
         let bytes = std::fs::read(path)
             .map_err(|e| ReadError::new(path, format!("cannot be opened: {e}")))?;
         Self::scan(path, &bytes)
     }
 
-    /// The lines that can be read, and what is wrong with the others: for those who go on to look at the cells. The
-    /// sheet is not whole unless there are no faults.
+    /// Parses the lines that can be read, and collects the errors of the others, for callers that go on to check the
+    /// cells. The sheet is complete only if there are no errors.
     pub fn scan(path: &Path, bytes: &[u8]) -> Result<(Self, Faults), ReadError> {
         let mut reader = ReaderBuilder::new()
             .delimiter(delimiter(bytes))
@@ -115,7 +115,7 @@ impl Sheet {
         Ok((sheet, faults))
     }
 
-    /// What is wrong with the last line of a file without a final line end; see [`ending`].
+    /// Returns the error of a last line that seems to be cut off; see [`ending`].
     fn cut(&self, bytes: &[u8]) -> Option<(usize, ReadError)> {
         if bytes.ends_with(b"\n") || bytes.ends_with(b"\r") {
             return None;
@@ -126,7 +126,7 @@ impl Sheet {
         }
         let (last, above) = self.records.split_last()?;
         let column = self.headings.len() - 1;
-        // A file is read once: no crate is worth the count.
+        // A file is read once, so that a crate for counting bytes is not worthwhile.
         #[allow(clippy::naive_bytecount)]
         let quotes = bytes.iter().filter(|&&b| b == b'"').count();
         let reason = if quotes % 2 == 1 {
@@ -143,13 +143,13 @@ impl Sheet {
         Some((last.line, error))
     }
 
-    /// The position of a column, if there is one of this name.
+    /// Returns the index of a column; `None` if there is none of this name.
     pub fn find(&self, name: &str) -> Option<usize> {
         let exact = self.headings.iter().position(|h| h.text == name);
         exact.or_else(|| self.headings.iter().position(|h| h.name == name))
     }
 
-    /// The position of a column that has to be there.
+    /// Returns the index of a required column; fails if there is none of this name.
     pub fn column(&self, name: &str) -> Result<usize, ReadError> {
         self.find(name).ok_or_else(|| {
             let names: Vec<&str> = self.headings.iter().map(|h| h.name.as_str()).collect();
@@ -158,7 +158,7 @@ impl Sheet {
         })
     }
 
-    /// A complaint about a cell.
+    /// Builds an error about a cell.
     pub fn complain(
         &self,
         record: &Record,
@@ -170,7 +170,7 @@ impl Sheet {
         ReadError::new(&self.path, message).at(place)
     }
 
-    /// A cell as a number; `None` if it is blank, `NaN` or `NA`.
+    /// Returns a cell as a number; `None` if it is blank, `NaN` or `NA`.
     pub fn number(&self, record: &Record, column: usize) -> Result<Option<f64>, ReadError> {
         let cell = &record.cells[column];
         if ["", "nan", "na"].iter().any(|missing| cell.eq_ignore_ascii_case(missing)) {
@@ -180,13 +180,13 @@ impl Sheet {
             let error = self.complain(record, column, format!("expected a number, found `{cell}`"));
             let point = cell.replacen(',', ".", 1);
             match point.parse::<f64>() {
-                Ok(_) => error.help(format!("decimals follow a point: `{point}`")),
+                Ok(_) => error.help(format!("write the decimals after a point: `{point}`")),
                 Err(_) => error,
             }
         })
     }
 
-    /// How to turn numbers of a column into a unit: by the unit of its heading, if it has one.
+    /// Returns the conversion of a column to a unit, from the unit of its heading if it has one.
     pub fn conversion(&self, column: usize, to: &Unit) -> Result<Conversion, ReadError> {
         let heading = &self.headings[column];
         let conversion = Conversion { from: heading.unit.clone(), to: to.clone() };
@@ -203,7 +203,7 @@ impl Sheet {
     }
 }
 
-/// A change of unit; none where the source does not say its unit.
+/// A unit conversion; the identity if the source states no unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conversion {
     from: Option<Unit>,
@@ -211,28 +211,29 @@ pub struct Conversion {
 }
 
 impl Conversion {
-    /// No change: the numbers are in this unit.
+    /// Returns the identity: the numbers are in this unit already.
     pub fn none(to: &Unit) -> Self {
         Self { from: None, to: to.clone() }
     }
 
-    /// The number in the new unit; `None` if the units do not measure the same.
+    /// Returns the number in the new unit; `None` if the units are incompatible.
     pub fn apply(&self, x: f64) -> Option<f64> {
         self.from.as_ref().map_or(Some(x), |from| from.convert(x, &self.to))
     }
 
-    /// A difference in the new unit, such as a standard deviation: the zeros of the units do not count.
+    /// Converts a difference, such as a standard deviation: offsets between the units, as of temperatures, do not
+    /// apply.
     pub fn width(&self, x: f64) -> Option<f64> {
         Some(self.apply(x)? - self.apply(0.0)?)
     }
 
-    /// Whether the source says its unit.
+    /// Returns true if the source states its unit.
     pub fn is_stated(&self) -> bool {
         self.from.is_some()
     }
 }
 
-/// What separates the fields of a table, by its first line.
+/// Determines the field separator of a table from its first line.
 pub(super) fn delimiter(bytes: &[u8]) -> u8 {
     let first = bytes.split(|&b| b == b'\n').find(|line| !line.starts_with(b"#"));
     let first = first.unwrap_or_default();
@@ -251,13 +252,13 @@ fn heading(text: &str) -> Result<Heading, String> {
     };
     match Unit::parse(unit) {
         Ok(unit) => Ok(whole(name.trim(), Some(unit))),
-        // A parameter of one scenario: `height[ball 1]`.
+        // A parameter of one scenario, such as `height[ball 1]`.
         Err(_) if !name.ends_with(' ') => Ok(whole(text, None)),
         Err(error) => Err(error.to_string()),
     }
 }
 
-/// An error of the table's form, with its line.
+/// Converts a parser error to one with its line.
 fn unequal(path: &Path, comma: bool, error: &csv::Error) -> (usize, ReadError) {
     let line_of = |pos: &Option<csv::Position>| pos.as_ref().map_or(0, |p| p.line() as usize);
     let at =
@@ -267,7 +268,8 @@ fn unequal(path: &Path, comma: bool, error: &csv::Error) -> (usize, ReadError) {
             let text = format!("expected {expected_len} fields as in the first line, found {len}");
             let (line, error) = at(line_of(pos), text);
             let more = comma && len > expected_len;
-            let help = "decimals follow a point, not a comma; a text with a comma needs quotes";
+            let help =
+                "write decimals after a point, not a comma, and put a text with a comma in quotes";
             (line, if more { error.help(help) } else { error })
         }
         ErrorKind::Utf8 { pos, .. } => at(line_of(pos), "is not UTF-8 text".to_owned()),

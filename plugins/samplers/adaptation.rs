@@ -1,67 +1,70 @@
-//! Proposals that learn from the history of the chains.
+//! Adaptation of proposals to the history of the chains.
 
-use lacuna::linalg::Matrix;
 use lacuna::math::moments::Moments;
 use lacuna::plugin::Target;
 use lacuna::plugin::sampler::State;
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
+use lacuna_linalg::Matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::chains;
 use super::proposal::{Proposal, Shape, best_scale};
 
-/// Accepted moves per unknown below which a window tells no covariance.
+/// Minimum number of accepted moves per unknown in a window; with fewer, the covariance of the window is not used.
 const MOVES: usize = 10;
-/// The part of its own variance that is added to each coordinate of a learnt covariance.
+/// Relative increase of the variances of a learnt covariance, which keeps it positive definite.
 const RIDGE: f64 = 1e-8;
-/// The power with which gains fall, between 1/2 and 1 (Andrieu and Thoms 2008, section 4).
+/// Exponent `c` of the gain `n^-c` of the Robbins-Monro recursion, between 1/2 and 1 (Andrieu and Thoms 2008, section
+/// 4).
 const DECAY: f64 = 0.6;
 
-/// How long a proposal goes on learning.
+/// Period during which the proposal is adapted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Adapt {
-    /// During the warm-up: after it the proposal is fixed, and all chains are exact Markov chains
-    /// that are independent of each other.
+    /// During the warm-up only. Afterwards the proposal is fixed, and the chains are exact Markov chains that are
+    /// independent of each other.
     WarmUp,
-    /// To the end, ever more rarely and in ever smaller steps. The distribution of the chains converges
-    /// all the same (Chimisov, Latuszynski and Roberts, arXiv 1801.09309), but is not exact after any
+    /// Throughout the run, at growing intervals and with falling gain. The distribution of the chains still converges
+    /// to the posterior (Chimisov, Latuszynski and Roberts, arXiv 1801.09309), but is not exact after any finite
     /// number of steps.
     Always,
 }
 
-/// What a proposal learns by.
+/// Settings of the adaptation.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rule {
-    /// The number of steps of the warm-up.
+    /// Number of warm-up steps of each chain.
     pub warm_up: usize,
-    /// When it ends.
+    /// Period during which the proposal is adapted.
     pub adapt: Adapt,
-    /// The share of accepted moves to aim at.
+    /// Target acceptance rate; `None` for the optimum of a normal density of the same dimension.
     pub acceptance: Option<f64>,
 }
 
 impl Rule {
-    /// Complains of a share of accepted moves that is none.
+    /// Reports an acceptance rate that is not between 0 and 1.
     pub(super) fn check(self, complaints: &mut Complaints<'_>) {
         if let Some(share) = self.acceptance.filter(|share| !(0.0 < *share && *share < 1.0)) {
             complaints
                 .at("acceptance")
-                .say("a share of accepted moves lies between none and all")
+                .say("the acceptance rate must be between 0 and 1")
                 .expected("a number between 0 and 1")
                 .found(share);
         }
     }
 
     fn acceptance(self, dimension: usize) -> f64 {
-        // Best for normal laws: 0.441, 0.352, 0.316, 0.279, 0.275 in one to five dimensions (Gelman, Roberts
-        // and Gilks, Bayesian Statistics 5 (1996) 599, table 1), 0.234 in many.
+        // Optimal acceptance rates for normal densities are 0.441, 0.352, 0.316, 0.279, 0.275 in one to five
+        // dimensions (Gelman, Roberts and Gilks, Bayesian Statistics 5 (1996) 599, table 1) and 0.234 in many; the
+        // formula agrees within 0.015.
         self.acceptance.unwrap_or(0.234 + 0.206 / dimension.max(1) as f64)
     }
 
-    /// The first step after which the shape is learnt; each next is twice as far.
+    /// Length of the first window in steps. The shape is learnt at its end, and again whenever the number of steps
+    /// has doubled.
     fn first_window(self) -> usize {
         if self.warm_up == 0 { 100 } else { (self.warm_up / 10).max(10) }
     }
@@ -70,35 +73,36 @@ impl Rule {
         self.adapt == Adapt::WarmUp && step >= self.warm_up
     }
 
-    /// Whether a window ends after this many steps.
+    /// Returns true if a window ends after `step` steps, i.e. after 1, 2, 4, 8, ... times the first window.
     fn ends_window(self, step: usize) -> bool {
         let first = self.first_window();
         step.is_multiple_of(first) && (step / first).is_power_of_two()
     }
 }
 
-/// A proposal with what it has learnt so far.
+/// A proposal with the state of its adaptation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Adaptive {
-    /// The shape of the steps.
+    /// Shape of the proposal: the Cholesky factor of its covariance up to `scale`.
     pub shape: Shape,
-    /// Their scale.
+    /// Factor on the standard deviations of `shape`.
     pub scale: f64,
-    /// What is being learnt; none when learning is over.
+    /// State of the adaptation; `None` once it has ended.
     learning: Option<Learning>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Learning {
     step: usize,
-    /// Accepted moves of all chains since the shape was learnt last.
+    /// Accepted moves of all chains in the current window.
     moves: usize,
-    /// The points of all chains since then.
+    /// Moments of the points of all chains in the current window.
     window: Moments,
 }
 
 impl Adaptive {
-    /// The state of `count` chains before their first step.
+    /// Returns the state of `count` chains before their first step. `points` has one row per chain
+    /// (`count x dimension`).
     pub(super) fn start(
         target: &dyn Target,
         points: Matrix,
@@ -122,24 +126,24 @@ impl Adaptive {
         Self { shape, scale: best_scale(dimension), learning }
     }
 
-    /// The proposal that a state keeps.
+    /// Reads the proposal from the memory of a state.
     pub(super) fn read(state: &State) -> Result<Self, Stop> {
         Self::deserialize(&state.memory)
             .map_err(|error| Stop::new(format!("the saved proposal cannot be read: {error}")))
     }
 
-    /// The proposal as a state keeps it.
+    /// Returns the proposal as the memory of a state.
     fn written(&self) -> Result<serde_json::Value, Stop> {
         serde_json::to_value(self)
             .map_err(|error| Stop::new(format!("the proposal cannot be saved: {error}")))
     }
 
-    /// Learns from a step: from the points where the chains now are, and from the probabilities with which
-    /// their moves were accepted.
+    /// Adapts the proposal after a step, from the current points of the chains and the acceptance probabilities of
+    /// their moves, `chances`, one per chain.
     ///
-    /// The scale follows Robbins and Monro's rule (algorithm 4 of Andrieu and Thoms). The shape becomes the
-    /// covariance of the later half of the history (Haario, Saksman and Tamminen 2001, equation
-    /// 1), of all chains together, after 1, 2, 4, 8 ... times a tenth of the warm-up.
+    /// The scale follows the Robbins-Monro recursion (algorithm 4 of Andrieu and Thoms). The shape becomes the
+    /// covariance of the later half of the history (Haario, Saksman and Tamminen 2001, equation 1), pooled over all
+    /// chains, after 1, 2, 4, 8, ... tenths of the warm-up.
     pub(super) fn learn(
         &mut self,
         state: &mut State,
@@ -159,6 +163,7 @@ impl Adaptive {
             let told = learning.moves >= MOVES * dimension;
             let shape = told.then(|| learnt(&learning.window)).flatten();
             if let Some(shape) = shape {
+                // The scale restarts at the optimum of a normal density: the old one was tuned to the old shape.
                 (self.shape, self.scale) = (shape, best_scale(dimension));
             }
             *learning = Learning { step, moves: 0, window: Moments::new(dimension) };
@@ -201,7 +206,7 @@ mod tests {
 
     #[test]
     fn a_walk_learns_the_covariance_and_then_keeps_it() {
-        // A strongly correlated normal law, and a first shape that is a hundred times too wide.
+        // A strongly correlated normal density, and an initial proposal that is a hundred times too wide.
         let priors = vec![Distribution::Normal([0.0, 100.0]), Distribution::Normal([0.0, 1.0])];
         let target = Density::new(priors, |x: &[f64]| {
             let (u, v) = (x[0], 100.0 * x[1]);
@@ -218,7 +223,7 @@ mod tests {
             if step == 2000 {
                 let learnt = Adaptive::read(&state).unwrap();
                 assert!(learnt.learning.is_none());
-                // The factor of [[1, 0.95e-2], [0.95e-2, 1e-4]]; the last window has 3200 points.
+                // The Cholesky factor of [[1, 0.95e-2], [0.95e-2, 1e-4]]; the last window has 3200 points.
                 let numbers = learnt.shape.into_numbers();
                 for (found, expected) in numbers.iter().zip([1.0, 0.95e-2, 0.312e-2]) {
                     assert!((found / expected - 1.0).abs() < 0.25, "{numbers:?}");

@@ -1,11 +1,11 @@
-//! `adaptive_metropolis`: random walks that learn the shape of the density.
+//! `adaptive_metropolis`: random walks that learn the covariance of the density.
 
-use lacuna::linalg::Matrix;
 use lacuna::math::random::Stream;
 use lacuna::plugin::sampler::{Plan, State};
 use lacuna::plugin::{Component, Context, Fact, Sampler, Target};
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
+use lacuna_linalg::Matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -14,32 +14,31 @@ use super::chains;
 use super::metropolis::Trial;
 use super::proposal::Proposal;
 
-/// Adaptive Metropolis: random walks whose normal proposal takes the covariance of the chains' own
-/// history, and whose length is tuned to the best share of accepted moves.
+/// Adaptive Metropolis: a random walk whose normal proposal takes the covariance of the chains' history and a length
+/// tuned to a target acceptance rate.
 ///
-/// It needs no gradient and no tuning, and suits up to some thirty unknowns whose density has one mode and no
-/// strong bends. All chains learn together during the warm-up; afterwards the proposal is fixed and
-/// the chains are independent. Give it a longer `warm_up` the more unknowns there are.
+/// It needs no gradient and no tuning. It suits up to about thirty unknowns and densities with a single mode and
+/// without strongly curved ridges. All chains adapt one common proposal during the warm-up; afterwards the proposal
+/// is fixed and the chains are independent. Increase `warm_up` with the number of unknowns.
 ///
-/// References: Haario, Saksman and Tamminen, Bernoulli 7 (2001) 223; Andrieu and Thoms, Statistics and
-/// Computing 18 (2008) 343 (the scale); Craiu, Rosenthal and Yang, JASA 104 (2009) 1454 (chains that
-/// learn together).
+/// References: Haario, Saksman and Tamminen, Bernoulli 7 (2001) 223; Andrieu and Thoms, Statistics and Computing 18
+/// (2008) 343 (the scale); Craiu, Rosenthal and Yang, JASA 104 (2009) 1454 (chains that adapt together).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct AdaptiveMetropolis {
-    /// The number of chains: at least two.
+    /// Number of chains, at least 2; convergence is judged by comparing them.
     pub chains: usize,
-    /// The number of steps of each chain, those of the warm-up included.
+    /// Number of steps of each chain, including the warm-up. A step costs one evaluation per chain.
     pub steps: usize,
-    /// The number of first steps in which the proposal learns; they are no draws.
+    /// Number of initial steps in which the proposal is adapted; they are discarded.
     pub warm_up: usize,
-    /// When learning ends.
+    /// Period during which the proposal is adapted.
     pub adapt: Adapt,
-    /// The shape of the proposal before anything is learnt: `"curvature"`, the normal law that touches
-    /// the density at its maximum, or a fraction of the width of the prior, such as `{ prior = 0.1 }`.
+    /// Covariance of the initial proposal: `"curvature"`, that of the normal approximation at the maximum of the
+    /// density, or a fraction of the prior's width, such as `{ prior = 0.1 }`.
     pub proposal: Proposal,
-    /// The share of accepted moves to which the length of the steps is tuned. The best for normal
-    /// densities when it is not given: 0.44 for one unknown, falling to 0.234 for many.
+    /// Target acceptance rate, between 0 and 1, to which the length of the steps is tuned. Default: the optimum for
+    /// normal densities, 0.44 for one unknown, falling to 0.234 for many.
     pub acceptance: Option<f64>,
 }
 

@@ -1,39 +1,42 @@
-//! The archive of the past from which differential evolution takes its jumps.
+//! Archive of past points, from which differential evolution takes its jumps.
 //!
-//! A state keeps it as plain numbers, which are read in place: a step looks at two or three places of some
-//! thousand.
+//! It is kept in the memory of the state as plain numbers and read in place, because a step needs only two or three
+//! of some thousand points.
 
-use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, below};
 use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
 use rand::Rng;
 use serde_json::{Value, json};
 
 use super::proposal::{Shape, normals};
 
-/// Places for each unknown at the start, as in the paper.
+/// Initial points per unknown, as in ter Braak and Vrugt 2008.
 const FIRST: usize = 10;
-/// Steps between two visits to the archive at first.
+/// Initial interval, in steps, at which the points of the chains are added to the archive.
 const EVERY: u64 = 10;
-/// The largest number of places.
+/// Maximum number of points.
 const LARGEST: usize = 2000;
 
-/// The number of places of the first cloud, and of the draws of the prior beside it.
+/// Number of points in the initial cloud, and of the prior draws added to it.
 pub(super) fn first(dimension: usize) -> usize {
     (FIRST * dimension).max(2 * FIRST)
 }
 
-/// The archive as a step reads it.
+/// The archive as read by a step.
 pub(super) struct Archive<'a> {
-    /// The places, coordinate by coordinate.
+    /// Coordinates of the points, one point after the other.
     places: &'a [Value],
     dimension: usize,
-    /// The standard deviation of the first archive in each coordinate.
+    /// Standard deviation of the initial cloud in each coordinate.
     pub lengths: Vec<f64>,
 }
 
 impl<'a> Archive<'a> {
-    /// What a state keeps before the first step: a normal cloud around the best starting point, and draws of the prior.
+    /// Returns the memory before the first step: a normal cloud around the best starting point, and draws of the
+    /// prior.
+    ///
+    /// `points` has one row per chain, `log_density` one value per chain, `prior` one row per draw.
     pub(super) fn begin(
         shape: &Shape,
         points: &Matrix,
@@ -43,7 +46,7 @@ impl<'a> Archive<'a> {
         let dimension = points.columns();
         let best = (0..points.rows()).max_by(|&a, &b| log_density[a].total_cmp(&log_density[b]));
         let centre = points.row(best.unwrap_or(0));
-        // The cloud is part of the proposal: any fixed stream will do.
+        // The cloud is part of the proposal, so that a fixed stream is sufficient.
         let mut rng = Stream::root(0).named("archive").generator();
         let mut places = Matrix::zeros(first(dimension), dimension);
         for i in 0..places.rows() {
@@ -59,7 +62,7 @@ impl<'a> Archive<'a> {
         })
     }
 
-    /// The archive that a state keeps.
+    /// Reads the archive from the memory of a state; fails if it is incomplete.
     pub(super) fn read(memory: &'a Value, dimension: usize) -> Result<Self, Stop> {
         let places = memory["places"].as_array().map_or(&[][..], Vec::as_slice);
         let lengths = super::chains::numbers(&memory["lengths"]);
@@ -69,7 +72,7 @@ impl<'a> Archive<'a> {
         Ok(Self { places, dimension, lengths })
     }
 
-    /// Some of its places, all different.
+    /// Draws `N` distinct points of the archive.
     pub(super) fn pick<const N: usize>(&self, rng: &mut impl Rng) -> [Vec<f64>; N] {
         let count = self.places.len() / self.dimension;
         let mut picked = [usize::MAX; N];
@@ -86,7 +89,10 @@ impl<'a> Archive<'a> {
         })
     }
 
-    /// Counts a step and takes in where the chains are, if it is time.
+    /// Counts a step, and adds the points of the chains to the archive when the interval has passed.
+    ///
+    /// At the end of the warm-up the older half of the archive is dropped. Above [`LARGEST`] points every second
+    /// visit is dropped, and the interval doubles.
     pub(super) fn remember(
         memory: &mut Value,
         points: &Matrix,
@@ -139,11 +145,11 @@ mod tests {
             Archive::remember(&mut memory, &points, 1000).unwrap();
             sizes.push(places(&memory));
         }
-        // Three places every ten steps; half of 320 is forgotten after the warm-up.
+        // Three points every ten steps; half of 320 is dropped at the end of the warm-up.
         assert_eq!((sizes[8], sizes[9], sizes[998], sizes[999]), (20, 23, 317, 160));
         assert!(sizes.iter().all(|&n| n <= LARGEST));
         assert!(memory["every"] == 40 && sizes[19_999] > LARGEST / 2, "{}", sizes[19_999]);
-        // Every chain keeps its share.
+        // Every chain keeps its share of the points.
         let archive = Archive::read(&memory, 2).unwrap();
         let firsts: Vec<f64> = archive.places.iter().step_by(2).filter_map(Value::as_f64).collect();
         let count = |x: f64| firsts.iter().filter(|f| **f == x).count();

@@ -1,13 +1,13 @@
-//! What samplers of several chains have in common: the checks of their size and of their start.
+//! Parts shared by samplers with several chains: checks of their size and of their starting points.
 
-use lacuna::linalg::Matrix;
 use lacuna::plugin::Target;
 use lacuna::plugin::sampler::State;
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
+use lacuna_linalg::Matrix;
 use serde_json::Value;
 
-/// Complains of a run without chains; two are the least whose disagreement can be seen.
+/// Reports fewer than two chains, because convergence is judged by comparing chains.
 pub(super) fn check_count(chains: usize, complaints: &mut Complaints<'_>) {
     if chains < 2 {
         complaints
@@ -18,7 +18,7 @@ pub(super) fn check_count(chains: usize, complaints: &mut Complaints<'_>) {
     }
 }
 
-/// Complains of a run without steps beyond its warm-up.
+/// Reports a run that has no steps after its warm-up.
 pub(super) fn check_steps(steps: usize, warm_up: usize, complaints: &mut Complaints<'_>) {
     if steps == 0 {
         complaints.at("steps").say("no steps").expected("at least 1").found(0);
@@ -31,14 +31,15 @@ pub(super) fn check_steps(steps: usize, warm_up: usize, complaints: &mut Complai
     }
 }
 
-/// Complains of a number that is not above zero.
+/// Reports a value that is not above zero.
 pub(super) fn check_positive(field: &str, value: f64, complaints: &mut Complaints<'_>) {
     if !(value > 0.0 && value.is_finite()) {
         complaints.at(field).say("chains would not move").expected("a number above 0").found(value);
     }
 }
 
-/// Checks number and size of the starting points of `count` chains, which the user knows as `kind`.
+/// Checks number, dimension and finiteness of the starting points of `count` chains; `kind` is the user's word for a
+/// chain.
 pub(super) fn check_points(
     points: &Matrix,
     count: usize,
@@ -64,7 +65,7 @@ pub(super) fn check_points(
     Ok(())
 }
 
-/// The log density at the starting points, each of which has to have one above zero.
+/// Returns the log density at the starting points, one per row; fails if any is zero or has no value.
 pub(super) fn log_density(
     target: &dyn Target,
     points: &Matrix,
@@ -89,20 +90,20 @@ pub(super) fn log_density(
     )))
 }
 
-/// The state before the first step.
+/// Returns the state before the first step.
 pub(super) fn state(points: Matrix, log_density: Vec<f64>, memory: Value) -> State {
     let count = points.rows();
     let (accepted, evaluations) = (vec![false; count], count as u64);
     State { points, log_density, accepted, evaluations, memory }
 }
 
-/// The numbers that a state keeps; none where it keeps something else.
+/// Returns the numbers of a JSON array; empty if `memory` is not an array.
 pub(super) fn numbers(memory: &Value) -> Vec<f64> {
     let list = memory.as_array().map_or(&[][..], Vec::as_slice);
     list.iter().filter_map(Value::as_f64).collect()
 }
 
-/// Moves a chain, or leaves it where it is.
+/// Moves a chain to `point` if the proposal was accepted; otherwise the chain stays.
 pub(super) fn decide(
     state: &mut State,
     chain: usize,

@@ -1,11 +1,11 @@
-//! `delayed_rejection_adaptive_metropolis`: adaptive random walks that try a second, smaller step.
+//! `delayed_rejection_adaptive_metropolis`: adaptive random walks with a second, shorter trial step.
 
-use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::sampler::{Plan, State};
 use lacuna::plugin::{Component, Context, Fact, Sampler, Target};
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
+use lacuna_linalg::Matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -14,34 +14,35 @@ use super::chains;
 use super::metropolis::Trial;
 use super::proposal::{Proposal, normals};
 
-/// Delayed-rejection adaptive Metropolis (DRAM): a chain whose step is rejected tries a smaller one
-/// before it stays where it is.
+/// Delayed-rejection adaptive Metropolis (DRAM): a chain whose step is rejected tries a shorter one before it stays
+/// where it is.
 ///
-/// The second try costs a second evaluation and has its own probability, which keeps the density exact. It
-/// helps where one length of steps does not suit the whole density, as with bends, bounds and a first
-/// proposal that is far too wide; on nearly normal densities `adaptive_metropolis` does as well with
-/// fewer evaluations. Everything else is as there.
+/// The second trial costs a second evaluation and has its own acceptance probability, which keeps the stationary
+/// distribution exact. It helps where no single step length suits the whole density: curved ridges, bounds, or an
+/// initial proposal that is far too wide. On nearly normal densities `adaptive_metropolis` does as well with fewer
+/// evaluations. Everything else is as in `adaptive_metropolis`.
 ///
-/// References: Haario, Laine, Mira and Saksman, Statistics and Computing 16 (2006) 339; Tierney and Mira,
-/// Statistics in Medicine 18 (1999) 2507 (the second probability).
+/// References: Haario, Laine, Mira and Saksman, Statistics and Computing 16 (2006) 339; Tierney and Mira, Statistics
+/// in Medicine 18 (1999) 2507 (the second acceptance probability).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DelayedRejectionAdaptiveMetropolis {
-    /// The number of chains: at least two.
+    /// Number of chains, at least 2; convergence is judged by comparing them.
     pub chains: usize,
-    /// The number of steps of each chain, those of the warm-up included.
+    /// Number of steps of each chain, including the warm-up. A step costs one evaluation per chain, and a second one
+    /// for each rejected trial.
     pub steps: usize,
-    /// The number of first steps in which the proposal learns; they are no draws.
+    /// Number of initial steps in which the proposal is adapted; they are discarded.
     pub warm_up: usize,
-    /// When learning ends.
+    /// Period during which the proposal is adapted.
     pub adapt: Adapt,
-    /// The shape of the proposal before anything is learnt: `"curvature"`, the normal law that touches
-    /// the density at its maximum, or a fraction of the width of the prior, such as `{ prior = 0.1 }`.
+    /// Covariance of the initial proposal: `"curvature"`, that of the normal approximation at the maximum of the
+    /// density, or a fraction of the prior's width, such as `{ prior = 0.1 }`.
     pub proposal: Proposal,
-    /// The share of first tries that are accepted, to which the length of the steps is tuned. The best
-    /// for normal densities when it is not given: 0.44 for one unknown, falling to 0.234 for many.
+    /// Target acceptance rate of the first trial, between 0 and 1, to which the length of the steps is tuned.
+    /// Default: the optimum for normal densities, 0.44 for one unknown, falling to 0.234 for many.
     pub acceptance: Option<f64>,
-    /// The length of second steps as a fraction of that of first ones.
+    /// Length of second trial steps as a fraction of that of first ones; above 0.
     pub shrink: f64,
 }
 
@@ -64,7 +65,7 @@ impl DelayedRejectionAdaptiveMetropolis {
         Rule { warm_up: self.warm_up, adapt: self.adapt, acceptance: self.acceptance }
     }
 
-    /// Tries a second step for every chain that stayed.
+    /// Tries a second, shorter step for every chain whose first trial was rejected.
     fn try_again(
         &self,
         target: &dyn Target,
@@ -100,12 +101,13 @@ impl DelayedRejectionAdaptiveMetropolis {
     }
 }
 
-/// The logarithm of the ratio by which a second step is taken (Haario et al. 2006, equation 2):
-/// `pi(y2) q(y2, y1) [1 - a(y2, y1)] / (pi(x) q(x, y1) [1 - a(x, y1)])`, with `q` the density and `a` the
-/// probability of first steps.
+/// Returns the logarithm of the acceptance ratio of a second trial (Haario et al. 2006, equation 2):
+/// `pi(y2) q(y2, y1) [1 - a(y2, y1)] / (pi(x) q(x, y1) [1 - a(x, y1)])`, with `q` the proposal density and `a` the
+/// acceptance probability of first trials.
 ///
 /// `densities` are the logarithms of `pi` at `x`, `y1` and `y2`; the points are `y1 = x + L z1` and
-/// `y2 = x + shrink L z2`, so that `y1 - y2 = L (z1 - shrink z2)`.
+/// `y2 = x + shrink L z2`, so that `y1 - y2 = L (z1 - shrink z2)`. The proposal density of the second trial itself is
+/// symmetric and cancels.
 fn second_ratio(densities: [f64; 3], z1: &[f64], z2: &[f64], shrink: f64) -> f64 {
     let [at_x, at_y1, at_y2] = densities;
     // ln(1 - min(1, pi(y1) / pi(from))).
@@ -168,7 +170,7 @@ mod tests {
 
     #[test]
     fn a_second_step_and_its_reverse_are_in_balance() {
-        // The ratio of the way back is the inverse: detailed balance through the same rejected point.
+        // The ratio of the reverse move is the inverse: detailed balance through the same rejected point.
         let density = |x: f64| -0.5 * x * x - (1.0 + x * x).ln();
         let shrink = 0.3;
         let mut tried = 0;
@@ -190,7 +192,7 @@ mod tests {
 
     #[test]
     fn a_second_step_beside_a_better_rejected_point_is_never_taken() {
-        // From y2 the first try would have been accepted, so that the way back does not exist.
+        // From y2 the first trial would certainly have been accepted, so that the reverse move is impossible.
         let ratio = second_ratio([0.0, -1.0, -2.0], &[1.0], &[1.0], 0.2);
         assert_eq!(ratio, f64::NEG_INFINITY);
         assert_eq!(

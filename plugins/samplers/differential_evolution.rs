@@ -1,12 +1,11 @@
-//! `differential_evolution`: few chains that jump by differences between places of their past.
+//! `differential_evolution`: few chains that jump by differences between past points.
 
-use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, normal, uniform};
-use lacuna::plugin::sampler::{Plan, State};
+use lacuna::plugin::sampler::{Plan, Start, State};
 use lacuna::plugin::{Component, Context, Fact, Sampler, Target};
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
-use lacuna::study::file::Start;
+use lacuna::text::Complaints;
+use lacuna_linalg::Matrix;
 use rand::Rng;
 use rand::rngs::ChaCha8Rng;
 use schemars::JsonSchema;
@@ -16,45 +15,45 @@ use super::archive::{self, Archive};
 use super::proposal::Proposal;
 use super::{chains, snooker};
 
-/// How often a jump has the whole length of the difference.
+/// Probability of a jump by the full difference, which can lead from one mode to another.
 const LEAPS: f64 = 0.1;
-/// The relative spread of the lengths of the other jumps: uniform within this on both sides.
+/// Relative half-width of the uniform distribution of the lengths of the other jumps.
 const STRETCH: f64 = 0.1;
-/// The standard deviation of what is added to every jump, in units of the first archive's, so that the
-/// chain can reach every place and not only the combinations of the archive.
+/// Standard deviation of the normal noise added to every jump, relative to that of the initial archive. With it the
+/// chain can reach every point, not only the combinations of archived ones.
 const NOISE: f64 = 1e-4;
 
-/// Differential evolution with an archive, DE-MC(Z): few chains, each of which jumps by the difference
-/// between two places that any of the chains has visited before.
+/// Differential evolution with an archive, DE-MC(Z): few chains, each of which jumps by the difference between two
+/// points that any of the chains has visited before.
 ///
-/// The archive of the past takes the shape of the density, so that there is nothing to tune, and no need for
-/// many chains. One jump in ten has the whole length of the difference, which leads from one mode to
-/// another once the archive has both, and `snooker` is the share of moves along the line through
-/// another place, which do so too. It suits up to some thirty unknowns and several modes.
+/// The archive takes the shape of the density, so that nothing has to be tuned and few chains suffice. One jump in
+/// ten has the full length of the difference, which leads from one mode to another once the archive holds points of
+/// both; snooker moves, along the line through another point, do so too. It suits up to about thirty unknowns and
+/// several modes.
 ///
-/// The chains start at draws of the whole prior unless the study says `start`, so that each mode has a chance to catch some
-/// of them. The archive starts with ten draws of the prior and ten places of a normal cloud for each unknown, the first for
-/// jumps between modes and the second for steps within one. It takes in where the chains are at every
-/// tenth step, and forgets its first half at the end of the warm-up. It keeps growing, so that the
-/// chains are exact in the limit only; each addition weighs less than the one before. Above two thousand
-/// places every second visit is dropped, and new ones come in half as often. Chains share nothing but
-/// the archive and count as independent.
+/// The chains start at draws of the whole prior unless the study sets `start`, so that each mode has a chance to be
+/// found by some of them. The archive starts with ten draws of the prior and ten points of a normal cloud for each
+/// unknown: the former for jumps between modes, the latter for steps within one. The points of the chains are added
+/// at every tenth step, and the older half of the archive is dropped at the end of the warm-up. The archive keeps
+/// growing, so that the chains are exact only in the limit; each addition changes it less than the one before. Above
+/// two thousand points every second visit is dropped, and new ones are added half as often. The chains share nothing
+/// but the archive and count as independent.
 ///
 /// References: ter Braak and Vrugt, Statistics and Computing 18 (2008) 435; ter Braak, Statistics and Computing 16
 /// (2006) 239.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DifferentialEvolution {
-    /// The number of chains: at least two.
+    /// Number of chains, at least 2; convergence is judged by comparing them.
     pub chains: usize,
-    /// The number of steps of each chain, those of the warm-up included.
+    /// Number of steps of each chain, including the warm-up. A step costs one evaluation per chain.
     pub steps: usize,
-    /// The number of first steps that are no draws, and after which the archive forgets its first half.
+    /// Number of initial steps that are discarded; at their end the older half of the archive is dropped.
     pub warm_up: usize,
-    /// The share of snooker moves.
+    /// Fraction of snooker moves, from 0 to 1.
     pub snooker: f64,
-    /// The shape of the first cloud: `"curvature"`, the normal law that touches the density at its
-    /// maximum, or a fraction of the width of the prior, such as `{ prior = 1.0 }`.
+    /// Covariance of the initial cloud: `"curvature"`, that of the normal approximation at the maximum of the
+    /// density, or a fraction of the prior's width, such as `{ prior = 1.0 }`.
     pub archive: Proposal,
 }
 
@@ -65,8 +64,8 @@ impl Default for DifferentialEvolution {
 }
 
 impl DifferentialEvolution {
-    /// Writes where a chain would go into `new` and gives the logarithm of the factor that belongs
-    /// to the ratio of the densities.
+    /// Writes the proposed point of a chain into `new` and returns the logarithm of the factor on the ratio of the
+    /// densities (1 for parallel moves, the Jacobian for snooker moves).
     fn propose(
         &self,
         archive: &Archive<'_>,
@@ -101,7 +100,7 @@ impl Component for DifferentialEvolution {
         if !(0.0..=1.0).contains(&self.snooker) {
             complaints
                 .at("snooker")
-                .say("the share of snooker moves lies between none and all")
+                .say("the fraction of snooker moves must be from 0 to 1")
                 .expected("a number from 0 to 1")
                 .found(self.snooker);
         }
@@ -125,7 +124,7 @@ impl Sampler for DifferentialEvolution {
         chains::check_points(&points, self.chains, target.dimension(), "chains")?;
         let log_density = chains::log_density(target, &points, "chains")?;
         let (shape, evaluations) = self.archive.shape(target, &points, &log_density)?;
-        // The archive is part of the proposal: any fixed stream will do.
+        // The archive is part of the proposal, so that a fixed stream is sufficient.
         let prior = Stream::root(0).named("places");
         let draws = target.prior_draws(archive::first(target.dimension()), &prior);
         let memory = Archive::begin(&shape, &points, &log_density, &draws);
@@ -151,7 +150,7 @@ impl Sampler for DifferentialEvolution {
         state.evaluations += count as u64;
         for (chain, rng) in generators.iter_mut().enumerate() {
             let ratio = factors[chain] + log_density[chain] - state.log_density[chain];
-            // A log density that is not a number compares false, and the chain stays.
+            // A NaN log density compares false, and the chain stays.
             let accepted = uniform(rng).ln() < ratio;
             chains::decide(state, chain, accepted, points.row(chain), log_density[chain]);
         }

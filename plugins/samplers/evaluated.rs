@@ -1,24 +1,24 @@
-//! Points with their prior density and their likelihood, for methods that treat the two differently.
+//! Points with prior density and likelihood kept apart, for samplers that treat the two differently.
 
-use lacuna::linalg::{Cholesky, Matrix};
 use lacuna::plugin::Target;
 use lacuna::plugin::sampler::State;
 use lacuna::run::Stop;
+use lacuna_linalg::{Cholesky, Matrix};
 
-/// Points with their log densities.
+/// Points with their log densities, one row per point.
 pub(super) struct Evaluated {
-    /// The points, one a row.
+    /// The points, one per row.
     pub points: Matrix,
-    /// The log prior density of each.
+    /// Log prior density of each point.
     pub log_prior: Vec<f64>,
-    /// The log density of each, prior times likelihood; minus infinity outside the support.
+    /// Log density of each point, prior times likelihood; minus infinity outside the support.
     pub log_density: Vec<f64>,
-    /// How many points lay in the prior's support, so that the likelihood was asked for.
+    /// Number of points inside the prior's support, i.e. of evaluations of the likelihood.
     pub evaluations: u64,
 }
 
 impl Evaluated {
-    /// Evaluates points; outside the prior's support the likelihood costs nothing.
+    /// Evaluates points, one per row. Points outside the prior's support are not passed to the likelihood.
     pub fn new(target: &dyn Target, points: Matrix) -> Self {
         let log_prior = target.log_prior(&points);
         let inside: Vec<usize> =
@@ -27,14 +27,14 @@ impl Evaluated {
         if !inside.is_empty() {
             let found = target.log_density(&points.select_rows(&inside));
             for (&i, value) in inside.iter().zip(found) {
-                // A density without a value is no density.
+                // NaN and plus infinity count as zero density.
                 log_density[i] = if value < f64::INFINITY { value } else { f64::NEG_INFINITY };
             }
         }
         Self { points, log_prior, log_density, evaluations: inside.len() as u64 }
     }
 
-    /// The points of a state, which loses them.
+    /// Takes the points out of a state, which is left empty.
     pub fn take(target: &dyn Target, state: &mut State) -> Self {
         let points = std::mem::take(&mut state.points);
         let log_density = std::mem::take(&mut state.log_density);
@@ -42,7 +42,7 @@ impl Evaluated {
         Self { points, log_prior, log_density, evaluations: 0 }
     }
 
-    /// The log-likelihood of one point; minus infinity outside the support.
+    /// Returns the log-likelihood of point `i`; minus infinity outside the support.
     pub fn log_likelihood(&self, i: usize) -> f64 {
         if self.log_density[i] > f64::NEG_INFINITY {
             self.log_density[i] - self.log_prior[i]
@@ -51,19 +51,19 @@ impl Evaluated {
         }
     }
 
-    /// The log-likelihood of each point.
+    /// Returns the log-likelihood of each point.
     pub fn log_likelihoods(&self) -> Vec<f64> {
         (0..self.log_density.len()).map(|i| self.log_likelihood(i)).collect()
     }
 
-    /// Puts point `from` of `other` in the place of point `to`.
+    /// Replaces point `to` by point `from` of `other`.
     pub fn replace(&mut self, to: usize, other: &Self, from: usize) {
         self.points.row_mut(to).copy_from_slice(other.points.row(from));
         self.log_prior[to] = other.log_prior[from];
         self.log_density[to] = other.log_density[from];
     }
 
-    /// The points at these places, in this order.
+    /// Returns the points with these indices, in this order.
     pub fn select(&self, places: &[usize]) -> Self {
         Self {
             points: self.points.select_rows(places),
@@ -74,16 +74,17 @@ impl Evaluated {
     }
 }
 
-/// Centre and factored covariance of weighted points.
+/// Mean and factored covariance of weighted points.
 pub(super) struct Shape {
     pub centre: Vec<f64>,
     pub factor: Cholesky,
 }
 
 impl Shape {
-    /// The shape of points with these weights, which sum to one.
+    /// Computes the mean and the covariance of points with these weights, which must sum to 1.
     ///
-    /// Where the points span no volume, a small share of the variances is added to them.
+    /// If the covariance is singular, its variances are increased by a factor of up to 1.001; fails if that is not
+    /// enough.
     pub fn of(points: &Matrix, weights: &[f64]) -> Result<Self, Stop> {
         let d = points.columns();
         let mut centre = vec![0.0; d];

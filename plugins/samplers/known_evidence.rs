@@ -1,23 +1,23 @@
-//! Problems whose evidence is known in closed form, and a whole run of a sampler on one.
+//! Problems with known evidence, and a complete run of a sampler on one of them.
 
-use lacuna::linalg::{Cholesky, Matrix, multiply_transposed};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::moments::{Moments, mean, variance};
 use lacuna::math::random::{Stream, normal};
 use lacuna::math::special::HALF_LN_TWO_PI;
 use lacuna::plugin::sampler::Harvest;
 use lacuna::plugin::{Sampler, Target};
+use lacuna_linalg::{Cholesky, Matrix, multiply_transposed};
 use rayon::prelude::*;
 
 type Likelihood = Box<dyn Fn(&[f64]) -> f64 + Sync>;
 
-/// Independent priors and a likelihood.
+/// A target with independent priors and a given likelihood.
 pub(super) struct Known {
     priors: Vec<Distribution>,
-    /// How many of the last coordinates are logarithms of what has the prior.
+    /// Number of trailing coordinates that are the logarithm of the quantity with the prior.
     logs: usize,
     log_likelihood: Likelihood,
-    /// The log of the evidence.
+    /// Logarithm of the evidence.
     pub log_evidence: f64,
 }
 
@@ -69,14 +69,14 @@ impl Known {
     }
 }
 
-/// The mean of two data with a normal prior, as in the self-test of UQLab: prior N(7, variance 2), data
-/// 9.1241 and 8.151 with variance 3; the posterior is N(7.935743, variance 0.857143).
+/// Mean of two data with a normal prior, as in the self-test of UQLab: prior N(7, variance 2), data 9.1241 and 8.151
+/// with variance 3; the posterior is N(7.935743, variance 0.857143).
 pub(super) fn two_data() -> Known {
     let log_likelihood = |x: &[f64]| {
         let misfit = (9.1241 - x[0]).powi(2) + (8.151 - x[0]).powi(2);
         -misfit / 6.0 - 3.0_f64.ln() - 2.0 * HALF_LN_TWO_PI
     };
-    // The data are normal with mean 7, variance 5 and covariance 2.
+    // Marginally the data are normal with mean 7, variance 5 and covariance 2.
     let (a, b) = (9.1241 - 7.0, 8.151 - 7.0);
     let quadratic = (5.0 * (a * a + b * b) - 4.0 * a * b) / 21.0;
     Known {
@@ -87,8 +87,8 @@ pub(super) fn two_data() -> Known {
     }
 }
 
-/// Linear regression of 40 data on 5 functions with normal priors and known noise: the data are
-/// normal with covariance `s^2 I + t^2 X X'`.
+/// Linear regression of 40 data on 5 functions with normal priors and known noise: marginally the data are normal
+/// with covariance `s^2 I + t^2 X X'`.
 pub(super) fn regression() -> Known {
     let (n, d, noise, width) = (40, 5, 0.3, 2.0);
     let mut rng = Stream::root(11).named("regression").generator();
@@ -111,16 +111,16 @@ pub(super) fn regression() -> Known {
     Known { priors, logs: 0, log_likelihood: Box::new(log_likelihood), log_evidence }
 }
 
-/// The founding posterior's shape: linear regression of 21,000 data on `unknowns` coefficients with wide
-/// uniform priors, beside the logarithm of the variance, which has a half-normal prior.
+/// A posterior as informative as the founding study's: linear regression of 21,000 data on `unknowns` coefficients
+/// with wide uniform priors, and the logarithm of the variance, which has a half-normal prior.
 ///
-/// With the coefficients' prior volume `V` and their least-squares misfit `R` the evidence is
-/// `1/V int p(v) (2 pi v)^(-(n - d)/2) exp(-R / 2v) dv / sqrt(det X'X)` as long as the posterior keeps off the
-/// edges; the integral over the variance is a sum over its logarithm.
+/// With the prior volume `V` of the coefficients and their least-squares misfit `R` the evidence is
+/// `1/V int p(v) (2 pi v)^(-(n - d)/2) exp(-R / 2v) dv / sqrt(det X'X)`, as long as the posterior is negligible at the
+/// bounds; the integral over the variance is a sum over its logarithm.
 pub(super) fn informative(unknowns: usize) -> Known {
     let (n, noise, wide) = (21_000.0_f64, 32.0_f64, 1000.0);
     let variance_prior = Distribution::HalfNormal(1e6);
-    // X'X / n, with neighbours correlated by 0.8.
+    // X'X / n, with a correlation of 0.8 between neighbours.
     let gram = Matrix::from_fn(unknowns, unknowns, |i, j| n * 0.8_f64.powi(i.abs_diff(j) as i32));
     let factor = Cholesky::new(&gram).unwrap();
     let misfit = (n - unknowns as f64) * noise * noise;
@@ -179,10 +179,10 @@ pub(super) fn shells(dimension: usize) -> Known {
     Known { priors, logs: 0, log_likelihood: Box::new(log_likelihood), log_evidence }
 }
 
-/// A normal likelihood deep inside a uniform prior on the unit cube, correlated by 0.8 between neighbours: the
-/// evidence is its integral, 1, and the posterior takes up `information` nats.
+/// A normal likelihood well inside a uniform prior on the unit cube, with a correlation of 0.8 between neighbours:
+/// the evidence is its integral, 1, and the information gain of the posterior is `information` nats.
 pub(super) fn peak(dimension: usize, information: f64) -> Known {
-    // The entropy of a normal law with covariance s^2 R is d (ln s + 1/2 ln 2 pi e) + 1/2 ln det R.
+    // The entropy of a normal distribution with covariance s^2 R is d (ln s + 1/2 ln 2 pi e) + 1/2 ln det R.
     let correlation =
         Matrix::from_fn(dimension, dimension, |i, j| 0.8_f64.powi((i as i32 - j as i32).abs()));
     let factor = Cholesky::new(&correlation).unwrap();
@@ -197,7 +197,7 @@ pub(super) fn peak(dimension: usize, information: f64) -> Known {
     Known { priors, logs: 0, log_likelihood: Box::new(log_likelihood), log_evidence: 0.0 }
 }
 
-/// Two normal peaks on the unit square, one with three quarters of the mass, thirty of its widths apart.
+/// Two normal peaks on the unit square, one with three quarters of the mass, about thirty widths apart.
 fn two_peaks() -> Known {
     let log_likelihood = |x: &[f64]| {
         let peak = |share: f64, centre: f64, sd: f64| {
@@ -211,7 +211,7 @@ fn two_peaks() -> Known {
     Known { priors, logs: 0, log_likelihood: Box::new(log_likelihood), log_evidence: 0.0 }
 }
 
-/// Any likelihood with a uniform prior on the unit cube.
+/// A given likelihood with a uniform prior on the unit cube.
 pub(super) fn unit_cube(
     dimension: usize,
     log_evidence: f64,
@@ -221,11 +221,11 @@ pub(super) fn unit_cube(
     Known { priors, logs: 0, log_likelihood: Box::new(log_likelihood), log_evidence }
 }
 
-/// A whole run: what it brings home, and its evaluations of the density.
+/// Runs a sampler to its end; returns its harvest and the number of evaluations of the density.
 pub(super) fn run(sampler: &dyn Sampler, target: &dyn Target, seed: u64) -> (Harvest, u64) {
     let root = Stream::root(seed);
     let plan = sampler.plan(target.dimension());
-    // Some priors reach far beyond the support of their likelihood.
+    // The starting points must have a likelihood above zero, and some priors reach far beyond its support.
     let drawn = target.prior_draws(200 * plan.chains, &root.named("start"));
     let inside = target.log_density(&drawn).into_iter().map(f64::is_finite);
     let inside = inside.enumerate().filter(|(_, is)| *is).map(|(i, _)| i);
@@ -241,23 +241,24 @@ pub(super) fn run(sampler: &dyn Sampler, target: &dyn Target, seed: u64) -> (Har
     (harvest.unwrap(), state.evaluations)
 }
 
-/// The evidence of a run and its error.
+/// Returns the log evidence of a run and its standard error.
 pub(super) fn evidence(harvest: &Harvest) -> (f64, f64) {
     let evidence = harvest.evidence.as_ref().unwrap();
     (evidence.log, evidence.error)
 }
 
-/// Asserts that the evidence is within 0.1 of the truth, and within four of its errors.
+/// Asserts that the log evidence is within 0.1 of the truth, and within four standard errors.
 pub(super) fn assert_evidence(what: &str, sampler: &dyn Sampler, target: &Known, seed: u64) {
     let (harvest, _) = run(sampler, target, seed);
     let (log, error) = evidence(&harvest);
     let off = log - target.log_evidence;
     assert!(off.abs() < 0.1, "{what}: off by {off} +- {error}");
-    // Published values have two decimals.
+    // Published values have two decimals, hence the allowance of 0.005.
     assert!(off.abs() < 4.0 * error + 0.005, "{what}: off by {off} +- {error}");
 }
 
-/// The divergence of a normal law with the moments of the draws from that of [`two_data`].
+/// Kullback-Leibler divergence of a normal distribution with the moments of the draws from the posterior of
+/// [`two_data`].
 fn divergence(harvest: &Harvest) -> f64 {
     let moments = Moments::of_rows(&harvest.points);
     let ratio = moments.covariance()[(0, 0)] / 0.857_143;
@@ -265,18 +266,18 @@ fn divergence(harvest: &Harvest) -> f64 {
     0.5 * (ratio - 1.0 - ratio.ln() + mean * mean / 0.857_143)
 }
 
-/// Evidences of runs with different seeds beside the truth.
+/// Log evidences of runs with different seeds, compared with the truth.
 #[derive(Debug)]
 pub(super) struct Calibration {
-    /// The number of runs.
+    /// Number of runs.
     pub runs: usize,
-    /// The mean of the errors.
+    /// Mean error of the log evidence.
     pub bias: f64,
-    /// The mean and the standard deviation of the errors in units of the stated ones.
+    /// Mean and standard deviation of the errors divided by their stated standard errors.
     pub standardised: (f64, f64),
-    /// The mean stated error.
+    /// Mean stated standard error.
     pub error: f64,
-    /// The mean number of evaluations.
+    /// Mean number of evaluations.
     pub evaluations: f64,
 }
 
@@ -301,9 +302,10 @@ pub(super) fn calibration(sampler: &dyn Sampler, target: &Known, runs: usize) ->
 }
 
 impl Calibration {
-    /// Asserts that the stated errors hold. The mean of standardised errors has the standard deviation
+    /// Asserts that the stated standard errors hold. The mean of the standardised errors has the standard deviation
     /// `1 / sqrt(runs)`, of which four are allowed; their variance is chi-square distributed, with the standard
-    /// deviation `sqrt(2 / (runs - 1))`. Three of these, and the errors' own errors of a fifth, give the bounds.
+    /// deviation `sqrt(2 / (runs - 1))`. Three of these, and an uncertainty of a fifth of the stated errors
+    /// themselves, give the bounds.
     pub fn assert(&self, what: &str) {
         let runs = self.runs as f64;
         let three = 3.0 * (2.0 / (runs - 1.0)).sqrt();
@@ -313,14 +315,14 @@ impl Calibration {
         assert!(mean.abs() < 4.0 / runs.sqrt(), "{what}: {self:?}");
     }
 
-    /// The same, and that the mean is within a tenth of the truth.
+    /// Like [`Calibration::assert`]; the mean must also be within 0.1 of the truth.
     pub fn assert_close(&self, what: &str) {
         self.assert(what);
         assert!(self.bias.abs() < 0.1, "{what}: {self:?}");
     }
 }
 
-/// Asserts that the median divergence of the draws of twenty runs from a conjugate posterior is small.
+/// Asserts that the median divergence of the draws of twenty runs from a conjugate posterior is below 0.01.
 pub(super) fn assert_conjugate(sampler: &dyn Sampler) {
     let target = two_data();
     let mut divergences: Vec<f64> =
@@ -329,7 +331,8 @@ pub(super) fn assert_conjugate(sampler: &dyn Sampler) {
     assert!(divergences[10] < 0.01, "{divergences:?}");
 }
 
-/// Asserts that two separated peaks have their shares in the mean of twenty runs, which is known to `largest`.
+/// Asserts that two separated peaks have the right mass in the mean of twenty runs; `largest` bounds its standard
+/// error.
 pub(super) fn assert_shares(sampler: &dyn Sampler, largest: f64) {
     let target = two_peaks();
     let share = |seed| {
@@ -343,7 +346,8 @@ pub(super) fn assert_shares(sampler: &dyn Sampler, largest: f64) {
     assert!(error < largest, "{error}");
 }
 
-/// Asserts that over many runs the mean of the draws scatters by the posterior's width over the root of the size.
+/// Asserts that over many runs the mean of the draws scatters by the posterior's standard deviation over the root of
+/// the stated effective size.
 pub(super) fn assert_effective_size(sampler: &dyn Sampler) {
     let target = two_data();
     let runs: Vec<_> = (0..60).map(|seed| run(sampler, &target, seed).0).collect();

@@ -1,11 +1,11 @@
-//! `metropolis`: random walks of a fixed normal proposal.
+//! `metropolis`: random walks with a fixed normal proposal.
 
-use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::sampler::{Plan, State};
 use lacuna::plugin::{Component, Context, Fact, Sampler, Target};
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
+use lacuna_linalg::Matrix;
 use rand::rngs::ChaCha8Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -13,29 +13,30 @@ use serde::{Deserialize, Serialize};
 use super::chains;
 use super::proposal::{Proposal, Shape, best_scale, normals};
 
-/// Random-walk Metropolis: each chain tries a normal step around its place and takes it with the
-/// ratio of the densities, or stays.
+/// Random-walk Metropolis: each chain proposes a normal step from its current point and accepts it with the
+/// probability given by the ratio of the densities, or stays.
 ///
-/// The oldest of the samplers and the easiest to reason about: nothing adapts, all chains are
-/// independent of each other, and each is an exact Markov chain from its first step. It pays only where
-/// the proposal fits the density, as the curvature at the maximum does for densities that are nearly
-/// normal. Elsewhere `adaptive_metropolis` is the better one. The number of steps for one
-/// independent draw grows as the number of unknowns, at best about five times that.
+/// The oldest of the samplers and the easiest to reason about: nothing is adapted, all chains are independent of each
+/// other, and each is an exact Markov chain from its first step. It is efficient only if the proposal fits the
+/// density, as the curvature at the maximum does for densities that are nearly normal; otherwise prefer
+/// `adaptive_metropolis`. The number of steps per independent draw is at best about five times the number of
+/// unknowns.
 ///
-/// References: Metropolis, Rosenbluth, Rosenbluth, Teller and Teller, J. Chem. Phys. 21 (1953) 1087;
-/// Roberts, Gelman and Gilks, Ann. Appl. Probab. 7 (1997) 110 (the scale).
+/// References: Metropolis, Rosenbluth, Rosenbluth, Teller and Teller, J. Chem. Phys. 21 (1953) 1087; Roberts, Gelman
+/// and Gilks, Ann. Appl. Probab. 7 (1997) 110 (the scale).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Metropolis {
-    /// The number of independent chains: at least two.
+    /// Number of independent chains, at least 2; convergence is judged by comparing them.
     pub chains: usize,
-    /// The number of steps of each chain.
+    /// Number of steps of each chain. A step costs one evaluation per chain.
     pub steps: usize,
-    /// The shape of the proposal: `"curvature"`, the normal law that touches the density at its maximum,
-    /// or a fraction of the width of the prior, such as `{ prior = 0.1 }`.
+    /// Covariance of the proposal: `"curvature"`, that of the normal approximation at the maximum of the density, or
+    /// a fraction of the prior's width, such as `{ prior = 0.1 }`.
     pub proposal: Proposal,
-    /// A further factor of the length of the steps. With 1, the proposal's standard deviations are
-    /// `2.38 / sqrt(d)` times those of its shape for `d` unknowns, the best for normal densities.
+    /// Factor on the length of the steps, above 0. With 1, the proposal's standard deviations are `2.38 / sqrt(d)`
+    /// times those of its covariance for `d` unknowns, the optimum for normal densities; smaller steps are accepted
+    /// more often.
     pub scale: f64,
 }
 
@@ -84,20 +85,20 @@ impl Sampler for Metropolis {
     }
 }
 
-/// One normal step of every chain, evaluated and not yet decided on.
+/// One proposed step of every chain, evaluated but not yet accepted or rejected.
 pub(super) struct Trial {
-    /// Where the chains would go.
+    /// Proposed points, one row per chain.
     pub points: Matrix,
-    /// The log density there.
+    /// Log density of each proposed point.
     pub log_density: Vec<f64>,
-    /// The standard normal numbers that led there.
+    /// Standard normal numbers that generated each proposal.
     pub normals: Vec<Vec<f64>>,
-    /// The generator of each chain.
+    /// Random generator of each chain.
     pub generators: Vec<ChaCha8Rng>,
 }
 
 impl Trial {
-    /// Tries a step of `scale` times the shape from the point of each chain.
+    /// Proposes for each chain a step of `scale` times the shape, and evaluates it.
     pub(super) fn of_all(
         target: &dyn Target,
         state: &mut State,
@@ -119,11 +120,11 @@ impl Trial {
         Self { points, log_density, normals, generators }
     }
 
-    /// Takes or leaves each step by the ratio of the densities; gives the probability of each.
+    /// Accepts or rejects each proposal by the ratio of the densities; returns the acceptance probability of each.
     pub(super) fn decide(&mut self, state: &mut State) -> Vec<f64> {
         let decided = (0..self.points.rows()).map(|chain| {
             let ratio = self.log_density[chain] - state.log_density[chain];
-            // A log density that is not a number compares false, and the chain stays.
+            // A NaN log density compares false, and the chain stays.
             let accepted = uniform(&mut self.generators[chain]).ln() < ratio;
             let (point, value) = (self.points.row(chain), self.log_density[chain]);
             chains::decide(state, chain, accepted, point, value);

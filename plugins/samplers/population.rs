@@ -1,48 +1,49 @@
-//! Populations that begin with draws of the prior, and what is kept of them from step to step.
+//! Populations that start as draws of the prior, and their storage in the state between steps.
 
-use lacuna::linalg::Matrix;
 use lacuna::math::random::Stream;
 use lacuna::plugin::Target;
 use lacuna::plugin::sampler::State;
 use lacuna::run::Stop;
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
+use lacuna_linalg::Matrix;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::evaluated::Evaluated;
 
-/// The share of the prior that lies inside the support of the density.
+/// Fraction of the prior's mass inside the support of the density, as estimated by the initial draws.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Share {
-    /// Its logarithm.
+    /// Logarithm of the fraction.
     pub log: f64,
-    /// The variance of that.
+    /// Variance of that logarithm.
     pub variance: f64,
 }
 
 impl Share {
-    /// The share when it took so many tries to draw so many points inside.
+    /// Estimates the fraction from the number of draws, `tried`, that gave `count` points inside the support.
     fn of(count: usize, tried: u64) -> Self {
         if tried == count as u64 {
             return Self { log: 0.0, variance: 0.0 };
         }
-        // The draws stop at the last point that is needed: a negative binomial number of them.
+        // The draws stop at the last point needed, so that their number is negative binomial; this estimator is
+        // unbiased for it.
         let share = (count as f64 - 1.0) / (tried as f64 - 1.0);
         Self { log: share.ln(), variance: (1.0 - share) / count as f64 }
     }
 }
 
-/// Complains about options that are no share between 0 and 1.
+/// Reports options that are not between 0 and 1.
 pub(super) fn check_shares(options: &[(&str, f64)], complaints: &mut Complaints<'_>) {
     for &(name, value) in options {
         if !(value > 0.0 && value < 1.0) {
             let spot = complaints.at(name);
-            spot.say("not a share").expected("a number between 0 and 1").found(value);
+            spot.say("this is out of range").expected("a number between 0 and 1").found(value);
         }
     }
 }
 
-/// Complains about options that leave nothing to do.
+/// Reports counts of zero.
 pub(super) fn check_counts(options: &[(&str, usize)], complaints: &mut Complaints<'_>) {
     for &(name, value) in options {
         if value == 0 {
@@ -51,8 +52,8 @@ pub(super) fn check_counts(options: &[(&str, usize)], complaints: &mut Complaint
     }
 }
 
-/// The state before the first step, which draws from the prior: the starting points are counted and used for nothing
-/// else, so that their density does not matter.
+/// Returns the state before the first step. The population itself is drawn from the prior at the first step; of the
+/// starting points only the number counts, so that their density does not matter.
 pub(super) fn start(target: &dyn Target, points: Matrix, count: usize) -> Result<State, Stop> {
     let log_density = counted(target, &points, count)?;
     Ok(State {
@@ -64,8 +65,8 @@ pub(super) fn start(target: &dyn Target, points: Matrix, count: usize) -> Result
     })
 }
 
-/// The population of a state, which loses it, and its memory; before the first step draws of the prior, and the
-/// memory that begins with them.
+/// Takes the population and the memory out of a state. Before the first step the population is drawn from the prior,
+/// and `first` makes the memory.
 pub(super) fn resume<M: DeserializeOwned>(
     target: &dyn Target,
     state: &mut State,
@@ -79,7 +80,7 @@ pub(super) fn resume<M: DeserializeOwned>(
     Ok((drawn, first(share)))
 }
 
-/// Gives a population and its memory back to their state.
+/// Puts a population and its memory back into their state.
 pub(super) fn keep<M: Serialize>(
     state: &mut State,
     population: Evaluated,
@@ -92,20 +93,18 @@ pub(super) fn keep<M: Serialize>(
     Ok(())
 }
 
-/// The memory of a state; none before the first step.
+/// Reads the memory of a state; `None` before the first step.
 pub(super) fn recall<M: DeserializeOwned>(state: &State) -> Result<Option<M>, Stop> {
     Option::deserialize(&state.memory)
         .map_err(|error| Stop::new(format!("the saved state of the sampler is damaged: {error}")))
 }
 
-/// The memory of a state from which draws are to be harvested.
+/// Reads the memory of a state at harvest; fails before the first step.
 pub(super) fn remembered<M: DeserializeOwned>(state: &State) -> Result<M, Stop> {
-    recall(state)?.ok_or_else(|| {
-        Stop::new("the points have not left their starting places, which are no draws")
-    })
+    recall(state)?.ok_or_else(|| Stop::new("there are no draws: the sampler has not made a step"))
 }
 
-/// The log densities of one starting point a chain.
+/// Returns the log densities of the starting points, one per chain; fails if their number or dimension is wrong.
 fn counted(target: &dyn Target, points: &Matrix, chains: usize) -> Result<Vec<f64>, Stop> {
     let dimension = target.dimension();
     if (points.rows(), points.columns()) != (chains, dimension) {
@@ -119,7 +118,8 @@ fn counted(target: &dyn Target, points: &Matrix, chains: usize) -> Result<Vec<f6
     Ok(target.log_density(points))
 }
 
-/// Draws of the prior, all of them inside the support of the density, and the support's share of the prior.
+/// Draws `count` points from the prior, all of them inside the support of the density, and estimates the fraction of
+/// the prior inside it.
 fn from_prior(
     target: &dyn Target,
     count: usize,

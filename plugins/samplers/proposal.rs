@@ -1,43 +1,43 @@
-//! The proposals of random walks.
+//! Proposals of random walks.
 
-use lacuna::linalg::{Cholesky, Matrix};
 use lacuna::math::moments::{quantile, sorted};
-use lacuna::math::optimise::{laplace, maximise};
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::Target;
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
+use lacuna_linalg::{Cholesky, Matrix};
+use lacuna_optimise::{laplace, maximise};
 use rand::Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::chains;
 
-/// Draws of the prior from which its width is taken.
+/// Number of prior draws from which the prior's width is estimated.
 const PRIOR_DRAWS: usize = 1000;
 
-/// Where a random walk takes its first shape from.
+/// Source of the initial proposal covariance of a random walk.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Proposal {
-    /// From the curvature of the log density at the maximum next to the best starting point. Where the
-    /// density has no curvature, and where it has no gradient at all, the width of the prior takes
-    /// its place.
+    /// The inverse curvature of the log density at the maximum reached from the best starting point. If the density
+    /// has no gradient or the curvature cannot be used, the prior's width takes its place.
     Curvature,
-    /// This fraction of the width of the prior in each unknown, half the distance of its 16 % and 84 %
-    /// quantiles, without correlation.
+    /// This fraction of the prior's width in each unknown (half the distance between the 16 % and 84 % quantiles),
+    /// without correlations.
     Prior(f64),
 }
 
 impl Proposal {
-    /// Complains of a fraction that is none.
+    /// Reports a fraction that is not above zero.
     pub(super) fn check(self, complaints: &mut Complaints<'_>) {
         if let Self::Prior(fraction) = self {
             chains::check_positive("proposal", fraction, complaints);
         }
     }
 
-    /// The first shape, and how many evaluations of density and gradient it took.
+    /// Returns the initial shape, and the number of evaluations of density and gradient it took. `points` has one row
+    /// per chain.
     pub(super) fn shape(
         self,
         target: &dyn Target,
@@ -64,9 +64,9 @@ impl Proposal {
     }
 }
 
-/// The width of the prior in each coordinate; of the starting points where the prior has none.
+/// Returns the prior's width in each coordinate; that of the starting points if the prior's is zero or infinite.
 fn widths(target: &dyn Target, points: &Matrix) -> Result<Vec<f64>, Stop> {
-    // Any fixed stream will do: the draws tell a width only.
+    // The draws only serve to estimate a width, so that a fixed stream is sufficient.
     let prior = target.prior_draws(PRIOR_DRAWS, &Stream::root(0).named("proposal"));
     let width = |draws: &Matrix, j: usize| {
         let column = sorted(&draws.column(j));
@@ -96,7 +96,7 @@ fn curvature(
     let shape = if laplace.definite {
         Shape::of(&laplace.covariance)
     } else {
-        // In some direction the density does not fall: no width of the curvature is believed beyond the prior's.
+        // The log density does not fall in some direction: standard deviations are limited to the prior's width.
         let sd = |j: usize| laplace.covariance[(j, j)].sqrt().min(widths[j]);
         Some(Shape::diagonal(&(0..widths.len()).map(sd).collect::<Vec<_>>()))
     };
@@ -104,8 +104,7 @@ fn curvature(
     Some((shape.filter(Shape::is_sound)?, evaluations as u64))
 }
 
-/// The shape of a normal proposal: the lower triangle `L` of the factor of its covariance `L L'`, row by
-/// row.
+/// Shape of a normal proposal: the lower Cholesky factor `L` of its covariance `L L'`, stored row by row.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub(super) struct Shape {
@@ -113,25 +112,25 @@ pub(super) struct Shape {
 }
 
 impl Shape {
-    /// The shape of a covariance; `None` when that is not positive definite.
+    /// Factors a covariance (`d x d`); `None` if it is not positive definite.
     pub(super) fn of(covariance: &Matrix) -> Option<Self> {
         let factor = Cholesky::new(covariance).ok()?;
         let rows = factor.lower().iter_rows().enumerate();
         Some(Self { lower: rows.flat_map(|(i, row)| row[..=i].to_vec()).collect() })
     }
 
-    /// The shape of independent coordinates with these standard deviations.
+    /// Returns the shape of independent coordinates with these standard deviations.
     pub(super) fn diagonal(sd: &[f64]) -> Self {
         let row = |i: usize| (0..=i).map(move |j| if i == j { sd[i] } else { 0.0 });
         Self { lower: (0..sd.len()).flat_map(row).collect() }
     }
 
-    /// The shape that a state keeps.
+    /// Restores a shape from the numbers kept in a state.
     pub(super) fn from_numbers(lower: Vec<f64>) -> Self {
         Self { lower }
     }
 
-    /// The numbers to keep.
+    /// Returns the numbers to keep in a state.
     pub(super) fn into_numbers(self) -> Vec<f64> {
         self.lower
     }
@@ -140,7 +139,7 @@ impl Shape {
         self.lower.iter().all(|x| x.is_finite()) && self.sd().iter().all(|sd| *sd > 0.0)
     }
 
-    /// The rows of the factor, of length 1, 2, 3, ...
+    /// Iterates over the rows of the factor, of lengths 1, 2, 3, ...
     fn rows(&self) -> impl Iterator<Item = &[f64]> {
         let mut rest = self.lower.as_slice();
         let mut length = 0;
@@ -152,7 +151,7 @@ impl Shape {
         })
     }
 
-    /// The standard deviation of each coordinate.
+    /// Returns the standard deviation of each coordinate.
     pub(super) fn sd(&self) -> Vec<f64> {
         self.rows().map(|row| row.iter().map(|x| x * x).sum::<f64>().sqrt()).collect()
     }
@@ -165,13 +164,13 @@ impl Shape {
     }
 }
 
-/// Independent standard normal numbers.
+/// Draws independent standard normal numbers.
 pub(super) fn normals(count: usize, rng: &mut impl Rng) -> Vec<f64> {
     (0..count).map(|_| normal(rng)).collect()
 }
 
-/// The scale of a random walk's covariance that is best for normal laws of many dimensions,
-/// as a factor of standard deviations (Roberts, Gelman and Gilks, Ann. Appl. Probab. 7 (1997) 110).
+/// Returns the factor on standard deviations, `2.38 / sqrt(d)`, that is optimal for random walks on normal densities
+/// of many dimensions (Roberts, Gelman and Gilks, Ann. Appl. Probab. 7 (1997) 110).
 pub(super) fn best_scale(dimension: usize) -> f64 {
     2.38 / (dimension.max(1) as f64).sqrt()
 }
@@ -184,7 +183,7 @@ mod tests {
     use super::super::truth::Density;
     use super::*;
 
-    /// A normal law with correlation 0.8 and standard deviations 2 and 1e-3.
+    /// A normal density with correlation 0.8 and standard deviations 2 and 1e-3.
     fn normal_law() -> Density<impl Fn(&[f64]) -> f64 + Sync> {
         let priors = vec![Distribution::Normal([0.0, 10.0]), Distribution::Normal([0.0, 1e-2])];
         Density::new(priors, |x: &[f64]| {
@@ -202,7 +201,7 @@ mod tests {
     fn the_curvature_of_a_normal_law_is_its_covariance() {
         let (shape, evaluations) = shape(&normal_law(), Proposal::Curvature);
         let found = shape.into_numbers();
-        // The factor of [[4, 1.6e-3], [1.6e-3, 1e-6]].
+        // The Cholesky factor of [[4, 1.6e-3], [1.6e-3, 1e-6]].
         for (found, expected) in found.iter().zip([2.0, 0.8e-3, 0.6e-3]) {
             assert!((found / expected - 1.0).abs() < 1e-3, "{found} and {expected}");
         }
@@ -212,8 +211,8 @@ mod tests {
     #[test]
     fn a_fraction_of_the_prior_is_as_wide() {
         let (shape, evaluations) = shape(&normal_law(), Proposal::Prior(0.1));
-        // The width of a normal law between its 16 % and 84 % quantiles is 0.9945 sd; its error over 1000
-        // draws is about 3.5 %.
+        // Half the distance between the 16 % and 84 % quantiles of a normal distribution is 0.9945 sd; its error with
+        // 1000 draws is about 3.5 %.
         for (found, expected) in shape.sd().iter().zip([0.9945, 0.9945e-3]) {
             assert!((found / expected - 1.0).abs() < 0.14, "{found} and {expected}");
         }

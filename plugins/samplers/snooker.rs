@@ -4,11 +4,11 @@
 use lacuna::math::random::uniform;
 use rand::Rng;
 
-/// Writes `x + g (a - b)`, with the difference projected on the line from `anchor` to `x` and `g`
-/// uniform between 1.2 and 2.2, into `new`; gives the logarithm of `(|new - anchor| / |x -
-/// anchor|)^(d - 1)`, the factor that belongs to the ratio of the densities (equation 5).
+/// Writes `x + g (a - b)`, with the difference projected on the line from `anchor` to `x` and `g` uniform between 1.2
+/// and 2.2, into `new`. Returns the logarithm of `(|new - anchor| / |x - anchor|)^(d - 1)`, the factor on the ratio
+/// of the densities (equation 5).
 ///
-/// The projection takes coordinates in units of `lengths`, which have to be the same for every move.
+/// Distances are measured with each coordinate in units of `lengths`, which must be the same for every move.
 pub(super) fn propose(
     x: &[f64],
     anchor: &[f64],
@@ -23,10 +23,10 @@ pub(super) fn propose(
         along += line * (a[j] - b[j]) / lengths[j];
         square += line * line;
     }
-    // The new place is the anchor and this multiple of the line.
+    // The proposed point is the anchor plus this multiple of the line.
     let multiple = 1.0 + (1.2 + uniform(rng)) * along / square;
     if !(multiple.abs() > 0.0 && multiple.is_finite()) {
-        // A walker on its anchor has no line: it stays.
+        // A walker at its anchor defines no line: it stays.
         new.copy_from_slice(x);
         return f64::NEG_INFINITY;
     }

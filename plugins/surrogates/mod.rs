@@ -1,4 +1,4 @@
-//! Surrogates.
+//! Surrogates: emulators fitted to simulation runs.
 
 pub mod gaussian_process;
 pub mod kriging;

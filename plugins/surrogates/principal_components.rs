@@ -1,48 +1,49 @@
-//! Principal components of the outputs: a thousand outputs that move together are a few tens of scores.
+//! Principal components of the outputs: a thousand correlated outputs are reduced to a few tens of scores.
 
-use lacuna::linalg::{self, Matrix};
 use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How many principal components of the outputs are emulated instead of the outputs themselves.
+/// Number of principal components of the outputs that are emulated in place of the outputs themselves.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum Components {
-    /// The outputs themselves, each of which that varies is its own component.
+    /// No reduction: each output that varies is its own component.
     None,
-    /// As many as carry this share of the variance of all outputs over the runs, such as `{ variance = 0.9999 }`.
+    /// As many components as carry this fraction of the variance of all outputs over the runs, above 0 and at most 1,
+    /// such as `{ variance = 0.9999 }`.
     Variance(f64),
-    /// This many, such as `{ count = 20 }`.
+    /// A fixed number of components, such as `{ count = 20 }`.
     Count(usize),
 }
 
 /// Responses `Y = 1 mean' + T V' + E` with few scores `T`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrincipalComponents {
-    /// The mean of each output over the runs.
+    /// Mean of each output over the runs.
     pub mean: Vec<f64>,
-    /// `V`, orthonormal columns in the order of the variance they carry, `outputs x components`.
+    /// `V`: orthonormal columns in decreasing order of the variance they carry (`outputs x components`).
     pub directions: Matrix,
-    /// `T`, `runs x components`.
+    /// `T` (`runs x components`).
     pub scores: Matrix,
-    /// `E`, what the components leave out, `runs x outputs`.
+    /// `E`, the part that the components leave out (`runs x outputs`).
     pub remainder: Matrix,
 }
 
 impl Components {
-    /// What is wrong with the choice, in words.
+    /// Returns a description of what is wrong with the choice, if anything.
     pub fn fault(&self) -> Option<String> {
         match *self {
             Self::Variance(share) if !(share > 0.0 && share <= 1.0) => Some(format!(
                 "the share of the variance is {share}, but must be above 0, at most 1"
             )),
-            Self::Count(0) => Some("no component at all is left".to_owned()),
+            Self::Count(0) => Some("the number of components must be at least 1".to_owned()),
             _ => None,
         }
     }
 
-    /// The components of responses, `runs x outputs`.
+    /// Computes the components of responses (`runs x outputs`).
     pub fn of(&self, responses: &Matrix) -> Result<PrincipalComponents, Stop> {
         let (runs, outputs) = (responses.rows(), responses.columns());
         let mean: Vec<f64> =
@@ -51,18 +52,18 @@ impl Components {
         if *self == Self::None {
             return Ok(PrincipalComponents::of_outputs(mean, &centred));
         }
-        let svd = linalg::thin_svd(&centred)
+        let svd = lacuna_linalg::thin_svd(&centred)
             .map_err(|e| Stop::new(format!("the principal components of the outputs: {e}")))?;
         let rank = self.rank(&svd.values);
         let scores = Matrix::from_fn(runs, rank, |i, k| svd.u[(i, k)] * svd.values[k]);
         let directions = Matrix::from_fn(outputs, rank, |j, k| svd.v[(j, k)]);
-        let kept = linalg::multiply_transposed(&scores, &directions);
+        let kept = lacuna_linalg::multiply_transposed(&scores, &directions);
         let remainder = Matrix::from_fn(runs, outputs, |i, j| centred[(i, j)] - kept[(i, j)]);
         Ok(PrincipalComponents { mean, directions, scores, remainder })
     }
 
     fn rank(&self, singular_values: &[f64]) -> usize {
-        // What is below round-off is no component.
+        // Singular values below round-off carry no information.
         let largest = singular_values.first().copied().unwrap_or(0.0);
         let real = singular_values.iter().take_while(|&&s| s > 1e-14 * largest).count();
         match *self {
@@ -83,7 +84,7 @@ impl Components {
 }
 
 impl PrincipalComponents {
-    /// Each output that varies by more than round-off as its own component, in the order of the outputs.
+    /// Takes each output that varies by more than round-off as its own component, in the order of the outputs.
     fn of_outputs(mean: Vec<f64>, centred: &Matrix) -> Self {
         let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
         let size = largest(centred.as_slice()).max(largest(&mean));
@@ -101,7 +102,7 @@ impl PrincipalComponents {
         Self { mean, directions, scores, remainder }
     }
 
-    /// The mean square of what the components leave out of each output over the runs.
+    /// Returns for each output the mean square over the runs of the part that the components leave out.
     pub fn truncation(&self) -> Vec<f64> {
         let runs = self.remainder.rows() as f64;
         let square = |j: usize| self.remainder.column(j).iter().map(|e| e * e).sum::<f64>() / runs;
@@ -114,12 +115,12 @@ mod tests {
     use super::*;
     use lacuna::math::random::{Stream, normal};
 
-    /// Responses of rank three, so that three components leave out round-off only (Eckart and Young 1936).
+    /// Responses of rank three, of which three components leave out only rounding errors (Eckart and Young 1936).
     #[test]
     fn responses_of_low_rank_have_few_components() {
         let mut rng = Stream::root(1).generator();
         let mut random = |rows, columns| Matrix::from_fn(rows, columns, |_, _| normal(&mut rng));
-        let responses = linalg::multiply(&random(40, 3), &random(3, 25));
+        let responses = lacuna_linalg::multiply(&random(40, 3), &random(3, 25));
         let found = Components::Variance(1.0).of(&responses).unwrap();
         assert_eq!(found.scores.columns(), 3);
         assert!(found.truncation().iter().all(|t| *t < 1e-24));
@@ -135,7 +136,7 @@ mod tests {
             Matrix::from_fn(6, 3, |i, j| if j == 1 { 5.0 } else { (i * (j + 2)) as f64 });
         let found = Components::None.of(&responses).unwrap();
         assert_eq!((found.scores.columns(), found.mean[1]), (2, 5.0));
-        let back = linalg::multiply_transposed(&found.scores, &found.directions);
+        let back = lacuna_linalg::multiply_transposed(&found.scores, &found.directions);
         for i in 0..6 {
             for j in 0..3 {
                 let whole = found.mean[j] + back[(i, j)] + found.remainder[(i, j)];

@@ -1,4 +1,4 @@
-//! `coulomb_friction`: dry friction, which does not grow with the speed.
+//! `coulomb_friction`: dry friction, independent of the magnitude of the speed.
 
 use lacuna::plugin::effect::Description;
 use lacuna::plugin::term::{Place, Sign, Site, Summand};
@@ -9,23 +9,22 @@ use toml::Table;
 
 use super::common::{of, quantity};
 
-/// Coulomb friction: dry friction, against the speed and as large at any speed.
+/// Coulomb friction: dry friction, opposed to the speed and independent of its magnitude.
 ///
 /// ```text
 /// rate = … - coefficient tanh(u / width),   coefficient ≥ 0
 /// ```
 ///
-/// The sign of the speed is rounded off over `width`, which decides how the speed crosses zero and which data seldom
-/// tell: without it, it is the change of the speed within one step of the response, and the candidate's formula says so.
-/// It is easily confused with `linear_friction` where the amplitude varies little.
+/// The sign of the speed is smoothed over `width`, which governs how the speed passes through zero and which data
+/// rarely determine. Without `width` it is the change of the speed within one step of the response, and the
+/// candidate's formula says so. The term is easily confused with `linear_friction` if the amplitude varies little.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CoulombFriction {
-    /// The speed `u`, as an expression; the state itself when left out.
+    /// Speed `u`, as an expression. Default: the state itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
-    /// The speed over which the sign is rounded off, as an expression such as `"0.01 {m/s}"`. It must be given where `of`
-    /// is.
+    /// Speed over which the sign is smoothed, as an expression such as `"0.01 {m/s}"`. Required with `of`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub width: Option<String>,
 }

@@ -1,4 +1,4 @@
-//! `cubic_stiffness`: a spring that hardens or softens.
+//! `cubic_stiffness`: a hardening or softening spring.
 
 use lacuna::plugin::effect::Description;
 use lacuna::plugin::term::{Place, Sign, Site, Summand};
@@ -9,18 +9,18 @@ use toml::Table;
 
 use super::common::{of, of_each};
 
-/// Cubic stiffness: a spring that hardens, or softens where the coefficient is below zero.
+/// Cubic stiffness: a spring that hardens (coefficient above zero) or softens (below zero).
 ///
 /// ```text
 /// rate = … - coefficient u³
 /// ```
 ///
-/// The spring of the Duffing oscillator (Duffing, Erzwungene Schwingungen bei veränderlicher Eigenfrequenz, 1918): the
-/// frequency depends on the amplitude.
+/// The spring of the Duffing oscillator (Duffing, Erzwungene Schwingungen bei veränderlicher Eigenfrequenz, 1918):
+/// the frequency depends on the amplitude.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CubicStiffness {
-    /// The deflection `u`, as an expression; the state itself when left out.
+    /// Deflection `u`, as an expression. Default: the state itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
 }

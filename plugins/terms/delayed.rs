@@ -1,38 +1,40 @@
-//! `delayed`: a reaction that comes late.
+//! `delayed`: a delayed reaction.
 
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::amend::State;
 use lacuna::plugin::effect::Description;
 use lacuna::plugin::term::{Index, Place, Site, Summand};
 use lacuna::plugin::{Component, Term};
-use lacuna::study::values::Count;
+use lacuna::text::values::Count;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use super::common::of;
 
-/// A delayed reaction: what acts now is what was some time ago.
+/// A delayed reaction: the rate depends on the state some time before.
 ///
 /// ```text
 /// rate = … + coefficient (u(t - delay) - u(t))
 /// ```
 ///
-/// The delay is a chain of first-order lags (the linear chain trick; Smith, An Introduction to Delay Differential
-/// Equations, 2011, chapter 7): with more of them it is sharper. Each lag is a state of its own that begins where `u` does.
+/// The delay is approximated by a chain of first-order lags (the linear chain trick; Smith, An Introduction to Delay
+/// Differential Equations, 2011, chapter 7): more lags make it sharper. Each lag is a state of its own with the
+/// initial value of `u`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Delayed {
-    /// What is delayed, `u`, as an expression; the state itself when left out.
+    /// Delayed quantity `u`, as an expression. Default: the state itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
-    /// Where `u` begins, as an expression of the model's inputs. It must be given where `of` is.
+    /// Initial value of `u`, as an expression of the model's inputs. Required with `of`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start: Option<String>,
-    /// The number of lags.
+    /// Number of lags. More lags make the delay sharper and add as many states.
     #[serde(default = "lags")]
     pub lags: Count,
-    /// Prior of the delay, in the unit of the time; from the shortest step to a quarter of the response when left out.
+    /// Prior of the delay, in the unit of the time. Default: log-uniform from one step to a quarter of the duration
+    /// of the response.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub delay: Option<Distribution>,
 }

@@ -1,4 +1,4 @@
-//! `evaporation`: a loss of heat with the vapour pressure.
+//! `evaporation`: a heat loss driven by the vapour pressure.
 
 use lacuna::plugin::effect::Description;
 use lacuna::plugin::term::{Place, Sign, Summand};
@@ -8,23 +8,26 @@ use serde::{Deserialize, Serialize};
 
 use super::common::of;
 
-/// Evaporation: a loss with the vapour pressure, which grows exponentially with the temperature.
+/// Evaporation: a heat loss in proportion to the excess vapour pressure, which grows exponentially with the
+/// temperature.
 ///
 /// ```text
 /// rate = … - coefficient (exp((u - ambient) / scale) - 1),   coefficient ≥ 0
 /// ```
 ///
-/// Dalton's law with the vapour pressure of Clausius and Clapeyron about the temperature of saturated surroundings: for
-/// water the pressure grows e-fold about every 16 K at 20 degrees Celsius, and every 21 K at 60.
+/// Dalton's law with the vapour pressure of Clausius and Clapeyron, linearised in its exponent about the temperature
+/// of saturated surroundings: for water the pressure increases by a factor of e about every 16 K at 20 degrees
+/// Celsius, and every 21 K at 60.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Evaporation {
-    /// The temperature `u`, as an expression; the state itself when left out.
+    /// Temperature `u`, as an expression. Default: the state itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
-    /// The temperature of the surroundings, as an expression such as `"293 {K}"`.
+    /// Temperature of the surroundings, as an expression such as `"293 {K}"`.
     pub ambient: String,
-    /// The difference of temperature over which the vapour pressure grows e-fold, as an expression such as `"16 {K}"`.
+    /// Temperature difference over which the vapour pressure increases by a factor of e, as an expression such as
+    /// `"16 {K}"`.
     pub scale: String,
 }
 

@@ -1,4 +1,4 @@
-//! `expression`: a term that the study writes by itself.
+//! `expression`: a term that the study defines.
 
 use lacuna::plugin::effect::Description;
 use lacuna::plugin::term::{Place, Sign as Signs, Summand};
@@ -6,31 +6,31 @@ use lacuna::plugin::{Component, Term};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A term as an expression: whatever else may be in the rate of a state.
+/// A term given by an expression: any further contribution to the rate of a state.
 ///
 /// ```text
 /// rate = … + coefficient shape
 /// ```
 ///
-/// The coefficient is called by the `name` of the section, and so is the effect when it is found.
+/// The coefficient takes the `name` of the section, and so does the effect when it is found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Expression {
-    /// What the coefficient multiplies: an expression of states, inputs, definitions and the time.
+    /// Factor that the coefficient multiplies: an expression of states, inputs, definitions and the time.
     pub shape: String,
-    /// The signs that the coefficient may have.
+    /// Allowed signs of the coefficient.
     #[serde(default)]
     pub sign: Sign,
 }
 
-/// The signs that a coefficient may have.
+/// Allowed signs of a coefficient.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Sign {
-    /// Both.
+    /// Both signs.
     #[default]
     Either,
-    /// Above zero only.
+    /// Positive values only.
     Positive,
 }
 

@@ -1,4 +1,4 @@
-//! `forcing`: a force at a frequency.
+//! `forcing`: a periodic force.
 
 use std::f64::consts::PI;
 
@@ -11,21 +11,22 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-/// The most frequencies from which a search starts.
+/// Maximum number of frequencies from which a search starts.
 const MOST: usize = 48;
 
-/// Forcing at a frequency: something shakes that the model does not have.
+/// Periodic forcing: a sinusoidal excitation that the model lacks.
 ///
 /// ```text
 /// rate = … + coefficient cos(2 π frequency t + phase)
 /// ```
 ///
-/// The frequency is looked for from one oscillation over the response to twelve, in steps in which the phase turns by half
-/// an oscillation; `frequency` says where else.
+/// By default the search covers the frequencies from 0.75 to 12 oscillations over the response, in steps that change
+/// the phase at the end of the response by half an oscillation; `frequency` sets another range.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Forcing {
-    /// Prior of the frequency, in oscillations by the unit of the time.
+    /// Prior of the frequency, in oscillations per unit of the time. Default: uniform from 0.75 to 12 oscillations
+    /// over the response, but at most one oscillation per two steps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frequency: Option<Distribution>,
 }
@@ -54,7 +55,8 @@ impl Term for Forcing {
         let given = self.frequency.clone();
         let prior = given.unwrap_or(Distribution::Uniform([low, high.max(2.0 * low)]));
         let (from, to) = (prior.quantile(0.01), prior.quantile(0.99));
-        // Half an oscillation over the whole response between neighbours, unless that makes a long list.
+        // Neighbouring frequencies differ by half an oscillation over the whole response, unless that makes the list
+        // too long.
         let count = ((2.0 * (to - from) * time.duration).ceil() as usize + 1).clamp(2, MOST);
         let step = (to - from) / (count - 1) as f64;
         let starts = (0..count).map(|i| from + step * i as f64).collect();

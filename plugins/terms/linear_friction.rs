@@ -16,11 +16,11 @@ use super::common::{of, of_each};
 /// ```
 ///
 /// Viscous dashpots and creeping flow (Stokes, Trans. Camb. Phil. Soc. 9 (1851) 8). It is easily confused with
-/// `quadratic_friction` where the speed varies little, and with `relaxation` towards zero, which has the same form.
+/// `quadratic_friction` if the speed varies little, and with `relaxation` towards zero, which has the same form.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LinearFriction {
-    /// The speed `u`, as an expression; the state itself when left out.
+    /// Speed `u`, as an expression. Default: the state itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
 }

@@ -1,4 +1,4 @@
-//! `pull`: the pull of a further body.
+//! `pull`: the gravity of a further body.
 
 use std::collections::BTreeMap;
 
@@ -16,17 +16,17 @@ use super::common::of;
 /// rate = … - coefficient u / distance³,   coefficient ≥ 0
 /// ```
 ///
-/// `u` is the component of the distance along the state, seen from the further body; the components along other states
-/// share the coefficient, which is the mass of the body times the constant of gravity.
+/// `u` is the component of the distance along the state, measured from the further body; the components along other
+/// states share the coefficient, which is the mass of the body times the gravitational constant.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Pull {
-    /// The component `u` of the distance, as an expression; the state itself when left out.
+    /// Component `u` of the distance, as an expression. Default: the state itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
-    /// The distance, as an expression such as `"hypot(x - far, y)"`.
+    /// Distance to the further body, as an expression such as `"hypot(x - far, y)"`.
     pub distance: String,
-    /// Further states with their components of the distance, such as `{ vy = "y" }`.
+    /// Further states with their components of the distance, such as `{ vy = "y" }`; they share the coefficient.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub beside: BTreeMap<String, String>,
 }

@@ -9,18 +9,18 @@ use toml::Table;
 
 use super::common::{of, of_each};
 
-/// Quadratic friction: a drag in proportion to the square of the speed, against it.
+/// Quadratic friction: a drag in proportion to the square of the speed, opposed to it.
 ///
 /// ```text
 /// rate = … - coefficient u |u|,   coefficient ≥ 0
 /// ```
 ///
-/// The drag of blunt bodies at large Reynolds numbers (Newton, Principia, book II, section VII). It is easily confused
-/// with `linear_friction` where the speed varies little.
+/// The drag of blunt bodies at large Reynolds numbers (Newton, Principia, book II, section VII). It is easily
+/// confused with `linear_friction` if the speed varies little.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct QuadraticFriction {
-    /// The speed `u`, as an expression; the state itself when left out.
+    /// Speed `u`, as an expression. Default: the state itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
 }

@@ -15,12 +15,12 @@ use super::common::{of, of_each};
 /// rate = … - coefficient u²
 /// ```
 ///
-/// Of either sign; it shifts the mean position of an oscillation and adds its second harmonic (Nayfeh and Mook, Nonlinear
-/// Oscillations, 1979, section 2.2).
+/// The coefficient may have either sign. The term shifts the mean position of an oscillation and adds its second
+/// harmonic (Nayfeh and Mook, Nonlinear Oscillations, 1979, section 2.2).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct QuadraticStiffness {
-    /// The deflection `u`, as an expression; the state itself when left out.
+    /// Deflection `u`, as an expression. Default: the state itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
 }

@@ -1,4 +1,4 @@
-//! `radiation`: a loss with the fourth power of the temperature.
+//! `radiation`: a heat loss with the fourth power of the temperature.
 
 use lacuna::plugin::effect::Description;
 use lacuna::plugin::term::{Place, Sign, Summand};
@@ -8,20 +8,20 @@ use serde::{Deserialize, Serialize};
 
 use super::common::of;
 
-/// Radiation: a loss of heat with the fourth power of the absolute temperature.
+/// Radiation: a heat loss with the fourth power of the absolute temperature.
 ///
 /// ```text
 /// rate = … - coefficient (u⁴ - ambient⁴),   coefficient ≥ 0
 /// ```
 ///
-/// The law of Stefan and Boltzmann, with an exchange in both directions.
+/// The Stefan-Boltzmann law, with exchange in both directions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Radiation {
-    /// The absolute temperature `u`, as an expression; the state itself when left out.
+    /// Absolute temperature `u`, as an expression. Default: the state itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
-    /// The absolute temperature of the surroundings, as an expression such as `"293 {K}"`.
+    /// Absolute temperature of the surroundings, as an expression such as `"293 {K}"`.
     pub ambient: String,
 }
 

@@ -1,4 +1,4 @@
-//! `relaxation`: an approach to a value.
+//! `relaxation`: an exponential approach to a value.
 
 use lacuna::plugin::effect::Description;
 use lacuna::plugin::term::{Place, Sign, Summand};
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::common::of;
 
-/// Relaxation: an approach to a value, the faster the farther it is.
+/// Relaxation: an approach to a value at a rate in proportion to the distance from it.
 ///
 /// ```text
 /// rate = … + coefficient (toward - u),   coefficient ≥ 0
@@ -18,10 +18,10 @@ use super::common::of;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Relaxation {
-    /// What relaxes, `u`, as an expression; the state itself when left out.
+    /// Relaxing quantity `u`, as an expression. Default: the state itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
-    /// The value that it relaxes to, as an expression such as `"20 {K}"`.
+    /// Value that `u` approaches, as an expression such as `"20 {K}"`.
     pub toward: String,
 }
 

@@ -72,7 +72,7 @@ typedef struct LacunaAnswer {
     void (*numbers)(void *context, LacunaNumbers numbers);
 } LacunaAnswer;
 
-/* What plugins of all kinds do: they are made from options, and check themselves. */
+/* The functions of plugins of all kinds: they are made from options, and check themselves. */
 typedef struct LacunaComponentFunctions {
     /* The size of this table in bytes. */
     size_t size;
@@ -93,7 +93,7 @@ typedef struct LacunaComponentFunctions {
      * nothing. `context` is described in `docs/abi.md`. No files are touched. */
     /* May be null. */
     int32_t (*check)(void *plugin, LacunaText context, const LacunaAnswer *answer);
-    /* The same against the machine: files, commands. Nothing is changed. */
+    /* Checks the options against the machine: files, commands. Nothing is changed. */
     /* May be null. */
     int32_t (*environment)(void *plugin, LacunaText context, const LacunaAnswer *answer);
     /* The revision of the plugin, a number from 1 that its author raises whenever what it computes changes; 1 where
@@ -122,7 +122,7 @@ typedef struct LacunaSquares {
     size_t size;
     /* The first argument of the functions. */
     void *squares;
-    /* What it does. */
+    /* The functions. */
     const LacunaSquaresFunctions *functions;
     /* The largest difference from the product's own sum of squares that round-off makes. */
     double error;
@@ -148,7 +148,7 @@ typedef struct LacunaLinear {
     size_t size;
     /* The first argument of the functions. */
     void *map;
-    /* What it does. */
+    /* The functions. */
     const LacunaLinearFunctions *functions;
     /* The coefficients, `terms x outputs`. */
     LacunaNumbers coefficients;
@@ -156,7 +156,7 @@ typedef struct LacunaLinear {
 
 /* An error that all replicates share, a covariance `F F'`. */
 typedef struct LacunaCommonErrorView {
-    /* Where it comes from: `emulator`, `numerics`, `replicates`. */
+    /* The origin: `emulator`, `numerics`, `replicates`. */
     LacunaText origin;
     /* The factor `F`, `outputs x rank`, in the response's unit. */
     LacunaNumbers factor;
@@ -164,7 +164,7 @@ typedef struct LacunaCommonErrorView {
     uint8_t predictive;
 } LacunaCommonErrorView;
 
-/* What can be asked about the data. */
+/* Functions of the data. */
 typedef struct LacunaKnownFunctions {
     /* The size of this table in bytes. */
     size_t size;
@@ -173,13 +173,13 @@ typedef struct LacunaKnownFunctions {
     int32_t (*slopes)(void *known, const LacunaAnswer *answer);
 } LacunaKnownFunctions;
 
-/* What a likelihood is made from. It is there for the time of the call. */
+/* The data from which a likelihood is made. It is there for the time of the call. */
 typedef struct LacunaKnown {
     /* The size of this struct in bytes. */
     size_t size;
     /* The first argument of the functions. */
     void *known;
-    /* What can be asked. */
+    /* The functions. */
     const LacunaKnownFunctions *functions;
     /* The shape of a complete measurement as JSON, and the names of the replicates: `{"layout": {…}, "replicates":
      * ["…"]}`. */
@@ -191,7 +191,7 @@ typedef struct LacunaKnown {
     /* The errors that all replicates share: their covariances are added once to that of the mean curve, never
      * divided by the number of replicates. */
     const LacunaCommonErrorView *common;
-    /* How many there are. */
+    /* The number of common errors. */
     size_t common_count;
     /* The standard deviation of the noise of each value, where the data state it: `replicates x outputs`, a row of
      * NaN for a replicate that states none, zero where nothing was measured; no rows where no replicate states any.
@@ -212,11 +212,11 @@ typedef struct LacunaCompressedFunctions {
     int32_t (*log_likelihood)(void *compressed, LacunaNumbers basis, LacunaNumbers hyper, double *values, const LacunaAnswer *answer);
     /* The derivatives at each row by the basis functions and by the hyperparameters. */
     int32_t (*gradient)(void *compressed, LacunaNumbers basis, LacunaNumbers hyper, double *by_basis, double *by_hyper, const LacunaAnswer *answer);
-    /* The same as `log_likelihood` at points in physical units, for those who can do with less than all basis
+    /* The values of `log_likelihood` at points in physical units, for those who can do with less than all basis
      * functions. */
     /* May be null. */
     int32_t (*log_likelihood_at)(void *compressed, const LacunaLinear *linear, LacunaNumbers points, LacunaNumbers hyper, double *values, const LacunaAnswer *answer);
-    /* The same as `gradient` by the parameters at points in physical units. */
+    /* The derivatives of `gradient`, by the parameters, at points in physical units. */
     /* May be null. */
     int32_t (*gradient_at)(void *compressed, const LacunaLinear *linear, LacunaNumbers points, LacunaNumbers hyper, double *by_points, double *by_hyper, const LacunaAnswer *answer);
 } LacunaCompressedFunctions;
@@ -227,7 +227,7 @@ typedef struct LacunaCompressed {
     size_t size;
     /* The first argument of the functions. */
     void *compressed;
-    /* What it does. */
+    /* The functions. */
     const LacunaCompressedFunctions *functions;
 } LacunaCompressed;
 
@@ -255,13 +255,19 @@ typedef struct LacunaLikelihoodFunctions {
      * one row. `ABSENT` where there is no such form. */
     /* May be null. */
     int32_t (*left_out)(void *likelihood, LacunaNumbers response, LacunaNumbers hyper, const LacunaAnswer *answer);
-    /* The same likelihood as a function of the basis functions of a linear emulator; `ABSENT` where there is no
-     * such form. */
+    /* The likelihood as a function of the basis functions of a linear emulator; `ABSENT` where there is no such
+     * form. */
     /* May be null. */
     int32_t (*compress)(void *likelihood, const LacunaLinear *linear, LacunaCompressed *out, const LacunaAnswer *answer);
     /* Answers what is worth telling, a JSON list of `{"name", "value"}`. */
     /* May be null. */
     int32_t (*facts)(void *likelihood, const LacunaAnswer *answer);
+    /* Answers how it has the common errors, where it samples some of their directions and leaves the rest out: the
+     * variance of the mean curve without them, one row, infinite where nothing was measured; the factor of the
+     * errors that are sampled, `outputs x directions`; and of those that are left out, `outputs x any number`.
+     * `ABSENT` where it has their whole covariance. Since version 1.1. */
+    /* May be null. */
+    int32_t (*sampled_errors)(void *likelihood, LacunaNumbers hyper, const LacunaAnswer *answer);
 } LacunaLikelihoodFunctions;
 
 /* The likelihood of fixed measurements. */
@@ -270,7 +276,7 @@ typedef struct LacunaLikelihood {
     size_t size;
     /* The first argument of the functions. */
     void *likelihood;
-    /* What it does. */
+    /* The functions. */
     const LacunaLikelihoodFunctions *functions;
 } LacunaLikelihood;
 
@@ -297,7 +303,7 @@ typedef struct LacunaDiscrepancyFunctions {
     int32_t (*takes_stated_noise)(void *plugin, uint8_t *takes, const LacunaAnswer *answer);
 } LacunaDiscrepancyFunctions;
 
-/* What can be asked of a log density. */
+/* A log density for samplers to ask. */
 typedef struct LacunaTargetFunctions {
     /* The size of this table in bytes. */
     size_t size;
@@ -321,7 +327,7 @@ typedef struct LacunaTarget {
     size_t size;
     /* The first argument of the functions. */
     void *target;
-    /* What can be asked. */
+    /* The functions. */
     const LacunaTargetFunctions *functions;
     /* The number of coordinates. */
     size_t dimension;
@@ -339,7 +345,7 @@ typedef struct LacunaPlan {
     uint8_t ensemble;
 } LacunaPlan;
 
-/* What a sampler needs for its next step. The buffers are the caller's. */
+/* The state of a sampler between two steps. The buffers are the caller's. */
 typedef struct LacunaState {
     /* The size of this struct in bytes. */
     size_t size;
@@ -364,7 +370,7 @@ typedef struct LacunaState {
 typedef struct LacunaSamplerFunctions {
     /* The size of this table in bytes. */
     size_t size;
-    /* How many chains and steps a run has on a density of this dimension. */
+    /* Writes the numbers of chains and steps that a run has on a density of this dimension. */
     int32_t (*plan)(void *plugin, size_t dimension, LacunaPlan *plan, const LacunaAnswer *answer);
     /* The state before the first step: its points are the starting points already. */
     int32_t (*start)(void *plugin, const LacunaTarget *target, LacunaState *state, const LacunaAnswer *answer);
@@ -429,7 +435,7 @@ typedef struct LacunaCalls {
     size_t size;
     /* The inputs, one call a row, in the order and the units of the signature. */
     LacunaNumbers inputs;
-    /* What all calls have in common, as JSON: `{"names", "units", "layout", "scenario", "study"}`. */
+    /* The properties that all calls have in common, as JSON: `{"names", "units", "layout", "scenario", "study"}`. */
     LacunaText about;
     /* A folder of each call's own for files that are kept, a JSON list of paths or `null`. */
     LacunaText folders;
@@ -447,7 +453,7 @@ typedef struct LacunaModelFunctions {
      * `FATAL`), `valid` is 1 where a run stayed inside the model's range of validity. The text is a JSON list with
      * one `{"message", "facts"}` or `null` a call, or nothing. */
     int32_t (*predict)(void *plugin, const LacunaCalls *calls, double *responses, int32_t *statuses, uint8_t *valid, const LacunaAnswer *answer);
-    /* How many evaluations are best asked for at once. */
+    /* The number of evaluations that are best asked for at once. */
     /* May be null. */
     size_t (*batch)(void *plugin);
     /* Answers the inputs on which no response depends, a JSON list of names. */
@@ -536,12 +542,13 @@ typedef struct LacunaReaderFunctions {
     /* One response from one file. */
     /* May be null. */
     int32_t (*response)(void *plugin, LacunaText path, LacunaText layout, size_t outputs, double *values, const LacunaAnswer *answer);
-    /* How many of so many simulation runs may fail; `ABSENT` where the options do not say it. Since version 1.1. */
+    /* Writes the number of failures that so many simulation runs may have; `ABSENT` where the options do not say
+     * it. Since version 1.1. */
     /* May be null. */
     int32_t (*allowed_failures)(void *plugin, size_t runs, size_t *allowed, const LacunaAnswer *answer);
 } LacunaReaderFunctions;
 
-/* How far a fit came. */
+/* The progress of a fit. */
 typedef struct LacunaProgressFunctions {
     /* The size of this table in bytes. */
     size_t size;
@@ -557,7 +564,7 @@ typedef struct LacunaProgress {
     size_t size;
     /* The first argument of the functions. */
     void *progress;
-    /* What can be told. */
+    /* The functions. */
     const LacunaProgressFunctions *functions;
 } LacunaProgress;
 
@@ -614,7 +621,7 @@ typedef struct LacunaEmulator {
     size_t size;
     /* The first argument of the functions. */
     void *emulator;
-    /* What it does. */
+    /* The functions. */
     const LacunaEmulatorFunctions *functions;
     /* The number of parameters. */
     size_t dimension;
@@ -624,7 +631,7 @@ typedef struct LacunaEmulator {
 
 /* A part of a sum of emulators. */
 typedef struct LacunaSummand {
-    /* What `save` of an emulator answered. */
+    /* The bytes that `save` of an emulator answered. */
     LacunaText bytes;
     /* One weight an output. */
     LacunaNumbers weights;
@@ -651,9 +658,9 @@ typedef struct LacunaHost {
     size_t size;
     /* The version of the boundary. */
     uint32_t major;
-    /* What was appended since. */
+    /* The minor version. */
     uint32_t minor;
-    /* How many threads a library may use for work of its own. */
+    /* The number of threads that a library may use for work of its own. */
     size_t threads;
 } LacunaHost;
 
@@ -661,17 +668,17 @@ typedef struct LacunaHost {
 typedef struct LacunaEntry {
     /* The size of this struct in bytes. */
     size_t size;
-    /* Its kind, such as `sampler`. */
+    /* The kind, such as `sampler`. */
     LacunaText kind;
-    /* Its name in a study. */
+    /* The name in a study. */
     LacunaText name;
-    /* What plugins of all kinds do. */
+    /* The functions that plugins of all kinds have. */
     const LacunaComponentFunctions *component;
-    /* What its kind does: for a `sampler` a `SamplerFunctions`. */
+    /* The functions of the kind: for a `sampler` a `SamplerFunctions`. */
     const void *functions;
 } LacunaEntry;
 
-/* What a library says of itself: the symbol `lacuna_plugin` that it exports. It is read before any of its code is
+/* The declaration of a library: the symbol `lacuna_plugin` that it exports. It is read before any of its code is
  * called. */
 typedef struct LacunaDeclaration {
     /* `LACUNA_MAGIC`. */
@@ -688,11 +695,11 @@ typedef struct LacunaDeclaration {
     uint32_t count;
     /* The name of the library. */
     LacunaText name;
-    /* Its version. */
+    /* The version of the library. */
     LacunaText version;
     /* With what it was made, such as `lacuna-plugin 0.1.0`. */
     LacunaText sdk;
-    /* Its plugins. */
+    /* The plugins. */
     const LacunaEntry *entries;
     /* The plain text by which `lacuna check` knows the library without loading it. */
     LacunaText record;

@@ -1,9 +1,10 @@
-//! What [`export!`](crate::export) writes into a library.
+//! The declaration that [`export!`](crate::export) writes into a library.
 
-use lacuna::plugin::abi::guest::{Export, start};
-use lacuna::plugin::abi::table::{MAGIC, MAJOR, MINOR, Text};
+use lacuna_abi::table::{MAGIC, MAJOR, MINOR, Text};
 
-pub use lacuna::plugin::abi::table::{Declaration, Entry};
+use crate::guest::{Export, start};
+
+pub use lacuna_abi::table::{Declaration, Entry};
 
 /// With what a library was made.
 const SDK: &str = concat!("lacuna-plugin ", env!("CARGO_PKG_VERSION"));
@@ -22,7 +23,7 @@ pub const fn entry<K: Export<T, REVISION> + ?Sized, T, const REVISION: u32>(
     }
 }
 
-/// What a library says of itself.
+/// The declaration of a library.
 pub const fn declaration(
     name: &'static str,
     version: &'static str,

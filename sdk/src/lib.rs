@@ -1,4 +1,4 @@
-//! What a library of plugins for Lacuna is written with.
+//! The SDK for libraries of plugins for Lacuna.
 //!
 //! A plugin outside the tree is written as one inside: a struct of options and the trait of its kind, from the crate
 //! `lacuna`, which this one re-exports. In the place of `register!` stands one [`export!`] for the whole library, a
@@ -14,10 +14,16 @@
 //! A study loads it with `[plugins] load = ["./libmine.so"]`. `docs/abi.md` tells what holds at the boundary.
 
 pub use lacuna;
-pub use lacuna::{data, linalg, math, plugin, run, study};
+pub use lacuna::{data, expression, math, plugin, run, text};
+
+#[cfg(not(feature = "linalg"))]
+pub use lacuna::matrix as linalg;
+#[cfg(feature = "linalg")]
+pub use lacuna_linalg as linalg;
 
 #[doc(hidden)]
 pub mod declaration;
+mod guest;
 
 /// Exports plugins from a library: for each its kind, its name in a study and its options, which implement the kind.
 ///
@@ -70,7 +76,7 @@ macro_rules! revision {
     }};
 }
 
-/// What a study calls the kind of a trait.
+/// The name in a study of the kind of a trait.
 #[macro_export]
 macro_rules! kind_name {
     (Design) => {

@@ -1,21 +1,20 @@
-//! `examples/campaign`, followed by its README in a folder outside of the project: a newcomer's way to a cluster.
+//! Follows the README of `examples/campaign` in a folder outside the project: a newcomer's way to a cluster.
 
 use std::fs;
 use std::path::Path;
 
+use super::queue;
 use crate::commands::there_is_python;
 use crate::quick;
 use crate::readme::Walk;
 use crate::slurm::{Kind, started};
 
-use super::queue;
-
 const FOLDER: &str = "examples/campaign";
 
-/// The truth of `truth.deck`, which the references of the study repeat.
+/// True values of `truth.deck`, repeated in the references of the study.
 const TRUTH: [(&str, f64); 3] = [("conductivity", 29.0), ("emissivity", 0.75), ("film", 14.0)];
 
-/// What came out holds the truth within its own error, which is small beside the priors.
+/// Checks that the posterior contains the truth within its uncertainty, which is small compared with the priors.
 fn finds_its_truth(out: &Path, runs: usize) {
     let summary = quick::summary(out);
     assert_eq!(summary["converged"], true, "{}", summary["verdict"]);
@@ -42,7 +41,7 @@ fn the_campaign_goes_as_its_readme_says() {
     finds_its_truth(&walk.path("runs/billet"), 50);
     walk.follow("Runs made by hand");
     finds_its_truth(&walk.path("runs/billet"), 52);
-    // Where runs are made, and whether at once or after a mend, changes nothing.
+    // The place of the runs, and whether they succeeded at once or after a repair, changes nothing.
     walk.give("lacuna run study.toml --out runs/threads", 0);
     assert_eq!(quick::results(&walk.path("runs/threads")), mended);
     if let Some(slurm) = started(Kind::Plain) {
@@ -58,7 +57,7 @@ fn the_campaign_goes_as_its_readme_says() {
     }
 }
 
-/// The data and the runs made by hand are what the programs beside them make.
+/// The shipped data and the runs made by hand are the output of the programs beside them.
 #[test]
 fn its_files_are_those_of_its_programs() {
     if !there_is_python() {
@@ -75,7 +74,7 @@ fn its_files_are_those_of_its_programs() {
     }
 }
 
-/// A study for a cluster is that for the laptop and one section.
+/// A study for a cluster is the one for the laptop plus one section.
 #[test]
 fn what_a_cluster_needs_is_one_section() {
     for name in ["processes", "slurm", "hyperqueue"] {

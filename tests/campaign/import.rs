@@ -9,7 +9,7 @@ use super::verbs::{campaign, made, printed};
 use super::{run, study};
 use crate::quick;
 
-/// Two scenarios, a parameter of both and one that each has for itself.
+/// Two scenarios, with one common parameter and one parameter for each.
 fn scenarios() -> (TempDir, PathBuf) {
     let script = "echo $1 >> \"$3/made\"; echo \"[$(awk \"BEGIN { print $2 + $4 * $5 }\")]\"";
     let (folder, path) = study(script, "use = \"local\"");
@@ -47,10 +47,10 @@ fn runs_of_all_scenarios_are_taken_in_together() {
         assert!(said.contains(complaint), "{said}");
         assert!(!out.join("imports/1").exists(), "{text}");
     }
-    // Lines in any order.
+    // Lines in arbitrary order.
     let rows = "x,hot,0.25,0.5,50,1h.csv\ny,cold,0.25,0.25,75,2c.csv\nx,cold,0.25,0.5,50,1c.csv\ny,hot,0.25,0.25,75,2h.csv\n";
     fs::write(&table, format!("{HEADER}{rows}")).unwrap();
-    assert!(printed(&mut import()).starts_with("2 runs taken into"));
+    assert!(printed(&mut import()).starts_with("2 runs imported into"));
     let (code, text) = quick::said(quick::command().arg("resume").arg(&out));
     assert_eq!(code, Some(0), "{text}");
     assert_eq!(made(folder.path()).len(), before, "no run is made again");
@@ -85,7 +85,7 @@ fn wrong_tables() -> Vec<(String, &'static str)> {
     ]
 }
 
-/// What a study has of two runs that were taken in.
+/// Responses of two runs that were imported.
 fn responses(out: &Path, scenario: &str) -> [f64; 2] {
     let text = fs::read_to_string(out.join("imports/1/asked.json")).unwrap();
     let roll: serde_json::Value = serde_json::from_str(&text).unwrap();
@@ -94,11 +94,11 @@ fn responses(out: &Path, scenario: &str) -> [f64; 2] {
     let folder = out.join("imports/1").join(own[1].as_str().unwrap());
     ["x", "y"].map(|run| {
         let file = folder.join(format!("{run}.nc"));
-        lacuna::run::arrays::read(&file, "y").unwrap().values[0]
+        lacuna_run::arrays::read(&file, "y").unwrap().values[0]
     })
 }
 
-/// A study with the scenarios the other way round takes each run for what it is, and one with others refuses.
+/// A study with the scenarios in reverse order assigns each run correctly, and one with other scenarios rejects them.
 fn another_order_is_no_other_scenario(path: &Path, out: &Path) {
     let imports = |name: &str, swap: &[(&str, &str)]| {
         let other = path.with_file_name(name);
@@ -121,7 +121,7 @@ fn another_order_is_no_other_scenario(path: &Path, out: &Path) {
     let roll: serde_json::Value = serde_json::from_str(&roll).unwrap();
     assert_eq!(roll["scenarios"][0][0], "hot");
     let folder = made.join("2-simulate").join(roll["scenarios"][0][1].as_str().unwrap());
-    let y = lacuna::run::arrays::read(&folder.join("x.nc"), "y").unwrap().values[0];
+    let y = lacuna_run::arrays::read(&folder.join("x.nc"), "y").unwrap().values[0];
     assert_eq!(y, 1.25);
     let measured = fs::read_to_string(path.with_file_name("measured.csv")).unwrap();
     fs::write(path.with_file_name("warm.csv"), measured.replace("hot", "warm")).unwrap();

@@ -1,4 +1,4 @@
-//! `slurm` against a real one.
+//! `slurm` tested with a real scheduler.
 
 use std::fs;
 use std::path::Path;
@@ -29,7 +29,7 @@ pub(super) fn wait_for(what: &str, mut is_so: impl FnMut() -> bool) {
     }
 }
 
-/// How many jobs were ever handed over: an array counts once.
+/// Number of jobs ever submitted; an array counts once.
 pub(super) fn submissions(out: &Path) -> usize {
     let campaign = out.join("2-simulate/campaign");
     let entries = fs::read_dir(campaign).unwrap().flatten();
@@ -48,7 +48,7 @@ fn a_cluster_gives_the_bits_that_this_machine_gives() {
     let (code, text) = on(&slurm, &mut run(&path, &there, &[executor]));
     assert_eq!(code, Some(0), "{text}");
     assert_eq!(quick::results(&there), quick::results(&here));
-    // 40 runs, six a job: one array of seven tasks.
+    // 40 runs, six per job: one array of seven tasks.
     assert_eq!(submissions(&there), 1);
     let script = fs::read_to_string(there.join("2-simulate/campaign/1/job.sh")).unwrap();
     assert!(script.contains("#SBATCH --array=0-6%2\n"), "{script}");
@@ -59,8 +59,8 @@ fn a_cluster_gives_the_bits_that_this_machine_gives() {
     assert!(codes.into_iter().all(|code| code == "0\n"));
 }
 
-/// What happens to each of six runs, two a job: an exit code of the model; its job killed; cancelled from outside; the
-/// others are sound.
+/// Events for six runs, two per job: an exit code of the model; its job killed; cancelled from outside; the others
+/// succeed.
 const TROUBLE: &str = "case $1 in
     run002) exit 7;;
     run004) kill -9 $PPID;;
@@ -89,7 +89,7 @@ fn each_cause_is_told(kind: Kind) {
         "{failed:?}"
     );
     assert!(failed[2].1.contains("it was cancelled"), "{failed:?}");
-    // The next attempt submits those three and no other.
+    // The next attempt submits only those three.
     fs::remove_file(folder.path().join("cancel-me")).unwrap();
     let before = submissions(&out);
     let mut again = resume(&out);
@@ -128,7 +128,7 @@ fn a_killed_process_submits_nothing_twice() {
     wait_for("the first run", || !made().is_empty());
     child.kill().unwrap();
     child.wait().unwrap();
-    // As if it had been killed before it wrote the number down.
+    // As if the program had been killed before it recorded the job number.
     let file = out.join("2-simulate/campaign/1/submission.json");
     let text = fs::read_to_string(&file).unwrap();
     let mut submission: serde_json::Value = serde_json::from_str(&text).unwrap();
@@ -148,7 +148,8 @@ fn a_killed_process_submits_nothing_twice() {
 #[test]
 fn a_time_limit_is_told_and_a_longer_one_given() {
     let Some(slurm) = started(Kind::Plain) else { return };
-    // Slurm counts in minutes. The first run of one pack and the second of the other take longer than their jobs may.
+    // Slurm's time limits are in minutes. The first run of one pack and the second of the other exceed the limit of
+    // their jobs.
     let script = "case $1 in run001|run005)
     if [ -e \"$3/again-$1\" ]; then touch \"$3/longer-$1\"; else touch \"$3/again-$1\"; sleep 300; fi;;
 esac
@@ -163,7 +164,7 @@ echo \"[$2]\"";
     for run in ["run001", "run005"] {
         assert!(folder.path().join(format!("longer-{run}")).exists(), "{run}");
     }
-    // Only the run that had its job to itself gets a longer limit; the others are submitted again as they were.
+    // Only the run that had its job to itself gets a longer limit; the others are submitted again unchanged.
     let longer = |n: usize| {
         let folder = out.join(format!("2-simulate/campaign/{n}"));
         let script = fs::read_to_string(folder.join("job.sh")).unwrap();

@@ -1,4 +1,4 @@
-//! Ensembles made by other processes, here and on a cluster.
+//! Ensembles made by other processes, on this machine and on a cluster.
 
 mod example;
 mod import;
@@ -16,7 +16,7 @@ use tempfile::TempDir;
 
 use crate::quick;
 
-/// A line of one value, whose model is a shell script; it is named `run` with the options of the executor.
+/// A study with a single value per run, whose model is a shell script.
 const STUDY: &str = r#"
 [study]
 title = "A line"
@@ -65,7 +65,7 @@ pub fn study(script: &str, executor: &str) -> (TempDir, PathBuf) {
     (folder, path)
 }
 
-/// How each run ended: its reason, empty when it is done.
+/// Name and failure reason of each run; the reason is empty if the run is done.
 pub fn outcomes(out: &Path) -> Vec<(String, String)> {
     let text = fs::read_to_string(out.join("2-simulate/runs.csv")).unwrap();
     let rows = text.lines().skip(1).map(|line| {
@@ -77,12 +77,12 @@ pub fn outcomes(out: &Path) -> Vec<(String, String)> {
     rows.collect()
 }
 
-/// The reasons of the runs that failed, by name.
+/// Failure reasons of the runs that failed, by name.
 pub fn failures(out: &Path) -> Vec<(String, String)> {
     outcomes(out).into_iter().filter(|(_, reason)| !reason.is_empty()).collect()
 }
 
-/// `lacuna run` with its output folder.
+/// The command `lacuna run` with its output folder.
 pub fn run(path: &Path, out: &Path, settings: &[&str]) -> std::process::Command {
     let mut command = quick::command();
     command.arg("run").arg(path).arg("--out").arg(out);

@@ -1,4 +1,4 @@
-//! `slurm` with several nodes: models that use some of them, nodes that fail, jobs that must give way.
+//! `slurm` with several nodes: models that use several nodes, nodes that fail, jobs that are preempted.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +8,7 @@ use super::jobs::{QUICKLY, on, wait_for};
 use super::{failures, run, study};
 use crate::slurm::{Kind, Slurm, started};
 
-/// One Slurm for all, since starting it takes the longest; what hurts its nodes comes last.
+/// One Slurm for all tests, since starting it takes the longest; the tests that damage its nodes come last.
 #[test]
 fn several_nodes() {
     let Some(slurm) = started(Kind::Nodes) else { return };
@@ -32,7 +32,7 @@ fn a_run_may_have_several_nodes(slurm: &Slurm) {
     }
 }
 
-/// A run that the first time says who makes it, and waits.
+/// A run that the first time records its process and waits.
 const WAITS: &str = "if [ $1 = run001 ] && [ ! -e \"$3/first\" ]; then
     echo $PPID $(cut -d ' ' -f 4 /proc/$PPID/stat) $SLURMD_NODENAME > \"$3/first.part\"
     mv \"$3/first.part\" \"$3/first\"
@@ -41,7 +41,7 @@ fi
 echo $SLURMD_NODENAME > \"$3/node-$1\"
 echo \"[$2]\"";
 
-/// A study whose first run waits; the words that it said.
+/// Starts a study whose first run waits; returns the recorded words.
 fn waiting(slurm: &Slurm, path: &Path, out: &Path) -> (Child, Vec<String>) {
     let mut command = run(path, out, &[]);
     command.env("SLURM_CONF", slurm.conf()).stdout(Stdio::null()).stderr(Stdio::null());
@@ -52,7 +52,7 @@ fn waiting(slurm: &Slurm, path: &Path, out: &Path) -> (Child, Vec<String>) {
     (child, said.split_whitespace().map(str::to_owned).collect())
 }
 
-/// What was noted when the first run was submitted again.
+/// Reason recorded when the first run was submitted again.
 fn cause(out: &Path) -> String {
     let file = out.join("2-simulate/campaign/1/submission.json");
     let text = fs::read_to_string(file).unwrap();
@@ -92,7 +92,7 @@ fn a_job_whose_node_failed_is_submitted_again(slurm: &Slurm) {
     assert_ne!(again.trim(), node);
     let local = run(&path, &here, &["executor={ use = \"local\" }"]).output().unwrap();
     assert!(local.status.success());
-    // The table has the hash of every response.
+    // The table contains the hash of every response.
     for file in ["2-simulate/runs.csv", "posterior.nc"] {
         let hash = |folder: &Path| lacuna::run::files::hash_file(&folder.join(file)).unwrap();
         assert_eq!(hash(&out), hash(&here), "{file}");
@@ -100,7 +100,7 @@ fn a_job_whose_node_failed_is_submitted_again(slurm: &Slurm) {
     assert_eq!(failures(&out), []);
 }
 
-/// The number of the process that stands for a node.
+/// Process number of the daemon that represents a node.
 fn of_node(slurm: &Slurm, name: &str) -> String {
     let file = slurm.conf().with_file_name(format!("slurmd-{name}.pid"));
     fs::read_to_string(file).unwrap().trim().to_owned()

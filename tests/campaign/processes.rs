@@ -1,4 +1,4 @@
-//! `local` with processes.
+//! `local` with several processes.
 
 use std::fs;
 
@@ -34,12 +34,12 @@ fn a_process_that_dies_costs_its_own_run() {
     assert_eq!(failed[0].0, "run003");
     assert!(failed[0].1.contains("was ended by signal 9"), "{failed:?}");
     assert!(failed[1].1.contains("exit code 7"), "{failed:?}");
-    // The next attempt makes those two and no other.
+    // The next attempt makes only those two.
     fs::write(folder.path().join("model.sh"), "echo \"[$2]\"").unwrap();
     let log = || fs::read_to_string(out.join("2-simulate/progress.jsonl")).unwrap();
     let before = log().lines().count();
     assert_eq!(before, 6);
-    // Another script is another model; the same script goes on where it was.
+    // Another script is another model; with the original script the study continues where it was.
     fs::write(folder.path().join("model.sh"), script).unwrap();
     let (code, _) = quick::said(&mut run(&path, &out, &[]));
     assert_eq!((code, log().lines().count()), (Some(1), 8));
@@ -52,7 +52,7 @@ fn processes_keep_to_their_processors_and_their_memory() {
     let (folder, path) =
         study(script, "use = \"local\"\nprocesses = 2\npin = true\nmemory = \"512 MiB\"");
     let out = folder.path().join("run");
-    // A response that is the same everywhere is none to fit anything to: the runs are what counts here.
+    // A constant response cannot be fitted, so the study fails later; only the runs matter here.
     let _ = quick::said(&mut run(&path, &out, &[]));
     let all = std::thread::available_parallelism().unwrap().get();
     for i in 1..=6 {

@@ -1,4 +1,4 @@
-//! `hyperqueue` against the server in the Python package `hyperqueue`, whose client stands in for the command `hq`.
+//! `hyperqueue` tested with the server of the Python package `hyperqueue`, whose client replaces the command `hq`.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader};
@@ -12,7 +12,7 @@ use tempfile::TempDir;
 use super::{failures, run, study};
 use crate::quick;
 
-/// A server with one worker; it ends with its input.
+/// A server with one worker; it ends when its input is closed.
 pub struct Server {
     folder: TempDir,
     python: PathBuf,
@@ -24,10 +24,10 @@ fn scripts() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("hyperqueue")
 }
 
-/// Starts one where there is the package; `LACUNA_REQUIRE_PYTHON=1` makes its absence a failure.
+/// Starts a server if the package is installed; `LACUNA_REQUIRE_PYTHON=1` makes its absence a failure.
 pub fn started() -> Option<Server> {
     let python = std::env::var_os("LACUNA_PYTHON").unwrap_or_else(|| "python3".into());
-    // The folder `hyperqueue` beside this one is a package of that name too, and has nothing in it.
+    // The folder `hyperqueue` beside this file counts as an empty package of that name, so an attribute is imported.
     let there = Command::new(&python).args(["-c", "from hyperqueue import Client"]).output();
     let there = there.is_ok_and(|output| output.status.success());
     let required = std::env::var_os("LACUNA_REQUIRE_PYTHON").is_some_and(|value| value == "1");
@@ -52,7 +52,7 @@ pub fn started() -> Option<Server> {
 }
 
 impl Server {
-    /// Its folder, into which the command `hq` is put.
+    /// Folder of the server, into which the command `hq` is written.
     pub fn folder(&self) -> &Path {
         let command = self.folder.path().join("hq");
         let text = format!(
@@ -66,7 +66,7 @@ impl Server {
         self.folder.path()
     }
 
-    /// The options that name the command and the server.
+    /// Options that name the command and the server.
     fn options(&self) -> String {
         let folder = self.folder();
         format!(
@@ -91,7 +91,7 @@ fn hyperqueue_keeps_the_contract_of_executors() {
     let options = format!("{}pack = 2\nprogram = \"{worker}\"\n", server.options());
     let built = from_text::<dyn Executor>("hyperqueue", &options).unwrap();
     let scratch = tempfile::tempdir().unwrap();
-    let kept = lacuna::contract::executor("hyperqueue", &*built.plugin, scratch.path());
+    let kept = lacuna_contract::executor("hyperqueue", &*built.plugin, scratch.path());
     assert_eq!(kept, Ok(()));
 }
 

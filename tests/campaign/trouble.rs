@@ -1,4 +1,4 @@
-//! `slurm` when something is wrong: with its answers, with what comes before a run, with the limits.
+//! `slurm` under faults: of its replies, of the preparation of a run, of resource limits.
 
 use std::fs::{self, File};
 use std::path::Path;
@@ -10,7 +10,7 @@ use super::{outcomes, run, study};
 use crate::quick;
 use crate::slurm::{Kind, Slurm, started};
 
-/// One Slurm for all, since starting it takes the longest.
+/// One Slurm for all tests, since starting it takes the longest.
 #[test]
 fn troubles() {
     let Some(slurm) = started(Kind::Nodes) else { return };
@@ -20,10 +20,10 @@ fn troubles() {
     why_jobs_wait_is_told(&slurm);
 }
 
-/// A model that notes each time that it is asked.
+/// A model that records each call.
 const NOTED: &str = "echo $1 >> \"$3/made\"; echo \"[$2]\"";
 
-/// A program or a module that the nodes do not have; then an `sbatch` whose answer is lost.
+/// A program or a module that the nodes do not have; then an `sbatch` whose reply is lost.
 fn what_comes_before_a_run_costs_no_run(slurm: &Slurm) {
     let (folder, path) = study(NOTED, QUICKLY);
     let out = folder.path().join("run 100% it's");
@@ -49,7 +49,7 @@ fn what_comes_before_a_run_costs_no_run(slurm: &Slurm) {
     assert_eq!(made(folder.path()), names, "each run was made once");
 }
 
-/// A `PATH` in which `sbatch` hands the jobs over, and then fails.
+/// A `PATH` in which `sbatch` submits the jobs and then fails.
 fn with_a_deaf_sbatch(folder: &Path) -> std::ffi::OsString {
     let deaf = folder.join("deaf");
     fs::create_dir(&deaf).unwrap();
@@ -68,7 +68,8 @@ fn with_a_deaf_sbatch(folder: &Path) -> std::ffi::OsString {
 }
 
 fn memory_that_runs_out_is_told_and_more_is_given(slurm: &Slurm) {
-    // `tail` keeps a line until it ends, and this one does not. Where memory is watched and not limited, that takes a moment.
+    // `tail` buffers a line until it ends, and this one does not end. If memory is only monitored and not limited,
+    // detection takes a moment.
     let script = "case $1 in
     run001) echo $1 >> \"$3/made\"; bytes=300000000;;
     run002) bytes=900000000;;
@@ -108,11 +109,11 @@ fn a_campaign_is_cancelled_and_goes_on(slurm: &Slurm) {
     let said = printed(campaign(&["cancel"], &out).env("SLURM_CONF", slurm.conf()));
     assert!(said.starts_with("6 runs cancelled"), "{said}");
     fs::write(folder.path().join("go"), "").unwrap();
-    // At once: what still ends is not what failed.
+    // Immediately: runs that are still ending do not count as failed.
     let (code, text) = on(slurm, &mut resume(&out));
     assert_eq!(code, Some(0), "{text}");
     assert!(submissions(&out) >= 2);
-    // And when all has ended.
+    // And again when all have ended.
     fs::remove_file(folder.path().join("go")).unwrap();
     fs::remove_dir_all(&out).unwrap();
     let mut command = run(&path, &out, &[]);
@@ -138,10 +139,10 @@ fn why_jobs_wait_is_told(slurm: &Slurm) {
     let said = folder.path().join("said");
     let mut command = run(&path, &out, &[]);
     command.env("SLURM_CONF", slurm.conf()).stdout(Stdio::null());
-    // What the study says goes before what the environment says.
+    // The study takes precedence over the environment.
     command.env("SBATCH_TIMELIMIT", "1").env("SBATCH_PARTITION", "debug");
     let mut child = command.stderr(File::create(&said).unwrap()).spawn().unwrap();
-    let words = "6 jobs wait for more than a turn: PENDING PartitionTimeLimit: \
+    let words = "6 jobs wait for a reason other than the queue: PENDING PartitionTimeLimit: \
                  `time` is more than the partition allows";
     let told = || fs::read_to_string(&said).unwrap().matches(words).count();
     wait_for("the reason", || told() > 0);

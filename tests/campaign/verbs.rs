@@ -1,4 +1,4 @@
-//! `lacuna campaign`.
+//! The commands `lacuna campaign …`.
 
 use std::fs;
 use std::path::Path;
@@ -13,14 +13,14 @@ pub(super) fn campaign(words: &[&str], out: &Path) -> Command {
     command
 }
 
-/// What a command prints when it goes well.
+/// Output of a command that must succeed.
 pub(super) fn printed(command: &mut Command) -> String {
     let output = command.output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// How often each run was made.
+/// Names of the runs that were made, one entry per call of the model.
 pub(super) fn made(folder: &Path) -> Vec<String> {
     let text = fs::read_to_string(folder.join("made")).unwrap_or_default();
     let mut runs: Vec<String> = text.lines().map(str::to_owned).collect();
@@ -56,7 +56,7 @@ fn only_what_failed_is_made_again() {
     assert_eq!(printed(&mut campaign(&["status"], &out)), "2-simulate: 6 runs, 6 done\n");
 }
 
-/// The points of the runs by name, as the table has them.
+/// Points of the runs by name, as in the table.
 fn points(out: &Path) -> Vec<(String, String)> {
     let text = fs::read_to_string(out.join("2-simulate/runs.csv")).unwrap();
     let cells = text.lines().skip(1).map(|line| {
@@ -80,10 +80,10 @@ fn a_design_grows_and_no_run_is_made_twice() {
     let after = points(&out);
     assert_eq!(after[..6], before);
     assert_eq!(made(folder.path()).len(), 10, "{:?}", made(folder.path()));
-    // The same written in the study is the same run.
+    // Stated in the study instead, the runs are the same.
     let (code, text) = quick::said(&mut run(&path, &out, &["design.extended=[4]"]));
     assert_eq!((code, made(folder.path()).len()), (Some(0), 10), "{text}");
-    // And without it the first results are back.
+    // Without it the first results are restored.
     let (code, text) = quick::said(&mut run(&path, &out, &[]));
     assert_eq!((code, made(folder.path()).len()), (Some(0), 10), "{text}");
     assert_eq!(points(&out), before);
@@ -118,7 +118,7 @@ fn runs_made_by_hand_are_taken_in() {
     }
     fs::write(&table, "run,a,file\nby-hand-1,0.25,first.csv\nby-hand-2,0.75,second.csv\n").unwrap();
     let said = printed(&mut import(&out));
-    assert!(said.starts_with("2 runs taken into"), "{said}");
+    assert!(said.starts_with("2 runs imported into"), "{said}");
     let (code, text) = quick::said(quick::command().arg("resume").arg(&out));
     assert_eq!(code, Some(0), "{text}");
     assert_eq!(made(folder.path()).len(), 6, "no run is made again");
@@ -126,7 +126,7 @@ fn runs_made_by_hand_are_taken_in() {
     assert_eq!(all.len(), 8);
     assert_eq!(all[6], ("by-hand-1".to_owned(), String::new()));
     assert_eq!(quick::summary(&out)["runs"]["used"], 8);
-    // A file that was changed afterwards is not what was imported.
+    // A file that was changed afterwards is not the one that was imported.
     fs::remove_dir_all(out.join("2-simulate")).unwrap();
     fs::write(out.join("imports/1/by-hand-2.nc"), "other").unwrap();
     let (code, text) = quick::said(quick::command().arg("resume").arg(&out));

@@ -1,6 +1,5 @@
-//! The library of effects: under options that a study writes, and under those that it proposes itself.
+//! The library of effects: with options that a study writes, and with those that effects propose themselves.
 
-use lacuna::contract;
 use lacuna::data::{Axis, Layout, Unit};
 use lacuna::plugin::effect::Situation;
 use lacuna::plugin::registry::{self, Built};
@@ -8,7 +7,7 @@ use lacuna::plugin::{Effect, Hyperparameter};
 
 use super::{Table, all};
 
-/// Options for responses of the size 1e-4 over some 1e-4 seconds, as the suite has them.
+/// Options for responses of magnitude 1e-4 over about 1e-4 seconds, as used by the suite.
 const OPTIONS: &Table = &[
     ("crosstalk", &["from = \"B\"", "from = \"C\"\nshare = { uniform = [0, 0.5] }"]),
     ("damping", &["rate = { half_normal = 2000 }"]),
@@ -65,10 +64,10 @@ const OPTIONS: &Table = &[
 
 #[test]
 fn effects() {
-    all::<dyn Effect>(OPTIONS, |case, effect| contract::effect(&case.label, effect));
+    all::<dyn Effect>(OPTIONS, |case, effect| lacuna_contract::effect(&case.label, effect));
 }
 
-/// Three sensors over unequal times; a grid of lengths where there is no other way to see something.
+/// Three sensors with unequal time steps; a grid of lengths for effects that cannot be observed otherwise.
 fn layouts() -> [Layout; 2] {
     let unit = |text: &str| Unit::parse(text).unwrap();
     let times = [0.0, 1e-4, 1.5e-4, 3e-4, 4e-4, 4.5e-4, 6e-4].to_vec();
@@ -83,7 +82,7 @@ fn layouts() -> [Layout; 2] {
     [layout(sensors), layout(places)]
 }
 
-/// Hands every version that the library proposes for a response to a test.
+/// Runs a test on every variant that the library proposes for a response.
 fn each_proposal(mut test: impl FnMut(&Built<dyn Effect>, &Layout, &Situation<'_>)) {
     let mut proposing = std::collections::BTreeSet::new();
     for layout in layouts() {
@@ -102,7 +101,7 @@ fn each_proposal(mut test: impl FnMut(&Built<dyn Effect>, &Layout, &Situation<'_
             }
         }
     }
-    // What is across which sensor, and what a formula would be, no data say.
+    // Data do not determine the source of crosstalk, nor the formula of an expression.
     let listed = OPTIONS.iter().map(|(name, _)| *name);
     let silent: Vec<&str> = listed.filter(|name| !proposing.contains(name)).collect();
     assert_eq!(silent, ["expression", "misalignment"]);
@@ -121,7 +120,7 @@ fn proposals_are_effects_that_can_be_searched() {
             let after = effect.apply(layout, situation.response, start);
             assert!(after.iter().all(|y| y.is_finite()) && after != situation.response, "{name}");
         }
-        // Both signs, where the prior allows both.
+        // Both signs, if the prior allows both.
         let absent = effect.absent(layout)[0];
         let (low, high) = parameters[0].prior.support();
         let sides = [low < absent, absent < high];
@@ -130,14 +129,14 @@ fn proposals_are_effects_that_can_be_searched() {
     });
 }
 
-/// The places are of another layout than the suite's own; the rest is put through it.
+/// The places belong to another layout than the suite's own; everything else is tested by the suite.
 #[test]
 fn proposals_keep_the_contract() {
     let mut breaches = Vec::new();
     each_proposal(|built, _, _| {
         let placed = ["crosstalk", "gauge_length", "misplacement"].contains(&built.name);
         if !placed {
-            let judged = contract::effect(built.name, &*built.plugin);
+            let judged = lacuna_contract::effect(built.name, &*built.plugin);
             breaches.extend(judged.err().unwrap_or_default());
         }
     });

@@ -1,6 +1,5 @@
-//! The executors, those of a scheduler where one can be started.
+//! All executors; those of a scheduler if one can be started.
 
-use lacuna::contract;
 use lacuna::plugin::Executor;
 
 use super::{Table, all, slurm};
@@ -8,7 +7,7 @@ use super::{Table, all, slurm};
 #[test]
 fn every_executor() {
     let table: &Table = &[
-        // Where its server is started: `campaign/queue.rs`.
+        // Tested where its server is started: `campaign/queue.rs`.
         ("hyperqueue", &[]),
         (
             "local",
@@ -31,7 +30,7 @@ fn every_executor() {
     let there_is_slurm = std::env::var_os("SLURM_CONF").is_some();
     all::<dyn Executor>(table, |case, plugin| match case.plugin {
         "slurm" if !there_is_slurm => Ok(()),
-        _ => contract::executor(&case.label, plugin, case.scratch),
+        _ => lacuna_contract::executor(&case.label, plugin, case.scratch),
     });
 }
 
@@ -42,6 +41,6 @@ fn those_of_a_scheduler() {
     inside.args(["--exact", "executors::every_executor"]).env("SLURM_CONF", slurm.conf());
     let output = inside.output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
-    // Nothing is left behind when the model or the caller has given up.
+    // No jobs are left behind after the model or the caller has failed.
     assert!(slurm.ask("squeue", &["-h", "-t", "all"]).contains("CD"), "no job was run");
 }

@@ -1,21 +1,20 @@
-//! The suites bite: a sound plugin of the program with one fault planted does not pass.
+//! The suites detect faults: a correct plugin of the program with one planted fault does not pass.
 
 use std::path::{Path, PathBuf};
 
-use lacuna::contract::{self, Sample};
 use lacuna::data::{Layout, Measurements};
-use lacuna::linalg::Matrix;
 use lacuna::math::random::Stream;
 use lacuna::plugin::discrepancy::{Known, VariancePart};
 use lacuna::plugin::model::{Call, EvalError, Response, Signature};
 use lacuna::plugin::reader::{Contents, ReadError};
-use lacuna::plugin::registry;
 use lacuna::plugin::surrogate::{FitError, Training};
 use lacuna::plugin::{
     Component, Context, Discrepancy, Emulator, Fact, Forward, Hyperparameter, Likelihood, Model,
-    Reader, Surrogate,
+    Reader, Surrogate, registry,
 };
 use lacuna::run::{Progress, Stop};
+use lacuna_contract::Sample;
+use lacuna_linalg::Matrix;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
@@ -31,7 +30,7 @@ enum Fault {
     Panic,
 }
 
-/// Demands that one of the breaches says this.
+/// Requires that one of the violations contains this text.
 fn found(breaches: Result<(), Vec<String>>, fault: Fault, expected: &str) {
     let breaches = breaches.err().unwrap_or_default();
     assert!(breaches.iter().any(|b| b.contains(expected)), "{fault:?}, {expected}: {breaches:?}");
@@ -94,7 +93,7 @@ fn faults_of_discrepancies_are_found() {
     ] {
         let options = "variance = { half_normal = 1.0 }";
         let sound = registry::from_text::<dyn Discrepancy>("gaussian", options).unwrap().plugin;
-        found(contract::discrepancy("faulty", &Faulty { fault, sound }), fault, expected);
+        found(lacuna_contract::discrepancy("faulty", &Faulty { fault, sound }), fault, expected);
     }
 }
 
@@ -157,7 +156,7 @@ impl Emulator for Faulty<dyn Emulator> {
     }
 }
 
-/// An emulator after reading: not quite the one that was saved.
+/// An emulator that differs slightly from the saved one after loading.
 struct Lossy(Faulty<dyn Emulator>);
 
 impl Forward for Lossy {
@@ -206,7 +205,7 @@ fn faults_of_surrogates_are_found() {
     ] {
         let sound = registry::from_text::<dyn Surrogate>("polynomial_chaos", "degree = 4");
         let sound = sound.unwrap().plugin;
-        found(contract::surrogate("faulty", &Faulty { fault, sound }), fault, expected);
+        found(lacuna_contract::surrogate("faulty", &Faulty { fault, sound }), fault, expected);
     }
 }
 
@@ -253,7 +252,7 @@ fn faults_of_models_are_found() {
         let layout = Layout::number("none");
         let context = Context::new(scratch.path(), &[], &layout);
         let faulty = Faulty { fault, sound };
-        found(contract::model("faulty", &faulty, &context, scratch.path()), fault, expected);
+        found(lacuna_contract::model("faulty", &faulty, &context, scratch.path()), fault, expected);
     }
 }
 
@@ -289,7 +288,7 @@ fn faults_of_readers_are_found() {
     let layout = super::layout();
     let values = super::strain();
     let response = Response { values: values.clone(), valid: true, facts: Vec::new() };
-    let file = lacuna::run::write_response(folder.path(), "sound", &layout, &response).unwrap();
+    let file = lacuna_run::write_response(folder.path(), "sound", &layout, &response).unwrap();
     let sample = Sample { file: folder.path().join(file), layout, values, tolerance: 0.0 };
     for (fault, expected) in [
         (Fault::Support, "no bytes are recognised"),
@@ -300,7 +299,7 @@ fn faults_of_readers_are_found() {
         let sound = registry::from_text::<dyn Reader>("netcdf", "").unwrap().plugin;
         let scratch = tempfile::tempdir().unwrap();
         let breaches =
-            contract::reader("faulty", &Faulty { fault, sound }, &sample, scratch.path());
+            lacuna_contract::reader("faulty", &Faulty { fault, sound }, &sample, scratch.path());
         found(breaches, fault, expected);
     }
 }

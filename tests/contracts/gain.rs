@@ -1,15 +1,14 @@
-//! The posterior with a gain, against a computation by hand.
+//! The posterior with a gain, compared with a computation by hand.
 
 use std::f64::consts::PI;
 
 use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Unit};
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::discrepancy::Known;
 use lacuna::plugin::effect::{On, Placed};
-use lacuna::plugin::registry;
-use lacuna::plugin::{Discrepancy, Effect, Forward, Likelihood, Target};
-use lacuna::posterior::{OfData, Posterior};
+use lacuna::plugin::{Discrepancy, Effect, Forward, Likelihood, Target, registry};
+use lacuna_engine::posterior::{OfData, Posterior};
+use lacuna_linalg::Matrix;
 
 /// `y(t) = a t + b t^2` at the times 1, 2 and 3.
 #[derive(Default)]
@@ -45,7 +44,7 @@ fn layout() -> Layout {
     Layout { name: "y".into(), unit: Unit::dimensionless(), axes }
 }
 
-/// Two replicates; the second did not measure the last time.
+/// Two replicates; the second has no value at the last time.
 const DATA: [[Option<f64>; 3]; 2] =
     [[Some(1.9), Some(5.2), Some(11.0)], [Some(2.1), Some(4.9), None]];
 
@@ -64,7 +63,7 @@ fn parameters() -> Vec<Parameter> {
     ]
 }
 
-/// Hands a posterior with the gain over `y = a t + b t^2` to a test.
+/// Runs a test on a posterior with the gain over `y = a t + b t^2`.
 fn with_posterior(test: impl FnOnce(&Posterior<'_>)) {
     let effect =
         registry::from_text::<dyn Effect>("gain", "factor = { normal = [1, 0.1] }").unwrap().plugin;
@@ -85,7 +84,7 @@ fn log_normal_density(x: f64, mean: f64, sd: f64) -> f64 {
     -0.5 * ((x - mean) / sd).powi(2) - (sd * (2.0 * PI).sqrt()).ln()
 }
 
-/// The log density of `a`, `b`, the gain and the logarithm of the variance, written out.
+/// Log density of `a`, `b`, the gain and the logarithm of the variance, written out.
 fn by_hand([a, b, gain, log_variance]: [f64; 4]) -> f64 {
     let variance = log_variance.exp();
     let prior = -(5.0_f64).ln()
@@ -99,7 +98,7 @@ fn by_hand([a, b, gain, log_variance]: [f64; 4]) -> f64 {
         .flat_map(|values| values.iter().zip(response))
         .filter_map(|(value, mean)| Some(log_normal_density((*value)?, mean, variance.sqrt())))
         .sum();
-    // The density of the logarithm of v is that of v times v.
+    // The density of log v is that of v times v.
     prior + likelihood + log_variance
 }
 

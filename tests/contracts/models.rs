@@ -1,6 +1,5 @@
-//! The models, each with options of a small study.
+//! All models, each with options of a small study.
 
-use lacuna::contract;
 use lacuna::data::{Axis, Layout, Parameter, Scenario, Unit};
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::{Context, Given, Model};
@@ -22,7 +21,7 @@ def rows(a, b):
     return [simulate(x, y) for x, y in zip(a, b)]
 ";
 
-/// Whether `python3` runs; `LACUNA_REQUIRE_PYTHON=1` makes its absence a failure.
+/// Returns true if `python3` runs; `LACUNA_REQUIRE_PYTHON=1` makes its absence a failure.
 fn there_is_python() -> bool {
     let there = std::process::Command::new("python3").arg("--version").output().is_ok();
     let required = std::env::var_os("LACUNA_REQUIRE_PYTHON").is_some_and(|value| value == "1");
@@ -79,6 +78,6 @@ fn models() {
             scenarios: &scenarios,
             ..Context::new(case.scratch, &parameters, &layout)
         };
-        contract::model(&case.label, model, &context, case.scratch)
+        lacuna_contract::model(&case.label, model, &context, case.scratch)
     });
 }

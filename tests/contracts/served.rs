@@ -5,7 +5,7 @@ use std::net::Ipv4Addr;
 use lacuna_um_bridge::protocol::{Config, Fault, Support};
 use lacuna_um_bridge::{Model, Server};
 
-/// From `a` and `b` in a vector each to five values and their derivatives.
+/// Maps `a` and `b`, each in its own vector, to five values and their derivatives.
 struct Curve;
 
 impl Model for Curve {
@@ -38,7 +38,7 @@ impl Model for Curve {
     }
 }
 
-/// The options of a model behind a server that answers until the test's process ends.
+/// Options of a model behind a server that runs until the process of the test ends.
 pub fn options() -> &'static [&'static str] {
     let server = Server::bind(Ipv4Addr::LOCALHOST.into(), 0).unwrap();
     let options = format!("url = \"http://{}\"\nmodel = \"curve\"", server.address());

@@ -1,5 +1,5 @@
-//! The skeletons that `lacuna new plugin` writes: compiled and registered here, each as `skeleton` of its kind, so that every
-//! suite tries them.
+//! The skeletons that `lacuna new plugin` writes: compiled and registered here, each as `skeleton` of its kind, so that
+//! every suite tests them.
 
 #[path = "../../cli/src/new/plugin/design.rs"]
 mod design;

@@ -1,12 +1,13 @@
-//! The discrepancy of the walk-through in CONTRIBUTING.md, in a study.
+//! The example discrepancy of CONTRIBUTING.md, in a study.
 
 #[path = "../../examples/shot_noise.rs"]
 mod shot_noise;
 
-use lacuna::run::{RunDirectory, Silent};
-use lacuna::study::resolve;
+use lacuna::run::Silent;
+use lacuna_engine::study::resolve;
+use lacuna_run::RunDirectory;
 
-/// Three readings of a level with a gain that is all but known.
+/// Three readings of a level with a gain that is almost known.
 const STUDY: &str = "
 [study]
 name = 'counts'
@@ -42,9 +43,10 @@ steps = 2000
 
 const READINGS: [f64; 3] = [9.0, 10.0, 12.5];
 
-/// With a flat prior and the gain `g`, three readings `y` of one level give it the density `m^(-3/2) exp(-3 m / 2 g - Σy² / 2 g m)`:
-/// the inverse Gaussian law of mean `sqrt(Σy² / 3)` and shape `Σy² / g`, whose variance is `mean³ / shape` (Johnson,
-/// Kotz and Balakrishnan, Continuous Univariate Distributions 1 (1994), chapter 15).
+/// With a flat prior and the gain `g`, three readings `y` of one level give it the density
+/// `m^(-3/2) exp(-3 m / 2 g - Σy² / 2 g m)`: the inverse Gaussian distribution with mean `sqrt(Σy² / 3)` and shape
+/// `Σy² / g`, whose variance is `mean³ / shape` (Johnson, Kotz and Balakrishnan, Continuous Univariate Distributions 1
+/// (1994), chapter 15).
 #[test]
 fn the_level_behind_three_readings_is_inverse_gaussian() {
     let folder = tempfile::tempdir().unwrap();
@@ -58,7 +60,7 @@ fn the_level_behind_three_readings_is_inverse_gaussian() {
     let complaints = checked.complaints();
     let study = checked.study.unwrap_or_else(|| panic!("{complaints}"));
     let out = folder.path().join("run");
-    lacuna::stage::run(&study, &mut RunDirectory::open(&out).unwrap(), &Silent).unwrap();
+    lacuna_engine::pipeline::run(&study, &mut RunDirectory::open(&out).unwrap(), &Silent).unwrap();
     let summary = std::fs::read_to_string(out.join("summary.json")).unwrap();
     let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
     let level = &summary["parameters"]["level"];
@@ -67,7 +69,7 @@ fn the_level_behind_three_readings_is_inverse_gaussian() {
     let squares: f64 = READINGS.iter().map(|y| y * y).sum();
     let (centre, shape) = ((squares / 3.0).sqrt(), squares / 0.5);
     let width = (centre.powi(3) / shape).sqrt();
-    // The relative error of a standard deviation is about one over the root of twice the draws.
+    // The relative error of a standard deviation is about one over the square root of twice the number of draws.
     let error = width / size.sqrt();
     assert!((mean - centre).abs() < 4.0 * error, "{mean} ± {error} and {centre}");
     assert!((sd - width).abs() < 4.0 * error, "{sd} ± {error} and {width}");

@@ -1,17 +1,19 @@
-//! `lacuna coverage`: right where the posterior is right, and not where it is not.
+//! `lacuna coverage`: nominal for a correct posterior, and not for a wrong one.
 
 use std::fs;
 use std::path::Path;
 
 use generator::{line, noise};
 use lacuna::diagnose::coverage::{Coverage, Noise, Source, Word};
-use lacuna::run::{RunDirectory, Silent, Stop};
-use lacuna::stage::coverage::{Asked, FOLDER, coverage};
+use lacuna::run::{Silent, Stop};
+use lacuna_engine::coverage::{Asked, coverage};
+
+use lacuna_run::{RunDirectory, Stage};
 use tempfile::TempDir;
 
 use crate::quick::{load, replace, root};
 
-/// The line with eight replicates of noise of this size.
+/// The line with eight replicates of noise of standard deviation `sd`.
 pub fn study(sd: f64) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let from = root().join("tests/coverage/study.toml");
@@ -31,10 +33,10 @@ fn count(folder: &Path, out: &Path, settings: &[&str], asked: &Asked) -> Result<
 }
 
 fn cases(out: &Path) -> String {
-    fs::read_to_string(out.join(FOLDER).join("cases.json")).unwrap()
+    fs::read_to_string(out.join(Stage::Coverage.folder().name()).join("cases.json")).unwrap()
 }
 
-/// The closed form: intervals hold what they say, ranks are uniform, and the posterior's width is the known one.
+/// Closed form: intervals have their nominal coverage, ranks are uniform, and the width of the posterior is known.
 #[test]
 fn a_posterior_in_closed_form_is_nominal() {
     let folder = study(0.5);
@@ -46,39 +48,40 @@ fn a_posterior_in_closed_form_is_nominal() {
     for (j, row) in found.tally.rows.iter().enumerate() {
         assert_eq!(row.uniform, Some(true), "{row:?}");
         let expected = exact.covariance[j][j].sqrt() / line::PRIOR[j];
-        // The median over 200 chains of some hundred independent draws each; the relative error of one sd is 5 %.
+        // The median over 200 chains of some hundred effective draws each; the relative error of one standard deviation
+        // is 5 %.
         let error = 4.0 * 0.05 * 1.25 / 200.0_f64.sqrt();
         assert!((row.shrinkage[1] / expected - 1.0).abs() < error, "{row:?} {expected}");
         assert!((row.z[1] - 1.0).abs() < 4.0 * 0.5_f64.sqrt() / 200.0_f64.sqrt(), "{row:?}");
     }
     for file in ["coverage.json", "coverage.html"] {
-        assert!(out.join(FOLDER).join(file).exists(), "{file}");
+        assert!(out.join(Stage::Coverage.folder().name()).join(file).exists(), "{file}");
     }
-    assert!(!out.join(FOLDER).join("cases/00001").exists());
+    assert!(!out.join(Stage::Coverage.folder().name()).join("cases/00001").exists());
 }
 
-/// Noise three times as large as the study states. With the noise of the replicates that is seen; with the
-/// stated one the coverage is right for data that nobody measured, and the difference is told.
+/// Noise three times as large as the study states. With the noise of the replicates the error is detected; with the
+/// stated noise the coverage is nominal for data that nobody measured, and the difference is reported.
 #[test]
 fn noise_that_is_stated_too_small_is_found_in_the_replicates() {
     let folder = study(1.5);
     let out = folder.path().join("out");
     let found = count(folder.path(), &out, &[], &asked(100, Some(Noise::Replicates))).unwrap();
     assert_eq!(found.tally.verdict.word, Word::TooNarrow, "{}", found.tally.verdict.text);
-    // 2 Phi(1.96 / 3) - 1, within four standard errors, the two unknowns counted as one.
+    // 2 Phi(1.96 / 3) - 1, within four standard errors, with the two unknowns counted as one.
     let share = found.tally.overall.as_ref().unwrap().levels[2].share;
     assert!((share - 0.486).abs() < 4.0 * (0.25_f64 / 100.0).sqrt(), "{share}");
     assert!((found.noise_ratio.unwrap() - 1.0).abs() < 0.15, "{found:?}");
     let stated = count(folder.path(), &out, &[], &asked(40, None)).unwrap();
-    // Eight replicates are too few to be the noise unless they are asked for.
+    // Eight replicates are too few to serve as the noise unless requested.
     assert_eq!(stated.noise, Noise::Posterior);
     assert_ne!(stated.tally.verdict.word, Word::TooNarrow);
     assert!((stated.noise_ratio.unwrap() - 1.0 / 3.0).abs() < 0.05, "{stated:?}");
-    let text = lacuna::report::coverage_text(&stated);
+    let text = lacuna_engine::report::coverage_text(&stated);
     assert!(text.contains("Replicates scatter by 0.3"), "{text}");
 }
 
-/// One thread or two, interrupted or not, at once or in two goes: the same bits.
+/// One thread or two, interrupted or not, in one run or in two: the same bits.
 #[test]
 fn the_cases_do_not_depend_on_threads_or_interruptions() {
     let folder = study(0.5);
@@ -91,14 +94,14 @@ fn the_cases_do_not_depend_on_threads_or_interruptions() {
     };
     let whole = with(1, "one", 12);
     assert_eq!(whole, with(2, "two", 12));
-    // Fewer truths first: those that are there are taken.
+    // Fewer truths first: existing ones are reused.
     with(2, "three", 5);
-    let log = folder.path().join("three").join(FOLDER).join("cases.jsonl");
+    let log = folder.path().join("three").join(Stage::Coverage.folder().name()).join("cases.jsonl");
     let before = fs::read_to_string(&log).unwrap();
     assert_eq!(whole, with(2, "three", 12));
     assert!(fs::read_to_string(&log).unwrap().starts_with(&before));
-    // Killed while it wrote a line: no stage record, half of a case.
-    let killed = folder.path().join("two").join(FOLDER);
+    // Killed while writing a line: no stage record, half of a case.
+    let killed = folder.path().join("two").join(Stage::Coverage.folder().name());
     let text = fs::read_to_string(killed.join("cases.jsonl")).unwrap();
     fs::write(killed.join("cases.jsonl"), &text[..text.len() / 2]).unwrap();
     for file in ["stage.json", "cases.json"] {
@@ -107,7 +110,7 @@ fn the_cases_do_not_depend_on_threads_or_interruptions() {
     assert_eq!(whole, with(1, "two", 12));
 }
 
-/// Without a model the truths are runs that the emulator of each case was not fitted to.
+/// Without a model the truths are runs held out from the emulator of each case.
 #[test]
 fn runs_that_are_held_back_are_truths() {
     let folder = crate::quick::tables();
@@ -115,7 +118,7 @@ fn runs_that_are_held_back_are_truths() {
     let asked = asked(20, Some(Noise::Prior));
     let found = count(folder.path(), &out, &["sampler.steps=300"], &asked).unwrap();
     assert_eq!((found.source, found.tally.truths), (Source::HeldBack, 20));
-    assert!(found.notes.iter().any(|note| note.contains("held back")), "{:?}", found.notes);
+    assert!(found.notes.iter().any(|note| note.contains("held out")), "{:?}", found.notes);
     let runs = fs::read_to_string(folder.path().join("runs.csv")).unwrap();
     let kept: serde_json::Value = serde_json::from_str(&cases(&out)).unwrap();
     let truth =
@@ -126,7 +129,7 @@ fn runs_that_are_held_back_are_truths() {
             .any(|x| (x - truth).abs() <= 1e-12 * x.abs())
     });
     assert!(is_there, "{truth}");
-    // Several fits, none of all runs.
+    // Several fits, none with all runs.
     assert!(out.join("7-coverage-surrogate-2").exists());
 }
 
@@ -156,19 +159,19 @@ fn what_cannot_be_counted_is_refused() {
     let data = line::replicates([0.4, -0.3], 0.5, 1, &mut noise::Source::new(5));
     fs::write(folder.path().join("line.csv"), line::table(&data)).unwrap();
     let error = stop(&["sampler.steps=200"], &asked(3, Some(Noise::Replicates)));
-    assert!(error.contains("has 1 replicate, and 3 are the fewest"), "{error}");
+    assert!(error.contains("has 1 replicate, but reusing residuals needs at least 3"), "{error}");
     assert!(error.contains("the value at t 1 s"), "{error}");
 }
 
-/// A model that answers on one side of the prior only: truths without a response are told and counted nowhere.
+/// A model that can be evaluated on one side of the prior only: truths without a response are reported and not counted.
 #[test]
 fn truths_at_which_the_model_fails_are_told() {
     let folder = study(0.5);
     let path = folder.path().join("study.toml");
-    // The logarithm of what is below zero is no number.
+    // The logarithm of a negative number is NaN.
     let observe = "observe = \"level * exp(0 * log((level0 + 0.5 {m}) / (1 {m})))\"";
     replace(&path, "observe = \"level\"", observe);
-    // The emulator has learned from tables in which nothing failed.
+    // The emulator is trained on tables in which no run failed.
     let design = "[design]\nuse = \"latin_hypercube\"\nruns = 40\n";
     let tables =
         "[simulations]\nuse = \"csv\"\nparameters = \"runs.csv\"\nresponses = \"responses.csv\"\n";
@@ -182,6 +185,6 @@ fn truths_at_which_the_model_fails_are_told() {
     let lost: usize = found.tally.without_data.iter().map(|(_, count)| count).sum();
     assert!((1..12).contains(&lost), "{:?}", found.tally.without_data);
     assert_eq!(found.tally.calibrated + lost, 12);
-    let text = lacuna::report::coverage_text(&found);
+    let text = lacuna_engine::report::coverage_text(&found);
     assert!(text.contains("Truths without data"), "{text}");
 }

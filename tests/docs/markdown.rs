@@ -1,4 +1,4 @@
-//! As much of Markdown as the tests of the documentation need.
+//! The subset of Markdown that the tests of the documentation need.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,9 +11,9 @@ pub struct Page {
 
 /// A fenced block.
 pub struct Block {
-    /// The line of its first fence, from 1.
+    /// Number of the line of its first fence, from 1.
     pub line: usize,
-    /// What stands behind the first fence.
+    /// Text after the first fence.
     info: String,
     pub text: String,
 }
@@ -24,7 +24,7 @@ impl Page {
         Self { path: path.to_owned(), text }
     }
 
-    /// Every page of the project, built and hidden folders left out.
+    /// All pages of the project, without build products and hidden folders.
     pub fn all(root: &Path) -> Vec<Self> {
         let mut pages = Vec::new();
         let mut folders = vec![root.to_owned()];
@@ -51,7 +51,7 @@ impl Page {
         Self { path: self.path.clone(), text }
     }
 
-    /// The fenced blocks with this text behind their first fence.
+    /// Fenced blocks with this text after their first fence.
     pub fn blocks(&self, info: &str) -> Vec<Block> {
         let (mut blocks, mut open) = (Vec::new(), None::<Block>);
         for (number, line) in self.text.lines().enumerate() {
@@ -69,7 +69,7 @@ impl Page {
         blocks
     }
 
-    /// The lines outside fenced blocks, code between backticks taken out.
+    /// Lines outside fenced blocks, with code between backticks removed.
     fn prose(&self) -> Vec<String> {
         let mut inside = false;
         let outside = self.text.lines().filter(|line| {
@@ -80,7 +80,7 @@ impl Page {
         outside.map(|line| line.split('`').step_by(2).collect()).collect()
     }
 
-    /// The targets of relative links and pictures.
+    /// Targets of relative links and pictures.
     pub fn links(&self) -> Vec<String> {
         let targets = |line: &String| -> Vec<String> {
             let after = line.split("](").skip(1);
@@ -91,7 +91,7 @@ impl Page {
         links
     }
 
-    /// The anchors of the headings, as they are formed from their words.
+    /// Anchors of the headings.
     pub fn anchors(&self) -> Vec<String> {
         let headings = self.text.lines().filter(|line| line.starts_with('#'));
         let anchor = |heading: &str| -> String {

@@ -1,10 +1,10 @@
-//! What the command line says of libraries.
+//! Output of the command line about libraries.
 
 use std::path::Path;
 
 use super::{quick, twin_path};
 
-/// What a command prints, and whether it succeeded.
+/// Runs a command; returns true if it succeeded, and its output.
 fn said(arguments: &[&str]) -> (bool, String) {
     let output = quick::command().args(arguments).output().unwrap();
     let text = [output.stdout, output.stderr].concat();
@@ -28,7 +28,7 @@ fn plugins_of_a_library_are_listed_with_their_origin() {
     let (done, page) = said(&["plugins", "discrepancy.twin_gaussian", "--plugin", path(&library)]);
     assert!(done && page.contains(&origin), "{page}");
     let (_, own) = said(&["plugins", "discrepancy.gaussian"]);
-    // Names elsewhere are part of a registration in the tree, and no library gives any.
+    // Aliases belong to a registration in the source tree; libraries do not declare any.
     let manual = |page: &str| {
         let lines: Vec<&str> = page.lines().skip(1).collect();
         let names = lines.iter().position(|line| line.starts_with("Known elsewhere as "));
@@ -41,7 +41,9 @@ fn plugins_of_a_library_are_listed_with_their_origin() {
     assert_eq!(a, b);
 
     let (done, schema) = said(&["schema", "--plugin", path(&library)]);
-    assert!(done && schema.contains("\"const\": \"twin_gaussian\""));
+    assert!(done && schema.contains("\"const\":\"twin_gaussian\""));
+    let (done, schema) = said(&["schema", "summary"]);
+    assert!(done && schema.contains("\"title\": \"Lacuna summary\""), "{schema}");
     let (done, refused) = said(&["plugins", "--plugin", "no/such.so"]);
     assert!(!done);
     assert_eq!(

@@ -1,16 +1,16 @@
-//! The suites of the kinds, put to plugins of a library.
+//! The suites of the kinds, applied to plugins of a library.
 
-use lacuna::contract::{self, Sample};
 use lacuna::data::{Axis, Layout, Parameter, Scenario, Unit};
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::registry::{self, Kind};
 use lacuna::plugin::{
     Component, Context, Design, Discrepancy, Effect, Given, Model, Reader, Sampler, Surrogate,
 };
+use lacuna_contract::Sample;
 
 use super::twin;
 
-/// Puts plugins of the library, with options, through a suite.
+/// Runs plugins of the library, with options, through a suite.
 fn all<K: Kind + ?Sized>(
     table: &[(&str, &str)],
     suite: impl Fn(&str, &K) -> Result<(), Vec<String>>,
@@ -33,7 +33,7 @@ fn all<K: Kind + ?Sized>(
     assert!(breaches.is_empty(), "{}", breaches.join("\n"));
 }
 
-/// A suite passed, and nothing went wrong that the suite did not see.
+/// Requires that a suite passed and no fault occurred that the suite did not see.
 pub fn sound(plugin: &dyn Component, outcome: Result<(), Vec<String>>) -> Result<(), Vec<String>> {
     let [fault] = &plugin.faults()[..] else { panic!("a plugin of a library may have a fault") };
     assert_eq!(fault.said(), None);
@@ -43,13 +43,13 @@ pub fn sound(plugin: &dyn Component, outcome: Result<(), Vec<String>>) -> Result
 #[test]
 fn designs() {
     let table = [("twin_latin_hypercube", ""), ("twin_quadrature", "")];
-    all::<dyn Design>(&table, |name, plugin| sound(plugin, contract::design(name, plugin)));
+    all::<dyn Design>(&table, |name, plugin| sound(plugin, lacuna_contract::design(name, plugin)));
 }
 
 #[test]
 fn effects() {
     let table = [("twin_delay", "time = { normal = [0, 1e-5] }"), ("twin_gain", "")];
-    all::<dyn Effect>(&table, |name, plugin| sound(plugin, contract::effect(name, plugin)));
+    all::<dyn Effect>(&table, |name, plugin| sound(plugin, lacuna_contract::effect(name, plugin)));
 }
 
 #[test]
@@ -58,7 +58,9 @@ fn surrogates() {
         ("twin_gaussian_process", "nugget = 1e-8"),
         ("twin_polynomial_chaos", "degree = { max = 8 }"),
     ];
-    all::<dyn Surrogate>(&table, |name, plugin| sound(plugin, contract::surrogate(name, plugin)));
+    all::<dyn Surrogate>(&table, |name, plugin| {
+        sound(plugin, lacuna_contract::surrogate(name, plugin))
+    });
 }
 
 /// The suite of models, in a study of two parameters and five times.
@@ -77,7 +79,7 @@ pub fn model(name: &str, plugin: &dyn Model) -> Result<(), Vec<String>> {
         scenarios: &scenarios,
         ..Context::new(scratch.path(), &parameters, &layout)
     };
-    contract::model(name, plugin, &context, scratch.path())
+    lacuna_contract::model(name, plugin, &context, scratch.path())
 }
 
 #[test]
@@ -104,7 +106,7 @@ pub fn reader(name: &str, plugin: &dyn Reader, ending: &str) -> Result<(), Vec<S
     std::fs::write(&file, format!("sensor,time,strain\n{rows}")).unwrap();
     let sample = Sample { file, layout, values, tolerance: 0.0 };
     let scratch = tempfile::tempdir().unwrap();
-    contract::reader(name, plugin, &sample, scratch.path())
+    lacuna_contract::reader(name, plugin, &sample, scratch.path())
 }
 
 #[test]
@@ -132,7 +134,7 @@ fn discrepancies() {
         ("twin_student_t", "scale = { half_normal = 1.0 }"),
     ];
     all::<dyn Discrepancy>(&table, |name, plugin| {
-        sound(plugin, contract::discrepancy(name, plugin))
+        sound(plugin, lacuna_contract::discrepancy(name, plugin))
     });
 }
 
@@ -148,5 +150,7 @@ fn samplers() {
         ("twin_nested", "live = 300"),
         ("twin_no_u_turn", "warm_up = 300"),
     ];
-    all::<dyn Sampler>(&table, |name, plugin| sound(plugin, contract::sampler(name, plugin)));
+    all::<dyn Sampler>(&table, |name, plugin| {
+        sound(plugin, lacuna_contract::sampler(name, plugin))
+    });
 }

@@ -1,16 +1,16 @@
-//! Models of a library in processes of their own, here and on a cluster: the bits are those of this process, and each loads
-//! the file that was meant or none.
+//! Models of a library in separate processes, here and on a cluster: the bits are those of this process, and each
+//! process loads the intended file or none.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use lacuna::study::emit;
+use lacuna::text::emit;
 use tempfile::TempDir;
 
 use super::slurm::{Kind, started};
 use super::{quick, twin_path};
 
-/// A study whose model is in a library, with a library of its own.
+/// A study with its own library, which contains its model.
 fn study() -> (TempDir, PathBuf) {
     let folder = quick::simulated();
     let path = folder.path().join("study.toml");
@@ -59,7 +59,7 @@ fn a_model_of_a_library_gives_the_same_bits_on_a_cluster() {
 fn a_library_that_was_exchanged_meanwhile_is_refused_by_the_worker() {
     let (folder, path) = study();
     let library = folder.path().join("libtwin.so");
-    // The program of the workers exchanges the file before they begin, as somebody might who builds it anew.
+    // The program of the workers replaces the file before they begin, as happens when somebody rebuilds it.
     let program = folder.path().join("late");
     let lacuna = quick::command().get_program().to_str().unwrap().to_owned();
     let own = library.display();
@@ -75,7 +75,7 @@ fn a_library_that_was_exchanged_meanwhile_is_refused_by_the_worker() {
     );
     let out = folder.path().join("out");
     let (code, text) = quick::said(&mut run(&path, &out, &executor));
-    // Of what a worker said the end is shown, up to a length; the hash that it found comes last.
+    // Only the end of a worker's output is shown, up to a length; the hash that it found comes last.
     let after = lacuna::run::files::hash_file(&library).unwrap();
     assert_eq!(code, Some(1), "{text}");
     let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -92,7 +92,7 @@ fn a_library_that_was_exchanged_meanwhile_is_refused_by_the_worker() {
     assert!(!out.join("2-simulate/stage.json").exists());
 }
 
-/// A chain, the first part of which is in a library.
+/// A chain whose first part is in a library.
 const CHAIN: &str = r#"
 [plugins]
 load = ["libtwin.so"]
@@ -141,7 +141,7 @@ emulator_check = 0
 rerun_model = false
 "#;
 
-/// The hash of a stage's inputs, and the libraries that the workers of its runs were told to load.
+/// Hash of a stage's inputs, and number of libraries that the workers of its runs were told to load.
 fn simulated(folder: &Path) -> (String, usize) {
     let out = folder.join("out");
     let study = folder.join("study.toml");
@@ -167,14 +167,14 @@ fn a_stage_is_made_again_when_the_library_of_a_part_changes() {
     let (first, told) = simulated(folder.path());
     assert_eq!(told, 1);
     assert_eq!(simulated(folder.path()).0, first);
-    // What follows the end of a library's file does nothing, but it is another file.
+    // Bytes after the end of a library are ignored, but they make it another file.
     let mut bytes = std::fs::read(&library).unwrap();
     bytes.push(0);
     std::fs::remove_file(&library).unwrap();
     std::fs::write(&library, &bytes).unwrap();
     let (second, _) = simulated(folder.path());
     assert_ne!(second, first);
-    // Without a part from it the library is none of the model's business.
+    // Without a part from the library, the model does not depend on it.
     quick::replace(&study, "twin_equations", "equations");
     let (without, told) = simulated(folder.path());
     assert_eq!(told, 0);

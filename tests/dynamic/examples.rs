@@ -1,21 +1,20 @@
-//! The examples of plugins outside the tree, built as their READMEs say, put through the suites and used in their studies.
+//! The examples of plugins outside the source tree, built as their READMEs say, run through the suites and used in
+//! their studies.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-use lacuna::contract;
 use lacuna::data::{Axis, Layout, Scenario, Unit};
-use lacuna::plugin::abi::library;
 use lacuna::plugin::model::{Call, EvalError};
-use lacuna::plugin::registry;
-use lacuna::plugin::{Context, Discrepancy, Model, Sampler};
-use lacuna::study::emit;
-use lacuna::study::resolve::{Use, load_for};
+use lacuna::plugin::{Context, Discrepancy, Library, Model, Sampler, registry};
+use lacuna::text::emit;
+use lacuna_engine::host::library;
+use lacuna_engine::study::resolve::{Use, load_for};
 
 use super::{quick, with_profile};
 
-/// The Rust example as a library: a workspace of its own, which shares what is compiled with this one.
+/// The Rust example as a library: a separate workspace that shares compiled crates with this one.
 fn rust() -> &'static Path {
     static BUILT: OnceLock<PathBuf> = OnceLock::new();
     BUILT.get_or_init(|| {
@@ -42,19 +41,19 @@ fn the_example_in_rust_keeps_the_contracts() {
     let options = "sd = 0.3\nlength = 2e-4\nnoise = 0.2";
     let built =
         registry::from_text::<dyn Discrepancy>("matern", options).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!(contract::discrepancy("matern", &*built.plugin), Ok(()));
+    assert_eq!(lacuna_contract::discrepancy("matern", &*built.plugin), Ok(()));
     assert_eq!(built.plugin.faults()[0].said(), None);
     let built = registry::from_text::<dyn Sampler>("difference_walk", "").unwrap();
-    assert_eq!(contract::sampler("difference_walk", &*built.plugin), Ok(()));
+    assert_eq!(lacuna_contract::sampler("difference_walk", &*built.plugin), Ok(()));
     assert_eq!(built.plugin.faults()[0].said(), None);
-    // Its documentation is the manual's.
+    // Its doc comments become the manual.
     let manual = registry::find::<dyn Discrepancy>("matern").unwrap().documentation();
     assert_eq!(manual.title, "A smooth bias of known size beside known noise.");
     let keys: Vec<&str> = manual.options.iter().map(|option| option.key.as_str()).collect();
     assert_eq!(keys, ["sd", "length", "noise"]);
 }
 
-/// Runs the study of an example with a library in the place of the one that it names.
+/// Runs the study of an example with another library in place of the one that it names.
 fn run(study: &str, library: &Path) -> serde_json::Value {
     let study = quick::root().join("examples").join(study);
     let load = format!("plugins.load=[{}]", emit::string(library.to_str().unwrap()));
@@ -86,7 +85,7 @@ fn the_study_of_the_example_in_c_gives_what_the_built_in_law_gives() {
         summary["parameters"][name][key].as_f64().unwrap()
     };
     let c = run("plugin_c/study.toml", &library);
-    // The same study with the built-in law: the draws differ by round-off at first and then go their own ways.
+    // The same study with the built-in discrepancy: the draws differ by round-off at first and then diverge.
     let study = quick::root().join("examples/plugin_c/study.toml");
     let text = std::fs::read_to_string(&study).unwrap();
     let text = text.replace(
@@ -109,8 +108,8 @@ fn the_study_of_the_example_in_c_gives_what_the_built_in_law_gives() {
 
 /// The library of the simulator in C, loaded.
 #[cfg(unix)]
-fn rod() -> &'static library::Library {
-    static BUILT: OnceLock<&'static library::Library> = OnceLock::new();
+fn rod() -> &'static Library {
+    static BUILT: OnceLock<&'static Library> = OnceLock::new();
     BUILT.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap().keep();
         let source = quick::root().join("examples/plugin_c/rod.c");
@@ -129,10 +128,10 @@ fn the_simulator_in_c_keeps_the_contract_and_comes_near_the_exact_answer() {
     let context = Context::new(scratch.path(), &parameters, &layout);
     let of = |options: &str| registry::from_text::<dyn Model>("rod", options).unwrap().plugin;
     let usual = of("");
-    assert_eq!(contract::model("rod", &*usual, &context, scratch.path()), Ok(()));
+    assert_eq!(lacuna_contract::model("rod", &*usual, &context, scratch.path()), Ok(()));
     assert_eq!(usual.faults()[0].said(), None);
 
-    // A batch in one call: all but the one whose steps are not stable.
+    // A batch in one call: all succeed except for the one with unstable time steps.
     let inputs = [[1.1e-4, 1e-3], [9e-3, 1e-3], [2.5e-4, 0.0], [f64::NAN, 0.0]];
     let scenario = Scenario::default();
     let calls = inputs.each_ref().map(|inputs| Call::new(inputs, &[], &layout, &scenario));
@@ -150,13 +149,13 @@ fn the_simulator_in_c_keeps_the_contract_and_comes_near_the_exact_answer() {
         let pairs = first.values.iter().chain(&third.values).zip(exact.iter().flatten());
         pairs.map(off).fold(0.0, f64::max)
     };
-    // Of second order in the cells, of first in the steps.
+    // Second order in the cell size, first order in the time step.
     let coarse = worst(&*of("cells = 20\nstep = 4.0"));
     let fine = worst(&*usual);
     assert!(fine < 0.2 && (3.0..5.0).contains(&(coarse / fine)), "{coarse} {fine}");
 }
 
-/// Temperatures at these places of the rod, ten times each.
+/// Layout of temperatures at these positions of the rod, at ten times each.
 #[cfg(unix)]
 fn rod_layout(places: [f64; 3], unit: &str) -> Layout {
     let unit_of = |text: &str| Unit::parse(text).unwrap();
@@ -168,7 +167,7 @@ fn rod_layout(places: [f64; 3], unit: &str) -> Layout {
     Layout { name: "temperature".to_owned(), unit: unit_of(unit), axes }
 }
 
-/// The two half-waves, each with its own decay.
+/// Analytical solution: two half-waves, each with its own decay rate.
 #[cfg(unix)]
 fn exact([diffusivity, loss]: [f64; 2]) -> Vec<f64> {
     use std::f64::consts::PI;

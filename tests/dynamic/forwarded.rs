@@ -1,10 +1,9 @@
-//! Optional methods of plugins cross the boundary too: a twin in a library gives the same bits.
+//! Optional methods of plugins cross the interface too: a twin in a library gives the same bits.
 
 use lacuna::data::{Axis, Layout, Layouts, Measurements, Parameter, Replicate, Scenario, Unit};
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, uniform};
-use lacuna::plugin::discrepancy::{CommonError, Known};
+use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin, Known};
 use lacuna::plugin::model::Call;
 use lacuna::plugin::reader::MeasurementSource;
 use lacuna::plugin::registry::{self, Built, Kind};
@@ -13,6 +12,7 @@ use lacuna::plugin::{
     Design, Discrepancy, Emulator, Likelihood, Model, Reader, Sampler, Surrogate, Target,
 };
 use lacuna::run::{Progress, Silent};
+use lacuna_linalg::Matrix;
 
 use super::twin;
 
@@ -61,7 +61,7 @@ fn further_points_of_a_design_are_the_same() {
         });
         assert_eq!(own, other, "{name} {options}");
     }
-    // A rule whose nodes would move says the same, with the same advice.
+    // A quadrature rule whose nodes would move gives the same error, with the same advice.
     let [own, other] = pair::<dyn Design>("quadrature", "").map(|built| {
         let (stream, parameters) = (Stream::root(7), parameters());
         let known = built.plugin.place(&parameters, 9, &stream).unwrap();
@@ -81,7 +81,7 @@ fn layout() -> Layout {
     Layout { name: "strain".to_owned(), unit: Unit::dimensionless(), axes }
 }
 
-/// Three replicates with a gap, whose noise is not stated.
+/// Three replicates with missing values and without stated noise.
 fn data() -> Measurements {
     let mut rng = Stream::root(3).generator();
     let mut replicate = |r: usize| {
@@ -93,7 +93,7 @@ fn data() -> Measurements {
     Measurements::new(layout(), replicates)
 }
 
-/// Data of which the second replicate states no noise, or all do.
+/// Data in which the second replicate states no noise, or all replicates state it.
 fn with_sd(all: bool) -> Measurements {
     let mut data = data();
     for (r, replicate) in data.replicates.iter_mut().enumerate() {
@@ -111,7 +111,7 @@ fn with_covariance() -> Measurements {
     Measurements { covariance: Some(covariance), ..data() }
 }
 
-/// All answers of a likelihood to a response: its value, its derivatives, what it left out, data that it makes, and facts.
+/// All results of a likelihood for a response: value, derivatives, leave-one-out densities, simulated data, and facts.
 fn told(likelihood: &dyn Likelihood) -> (Vec<u64>, Vec<Measurements>, String) {
     let response: Vec<f64> = (0..OUTPUTS).map(|i| (1.1 * i as f64).sin()).collect();
     let hyper: Vec<f64> = likelihood.hyperparameters().iter().map(|h| h.start).collect();
@@ -119,6 +119,11 @@ fn told(likelihood: &dyn Likelihood) -> (Vec<u64>, Vec<Measurements>, String) {
     let mut numbers = vec![likelihood.log_likelihood(&response, &hyper)];
     numbers.extend(by_response.into_iter().chain(by_hyper));
     numbers.extend(likelihood.left_out(&response, &hyper).unwrap_or_default());
+    if let Some(errors) = likelihood.sampled_errors(&hyper) {
+        numbers.extend(errors.noise);
+        numbers.extend(errors.sampled.into_vec());
+        numbers.extend(errors.left_out.into_vec());
+    }
     for part in likelihood.predictive(&response, &hyper) {
         numbers.extend(part.variance);
     }
@@ -128,13 +133,13 @@ fn told(likelihood: &dyn Likelihood) -> (Vec<u64>, Vec<Measurements>, String) {
     (bits(&numbers), made, facts)
 }
 
-/// The likelihoods of a discrepancy: of all data, and of a part of them.
+/// Likelihoods of a discrepancy: of all data, and of a part of them.
 fn likelihoods(
     built: &Built<dyn Discrepancy>,
     data: &Measurements,
 ) -> [Option<Box<dyn Likelihood>>; 2] {
     let factor = Matrix::from_fn(OUTPUTS, 1, |i, _| 0.02 * (1.0 + i as f64));
-    let common = [CommonError { origin: "emulator".to_owned(), factor, predictive: true }];
+    let common = [CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }];
     let slopes = || Ok(Matrix::from_fn(OUTPUTS, 2, |i, j| (0.4 * (i + 3 * j) as f64).sin()));
     let known = Known { data, common: &common, slopes: &slopes };
     let mut part = data.clone();
@@ -176,7 +181,7 @@ fn likelihoods_of_parts_and_of_data_that_state_their_noise_are_the_same() {
         assert_eq!(own[1].is_some(), has_part, "{name} {options}");
         assert!(own == other, "{name} {options}: {own:?} {other:?}");
     }
-    // What one replicate of several states crosses as it is, whatever a discrepancy makes of it.
+    // Noise that only some replicates state crosses unchanged, whatever a discrepancy does with it.
     let mixed = with_sd(false);
     let [own, other] = pair::<dyn Discrepancy>("gaussian", stated).map(|built| {
         let made = built.plugin.likelihood(&Known::without_slopes(&mixed, &[]));
@@ -307,7 +312,7 @@ fn a_response_with_its_derivatives_is_the_same() {
     assert_eq!(own, other);
 }
 
-/// All answers of an emulator at a point, alone and together with its derivatives.
+/// All results of an emulator at a point, separately and together with its derivatives.
 fn said(emulator: &dyn Emulator) -> Vec<u64> {
     let point = [0.3, 1.2];
     let (mean, jacobian) = emulator.mean_and_jacobian(&point);
@@ -344,7 +349,7 @@ fn emulators_and_their_sums_are_the_same() {
             let weights = [[1.0, 2.0, 0.5], [-1.0, 0.25, 3.0]];
             let parts = [0, 1].map(|i| Summand { bytes: &saved[i], weights: &weights[i] });
             let sum = built.plugin.sum(&parts, &[0.1, 0.2, 0.3]).unwrap();
-            // Emulators that do not go together have no sum.
+            // Emulators that cannot be combined have no sum.
             assert!(built.plugin.sum(&parts, &[0.1]).unwrap().is_none());
             (emulators.map(|emulator| said(&*emulator)), sum.map(|sum| said(&*sum)))
         });

@@ -188,6 +188,29 @@ static int32_t left_out(void *likelihood, LacunaNumbers response, LacunaNumbers 
 #endif
 }
 
+static int32_t sampled_errors(void *likelihood, LacunaNumbers hyper, const LacunaAnswer *answer)
+{
+    static const double numbers[] = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1}, below[] = {1, 1, -1, 1, 1, 1, 1, 1, 1, 1};
+    (void)likelihood;
+    (void)hyper;
+    (void)numbers;
+    (void)below;
+#if defined(SHORT_SAMPLED)
+    lacuna_give(answer, numbers, 1, 10);
+    lacuna_give(answer, numbers, 9, 1);
+    lacuna_give(answer, numbers, 10, 1);
+    return LACUNA_OK;
+#elif defined(SAMPLED_BELOW_ZERO)
+    lacuna_give(answer, below, 1, 10);
+    lacuna_give(answer, numbers, 10, 1);
+    lacuna_give(answer, numbers, 10, 1);
+    return LACUNA_OK;
+#else
+    (void)answer;
+    return LACUNA_ABSENT;
+#endif
+}
+
 /* A table may be that of an earlier version, without the functions that came later, or of a later one. */
 #if defined(EARLIER_TABLE)
 #define TABLE_SIZE offsetof(LacunaLikelihoodFunctions, left_out)
@@ -209,7 +232,7 @@ static const struct {
 #else
     gradient,
 #endif
-    predictive, simulate, left_out, NULL, NULL
+    predictive, simulate, left_out, NULL, NULL, sampled_errors
 }, (size_t)-1};
 
 static int32_t likelihood(void *plugin, const LacunaKnown *known, LacunaLikelihood *out, const LacunaAnswer *answer)

@@ -1,19 +1,18 @@
-//! Libraries that are broken: each is an error that names it, and the program goes on.
+//! Broken libraries: each gives an error that names it, and the program continues.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use lacuna::contract;
 use lacuna::data::{Axis, Layout, Measurements, Replicate, Unit};
-use lacuna::plugin::abi::library;
 use lacuna::plugin::discrepancy::Known;
 use lacuna::plugin::registry::{self, Built};
 use lacuna::plugin::{Discrepancy, Likelihood};
-use lacuna::study::resolve::{Use, load_for};
+use lacuna_engine::host::library;
+use lacuna_engine::study::resolve::{Use, load_for};
 
 use super::quick;
 
-/// Compiles a library from C, with these flags beside those that let no warning pass.
+/// Compiles a library from C, with these flags besides those that turn warnings into errors.
 pub fn compiled(folder: &Path, source: &Path, name: &str, flags: &[String]) -> PathBuf {
     let library = folder.join(format!("lib{name}.so"));
     let output = Command::new("cc")
@@ -30,15 +29,15 @@ pub fn compiled(folder: &Path, source: &Path, name: &str, flags: &[String]) -> P
     library
 }
 
-/// Compiles a library that misbehaves as the definitions say. What it ends it writes into the file `ended`, a letter
-/// each.
+/// Compiles a library that misbehaves as the definitions say. It writes one letter to the file `ended` for each object
+/// that it frees.
 pub fn misguided(folder: &Path, source: &str, name: &str, defines: &[&str]) -> PathBuf {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("dynamic").join(source);
     let ended = folder.join("ended").display().to_string();
     let own = [format!("NAME=\"{name}\""), format!("ENDED=\"{ended}\"")];
     let defines = defines.iter().map(ToString::to_string).chain(own);
     let mut flags: Vec<String> = defines.map(|define| format!("-D{define}")).collect();
-    // Each way to misbehave leaves something unused.
+    // Each kind of misbehaviour leaves something unused.
     flags.push("-Wno-unused".to_owned());
     compiled(folder, &source, name, &flags)
 }
@@ -47,7 +46,7 @@ fn broken(folder: &Path, name: &str, defines: &[&str]) -> PathBuf {
     misguided(folder, "hostile.c", name, defines)
 }
 
-/// What loading such a library says.
+/// The error of loading such a library.
 fn refused(name: &str, defines: &[&str]) -> String {
     let folder = tempfile::tempdir().unwrap();
     library::load(&broken(folder.path(), name, defines), None).unwrap_err()
@@ -175,6 +174,7 @@ fn what_has_no_room_for_an_error_is_a_fault_that_names_the_library() {
         assert_eq!(l.simulate(&[0.0; 10], &[1.0], &stream), [data()]);
     };
     let left: Ask = |l| assert_eq!(l.left_out(&[0.0; 10], &[1.0]), None);
+    let sampled: Ask = |l| assert_eq!(l.sampled_errors(&[1.0]), None);
     for (name, define, ask, expected) in [
         ("nan", "NAN_VALUES", value, "`log_likelihood` gives no number as value 1 of 1"),
         ("unwritten", "UNWRITTEN", value, "`log_likelihood` gives no number as value 1 of 1"),
@@ -209,6 +209,13 @@ fn what_has_no_room_for_an_error_is_a_fault_that_names_the_library() {
             left,
             "`left_out` answers 3 numbers for 50 measured values",
         ),
+        (
+            "short_sampled",
+            "SHORT_SAMPLED",
+            sampled,
+            "`sampled_errors` answers 9 rows of 1 numbers where 10 of 1 belong",
+        ),
+        ("sampled_below", "SAMPLED_BELOW_ZERO", sampled, "`sampled_errors` gives the variance -1"),
     ] {
         let built = misbehaving(name, define);
         let likelihood = likelihood(&built).unwrap();
@@ -287,7 +294,7 @@ fn a_study_says_at_which_line_a_library_is_broken() {
     assert!(complaints.contains(old), "{complaints}");
     let none = "the library of plugins libnone.so cannot be used: no such file or directory";
     assert!(complaints.contains(none), "{complaints}");
-    assert!(complaints.contains("5 | load = [\"libold.so\", \"libnone.so\"]"), "{complaints}");
+    assert!(complaints.contains("6 | load = [\"libold.so\", \"libnone.so\"]"), "{complaints}");
 }
 
 #[test]
@@ -309,17 +316,16 @@ fn options_of_a_library_are_checked_by_its_schema() {
     );
 
     let built = registry::from_text::<dyn Discrepancy>("plain_gaussian", "scale = 1.0").unwrap();
-    assert_eq!(contract::discrepancy("plain_gaussian", &*built.plugin), Ok(()));
+    assert_eq!(lacuna_contract::discrepancy("plain_gaussian", &*built.plugin), Ok(()));
     assert_eq!(built.plugin.faults()[0].said(), None);
-    // Written by another hand in another language, it is the same law as the built-in one.
+    // An independent implementation in another language of the built-in discrepancy.
     let own =
         registry::from_text::<dyn Discrepancy>("gaussian", "variance = { half_normal = 1.0 }")
             .unwrap();
-    let factor = lacuna::linalg::Matrix::from_fn(10, 2, |i, j| {
-        0.1 * (1.0 + i as f64 - 2.0 * j as f64).cos()
-    });
+    let factor =
+        lacuna_linalg::Matrix::from_fn(10, 2, |i, j| 0.1 * (1.0 + i as f64 - 2.0 * j as f64).cos());
     let common = [lacuna::plugin::discrepancy::CommonError {
-        origin: "emulator".to_owned(),
+        origin: lacuna::plugin::discrepancy::ErrorOrigin::Emulator,
         factor,
         predictive: true,
     }];
@@ -340,7 +346,7 @@ fn options_of_a_library_are_checked_by_its_schema() {
     }
 }
 
-/// The header is one for C++ too: the same example, compiled as such.
+/// The header is valid C++ too: the same example, compiled as C++.
 #[test]
 fn the_header_serves_another_language() {
     let folder = tempfile::tempdir().unwrap();
@@ -375,7 +381,7 @@ fn the_header_serves_another_language() {
     let built = registry::from_text::<dyn lacuna::plugin::Design>("middle", "").unwrap();
     let points = built.plugin.points(3, 2, &lacuna::math::random::Stream::root(1)).unwrap();
     assert_eq!(points.as_slice(), [0.5; 6]);
-    // What it leaves out is as a plugin in the tree leaves it out.
+    // Functions that it leaves out behave like the defaults of a plugin in the source tree.
     assert_eq!(built.revision, 1);
     let stop = built.plugin.extend(&[], &points, 2, &lacuna::math::random::Stream::root(1));
     let stop = stop.unwrap_err();

@@ -1,29 +1,30 @@
-//! Functions that a library may leave out: without them a plugin does what one in the tree does by default, and what they
-//! answer is checked.
+//! Functions that a library may leave out: without them a plugin has the defaults of a plugin in the source tree, and
+//! their results are checked.
 
 use lacuna::data::statistics::Kind;
 use lacuna::data::{Axis, Layout, Parameter, Scenario, Unit};
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
 use lacuna::plugin::discrepancy::Known;
 use lacuna::plugin::model::Call;
 use lacuna::plugin::reader::MeasurementSource;
 use lacuna::plugin::registry::Built;
-use lacuna::plugin::surrogate;
-use lacuna::plugin::{Component, Design, Discrepancy, Model, Reader, Sampler, Surrogate};
-use lacuna::study::file::Start;
+use lacuna::plugin::sampler::Start;
+use lacuna::plugin::{
+    Component, Design, Discrepancy, Model, Reader, Sampler, Surrogate, surrogate,
+};
+use lacuna_linalg::Matrix;
 
 use super::hostile::{data, likelihood, misbehaving as discrepancy};
 use super::unruly::{Flat, fitted, misbehaving};
 
-/// The error has these words and the file of the library.
+/// Requires that the error contains these words and the file of the library.
 fn is_told(error: &impl std::fmt::Display, library: &str, words: &str) {
     let said = error.to_string();
     assert!(said.contains(words) && said.contains(&format!("lib{library}.so")), "{said}");
 }
 
-/// Functions appended in version 1.1 are not there in a library of version 1.0, whatever stands behind its tables.
+/// Functions added in version 1.1 are absent in a library of version 1.0, whatever bytes follow its tables.
 #[test]
 fn a_library_of_the_first_version_does_what_it_did() {
     let part = |built: &Built<dyn Discrepancy>| {
@@ -83,7 +84,7 @@ fn whether_stated_noise_is_used_is_checked() {
     }
 }
 
-/// A fault of a plugin, which names its library.
+/// The fault of a plugin, which names its library.
 fn fault(plugin: &dyn Component, name: &str) -> String {
     let faults = plugin.faults();
     let said = faults[0].said().unwrap_or_else(|| panic!("{name} has no fault"));
@@ -187,7 +188,7 @@ fn a_sum_of_emulators_is_checked_and_ended_once() {
         ("adds_nothing", "SUM_OF_NOTHING", Err("its emulator has no functions"), ""),
         ("adds_lacking", "EMULATOR_LACKS", Err("its emulator has no function `save`"), "e"),
         ("adds_widely", "WIDE_SUM", Err("an emulator of 2 outputs where 1 belong"), "e"),
-        // What a sum says of its errors means nothing.
+        // Error estimates of a sum are meaningless.
         ("adds_unjudged", "WIDE_ERRORS", Ok(true), "e"),
     ] {
         let (surrogate, folder) = misbehaving::<dyn Surrogate>(name, define);

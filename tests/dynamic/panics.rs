@@ -1,12 +1,12 @@
-//! Plugins of a library that panic: each panic is an error that names library and call, and the program goes on.
+//! Plugins of a library that panic: each panic becomes an error that names library and call, and the program continues.
 
 use lacuna::data::{Layout, Measurements, Replicate};
-use lacuna::linalg::Matrix;
 use lacuna::math::random::Stream;
 use lacuna::plugin::discrepancy::Known;
 use lacuna::plugin::registry::{self, Built};
+use lacuna::plugin::sampler::Start;
 use lacuna::plugin::{Discrepancy, Likelihood, Sampler, Target};
-use lacuna::study::file::Start;
+use lacuna_linalg::Matrix;
 
 use super::twin;
 
@@ -22,12 +22,12 @@ fn likelihood(built: &Built<dyn Discrepancy>) -> Result<Box<dyn Likelihood>, Str
     built.plugin.likelihood(&Known::without_slopes(&data, &[])).map_err(|stop| stop.to_string())
 }
 
-/// How the file of the library is called in messages.
+/// Name of the library's file in messages.
 fn library() -> String {
     twin().file()
 }
 
-/// One thing that is asked of a likelihood.
+/// One call of a likelihood.
 type Ask<'a> = &'a dyn Fn(&dyn Likelihood);
 
 #[test]
@@ -68,15 +68,15 @@ fn a_panic_of_a_discrepancy_is_an_error_or_a_fault() {
     let said = of_part("likelihood_of_part").map(|_| ()).unwrap_err().message;
     assert!(said.ends_with("`likelihood_of_part` panicked: as I was told"), "{said}");
     assert!(of_part("").unwrap().is_none());
-    // Even where nothing can be said.
+    // Even in `drop`, where no error can be returned.
     drop(likelihood(&panicking("drop")).unwrap());
-    // And the next one is sound.
+    // The next instance is unaffected.
     let sound = likelihood(&panicking("")).unwrap();
     assert_eq!(sound.log_likelihood(&[0.0], &[1.0]), -1.0);
     assert_eq!(sound.failure(), None);
 }
 
-/// A density that panics where the first coordinate is negative.
+/// A density that panics if the first coordinate is negative.
 struct Brittle;
 
 impl Target for Brittle {
@@ -101,7 +101,7 @@ impl Target for Brittle {
     }
 }
 
-/// One thing that is asked of a sampler.
+/// One call of a sampler.
 type AskSampler<'a> = &'a dyn Fn(&dyn Sampler);
 
 #[test]
@@ -144,7 +144,7 @@ fn a_panic_of_a_sampler_or_of_its_density_is_an_error() {
     assert!(!sound.uses_starts() && sound.steps_are_draws());
     assert_eq!((sound.start_where(), sound.statistics(&before)), (Start::Prior, Vec::new()));
     assert_eq!(sound.faults()[0].said(), None);
-    // A panic of the program, asked by the library, crosses twice and ends as an error.
+    // A panic of the program, called back by the library, crosses the interface twice and becomes an error.
     let begun = of("").start(&Brittle, points(-1.0)).unwrap_err();
     assert_eq!(begun.message, format!("{who}: the program: below zero"));
 }

@@ -1,15 +1,15 @@
-//! Whole studies with plugins of a library: the same bits as with the built-in ones, and what is kept of the library.
+//! Complete studies with plugins of a library: the same bits as with the built-in ones, and the records kept of the
+//! library.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use lacuna::study::emit;
-use lacuna::study::resolve::{Use, load_for};
+use lacuna::text::emit;
+use lacuna_engine::study::resolve::{Use, load_for};
 
-use super::quick;
-use super::twin_path;
+use super::{quick, twin_path};
 
-/// What a study leaves behind with these settings.
+/// Results of a study with these settings.
 fn results(study: &Path, settings: &[&str]) -> BTreeMap<String, String> {
     let out = tempfile::tempdir().unwrap();
     let out = out.path();
@@ -56,11 +56,11 @@ fn twins_give_the_same_bits() {
     }
 }
 
-/// The same study with all its plugins from the library, and without.
+/// Runs the same study with all its plugins from the library, and without.
 fn all_twins(study: &Path) {
     let own = results(study, &[]);
     let text = std::fs::read_to_string(study).unwrap();
-    // The reader of the simulator's own format stays, so that it reads what the twin of the model writes.
+    // The reader of the simulator's own format is kept, so that it reads the output of the model's twin.
     let twins = text.replace("use = \"", "use = \"twin_").replace("twin_sierra", "sierra");
     std::fs::write(study, twins).unwrap();
     assert_eq!(own, results(study, &[&load_twin()]));
@@ -77,7 +77,7 @@ fn a_study_with_effects_gives_the_same_bits() {
     let folder = tempfile::tempdir().unwrap();
     let study = folder.path().join("study.toml");
     std::fs::copy(quick::root().join("tests/effects/study.toml"), &study).unwrap();
-    // Its unknowns are called as it is, whatever its plugin's name.
+    // The unknowns of the effect are named after it, whatever the name of its plugin.
     quick::replace(&study, "use = \"gain\"", "use = \"gain\"\nname = \"gain\"");
     quick::replace(&study, "steps = 600", "steps = 80");
     quick::replace(&study, "warm_up = 200", "warm_up = 40");
@@ -120,8 +120,8 @@ fn a_run_keeps_what_it_loaded_and_goes_on_with_it() {
     let again = quick::run(&resolved, &[], out.path()).unwrap();
     assert_eq!(again.made, Vec::<String>::new());
 
-    // Another file of that name is refused, since the study pins the one that it means.
-    // A file that is loaded must not change under the program: another one takes its place.
+    // Another file of that name is rejected, since the study pins its hash. A loaded file must not change under the
+    // program, so it is removed and written anew.
     std::fs::remove_file(&library).unwrap();
     std::fs::write(&library, "no library").unwrap();
     let complaints = load_for(&resolved, &[], Use::Look).complaints();
@@ -132,7 +132,7 @@ fn a_run_keeps_what_it_loaded_and_goes_on_with_it() {
 fn a_check_loads_nothing() {
     let folder = quick::tables();
     let study = folder.path().join("study.toml");
-    // A file that could not be loaded, with the record of one that could.
+    // A file that cannot be loaded, with the record of one that could.
     let record = "lacuna-plugin-record:1.0\ndiscrepancy=unheard_of\nsampler=unheard_of\nend\n";
     std::fs::write(folder.path().join("libheard.so"), record).unwrap();
     quick::replace(&study, "[study]", "[plugins]\nload = [\"libheard.so\"]\n\n[study]");
@@ -144,10 +144,10 @@ fn a_check_loads_nothing() {
     let plugins = &seen.record.as_ref().unwrap().plugins;
     assert_eq!(plugins.len(), 2);
 
-    // What is wrong elsewhere is still said.
+    // Other problems are still reported.
     let wrong = ["surrogate.degree={ max = -1 }".to_owned()];
     assert!(load_for(&study, &wrong, Use::Check).complaints().contains("degree"));
-    // Nothing stays behind: a study without the library knows no such plugin.
+    // Declarations are temporary: a study without the library does not know the plugin.
     quick::replace(&study, "load = [\"libheard.so\"]", "load = []");
     let complaints = load_for(&study, &[], Use::Check).complaints();
     assert!(complaints.contains("there is no discrepancy `unheard_of`"), "{complaints}");
@@ -161,8 +161,8 @@ fn a_design_that_cannot_grow_says_so_and_nothing_is_changed() {
     quick::run(&study, &[&load_twin()], &out).unwrap();
     let resolved = || std::fs::read_to_string(out.join("resolved.toml")).unwrap();
     let before = resolved();
-    let run = lacuna::run::RunDirectory::open(&out).unwrap();
-    let stop = lacuna::campaign::extend(&run, 4).unwrap_err();
+    let run = lacuna_run::RunDirectory::open(&out).unwrap();
+    let stop = lacuna_engine::campaign::extend(&run, 4).unwrap_err();
     let message = "this design cannot be extended without moving its points";
     assert!(stop.message.starts_with("design `rigid` of ") && stop.message.ends_with(message));
     assert!(stop.help.unwrap().contains("a greater number of `runs`"));

@@ -1,15 +1,15 @@
-//! Models, samplers and surrogates that misbehave: each is an error that names them.
+//! Misbehaving models, samplers and surrogates: each gives an error that names it.
 
 use lacuna::data::{Layout, Layouts, Parameter, Scenario};
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
-use lacuna::plugin::abi::library;
 use lacuna::plugin::model::{Call, EvalError};
 use lacuna::plugin::registry::{self, Kind};
 use lacuna::plugin::surrogate::Training;
 use lacuna::plugin::{Emulator, Model, Sampler, Surrogate, Target};
 use lacuna::run::{Progress, Silent};
+use lacuna_engine::host::library;
+use lacuna_linalg::Matrix;
 use tempfile::TempDir;
 
 use super::hostile::misguided;
@@ -59,7 +59,7 @@ fn an_answer_of_a_model_is_checked() {
     }
 }
 
-/// A flat density.
+/// A constant density.
 pub struct Flat;
 
 impl Target for Flat {
@@ -166,7 +166,7 @@ fn a_linear_form_is_checked() {
 #[test]
 fn a_schema_and_a_complaint_may_say_anything() {
     misbehaving::<dyn Model>("circle", "SCHEMA_IN_A_CIRCLE");
-    // A type that holds itself has no end, but its description has one.
+    // A type that contains itself is infinite, but its description is finite.
     let manual = registry::find::<dyn Model>("circle").unwrap().documentation();
     let keys: Vec<&str> = manual.options.iter().map(|option| option.key.as_str()).collect();
     assert_eq!(keys, ["a", "b"]);

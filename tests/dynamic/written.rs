@@ -1,4 +1,4 @@
-//! Libraries as `lacuna new plugin KIND NAME --library FOLDER` writes them: built, tested by the tests that they bring, put
+//! Libraries as written by `lacuna new plugin KIND NAME --library FOLDER`: built, tested by their own tests, run
 //! through the suites of their kinds, and used together in one study.
 
 use std::fs;
@@ -7,19 +7,18 @@ use std::process::Command;
 use std::sync::OnceLock;
 use std::time::Instant;
 
-use lacuna::contract;
-use lacuna::plugin::abi::library;
 use lacuna::plugin::registry::{self, Kind};
 use lacuna::plugin::{Design, Discrepancy, Effect, Model, Reader, Sampler, Surrogate};
+use lacuna_engine::host::library;
 
 use super::contracts::{model, reader, sound};
 use super::{quick, with_profile};
 
-/// The kinds that libraries can bring.
+/// Kinds that libraries can provide.
 const KINDS: [&str; 7] =
     ["design", "discrepancy", "effect", "model", "reader", "sampler", "surrogate"];
 
-/// The folder of this test's profile, such as `target/debug`.
+/// Folder of this test's profile, such as `target/debug`.
 fn profile() -> PathBuf {
     std::env::current_exe().unwrap().parent().unwrap().parent().unwrap().to_owned()
 }
@@ -39,12 +38,12 @@ fn cargo(verb: &str, folder: &Path) -> String {
     out
 }
 
-/// The libraries, by kind. Each is a crate in a folder of its own that is part of no workspace.
+/// The libraries, by kind. Each is a crate in its own folder that belongs to no workspace.
 fn written() -> &'static [PathBuf; 7] {
     static BUILT: OnceLock<[PathBuf; 7]> = OnceLock::new();
     BUILT.get_or_init(|| {
         let begun = Instant::now();
-        // Always the same place, so that what is built there takes the place of what was.
+        // Always the same place, so that new build products replace the old ones.
         let all = profile().with_file_name("written");
         if all.exists() {
             fs::remove_dir_all(&all).unwrap();
@@ -55,7 +54,7 @@ fn written() -> &'static [PathBuf; 7] {
             lacuna.args(["new", "plugin", kind, &name, "--library"]).arg(&folder);
             let (code, said) = quick::said(lacuna.current_dir(quick::root()));
             assert_eq!(code, Some(0), "{said}");
-            // The versions that are compiled already.
+            // The versions that have been compiled already.
             fs::copy(quick::root().join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
             cargo("build", &folder);
             let told = cargo("test", &folder);
@@ -68,7 +67,7 @@ fn written() -> &'static [PathBuf; 7] {
     })
 }
 
-/// Puts the plugin of a kind through a suite.
+/// Runs the plugin of a kind through a suite.
 fn kept<K: Kind + ?Sized>(suite: impl Fn(&str, &K) -> Result<(), Vec<String>>) {
     let name = format!("trial_{}", K::NAME);
     let built = registry::from_text::<K>(&name, "").unwrap_or_else(|e| panic!("{e}"));
@@ -82,17 +81,19 @@ fn a_library_of_each_kind_keeps_its_contract_and_serves_one_study() {
     for library in libraries {
         library::load(library, None).unwrap_or_else(|e| panic!("{}: {e}", library.display()));
     }
-    kept::<dyn Design>(|name, plugin| sound(plugin, contract::design(name, plugin)));
-    kept::<dyn Discrepancy>(|name, plugin| sound(plugin, contract::discrepancy(name, plugin)));
-    kept::<dyn Effect>(|name, plugin| sound(plugin, contract::effect(name, plugin)));
+    kept::<dyn Design>(|name, plugin| sound(plugin, lacuna_contract::design(name, plugin)));
+    kept::<dyn Discrepancy>(|name, plugin| {
+        sound(plugin, lacuna_contract::discrepancy(name, plugin))
+    });
+    kept::<dyn Effect>(|name, plugin| sound(plugin, lacuna_contract::effect(name, plugin)));
     kept::<dyn Model>(|name, plugin| sound(plugin, model(name, plugin)));
     kept::<dyn Reader>(|name, plugin| sound(plugin, reader(name, plugin, "columns")));
-    kept::<dyn Sampler>(|name, plugin| sound(plugin, contract::sampler(name, plugin)));
-    kept::<dyn Surrogate>(|name, plugin| sound(plugin, contract::surrogate(name, plugin)));
+    kept::<dyn Sampler>(|name, plugin| sound(plugin, lacuna_contract::sampler(name, plugin)));
+    kept::<dyn Surrogate>(|name, plugin| sound(plugin, lacuna_contract::surrogate(name, plugin)));
     one_study(libraries);
 }
 
-/// A capacitor that is discharged, every part of whose study is in one of the libraries.
+/// A discharging capacitor; every part of the study comes from one of the libraries.
 const STUDY: &str = r#"
 [study]
 name = "written"
@@ -141,7 +142,7 @@ fn one_study(libraries: &[PathBuf]) {
     let (study, out) = (folder.path().join("study.toml"), folder.path().join("out"));
     fs::write(&study, STUDY).unwrap();
     let file = folder.path().join("measured.columns");
-    // An amplitude of 2 V that falls at a rate of 1/s; what scatters is as good as noise of 0.01 V.
+    // An amplitude of 2 V that decays at a rate of 1/s; the deterministic scatter corresponds to noise of 0.01 V.
     let row = |(r, i): (u32, u32)| {
         let t = 0.2 * f64::from(i + 1);
         let noise = 0.014 * f64::from(7 * i + 11 * r + i * i * r).sin();
@@ -165,7 +166,7 @@ fn one_study(libraries: &[PathBuf]) {
         lacuna::run::files::read_json(&out.join("manifest.json")).unwrap();
     assert_eq!(manifest["plugins"].as_array().unwrap().len(), KINDS.len());
 
-    // The reader of a library knows its files, and no built-in one claims them.
+    // The reader of a library recognises its files, and no built-in reader claims them.
     let mut inspect = quick::command();
     let output = inspect.arg("inspect").arg(&file).args(&plugins).output().unwrap();
     let seen = String::from_utf8(output.stdout).unwrap();

@@ -1,12 +1,12 @@
-//! Which cases are asked, and how many.
+//! Selection and number of the cases.
 
 use generator::{Case, Kind, SENSORS};
-use lacuna::gap::name::Named;
+use lacuna_engine::gap::search::MissingEffect;
 use rayon::prelude::*;
 
 use super::chain::{Answer, ask, prepare};
 
-/// The effects of the library that are hidden, by the name that they should get.
+/// Hidden effects that are in the library, with the name that they should get.
 pub const LISTED: [(Kind, &str); 14] = [
     (Kind::Gain, "gain"),
     (Kind::Offset, "offset"),
@@ -24,7 +24,7 @@ pub const LISTED: [(Kind, &str); 14] = [
     (Kind::Crosstalk, "crosstalk"),
 ];
 
-/// Physics that no candidate has.
+/// Hidden physics that is not in the library.
 pub const UNLISTED: [Kind; 5] =
     [Kind::Burst, Kind::Switching, Kind::Cubic, Kind::Drag, Kind::Rectified];
 
@@ -32,45 +32,45 @@ fn number(variable: &str, otherwise: u64) -> u64 {
     std::env::var(variable).ok().and_then(|n| n.parse().ok()).unwrap_or(otherwise)
 }
 
-/// The share `of` 126 of as many single effects as `LACUNA_GAP_CASES` says; not less than `least`.
+/// Number of cases: the fraction `of / 126` of `LACUNA_GAP_CASES`, but at least `least`.
 pub fn count(of: u64, least: u64) -> u64 {
     (number("LACUNA_GAP_CASES", 7) * of / 126).max(least)
 }
 
-/// The name that a kind should get; its own where it is of no library.
+/// Name that a kind should get; its own if it is not in the library.
 pub fn name(kind: Kind) -> String {
     let listed = LISTED.iter().find(|(other, _)| *other == kind);
     listed.map_or_else(|| format!("{kind:?}").to_lowercase(), |(_, name)| (*name).to_owned())
 }
 
-/// A case that is to be asked.
+/// Specification of a case.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    /// What is hidden where.
+    /// Hidden effects, and the sensors they act on.
     pub kinds: Vec<(Kind, Vec<usize>)>,
-    /// How large it is.
+    /// Size of the effect relative to the noise.
     pub ratio: f64,
-    /// Replicates to find it with.
+    /// Number of replicates for the search.
     pub replicates: usize,
-    /// Replicates to prove it with.
+    /// Number of held-out replicates for the proof.
     pub held_out: usize,
 }
 
 impl Plan {
-    /// With 8, 12 or 20 replicates.
+    /// A case with 8, 12 or 20 replicates.
     pub fn new(i: u64, kinds: Vec<(Kind, Vec<usize>)>, ratio: f64) -> Self {
         Self { kinds, ratio, replicates: [8, 12, 20][(i % 3) as usize], held_out: 0 }
     }
 }
 
-/// A case with its answer.
+/// A case with the workflow's answer.
 pub struct Asked {
     pub plan: Plan,
     pub case: Case,
     pub answer: Answer,
 }
 
-/// Asks all; `family` keeps the data of different tests apart.
+/// Runs all cases; `family` keeps the data of different tests independent.
 pub fn asked(family: u64, plans: Vec<Plan>) -> Vec<Asked> {
     prepare();
     let base = 1_000_000 * (100 * number("LACUNA_GAP_SEED", 1) + family);
@@ -84,18 +84,18 @@ pub fn asked(family: u64, plans: Vec<Plan>) -> Vec<Asked> {
 }
 
 impl Asked {
-    /// The names that should be given.
+    /// Names that should be given.
     pub fn truths(&self) -> Vec<String> {
         self.plan.kinds.iter().map(|(kind, _)| name(*kind)).collect()
     }
 
-    /// Everything in one line.
+    /// Description of the case and its answer, in one line.
     pub fn said(&self) -> String {
         let hidden = self.case.hidden.iter().map(|h| {
             let sensors: Vec<&str> = h.sensors.iter().map(|&s| SENSORS[s]).collect();
             format!("{} on {} {:.3} {:.2?}", name(h.kind), sensors.join("+"), h.size, h.shape)
         });
-        let one = |e: &Named| {
+        let one = |e: &MissingEffect| {
             let places: Vec<String> = e.on.values().map(|labels| labels.join("+")).collect();
             let each = e.values.iter().zip(&e.sd).map(|(x, sd)| format!("{x:.3}±{sd:.3}"));
             let values: Vec<String> = each.collect();

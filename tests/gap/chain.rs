@@ -1,25 +1,26 @@
-//! The workflow on a chain of two masses under two forces, with a polynomial chaos in place of the model.
+//! The workflow on a chain of two masses under two forces, with a polynomial chaos expansion in place of the model.
 
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use generator::{Case, Chain, Kind, PARAMETERS, REFERENCE, SENSORS, chain::CONDITIONS, times};
+use generator::chain::CONDITIONS;
+use generator::{Case, Chain, Kind, PARAMETERS, REFERENCE, SENSORS, times};
 use lacuna::data::{Axis, Layout, Layouts, Measurements, Observations, Parameter, Replicate, Unit};
-use lacuna::gap::candidates::proposed;
-use lacuna::gap::common::shared;
-use lacuna::gap::experiment::Experiment;
-use lacuna::gap::locate::Region;
-use lacuna::gap::name::{Found, Options, Verdict, search, verdict};
-use lacuna::gap::noise::{Around, Noise};
-use lacuna::gap::prove::{Proof, prove};
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
-use lacuna::plugin::discrepancy::CommonError;
+use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin};
 use lacuna::plugin::effect::Situation;
 use lacuna::plugin::surrogate::Training;
 use lacuna::plugin::{Design, Emulator, Surrogate, registry};
 use lacuna::run::{Progress, Silent};
+use lacuna_engine::gap::candidates::proposed;
+use lacuna_engine::gap::experiment::Experiment;
+use lacuna_engine::gap::noise::{Noise, ResponseTangents};
+use lacuna_engine::gap::prove::{Proof, prove};
+use lacuna_engine::gap::search::{SearchOptions, SearchResult, Verdict, search, verdict};
+use lacuna_engine::gap::system::emulator_error::error_covariance;
+use lacuna_engine::gap::test::Region;
+use lacuna_linalg::Matrix;
 
 const RUNS: usize = 150;
 
@@ -49,7 +50,7 @@ fn model(point: &[f64]) -> Vec<f64> {
     (0..CONDITIONS).flat_map(|c| generator::sampled(&chain.curves(c)).concat()).collect()
 }
 
-/// The emulator with its error by leaving runs out.
+/// The emulator with its error, estimated by leaving runs out.
 pub fn emulator() -> &'static (Box<dyn Emulator>, CommonError) {
     static MADE: OnceLock<(Box<dyn Emulator>, CommonError)> = OnceLock::new();
     MADE.get_or_init(|| {
@@ -72,11 +73,11 @@ pub fn emulator() -> &'static (Box<dyn Emulator>, CommonError) {
         let residuals = &emulator.fit_error().residuals;
         let scale = (RUNS as f64).sqrt();
         let factor = Matrix::from_fn(layouts.len(), RUNS, |i, r| residuals[(r, i)] / scale);
-        (emulator, CommonError { origin: "emulator".into(), factor, predictive: true })
+        (emulator, CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true })
     })
 }
 
-/// Some replicates of a case.
+/// Some replicates of a case, as observations.
 pub fn observations(case: &Case, replicates: Range<usize>) -> Observations {
     let replicate = |r: usize| {
         Replicate::new(
@@ -88,23 +89,23 @@ pub fn observations(case: &Case, replicates: Range<usize>) -> Observations {
     Measurements::new(layout, replicates.map(replicate).collect()).into()
 }
 
-/// What the workflow says of a case.
+/// Answer of the workflow for a case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answer {
-    /// Probabilities without a gap of the largest score, the best cell of the scan and the energy.
+    /// p-values under no gap: of the largest score, the best cell of the scan and the energy.
     pub p: [f64; 3],
-    /// The log of the odds that any candidate acts.
+    /// Logarithm of the odds that any candidate acts.
     pub log_odds: f64,
-    /// The verdict.
+    /// Verdict of the search.
     pub verdict: Verdict,
-    /// Where data and model disagree.
+    /// Regions in which data and model disagree.
     pub regions: Vec<Region>,
-    /// Whether the gap shrank on the replicates that were held out, where any were.
+    /// Test of the gap on held-out replicates, if there are any.
     pub proof: Option<Proof>,
 }
 
-/// The answer of the workflow to a case, found with some of its replicates and proven with the others; it does not see
-/// what is hidden.
+/// Runs the workflow on a case: the search with some of its replicates, the proof with the others. The workflow does
+/// not see what is hidden.
 pub fn ask(case: &Case, replicates: usize, seed: u64) -> Answer {
     let (layouts, parameters) = (layouts(), parameters());
     let (emulator, error) = emulator();
@@ -112,15 +113,16 @@ pub fn ask(case: &Case, replicates: usize, seed: u64) -> Answer {
     let mut experiment = Experiment::new(&layouts, &parameters, &**emulator, &data);
     let centre: Vec<f64> = REFERENCE.to_vec();
     let response = emulator.mean(&Matrix::from_rows(4, [&centre])).row(0).to_vec();
-    let noise = Noise::of(&experiment, &Around::fixed(&response), None);
-    let all = shared(&experiment, &noise, &response, std::slice::from_ref(error));
+    let noise = Noise::of(&experiment, &ResponseTangents::fixed(&response), None);
+    let all = error_covariance(&experiment, &noise, &response, std::slice::from_ref(error));
     (experiment.common, experiment.remainder) = (all.common, all.remainder);
     let sd = noise.sd(&experiment, &response);
     let situation = Situation { layouts: &layouts, response: &response, noise: &sd };
     let candidates = proposed(None, &situation).unwrap();
-    let options = Options { naming: 0.03, unlisted: 0.02, simulations: 199, most: 3 };
+    let options = SearchOptions { naming: 0.03, unlisted: 0.02, simulations: 199, most: 3 };
     let stream = Stream::root(seed);
-    let found: Found<'_> = search(&experiment, &candidates, &[centre], options, &stream).unwrap();
+    let found: SearchResult<'_> =
+        search(&experiment, &candidates, &[centre], options, &stream).unwrap();
     let first = found.path.first().map_or(&found.last, |step| &step.before);
     let verdict = verdict(&found, &candidates, options);
     let log_odds = found.path.first().map_or(f64::NAN, |step| step.log_odds);
@@ -133,12 +135,12 @@ pub fn ask(case: &Case, replicates: usize, seed: u64) -> Answer {
     Answer { p: first.p, log_odds, verdict, regions: first.regions.clone(), proof }
 }
 
-/// Makes what all cases share, before they run in parallel.
+/// Computes what all cases share, before they run in parallel.
 pub fn prepare() {
     emulator();
 }
 
-/// The workflow uses as many threads as there are, and finds the same with each number.
+/// The workflow gives the same result with any number of threads.
 #[test]
 fn threads_change_nothing() {
     prepare();

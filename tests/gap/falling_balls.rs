@@ -1,20 +1,21 @@
-//! The drag of the air on measured drops of balls from a bridge, which free fall does not know. The files are those of de Silva,
-//! Higdon, Brunton and Kutz, Frontiers in AI 3 (2020) 25.
+//! Air drag, missing in free fall, on measured drops of balls from a bridge. The files are those of de Silva, Higdon,
+//! Brunton and Kutz, Frontiers in AI 3 (2020) 25.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use lacuna::gap::account::Account;
-use lacuna::gap::name::Word;
-use lacuna::run::{RunDirectory, Silent};
-use lacuna::study::resolve::load_text;
+use lacuna::run::Silent;
+use lacuna_engine::gap::result::GapResult;
+use lacuna_engine::gap::search::VerdictKind;
+use lacuna_engine::study::resolve::load_text;
+use lacuna_run::RunDirectory;
 
-/// A heavy ball, two of sport, a hollow one with holes: 2.3 to 0.03 kg.
+/// A heavy ball, two sports balls, a hollow one with holes: 2.3 to 0.03 kg.
 const BALLS: [&str; 4] = ["bowling_ball", "golf_ball", "tennis_ball", "whiffle_ball_1"];
 
-/// Frames of the camera in a second.
+/// Frames of the camera per second.
 const FRAMES: f64 = 15.0;
 
 const STUDY: &str = r#"
@@ -81,7 +82,7 @@ simulations = 59
 hold_out = { along = [[0.7, 1.0], [1.7, 2.0]] }
 "#;
 
-/// The rows of a table by their first two cells.
+/// Rows of a table by their first two cells.
 type Rows = BTreeMap<(String, String), Vec<[f64; 2]>>;
 
 fn rows(text: &str) -> Rows {
@@ -94,7 +95,7 @@ fn rows(text: &str) -> Rows {
     rows
 }
 
-/// The height at a time, straight between frames.
+/// Height at a time, linearly interpolated between frames.
 fn height(drop: &[[f64; 2]], time: f64) -> f64 {
     let pair = drop.windows(2).find(|pair| time <= pair[1][0] + 1e-9);
     pair.map_or(drop[drop.len() - 1][1], |pair| {
@@ -103,8 +104,8 @@ fn height(drop: &[[f64; 2]], time: f64) -> f64 {
     })
 }
 
-/// A study of the drops, each a record of its own or both of a ball replicates; what the workflow says of it.
-fn search(drops: &Rows, balls: &str, together: bool) -> Account {
+/// The search in a study of the drops, each as its own record or both of a ball as replicates.
+fn search(drops: &Rows, balls: &str, together: bool) -> GapResult {
     let folder = tempfile::tempdir().unwrap();
     let mut text = STUDY.to_owned();
     for line in balls.lines().skip(1) {
@@ -135,11 +136,11 @@ fn search(drops: &Rows, balls: &str, together: bool) -> Account {
     let complaints = checked.complaints();
     let study = checked.study.unwrap_or_else(|| panic!("{complaints}"));
     let mut run = RunDirectory::open(&folder.path().join("run")).unwrap();
-    let findings = lacuna::stage::find_gap(&study, &mut run, &Silent).unwrap();
-    findings.gap.unwrap().account
+    let findings = lacuna_engine::pipeline::find_gap(&study, &mut run, &Silent).unwrap();
+    findings.gap.unwrap().result
 }
 
-/// The tables, where they are.
+/// The tables, if they are available.
 fn tables() -> Option<(Rows, String)> {
     let folder = Path::new(concat!(
         env!("CARGO_MANIFEST_DIR"),
@@ -153,35 +154,35 @@ fn tables() -> Option<(Rows, String)> {
     both.map(|(drops, balls)| (rows(&drops), balls))
 }
 
-fn kinds(account: &Account) -> Vec<&str> {
-    account.additions.iter().map(|addition| addition.kind.as_str()).collect()
+fn kinds(result: &GapResult) -> Vec<&str> {
+    result.additions.iter().map(|addition| addition.kind.as_str()).collect()
 }
 
 const DRAG: [&str; 2] = ["linear_friction", "quadratic_friction"];
 
-/// Two drops of a ball show how drops differ: drag is what the model lacks, whatever its law.
+/// Two drops of a ball show the variation between drops: the model lacks drag, whatever its law.
 #[test]
 fn the_drag_of_the_air_is_missing_in_free_fall() {
     let Some((drops, balls)) = tables() else { return };
-    let account = search(&drops, &balls, true);
-    let verdict = &account.verdict;
-    assert!(matches!(verdict.word, Word::Named | Word::Class), "{verdict:?}");
-    let kinds = kinds(&account);
+    let result = search(&drops, &balls, true);
+    let verdict = &result.verdict;
+    assert!(matches!(verdict.word, VerdictKind::Named | VerdictKind::Class), "{verdict:?}");
+    let kinds = kinds(&result);
     assert!(kinds.len() == 1 && DRAG.contains(&kinds[0]), "{kinds:?} {verdict:?}");
-    assert!(!account.noise_assumed);
-    let proof = &account.held_out[0].proof;
+    assert!(!result.noise_assumed);
+    let proof = &result.held_out[0].proof;
     assert!(proof.all.closed > 0.8, "{proof:?}");
 }
 
-/// One drop of each ball has no replicates: the noise is assumed from what a record leaves beside its slow part, which a camera
-/// takes smoother than drops repeat. Then no law of drag is good enough, and none may be called the answer.
+/// One drop of each ball has no replicates: the noise is estimated from the residual about the slow part of a record,
+/// which is smoother than drops are repeatable. Then no law of drag fits, and none may be named with confidence.
 #[test]
 fn drops_without_replicates_name_no_law_with_confidence() {
     let Some((drops, balls)) = tables() else { return };
-    let account = search(&drops, &balls, false);
-    let verdict = &account.verdict;
-    assert!(account.noise_assumed);
-    assert_eq!(verdict.word, Word::Unlisted, "{verdict:?}");
-    assert!(kinds(&account).iter().any(|kind| DRAG.contains(kind)), "{verdict:?}");
+    let result = search(&drops, &balls, false);
+    let verdict = &result.verdict;
+    assert!(result.noise_assumed);
+    assert_eq!(verdict.word, VerdictKind::Unlisted, "{verdict:?}");
+    assert!(kinds(&result).iter().any(|kind| DRAG.contains(kind)), "{verdict:?}");
     assert!(verdict.reasons.iter().any(|reason| reason.contains("noise assumed")), "{verdict:?}");
 }

@@ -1,29 +1,31 @@
-//! Pieces missing inside the model, in data made by exact solutions: a damper that the study holds at zero, the drag of a
-//! falling body.
+//! Pieces missing inside the model, in data made by exact solutions: a damper that the study fixes at zero, the drag of
+//! a falling body.
 
 use std::fmt::Write as _;
 use std::fs;
 
-use lacuna::gap::experiment::Experiment;
-use lacuna::gap::fit::fit;
-use lacuna::gap::name::{Options, Verdict, Word, search, verdict};
-use lacuna::gap::noise::{Around, Noise};
-use lacuna::gap::system::System;
-use lacuna::gap::whitener::Whitener;
-use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, normal};
-use lacuna::run::{RunDirectory, Silent};
-use lacuna::stage::direct::Prepared;
-use lacuna::stage::gap::add::{Begun, add};
-use lacuna::stage::gap_model::{Pieces, candidates, rivals};
-use lacuna::study::emit::to_toml;
-use lacuna::study::resolve::load_text;
-use lacuna::study::{Study, gap::Edit};
+use lacuna::run::Silent;
+use lacuna::text::emit::to_toml;
+use lacuna_engine::augment::{Begun, add};
+use lacuna_engine::gap::edit::Edit;
+use lacuna_engine::gap::experiment::Experiment;
+use lacuna_engine::gap::inside::{Pieces, alternatives, candidates};
+use lacuna_engine::gap::noise::{Noise, ResponseTangents};
+use lacuna_engine::gap::search::{SearchOptions, Verdict, VerdictKind, search, verdict};
+use lacuna_engine::gap::system::System;
+use lacuna_engine::gap::system::fit::fit;
+use lacuna_engine::gap::system::whitener::Whitener;
+use lacuna_engine::stage::direct::Direct;
+use lacuna_engine::study::Study;
+use lacuna_engine::study::resolve::load_text;
+use lacuna_linalg::Matrix;
+use lacuna_run::RunDirectory;
 use tempfile::TempDir;
 
 const REPLICATES: usize = 8;
 
-/// A study in a folder of its own, with replicates of a curve plus white noise.
+/// A study in its own folder, with replicates of a curve plus white noise.
 pub fn study(
     text: &str,
     curve: impl Fn(f64) -> f64,
@@ -110,7 +112,7 @@ of = "x"
 const STIFFNESS: f64 = 101.0;
 const DRAG: f64 = 0.2;
 
-/// The damped oscillator (Landau and Lifshitz, Mechanics, section 25) with mass 2, from rest at 0.01.
+/// The damped oscillator (Landau and Lifshitz, Mechanics, section 25) with mass 2, released from rest at 0.01.
 fn damped(t: f64) -> f64 {
     let rate = DRAG / 4.0;
     let omega = (STIFFNESS / 2.0 - rate * rate).sqrt();
@@ -121,18 +123,18 @@ fn times() -> Vec<f64> {
     (1..=80).map(|i| 0.1 * f64::from(i)).collect()
 }
 
-/// What the search says with the candidates inside the model alone, and the point it found.
+/// Verdict of the search with only the candidates inside the model, the point it found, and its edit of the study.
 fn ask(folder: &TempDir, study: &Study, start: &[f64]) -> (Verdict, Vec<f64>, Edit) {
     let pieces = Pieces::of(study).unwrap().unwrap();
     let mut run = RunDirectory::open(&folder.path().join("run")).unwrap();
-    let prepared = Prepared::of(study, &mut run, &Silent).unwrap();
-    let known = prepared.known();
+    let prepared = Direct::of(study, &mut run, &Silent).unwrap();
+    let known = prepared.problem();
     let (candidates, wide) = candidates(&pieces, study, &known, &mut run, &Silent).unwrap();
     let measured = &known.data.value.measured.as_ref().unwrap().used;
-    let forward = known.forward;
+    let forward = known.forward();
     let mut experiment = Experiment::new(&study.layouts, &study.parameters, forward, measured);
     experiment.wide = Some(&wide);
-    let options = Options { naming: 0.03, unlisted: 0.02, simulations: 199, most: 3 };
+    let options = SearchOptions { naming: 0.03, unlisted: 0.02, simulations: 199, most: 3 };
     let starts = [start.to_vec()];
     let found = search(&experiment, &candidates, &starts, options, &Stream::root(5)).unwrap();
     let switches: Vec<&[usize]> =
@@ -148,13 +150,13 @@ fn ask(folder: &TempDir, study: &Study, start: &[f64]) -> (Verdict, Vec<f64>, Ed
     (verdict(&found, &candidates, options), found.last.fit.at.point.clone(), edit)
 }
 
-/// The study that is written has the response that the search found.
+/// Checks that the study that is written has the response that the search found.
 fn agrees(folder: &TempDir, study: &Study, edit: &Edit, response: &[f64], point: &[f64]) {
     let text = to_toml(&edit.applied(&study.resolved).unwrap()).unwrap();
     let written = loaded(folder, &text);
     let mut run = RunDirectory::open(&folder.path().join("written")).unwrap();
-    let prepared = Prepared::of(&written, &mut run, &Silent).unwrap();
-    let again = prepared.known().forward.mean(&Matrix::from_rows(point.len(), [point]));
+    let prepared = Direct::of(&written, &mut run, &Silent).unwrap();
+    let again = prepared.problem().forward().mean(&Matrix::from_rows(point.len(), [point]));
     let largest = response.iter().fold(0.0, |most: f64, y| most.max(y.abs()));
     for (a, b) in again.row(0).iter().zip(response) {
         assert!((a - b).abs() < 1e-7 * largest, "{a} {b}\n{text}");
@@ -171,7 +173,7 @@ fn a_damper_that_the_study_holds_at_zero_is_found() {
     let (folder, study) = study(&text, damped, &times(), 5e-4);
     let (verdict, point, edit) = ask(&folder, &study, &[100.0]);
     assert_eq!(kinds(&verdict), ["drag"], "{verdict:?}");
-    assert_eq!(verdict.word, Word::Named, "{verdict:?}");
+    assert_eq!(verdict.word, VerdictKind::Named, "{verdict:?}");
     let found = &verdict.effects[0];
     assert!((found.values[0] - DRAG).abs() < 4.0 * found.sd[0], "{verdict:?}");
     assert!(found.sd[0] < 0.1 * DRAG, "{verdict:?}");
@@ -221,8 +223,8 @@ state = "v"
 shape = "t / 1 {s}"
 "#;
 
-/// The fall of a body with quadratic drag (Parker, American Journal of Physics 45 (1977) 606, section I): `x = u² / g ln cosh(g
-/// t / u)` with the terminal speed `u`, whose coefficient is `g / u²`.
+/// The fall of a body with quadratic drag (Parker, American Journal of Physics 45 (1977) 606, section I):
+/// `x = u² / g ln cosh(g t / u)` with the terminal speed `u`, whose drag coefficient is `g / u²`.
 #[test]
 fn the_drag_of_a_falling_body_is_named() {
     let (g, terminal) = (9.81, 20.0);
@@ -231,7 +233,7 @@ fn the_drag_of_a_falling_body_is_named() {
     let (folder, study) = study(&[FALL, REST, NONE, DRAGS].concat(), fall, &times, 0.02);
     let (verdict, _, edit) = ask(&folder, &study, &[9.81]);
     assert_eq!(kinds(&verdict), ["quadratic_friction"], "{verdict:?}");
-    assert_eq!(verdict.word, Word::Named, "{verdict:?}");
+    assert_eq!(verdict.word, VerdictKind::Named, "{verdict:?}");
     let found = &verdict.effects[0];
     let exact = g / (terminal * terminal);
     assert!((found.values[0] - exact).abs() < 4.0 * found.sd[0], "{verdict:?} {exact}");
@@ -252,8 +254,8 @@ runs = 60
 use = "polynomial_chaos"
 "#;
 
-/// An input that is learned from runs of its own: the emulators agree where it is absent, and the error elsewhere is what
-/// the common error says.
+/// An input that is learned from its own runs: the emulators agree where it is zero, and elsewhere the error is covered
+/// by the covariance of the emulator's error.
 #[test]
 fn an_input_is_learned_from_runs_of_its_own() {
     let (folder, study) = {
@@ -263,11 +265,12 @@ fn an_input_is_learned_from_runs_of_its_own() {
     };
     let pieces = Pieces::of(&study).unwrap().unwrap();
     let mut run = RunDirectory::open(&folder.path().join("run")).unwrap();
-    let (learned, _) = lacuna::stage::learn(&study, &mut run, &Silent).unwrap();
-    let known = learned.known();
+    let (learned, _) =
+        lacuna_engine::pipeline::calibrate_emulated(&study, &mut run, &Silent).unwrap();
+    let known = learned.problem();
     let (_, wide) = candidates(&pieces, &study, &known, &mut run, &Silent).unwrap();
     let at = |point: &[f64]| wide.forward.mean(&Matrix::from_rows(2, [point])).row(0).to_vec();
-    let base = known.forward.mean(&Matrix::from_rows(1, [[STIFFNESS]]));
+    let base = known.forward().mean(&Matrix::from_rows(1, [[STIFFNESS]]));
     assert_eq!(at(&[STIFFNESS, 0.0]), base.row(0));
     let said = wide.common[0].factor.as_slice().iter().map(|x| x * x).sum::<f64>() / 20.0;
     let errors = at(&[STIFFNESS, DRAG]).into_iter().zip(times());
@@ -308,24 +311,25 @@ rate = { x = "v", v = "-stiffness * x / mass" }
 observe = "x"
 "#;
 
-/// Models side by side: the one that made the data wins by its likelihood, one that is the study's own by nothing.
+/// Models side by side: the one that made the data wins by its likelihood, one that equals the study's own gains
+/// nothing.
 #[test]
 fn another_model_is_weighed_after_its_own_calibration() {
     let text = [OSCILLATOR, REST, MODELS].concat();
     let (folder, study) = study(&text, damped, &times(), 5e-4);
     let mut run = RunDirectory::open(&folder.path().join("run")).unwrap();
-    let prepared = Prepared::of(&study, &mut run, &Silent).unwrap();
-    let known = prepared.known();
-    let rivals = rivals(&study, &known, &mut run, &Silent).unwrap();
+    let prepared = Direct::of(&study, &mut run, &Silent).unwrap();
+    let known = prepared.problem();
+    let alternatives = alternatives(&study, &known, &mut run, &Silent).unwrap();
     let measured = &known.data.value.measured.as_ref().unwrap().used;
-    let experiment = Experiment::new(&study.layouts, &study.parameters, known.forward, measured);
+    let experiment = Experiment::new(&study.layouts, &study.parameters, known.forward(), measured);
     let system = System::new(&experiment, Vec::new());
     let response = system.response(&[100.0]);
-    let noise = Noise::of(&experiment, &Around::fixed(&response), None);
+    let noise = Noise::of(&experiment, &ResponseTangents::fixed(&response), None);
     let whitener = Whitener::new(&experiment, &noise, &response);
     let means = experiment.means().1;
     let base = fit(&system, &whitener, &means, &[100.0]);
-    let compared: Vec<_> = rivals
+    let compared: Vec<_> = alternatives
         .iter()
         .map(|r| r.compare(&experiment, Vec::new(), &base, &noise, &Stream::root(4)).unwrap())
         .collect();
@@ -334,12 +338,12 @@ fn another_model_is_weighed_after_its_own_calibration() {
     assert!((stiffness.value - STIFFNESS).abs() < 4.0 * stiffness.sd, "{stiffness:?}");
     let same = &compared[1];
     assert!(same.log_odds.abs() < 4.0 * same.error + 1e-3, "{same:?}");
-    let text = to_toml(&rivals[0].edit.applied(&study.resolved).unwrap()).unwrap();
+    let text = to_toml(&alternatives[0].edit.applied(&study.resolved).unwrap()).unwrap();
     let written = loaded(&folder, &text);
-    assert_eq!(written.model.unwrap().common.fixed.len(), 2, "{text}");
+    assert_eq!(written.plugins.model.unwrap().common.fixed.len(), 2, "{text}");
 }
 
-/// The whole workflow: the drag is found among effects on the response, proven on replicates that were set aside, written
+/// The complete workflow: the drag is found among effects on the response, confirmed on held-out replicates, written
 /// into the equations of the study, and sampled with its parameter.
 #[test]
 fn the_study_with_the_drag_is_written_and_run() {
@@ -352,12 +356,15 @@ fn the_study_with_the_drag_is_written_and_run() {
     let path = folder.path().join("study.toml");
     fs::write(&path, &study.text).unwrap();
     let mut run = RunDirectory::open(&folder.path().join("run")).unwrap();
-    let findings = lacuna::stage::find_gap(&study, &mut run, &Silent).unwrap();
+    let findings = lacuna_engine::pipeline::find_gap(&study, &mut run, &Silent).unwrap();
     let gap = findings.gap.as_ref().unwrap();
-    let account = &gap.account;
-    let kinds: Vec<&str> = account.additions.iter().map(|a| a.kind.as_str()).collect();
-    assert_eq!((account.verdict.word, &kinds[..]), (Word::Named, &["quadratic_friction"][..]));
-    assert!(account.held_out[0].proof.shrank, "{:?}", account.held_out);
+    let result = &gap.result;
+    let kinds: Vec<&str> = result.additions.iter().map(|a| a.kind.as_str()).collect();
+    assert_eq!(
+        (result.verdict.word, &kinds[..]),
+        (VerdictKind::Named, &["quadratic_friction"][..])
+    );
+    assert!(result.held_out[0].proof.shrank, "{:?}", result.held_out);
     let begun =
         Begun { study: &study, path: &path, folder: None, settings: &[], findings: &findings, gap };
     let (added, _) = add(&begun, &run, &Silent).unwrap();

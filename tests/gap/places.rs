@@ -1,11 +1,11 @@
-//! A bump on one sensor under one condition is found where it is.
+//! A bump on one sensor under one condition is located correctly.
 
 use generator::{Kind, SAMPLES, STEP};
-use lacuna::gap::locate::Region;
+use lacuna_engine::gap::test::Region;
 
 use super::cases::{Asked, Plan, asked, count};
 
-/// The samples in which the bump differs from nothing, by curve: two conditions of four sensors.
+/// Samples in which the bump is not negligible, by curve: two conditions of four sensors.
 fn truth(asked: &Asked) -> Vec<bool> {
     let hidden = &asked.case.hidden[0];
     let [begin, width, condition] = hidden.shape;
@@ -29,15 +29,15 @@ fn cells(regions: &[Region]) -> Vec<bool> {
     cells
 }
 
-/// The samples in both over those in either.
+/// Intersection over union of two sets of samples.
 fn overlap(a: &[bool], b: &[bool]) -> f64 {
     let both = a.iter().zip(b).filter(|(a, b)| **a && **b).count();
     let either = a.iter().zip(b).filter(|(a, b)| **a || **b).count();
     both as f64 / either as f64
 }
 
-/// Demanded: a mean intersection over union of sensor and time of 0.55 at the noise of one replicate. The bound is four standard
-/// errors of the mean below; a single overlap has a standard deviation of 0.2 at most.
+/// Requirement: a mean intersection over union of sensor and time of 0.55 at the noise of one replicate. The bound is
+/// four standard errors of the mean lower; a single overlap has a standard deviation of at most 0.2.
 #[test]
 fn a_bump_is_found_where_it_is() {
     let plan = |i: u64| {

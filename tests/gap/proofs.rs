@@ -1,10 +1,10 @@
-//! With what was added the gap shrinks on replicates that nothing was fitted to.
+//! The added effect shrinks the gap on held-out replicates.
 
 use super::cases::{Asked, LISTED, Plan, asked, count};
 use super::tally::Rate;
 
-/// Demanded: the interval of what closed above zero in 90 of 100, at 0.8 times the noise of one replicate, with eight replicates to
-/// find the effect and four held out.
+/// Requirement: the interval of the closed fraction is above zero in 90 of 100 cases, at 0.8 times the noise of one
+/// replicate, with eight replicates for the search and four held out.
 #[test]
 fn the_gap_shrinks_on_replicates_held_out() {
     let plan = |i: u64| {

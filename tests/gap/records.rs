@@ -1,24 +1,24 @@
-//! One record without replicates: noise that follows itself raises no alarm, and what is missing is found beside it.
+//! One record without replicates: autocorrelated noise raises no alarm, and missing physics is found beside it.
 
 use std::f64::consts::TAU;
 
 use lacuna::data::{Axis, Layout, Layouts, Measurements, Observations, Parameter, Replicate, Unit};
-use lacuna::gap::candidates::proposed;
-use lacuna::gap::experiment::Experiment;
-use lacuna::gap::name::{Options, Verdict, Word, search, verdict};
-use lacuna::gap::noise::{Around, Noise};
-use lacuna::gap::system::System;
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::Forward;
 use lacuna::plugin::effect::Situation;
+use lacuna_engine::gap::candidates::proposed;
+use lacuna_engine::gap::experiment::Experiment;
+use lacuna_engine::gap::noise::Noise;
+use lacuna_engine::gap::search::{SearchOptions, Verdict, VerdictKind, search, verdict};
+use lacuna_engine::gap::system::System;
+use lacuna_linalg::Matrix;
 use rayon::prelude::*;
 
 use super::cases::count;
 use super::tally::Rate;
 
-/// A level and something that dies away.
+/// A level and a decaying exponential.
 struct Decay(usize);
 
 impl Decay {
@@ -44,7 +44,7 @@ impl Forward for Decay {
     }
 }
 
-/// Noise with these coefficients, in units of its own standard deviation, after it has forgotten its beginning.
+/// Autoregressive noise with these coefficients, in units of its own standard deviation, after a burn-in.
 fn noise(coefficients: &[f64], length: usize, stream: &Stream) -> Vec<f64> {
     const BEFORE: usize = 2000;
     let mut rng = stream.generator();
@@ -64,7 +64,8 @@ fn noise(coefficients: &[f64], length: usize, stream: &Stream) -> Vec<f64> {
     all[BEFORE..].iter().map(|x| x / sd).collect()
 }
 
-/// What the search says of one record with a gap in units of the noise, over the share of the record.
+/// Verdict of the search on one record with a gap in units of the noise, as a function of the relative position along
+/// the record.
 fn asked(length: usize, coefficients: &[f64], gap: &dyn Fn(f64) -> f64, seed: u64) -> Verdict {
     let at = (0..length).map(|t| t as f64).collect();
     let grid = Axis::grid("time", at, Unit::parse("s").unwrap());
@@ -89,24 +90,24 @@ fn asked(length: usize, coefficients: &[f64], gap: &dyn Fn(f64) -> f64, seed: u6
     let data: Observations = Measurements::new(layout, vec![replicate]).into();
     let experiment = Experiment::new(&layouts, &parameters, &forward, &data);
     let system = System::new(&experiment, Vec::new());
-    let around = Around::fit(&system, &system.linearised(&truth));
+    let around = system.around(&system.linearised(&truth));
     let sd = Noise::of(&experiment, &around, None).sd(&experiment, &around.response);
     let situation = Situation { layouts: &layouts, response: &around.response, noise: &sd };
     let candidates = proposed(None, &situation).unwrap();
-    let options = Options { naming: 0.03, unlisted: 0.02, simulations: 199, most: 3 };
+    let options = SearchOptions { naming: 0.03, unlisted: 0.02, simulations: 199, most: 3 };
     let starts = [truth.to_vec()];
     let found = search(&experiment, &candidates, &starts, options, &stream.named("search"));
     verdict(&found.unwrap(), &candidates, options)
 }
 
-/// White noise, first order, and a second order that swings.
+/// White noise, two of first order, and one of second order that oscillates.
 const LAWS: [(&str, &[f64]); 4] =
     [("white", &[]), ("0.5", &[0.5]), ("0.8", &[0.8]), ("1.05, -0.5", &[1.05, -0.5])];
 
 const LENGTHS: [usize; 4] = [60, 120, 250, 500];
 
-/// Where nothing is missing there is an alarm in one record of twenty; the memory of sixty values of noise is known so badly that it
-/// may be one of ten.
+/// Without missing physics there is a false alarm in one record of twenty; for records of sixty values the
+/// autocorrelation is so poorly known that one in ten is allowed.
 #[test]
 fn a_record_of_noise_raises_no_alarm() {
     let mut all = Rate::default();
@@ -116,9 +117,9 @@ fn a_record_of_noise_raises_no_alarm() {
             let seeds: Vec<u64> = (0..cases).map(|b| 7000 + 100 * length as u64 + b).collect();
             let words: Vec<Verdict> =
                 seeds.into_par_iter().map(|s| asked(length, coefficients, &|_| 0.0, s)).collect();
-            let rate = Rate::of(&words, |verdict| verdict.word != Word::None);
+            let rate = Rate::of(&words, |verdict| verdict.word != VerdictKind::None);
             println!("{}", rate.row(&format!("{name}, {length} values")));
-            for verdict in words.iter().filter(|verdict| verdict.word != Word::None) {
+            for verdict in words.iter().filter(|verdict| verdict.word != VerdictKind::None) {
                 let kinds: Vec<&str> = verdict.effects.iter().map(|e| e.kind.as_str()).collect();
                 println!("  {:?} {kinds:?}", verdict.word);
             }
@@ -130,7 +131,7 @@ fn a_record_of_noise_raises_no_alarm() {
     all.assert_below("alarms", 0.08);
 }
 
-/// What is missing in a record, in units of the noise, and the types that may name it.
+/// Missing curve in units of the noise, and the types that may name it.
 type Missing = (&'static str, fn(f64) -> f64, &'static [&'static str]);
 
 const MISSING: [Missing; 3] = [
@@ -139,7 +140,7 @@ const MISSING: [Missing; 3] = [
     ("a smooth curve", |x| 5.0 * x * x, &[]),
 ];
 
-/// What is several times as large as the noise is found and, where it is of a type that is tried, named.
+/// Missing physics several times as large as the noise is found and, if its type is among the candidates, named.
 #[test]
 fn what_is_missing_in_a_record_is_found() {
     let (mut found, mut named) = (Rate::default(), Rate::default());
@@ -152,7 +153,7 @@ fn what_is_missing_in_a_record_is_found() {
                     .into_par_iter()
                     .map(|s| asked(200, coefficients, &|x| size * shape(x), s))
                     .collect();
-                let alarm = Rate::of(&verdicts, |verdict| verdict.word != Word::None);
+                let alarm = Rate::of(&verdicts, |verdict| verdict.word != VerdictKind::None);
                 let right = Rate::of(&verdicts, |verdict| {
                     verdict.effects.iter().any(|e| kinds.contains(&e.kind.as_str()))
                 });

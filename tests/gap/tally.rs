@@ -1,4 +1,4 @@
-//! Counts of cases, what they say of a rate, and what they may be by chance.
+//! Counts of cases, confidence intervals of rates, and tests against chance.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -11,12 +11,12 @@ pub struct Rate {
 }
 
 impl Rate {
-    /// Of the things for which something holds.
+    /// Rate at which a condition holds.
     pub fn of<T>(all: &[T], holds: impl Fn(&T) -> bool) -> Self {
         Self { events: all.iter().filter(|x| holds(x)).count() as u64, trials: all.len() as u64 }
     }
 
-    /// The interval of Clopper and Pearson (Biometrika 26 (1934) 404) of 95 %.
+    /// 95 % confidence interval of Clopper and Pearson (Biometrika 26 (1934) 404).
     fn interval(self) -> [f64; 2] {
         let Self { events, trials } = self;
         let lower = if events == 0 {
@@ -37,22 +37,22 @@ impl Rate {
         format!("| {what} | {events}/{trials} | {rate:.1} % | {lower:.1} to {upper:.1} % |")
     }
 
-    /// Asserts that the events are not more than those of a probability would be: four standard deviations, and one event for the
-    /// discreteness.
+    /// Asserts that the events are not more than expected for a probability: tolerance of four standard deviations,
+    /// plus one event for the discreteness.
     pub fn assert_below(self, what: &str, probability: f64) {
         let n = self.trials as f64;
         let most = n * probability + 4.0 * (n * probability * (1.0 - probability)).sqrt() + 1.0;
         assert!(self.events as f64 <= most, "{what}: {self:?}, at most {most:.1}");
     }
 
-    /// The same of the trials without event.
+    /// Asserts that the events are not fewer than expected for a probability, with the same tolerance.
     pub fn assert_above(self, what: &str, probability: f64) {
         let without = Self { events: self.trials - self.events, ..self };
         without.assert_below(&format!("not {what}"), 1.0 - probability);
     }
 }
 
-/// The probability of at most so many events.
+/// Probability of at most this many events.
 fn at_most(events: u64, trials: u64, p: f64) -> f64 {
     let mut term = (trials as f64 * (-p).ln_1p()).exp();
     let mut sum = term;
@@ -63,7 +63,7 @@ fn at_most(events: u64, trials: u64, p: f64) -> f64 {
     sum
 }
 
-/// The largest number between zero and one for which something holds that holds up to there.
+/// The largest number between zero and one for which a monotone condition holds.
 fn bisected(holds: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..50 {
@@ -77,7 +77,7 @@ fn bisected(holds: impl Fn(f64) -> bool) -> f64 {
     low
 }
 
-/// How often each truth was given each name, as a table.
+/// Confusion table: how often each truth was given each name.
 pub fn confusion(pairs: &[(String, String)]) -> String {
     let mut counts: BTreeMap<&str, BTreeMap<&str, u64>> = BTreeMap::new();
     for (truth, said) in pairs {

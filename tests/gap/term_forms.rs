@@ -1,12 +1,13 @@
-//! What terms do, against exact solutions: the wide forward map of a study with the term, at values of its unknowns.
+//! Terms compared with exact solutions: the extended forward map of a study with the term, at values of its unknowns.
 
 use std::f64::consts::TAU;
 use std::fs;
 
-use lacuna::linalg::Matrix;
-use lacuna::run::{RunDirectory, Silent};
-use lacuna::stage::direct::Prepared;
-use lacuna::stage::gap_model::{Pieces, candidates};
+use lacuna::run::Silent;
+use lacuna_engine::gap::inside::{Pieces, candidates};
+use lacuna_engine::stage::direct::Direct;
+use lacuna_linalg::Matrix;
+use lacuna_run::RunDirectory;
 
 use super::inside::loaded;
 
@@ -44,7 +45,7 @@ fn times() -> Vec<f64> {
     (1..=40).map(|i| 0.1 * f64::from(i)).collect()
 }
 
-/// The response with the term at a point: the supply, the coefficient, what else the term brings.
+/// Response with the term at a point: the supply, the coefficient, the term's further unknowns.
 fn response(units: [&str; 2], body: &str, point: &[f64]) -> Vec<f64> {
     let text = HEAD.replace("SUPPLY", units[0]).replace("OBSERVED", units[1]) + body;
     let folder = tempfile::tempdir().unwrap();
@@ -55,12 +56,12 @@ fn response(units: [&str; 2], body: &str, point: &[f64]) -> Vec<f64> {
     let pieces = Pieces::of(&study).unwrap().unwrap();
     assert_eq!(pieces.all.len(), 1);
     let mut run = RunDirectory::open(&folder.path().join("run")).unwrap();
-    let prepared = Prepared::of(&study, &mut run, &Silent).unwrap();
-    let known = prepared.known();
+    let prepared = Direct::of(&study, &mut run, &Silent).unwrap();
+    let known = prepared.problem();
     let (_, wide) = candidates(&pieces, &study, &known, &mut run, &Silent).unwrap();
     let response = wide.forward.mean(&Matrix::from_rows(point.len(), [point])).into_vec();
     let jacobian = wide.forward.jacobian(point);
-    // The derivatives are those of the response.
+    // The derivatives agree with differences of the response.
     for j in 1..point.len() {
         let step = 1e-4 * point[j].abs();
         let moved = |sign: f64| {
@@ -97,7 +98,8 @@ use = "forcing"
 state = "v"
 "#;
 
-/// Landau and Lifshitz, Mechanics, section 22: `c / (w² - W²) cos(W t + phase)` and what the start leaves over.
+/// Landau and Lifshitz, Mechanics, section 22: `c / (w² - W²) cos(W t + phase)` plus the transient from the initial
+/// state.
 #[test]
 fn forcing_drives_as_in_the_textbook() {
     let (c, frequency, phase) = (2.0, 0.3, 0.7);
@@ -123,7 +125,8 @@ observe = "y"
 state = "y"
 "#;
 
-/// `dT/dt = -c (T⁴ - a⁴)`: `c t` is the difference of `(ln((T + a) / (T - a)) + 2 atan(T / a)) / (4 a³)`, by partial fractions.
+/// `dT/dt = -c (T⁴ - a⁴)`: `c t` is the difference of `(ln((T + a) / (T - a)) + 2 atan(T / a)) / (4 a³)`, by partial
+/// fractions.
 #[test]
 fn radiation_cools_by_the_fourth_power() {
     let (start, ambient, c) = (900.0, 300.0, 4e-10);
@@ -140,7 +143,7 @@ fn radiation_cools_by_the_fourth_power() {
     assert!(found[39] < 700.0);
 }
 
-/// `dT/dt = c (1 - exp((T - a) / s))`: `exp(-(T - a) / s)` approaches one exponentially with the rate `c / s`.
+/// `dT/dt = c (1 - exp((T - a) / s))`: `exp(-(T - a) / s)` approaches one exponentially at the rate `c / s`.
 #[test]
 fn evaporation_cools_by_the_vapour_pressure() {
     let (start, ambient, scale, c) = (350.0, 293.0, 16.0, 0.8);
@@ -178,8 +181,8 @@ distance = "hypot(x, y)"
 beside = { vy = "y" }
 "#;
 
-/// Kepler's ellipse of half axis 1 and eccentricity 0.4 from its nearest point, where the speed is `sqrt(1.4 / 0.6)` times the
-/// root of the coefficient.
+/// Kepler's ellipse of semi-major axis 1 and eccentricity 0.4 from its pericentre, where the speed is `sqrt(1.4 / 0.6)`
+/// times the square root of the coefficient.
 #[test]
 fn pull_holds_a_body_in_an_ellipse() {
     let (e, c) = (0.4, 4.0 * 0.6 / 1.4);
@@ -204,7 +207,7 @@ const SUPPLY: f64 = 2.0;
 const LATE: f64 = 1.5;
 const DELAY: f64 = 2.0;
 
-/// One lag is a linear system of two states; `u - lag` approaches its end with the rate `c + 1 / delay`.
+/// One lag is a linear system of two states; `u - lag` approaches its limit at the rate `c + 1 / delay`.
 #[test]
 fn one_lag_follows_exponentially() {
     let rate = LATE + 1.0 / DELAY;
@@ -215,16 +218,16 @@ fn one_lag_follows_exponentially() {
     near(&delayed(1), exact, 1e-6);
 }
 
-/// Many lags are a delay: `du/dt = s + c (u(t - d) - u)`, by the method of steps (Smith, An Introduction to Delay
-/// Differential Equations, section 1.1). The delays of a chain scatter by `d² / n`, which at the kink, where the start arrives,
-/// leaves `c s d² / 4 n`.
+/// Many lags approximate a delay: `du/dt = s + c (u(t - d) - u)`, by the method of steps (Smith, An Introduction to
+/// Delay Differential Equations, section 1.1). The delays of a chain have variance `d² / n`, which leaves
+/// `c s d² / 4 n` at the kink, where the initial state arrives.
 #[test]
 fn many_lags_are_a_delay() {
     let exact = |t: f64| {
         let level = SUPPLY / LATE;
         let first = level * (1.0 - (-LATE * t).exp());
         let late = (t - DELAY).max(0.0);
-        // Over the second step `c u(t - d)` comes back: the convolution of what was with the decay.
+        // In the second step `c u(t - d)` contributes: the convolution of the earlier solution with the decay.
         let back = level * (1.0 - (-LATE * late).exp() * (1.0 + LATE * late));
         first + back
     };

@@ -1,13 +1,14 @@
-//! Terms that nobody named, in a study that says nothing of `[gap]`: the truth is an oscillator that the generator integrates
-//! by a scheme of its own.
+//! Terms found without being named, in a study without `[gap]`: the truth is an oscillator that the generator
+//! integrates by a scheme of its own.
 
 use std::fs;
 
 use generator::oscillator::Oscillator;
-use lacuna::gap::account::Account;
-use lacuna::gap::name::Word;
-use lacuna::run::{RunDirectory, Silent};
-use lacuna::stage::gap::add::{Begun, add};
+use lacuna::run::Silent;
+use lacuna_engine::augment::{Begun, add};
+use lacuna_engine::gap::result::GapResult;
+use lacuna_engine::gap::search::VerdictKind;
+use lacuna_run::RunDirectory;
 
 use super::inside::study;
 
@@ -53,8 +54,8 @@ steps = 300
 const PLAIN: Oscillator =
     Oscillator { stiffness: 40.0, damping: 0.2, cubic: 0.0, quadratic: 0.0, start: 0.1 };
 
-/// The account of a search in data of this oscillator, and what is written where it has something to add.
-fn searched(truth: Oscillator) -> (Account, Option<String>) {
+/// Result of a search in data of this oscillator, and the study that is written if something is to be added.
+fn searched(truth: Oscillator) -> (GapResult, Option<String>) {
     let curve = truth.deflection(50, 120);
     let times: Vec<f64> = (1..=120).map(|i| 0.05 * f64::from(i)).collect();
     let at = |t: f64| curve[(t / 0.05).round() as usize - 1];
@@ -62,9 +63,9 @@ fn searched(truth: Oscillator) -> (Account, Option<String>) {
     let path = folder.path().join("study.toml");
     fs::write(&path, &study.text).unwrap();
     let mut run = RunDirectory::open(&folder.path().join("run")).unwrap();
-    let findings = lacuna::stage::find_gap(&study, &mut run, &Silent).unwrap();
+    let findings = lacuna_engine::pipeline::find_gap(&study, &mut run, &Silent).unwrap();
     let gap = findings.gap.as_ref().unwrap();
-    let written = (!gap.account.additions.is_empty()).then(|| {
+    let written = (!gap.result.additions.is_empty()).then(|| {
         let begun = Begun {
             study: &study,
             path: &path,
@@ -76,47 +77,51 @@ fn searched(truth: Oscillator) -> (Account, Option<String>) {
         let (added, _) = add(&begun, &run, &Silent).unwrap();
         fs::read_to_string(&added.study).unwrap()
     });
-    (gap.account.clone(), written)
+    (gap.result.clone(), written)
 }
 
-fn names(account: &Account, kind: &str, coefficient: f64) {
-    let kinds: Vec<&str> = account.additions.iter().map(|a| a.kind.as_str()).collect();
-    let leaders: Vec<_> = account.path.iter().map(|step| &step.leaders).collect();
-    assert_eq!((account.verdict.word, &kinds[..]), (Word::Named, &[kind][..]), "{leaders:#?}");
-    let found = &account.additions[0].unknowns[0];
+fn names(result: &GapResult, kind: &str, coefficient: f64) {
+    let kinds: Vec<&str> = result.additions.iter().map(|a| a.kind.as_str()).collect();
+    let leaders: Vec<_> = result.path.iter().map(|step| &step.leaders).collect();
+    assert_eq!(
+        (result.verdict.word, &kinds[..]),
+        (VerdictKind::Named, &[kind][..]),
+        "{leaders:#?}"
+    );
+    let found = &result.additions[0].unknowns[0];
     assert!((found.value - coefficient).abs() < 4.0 * found.sd, "{found:?}");
-    assert!(account.held_out[0].proof.shrank, "{:?}", account.held_out);
+    assert!(result.held_out[0].proof.shrank, "{:?}", result.held_out);
 }
 
 #[test]
 fn a_spring_that_hardens_is_named_unasked() {
-    let (account, text) = searched(Oscillator { cubic: 600.0, ..PLAIN });
-    names(&account, "cubic_stiffness", 600.0);
+    let (result, text) = searched(Oscillator { cubic: 600.0, ..PLAIN });
+    names(&result, "cubic_stiffness", 600.0);
     let text = text.unwrap();
     let rate = r#"v = "-stiffness * x - damping * v + cubic_stiffness * (-(x)^3)""#;
     assert!(text.contains(rate) && text.contains("name = \"cubic_stiffness\""), "{text}");
 }
 
-/// The linear drag of the study stood in for the quadratic one: beside that it is not needed.
+/// The linear drag of the study replaced the quadratic one: beside the quadratic one it is not needed.
 #[test]
 fn a_term_that_stood_in_for_another_is_needless() {
-    let (account, text) = searched(Oscillator { quadratic: 1.5, damping: 0.0, ..PLAIN });
-    names(&account, "quadratic_friction", 1.5);
-    let own: Vec<&str> = account.needless.iter().map(|piece| piece.name.as_str()).collect();
-    assert_eq!(own, ["damping"], "{:?}", account.needless);
+    let (result, text) = searched(Oscillator { quadratic: 1.5, damping: 0.0, ..PLAIN });
+    names(&result, "quadratic_friction", 1.5);
+    let own: Vec<&str> = result.needless.iter().map(|piece| piece.name.as_str()).collect();
+    assert_eq!(own, ["damping"], "{:?}", result.needless);
     assert!(text.unwrap().contains("the study's own `damping` is not needed"));
 }
 
 #[test]
 fn a_drag_with_the_square_of_the_speed_is_named_unasked() {
-    let (account, _) = searched(Oscillator { quadratic: 1.5, ..PLAIN });
-    names(&account, "quadratic_friction", 1.5);
-    assert!(account.needless.is_empty(), "{:?}", account.needless);
+    let (result, _) = searched(Oscillator { quadratic: 1.5, ..PLAIN });
+    names(&result, "quadratic_friction", 1.5);
+    assert!(result.needless.is_empty(), "{:?}", result.needless);
 }
 
 #[test]
 fn where_the_equations_are_right_no_term_is_named() {
-    let (account, text) = searched(PLAIN);
-    assert_eq!(account.verdict.word, Word::None, "{:?}", account.verdict);
+    let (result, text) = searched(PLAIN);
+    assert_eq!(result.verdict.word, VerdictKind::None, "{:?}", result.verdict);
     assert!(text.is_none());
 }

@@ -1,15 +1,17 @@
-//! The whole workflow on `configs/hidden_effect`: the search, the study that it writes, the run of that, and what the report
-//! and `summary.json` say. The answer is told by the generator, in the last assertions only.
+//! The complete workflow on `configs/hidden_effect`: the search, the study that it writes, its run, and the contents of
+//! the report and `summary.json`. The answer is taken from the generator, in the last assertions only.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use generator::{Kind, PARAMETERS};
-use lacuna::report::summary;
-use lacuna::run::{RunDirectory, Silent};
-use lacuna::stage;
-use lacuna::stage::gap::add::{Begun, add};
-use lacuna::study::resolve;
+use lacuna::run::Silent;
+use lacuna_engine::augment::{Begun, add};
+use lacuna_engine::pipeline;
+use lacuna_engine::study::resolve;
+use lacuna_run::RunDirectory;
+
+use crate::quick::described::summary_of;
 
 /// As in `examples/hidden_effect.rs`.
 const SEED: u64 = 1846;
@@ -30,7 +32,7 @@ fn a_hidden_effect_is_found_added_and_shown_to_close_the_gap() {
     let complaints = checked.complaints();
     let study = checked.study.unwrap_or_else(|| panic!("{complaints}"));
     let mut run = RunDirectory::open(&folder.path().join("runs/base")).unwrap();
-    let findings = stage::find_gap(&study, &mut run, &Silent).unwrap();
+    let findings = pipeline::find_gap(&study, &mut run, &Silent).unwrap();
     let gap = findings.gap.as_ref().unwrap();
     let settings = ["sampler.steps=600".to_owned()];
     let begun = Begun {
@@ -43,7 +45,7 @@ fn a_hidden_effect_is_found_added_and_shown_to_close_the_gap() {
     };
     let (added, _) = add(&begun, &run, &Silent).unwrap();
 
-    // The old study, word for word but for its name, and a block that says why it is there.
+    // The old study unchanged except for its name, and a block that states why it was added.
     let text = fs::read_to_string(&added.study).unwrap();
     let old = fs::read_to_string(&path).unwrap();
     let name = added.study.file_stem().unwrap().to_string_lossy().replace("study", "hidden_effect");
@@ -56,16 +58,17 @@ fn a_hidden_effect_is_found_added_and_shown_to_close_the_gap() {
         assert_eq!(file(run.root()), file(&added.run), "{stage}");
     }
 
-    // The study with the effect, calibrated with the same data, says what the search said: its emulator is the same.
-    let [searched, shown] = [&gap.account.held_out[0], &added.held_out[0]];
+    // The study with the effect, calibrated with the same data, agrees with the search, because its emulator is the
+    // same.
+    let [searched, shown] = [&gap.result.held_out[0], &added.held_out[0]];
     assert_eq!(searched.names, shown.names);
     let [searched, shown] = [searched, shown].map(|part| part.proof.all.closed);
     assert!((searched - shown).abs() < 1e-3, "{searched} {shown}");
 
-    // Without a new search the report tells what became of it, and a second run of the study keeps it.
-    let again = stage::run(&study, &mut run, &Silent).unwrap();
+    // Without a new search the report shows the outcome, and a second run of the study keeps it.
+    let again = pipeline::run(&study, &mut run, &Silent).unwrap();
     assert_eq!(again.gap.as_ref().unwrap().added.as_ref(), Some(&added));
-    let summary = summary(&again);
+    let summary = summary_of(&again);
     let told = &summary["gap"];
     assert_eq!(told["effects"][0]["parameters"].as_object().unwrap().len(), 1, "{told:#}");
     assert!(told["held_out"]["lower"].as_f64().unwrap() > 0.0, "{told:#}");

@@ -1,4 +1,4 @@
-//! The entries of the gate: what is counted of each printed uncertainty.
+//! Entries of the gate: what is counted for each printed uncertainty.
 
 use generator::line;
 use lacuna::diagnose::coverage::binomial;
@@ -6,46 +6,46 @@ use serde_json::Value;
 
 use super::lines::Case;
 
-/// How often a printed uncertainty held.
+/// Coverage of a printed uncertainty.
 #[derive(Debug, Clone)]
 pub struct Count {
-    /// The entry.
+    /// Name of the entry.
     pub name: &'static str,
-    /// What was counted.
+    /// Description of what was counted.
     pub what: &'static str,
-    /// How often it should hold.
+    /// Nominal coverage.
     pub nominal: f64,
-    /// Why it is known not to.
+    /// Known reason for a deviation.
     pub open: Option<&'static str>,
-    /// How often it did.
+    /// Number of cases inside.
     pub inside: usize,
-    /// Of how many.
+    /// Number of cases counted.
     pub of: usize,
 }
 
 impl Count {
-    /// The counts that chance allows in 99 % of such counts.
+    /// Counts that 99 % of such experiments give if the coverage is nominal.
     pub fn band(&self) -> [usize; 2] {
         binomial::band(self.of, self.nominal, 0.005)
     }
 
-    /// Whether the count is one of them.
+    /// Returns true if the count is inside the band.
     pub fn holds(&self) -> bool {
         (self.band()[0]..=self.band()[1]).contains(&self.inside)
     }
 }
 
-/// A printed uncertainty with the truth that it should hold.
+/// A printed uncertainty and the truth that it should contain.
 pub struct Entry {
-    /// Its name.
+    /// Name of the entry.
     pub name: &'static str,
-    /// What is counted.
+    /// Description of what is counted.
     pub what: &'static str,
-    /// How often it should hold.
+    /// Nominal coverage.
     pub nominal: f64,
-    /// Why it is known not to, until somebody mends it.
+    /// Known reason for a deviation, as long as it is not fixed.
     pub open: Option<&'static str>,
-    /// Whether it does in a case; `None` where the case says nothing of it.
+    /// Tests a case: true if the uncertainty contains the truth; `None` if the case does not apply.
     pub test: fn(&Case) -> Option<bool>,
 }
 
@@ -64,10 +64,10 @@ fn exact_sd(case: &Case, j: usize) -> f64 {
     case.exact.covariance[j][j].sqrt()
 }
 
-/// Two standard deviations either way hold 95.45 %.
+/// Probability within two standard deviations of a normal distribution.
 const TWO: f64 = 0.954_5;
 
-/// All entries that are counted over straight lines.
+/// All entries that are counted with straight lines.
 pub const LINES: [Entry; 9] = [
     Entry {
         name: "posterior_interval",

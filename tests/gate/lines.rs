@@ -1,40 +1,42 @@
-//! Planted truths: straight lines with normal noise, whose posterior, evidence and predictions have closed forms. The
+//! Known truths: straight lines with normal noise, whose posterior, evidence and predictions have closed forms. The
 //! generator shares no code with the engine.
 
 use std::fs;
 use std::path::Path;
 
 use generator::{line, noise};
-use lacuna::report::summary;
-use lacuna::run::{RunDirectory, Silent};
-use lacuna::stage;
+use lacuna::run::Silent;
+use lacuna_engine::pipeline;
+use lacuna_run::RunDirectory;
 use rayon::prelude::*;
 use serde_json::Value;
 
+use crate::quick::described::summary_of;
 use crate::quick::{load, root};
 
 /// The standard deviation of the noise.
 pub const SD: f64 = 0.5;
-/// Replicates of a case.
+/// Number of replicates of a case.
 const REPLICATES: usize = 4;
 
-/// What a run said of a truth, with the truth.
+/// Result of a run, with the truth.
 pub struct Case {
-    /// The level and the rise.
+    /// True level and slope.
     pub truth: [f64; 2],
     /// The exact posterior.
     pub exact: line::Posterior,
-    /// A replicate that the run has not seen.
+    /// A replicate that was not used in the run.
     pub new: Vec<f64>,
-    /// `summary.json`.
+    /// Content of `summary.json`.
     pub summary: Value,
-    /// The band of a new replicate: lower and upper ends.
+    /// Band of a new replicate: lower and upper ends.
     pub band: (Vec<f64>, Vec<f64>),
-    /// The expected log density of data like the measured ones under the exact prediction from the measured ones, at the truth.
+    /// Expected log density at the truth of data like the measured ones, under the exact prediction from the measured
+    /// ones.
     pub elpd: f64,
 }
 
-/// Draws truths from the priors and runs the study on data of each.
+/// Draws truths from the priors and runs the study on data for each.
 pub fn cases(count: usize, seed: u64) -> Vec<Case> {
     (0..count).into_par_iter().map(|k| case(seed + k as u64)).collect()
 }
@@ -50,12 +52,12 @@ fn case(seed: u64) -> Case {
     let study =
         load(&folder.path().join("study.toml"), &[&format!("study.seed={}", seed % 100_000)]);
     let mut run = RunDirectory::open(&folder.path().join("out")).unwrap();
-    let findings = stage::run(&study, &mut run, &Silent).unwrap();
+    let findings = pipeline::run(&study, &mut run, &Silent).unwrap();
     let band = findings.validation.as_ref().and_then(|v| v.predictive.clone()).unwrap();
-    Case { truth, exact, new, summary: summary(&findings), band, elpd: elpd(truth, &exact) }
+    Case { truth, exact, new, summary: summary_of(&findings), band, elpd: elpd(truth, &exact) }
 }
 
-/// The study with its measurements, and runs at points of the priors.
+/// Writes the study with its measurements, and runs at points drawn from the priors.
 fn write(folder: &Path, data: &[Vec<f64>], random: &mut noise::Source) {
     fs::copy(root().join("tests/gate/study.toml"), folder.join("study.toml")).unwrap();
     fs::write(folder.join("line.csv"), line::table(data)).unwrap();
@@ -64,7 +66,7 @@ fn write(folder: &Path, data: &[Vec<f64>], random: &mut noise::Source) {
     fs::write(folder.join("responses.csv"), responses).unwrap();
 }
 
-/// The expected log predictive density of new data of the same size: at each time the prediction is normal.
+/// Expected log predictive density of new data of the same size: at each time the prediction is normal.
 fn elpd(truth: [f64; 2], exact: &line::Posterior) -> f64 {
     let [[a, b], [_, c]] = exact.covariance;
     let one = |t: &f64| {

@@ -1,65 +1,88 @@
-//! What is printed: the keys of `summary.json`, read from the source that writes them, so that a key which no run of the
-//! tests makes is found too.
+//! The printed keys: those of `summary.json`, from its schema, so that a key which no run of the tests makes is found too.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::fs;
+
+use lacuna_engine::report::{Key, keys, schema};
+use serde::Deserialize;
 
 use crate::quick::root;
 
-/// The files that write keys.
-const FOLDER: &str = "core/src/report/summary";
-
-/// All keys as `file.function.key`, without the keys of tests.
-pub fn keys() -> BTreeSet<String> {
-    let mut keys = BTreeSet::new();
-    let folder = root().join(FOLDER);
-    for entry in fs::read_dir(&folder).unwrap() {
-        let path = entry.unwrap().path();
-        let name = path.file_stem().unwrap().to_string_lossy().into_owned();
-        let text = fs::read_to_string(&path).unwrap();
-        let code = text.split("#[cfg(test)]").next().unwrap_or_default();
-        keys.extend(of_code(code).into_iter().map(|key| format!("{name}.{key}")));
-    }
-    keys
+/// The entries of `tests/gate/printed.toml`, by the path of the key.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Registry {
+    /// The entry of the gate that counts the key.
+    pub counted: BTreeMap<String, String>,
+    /// The file and function of another test that counts the key.
+    pub elsewhere: BTreeMap<String, String>,
+    /// The reason why nobody has counted the key.
+    pub uncounted: BTreeMap<String, String>,
+    /// The reason why a number that is not declared a quantity claims nothing.
+    pub plain: BTreeMap<String, String>,
+    /// An object and the object with the same keys whose entries count for it.
+    pub same: BTreeMap<String, String>,
 }
 
-/// The keys of a source file as `function.key`: string literals before a colon (in `json!`), in the place of an index, and as
-/// the first argument of a call.
-fn of_code(code: &str) -> BTreeSet<String> {
-    let mut keys = BTreeSet::new();
-    let mut function = String::new();
-    for line in code.lines().filter(|line| !line.trim_start().starts_with("//")) {
-        if let Some((_, rest)) = line.split_once("fn ") {
-            function = rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-        }
-        for (at, literal) in literals(line) {
-            let (before, after) =
-                (line[..at].trim_end(), line[at + literal.len() + 2..].trim_start());
-            let is_key = after.starts_with(':')
-                || (before.ends_with('[') && after.starts_with(']'))
-                || (before.ends_with('(') && after.starts_with(','));
-            let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
-            if is_key && !literal.is_empty() && literal.chars().all(plain) {
-                keys.insert(format!("{function}.{literal}"));
-            }
+impl Registry {
+    /// The file.
+    pub fn read() -> Self {
+        let text = fs::read_to_string(root().join("tests/gate/printed.toml")).unwrap();
+        toml::from_str(&text).unwrap()
+    }
+
+    /// All keys that have an entry; one that has two stands twice.
+    pub fn keys(&self) -> Vec<&str> {
+        let lists = [&self.counted, &self.elsewhere, &self.uncounted, &self.plain];
+        lists.into_iter().flat_map(BTreeMap::keys).map(String::as_str).collect()
+    }
+
+    /// The path whose entry counts for a key.
+    pub fn counts_as(&self, path: &str) -> String {
+        let below = |object: &str| path.strip_prefix(object)?.strip_prefix('.').map(str::to_owned);
+        let mut same = self.same.iter().filter_map(|(object, as_in)| Some((below(object)?, as_in)));
+        match same.next() {
+            Some((key, as_in)) => self.counts_as(&format!("{as_in}.{key}")),
+            None => path.to_owned(),
         }
     }
-    keys
+
+    /// The printed claims that have no entry.
+    pub fn missing(&self, printed: &[Key]) -> Vec<String> {
+        let known = self.keys();
+        let claims = printed.iter().filter(|key| key.is_claim).map(|key| self.counts_as(&key.path));
+        claims.filter(|path| !known.contains(&&**path)).collect()
+    }
+
+    /// The entries, and the objects of `same`, that are printed no longer.
+    pub fn gone(&self, printed: &[Key]) -> Vec<String> {
+        let is_there = |path: &str| printed.iter().any(|key| key.path == path);
+        let of_keys = self.keys().into_iter().filter(|path| !is_there(path));
+        let objects = self.same.iter().flat_map(|(object, as_in)| [object, as_in]);
+        let of_objects = objects.map(String::as_str).filter(|path| !is_there(path));
+        of_keys.chain(of_objects).map(str::to_owned).collect()
+    }
 }
 
-/// The string literals of a line with the places where they begin.
-fn literals(line: &str) -> Vec<(usize, &str)> {
-    let quotes: Vec<usize> = line.match_indices('"').map(|(at, _)| at).collect();
-    quotes.chunks_exact(2).map(|pair| (pair[0], &line[pair[0] + 1..pair[1]])).collect()
+/// All keys that `summary.json` can have.
+pub fn printed() -> Vec<Key> {
+    keys(&schema())
 }
 
 #[test]
-fn keys_are_found_wherever_they_are_written() {
-    let code = r#"
-        // "comment": 1
-        fn one() { put("first", json!({ "second": 2, "third": "text" })); }
-        fn two() { value["fourth"] = json!(4); format!("no {}", "key"); }
-    "#;
-    let expected = ["one.first", "one.second", "one.third", "two.fourth"];
-    assert_eq!(of_code(code), expected.iter().map(ToString::to_string).collect());
+fn a_new_claim_needs_an_entry_and_a_new_quantity_none() {
+    let registry = Registry::read();
+    let key = |path: &str, is_claim: bool| Key {
+        path: path.to_owned(),
+        kind: "number".to_owned(),
+        meaning: "A new key.".to_owned(),
+        choices: Vec::new(),
+        is_claim,
+        definition: None,
+    };
+    let new = [key("gap.p.new", true), key("gap.p_after.new", true), key("gap.size", false)];
+    assert_eq!(registry.missing(&new), ["gap.p.new", "gap.p.new"]);
+    assert_eq!(registry.missing(&[key("gap.p_after.score", true)]), Vec::<String>::new());
+    let twice = "gap.held_out_further[].conditions.<scenario>.lower";
+    assert_eq!(registry.counts_as(twice), "gap.held_out.lower");
 }

@@ -1,14 +1,13 @@
-//! What each plugin makes of a small task.
+//! Results of each plugin for a small task.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Scenario, Unit};
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::amend::State;
-use lacuna::plugin::discrepancy::{CommonError, Known};
+use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin, Known};
 use lacuna::plugin::effect::Situation;
 use lacuna::plugin::model::Call;
 use lacuna::plugin::registry::{self, Kind};
@@ -19,13 +18,14 @@ use lacuna::plugin::{
     Target, Term,
 };
 use lacuna::run::{Progress, Silent};
+use lacuna_linalg::Matrix;
 
 use super::{Bits, Made};
 
-/// Plugins that compute nothing, or ask other programs for it: what they give is not the work of this one.
+/// Plugins that compute nothing themselves, or call other programs, so that their results are not their own.
 const OTHERS: [&str; 3] = ["model.external", "model.python", "model.um_bridge"];
 
-/// Options of plugins that have no defaults for all, and of those whose defaults take long.
+/// Options of plugins without complete defaults, and of those whose defaults take long.
 const OPTIONS: [(&str, &str); 46] = [
     (
         "discrepancy.autoregressive",
@@ -99,7 +99,7 @@ const OPTIONS: [(&str, &str); 46] = [
     ("term.relaxation", "toward = \"1\""),
 ];
 
-/// Each plugin of the program with its revision and the hash of what it computes.
+/// Each plugin of the program with its revision and the hash of its results.
 pub fn all() -> BTreeMap<String, Made> {
     let mut found = BTreeMap::new();
     add::<dyn Design>(&mut found, design);
@@ -169,7 +169,7 @@ fn discrepancy(_: &str, discrepancy: &dyn Discrepancy, bits: &mut Bits) {
     let data = Measurements::new(layout(), (0..4).map(replicate).collect());
     let mut rng = Stream::root(8).generator();
     let factor = Matrix::from_fn(16, 2, |_, _| 0.05 * normal(&mut rng));
-    let common = [CommonError { origin: "emulator".into(), factor, predictive: true }];
+    let common = [CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }];
     let slopes = || Ok(Matrix::from_fn(16, 2, |i, j| (0.3 * i as f64 + j as f64).cos()));
     let known = Known { data: &data, common: &common, slopes: &slopes };
     let likelihood = discrepancy.likelihood(&known).unwrap();
@@ -228,7 +228,7 @@ fn reader(name: &str, reader: &dyn Reader, bits: &mut Bits) {
         "netcdf" => "hist_nc4.h",
         _ => "hist_cdf5.h",
     };
-    // What stands in a file; the numbers that it gives a study are those of the stage that reads.
+    // The contents of a file; the numbers read for a study are covered by the read stage.
     let said = match reader.inspect(&samples.join(file)) {
         Ok(contents) => format!("{contents:?}"),
         Err(error) => error.to_string(),
@@ -236,7 +236,7 @@ fn reader(name: &str, reader: &dyn Reader, bits: &mut Bits) {
     bits.text(&said.replace(&samples.display().to_string(), ""));
 }
 
-/// Two correlated coordinates and a third between bounds.
+/// Two correlated coordinates and a third one between bounds.
 struct Three;
 
 impl Target for Three {
@@ -329,7 +329,7 @@ fn target(_: &str, target: &dyn Density, bits: &mut Bits) {
     bits.add(&slope);
 }
 
-/// A term is text until a model of equations takes it up.
+/// A term is text until a model of equations uses it.
 fn term(_: &str, term: &dyn Term, bits: &mut Bits) {
     let unit = |text: &str| Unit::parse(text).unwrap();
     let state = State {

@@ -1,4 +1,4 @@
-//! A Slurm for tests; `start` beside this file has the steps.
+//! A Slurm scheduler for tests; `start` beside this file has the steps.
 
 use std::fs::{self, File};
 use std::net::TcpListener;
@@ -13,12 +13,12 @@ pub struct Slurm {
     folder: TempDir,
 }
 
-/// Whether it keeps accounts.
+/// Configuration of the scheduler.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     Plain,
     Accounting,
-    /// Two nodes, limits of memory, jobs that take the place of others.
+    /// Two nodes, memory limits, preemption.
     Nodes,
 }
 
@@ -36,7 +36,7 @@ fn scripts() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("slurm")
 }
 
-/// Starts one, where that can be; `LACUNA_REQUIRE_SLURM=1` makes it a failure where it cannot.
+/// Starts a scheduler if possible; `LACUNA_REQUIRE_SLURM=1` makes it a failure if not.
 pub fn started(kind: Kind) -> Option<Slurm> {
     let folder = tempfile::tempdir().unwrap();
     let begun = missing(kind).map_or_else(|| start(folder.path(), kind), Err);
@@ -51,7 +51,7 @@ pub fn started(kind: Kind) -> Option<Slurm> {
     }
 }
 
-/// Why it cannot be started here.
+/// Reason why it cannot be started here.
 fn missing(kind: Kind) -> Option<String> {
     let root = Command::new("id").arg("-u").output().is_ok_and(|o| o.stdout == b"0\n");
     if !root {
@@ -90,7 +90,7 @@ fn start(folder: &Path, kind: Kind) -> Result<(), String> {
     }
 }
 
-/// The first of four ports that nobody uses. Tests of one process that ask at the same time get different ones.
+/// The first of four free ports. Tests of one process that call this at the same time get different ones.
 fn free_ports() -> u16 {
     static ASKED: AtomicU16 = AtomicU16::new(0);
     let own = 20_000 + (std::process::id() % 500) as u16 * 40;
@@ -104,12 +104,12 @@ fn stop(folder: &Path) {
 }
 
 impl Slurm {
-    /// The file that says where it is, for the variable `SLURM_CONF`.
+    /// Path of its configuration file, for the variable `SLURM_CONF`.
     pub fn conf(&self) -> PathBuf {
         self.folder.path().join("slurm.conf")
     }
 
-    /// What one of its commands prints.
+    /// Output of one of its commands.
     pub fn ask(&self, program: &str, arguments: &[&str]) -> String {
         let output =
             Command::new(program).args(arguments).env("SLURM_CONF", self.conf()).output().unwrap();

@@ -1,1 +1,1 @@
-//! No library: the tests of the whole are in `main.rs` and `contracts.rs`.
+//! Empty library; the integration tests are in `main.rs` and `contracts.rs`.

@@ -1,25 +1,25 @@
 //! Simulation-based calibration of every sampler with every discrepancy.
 //!
-//! Source: Talts, Betancourt, Simpson, Vehtari and Gelman, *Validating Bayesian inference algorithms with simulation-based
-//! calibration*, arXiv 1804.06788. Parameters and hyperparameters are drawn from their priors, data simulated by the
-//! discrepancy itself; the rank of each drawn value among posterior draws must be uniform. A pair passes when the
-//! chi-square test of its least uniform coordinate has p > 0.01, corrected for the number of coordinates. Of so many
-//! pairs some fail by chance; a pair that does is tried once more on four times as many simulations with other random
-//! numbers, where it must pass: a sound pair fails both with probability 1e-4.
+//! Source: Talts, Betancourt, Simpson, Vehtari and Gelman, *Validating Bayesian inference algorithms with
+//! simulation-based calibration*, arXiv 1804.06788. Parameters and hyperparameters are drawn from their priors, data
+//! simulated by the discrepancy itself; the rank of each drawn value among posterior draws must be uniform. A pair
+//! passes if the chi-square test of its least uniform coordinate has p > 0.01, corrected for the number of coordinates.
+//! With many pairs some fail by chance; such a pair is repeated once with four times as many simulations and other
+//! random numbers, and must then pass: a correct pair fails both with probability 1e-4.
 
 use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Unit};
-use lacuna::linalg::{Matrix, multiply};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
-use lacuna::plugin::discrepancy::{CommonError, Known};
+use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin, Known};
 use lacuna::plugin::forward::Linear;
 use lacuna::plugin::{Discrepancy, Forward, Likelihood, Target, registry};
-use lacuna::posterior::{OfData, Posterior};
+use lacuna_engine::posterior::{OfData, Posterior};
+use lacuna_linalg::{Matrix, multiply};
 use rayon::prelude::*;
 
 use super::runs;
 
-/// Ranks among this many draws fall into [`BINS`] bins of equal probability.
+/// Number of draws among which a value is ranked; the ranks are sorted into [`BINS`] bins of equal probability.
 const DRAWS: usize = 63;
 const BINS: usize = 8;
 const SIMULATIONS: u64 = 96;
@@ -105,7 +105,7 @@ fn parameters() -> Vec<Parameter> {
     vec![parameter("a"), parameter("b")]
 }
 
-/// Three replicates with gaps; the values are replaced by simulated ones.
+/// Three replicates with missing values; the values are replaced by simulated ones.
 fn pattern() -> Measurements {
     let replicate = |r: usize| {
         Replicate::new(
@@ -118,7 +118,7 @@ fn pattern() -> Measurements {
 
 fn likelihood(discrepancy: &dyn Discrepancy, data: &Measurements) -> Box<dyn Likelihood> {
     let emulator = CommonError {
-        origin: "emulator".into(),
+        origin: ErrorOrigin::Emulator,
         factor: Matrix::from_fn(OUTPUTS, 1, |i, _| 0.2 * (1.3 * i as f64).sin()),
         predictive: true,
     };
@@ -127,7 +127,7 @@ fn likelihood(discrepancy: &dyn Discrepancy, data: &Measurements) -> Box<dyn Lik
     discrepancy.likelihood(&known).unwrap_or_else(|stop| panic!("{stop}"))
 }
 
-/// The bin of each coordinate's rank in one simulation.
+/// Bin of each coordinate's rank in one simulation.
 fn bins(sampler: (&str, &str), discrepancy: (&str, &str), stream: &Stream) -> Vec<usize> {
     let built = registry::from_text::<dyn Discrepancy>(discrepancy.0, discrepancy.1);
     let discrepancy = built.unwrap_or_else(|e| panic!("{e}")).plugin;
@@ -152,7 +152,7 @@ fn bins(sampler: (&str, &str), discrepancy: (&str, &str), stream: &Stream) -> Ve
     (0..truth.columns()).map(|j| rank(j) * BINS / (DRAWS + 1)).collect()
 }
 
-/// The corrected p-value of a pair over so many simulations.
+/// Corrected p-value of a pair over `count` simulations.
 fn p_value(sampler: (&str, &str), discrepancy: (&str, &str), count: u64, stream: &Stream) -> f64 {
     let each: Vec<Vec<usize>> =
         (0..count).into_par_iter().map(|k| bins(sampler, discrepancy, &stream.at(k))).collect();
@@ -171,7 +171,7 @@ fn p_value(sampler: (&str, &str), discrepancy: (&str, &str), count: u64, stream:
     (coordinates as f64 * smallest).min(1.0)
 }
 
-/// Every pair that must be calibrated.
+/// Tests every pair of the lists.
 fn judge(samplers: &[(&str, &str)], discrepancies: &[(&str, &str)]) {
     let mut failed = Vec::new();
     for &sampler in samplers {
@@ -191,7 +191,7 @@ fn judge(samplers: &[(&str, &str)], discrepancies: &[(&str, &str)]) {
     assert!(failed.is_empty(), "{}", failed.join("\n"));
 }
 
-/// Every discrepancy, with priors that do not depend on the data.
+/// All discrepancies, with priors that do not depend on the data.
 const DISCREPANCIES: [(&str, &str); 7] = [
     ("gaussian", "variance = { log_normal = [-1.0, 0.7] }"),
     ("gaussian", "variance = { log_normal = [-1.0, 0.7] }\nby = \"sensor\""),
@@ -258,7 +258,7 @@ fn nested() {
     judge(&[("nested", "live = 100")], &DISCREPANCIES);
 }
 
-/// An approximation: calibrated where its Pareto k-hat lets its draws be corrected.
+/// An approximate method: calibrated if its Pareto k-hat allows its draws to be corrected.
 #[test]
 fn variational() {
     judge(&[("variational", "draws = 1000")], &DISCREPANCIES[..3]);

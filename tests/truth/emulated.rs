@@ -1,17 +1,18 @@
-//! Intervals of calibrations through an emulator of few runs hold the truth, at the edges of the prior too.
+//! Coverage of calibrations through an emulator of few runs, including truths at the edges of the prior.
 //!
-//! Truths are drawn from the prior, and data are the model in closed form with independent noise; random numbers are those of
-//! `SplitMix64` (Steele, Lea and Flood, OOPSLA 2014) and Box and Muller, so that nothing of what makes the data is the engine's. The
-//! bounds are the nominal share less 2.58 standard errors of a binomial count over the truths.
+//! Truths are drawn from the prior, and data are the model in closed form with independent noise; random numbers are
+//! those of `SplitMix64` (Steele, Lea and Flood, OOPSLA 2014) and Box and Muller, so that no code of the engine makes
+//! the data. The bounds are the nominal fraction less 2.58 standard errors of a binomial count over the truths.
 
 use std::fmt::Write as _;
 
 use lacuna::data::{Measurements, Observations, Replicate};
 use lacuna::math::moments;
-use lacuna::run::{RunDirectory, Silent};
-use lacuna::stage;
-use lacuna::stage::calibrate::{self, Parts};
-use lacuna::study::resolve;
+use lacuna::run::Silent;
+use lacuna_engine::pipeline;
+use lacuna_engine::stage::calibrate::{self, Parts};
+use lacuna_engine::study::resolve;
+use lacuna_run::{RunDirectory, Stage};
 
 struct Random(u64);
 
@@ -29,7 +30,7 @@ impl Random {
         (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
     }
 
-    /// Three columns, each with one value in every one of `n` equal slices.
+    /// Latin hypercube: three columns, each with one value in every one of `n` equal slices.
     fn latin(&mut self, n: usize) -> Vec<[f64; 3]> {
         let mut all = vec![[0.0; 3]; n];
         for k in 0..3 {
@@ -47,20 +48,21 @@ impl Random {
 
 const OUTPUTS: usize = 30;
 
-/// A front whose place, width and height are unknown.
+/// A front with unknown position, width and height.
 fn front([a, b, c]: [f64; 3]) -> Vec<f64> {
     let (place, width, height) = (0.3 + 0.4 * a, 0.1 + 0.2 * b, 0.5 + c);
     let value = |t: f64| height * ((t - place) / width).tanh() + 0.5 * height * place * t;
     (0..OUTPUTS).map(|i| value(i as f64 / (OUTPUTS - 1) as f64)).collect()
 }
 
-/// A quadratic of the parameters, which an expansion of the second degree holds exactly.
+/// A quadratic function of the parameters, which an expansion of degree two represents exactly.
 fn quadratic([a, b, c]: [f64; 3]) -> Vec<f64> {
     let value = |t: f64| a + b * t + c * (6.0 * t).sin() + 0.3 * a * b * t * t - 0.2 * c * c;
     (0..OUTPUTS).map(|i| value(i as f64 / (OUTPUTS - 1) as f64)).collect()
 }
 
-/// The result of calibrations: for each parameter, if intervals of 50, 90 and 95 % hold it, and its standard deviation.
+/// Counts over calibrations: for each parameter, whether the 50, 90 and 95 % intervals contain it, and its standard
+/// deviation.
 struct Found {
     held: [Vec<bool>; 3],
     widths: Vec<f64>,
@@ -112,7 +114,7 @@ fn calibrations(
     let complaints = checked.complaints();
     let study = checked.study.expect(&complaints);
     let mut run = RunDirectory::open(&folder.path().join("run")).unwrap();
-    let (mut learned, _) = stage::learn(&study, &mut run, &Silent).unwrap();
+    let (mut learned, _) = pipeline::calibrate_emulated(&study, &mut run, &Silent).unwrap();
     let mut found = Found { held: Default::default(), widths: Vec::new() };
     for i in 0..truths {
         let truth = [random.uniform(), random.uniform(), random.uniform()];
@@ -122,12 +124,12 @@ fn calibrations(
         let data = Observations { blocks: vec![Measurements::new(layout, replicates)] };
         let measured = learned.data.value.measured.as_mut().unwrap();
         (measured.read, measured.used, measured.likelihood) = (data.clone(), data.clone(), data);
-        let known = learned.known();
+        let known = learned.problem();
         let parts = Parts::of(&study, known.data.value.measured.as_ref().unwrap(), &known).unwrap();
         let posterior = parts.posterior(&study, &known);
-        let folder = format!("truth-{i}");
+        let folder = Stage::Calibrate.part(&format!("truth-{i}"));
         let kept =
-            calibrate::draw(&study, &posterior, None, &folder, &folder, &mut run, &Silent).unwrap();
+            calibrate::draw(&study, &posterior, None, &folder, &i, &mut run, &Silent).unwrap();
         let draws = kept.value.draws.from_step(200);
         for (k, truth) in truth.iter().enumerate() {
             let sorted = moments::sorted(&draws.pooled(k));
@@ -142,7 +144,8 @@ fn calibrations(
     found
 }
 
-/// Over 12 truths of each of four designs; about half of the truths are within a tenth of an edge in some parameter.
+/// Coverage over 12 truths for each of four designs; about half of the truths are within a tenth of an edge in some
+/// parameter.
 fn holds_the_truth(surrogate: &str) {
     let (designs, truths) = (4, 12);
     let found: Vec<Found> =
@@ -166,7 +169,7 @@ fn intervals_through_a_gaussian_process_of_24_runs_hold_the_truth() {
     holds_the_truth("use = \"gaussian_process\"");
 }
 
-/// Beside the same calibration that takes the emulator as exact, which it is.
+/// Compared with the same calibration that takes the emulator as exact, which it is.
 #[test]
 fn an_excellent_emulator_does_not_widen_the_posterior() {
     let surrogate = "use = \"polynomial_chaos\"\ndegree = { max = 3 }";

@@ -1,18 +1,18 @@
 //! Every sampler on the posteriors of posteriordb.
 //!
-//! A sampler passes when the mean and the standard deviation of every published quantity agree with the reference draws
-//! within three Monte Carlo errors of both sides together. Of a few hundred figures some miss that by chance: a
-//! quantity that does is tried once more in a run with other random numbers, where all must agree again.
+//! A sampler passes if the mean and the standard deviation of every published quantity agree with the reference draws
+//! within three Monte Carlo errors of both combined. Of a few hundred quantities some fail by chance: they are repeated
+//! once with other random numbers, where all must agree.
 
-use lacuna::linalg::Matrix;
 use lacuna::math::moments::{mean, variance};
 use lacuna::math::random::Stream;
-use lacuna::posterior::{Given, Posterior};
+use lacuna_engine::posterior::{Given, Posterior};
+use lacuna_linalg::Matrix;
 
 use super::posteriordb::{self, Reference};
 use super::runs::{self, Estimate, Run};
 
-/// Regressions, series and hierarchical models: twelve posteriors of three to ten unknowns.
+/// Regressions, time series and hierarchical models: twelve posteriors of three to ten unknowns.
 const PLAIN: [&str; 12] = [
     "arK-arK",
     "eight_schools-eight_schools_noncentered",
@@ -28,7 +28,7 @@ const PLAIN: [&str; 12] = [
     "sblri-blr",
 ];
 
-/// What one run says of the published quantities: those that disagree, in words.
+/// Published quantities with which one run disagrees, as text.
 fn disagreements(
     posterior: &posteriordb::Posterior,
     sampler: (&str, &str),
@@ -39,7 +39,7 @@ fn disagreements(
     let target = Posterior::new(&posterior.parameters, given);
     let run = runs::run(&*runs::sampler(sampler.0, sampler.1), &target, stream);
     if run.harvest.as_ref().is_some_and(|harvest| !harvest.doubts.is_empty()) {
-        // A method that says itself that its draws are not to be trusted claims nothing.
+        // A method that itself reports its draws as unreliable makes no claim.
         return Vec::new();
     }
     posterior
@@ -54,7 +54,7 @@ fn disagreements(
         .collect()
 }
 
-/// The fourth moment over the squared variance.
+/// Kurtosis: fourth moment over the squared variance.
 fn kurtosis(run: &Run, function: impl Fn(&[f64]) -> f64) -> f64 {
     let points: Matrix = run.draws.points();
     let values: Vec<f64> = points.iter_rows().map(function).collect();
@@ -64,8 +64,8 @@ fn kurtosis(run: &Run, function: impl Fn(&[f64]) -> f64) -> f64 {
 }
 
 fn judge(reference: &Reference, mean: Estimate, sd: Estimate, tails: f64) -> Option<String> {
-    // The reference's effective number of draws from the published error of its mean; the delta method gives the
-    // error of its standard deviation.
+    // The effective sample size of the reference follows from the published error of its mean; the delta method gives
+    // the error of its standard deviation.
     let draws = (reference.sd / reference.mean_error).powi(2);
     let sd_error = 0.5 * reference.sd * ((tails - 1.0).max(2.0) / draws).sqrt();
     let apart = |found: Estimate, value: f64, error: f64| {

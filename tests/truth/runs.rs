@@ -1,21 +1,20 @@
-//! Whole runs of a sampler on a density, as a study makes them: starts scattered about the best maximum.
+//! Complete runs of a sampler on a density, as in a study: starts scattered around the best maximum.
 
 use lacuna::data::Draws;
 use lacuna::diagnose::{autocorrelation, chains};
-use lacuna::linalg::Matrix;
 use lacuna::math::moments::{mean, variance};
-use lacuna::math::optimise;
 use lacuna::math::random::Stream;
 use lacuna::plugin::sampler::Harvest;
 use lacuna::plugin::{Sampler, Target, registry};
+use lacuna_linalg::Matrix;
 
-/// The draws of one run.
+/// Draws of one run.
 pub struct Run {
-    /// Draws after burn-in and warm-up, one list of points a chain; one chain for a harvest.
+    /// Draws after burn-in and warm-up; a single chain for a harvest.
     pub draws: Draws,
-    /// Whether the chains are walkers of one ensemble.
+    /// True if the chains are walkers of one ensemble.
     pub ensemble: bool,
-    /// What was brought home, by methods whose steps are not draws.
+    /// The harvest, for methods whose steps are not draws.
     pub harvest: Option<Harvest>,
 }
 
@@ -26,26 +25,27 @@ pub fn sampler(name: &str, options: &str) -> Box<dyn Sampler> {
         .plugin
 }
 
-/// Starting points about the largest maximum that is reached from draws of the prior.
+/// Starting points around the largest maximum reached from draws of the prior.
 pub fn starts(target: &dyn Target, chains: usize, stream: &Stream) -> Matrix {
     let candidates = target.prior_draws(200, &stream.named("candidates"));
     let density = target.log_density(&candidates);
     let mut order: Vec<usize> = (0..200).filter(|&i| density[i].is_finite()).collect();
     order.sort_by(|&a, &b| density[b].total_cmp(&density[a]));
     order.truncate(6);
-    let maxima = optimise::maximise(target, &candidates.select_rows(&order));
-    let shape = optimise::laplace(target, &maxima[0].point).unwrap();
-    optimise::scatter(target, &maxima[0].point, &shape, chains, &stream.named("start")).unwrap()
+    let maxima = lacuna_optimise::maximise(target, &candidates.select_rows(&order));
+    let shape = lacuna_optimise::laplace(target, &maxima[0].point).unwrap();
+    lacuna_optimise::scatter(target, &maxima[0].point, &shape, chains, &stream.named("start"))
+        .unwrap()
 }
 
-/// Runs all steps; the first quarter, and at least the warm-up, is left out.
+/// Runs all steps; the first quarter, and at least the warm-up, is dropped.
 pub fn run(sampler: &dyn Sampler, target: &dyn Target, stream: &Stream) -> Run {
     let plan = sampler.plan(target.dimension());
     let points = starts(target, plan.chains, stream);
     run_from(sampler, target, points, stream)
 }
 
-/// The same from given points.
+/// Like [`run`], from given points.
 pub fn run_from(
     sampler: &dyn Sampler,
     target: &dyn Target,
@@ -88,7 +88,7 @@ pub struct Estimate {
 }
 
 impl Run {
-    /// The mean and the standard deviation of a function of the point.
+    /// Mean and standard deviation of a function of the point.
     pub fn moments(&self, function: impl Fn(&[f64]) -> f64) -> (Estimate, Estimate) {
         let d = self.draws.dimension();
         let values: Vec<Vec<f64>> = (0..self.draws.chains)
@@ -101,7 +101,7 @@ impl Run {
             values.iter().map(|c| c.iter().map(|x| (x - centre).powi(2)).collect()).collect();
         let sd = spread.sqrt();
         let of_mean = self.error(&values);
-        // The delta method turns the error of the variance into that of its root.
+        // The delta method converts the error of the variance into that of the standard deviation.
         let of_sd = self.error(&squares) / (2.0 * sd);
         (Estimate { value: centre, error: of_mean }, Estimate { value: sd, error: of_sd })
     }

@@ -17,17 +17,17 @@ fn study() -> PathBuf {
     quick::root().join("configs/um_bridge/study.toml")
 }
 
-/// What least squares gives: with these data flux -18.41, coefficient 0.00191 (Smith 2014, example 7.16, to the digits
-/// printed there), and the figures below by Gauss-Newton iterations in double precision.
+/// Least-squares result: with these data flux -18.41, coefficient 0.00191 (Smith 2014, example 7.16, to the digits
+/// printed there), and the digits below by Gauss-Newton iterations in double precision.
 const LEAST_SQUARES: [(&str, f64, f64); 2] =
     [("flux", -18.414_851_8, 0.139_247_8), ("coefficient", 1.914_321_45e-3, 1.392_989e-5)];
-/// The variance of its residuals, for 13 degrees of freedom.
+/// Residual variance, for 13 degrees of freedom.
 const RESIDUAL: f64 = 0.057_468_3;
 
-/// Means and standard deviations of the posterior against least squares.
+/// Compares means and standard deviations of the posterior with least squares.
 ///
-/// Given the variance the posterior is normal to the extent that the model is linear, so that its covariance is that
-/// of least squares with the posterior mean of the variance in place of the residual variance.
+/// Given the variance the posterior is normal to the extent that the model is linear, so that its covariance is that of
+/// least squares with the posterior mean of the variance in place of the residual variance.
 fn agrees_with_least_squares(summary: &serde_json::Value) {
     assert_eq!(summary["converged"], true);
     let parameters = &summary["parameters"];
@@ -52,10 +52,10 @@ fn the_worked_study_finds_what_least_squares_finds() {
     agrees_with_least_squares(&quick::summary(&out));
 }
 
-/// What is complained about: message, what is expected, what is found, advice; the address taken out.
+/// Problems reported: message, expected, found, advice; without the address.
 fn complaints(settings: &[&str], address: &str) -> Vec<String> {
     let settings: Vec<String> = settings.iter().map(ToString::to_string).collect();
-    let checked = lacuna::study::resolve::load(&study(), &settings);
+    let checked = lacuna_engine::study::resolve::load(&study(), &settings);
     assert!(checked.study.is_none(), "the study is accepted");
     let said = checked.problems.sorted().into_iter().map(|problem| {
         let parts = [&problem.expected, &problem.found].into_iter().flatten().chain(&problem.help);
@@ -99,11 +99,11 @@ fn a_server_that_does_not_fit_is_found_before_anything_runs() {
     });
 }
 
-/// The address of a server that answers everything with the same text.
+/// Address of a server that responds to everything with the same text.
 fn always(body: &'static str) -> String {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
     let address = listener.local_addr().unwrap().to_string();
-    // Ends with the test's process.
+    // The thread ends with the process of the test.
     std::thread::spawn(move || {
         for stream in listener.incoming() {
             let mut stream = stream.unwrap();
@@ -176,8 +176,8 @@ fn a_server_that_dies_stops_the_study_which_goes_on_with_the_next() {
         let ran = quick::run(&study(), &[&url, &retries], folder.path());
         ran.unwrap_or_else(|stop| panic!("{stop}"));
     });
-    // 100 runs in all, and the model once more at the calibrated and at the reference values. What was under way when
-    // the first server stopped may be asked twice.
+    // 100 runs in all, plus the model at the calibrated and at the reference values. Runs in progress when the first
+    // server stopped may be requested twice.
     let (before, after) = [&first, &second].map(|rod| rod.evaluated.load(Ordering::SeqCst)).into();
     assert!(before >= 30 && after <= 102 - 28, "{before} {after}");
 }

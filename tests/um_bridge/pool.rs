@@ -1,4 +1,4 @@
-//! `examples/um_bridge`: three official servers in Python, followed by its README in a folder outside of the project.
+//! `examples/um_bridge`: three official servers in Python, following its README in a folder outside the project.
 
 use std::net::{Ipv4Addr, TcpListener};
 use std::time::{Duration, Instant};
@@ -12,7 +12,7 @@ use crate::readme::Walk;
 
 const FOLDER: &str = "examples/um_bridge";
 
-/// Three ports that nobody uses.
+/// Three free ports.
 fn free_ports() -> [u16; 3] {
     let listeners = [(); 3].map(|()| TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap());
     listeners.map(|listener| listener.local_addr().unwrap().port())
@@ -42,7 +42,7 @@ fn the_study_on_three_servers_goes_as_its_readme_says() {
     }
     walk.follow("The study");
     agrees_with_least_squares(&quick::summary(&walk.path("runs/pool")));
-    // Each of them is asked who it is.
+    // Each server is asked for its information.
     walk.end(1);
     let said = walk.give(&format!("lacuna check {FOLDER}/study.toml"), 2);
     assert!(said.contains(&format!("no server at http://localhost:{}", ports[1])), "{said}");

@@ -1,11 +1,11 @@
-//! Against the official Python package `umbridge`, both ways.
+//! Interoperation with the official Python package `umbridge`, in both directions.
 
 use std::net::{Ipv4Addr, TcpListener};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use lacuna::plugin::model::Gradient;
-use lacuna::stage::simulator::Simulator;
+use lacuna_engine::stage::simulator::Simulator;
 use lacuna_um_bridge::Client;
 
 use super::served::Served;
@@ -20,7 +20,7 @@ struct Python {
 }
 
 impl Python {
-    /// `None` when there is no interpreter and none is required.
+    /// Starts the server; `None` if there is no interpreter and none is required.
     fn start() -> Option<Self> {
         let python = interpreter("umbridge")?;
         let free = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
@@ -48,7 +48,7 @@ impl Drop for Python {
     }
 }
 
-fn gradient(simulator: &Simulator<'_>) -> lacuna::linalg::Matrix {
+fn gradient(simulator: &Simulator<'_>) -> lacuna_linalg::Matrix {
     let gradient: &dyn Gradient = simulator.model.gradient().unwrap();
     simulator.jacobian(&simulator.settings[0], gradient, &[-18.41, 0.00191]).unwrap()
 }
@@ -82,7 +82,7 @@ fn the_worked_study_runs_on_the_official_server() {
     official_client_is_understood(&served.url);
 }
 
-/// What `examples/um_bridge/client.py` prints.
+/// Output of `examples/um_bridge/client.py`.
 fn client(url: &str) -> serde_json::Value {
     let script = quick::root().join("examples/um_bridge/client.py");
     let mut command = Command::new(interpreter("umbridge").unwrap());
@@ -92,7 +92,7 @@ fn client(url: &str) -> serde_json::Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// Every endpoint and the errors, by the package's own client.
+/// Every endpoint and the errors, called by the package's own client.
 const ENDPOINTS: &str = r"
 import sys, umbridge
 url = sys.argv[1]

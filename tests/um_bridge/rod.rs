@@ -1,4 +1,4 @@
-//! The model of `examples/um_bridge/server.py`, and servers of it.
+//! The model of `examples/um_bridge/server.py`, and servers that offer it.
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -12,11 +12,11 @@ use lacuna_um_bridge::{Model, Server};
 /// The heated rod.
 #[derive(Default)]
 pub struct Rod {
-    /// Fluxes below this have no answer.
+    /// Fluxes below this value are rejected.
     pub lowest: Option<f64>,
-    /// The server stops after so many evaluations.
+    /// Number of evaluations after which the server stops.
     pub dies_after: Option<usize>,
-    /// How often it was evaluated.
+    /// Number of evaluations so far.
     pub evaluated: AtomicUsize,
     /// Stops the server.
     pub stopper: Mutex<Option<Stopper>>,
@@ -64,18 +64,18 @@ impl Model for Rod {
     }
 }
 
-/// Serves while `act` acts.
+/// Runs a server while `act` runs.
 pub fn serving<R>(rod: &Rod, act: impl FnOnce(SocketAddr) -> R) -> R {
     serving_at(0, rod, act)
 }
 
-/// The same at a port of one's own.
+/// Like [`serving`], at a given port.
 pub fn serving_at<R>(port: u16, rod: &Rod, act: impl FnOnce(SocketAddr) -> R) -> R {
     let server = Server::bind(Ipv4Addr::LOCALHOST.into(), port).unwrap();
     *rod.stopper.lock().unwrap() = Some(server.stopper());
     std::thread::scope(|scope| {
         let address = server.address();
-        // With its thread the server ends and leaves the port.
+        // The server ends with its thread and releases the port.
         let stopper = server.stopper();
         scope.spawn(move || server.serve(&[rod], 2));
         let outcome = catch_unwind(AssertUnwindSafe(|| act(address)));
@@ -84,7 +84,7 @@ pub fn serving_at<R>(port: u16, rod: &Rod, act: impl FnOnce(SocketAddr) -> R) ->
     })
 }
 
-/// The `--set` argument that puts a study on a server.
+/// The `--set` argument that lets a study use the server.
 pub fn setting(address: SocketAddr) -> String {
     format!("model.url=\"http://{address}\"")
 }

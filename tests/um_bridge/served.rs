@@ -1,12 +1,12 @@
-//! `lacuna serve`, asked by our own client.
+//! `lacuna serve`, called by our own client.
 
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use lacuna::run::arrays;
-use lacuna::stage::simulator::Simulator;
+use lacuna_engine::stage::simulator::Simulator;
+use lacuna_run::arrays;
 use lacuna_um_bridge::Client;
 use lacuna_um_bridge::client::Place;
 use lacuna_um_bridge::protocol::About;
@@ -18,7 +18,7 @@ use crate::quick;
 pub struct Served {
     child: Child,
     pub url: String,
-    /// What it said before it listened.
+    /// Output before it listened.
     pub said: String,
 }
 
@@ -49,7 +49,7 @@ impl Served {
         Client::new(&self.url, Duration::from_secs(60), 0)
     }
 
-    /// Ctrl-C: the exit code.
+    /// Sends Ctrl-C and returns the exit code.
     fn interrupt(mut self) -> Option<i32> {
         let id = self.child.id().to_string();
         assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
@@ -70,7 +70,7 @@ fn about(name: &str) -> About {
 
 const WHOLE: Place = Place { output: 0, input: 0 };
 
-/// A run of the study that `lacuna new study` writes, served.
+/// A served run of the study that `lacuna new study` writes.
 fn finished(folder: &Path) -> Served {
     let (study, out) = (folder.join("study.toml"), folder.join("run"));
     let short = ["sampler.steps=100", "surrogate.degree=6"];
@@ -98,7 +98,7 @@ fn the_posterior_that_is_served_is_the_one_that_was_sampled() {
     for i in [0, 1234, 3999] {
         let point = draws.values[3 * i..3 * (i + 1)].to_vec();
         let value = client.evaluate(&posterior, std::slice::from_ref(&point)).unwrap()[0][0];
-        // The sampler's coordinate is the logarithm of the variance: its density carries the Jacobian.
+        // The sampler's coordinate is the logarithm of the variance: its density includes the Jacobian.
         let expected = densities.values[i] - point[2].ln();
         assert!((value - expected).abs() < 1e-9 * expected.abs(), "{value} {expected}");
     }
@@ -111,7 +111,7 @@ fn the_posterior_that_is_served_is_the_one_that_was_sampled() {
     assert_eq!(served.interrupt(), Some(0));
 }
 
-/// Gradients against differences of values, second derivatives against differences of gradients.
+/// Compares gradients with differences of values, and second derivatives with differences of gradients.
 fn derivatives_agree(client: &Client, model: &About, point: &[f64]) {
     let value = |x: &[f64]| client.evaluate(model, &[x.to_vec()]).unwrap()[0][0];
     let gradient = |x: &[f64]| client.gradient(model, WHOLE, &[x.to_vec()], &[1.0]).unwrap();
@@ -150,7 +150,7 @@ fn an_emulator_answers_where_it_was_fitted() {
     let error = client.evaluate(&emulator, &[vec![2.0, 9.0]]).unwrap_err().to_string();
     let expected = "InvalidInput: `damping` is 9, outside 0.5 to 3 where the emulator was fitted";
     assert!(error.ends_with(expected), "{error}");
-    // At the edge second derivatives are one-sided; those beside it lead there.
+    // At the edge second derivatives are one-sided; values beside it must converge to them.
     let curve = |damping: f64| {
         let weights = [1.0; 20];
         let input = [vec![2.0, damping]];
@@ -211,7 +211,7 @@ fn scenarios_are_asked_for_one_at_a_time() {
     let parts = ["gentle", "middle", "steep"]
         .map(|name| client.evaluate(&of(name), &point).unwrap().concat());
     assert_eq!(parts.concat(), all);
-    // The derivative by gravity of the second record alone, and among those of all.
+    // Derivative by gravity of the second record alone, and as part of all records.
     let along = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
     let whole = client.apply_jacobian(&about("model"), WHOLE, &point, &along).unwrap();
     let middle = client.apply_jacobian(&of("middle"), WHOLE, &point, &along).unwrap();
@@ -241,7 +241,7 @@ fn what_a_finished_run_keeps_needs_no_server() {
     let point = [vec![-18.4, 1.9e-3]];
     assert_eq!(client.evaluate(&about("emulator"), &point).unwrap()[0].len(), 15);
     assert!(client.evaluate(&about("model"), &point).is_err());
-    // A run that is not finished asks the model, and says that it is not there.
+    // An unfinished run calls the model, and reports that the server is not available.
     std::fs::remove_file(out.join("manifest.json")).unwrap();
     let (code, text) = quick::said(quick::command().arg("resume").arg(&out));
     assert!(code == Some(2) && text.contains("the connection is refused"), "{text}");

@@ -1,4 +1,4 @@
-//! What a question costs: evaluates a model of a server at one point, many times.
+//! Cost of a request: evaluates a model of a server at one point, many times.
 //!
 //! `overhead URL MODEL COUNT SIZES CONFIG VALUE...`, such as
 //! `overhead http://localhost:4242 rod 2000 2,1 '{"positions": [10, 66]}' -18.4 0.0019 2.37`

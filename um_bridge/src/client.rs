@@ -1,4 +1,4 @@
-//! Asks a server.
+//! UM-Bridge client.
 
 mod answer;
 mod error;
@@ -15,16 +15,16 @@ use crate::protocol::{
 
 pub use error::Error;
 
-/// The largest answer that is read, in bytes.
+/// Largest response that is read, in bytes.
 const LARGEST: u64 = 1 << 30;
 
-/// The longest wait for a connection.
+/// Longest wait for a connection.
 const CONNECTING: Duration = Duration::from_secs(10);
 
-/// The longest pause before another attempt.
+/// Longest pause before another attempt.
 const PAUSE: Duration = Duration::from_secs(30);
 
-/// A connection to a server; may be used from many threads at a time.
+/// A connection to a server; may be used from many threads at once.
 pub struct Client {
     agent: ureq::Agent,
     url: String,
@@ -32,24 +32,24 @@ pub struct Client {
     retries: u32,
 }
 
-/// A derivative of one output vector by one input vector.
+/// Selects the derivative of one output vector by one input vector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Place {
-    /// Which output vector.
+    /// Index of the output vector.
     pub output: usize,
-    /// Which input vector.
+    /// Index of the input vector.
     pub input: usize,
 }
 
 impl Client {
     /// A client of the server at `url`, such as `http://localhost:4242`.
     ///
-    /// A question that has no answer within `timeout` has none. One that finds no server, or whose connection breaks,
-    /// is asked again so many times, after a quarter of a second, a half, one second and so on.
+    /// A request without a response within `timeout` fails. A request that finds no server, or whose connection breaks,
+    /// is repeated up to `retries` times, after a quarter of a second, half a second, one second and so on.
     pub fn new(url: &str, timeout: Duration, retries: u32) -> Self {
         let config = ureq::Agent::config_builder()
             .http_status_as_error(false)
-            // A model's server is on this machine or beside it; what the environment says of proxies is for the web.
+            // A model's server is on this machine or nearby; the proxy settings of the environment are for the web.
             .proxy(None)
             .timeout_global(Some(timeout))
             .timeout_connect(Some(timeout.min(CONNECTING)))
@@ -59,32 +59,32 @@ impl Client {
         Self { agent: config.new_agent(), url, timeout, retries }
     }
 
-    /// The server's address.
+    /// Address of the server.
     pub fn url(&self) -> &str {
         &self.url
     }
 
-    /// The version of the protocol and the names of the models.
+    /// Version of the protocol and names of the models.
     pub fn info(&self) -> Result<Info, Error> {
         self.patiently(|| self.sent(self.agent.get(self.path("Info")).call()))
     }
 
-    /// What a model can be asked for.
+    /// Operations that a model supports.
     pub fn support(&self, about: &About) -> Result<Support, Error> {
         self.ask::<ModelInfo>("ModelInfo", about).map(|info| info.support)
     }
 
-    /// The length of each input vector.
+    /// Length of each input vector.
     pub fn input_sizes(&self, about: &About) -> Result<Vec<usize>, Error> {
         self.ask::<InputSizes>("InputSizes", about).map(|sizes| sizes.input_sizes)
     }
 
-    /// The length of each output vector.
+    /// Length of each output vector.
     pub fn output_sizes(&self, about: &About) -> Result<Vec<usize>, Error> {
         self.ask::<OutputSizes>("OutputSizes", about).map(|sizes| sizes.output_sizes)
     }
 
-    /// The output vectors at these input vectors.
+    /// Evaluates the output vectors at these input vectors.
     pub fn evaluate(&self, about: &About, input: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, Error> {
         let About { name, config } = about.clone();
         let question = Evaluate { name, input: input.to_vec(), config };
@@ -93,7 +93,7 @@ impl Client {
         vectors.map(|(i, values)| self.numbers(&format!(" of output vector {i}"), values)).collect()
     }
 
-    /// The derivatives of `sens · output` by the input.
+    /// Gradient of `sens · output` by the input.
     pub fn gradient(
         &self,
         about: &About,
@@ -107,7 +107,7 @@ impl Client {
         self.vector("Gradient", &Gradient { name, out_wrt, in_wrt, input, sens, config })
     }
 
-    /// The derivative of the output along the direction `vec` of the input.
+    /// Derivative of the output along the direction `vec` of the input.
     pub fn apply_jacobian(
         &self,
         about: &About,
@@ -121,7 +121,7 @@ impl Client {
         self.vector("ApplyJacobian", &ApplyJacobian { name, out_wrt, in_wrt, input, vec, config })
     }
 
-    /// The derivatives of `sens · output` by the input and along the direction `vec` of the input `second`.
+    /// Second derivative of `sens · output` by the input and along the direction `vec` of the input `second`.
     pub fn apply_hessian(
         &self,
         about: &About,
@@ -154,7 +154,7 @@ impl Client {
         self.numbers("", answer.output)
     }
 
-    /// The values, if all are numbers.
+    /// The values, or an error unless all are numbers.
     fn numbers(&self, of: &str, values: Vec<Option<f64>>) -> Result<Vec<f64>, Error> {
         let number = |(i, value): (usize, Option<f64>)| {
             let reason = || format!("value {i}{of} is not a finite number");
@@ -174,7 +174,7 @@ impl Client {
         self.patiently(|| self.sent(post().send(&text[..])))
     }
 
-    /// Asks again while the connection fails.
+    /// Repeats a request while the connection fails.
     fn patiently<T>(&self, ask: impl Fn() -> Result<T, Error>) -> Result<T, Error> {
         let mut pause = Duration::from_millis(250);
         for _ in 0..self.retries {

@@ -1,12 +1,13 @@
-//! UM-Bridge, the protocol by which a model in any language answers an uncertainty quantification program in any
-//! other: version 1.0, client and server.
+//! UM-Bridge, a protocol through which uncertainty quantification programs call models written in any language: version
+//! 1.0, client and server.
 //!
-//! A model is a function from some vectors to some vectors, with derivatives where it has them. All questions and
-//! answers are JSON over HTTP. Source: Seelinger, Cheng-Seelinger, Davis, Parno and Reinarz, UM-Bridge: Uncertainty
-//! quantification and modeling bridge, Journal of Open Source Software 8 (2023) 4748; the reference
-//! implementation is the Python package `umbridge`.
+//! A model is a function from vectors to vectors, with optional derivatives. All requests and responses are JSON over
+//! HTTP. Source: Seelinger, Cheng-Seelinger, Davis, Parno and Reinarz, UM-Bridge: Uncertainty quantification and
+//! modeling bridge, Journal of Open Source Software 8 (2023) 4748; the reference implementation is the Python package
+//! `umbridge`.
 //!
-//! This crate knows nothing of studies: the plugin `um_bridge` puts a study on the client, `lacuna serve` on the server.
+//! This crate does not depend on studies: the plugin `um_bridge` uses the client for a study's model, `lacuna serve`
+//! uses the server.
 
 pub mod client;
 pub mod protocol;

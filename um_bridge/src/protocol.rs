@@ -1,183 +1,183 @@
-//! What goes over the wire, by the names of the protocol.
+//! Messages of the protocol, with the protocol's names.
 
 use serde::{Deserialize, Serialize};
 
-/// The version of the protocol that this crate speaks.
+/// Version of the protocol that this crate implements.
 pub const VERSION: f64 = 1.0;
 
-/// Settings of a model, as it defines them.
+/// Settings of a model; their meaning is defined by the model.
 pub type Config = serde_json::Map<String, serde_json::Value>;
 
-/// The answer to `GET /Info`.
+/// Response to `GET /Info`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Info {
-    /// The version of the protocol that the server speaks.
+    /// Version of the protocol that the server implements.
     pub protocol_version: f64,
-    /// The names of its models.
+    /// Names of the models.
     pub models: Vec<String>,
 }
 
-/// The question of `POST /ModelInfo`, `/InputSizes` and `/OutputSizes`.
+/// Request to `POST /ModelInfo`, `/InputSizes` and `/OutputSizes`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct About {
-    /// The model's name.
+    /// Name of the model.
     pub name: String,
-    /// Its settings.
+    /// Settings of the model.
     #[serde(default)]
     pub config: Config,
 }
 
-/// The answer to `POST /ModelInfo`.
+/// Response to `POST /ModelInfo`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ModelInfo {
-    /// What the model can be asked for.
+    /// Operations that the model supports.
     pub support: Support,
 }
 
-/// What a model can be asked for.
+/// Operations that a model supports.
 #[expect(clippy::struct_excessive_bools, reason = "the protocol's own four")]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "PascalCase", default)]
 pub struct Support {
-    /// Its outputs.
+    /// Evaluation of the outputs.
     pub evaluate: bool,
-    /// The derivative of a weighted sum of an output by an input.
+    /// Gradient of a weighted sum of an output by an input.
     pub gradient: bool,
-    /// The derivative of an output along a direction of an input.
+    /// Derivative of an output along a direction of an input.
     pub apply_jacobian: bool,
-    /// The derivative of a gradient along a direction of an input.
+    /// Derivative of a gradient along a direction of an input.
     pub apply_hessian: bool,
 }
 
-/// The answer to `POST /InputSizes`.
+/// Response to `POST /InputSizes`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct InputSizes {
-    /// The length of each input vector.
+    /// Length of each input vector.
     pub input_sizes: Vec<usize>,
 }
 
-/// The answer to `POST /OutputSizes`.
+/// Response to `POST /OutputSizes`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct OutputSizes {
-    /// The length of each output vector.
+    /// Length of each output vector.
     pub output_sizes: Vec<usize>,
 }
 
-/// The question of `POST /Evaluate`.
+/// Request to `POST /Evaluate`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Evaluate {
-    /// The model's name.
+    /// Name of the model.
     pub name: String,
-    /// The input vectors.
+    /// Input vectors.
     pub input: Vec<Vec<f64>>,
-    /// The model's settings.
+    /// Settings of the model.
     #[serde(default)]
     pub config: Config,
 }
 
-/// The question of `POST /Gradient`: the derivatives of `sens · output` by an input.
+/// Request to `POST /Gradient`: the gradient of `sens · output` by an input.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Gradient {
-    /// The model's name.
+    /// Name of the model.
     pub name: String,
-    /// Which output vector.
+    /// Index of the output vector.
     pub out_wrt: usize,
-    /// Which input vector.
+    /// Index of the input vector.
     pub in_wrt: usize,
-    /// The input vectors.
+    /// Input vectors.
     pub input: Vec<Vec<f64>>,
-    /// The weight of each value of the output.
+    /// Weight of each value of the output.
     pub sens: Vec<f64>,
-    /// The model's settings.
+    /// Settings of the model.
     #[serde(default)]
     pub config: Config,
 }
 
-/// The question of `POST /ApplyJacobian`: the derivative of an output along a direction of an input.
+/// Request to `POST /ApplyJacobian`: the derivative of an output along a direction of an input.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct ApplyJacobian {
-    /// The model's name.
+    /// Name of the model.
     pub name: String,
-    /// Which output vector.
+    /// Index of the output vector.
     pub out_wrt: usize,
-    /// Which input vector.
+    /// Index of the input vector.
     pub in_wrt: usize,
-    /// The input vectors.
+    /// Input vectors.
     pub input: Vec<Vec<f64>>,
-    /// The direction.
+    /// Direction in the input vector.
     pub vec: Vec<f64>,
-    /// The model's settings.
+    /// Settings of the model.
     #[serde(default)]
     pub config: Config,
 }
 
-/// The question of `POST /ApplyHessian`: the second derivatives of `sens · output` by the first input and, along a
-/// direction, the second.
+/// Request to `POST /ApplyHessian`: the second derivative of `sens · output` by the first input and along a direction
+/// of the second input.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct ApplyHessian {
-    /// The model's name.
+    /// Name of the model.
     pub name: String,
-    /// Which output vector.
+    /// Index of the output vector.
     pub out_wrt: usize,
-    /// Which input vector the answer is by.
+    /// Index of the input vector by which the result is a derivative.
     pub in_wrt1: usize,
-    /// Which input vector the direction is of.
+    /// Index of the input vector to which the direction belongs.
     pub in_wrt2: usize,
-    /// The input vectors.
+    /// Input vectors.
     pub input: Vec<Vec<f64>>,
-    /// The weight of each value of the output.
+    /// Weight of each value of the output.
     pub sens: Vec<f64>,
-    /// The direction.
+    /// Direction in the second input vector.
     pub vec: Vec<f64>,
-    /// The model's settings.
+    /// Settings of the model.
     #[serde(default)]
     pub config: Config,
 }
 
-/// The answer to an evaluation (one vector an output) or a derivative (one vector).
+/// Response to an evaluation (one vector per output) or a derivative (one vector).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Output<T> {
-    /// The values.
+    /// Values.
     pub output: T,
 }
 
-/// An answer that is an error.
+/// Response that reports an error.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Failed {
-    /// What is wrong.
+    /// Description of the error.
     pub error: Fault,
 }
 
-/// What is wrong, as a server says it.
+/// Description of an error by a server.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[error("{kind}: {message}")]
 pub struct Fault {
-    /// What sort of error, such as `InvalidInput`.
+    /// Type of the error, such as `InvalidInput`.
     #[serde(rename = "type")]
     pub kind: String,
-    /// In words.
+    /// Message of the error.
     pub message: String,
 }
 
 /// The server has no model of this name.
 pub const MODEL_NOT_FOUND: &str = "ModelNotFound";
-/// The model cannot be asked for this.
+/// The model does not support this operation.
 pub const UNSUPPORTED_FEATURE: &str = "UnsupportedFeature";
-/// The question is malformed, of the wrong size, or has no answer.
+/// The request is malformed, of the wrong size, or cannot be evaluated.
 pub const INVALID_INPUT: &str = "InvalidInput";
-/// The model's answer is of the wrong size or not finite.
+/// The model's output is of the wrong size or not finite.
 pub const INVALID_OUTPUT: &str = "InvalidOutput";
-/// The model broke.
+/// The model failed.
 pub const INTERNAL_ERROR: &str = "InternalError";
 
 impl Fault {
-    /// A fault of this kind.
+    /// A fault of this type.
     pub fn new(kind: &str, message: impl Into<String>) -> Self {
         Self { kind: kind.to_owned(), message: message.into() }
     }

@@ -1,6 +1,6 @@
-//! Answers clients: HTTP/1.1 with connections that stay open, one thread a connection.
+//! UM-Bridge server: HTTP/1.1 with persistent connections, one thread per connection.
 //!
-//! So many evaluations run at a time as the server is told; further ones wait their turn.
+//! The number of evaluations in parallel is limited; further ones wait for their turn.
 
 mod answer;
 mod connection;
@@ -20,10 +20,10 @@ pub use model::Model;
 
 use turns::Turns;
 
-/// The most connections that are open at a time.
+/// Largest number of open connections.
 const CONNECTIONS: usize = 512;
 
-/// A server whose port is taken and who does not answer yet.
+/// A server that has bound its port and does not respond yet.
 pub struct Server {
     listener: TcpListener,
     address: SocketAddr,
@@ -38,10 +38,10 @@ pub struct Stopper {
 }
 
 impl Stopper {
-    /// The server answers what it was asked, and ends.
+    /// Makes the server complete its pending requests and end.
     pub fn stop(&self) {
         self.stopped.store(true, Ordering::SeqCst);
-        // The server waits for a connection: this is the last one.
+        // The server is blocked waiting for a connection; this one makes it notice the flag.
         let _ = TcpStream::connect_timeout(&self.address, Duration::from_secs(1));
     }
 
@@ -50,7 +50,7 @@ impl Stopper {
     }
 }
 
-/// What all connections share.
+/// Data shared by all connections.
 struct Shared<'a> {
     models: &'a [&'a dyn Model],
     turns: Turns,
@@ -60,7 +60,7 @@ struct Shared<'a> {
 }
 
 impl Server {
-    /// Takes a port of an address; port 0 takes any that is free.
+    /// Binds a port of an address; port 0 takes any free port.
     pub fn bind(host: IpAddr, port: u16) -> io::Result<Self> {
         let listener = TcpListener::bind((host, port))?;
         let address = listener.local_addr()?;
@@ -75,18 +75,18 @@ impl Server {
         Ok(Self { listener, address, stopper })
     }
 
-    /// Where it listens.
+    /// Address at which the server listens.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// What stops it.
+    /// A handle that stops the server.
     pub fn stopper(&self) -> Stopper {
         self.stopper.clone()
     }
 
-    /// Answers questions about these models, so many evaluations at a time, until it is stopped; returns how many
-    /// questions it answered.
+    /// Responds to requests for these models, with at most `at_a_time` evaluations in parallel, until it is stopped;
+    /// returns the number of requests served.
     pub fn serve(&self, models: &[&dyn Model], at_a_time: usize) -> u64 {
         let shared = Shared {
             models,
@@ -101,7 +101,7 @@ impl Server {
                     break;
                 }
                 let Ok(stream) = stream else {
-                    // Too many open files, or a client that is gone already: neither ends the server.
+                    // Too many open files, or a client that has disconnected already: neither ends the server.
                     std::thread::sleep(Duration::from_millis(10));
                     continue;
                 };
@@ -124,7 +124,7 @@ impl Server {
     }
 }
 
-/// The HTTP status of a fault, as the reference implementation has it.
+/// HTTP status of a fault, as in the reference implementation.
 fn status(fault: &Fault) -> u16 {
     use crate::protocol::{INTERNAL_ERROR, INVALID_OUTPUT};
     if [INVALID_OUTPUT, INTERNAL_ERROR].contains(&fault.kind.as_str()) { 500 } else { 400 }

@@ -1,20 +1,20 @@
-//! How fast each discrepancy is: `cargo run --release -p lacuna-bench --bin discrepancies [-- RANK [WORD]]`.
+//! Speed of each discrepancy: `cargo run --release -p lacuna-bench --bin discrepancies [-- RANK [WORD]]`.
 //!
-//! Ten sensors with a hundred times, twenty replicates, three parameters, `RANK` directions of common
-//! errors (30 when it is left away): the founding study's size. Prints one line of JSON for each
-//! discrepancy whose name and options hold `WORD`: microseconds of processor time of a density, of one with its
-//! gradient, and of the same in the compressed form, where there is one.
+//! Ten sensors with a hundred times, twenty replicates, three parameters, `RANK` directions of common errors (default:
+//! 30): the founding study's size. Prints one line of JSON for each discrepancy whose name and options contain `WORD`:
+//! microseconds of processor time for the density, for the density with its gradient, and for both in the compressed
+//! form, if there is one.
 
 use std::error::Error;
 use std::hint::black_box;
 
 use lacuna::data::{Axis, Layout, Measurements, Replicate, Unit};
-use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, normal};
-use lacuna::plugin::discrepancy::{CommonError, Known};
+use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin, Known};
 use lacuna::plugin::forward::Linear;
 use lacuna::plugin::{Discrepancy, registry};
 use lacuna_bench::clock::per_call;
+use lacuna_linalg::Matrix;
 use lacuna_plugins as _;
 use serde_json::{Value, json};
 
@@ -33,7 +33,7 @@ fn main() -> Fallible<()> {
     let word = arguments.next().unwrap_or_default();
     let data = data()?;
     let factor = random(OUTPUTS, rank, 0.1, 2);
-    let error = [CommonError { origin: "emulator".into(), factor, predictive: true }];
+    let error = [CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }];
     let slopes = || Ok(random(OUTPUTS, 3, 1.0, 3));
     let common = if rank > 0 { &error[..] } else { &[] };
     let known = Known { data: &data, common, slopes: &slopes };

@@ -1,19 +1,22 @@
-//! What it costs that a discrepancy and a sampler stand in a library: `cargo run --release -p lacuna-bench --bin dynamic [--
-//! REPEATS]`.
+//! Overhead of a discrepancy and a sampler in a library:
+//! `cargo run --release -p lacuna-bench --bin dynamic [-- REPEATS]`.
 //!
 //! The calibration of the founding study (MAP search and 144,000 evaluations), with the built-in `gaussian` and
-//! `affine_invariant_ensemble` and with the same code in a library that is loaded, in turns. Prints one line of JSON:
-//! the medians of the processor seconds, their ratio, and the quartiles of the ratios of neighbours.
+//! `affine_invariant_ensemble` and with the same code in a loaded library, alternately. Prints one line of JSON: the
+//! medians of the processor seconds, their ratio, and the quartiles of the ratios of neighbouring runs.
 
 use std::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use lacuna::plugin::abi::library;
-use lacuna::run::{RunDirectory, Silent};
-use lacuna::stage::{Learned, calibrate, learn};
-use lacuna::study::{Study, resolve};
+use lacuna::run::Silent;
 use lacuna_bench::clock::timed;
+use lacuna_engine::host::library;
+use lacuna_engine::pipeline::calibrate_emulated;
+use lacuna_engine::stage::calibrate;
+use lacuna_engine::stage::emulated::Emulated;
+use lacuna_engine::study::{Study, resolve};
+use lacuna_run::{RunDirectory, Stage};
 // Without these lines the linker leaves the plugins out, and cargo the library.
 use lacuna_plugins as _;
 use lacuna_twin as _;
@@ -21,11 +24,11 @@ use serde_json::json;
 
 type Fallible<T> = Result<T, Box<dyn Error>>;
 
-/// A study with what its runs have taught.
+/// A study with its fitted emulator.
 struct Side {
     study: Study,
     run: RunDirectory,
-    learned: Learned,
+    learned: Emulated,
 }
 
 fn main() -> Fallible<()> {
@@ -39,7 +42,7 @@ fn main() -> Fallible<()> {
     let mut loaded = side(&[&twins[..], &walkers[..]].concat(), &folder.join("loaded"))?;
     let (mut pairs, mut bits) = (Vec::new(), Vec::new());
     for i in 0..repeats {
-        // Each goes first every other time.
+        // Each variant goes first every other time.
         let first = calibrated(if i % 2 == 0 { &mut own } else { &mut loaded }, i)?;
         let second = calibrated(if i % 2 == 0 { &mut loaded } else { &mut own }, i)?;
         let (a, b) = if i % 2 == 0 { (first, second) } else { (second, first) };
@@ -63,7 +66,7 @@ fn sorted(mut values: Vec<f64>) -> Vec<f64> {
     values
 }
 
-/// The library, which was built with this program.
+/// Path of the library, which was built together with this program.
 fn twin() -> Fallible<PathBuf> {
     let program = std::env::current_exe()?;
     let name =
@@ -77,20 +80,20 @@ fn side(settings: &[&str], out: &Path) -> Fallible<Side> {
     let complaints = checked.complaints();
     let study = checked.study.ok_or(complaints)?;
     let mut run = RunDirectory::open(out)?;
-    let (learned, _) = learn(&study, &mut run, &Silent)?;
+    let (learned, _) = calibrate_emulated(&study, &mut run, &Silent)?;
     Ok(Side { study, run, learned })
 }
 
-/// The processor seconds of one calibration, and the hash of its draws.
+/// Processor seconds of one calibration, and the hash of its draws.
 fn calibrated(side: &mut Side, repeat: usize) -> Fallible<(f64, String)> {
     let Side { study, run, learned } = side;
-    let folder = format!("5-calibrate-{repeat}");
+    let folder = Stage::Calibrate.part(&repeat.to_string());
     let (made, seconds) =
-        timed(|| calibrate::stage(study, &learned.known(), &folder, run, &Silent))?;
+        timed(|| calibrate::stage(study, &learned.problem(), &folder, run, &Silent))?;
     made?;
     let folder = run.stage_folder(&folder);
     let hash = lacuna::run::files::hash_file(&folder.join("draws.nc"))?;
-    // What is kept would be taken the next time.
+    // A kept result would be reused the next time.
     fs::remove_dir_all(&folder)?;
     Ok((seconds, hash))
 }

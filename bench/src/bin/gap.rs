@@ -1,28 +1,28 @@
-//! How fast the gap workflow is: `cargo run --release -p lacuna-bench --bin gap`.
+//! Speed of the gap workflow: `cargo run --release -p lacuna-bench --bin gap`.
 //!
-//! A case of founding size: ten sensors of a hundred times, twenty replicates, three parameters, a polynomial chaos whose error is
-//! of low rank, and an echo that is hidden on one sensor. All effects of the library are looked for. Printed are wall time
-//! and processor time of each stage; say the machine's load with them.
+//! A case of the founding study's size: ten sensors with a hundred times, twenty replicates, three parameters, a
+//! polynomial chaos expansion whose error is of low rank, and an echo hidden on one sensor. All effects of the library
+//! are candidates. Prints wall time and processor time of each stage; quote them together with the load of the machine.
 
 use std::error::Error;
 use std::time::Instant;
 
 use lacuna::data::{Axis, Layout, Layouts, Measurements, Observations, Parameter, Replicate, Unit};
-use lacuna::gap::candidates::proposed;
-use lacuna::gap::experiment::Experiment;
-use lacuna::gap::name::{Options, search, verdict};
-use lacuna::gap::noise::{Around, Noise};
-use lacuna::gap::prove::prove;
-use lacuna::gap::whitener::condensed;
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal};
-use lacuna::plugin::discrepancy::CommonError;
+use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin};
 use lacuna::plugin::effect::Situation;
 use lacuna::plugin::surrogate::Training;
 use lacuna::plugin::{Design, Emulator, Surrogate, registry};
 use lacuna::run::{Progress, Silent};
 use lacuna_bench::clock::timed;
+use lacuna_engine::gap::candidates::proposed;
+use lacuna_engine::gap::experiment::Experiment;
+use lacuna_engine::gap::noise::{Noise, ResponseTangents};
+use lacuna_engine::gap::prove::prove;
+use lacuna_engine::gap::search::{SearchOptions, search, verdict};
+use lacuna_engine::gap::system::whitener::condensed;
+use lacuna_linalg::Matrix;
 use lacuna_plugins as _;
 
 const SENSORS: usize = 10;
@@ -31,7 +31,7 @@ const REPLICATES: usize = 20;
 const HELD_OUT: usize = 5;
 const RUNS: usize = 100;
 
-/// The standard deviation of one replicate's noise; the responses are of order one.
+/// Standard deviation of one replicate's noise; the responses are of order one.
 const NOISE: f64 = 0.05;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -44,7 +44,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let centre = vec![0.5; 3];
     let response = emulator.mean(&Matrix::from_rows(3, [&centre])).row(0).to_vec();
     let whole = Instant::now();
-    let noise = stage("noise", || Noise::of(&experiment, &Around::fixed(&response), None))?;
+    let noise =
+        stage("noise", || Noise::of(&experiment, &ResponseTangents::fixed(&response), None))?;
     experiment.common =
         stage("common errors condensed", || condensed(&experiment, &noise, &response))?;
     println!("  directions of the common error: {}", experiment.common[0].factor.columns());
@@ -53,7 +54,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let candidates = stage("candidates", || proposed(None, &situation))??;
     println!("  candidates: {}", candidates.len());
     for (what, most) in [("a look, without adding", 0), ("search: look, add, look again", 3)] {
-        let options = Options { naming: 0.03, unlisted: 0.02, simulations: 199, most };
+        let options = SearchOptions { naming: 0.03, unlisted: 0.02, simulations: 199, most };
         let starts = [centre.clone()];
         let stream = Stream::root(1);
         let found = stage(what, || search(&experiment, &candidates, &starts, options, &stream))?
@@ -78,7 +79,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A stage, with its times printed.
+/// Runs a stage and prints its times.
 fn stage<T>(what: &str, call: impl FnOnce() -> T) -> Result<T, Box<dyn Error>> {
     let begun = Instant::now();
     let (value, processor) = timed(call)?;
@@ -117,7 +118,7 @@ fn model(point: &[f64]) -> Vec<f64> {
     (0..SENSORS).flat_map(|s| (0..TIMES).map(move |t| value(s, 0.1 * t as f64))).collect()
 }
 
-/// A polynomial chaos with its error by leaving runs out.
+/// A polynomial chaos expansion with its error, estimated by leaving runs out.
 fn emulator(
     layouts: &Layouts,
     parameters: &[Parameter],
@@ -134,10 +135,10 @@ fn emulator(
     let residuals = &emulator.fit_error().residuals;
     let scale = (RUNS as f64).sqrt();
     let factor = Matrix::from_fn(layouts.len(), RUNS, |i, r| residuals[(r, i)] / scale);
-    Ok((emulator, CommonError { origin: "emulator".into(), factor, predictive: true }))
+    Ok((emulator, CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }))
 }
 
-/// Replicates with autoregressive noise and an offset, of a truth with an echo on the fourth sensor.
+/// Replicates with autoregressive noise and an offset, for a truth with an echo on the fourth sensor.
 fn measured(layouts: &Layouts, replicates: std::ops::Range<usize>) -> Observations {
     let mut truth = model(&[0.4, 0.6, 0.5]);
     let (begin, lag) = (3 * TIMES, 17);

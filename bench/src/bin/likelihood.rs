@@ -1,24 +1,23 @@
-//! How fast the posterior is: `cargo run --release -p lacuna-bench --bin likelihood [-- DEGREE [RANK]]`.
+//! Speed of the posterior: `cargo run --release -p lacuna-bench --bin likelihood [-- DEGREE [RANK]]`.
 //!
-//! A problem of the founding study's size (1000 outputs, 20 replicates, an expansion in three parameters, an
-//! emulator's error of some hundred directions), evaluated at the walkers of half a step. Prints one
-//! line of JSON: evaluations per second of processor time, the operations each one takes, and how that compares
-//! with a product of large matrices on the same machine.
+//! A problem of the founding study's size (1000 outputs, 20 replicates, an expansion in three parameters, an emulator's
+//! error with some hundred directions), evaluated at the walkers of half a step. Prints one line of JSON: evaluations
+//! per second of processor time, operations per evaluation, and a comparison with a product of large matrices on the
+//! same machine.
 
 use std::error::Error;
 use std::hint::black_box;
 
 use lacuna::data::{Axis, Layout, Layouts, Measurements, Parameter, Replicate, Unit};
-use lacuna::linalg::{Matrix, multiply};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal, uniform};
-use lacuna::plugin::discrepancy::Known;
-use lacuna::plugin::discrepancy::{CommonError, Discrepancy};
+use lacuna::plugin::discrepancy::{CommonError, Discrepancy, ErrorOrigin, Known};
 use lacuna::plugin::surrogate::{Surrogate, Training};
 use lacuna::plugin::{Emulator, Target};
-use lacuna::posterior::{OfData, Posterior};
 use lacuna::run::{Progress, Silent};
 use lacuna_bench::clock::{per_call, processor_seconds};
+use lacuna_engine::posterior::{OfData, Posterior};
+use lacuna_linalg::{Matrix, multiply};
 use lacuna_plugins::discrepancies::gaussian::Gaussian;
 use lacuna_plugins::surrogates::polynomial_chaos::{Degree, PolynomialChaos, Solver};
 use serde_json::json;
@@ -29,7 +28,7 @@ const OUTPUTS: usize = 1000;
 const REPLICATES: usize = 20;
 const WALKERS: usize = 60;
 const BOX: [[f64; 2]; 3] = [[0.0, 1e6], [1e4, 1.36e4], [1200.0, 2200.0]];
-/// The standard deviation of the replicates.
+/// Standard deviation between the replicates.
 const NOISE: f64 = 5e-6;
 
 fn main() -> Fallible<()> {
@@ -93,7 +92,7 @@ impl Coordinates for Posterior<'_> {
     }
 }
 
-/// The strain of a damped wave that arrives at each sensor at its own time.
+/// Strain of a damped wave that arrives at each sensor at a different time.
 fn response(theta: &[f64]) -> Vec<f64> {
     let [cutoff, density, speed] = [theta[0] / 1e6, theta[1] / 1e4, theta[2] / 1e3];
     let strain = |k: usize| {
@@ -130,7 +129,7 @@ fn layout() -> Fallible<Layout> {
     Ok(Layout { name: "strain".into(), unit: Unit::parse("1")?, axes })
 }
 
-/// All terms of a degree, fitted to half as many runs again.
+/// All terms up to a degree, fitted to 1.5 times as many runs.
 fn emulator(
     parameters: &[Parameter],
     layouts: &Layouts,
@@ -159,16 +158,16 @@ fn measured(emulator: &dyn Emulator, layout: &Layout) -> Measurements {
     Measurements::new(layout.clone(), replicates)
 }
 
-/// An emulator's error in `rank` directions, a fifth of the noise altogether.
+/// An emulator's error in `rank` directions, in total a fifth of the noise.
 fn error(rank: usize) -> Vec<CommonError> {
     let mut rng = Stream::root(5).generator();
     let scale = 0.2 * NOISE / (rank.max(1) as f64).sqrt();
     let factor = Matrix::from_fn(OUTPUTS, rank, |_, _| scale * normal(&mut rng));
-    let error = CommonError { origin: "emulator".to_owned(), factor, predictive: true };
+    let error = CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true };
     if rank == 0 { Vec::new() } else { vec![error] }
 }
 
-/// Billions of operations per second in a product of large matrices on one thread.
+/// Operations per second, in 10^9, of a product of large matrices on one thread.
 fn product_speed() -> Fallible<f64> {
     let size = 1000;
     let matrix =

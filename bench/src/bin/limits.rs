@@ -1,7 +1,7 @@
-//! The founding study against its limits: `cargo run --release -p lacuna-bench --bin limits [-- STUDY]`.
+//! The founding study compared with its limits: `cargo run --release -p lacuna-bench --bin limits [-- STUDY]`.
 //!
-//! Runs the built `lacuna` on a study twice in a temporary folder, from nothing and with its simulations kept, and
-//! prints wall time, peak memory and the time of every stage beside the limit, with the machine's load.
+//! Runs the built `lacuna` on a study twice in a temporary folder, from scratch and with its simulations kept, and
+//! prints wall time, peak memory and the time of every stage beside the limit, with the load of the machine.
 
 use std::error::Error;
 use std::fs;
@@ -51,7 +51,7 @@ fn row(what: &str, value: f64, unit: &str, limit: f64) {
     println!("{what:<24} {value:>9.2} {unit:<4} {verdict}");
 }
 
-/// Runs a study; its wall time in seconds and its peak resident memory in MiB.
+/// Runs a study; returns its wall time in seconds and its peak resident memory in MiB.
 fn run(lacuna: &Path, study: &Path, out: &Path) -> Result<(f64, f64), Box<dyn Error>> {
     let begun = Instant::now();
     let mut command = Command::new(lacuna);
@@ -71,7 +71,7 @@ fn run(lacuna: &Path, study: &Path, out: &Path) -> Result<(f64, f64), Box<dyn Er
     Ok((begun.elapsed().as_secs_f64(), memory))
 }
 
-/// The peak resident memory of a running process so far, in MiB, as Linux tells it.
+/// Peak resident memory of a running process so far, in MiB, as reported by Linux.
 fn resident(child: &Child) -> f64 {
     let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
@@ -79,7 +79,7 @@ fn resident(child: &Child) -> f64 {
     kibibytes.unwrap_or(0.0) / 1024.0
 }
 
-/// The load averages over 1, 5 and 15 minutes.
+/// Load averages over 1, 5 and 15 minutes.
 fn load() -> String {
     let text = fs::read_to_string("/proc/loadavg").unwrap_or_default();
     text.split_whitespace().take(3).collect::<Vec<_>>().join(" ")

@@ -1,7 +1,7 @@
-//! What it costs to ask a model of the user's own: `cargo run --release -p lacuna-bench --bin models`.
+//! Overhead of calling a user's model: `cargo run --release -p lacuna-bench --bin models`.
 //!
-//! Models that do next to nothing are asked many times, one call after another. Printed is the median wall time a
-//! run: these models wait for other processes, whose time is part of the cost. Say the machine's load with it.
+//! Models of negligible cost are called many times, one call after another. Prints the median wall time per run: these
+//! models wait for other processes, whose time is part of the cost. Quote it together with the load of the machine.
 
 use std::error::Error;
 use std::path::Path;
@@ -48,7 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(std::fs::remove_dir_all(&study)?)
 }
 
-/// What equations cost: values, and values with the derivatives by three inputs.
+/// Cost of `equations`: values, and values with the derivatives by three inputs.
 fn equations() -> Result<(), Box<dyn Error>> {
     let free = "state = { x = 1.0, v = 0.0 }\nobserve = 'x'\n\
                 rate = { x = 'v', v = '(-a * v - b * x) / c' }";
@@ -74,7 +74,7 @@ fn equations() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The median times of a run for the response, and for the response with its derivatives, in seconds.
+/// Median times of a run for the response, and for the response with its derivatives, in seconds.
 fn derive(
     model: &dyn Model,
     points: u32,
@@ -118,7 +118,7 @@ fn derive(
     Ok([values, both])
 }
 
-/// The median time of a run, in seconds.
+/// Median time of a run, in seconds.
 fn ask(
     model: &dyn Model,
     study: &Path,
@@ -149,7 +149,7 @@ fn ask(
         }
         seconds.push(begun.elapsed().as_secs_f64() / batch as f64);
     }
-    // The first call starts what the others use.
+    // The first call starts the processes that the others use.
     seconds.remove(0);
     seconds.sort_by(f64::total_cmp);
     Ok(seconds[seconds.len() / 2])

@@ -1,14 +1,14 @@
-//! The samplers' own time an evaluation, on a density of four unknowns that costs next to nothing.
+//! Time per evaluation spent in the samplers themselves, on a density of four unknowns with negligible cost.
 //!
-//! Two figures each: the first half of the steps, with the warm-up, and the second.
+//! Two values each: for the first half of the steps, including the warm-up, and for the second half.
 
 use std::error::Error;
 
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
 use lacuna::plugin::{Sampler, Target};
 use lacuna_bench::clock::timed;
+use lacuna_linalg::Matrix;
 use lacuna_plugins::samplers::adaptive_metropolis::AdaptiveMetropolis;
 use lacuna_plugins::samplers::affine_invariant_ensemble::{AffineInvariantEnsemble, Moves, Update};
 use lacuna_plugins::samplers::delayed_rejection_adaptive_metropolis::DelayedRejectionAdaptiveMetropolis;
@@ -18,7 +18,7 @@ use lacuna_plugins::samplers::metropolis::Metropolis;
 const UNKNOWNS: usize = 4;
 const PRIOR: Distribution = Distribution::Normal([0.0, 1.0]);
 
-/// Independent standard normal numbers.
+/// Independent standard normal variables.
 struct Standard;
 
 impl Target for Standard {

@@ -1,4 +1,4 @@
-//! A plugin that works as it stands.
+//! Skeleton of a working plugin.
 
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::fs;
@@ -7,10 +7,9 @@ use std::path::{Path, PathBuf};
 use lacuna::plugin::registry;
 use lacuna::run::files;
 
-use super::library;
 use super::skeleton::{ALL, Skeleton, kinds};
-use super::tree;
-use crate::{Failure, print};
+use super::{library, tree};
+use crate::{misuse, print};
 
 /// Writes a plugin into the source around the current folder, or into a library of its own.
 pub fn write(
@@ -18,7 +17,7 @@ pub fn write(
     name: &str,
     folder: Option<&Path>,
     source: Option<&Path>,
-) -> Result<(), Failure> {
+) -> anyhow::Result<()> {
     let skeleton = Skeleton::of(kind).ok_or_else(|| {
         let kinds = quoted(kinds());
         wrong(&format!("there is no kind `{kind}` of plugins"), &format!("the kinds are {kinds}"))
@@ -45,8 +44,8 @@ pub fn write(
     }
 }
 
-/// The folder of the SDK, from the root: in the source that is given, or in that from which this program was built.
-fn sdk(source: Option<&Path>) -> Result<PathBuf, Failure> {
+/// Absolute folder of the SDK: in the given source, or in that from which this program was built.
+fn sdk(source: Option<&Path>) -> anyhow::Result<PathBuf> {
     let text = match source {
         Some(source) => format!("{} is not in Lacuna's source", source.display()),
         None => "Lacuna's source, which holds the SDK, is not found".to_owned(),
@@ -57,16 +56,16 @@ fn sdk(source: Option<&Path>) -> Result<PathBuf, Failure> {
     Ok(sdk.canonicalize().map_err(|error| files::cannot_read(&sdk, &error))?)
 }
 
-fn wrong(text: &str, help: &str) -> Failure {
+fn wrong(text: &str, help: &str) -> anyhow::Error {
     let help = if help.is_empty() { String::new() } else { format!("\nhelp: {help}") };
-    Failure::wrong(format!("error: {text}{help}"))
+    misuse(format!("error: {text}{help}"))
 }
 
 fn quoted(names: Vec<&str>) -> String {
     names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 
-fn in_tree(skeleton: &Skeleton, name: &str, tree: &Path) -> Result<(), Failure> {
+fn in_tree(skeleton: &Skeleton, name: &str, tree: &Path) -> anyhow::Result<()> {
     let kind = skeleton.kind;
     refuse_known(kind, name)?;
     let folder = Path::new("plugins").join(skeleton.folder);
@@ -91,7 +90,7 @@ fn in_tree(skeleton: &Skeleton, name: &str, tree: &Path) -> Result<(), Failure> 
         "wrote {file}, and its line in {list}
 
 It works as it stands. Next:
-  1. write what it shall do in the place of what it does; its doc comments are its manual
+  1. replace its behaviour with your own; its doc comments are its manual
   2. cargo fmt --all
   3. cargo test --workspace -- {name}
      cargo test --workspace --test contracts
@@ -104,8 +103,8 @@ It works as it stands. Next:
     Ok(())
 }
 
-/// Refuses the name of a plugin that there is.
-fn refuse_known(kind: &str, name: &str) -> Result<(), Failure> {
+/// Rejects the name of an existing plugin.
+fn refuse_known(kind: &str, name: &str) -> anyhow::Result<()> {
     let known = registry::kinds().into_iter().find(|other| other.name == kind);
     if known.is_some_and(|kind| kind.plugins().iter().any(|plugin| plugin.name == name)) {
         return Err(wrong(&format!("there is a {kind} `{name}` already"), "choose another name"));
@@ -113,7 +112,7 @@ fn refuse_known(kind: &str, name: &str) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The section of a study that chooses a plugin of this kind.
+/// Section of a study that chooses a plugin of this kind.
 fn section(kind: &str) -> String {
     let known = registry::kinds().into_iter().find(|other| other.name == kind);
     known.and_then(|kind| kind.sections.last()).copied().unwrap_or(kind).to_owned()
@@ -124,7 +123,7 @@ fn as_library(
     name: &str,
     folder: &Path,
     tree: Option<&Path>,
-) -> Result<(), Failure> {
+) -> anyhow::Result<()> {
     let kind = skeleton.kind;
     if !skeleton.in_libraries {
         let kinds = ALL.iter().filter(|other| other.in_libraries).map(|other| other.kind);
@@ -149,7 +148,7 @@ fn as_library(
         "wrote {folder}/Cargo.toml and {folder}/src/lib.rs
 
 It works as it stands. Next, in {folder}:
-  1. write what it shall do in the place of what it does; its doc comments are its manual
+  1. replace its behaviour with your own; its doc comments are its manual
   2. cargo test
   3. cargo build --release
   4. load it in a study: `load = [\"{folder}/{built}\"]` in `[plugins]`

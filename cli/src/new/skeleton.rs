@@ -1,16 +1,16 @@
-//! The skeletons of plugins, one a kind: whole plugins whose names are replaced.
+//! Skeletons of plugins, one per kind: complete plugins whose names are replaced.
 //!
-//! They are compiled and tested where the contracts are (`tests/contracts/skeletons.rs`).
+//! They are compiled and tested together with the contracts (`tests/contracts/skeletons.rs`).
 
 /// A skeleton.
 pub struct Skeleton {
-    /// The kind, as a study calls it.
+    /// Kind, as a study names it.
     pub kind: &'static str,
-    /// The trait of the kind, as `register!` calls it.
+    /// Trait of the kind, as `register!` takes it.
     pub kind_trait: &'static str,
-    /// The folder in `plugins/`.
+    /// Folder in `plugins/`.
     pub folder: &'static str,
-    /// Whether a library can bring plugins of this kind.
+    /// True if a library can provide plugins of this kind.
     pub in_libraries: bool,
     text: &'static str,
 }
@@ -27,7 +27,7 @@ macro_rules! skeletons {
     };
 }
 
-/// All of them, by kind.
+/// All skeletons, by kind.
 pub const ALL: [Skeleton; 10] = skeletons![
     "design" "Design" "designs" true,
     "discrepancy" "Discrepancy" "discrepancies" true,
@@ -41,18 +41,18 @@ pub const ALL: [Skeleton; 10] = skeletons![
     "term" "Term" "terms" false,
 ];
 
-/// The kinds that there are skeletons of.
+/// Kinds for which there are skeletons.
 pub fn kinds() -> Vec<&'static str> {
     ALL.iter().map(|skeleton| skeleton.kind).collect()
 }
 
-/// The names that the skeletons have, as a type and as a plugin.
+/// Names in the skeletons, as a type and as a plugin.
 const NAMES: [&str; 2] = ["Skeleton", "skeleton"];
 
-/// Names that no module can have: the words that Rust uses or reserves.
+/// Invalid names of modules: the words that Rust uses or reserves.
 const KEYWORDS: &str = include_str!("keywords.txt");
 
-/// Types that the code means without saying where they come from.
+/// Types that the skeletons use from the prelude, without importing them.
 const PRELUDE: [&str; 13] = [
     "Box", "Clone", "Debug", "Default", "Err", "Iterator", "None", "Ok", "Option", "Result",
     "Some", "String", "Vec",
@@ -64,12 +64,12 @@ impl Skeleton {
         ALL.iter().find(|skeleton| skeleton.kind == kind)
     }
 
-    /// The plugin under a name.
+    /// The source of the plugin under another name.
     pub fn named(&self, name: &str) -> String {
         self.text.replace(NAMES[0], &type_name(name)).replace(NAMES[1], name)
     }
 
-    /// What is wrong with a name of a plugin that is written from this skeleton, and what would be right.
+    /// The fault of a plugin name for this skeleton, and a description of valid names; `None` if the name is valid.
     pub fn fault(&self, name: &str) -> Option<(String, &'static str)> {
         let words = || name.split('_');
         let sound = |word: &str| {
@@ -81,7 +81,7 @@ impl Skeleton {
             return Some((format!("`{name}` is no name of a plugin"), help));
         }
         if KEYWORDS.split_whitespace().any(|word| word == name) {
-            let text = format!("`{name}` is a word of Rust, and no file can be called so");
+            let text = format!("`{name}` is a keyword of Rust and cannot name a module");
             return Some((text, "choose another name"));
         }
         let of_code = type_name(name);
@@ -94,7 +94,7 @@ impl Skeleton {
         None
     }
 
-    /// Whether a word of the code, comments left out, is this one.
+    /// Returns true if the code, without comments, contains the word.
     fn uses(&self, word: &str) -> bool {
         let code = self.text.lines().filter(|line| !line.trim_start().starts_with("//"));
         let is_word = |c: char| c.is_alphanumeric() || c == '_';
@@ -103,7 +103,7 @@ impl Skeleton {
     }
 }
 
-/// The name of the options' type: `random_walk` gives `RandomWalk`.
+/// Name of the options type: `random_walk` gives `RandomWalk`.
 pub fn type_name(name: &str) -> String {
     let word = |word: &str| {
         let mut letters = word.chars();

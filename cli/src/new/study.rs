@@ -1,29 +1,33 @@
-//! A study that runs as it stands.
+//! Skeleton of a study that runs as it is.
 
 use std::path::Path;
 
 use lacuna::run::{Stop, files};
-use lacuna::study::emit;
+use lacuna::text::emit;
+use lacuna_engine::study::language;
 
-use crate::{Failure, print};
+use crate::print;
 
 const STUDY: &str = include_str!("study.toml");
-/// What the skeleton calls itself; the folder's name takes its place.
+/// Name in the skeleton, replaced by that of the folder.
 const NAME: &str = "\"oscillator\"";
 const RUNS: &str = include_str!("runs.csv");
 const RESPONSES: &str = include_str!("responses.csv");
 const MEASURED: &str = include_str!("measured.csv");
 
-/// Makes the folder.
-pub fn write(folder: &Path) -> Result<(), Failure> {
+/// Creates the folder.
+pub fn write(folder: &Path) -> anyhow::Result<()> {
     if folder.exists() {
         let stop = Stop::new(format!("{} is there already", folder.display()));
         return Err(stop.help("choose another name").into());
     }
     let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let named = STUDY.replace(NAME, &emit::string(&name));
+    let schema = language::schema_text();
     let all = [
         ("study.toml", named.as_str()),
+        // Named in the first line of the study, from where editors take it.
+        ("study.schema.json", schema.as_str()),
         ("runs.csv", RUNS),
         ("responses.csv", RESPONSES),
         ("measured.csv", MEASURED),

@@ -1,4 +1,4 @@
-//! The names of skeletons and the places they are written to.
+//! Names of skeletons and the places they are written to.
 
 #![allow(clippy::unwrap_used)]
 
@@ -32,7 +32,7 @@ fn names_are_those_of_modules_and_types() {
         assert_eq!(text, format!("`{name}` is no name of a plugin"));
     }
     for (name, expected) in [
-        ("loop", "`loop` is a word of Rust"),
+        ("loop", "`loop` is a keyword of Rust"),
         ("state", "the type of `state` would be called `State`"),
         ("option", "the type of `option` would be called `Option`"),
     ] {
@@ -57,7 +57,7 @@ fn modules_stand_in_order() {
     for (name, before) in
         [("a", "mod b;"), ("c", "#[cfg(test)]\nmod d;"), ("e", "pub mod f;"), ("g", "\n#[cfg")]
     {
-        // In another block there may be a module of this name: that one is refused.
+        // Another block of the file may declare a module of this name, which is rejected.
         if name == "a" {
             assert_eq!(tree::with_module(text, name), None);
             continue;

@@ -1,48 +1,64 @@
-//! The Cholesky factorisation of symmetric positive definite matrices.
+//! Cholesky factorisation of symmetric positive definite matrices.
 
+use std::ops::Range;
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::{
+    LltError, LltRegularization, cholesky_in_place, cholesky_in_place_scratch,
+};
 use faer::linalg::triangular_inverse::invert_lower_triangular;
-use faer::{Par, Side};
+use faer::{Mat, Par, Spec};
 
 use crate::error::{Error, finite};
-use crate::faer_view::{on_one_thread, view, view_mut};
+use crate::faer_view::{view, view_mut};
 use crate::triangular::{solve_lower, solve_lower_matrix, solve_lower_transposed};
 use crate::{Matrix, vector};
 
-/// `A = L L'` with `L` lower triangular and its diagonal positive.
+/// The factorisation `A = L L'`, with `L` lower triangular and a positive diagonal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cholesky {
     lower: Matrix,
 }
 
 impl Cholesky {
-    /// Factors a symmetric positive definite `n x n` matrix, of which the lower triangle is read.
+    /// Factors a symmetric positive definite `n x n` matrix, of which only the lower triangle is read.
     ///
     /// # Panics
-    /// When the matrix is not square.
+    /// If the matrix is not square.
+    ///
+    /// # Errors
+    /// If an entry is not finite, or the matrix is not positive definite.
     pub fn new(a: &Matrix) -> Result<Self, Error> {
         assert_eq!(a.rows(), a.columns(), "a square matrix");
         finite(a)?;
-        on_one_thread();
-        let factor = view(a).llt(Side::Lower).map_err(|error| match error {
-            faer::linalg::cholesky::llt::factor::LltError::NonPositivePivot { index } => {
-                Error::NotPositiveDefinite { pivot: index }
-            }
-        })?;
-        let l = factor.L();
         let n = a.rows();
-        Ok(Self { lower: Matrix::from_fn(n, n, |i, j| if j <= i { l[(i, j)] } else { 0.0 }) })
+        let mut factor = columns_of_lower(a);
+        let scratch = cholesky_in_place_scratch::<f64>(n, Par::Seq, Spec::default());
+        let mut memory = MemBuffer::new(scratch);
+        let stack = MemStack::new(&mut memory);
+        cholesky_in_place(
+            factor.as_mut(),
+            LltRegularization::default(),
+            Par::Seq,
+            stack,
+            Spec::default(),
+        )
+        .map_err(|LltError::NonPositivePivot { index }| Error::NotPositiveDefinite {
+            pivot: index,
+        })?;
+        Ok(Self { lower: rows_of_lower(&factor) })
     }
 
-    /// The factorisation with this lower factor `L`, its diagonal positive.
+    /// The factorisation with the given lower factor `L`, whose diagonal is positive.
     ///
     /// # Panics
-    /// When the factor is not square.
+    /// If the factor is not square.
     pub fn from_lower(lower: Matrix) -> Self {
         assert_eq!(lower.rows(), lower.columns(), "a square matrix");
         Self { lower }
     }
 
-    /// `n`.
+    /// Size `n` of the matrix.
     pub fn size(&self) -> usize {
         self.lower.rows()
     }
@@ -66,7 +82,7 @@ impl Cholesky {
         solve_lower_transposed(&self.lower, b);
     }
 
-    /// Replaces `b` by `L^-1 b`: the whitened vector, with the unit covariance when `b` has `A`.
+    /// Replaces `b` by `L^-1 b`, which whitens it: if `b` has covariance `A`, the result has unit covariance.
     ///
     /// # Panics
     /// When the sizes differ.
@@ -74,7 +90,7 @@ impl Cholesky {
         solve_lower(&self.lower, b);
     }
 
-    /// `L z`: has covariance `A` when `z` has the unit covariance.
+    /// `L z`: has covariance `A` if `z` has unit covariance.
     ///
     /// # Panics
     /// When the sizes differ.
@@ -126,12 +142,12 @@ impl Cholesky {
         crate::gram_lower(&self.lower_inverse())
     }
 
-    /// The factorisation of `A` bordered by one more row and column, `n^2` operations.
+    /// The factorisation of `A` bordered by one more row and column, in `n^2` operations.
     ///
-    /// `border` holds the new row: `n` entries beside `A` and the new diagonal entry last.
+    /// `border` holds the new row: the `n` entries beside `A`, then the new diagonal entry.
     ///
     /// # Panics
-    /// When `border` has not `n + 1` entries.
+    /// If `border` does not have `n + 1` entries.
     pub fn bordered(&self, border: &[f64]) -> Result<Self, Error> {
         let n = self.size();
         assert_eq!(border.len(), n + 1, "the border has one entry more than the matrix has rows");
@@ -152,6 +168,44 @@ impl Cholesky {
         lower.row_mut(n).copy_from_slice(&row);
         Ok(Self { lower })
     }
+}
+
+/// The lower triangle of a matrix whose rows are contiguous, as one whose columns are; zero above the diagonal.
+fn columns_of_lower(a: &Matrix) -> Mat<f64> {
+    let n = a.rows();
+    let mut copy = Mat::zeros(n, n);
+    for (rows, columns) in tiles_of_lower(n) {
+        for j in columns {
+            let column = copy.col_as_slice_mut(j);
+            for i in rows.start.max(j)..rows.end {
+                column[i] = a[(i, j)];
+            }
+        }
+    }
+    copy
+}
+
+/// The lower triangle of a matrix whose columns are contiguous, as one whose rows are; zero above the diagonal.
+fn rows_of_lower(a: &Mat<f64>) -> Matrix {
+    let n = a.nrows();
+    let mut copy = Matrix::zeros(n, n);
+    for (rows, columns) in tiles_of_lower(n) {
+        for i in rows {
+            let row = copy.row_mut(i);
+            for j in columns.start..columns.end.min(i + 1) {
+                row[j] = a[(i, j)];
+            }
+        }
+    }
+    copy
+}
+
+/// The square tiles, as rows and columns, that cover the lower triangle of an `n x n` matrix. The rows and the columns of a
+/// tile stay in the cache together; a copy of one layout to the other along whole rows would miss it at each entry.
+fn tiles_of_lower(n: usize) -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
+    const SIDE: usize = 32;
+    let range = move |tile: usize| tile * SIDE..((tile + 1) * SIDE).min(n);
+    (0..n.div_ceil(SIDE)).flat_map(move |i| (0..=i).map(move |j| (range(i), range(j))))
 }
 
 #[cfg(test)]
@@ -186,6 +240,21 @@ mod tests {
                         _ => 0.0,
                     };
                     assert!((inverse[(i, j)] - expected).abs() < 1e-10);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_factor_has_the_bits_of_the_solver_of_faer() {
+        for n in [1, 2, 31, 32, 33, 100, 200] {
+            let a = Matrix::from_fn(n, n, |i, j| (-0.1 * i.abs_diff(j) as f64).exp());
+            let solver = view(&a).llt(faer::Side::Lower).unwrap();
+            let lower = Cholesky::new(&a).unwrap().lower;
+            for i in 0..n {
+                for j in 0..n {
+                    let expected = if j <= i { solver.L()[(i, j)] } else { 0.0 };
+                    assert_eq!(lower[(i, j)].to_bits(), expected.to_bits(), "n = {n}, ({i}, {j})");
                 }
             }
         }

@@ -9,16 +9,16 @@ use crate::faer_view::{copied, on_one_thread, view};
 /// `A = V diag(values) V'` with `V` orthogonal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SymmetricEigen {
-    /// The eigenvalues, increasing.
+    /// Eigenvalues, increasing.
     pub values: Vec<f64>,
-    /// `V`, `n x n`: column `j` belongs to value `j`; its largest entry is positive.
+    /// `V`, `n x n`: column `j` is the eigenvector of value `j`; its entry of largest magnitude is positive.
     pub vectors: Matrix,
 }
 
-/// The eigen-decomposition of a symmetric `n x n` matrix, of which the lower triangle is read.
+/// Eigendecomposition of a symmetric `n x n` matrix, of which only the lower triangle is read.
 ///
 /// # Panics
-/// When the matrix is not square.
+/// If the matrix is not square.
 pub fn symmetric_eigen(a: &Matrix) -> Result<SymmetricEigen, Error> {
     assert_eq!(a.rows(), a.columns(), "a square matrix");
     finite(a)?;
@@ -32,7 +32,7 @@ pub fn symmetric_eigen(a: &Matrix) -> Result<SymmetricEigen, Error> {
     Ok(SymmetricEigen { values, vectors })
 }
 
-/// For each column the sign of its first entry of largest size.
+/// For each column, the sign of its entry of largest magnitude (the first one of several).
 pub(crate) fn column_signs(a: &Matrix) -> Vec<f64> {
     let sign = |j: usize| {
         let largest = (0..a.rows())

@@ -1,22 +1,22 @@
-//! Why a factorisation has no answer.
+//! Errors of factorisations.
 
 use std::fmt;
 
 use crate::Matrix;
 
-/// Why a factorisation has no answer.
+/// Reason why a factorisation has no result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Error {
     /// An entry of the input is NaN or infinite.
     NotFinite {
-        /// The row of the first such entry.
+        /// Row of the first such entry.
         row: usize,
-        /// Its column.
+        /// Column of that entry.
         column: usize,
     },
-    /// A Cholesky factorisation met a pivot that is not positive.
+    /// A Cholesky factorisation encountered a pivot that is not positive.
     NotPositiveDefinite {
-        /// The row of that pivot.
+        /// Row of that pivot.
         pivot: usize,
     },
     /// An iterative factorisation did not converge.

@@ -1,4 +1,4 @@
-//! Between [`Matrix`] and the types of `faer`.
+//! Conversions between [`Matrix`] and the types of `faer`.
 
 use faer::{MatMut, MatRef, Par};
 
@@ -9,7 +9,7 @@ pub(crate) fn view(a: &Matrix) -> MatRef<'_, f64> {
     MatRef::from_row_major_slice(a.as_slice(), a.rows(), a.columns())
 }
 
-/// A view to be written.
+/// A mutable view without a copy.
 pub(crate) fn view_mut(a: &mut Matrix) -> MatMut<'_, f64> {
     let (rows, columns) = (a.rows(), a.columns());
     MatMut::from_row_major_slice_mut(a.as_mut_slice(), rows, columns)
@@ -22,8 +22,8 @@ pub(crate) fn copied(a: MatRef<'_, f64>) -> Matrix {
     copy
 }
 
-/// Makes the factorisations of `faer` run on one thread: those of QR, singular values and
-/// eigenvalues have other bits on another number of threads.
+/// Makes the factorisations of `faer` run on one thread: the bits of QR, singular values and eigenvalues depend on the
+/// number of threads.
 pub(crate) fn on_one_thread() {
     faer::set_global_parallelism(Par::Seq);
 }

@@ -1,22 +1,21 @@
-//! Numbers of several points side by side: a loop over terms then does its arithmetic for all of them at
-//! once, whatever the terms look like. No multiplication is fused with an addition, so the bits
-//! are portable and those of a point do not depend on its neighbours.
+//! Values of several points side by side, so that a loop over terms computes all of them at once, whatever the terms.
+//! No multiplication is fused with an addition, so the bits are portable and those of a point do not depend on its
+//! neighbours.
 
 #![allow(clippy::inline_always)]
 
 use pulp::{Arch, Simd, WithSimd};
 
-/// How many points stand side by side.
+/// Number of points side by side.
 pub const LANES: usize = 16;
 
-/// A number of each point.
+/// One value per point.
 pub type Lanes = [f64; LANES];
 
-/// Sums of entries of a table: `out[r] = sum_k weights[k] table[columns[k]]` for `k` in
-/// `starts[r]..starts[r + 1]`, a sparse matrix times the table.
+/// Sparse matrix times a table: `out[r] = sum_k weights[k] table[columns[k]]` for `k` in `starts[r]..starts[r + 1]`.
 ///
 /// # Panics
-/// When there is not one column a weight, not one row an output, or a column is not in the table.
+/// If the numbers of columns and weights differ, `starts` does not fit `out`, or a column is not in the table.
 pub fn sparse_multiply(
     starts: &[usize],
     columns: &[u16],

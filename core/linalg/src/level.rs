@@ -1,5 +1,5 @@
-//! Lines `value - distance * rate` beside a level that falls at the rate 1, from above for positive and from below for
-//! negative values: kernels on slices as in [`vector`](crate::vector).
+//! Lines `value - distance * rate` and a level that falls at rate 1, approaching them from above for positive values
+//! and from below (as its negative) for negative values: kernels on slices as in [`vector`](crate::vector).
 
 #![allow(clippy::inline_always)]
 
@@ -7,14 +7,14 @@ use pulp::{Arch, Simd, WithSimd};
 
 const LANES: usize = 8;
 
-/// Lines side by side.
+/// Lines, given as arrays of equal length.
 #[derive(Debug, Clone, Copy)]
 pub struct Lines<'a> {
-    /// Where they are.
+    /// Value of each line at distance zero.
     pub values: &'a [f64],
-    /// How fast their values fall.
+    /// Rate at which each line falls.
     pub rates: &'a [f64],
-    /// Added to each one's distances: zero, or infinity for lines that are not to be met.
+    /// Added to the distance of each line: zero, or infinity for lines that must not be met.
     pub closed: &'a [f64],
 }
 
@@ -25,13 +25,12 @@ impl Lines<'_> {
     }
 }
 
-/// The line that the level, or its negative, meets first, and how far that is. `scratch` has one entry a line.
+/// The line that the level, or its negative, meets first, and the distance to it. `scratch` has one entry per line.
 ///
-/// A line on which the level does not gain is never met; one that stands at the level, but for round-off, at
-/// once.
+/// A line that the level does not approach is never met; one that equals the level up to round-off is met at once.
 ///
 /// # Panics
-/// When the lengths differ.
+/// If the lengths differ.
 pub fn first_meeting(level: f64, lines: Lines<'_>, scratch: &mut [f64]) -> Option<(usize, f64)> {
     lines.check(scratch);
     Arch::new().dispatch(FirstMeeting { level, lines, scratch })
@@ -50,7 +49,7 @@ fn meeting(level: f64, value: f64, rate: f64, closed: f64) -> f64 {
     closed + if up < down { up } else { down }
 }
 
-/// How long a gap takes to close.
+/// Distance at which a gap closes; infinite if `gain`, the rate at which it shrinks, is not positive.
 #[inline(always)]
 fn closing(gap: f64, gain: f64) -> f64 {
     let distance = (if gap > 0.0 { gap } else { 0.0 }) / gain;
@@ -91,6 +90,7 @@ impl WithSimd for FirstMeeting<'_> {
             least = if lane < least { lane } else { least };
         }
         let mut whole = 0;
+        // The minimum is found without its index, which would prevent vectorisation; a second pass locates it.
         while whole < s.len() && !holds(&s[whole], least) {
             whole += 1;
         }
@@ -100,12 +100,12 @@ impl WithSimd for FirstMeeting<'_> {
     }
 }
 
-/// The least gap between each line and the level while this falls by `distance`, written to `gaps`.
+/// Writes to `gaps` the smallest gap between each line and the level while the level falls by `distance`.
 ///
-/// A gap is concave along the way, so that it is least at one of the ends.
+/// A gap is a concave function of the distance, so its minimum is at one of the ends.
 ///
 /// # Panics
-/// When the lengths differ.
+/// If the lengths differ.
 pub fn least_gaps(level: f64, distance: f64, lines: Lines<'_>, gaps: &mut [f64]) {
     lines.check(gaps);
     Arch::new().dispatch(LeastGaps { level, distance, lines, gaps });
@@ -136,7 +136,7 @@ impl WithSimd for LeastGaps<'_> {
 mod tests {
     use super::*;
 
-    /// Some lines: deterministic, of both signs, every fifth closed.
+    /// Deterministic lines of both signs, every fifth one closed.
     fn lines(n: usize) -> [Vec<f64>; 3] {
         let closed = |i: usize| if i % 5 == 3 { f64::INFINITY } else { 0.0 };
         [

@@ -5,29 +5,28 @@ use pulp::{Arch, Simd, WithSimd};
 
 const LANES: usize = 8;
 
-/// An upper triangular `n x n` matrix to which columns are appended: the shape of factors that are updated one
-/// column at a time.
+/// An upper triangular `n x n` matrix to which columns are appended, as factors that are updated one column at a time.
 ///
 /// Stored in panels of eight columns, each column after the other, without the zeros below the panel.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PackedUpper {
-    /// The panels; columns that are not there yet are zero.
+    /// Panels; columns that do not exist yet are zero.
     lanes: Vec<[f64; LANES]>,
     size: usize,
 }
 
-/// Where panel `p` begins: the panels before have `1, 2, ..., p` lanes a column.
+/// Index of the first entry of panel `p`: the panels before it have `1, 2, ..., p` lanes per column.
 fn start(p: usize) -> usize {
     LANES * p * (p + 1) / 2
 }
 
 impl PackedUpper {
-    /// The matrix without columns.
+    /// A matrix without columns.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// `n`.
+    /// Size `n` of the matrix.
     pub fn size(&self) -> usize {
         self.size
     }
@@ -35,7 +34,7 @@ impl PackedUpper {
     /// Column `j` down to the diagonal: `j + 1` entries.
     ///
     /// # Panics
-    /// When there is no such column.
+    /// If there is no such column.
     pub fn column(&self, j: usize) -> &[f64] {
         assert!(j < self.size, "a column of the matrix");
         let panel = j / LANES;
@@ -43,10 +42,10 @@ impl PackedUpper {
         &self.lanes[first..=first + panel].as_flattened()[..=j]
     }
 
-    /// Appends a column down to the diagonal.
+    /// Appends a column, given down to the diagonal.
     ///
     /// # Panics
-    /// When it has not `n + 1` entries.
+    /// If it does not have `n + 1` entries.
     pub fn push(&mut self, column: &[f64]) {
         assert_eq!(column.len(), self.size + 1, "a column reaches down to the diagonal");
         let panel = self.size / LANES;
@@ -57,11 +56,11 @@ impl PackedUpper {
         self.size += 1;
     }
 
-    /// Writes `U U' x` and returns `|U' x|^2`, reading the matrix once. `x` is handed over with its memory, which
-    /// is filled up with zeros meanwhile.
+    /// Writes `U U' x` to `product` and returns `|U' x|^2`, reading the matrix once. `x` is padded with zeros during
+    /// the call.
     ///
     /// # Panics
-    /// When `x` has not `n` entries.
+    /// If `x` does not have `n` entries.
     pub fn square_multiply(&self, x: &mut Vec<f64>, product: &mut Vec<f64>) -> f64 {
         assert_eq!(x.len(), self.size, "a vector of the matrix' size");
         let padded = self.size.next_multiple_of(LANES);
@@ -98,6 +97,8 @@ impl WithSimd for SquareMultiply<'_> {
             let (left, right) = panel.split_at(4 * length);
             let x = &self.x[..length];
             let product = &mut self.product[..length];
+            // Four columns at a time: their inner products stay in registers until the same columns are combined, so
+            // that the matrix is read once.
             for columns in [left, right] {
                 let weights = inner_products(columns, x);
                 combine(columns, weights, product);
@@ -109,7 +110,7 @@ impl WithSimd for SquareMultiply<'_> {
     }
 }
 
-/// The inner products of four columns, one after the other, with a vector.
+/// Inner products of four consecutive columns with a vector.
 #[inline(always)]
 fn inner_products(columns: &[[f64; LANES]], x: &[[f64; LANES]]) -> [f64; 4] {
     let ((a, b), (c, d)) = halves(columns);
@@ -125,10 +126,11 @@ fn inner_product(column: &[[f64; LANES]], x: &[[f64; LANES]]) -> f64 {
         }
     }
     let [a, b, c, d, e, f, g, h] = sums;
+    // A fixed tree of additions: the bits do not depend on the width of the processor's vectors.
     ((a + e) + (b + f)) + ((c + g) + (d + h))
 }
 
-/// Adds four columns with their weights.
+/// Adds four columns times their weights to `product`.
 #[inline(always)]
 fn combine(columns: &[[f64; LANES]], weights: [f64; 4], product: &mut [[f64; LANES]]) {
     let ((a, b), (c, d)) = halves(columns);

@@ -1,11 +1,11 @@
-//! Products.
+//! Matrix products.
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, Par};
 
+use crate::Matrix;
 use crate::faer_view::{view, view_mut};
-use crate::{Matrix, vector};
 
 /// `A B`: `m x k` by `k x n` gives `m x n`.
 ///
@@ -18,12 +18,10 @@ pub fn multiply(a: &Matrix, b: &Matrix) -> Matrix {
     product
 }
 
-/// Width of a block of columns: wide enough for the products to run at full speed, narrow enough to
-/// skip most zeros.
+/// Width of a block of columns: wide enough for the products to run at full speed, narrow enough to skip most zeros.
 const WIDTH: usize = 96;
 
-/// `A L`: `m x k` by `k x n` gives `m x n`, for `L` with zeros above its diagonal, which are not
-/// multiplied.
+/// `A L`: `m x k` by `k x n` gives `m x n`, for `L` with zeros above its diagonal, which are skipped.
 ///
 /// # Panics
 /// When the inner sizes differ.
@@ -31,6 +29,7 @@ pub fn multiply_lower(a: &Matrix, l: &Matrix) -> Matrix {
     assert_eq!(a.columns(), l.rows(), "inner sizes of a product");
     let (inner, columns) = (l.rows(), l.columns());
     let mut product = Matrix::zeros(a.rows(), columns);
+    // Rows above `first` are zero in this block of columns.
     for first in (0..columns.min(inner)).step_by(WIDTH) {
         let width = WIDTH.min(columns - first);
         matmul(
@@ -67,12 +66,12 @@ pub fn multiply_transposed(a: &Matrix, b: &Matrix) -> Matrix {
     product
 }
 
-/// `A' A`: `m x n` gives a symmetric `n x n`, exactly symmetric.
+/// `A' A`: `m x n` gives `n x n`, exactly symmetric.
 pub fn gram(a: &Matrix) -> Matrix {
     gram_of(a, BlockStructure::Rectangular, BlockStructure::Rectangular)
 }
 
-/// `L' L` for a square `L` with zeros above its diagonal, which are not multiplied; exactly symmetric.
+/// `L' L` for a square `L` with zeros above its diagonal, which are skipped; exactly symmetric.
 ///
 /// # Panics
 /// When `L` is not square.
@@ -102,33 +101,12 @@ fn gram_of(a: &Matrix, left: BlockStructure, right: BlockStructure) -> Matrix {
     product
 }
 
-/// `A x`: `m x n` by `n` gives `m`.
-///
-/// # Panics
-/// When the inner sizes differ.
-pub fn multiply_vector(a: &Matrix, x: &[f64]) -> Vec<f64> {
-    assert_eq!(a.columns(), x.len(), "inner sizes of a product");
-    a.iter_rows().map(|row| vector::dot(row, x)).collect()
-}
-
-/// `A' x`: `m x n` by `m` gives `n`.
-///
-/// # Panics
-/// When the inner sizes differ.
-pub fn transposed_multiply_vector(a: &Matrix, x: &[f64]) -> Vec<f64> {
-    assert_eq!(a.rows(), x.len(), "inner sizes of a product");
-    let mut product = vec![0.0; a.columns()];
-    for (row, &weight) in a.iter_rows().zip(x) {
-        vector::add_scaled(&mut product, weight, row);
-    }
-    product
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{multiply_vector, transposed_multiply_vector};
 
-    /// The definition, entry by entry.
+    /// Reference: the definition, entry by entry.
     fn plain(a: &Matrix, b: &Matrix) -> Matrix {
         Matrix::from_fn(a.rows(), b.columns(), |i, j| {
             (0..a.columns()).map(|k| a[(i, k)] * b[(k, j)]).sum()

@@ -1,4 +1,4 @@
-//! The QR factorisation and least squares.
+//! QR factorisation and least squares.
 
 use crate::error::{Error, finite};
 use crate::faer_view::{copied, on_one_thread, view};
@@ -9,13 +9,13 @@ use crate::{Matrix, transposed_multiply};
 /// `k = min(m, n)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Qr {
-    /// `Q`.
+    /// `Q`, `m x k`.
     pub q: Matrix,
-    /// `R`.
+    /// `R`, `k x n`.
     pub r: Matrix,
 }
 
-/// The thin QR factorisation by Householder reflections; the signs of `R`'s diagonal are free.
+/// Thin QR factorisation by Householder reflections; the signs of `R`'s diagonal are arbitrary.
 pub fn thin_qr(a: &Matrix) -> Result<Qr, Error> {
     finite(a)?;
     on_one_thread();
@@ -27,23 +27,23 @@ fn upper(r: &Matrix) -> Matrix {
     Matrix::from_fn(r.rows(), r.columns(), |i, j| if i <= j { r[(i, j)] } else { 0.0 })
 }
 
-/// The answer of [`least_squares`].
+/// Result of [`least_squares`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeastSquares {
-    /// The coefficients `X`, `n x p`; zero for columns that depend on others.
+    /// Coefficients `X`, `n x p`; zero for columns that depend on others.
     pub solution: Matrix,
-    /// The number of columns of `A` that are independent to working precision.
+    /// Number of columns of `A` that are independent to working precision.
     pub rank: usize,
 }
 
-/// Minimises `|A X - B|` column by column, `A` `m x n`, `B` `m x p`, by a column-pivoted QR.
+/// Minimises `|A X - B|` column by column, with `A` `m x n` and `B` `m x p`, by a column-pivoted QR.
 ///
-/// A column counts as dependent when its pivot is below `max(m, n)` units of round-off of the first
-/// (Golub and Van Loan, Matrix Computations, 5.5.7). The solution is then the basic one: as many non-zero rows as
-/// the rank.
+/// A column counts as dependent if its pivot is below `max(m, n)` times the unit round-off times the first pivot (Golub
+/// and Van Loan, Matrix Computations, 5.5.7). The solution is then the basic one, with as many nonzero rows as the
+/// rank.
 ///
 /// # Panics
-/// When `A` and `B` have different numbers of rows.
+/// If `A` and `B` have different numbers of rows.
 pub fn least_squares(a: &Matrix, b: &Matrix) -> Result<LeastSquares, Error> {
     assert_eq!(a.rows(), b.rows(), "as many equations as right-hand sides");
     finite(a)?;
@@ -60,6 +60,7 @@ pub fn least_squares(a: &Matrix, b: &Matrix) -> Result<LeastSquares, Error> {
     let rank = (0..size).take_while(|&i| r[(i, i)].abs() > tolerance).count();
     let projected = transposed_multiply(&copied(qr.compute_thin_Q().as_ref()), b);
     let leading: Vec<usize> = (0..rank).collect();
+    // Basic solution: the coefficients of dependent columns remain zero.
     let mut basic = projected.select_rows(&leading);
     solve_upper_matrix(&Matrix::from_fn(rank, rank, |i, j| r[(i, j)]), &mut basic);
     let mut solution = Matrix::zeros(a.columns(), b.columns());

@@ -1,5 +1,5 @@
-//! What functions of distance between points are made of. No multiplication is fused with an addition, so
-//! the bits are portable, and those of a point do not depend on its neighbours.
+//! Kernels for functions of the distance between points. No multiplication is fused with an addition, so the bits are
+//! portable, and those of a point do not depend on its neighbours.
 
 #![allow(clippy::inline_always)]
 
@@ -8,11 +8,10 @@ use pulp::{Arch, Simd, WithSimd};
 use crate::Matrix;
 use crate::lanes::LANES;
 
-/// The squared distance of a point from each of some points, the columns of `points` (`dimension x
-/// count`); the first `out.len()` of them.
+/// Squared distances of a point from the first `out.len()` columns of `points` (`dimension x count`).
 ///
 /// # Panics
-/// When the point has another dimension or there are fewer points than `out` is long.
+/// If the dimensions differ or there are fewer points than `out` is long.
 pub fn squared_distances(point: &[f64], points: &Matrix, out: &mut [f64]) {
     assert_eq!(point.len(), points.rows(), "points of one dimension");
     assert!(out.len() <= points.columns(), "as many points as distances");
@@ -71,15 +70,14 @@ impl WithSimd for Polynomials<'_> {
     }
 }
 
-/// The first and the last argument of [`exponentials`] that have a normal value.
+/// Smallest and largest argument of [`exponentials`] whose result is a normal number.
 const RANGE: (f64, f64) = (-708.0, 709.0);
-/// `ln 2` in two parts, the first with zeros at its end, so that its multiples are exact.
+/// `ln 2` in two parts; the first ends in zero bits, so that its integer multiples are exact.
 const LN_2: (f64, f64) = (6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10);
-/// `1.5 * 2^52`: added to a small number it leaves the nearest whole one in the last bits.
+/// `1.5 * 2^52`: the sum with a small number holds the nearest integer in its last bits.
 const SHIFT: f64 = 6_755_399_441_055_744.0;
 
-/// Replaces each number by its exponential to two units of round-off; arguments outside of -708 to 709 count as
-/// the nearer of these.
+/// Replaces each number by its exponential, accurate to two units of round-off; arguments are clamped to -708..709.
 pub fn exponentials(x: &mut [f64]) {
     Arch::new().dispatch(Exponentials { x });
 }
@@ -118,6 +116,8 @@ fn exponential(x: f64) -> f64 {
     ];
     let above = if x < RANGE.0 { RANGE.0 } else { x };
     let x = if above > RANGE.1 { RANGE.1 } else { above };
+    // Adding and subtracting `SHIFT` rounds to the nearest integer without a branch or a call, so that the loop
+    // vectorises.
     let shifted = x * std::f64::consts::LOG2_E + SHIFT;
     let n = shifted - SHIFT;
     let r = (x - n * LN_2.0) - n * LN_2.1;

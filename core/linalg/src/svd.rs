@@ -1,4 +1,4 @@
-//! Singular values.
+//! Singular value decomposition.
 
 use crate::Matrix;
 use crate::eigen::{column_signs, scale_column};
@@ -9,15 +9,15 @@ use crate::faer_view::{copied, on_one_thread, view};
 /// `k = min(m, n)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Svd {
-    /// `U`, its columns signed so that those of `V` have a positive largest entry.
+    /// `U`, `m x k`, with the signs that make the entry of largest magnitude in each column of `V` positive.
     pub u: Matrix,
-    /// The singular values, decreasing.
+    /// Singular values, decreasing.
     pub values: Vec<f64>,
-    /// `V`.
+    /// `V`, `n x k`.
     pub v: Matrix,
 }
 
-/// The thin singular value decomposition.
+/// Thin singular value decomposition.
 pub fn thin_svd(a: &Matrix) -> Result<Svd, Error> {
     finite(a)?;
     on_one_thread();

@@ -92,7 +92,7 @@ mod tests {
     #[test]
     fn solutions_give_back_the_right_hand_sides() {
         let n = 37;
-        // The other triangle holds NaN: it must not be read.
+        // The other triangle holds NaN to prove that it is not read.
         let entry = |i: usize, j: usize| {
             if i == j { 3.0 + (i as f64).sin() } else { ((i * 31 + j) as f64).cos() / 8.0 }
         };

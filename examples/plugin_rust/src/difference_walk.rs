@@ -5,24 +5,24 @@ use lacuna_plugin::math::random::{Stream, below, normal, permutation, uniform};
 use lacuna_plugin::plugin::sampler::{Plan, State};
 use lacuna_plugin::plugin::{Component, Context, Sampler, Target};
 use lacuna_plugin::run::Stop;
-use lacuna_plugin::study::Complaints;
+use lacuna_plugin::text::Complaints;
 use rand::Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Difference walk: many walkers, each of which jumps by the difference between two others.
 ///
-/// The jumps take the shape of the ensemble, so that nothing has to be tuned to the scales and
-/// correlations of the unknowns.
+/// The jumps have the shape of the ensemble, so that no tuning to the scales and correlations of the unknowns is
+/// needed.
 ///
-/// Reference: ter Braak, Statistics and Computing 16 (2006) 239. The built-in `affine_invariant_ensemble` has
-/// the same as one of its moves.
+/// Reference: ter Braak, Statistics and Computing 16 (2006) 239. The built-in `affine_invariant_ensemble` has this move
+/// as one of several.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DifferenceWalk {
-    /// The number of walkers: at least four times the number of unknowns.
+    /// Number of walkers, at least four times the number of unknowns.
     pub walkers: usize,
-    /// The number of steps of each walker.
+    /// Number of steps of each walker.
     pub steps: usize,
 }
 
@@ -64,7 +64,7 @@ impl Sampler for DifferenceWalk {
         Ok(State { points, log_density, accepted, evaluations: count as u64, memory })
     }
 
-    /// Each half of the walkers moves by differences within the other half, which stands still.
+    /// Each half of the walkers moves by differences within the other half, which is fixed meanwhile.
     fn step(&self, target: &dyn Target, state: &mut State, stream: &Stream) -> Result<(), Stop> {
         let mut rng = stream.generator();
         state.accepted.fill(false);
@@ -90,7 +90,7 @@ fn jump(
         let first = below(rng, others.len());
         let second = (first + 1 + below(rng, others.len() - 1)) % others.len();
         let [a, b] = [first, second].map(|k| state.points.row(others[k]));
-        // A length that varies a little keeps the jumps off a lattice.
+        // A slightly random length keeps the jumps from being confined to a lattice.
         let length = scale * (1.0 + 0.1 * normal(rng));
         for ((x, a), b) in points.row_mut(i).iter_mut().zip(a).zip(b) {
             *x += length * (a - b);

@@ -1,6 +1,6 @@
 //! A library of plugins: a discrepancy and a sampler.
 //!
-//! Each is written as one inside the tree; the last lines export both.
+//! Each is written like a plugin in the source tree; the last lines export both.
 
 mod difference_walk;
 mod matern;

@@ -9,24 +9,24 @@ use lacuna_plugin::math::random::{Stream, normal};
 use lacuna_plugin::plugin::discrepancy::{Discrepancy, Known, Likelihood, VariancePart};
 use lacuna_plugin::plugin::{Component, Context, Fact, Hyperparameter};
 use lacuna_plugin::run::Stop;
-use lacuna_plugin::study::Complaints;
+use lacuna_plugin::text::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A smooth bias of known size beside known noise.
 ///
-/// All replicates share one bias, a Gaussian process along the last axis with the covariance function
-/// `sd² (1 + √3 d / length) exp(-√3 d / length)` (Matérn of smoothness 3/2; Rasmussen and Williams, Gaussian Processes for
-/// Machine Learning (2006), equation 4.17); curves of different sensors are independent. Each measured value has
-/// independent normal noise besides.
+/// The bias is common to all replicates: a Gaussian process along the last axis with the covariance function
+/// `sd² (1 + √3 d / length) exp(-√3 d / length)` (Matérn with smoothness 3/2; Rasmussen and Williams, Gaussian
+/// Processes for Machine Learning (2006), equation 4.17); curves of different sensors are independent. In addition,
+/// each measured value has independent normal noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Matern {
-    /// The standard deviation of the bias, in the unit of the response.
+    /// Standard deviation of the bias, in the unit of the response.
     pub sd: f64,
-    /// The length over which the bias changes, in the unit of the last axis.
+    /// Correlation length of the bias, in the unit of the last axis.
     pub length: f64,
-    /// The standard deviation of one measured value, in the unit of the response.
+    /// Standard deviation of the noise of one measured value, in the unit of the response.
     pub noise: f64,
 }
 
@@ -42,7 +42,7 @@ impl Component for Matern {
 }
 
 impl Matern {
-    /// The covariance of the bias at two outputs.
+    /// Covariance of the bias at two outputs.
     fn covariance(&self, layout: &Layout, i: usize, j: usize) -> f64 {
         let Some(axis) = layout.axes.last() else { return self.sd * self.sd };
         let (curve, other) = (i / axis.len(), j / axis.len());
@@ -62,18 +62,18 @@ impl Discrepancy for Matern {
     }
 }
 
-/// The likelihood: everything is known, so that it has no unknowns of its own.
+/// The likelihood: everything is known, so it has no unknowns.
 struct MaternLikelihood {
     data: Measurements,
-    /// The outputs that were measured, and the means of their values.
+    /// Indices of the measured outputs, and the means of their values.
     measured: Vec<usize>,
     means: Vec<f64>,
-    /// The factor of the covariance of the means.
+    /// Cholesky factor of the covariance of the means.
     factor: Cholesky,
-    /// What does not depend on the response.
+    /// Part of the log-likelihood that does not depend on the response.
     constant: f64,
     noise: f64,
-    /// A factor of the covariance of what all replicates share and a new one has.
+    /// Factor of the covariance that all replicates, including a new one, have in common.
     shared: Matrix,
 }
 
@@ -110,7 +110,7 @@ impl MaternLikelihood {
             constant -= 0.5 * ((count - 1.0) * (TAU * variance).ln() + count.ln() + summary.scatter / variance);
         }
         let bias = Matrix::from_fn(outputs, outputs, |i, j| {
-            // With round-off the covariance of a smooth bias is not positive.
+            // The covariance of a smooth bias is singular to round-off; the small diagonal makes it positive definite.
             plugin.covariance(layout, i, j) + if i == j { 1e-10 * plugin.sd * plugin.sd } else { 0.0 }
         });
         let bias = Cholesky::new(&bias).map_err(|e| Stop::new(format!("the covariance of the bias: {e}")))?;
@@ -126,7 +126,7 @@ impl MaternLikelihood {
         Ok(Self { data, measured, means, factor, constant, noise, shared })
     }
 
-    /// Residual and weighted residual of the means.
+    /// Residuals of the means, and residuals multiplied by the inverse covariance.
     fn residuals(&self, response: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let residual: Vec<f64> = self.measured.iter().zip(&self.means).map(|(&i, y)| y - response[i]).collect();
         let mut weighted = residual.clone();
@@ -157,10 +157,10 @@ impl Likelihood for MaternLikelihood {
         let shared = self.shared.iter_rows().map(|row| dot(row, row)).collect();
         vec![
             VariancePart {
-                origin: "measurement".to_owned(),
+                origin: "measurement".into(),
                 variance: vec![self.noise * self.noise; response.len()],
             },
-            VariancePart { origin: "model_form".to_owned(), variance: shared },
+            VariancePart { origin: "model_form".into(), variance: shared },
         ]
     }
 

@@ -5,41 +5,41 @@ mod rule;
 mod tests;
 
 use lacuna::data::{Parameter, Unit};
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::{Component, Context, Design};
 use lacuna::run::Stop;
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
+use lacuna_linalg::Matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use rule::{Nodes, Rule};
-
 use crate::surrogates::polynomial_chaos::{Coordinate, Family, Recurrence};
 
-/// The nodes of a Gauss rule, for a `polynomial_chaos` surrogate with `solver = "quadrature"`.
+pub use rule::{Nodes, Rule};
+
+/// Nodes of a Gauss rule, for a `polynomial_chaos` surrogate with `solver = "quadrature"`.
 ///
-/// The first runs are the nodes; runs beyond them are random points, which the surrogate can keep aside for
-/// validation: with 64 nodes, `runs = 80` here and `training = 64`, `validation = 16` in `[surrogate]`. A rule of level
-/// `l` integrates polynomials of total degree up to `2 l + 1` exactly, so that it finds an expansion of degree
-/// `l`. Good for smooth responses of few parameters; a run that fails cannot be left out.
+/// The first runs are the nodes; further runs are random points, which the surrogate can hold out for validation:
+/// with 64 nodes, `runs = 80` here and `training = 64`, `validation = 16` in `[surrogate]`. A rule of level `l`
+/// integrates polynomials of total degree up to `2 l + 1` exactly and so determines an expansion of degree `l`. It
+/// suits smooth responses of few parameters; no run may fail, because every node has its weight.
 ///
-/// References: Golub and Welsch, Mathematics of Computation 23 (1969) 221; Novak and Ritter, Numerische Mathematik
-/// 75 (1996) 79.
+/// References: Golub and Welsch, Mathematics of Computation 23 (1969) 221; Novak and Ritter, Numerische Mathematik 75
+/// (1996) 79.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Quadrature {
-    /// How the parameters' rules make one.
+    /// Combination of the one-dimensional rules of the parameters.
     pub rule: Rule,
-    /// The level: `level + 1` nodes of each parameter in the tensor rule. The largest with no more nodes
-    /// than runs when not given.
+    /// Level of the rule: the tensor rule has `level + 1` nodes per parameter. Default: the highest level with no
+    /// more nodes than runs.
     pub level: Option<usize>,
-    /// The polynomials of the rule; the same as the surrogate's `basis`.
+    /// Polynomials of the rule; must equal the surrogate's `basis`.
     pub basis: Family,
 }
 
-/// Levels beyond this are not looked for.
+/// Number of levels that are tried if none is given.
 const MOST_LEVELS: usize = 100;
 
 impl Quadrature {
@@ -51,7 +51,8 @@ impl Quadrature {
         parameters.iter().map(|p| Coordinate::new(self.basis, p, level + 1)).collect()
     }
 
-    /// The rule with no more nodes than runs; none without runs or where one node has no place.
+    /// Returns the rule of the given level, or else the largest one with no more nodes than runs; `None` if not even
+    /// one node fits.
     fn rule(
         &self,
         parameters: &[Parameter],
@@ -66,7 +67,8 @@ impl Quadrature {
         let Some(level) = self.level else {
             let mut found = None;
             for level in 0..MOST_LEVELS {
-                // A law with few moments ends the search; without the first level it has none.
+                // Finitely many moments limit the level: a distribution that lacks them ends the search, and is an
+                // error at the first level.
                 match of_level(level, runs) {
                     Ok(Some(rule)) => found = Some(rule),
                     Err(fault) if level == 0 => return Err(fault),
@@ -101,7 +103,7 @@ impl Component for Quadrature {
 
 impl Design for Quadrature {
     fn points(&self, count: usize, dimension: usize, stream: &Stream) -> Result<Matrix, Stop> {
-        // Without laws the coordinates themselves are uniform.
+        // Without distributions the coordinates themselves are uniform.
         let parameter = |i: usize| Parameter {
             name: format!("coordinate {}", i + 1),
             symbol: String::new(),
@@ -126,7 +128,7 @@ impl Design for Quadrature {
             if let Some((coordinates, nodes)) = &rule {
                 for node in nodes.points.iter_rows() {
                     let unit = |((z, c), p): ((&f64, &Coordinate), &Parameter)| {
-                        // Inside the open cube, however far out the node lies.
+                        // The clamp keeps nodes far out in the tail inside the open cube.
                         p.design.cdf(c.parameter(*z)).clamp(f64::MIN_POSITIVE, 1.0 - 1e-16)
                     };
                     let place: Vec<f64> =
@@ -143,7 +145,8 @@ impl Design for Quadrature {
         Ok(points)
     }
 
-    /// The nodes stay; what is added are random points, as behind the nodes of any design of this kind.
+    /// Keeps the nodes and adds random points, like those behind the nodes of any design of this kind. Fails if more
+    /// runs would change the rule.
     fn extend(
         &self,
         parameters: &[Parameter],
@@ -153,8 +156,10 @@ impl Design for Quadrature {
     ) -> Result<Matrix, Stop> {
         let all = self.place(parameters, known.rows() + count, stream)?;
         if all.as_slice()[..known.as_slice().len()] != *known.as_slice() {
-            return Err(Stop::new("with more runs the rule has other nodes")
-                .help("give the `level` of the rule: then further runs are random points"));
+            return Err(Stop::new(
+                "the quadrature rule for more runs does not contain the nodes of the existing runs",
+            )
+            .help("give the `level` of the rule: then further runs are random points"));
         }
         Ok(all.select_rows(&(known.rows()..all.rows()).collect::<Vec<_>>()))
     }

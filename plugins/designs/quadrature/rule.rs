@@ -2,38 +2,38 @@
 
 use std::collections::BTreeMap;
 
-use lacuna::linalg::Matrix;
+use lacuna_linalg::Matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::surrogates::polynomial_chaos::{Nested, Recurrence, Truncation};
 
-/// How rules in one variable make one in several.
+/// Combination of one-dimensional rules.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Rule {
     /// All combinations of `level + 1` Gauss nodes of each parameter.
     #[default]
     Tensor,
-    /// Smolyak's sum of small products of Gauss rules: as exact for polynomials of total degree up to
-    /// `2 level + 1`, with far fewer nodes in four parameters and more. Some weights are negative.
+    /// Smolyak's sum of small products of Gauss rules: exact for polynomials of the same total degree, up to
+    /// `2 level + 1`, with far fewer nodes for four parameters or more. Some weights are negative.
     Smolyak,
 }
 
-/// Nodes, one a row in standard variables, and their weights, which sum to 1.
+/// Nodes, one per row in standard variables, and their weights, which sum to 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Nodes {
-    /// `nodes x parameters`.
+    /// Nodes (`nodes x parameters`).
     pub points: Matrix,
-    /// One a node.
+    /// Weights, one per node.
     pub weights: Vec<f64>,
 }
 
-/// Weights below this share are what is left of terms that cancel.
+/// Weight below which a node is dropped: a rounding residue of terms that cancel.
 const NOTHING: f64 = 1e-14;
 
 impl Rule {
-    /// The name in a study.
+    /// Returns the name of the rule in a study.
     pub fn name(self) -> &'static str {
         match self {
             Self::Tensor => "tensor",
@@ -41,11 +41,12 @@ impl Rule {
         }
     }
 
-    /// The rule of a level, exact for polynomials of total degree up to `2 level + 1` under the laws of
-    /// these polynomials (one an axis, at least to degree `level + 1`); none with more than `limit` nodes.
+    /// Returns the rule of a level, exact for polynomials of total degree up to `2 level + 1` under the distributions
+    /// to which the polynomials of `axes` are orthogonal (one recurrence per axis, at least to degree `level + 1`);
+    /// `None` if it has more than `limit` nodes.
     ///
-    /// Source: Smolyak's formula as in Novak and Ritter, Numerische Mathematik 75 (1996) 79, with `k + 1` Gauss
-    /// nodes in level `k`.
+    /// Source: Smolyak's formula as in Novak and Ritter, Numerische Mathematik 75 (1996) 79, with `k + 1` Gauss nodes
+    /// at level `k`.
     pub fn nodes(self, axes: &[Recurrence], level: usize, limit: usize) -> Option<Nodes> {
         let d = axes.len();
         let tables: Vec<Axis> = axes.iter().map(|a| Axis::new(a, level)).collect::<Option<_>>()?;
@@ -62,7 +63,8 @@ impl Rule {
         Some(Nodes { points: Matrix::from_rows(d, points), weights: sums.into_values().collect() })
     }
 
-    /// The levels of each axis in the products and their shares; none where there are far too many.
+    /// Returns the levels of each axis in the products, and the coefficient of each product; `None` if there are far
+    /// too many.
     fn products(self, d: usize, level: usize, limit: usize) -> Option<Vec<(Vec<usize>, f64)>> {
         if self == Self::Tensor {
             let count = u32::try_from(d).ok().and_then(|d| (level + 1).checked_pow(d));
@@ -86,7 +88,7 @@ impl Rule {
     }
 }
 
-/// The different nodes of one axis' rules and which of them each rule has, with its weights.
+/// Distinct nodes of the rules of one axis; each rule lists the indices of its nodes and their weights.
 struct Axis {
     nodes: Vec<f64>,
     rules: Vec<Vec<(usize, f64)>>,
@@ -98,7 +100,7 @@ impl Axis {
             (0..=level).map(|k| recurrence.gauss(k + 1)).collect::<Option<_>>()?;
         let mut nodes: Vec<f64> = rules.iter().flatten().map(|(z, _)| *z).collect();
         nodes.sort_by(f64::total_cmp);
-        // Equal but for round-off: the middle of symmetric rules.
+        // Nodes that are equal up to rounding, such as the centres of symmetric rules.
         nodes.dedup_by(|a, b| (*a - *b).abs() < 1e-9 * (1.0 + b.abs()));
         let id = |z: f64| {
             let above = nodes.partition_point(|&n| n < z);
@@ -116,7 +118,7 @@ impl Axis {
     }
 }
 
-/// Adds the product of one rule an axis; false when there are more nodes than allowed.
+/// Adds the product of one rule per axis; returns false if there are more nodes than allowed.
 fn add_product(
     sums: &mut BTreeMap<Vec<usize>, f64>,
     tables: &[Axis],

@@ -8,7 +8,7 @@ fn axes(level: usize, d: usize) -> Vec<Recurrence> {
     (0..d).map(|i| all[i % 2].clone()).collect()
 }
 
-/// `E z^n` of the uniform law on (-1, 1) and of the standard normal law.
+/// Returns `E z^n` of the uniform distribution on (-1, 1) and of the standard normal distribution.
 fn moment(axis: usize, n: u32) -> f64 {
     match (n % 2, axis % 2) {
         (1, _) => 0.0,

@@ -1,22 +1,21 @@
-//! The likelihood, step by step.
+//! Likelihood of the autoregressive process, step by step.
 //!
-//! With `rho = exp(-gap / tau)`, `w = 1 / (1 - rho^2)` and standard deviations `s`, a value `y`
-//! after `x` adds `log(2 pi s_y^2 / w) + w ((y - m_y)/s_y - rho (x - m_x)/s_x)^2` to minus twice
-//! the log density of a replicate. Summed over the replicates of a step only its
-//! [statistics](super::steps::Step) remain. The common errors `F zeta` make the whitened residuals
-//! of the means a regression on `zeta`, whose best value and whose covariance `C^-1` follow from a
-//! Cholesky factor. Derivatives are those of the density of data and `zeta` together, averaged over
-//! `zeta` given the data (Fisher's identity).
+//! With `rho = exp(-gap / tau)`, `w = 1 / (1 - rho^2)` and standard deviations `s`, a value `y` after `x` adds
+//! `log(2 pi s_y^2 / w) + w ((y - m_y)/s_y - rho (x - m_x)/s_x)^2` to minus twice the log density of a replicate.
+//! Summed over the replicates of a step, only its [statistics](super::steps::Step) remain. The common errors `F zeta`
+//! make the whitened residuals of the means a linear regression on `zeta`, whose estimate and covariance `C^-1` follow
+//! from a Cholesky factor. Derivatives are those of the joint density of data and `zeta`, averaged over `zeta` given
+//! the data (Fisher's identity).
 
 use std::f64::consts::TAU;
 
 use lacuna::data::Measurements;
-use lacuna::linalg::vector::{add_scaled, dot};
-use lacuna::linalg::{self, Cholesky, Matrix};
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::Fact;
 use lacuna::plugin::discrepancy::{Hyperparameter, Known, Likelihood, VariancePart};
 use lacuna::run::Stop;
+use lacuna_linalg::vector::{add_scaled, dot};
+use lacuna_linalg::{Cholesky, Matrix};
 
 use super::Autoregressive;
 use super::steps::{Step, for_each_step, places, steps};
@@ -24,45 +23,45 @@ use crate::discrepancies::common::{
     Groups, Noise, PerGroup, Replicates, Series, Unknown, conditional,
 };
 
-/// See the module.
+/// Likelihood of the autoregressive process (see the module).
 pub(super) struct AutoregressiveLikelihood {
     noise: Noise,
     hyper: Vec<Hyperparameter>,
     replicates: Replicates,
     series: Series,
     steps: Vec<Step>,
-    /// The common errors at the measured outputs.
+    /// Factor of the common errors at the measured outputs (`measured x rank`).
     factor: Matrix,
     time: PerGroup,
-    /// The groups that share a correlation time.
+    /// Groups of series with a common correlation time.
     times: Groups,
 }
 
-/// The numbers of one step at given hyperparameters.
+/// Coefficients of one step at given hyperparameters.
 #[derive(Clone, Copy)]
 struct Law {
     rho: f64,
     /// `1 / (1 - rho^2)`.
     w: f64,
-    /// The standard deviations, at and before.
+    /// Standard deviations of the value and of the one before.
     sd: [f64; 2],
 }
 
 impl Law {
-    /// Weights of the residuals at and before in the whitened residual.
+    /// Returns the weights of the residuals of the value and of the one before in the whitened residual.
     fn weights(&self) -> [f64; 2] {
         let root = self.w.sqrt();
         [root / self.sd[0], -root * self.rho / self.sd[1]]
     }
 
-    /// The quadratic form of these second moments: at, both, before.
+    /// Returns the quadratic form of second moments of the residuals: of the value, of both, of the one before.
     fn quadratic(&self, moments: [f64; 3]) -> f64 {
         let [a, b] = self.weights();
         a * a * moments[0] + 2.0 * a * b * moments[1] + b * b * moments[2]
     }
 }
 
-/// The density at one response and one set of hyperparameters.
+/// Likelihood and intermediate results at one response and one set of hyperparameters.
 struct Solved {
     log_likelihood: f64,
     laws: Vec<Law>,
@@ -75,7 +74,7 @@ impl AutoregressiveLikelihood {
         Self::under(options, known, known.data)
     }
 
-    /// The same where the noise that replicates show is that of `shown`.
+    /// Builds the likelihood of `known.data`, with measured variances taken from the replicates of `shown`.
     pub(super) fn under(
         options: &Autoregressive,
         known: &Known<'_>,
@@ -106,14 +105,14 @@ impl AutoregressiveLikelihood {
         })
     }
 
-    /// The standard deviation of each measured output.
+    /// Returns the standard deviation of each measured output; `None` if a variance is not positive.
     fn sds(&self, hyper: &[f64]) -> Option<Vec<f64>> {
         let groups = self.noise.variance.values(hyper)?;
         let variance = self.noise.by_measured(&self.replicates, groups);
         Some(variance.iter().map(|v| v.sqrt()).collect())
     }
 
-    /// The correlation time of a measured output.
+    /// Returns the correlation time of a measured output.
     fn time_of(&self, measured: usize, times: &[f64]) -> f64 {
         self.times.of[self.replicates.measured[measured]].map_or(f64::NAN, |g| times[g])
     }
@@ -126,7 +125,7 @@ impl AutoregressiveLikelihood {
         Law { rho: (-x).exp(), w: -1.0 / (-2.0 * x).exp_m1(), sd: [sds[at], sds[before]] }
     }
 
-    /// The mean residuals of a step, at and before.
+    /// Returns the mean residuals of a step: of the value and of the one before.
     fn residual(&self, step: &Step, response: &[f64]) -> [f64; 2] {
         let of = |k: usize| response[self.replicates.measured[k]];
         [step.mean[0] - of(step.at), step.before.map_or(0.0, |b| step.mean[1] - of(b))]
@@ -153,12 +152,12 @@ impl AutoregressiveLikelihood {
             }
             laws.push(law);
         }
-        let mut capacitance = linalg::gram(&whitened);
+        let mut capacitance = lacuna_linalg::gram(&whitened);
         for k in 0..rank {
             capacitance[(k, k)] += 1.0;
         }
         let capacitance = Cholesky::new(&capacitance).ok()?;
-        let mut zeta = linalg::transposed_multiply_vector(&whitened, &white);
+        let mut zeta = lacuna_linalg::transposed_multiply_vector(&whitened, &white);
         capacitance.solve(&mut zeta);
         for (x, row) in white.iter().zip(whitened.iter_rows()) {
             twice += (x - dot(row, &zeta)).powi(2);
@@ -167,7 +166,7 @@ impl AutoregressiveLikelihood {
         Some(Solved { log_likelihood: -0.5 * twice, laws, zeta, capacitance })
     }
 
-    /// The complete simulated noise of a replicate.
+    /// Simulates the noise of all outputs of a replicate.
     fn noise_of(&self, sds: &[f64], times: &[f64], stream: &Stream) -> Vec<f64> {
         let mut rng = stream.generator();
         let mut noise = vec![0.0; sds.len()];
@@ -240,7 +239,8 @@ impl Likelihood for AutoregressiveLikelihood {
         (self.replicates.over_all(&by_mean, response.len()), by_hyper)
     }
 
-    /// The precision matrix of a replicate without common errors is tridiagonal along each series.
+    /// Computes the log density of each value given all others. The precision matrix of a replicate without common
+    /// errors is tridiagonal along each series, so that each value interacts only with its two neighbours.
     fn left_out(&self, response: &[f64], hyper: &[f64]) -> Option<Vec<f64>> {
         let solved = self.solve(response, hyper)?;
         let (sds, times) = (self.sds(hyper)?, self.time.values(hyper)?);
@@ -248,10 +248,11 @@ impl Likelihood for AutoregressiveLikelihood {
         let (outputs, rank) = (response.len(), self.factor.columns());
         let place = places(outputs, &self.replicates);
         let cells = outputs * data.replicates.len();
-        // Precision times residual, the diagonal of the precision, and precision times common factor.
+        // For each value: the precision times the residual, the diagonal of the precision, and the precision times
+        // the common factor.
         let (mut pull, mut precision) = (vec![0.0; cells], vec![0.0; cells]);
         let mut rows = Matrix::zeros(cells, rank);
-        // The outputs that were measured before and after.
+        // The outputs measured before and after each value.
         let mut neighbours = vec![[None, None]; cells];
         let left = |k: usize, y: f64| {
             y - response[self.replicates.measured[k]] - dot(self.factor.row(k), &solved.zeta)
@@ -277,7 +278,8 @@ impl Likelihood for AutoregressiveLikelihood {
             precision[cell] += a * a;
             add_scaled(rows.row_mut(cell), a, &whitened);
         });
-        // What the common errors explain is the same in all replicates in which a value has the same neighbours.
+        // The variance explained by the common errors depends only on a value's neighbours, and is computed once for
+        // each case.
         let mut explained: Vec<Vec<([Option<usize>; 2], f64)>> = vec![Vec::new(); outputs];
         let mut densities = Vec::new();
         for (r, replicate) in data.replicates.iter().enumerate() {

@@ -9,47 +9,44 @@ use lacuna::data::{Layout, Measurements};
 use lacuna::plugin::component::{Component, Context};
 use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood, StatedNoise};
 use lacuna::run::Stop;
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::common::{By, Groups, Quantity, Series, Variance};
 use likelihood::AutoregressiveLikelihood;
 
-/// Normal differences that are correlated along an axis within each replicate: a first-order
-/// autoregressive process.
+/// Normal differences that are correlated along an axis within each replicate: a first-order autoregressive process.
 ///
-/// Within one replicate and one series (one sensor, say) the differences between data and model are
-/// a stationary normal process with the correlation `exp(-|t - t'| / correlation_time)` at two
-/// times, of the given `variance` at each (the Ornstein-Uhlenbeck process; in discrete time
-/// autoregressive of order one with the coefficient `exp(-dt / correlation_time)`; Box and Jenkins,
-/// Time Series Analysis (1976), 3.2, and Jones, Technometrics 22 (1980) 389 for gaps). Replicates
-/// and series are independent. Take it when residuals of neighbouring times resemble each other in
-/// each replicate on its own; what all replicates have in common is the business of
-/// `gaussian_process`.
+/// Within one replicate and one series (one sensor, say) the differences between data and model are a stationary
+/// normal process of the given `variance`, with the correlation `exp(-|t - t'| / correlation_time)` between two times
+/// (the Ornstein-Uhlenbeck process; in discrete time autoregressive of order one with the coefficient
+/// `exp(-dt / correlation_time)`; Box and Jenkins, Time Series Analysis (1976), 3.2, and Jones, Technometrics 22 (1980)
+/// 389 for gaps). Replicates and series are independent. Choose it if residuals at neighbouring times are similar
+/// within each replicate; a deviation common to all replicates is described by `gaussian_process`.
 ///
-/// Uneven grids and gaps are exact: each value depends only on the one measured before it. Since
-/// the law of a value given the one before has the same form in all replicates that measured both,
-/// the likelihood uses counts, means, scatters and co-scatters of such pairs. Errors that all
-/// replicates share enter once, as for `gaussian`.
+/// Uneven grids and gaps are treated exactly: the distribution of a value depends only on the one measured before it.
+/// Since it has the same form in all replicates that measured both, the likelihood uses counts, means, scatters and
+/// co-scatters of such pairs. Errors common to all replicates enter once, as for `gaussian`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Autoregressive {
-    /// The variance of a single value: a prior such as `{ half_normal = 1e-6 }`,
-    /// `{ known = 2.5e-11 }`, or a multiple of the measured one,
-    /// `{ measured = { inverse_gamma = [3, 4] } }`, as for `gaussian`.
+    /// Variance of a single value, in the squared unit of the response: a prior such as `{ half_normal = 1e-6 }`,
+    /// `{ known = 2.5e-11 }`, or a multiple of the measured variance, `{ measured = { inverse_gamma = [3, 4] } }`, as
+    /// for `gaussian`.
     pub variance: Variance,
-    /// Which outputs share a variance: `"all"`, an axis such as `"sensor"`, windows, or a list of these.
+    /// Groups of outputs with a common variance: `"all"`, one per value of an axis such as `"sensor"`, windows of an
+    /// axis, or a list of these. More groups mean more unknowns.
     #[serde(default)]
     pub by: By,
-    /// The time over which correlations fall by a factor e, in the unit of the axis: a prior such
-    /// as `{ log_uniform = [1e-6, 1e-3] }`, or `{ known = 5e-5 }`.
+    /// Correlation time: the distance over which correlations decrease by a factor of e, in the unit of the axis. A
+    /// prior such as `{ log_uniform = [1e-6, 1e-3] }`, or `{ known = 5e-5 }`.
     pub correlation_time: Quantity,
-    /// Which series share a correlation time: `"all"`, or another axis than the one they run along,
-    /// such as `"sensor"`.
+    /// Groups of series with a common correlation time: `"all"`, or one per value of another axis than the one they
+    /// run along, such as `"sensor"`.
     #[serde(default)]
     pub correlation_by: By,
-    /// The axis of numbers along which differences are correlated; the last one when it is left away.
+    /// Name of the numeric axis along which differences are correlated. Default: the last numeric axis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub along: Option<String>,
 }
@@ -69,7 +66,7 @@ impl Component for Autoregressive {
             Ok(series) if self.correlation_by.divides(&series.axis) => {
                 complaints
                     .at("correlation_by")
-                    .say("a correlation time belongs to a whole series")
+                    .say("a correlation time applies to a whole series")
                     .expected(format!("another axis than `{}`", series.axis));
             }
             Ok(_) => {}
@@ -93,7 +90,7 @@ impl Discrepancy for Autoregressive {
     }
 
     fn stated_noise(&self, layout: &Layout, _: &[f64]) -> Option<StatedNoise> {
-        // Values along another axis than the last do not follow each other in a curve.
+        // A stated correlation time applies along the last axis, along which the values of a curve follow each other.
         let last = Series::of(layout, None).ok()?.axis;
         let sd = self.variance.known_sd(layout, &self.by)?;
         let times = self.correlation_time.known(layout, &self.correlation_by)?;

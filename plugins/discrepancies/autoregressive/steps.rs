@@ -1,4 +1,4 @@
-//! The steps from one measured value of a series to the next, over all replicates.
+//! Steps from one measured value of a series to the next, collected over all replicates.
 
 use std::collections::BTreeMap;
 
@@ -6,37 +6,37 @@ use lacuna::data::Measurements;
 
 use crate::discrepancies::common::{Replicates, Series};
 
-/// A value and the one measured before it, with what the replicates that measured both in this order say.
+/// A value and the one measured before it, with the statistics of the replicates that measured both in succession.
 #[derive(Debug, Clone)]
 pub(super) struct Step {
-    /// The value, among the measured outputs.
+    /// Index of the value among the measured outputs.
     pub at: usize,
-    /// The one before; `None` for a first value.
+    /// Index of the value before; `None` for a first value.
     pub before: Option<usize>,
-    /// The distance between the two.
+    /// Distance between the two along the axis.
     pub gap: f64,
-    /// The number of replicates.
+    /// Number of replicates.
     pub count: f64,
-    /// Their mean values, at and before.
+    /// Means over the replicates: of the value and of the one before.
     pub mean: [f64; 2],
     /// Sums of products of the deviations from the means: of the value, of both, of the one before.
     pub scatter: [f64; 3],
 }
 
-/// A value and the one before it, among the measured outputs.
+/// Indices of a value and the one before it among the measured outputs.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
 struct Key {
     at: usize,
     before: Option<usize>,
 }
 
-/// The values of the replicates that measured both, at and before.
+/// Values of the replicates that measured both: of the output and of the one before.
 struct Pairs {
     gap: f64,
     values: Vec<[f64; 2]>,
 }
 
-/// The steps of all series, in a fixed order.
+/// Returns the steps of all series, in a fixed order.
 pub(super) fn steps(data: &Measurements, replicates: &Replicates, series: &Series) -> Vec<Step> {
     let mut found: BTreeMap<Key, Pairs> = BTreeMap::new();
     let place = places(data.layout.len(), replicates);
@@ -57,15 +57,15 @@ pub(super) fn steps(data: &Measurements, replicates: &Replicates, series: &Serie
     found.into_iter().map(step).collect()
 }
 
-/// The place of each output among the measured ones.
+/// Returns the index of each output among the measured ones; `usize::MAX` for outputs never measured.
 pub(super) fn places(outputs: usize, replicates: &Replicates) -> Vec<usize> {
     let mut place = vec![usize::MAX; outputs];
     replicates.measured.iter().enumerate().for_each(|(k, &i)| place[i] = k);
     place
 }
 
-/// Visits each measured value of each series with the one before it: the replicate, the value with
-/// its output, the one before, and their distance.
+/// Visits each measured value of each series together with the one before it. The arguments are the replicate, the
+/// output and its value, the output and value before, and their distance.
 pub(super) fn for_each_step(
     data: &Measurements,
     series: &Series,

@@ -53,7 +53,7 @@ fn it_is_the_normal_density_written_out() {
     }
 }
 
-/// In units of a ten-thousandth of a second, so that steps of differences fit all hyperparameters.
+/// Times are in units of 1e-4 s, so that one difference step suits all hyperparameters.
 #[test]
 fn gradients_are_the_derivatives() {
     let (mut data, error) = (data(3, 4), [common(4)]);

@@ -1,46 +1,45 @@
-//! Which outputs share a number.
+//! Groups of outputs with a common number.
 
 use std::fmt;
 
 use lacuna::data::{Axis, Coordinates, Layout};
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
 use serde::de::value::{MapAccessDeserializer, StrDeserializer};
 use serde::{Deserialize, Deserializer, Serialize, de};
 
-/// Which outputs share a number: `"all"`, an axis such as `"sensor"` (one number for each of its values),
-/// windows of an axis, or a list of these (one number for each combination).
+/// Groups of outputs with a common number: `"all"`, an axis such as `"sensor"` (one group per value), windows of an
+/// axis, or a list of these (one group per combination).
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum By {
-    /// One division: `"all"`, the name of an axis, or windows.
+    /// Single division: `"all"`, the name of an axis, or windows.
     One(Division),
-    /// Combinations, such as `["sensor", { axis = "time", windows = 5 }]`.
+    /// Combination of divisions, such as `["sensor", { axis = "time", windows = 5 }]`.
     Many(Vec<Division>),
 }
 
-/// How one axis divides the outputs.
+/// Division of the outputs along one axis.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Division {
-    /// Each value of this axis.
+    /// One group for each value of this axis.
     Axis(String),
-    /// Windows of a grid, such as `{ axis = "time", windows = 5 }` or
+    /// Windows of a numeric axis, such as `{ axis = "time", windows = 5 }` or
     /// `{ axis = "time", edges = [2e-4, 5e-4] }`.
     Windows(AxisWindows),
 }
 
-/// Windows of a grid: their number, or the edges between them.
+/// Windows of a numeric axis: their number, or the edges between them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AxisWindows {
-    /// The name of the axis.
+    /// Name of the axis.
     pub axis: String,
-    /// So many windows, which hold equal numbers of grid values as nearly as possible.
+    /// Number of windows, which hold numbers of grid values as equal as possible.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub windows: Option<usize>,
-    /// The edges between windows, increasing, in the unit of the axis. A value on an edge belongs
-    /// to the window after it.
+    /// Edges between windows, increasing, in the unit of the axis. A value on an edge belongs to the window after it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edges: Option<Vec<f64>>,
 }
@@ -52,12 +51,12 @@ impl Default for By {
 }
 
 impl By {
-    /// A number for each value of this axis.
+    /// Returns the division with one group for each value of this axis.
     pub fn axis(name: &str) -> Self {
         Self::One(Division::Axis(name.to_owned()))
     }
 
-    /// Whether the outputs are divided along this axis.
+    /// Returns true if the outputs are divided along this axis.
     pub fn divides(&self, axis: &str) -> bool {
         self.divisions().iter().any(|division| division.axis() == axis)
     }
@@ -70,7 +69,7 @@ impl By {
         }
     }
 
-    /// Complains about axes that the response has not, and about windows that are none.
+    /// Reports axes that the response does not have, and invalid windows.
     pub fn check(&self, at: &str, layout: &Layout, complaints: &mut Complaints<'_>) {
         for division in self.divisions() {
             if let Err(text) = division.classes(layout) {
@@ -88,7 +87,7 @@ impl Division {
         }
     }
 
-    /// The position of the axis, the class of each of its places, and the names of the classes.
+    /// Returns the position of the axis, the class of each of its values, and the names of the classes.
     fn classes(&self, layout: &Layout) -> Result<(usize, Vec<usize>, Vec<String>), String> {
         let Some((position, axis)) = layout.axis(self.axis()) else {
             let names: Vec<String> = layout.axes.iter().map(|a| format!("`{}`", a.name)).collect();
@@ -127,7 +126,7 @@ impl AxisWindows {
             (None, Some(_)) => return Err("the edges of windows must increase".to_owned()),
             _ => return Err("expected either `windows` or `edges`".to_owned()),
         };
-        // Windows without a grid value are none.
+        // Windows without a grid value are dropped.
         let mut kept = raw.clone();
         kept.dedup();
         let of: Vec<usize> = raw.iter().map(|w| kept.partition_point(|k| k < w)).collect();
@@ -140,7 +139,7 @@ impl AxisWindows {
     }
 }
 
-/// The places `first` to `last` of an axis in words: a label, a number, or a range of numbers, with the unit.
+/// Names the values `first` to `last` of an axis: a label, a number, or a range of numbers, with the unit.
 fn word(axis: &Axis, first: usize, last: usize) -> String {
     let unit = match &axis.coordinates {
         Coordinates::Grid { unit, .. } if !unit.is_dimensionless() => format!(" {unit}"),
@@ -152,19 +151,19 @@ fn word(axis: &Axis, first: usize, last: usize) -> String {
     format!("{}..{}{unit}", axis.text(first), axis.text(last))
 }
 
-/// The group of each output.
+/// Assignment of the outputs to groups.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Groups {
-    /// The name of each group: empty for the only one.
+    /// Name of each group; empty if there is only one.
     pub names: Vec<String>,
-    /// The group of each output; `None` where the group was never measured.
+    /// Group of each output; `None` if the group was never measured.
     pub of: Vec<Option<usize>>,
-    /// The position of each group among all of the layout.
+    /// Index of each group among all groups of the layout.
     pub position: Vec<usize>,
 }
 
 impl Groups {
-    /// The groups of a layout, in the order of the outputs.
+    /// Returns the groups of a layout, in the order of the outputs; fails if an axis is missing.
     pub fn of(layout: &Layout, by: &By) -> Result<Self, String> {
         let divisions: Vec<_> =
             by.divisions().iter().map(|d| d.classes(layout)).collect::<Result<_, _>>()?;
@@ -187,7 +186,7 @@ impl Groups {
         })
     }
 
-    /// Without the groups that hold none of these outputs.
+    /// Returns the groups without those that hold none of these outputs.
     pub fn with_data(&self, measured: &[usize]) -> Self {
         let mut kept: Vec<usize> = measured.iter().filter_map(|&i| self.of[i]).collect();
         kept.sort_unstable();
@@ -199,12 +198,12 @@ impl Groups {
         }
     }
 
-    /// The number of groups.
+    /// Returns the number of groups.
     pub fn count(&self) -> usize {
         self.names.len()
     }
 
-    /// What the number called `base` is called for a group.
+    /// Returns the name of the number `base` of a group, such as `variance[B]`.
     pub fn name(&self, base: &str, group: usize) -> String {
         match self.names[group].as_str() {
             "" => base.to_owned(),
@@ -212,14 +211,14 @@ impl Groups {
         }
     }
 
-    /// The number of each output's group; the mean of all where the group was never measured.
+    /// Returns for each output the number of its group; the mean of all groups if its group was never measured.
     pub fn spread(&self, values: &[f64]) -> Vec<f64> {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         let of = |g: usize| values.get(g).copied().unwrap_or(f64::NAN);
         self.of.iter().map(|g| g.map_or(mean, of)).collect()
     }
 
-    /// The sums over the groups of numbers that belong to these outputs.
+    /// Returns the sums over the groups of numbers that belong to these outputs.
     pub fn sums(&self, outputs: &[usize], values: impl IntoIterator<Item = f64>) -> Vec<f64> {
         let mut sums = vec![0.0; self.count()];
         for (&i, value) in outputs.iter().zip(values) {
@@ -246,8 +245,7 @@ impl<'de> Deserialize<'de> for Division {
     }
 }
 
-/// Reads a [`By`] by the kind of value that stands there, so that errors inside keep their own
-/// place and words.
+/// Deserialises a [`By`] by the type of the value, so that errors inside keep their own position and message.
 struct Visitor {
     list: bool,
 }

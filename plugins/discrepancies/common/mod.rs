@@ -1,5 +1,5 @@
-//! What the discrepancies share: how outputs are grouped, numbers that are known or not, replicates, the
-//! normal density with errors that all replicates share.
+//! Parts shared by the discrepancies: groups of outputs, known or unknown numbers, replicates, and the normal density
+//! with errors common to all replicates.
 
 mod groups;
 mod noise;

@@ -1,40 +1,39 @@
 //! Independent noise with a variance for each group of outputs.
 
 use lacuna::data::{Measurements, Unit};
-use lacuna::linalg::vector::dot;
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::discrepancy::{CommonError, Hyperparameter, Known, VariancePart};
 use lacuna::run::Stop;
 
 use super::{By, Groups, PerGroup, Replicates, Unknown, Variance, squared};
 
-/// The data of a study with the errors that replicates share: what it takes to predict and to simulate them.
+/// The data of a study and the errors common to all replicates, from which replicates are predicted and simulated.
 #[derive(Debug, Clone)]
 pub struct Setting {
-    /// The data.
+    /// Measurements of the study.
     pub data: Measurements,
     common: Vec<CommonError>,
-    /// The variance that the data state of each output, else the pooled variance between the replicates of its group,
-    /// where there are any.
+    /// Variance of each output stated by the data, or else the variance between replicates pooled over its group;
+    /// `None` without either.
     replicated: Option<Vec<f64>>,
 }
 
 /// The noise of a study's data.
 #[derive(Debug, Clone)]
 pub struct Noise {
-    /// The data and what is common.
+    /// The data and the common errors.
     pub setting: Setting,
-    /// The groups that share a variance.
+    /// Groups of outputs with a common variance.
     pub groups: Groups,
-    /// The variance of each group, or its multiplier.
+    /// Variance or multiplier of each group.
     pub variance: PerGroup,
-    /// By what each output multiplies it: the variance between replicates, or one.
+    /// Factor on the group's number for each output: the measured variance, or 1.
     pub scale: Vec<f64>,
 }
 
 impl Noise {
-    /// The noise of data; its unknown variances are added to the hyperparameters. A measured variance is the one between
-    /// the replicates of `shown`, of which the data are a part.
+    /// Builds the noise of data and adds its unknown variances to the hyperparameters. Measured variances are those
+    /// between the replicates of `shown`, of which the data are a part.
     pub fn new(
         known: &Known<'_>,
         shown: &Measurements,
@@ -61,7 +60,7 @@ impl Noise {
                 (quantity, scale, unknown)
             }
         };
-        // What the data state of their noise is where its multiplier starts.
+        // With stated noise the multiplier starts at 1.
         let stated = known.data.states_noise();
         let start = |g: usize| if stated { 1.0 } else { start(&groups, replicates, &scale, g) };
         Ok(Self {
@@ -72,18 +71,19 @@ impl Noise {
         })
     }
 
-    /// The variance of each output, given those of the groups.
+    /// Returns the variance of each output, given those of the groups.
     pub fn by_output(&self, groups: &[f64]) -> Vec<f64> {
         self.groups.spread(groups).iter().zip(&self.scale).map(|(v, s)| v * s).collect()
     }
 
-    /// The variance of each measured output, given those of the groups.
+    /// Returns the variance of each measured output, given those of the groups.
     pub fn by_measured(&self, replicates: &Replicates, groups: &[f64]) -> Vec<f64> {
         let of = |&i: &usize| self.groups.of[i].map_or(f64::NAN, |g| groups[g] * self.scale[i]);
         replicates.measured.iter().map(of).collect()
     }
 
-    /// The derivatives by the groups' variances, given those by the variances of the measured outputs.
+    /// Returns the derivatives with respect to the groups' variances, given those with respect to the variances of
+    /// the measured outputs.
     pub fn by_group(&self, replicates: &Replicates, by_measured: &[f64]) -> Vec<f64> {
         let scaled = replicates.measured.iter().zip(by_measured).map(|(&i, g)| g * self.scale[i]);
         self.groups.sums(&replicates.measured, scaled)
@@ -91,7 +91,7 @@ impl Noise {
 }
 
 impl Setting {
-    /// The setting of data whose replicates are pooled over these groups.
+    /// Builds the setting; variances between replicates are pooled over these groups.
     pub fn new(known: &Known<'_>, replicates: &Replicates, groups: &Groups) -> Self {
         Self {
             data: known.data.clone(),
@@ -104,16 +104,16 @@ impl Setting {
         }
     }
 
-    /// The parts of a new replicate's variance: what the replicates show of it, the rest as the
-    /// model's form, and the common errors that a new replicate has too. Without replicates the
-    /// first two are one, `discrepancy`.
+    /// Splits the variance of a new replicate into parts: `measurement`, up to the variance that replicates show;
+    /// `model_form`, the rest; and the common errors that a new replicate has too. Without replicates the first two
+    /// are one part, `discrepancy`.
     pub fn parts(&self, variance: &[f64]) -> Vec<VariancePart> {
         let mut parts = self.own_parts(variance);
         parts.extend(self.common_parts());
         parts
     }
 
-    /// The parts without the common errors.
+    /// Returns the parts without the common errors.
     pub fn own_parts(&self, variance: &[f64]) -> Vec<VariancePart> {
         let Some(replicated) = &self.replicated else {
             return vec![part("discrepancy", variance.to_vec())];
@@ -123,27 +123,18 @@ impl Setting {
         vec![part("measurement", shown), part("model_form", rest)]
     }
 
-    /// The parts that are common errors.
+    /// Returns the parts that are common errors of a new replicate.
     pub fn common_parts(&self) -> Vec<VariancePart> {
-        let predictive = self.common.iter().filter(|error| error.predictive);
-        let variance = |e: &CommonError| e.factor.iter_rows().map(|row| dot(row, row)).collect();
-        predictive.map(|error| part(&error.origin, variance(error))).collect()
+        self.common.iter().filter(|error| error.predictive).map(CommonError::part).collect()
     }
 
-    /// The response with common errors as they could be.
+    /// Adds randomly drawn common errors to a response.
     pub fn with_common_errors(&self, response: &[f64], stream: &Stream) -> Vec<f64> {
-        let mut mean = response.to_vec();
-        for (k, error) in self.common.iter().enumerate() {
-            let mut rng = stream.named("common").at(k as u64).generator();
-            let weights: Vec<f64> = (0..error.factor.columns()).map(|_| normal(&mut rng)).collect();
-            for (m, row) in mean.iter_mut().zip(error.factor.iter_rows()) {
-                *m += dot(row, &weights);
-            }
-        }
-        mean
+        CommonError::added(&self.common, response, stream)
     }
 
-    /// The data with new values: for each replicate those that `values` makes of its own stream.
+    /// Returns the data with the measured values of each replicate replaced by those that `values` makes from the
+    /// replicate's stream.
     pub fn replaced(&self, stream: &Stream, values: impl Fn(&Stream) -> Vec<f64>) -> Measurements {
         let mut data = self.data.clone();
         for (r, replicate) in data.replicates.iter_mut().enumerate() {
@@ -155,7 +146,7 @@ impl Setting {
         data
     }
 
-    /// Data with independent normal noise of these variances about a mean curve.
+    /// Returns data with independent normal noise of these variances about a mean curve.
     pub fn noisy(&self, mean: &[f64], variance: &[f64], stream: &Stream) -> Measurements {
         let sd: Vec<f64> = variance.iter().map(|v| v.sqrt()).collect();
         self.replaced(stream, |own| {
@@ -164,19 +155,19 @@ impl Setting {
         })
     }
 
-    /// The same about a response and its common errors.
+    /// Like [`Setting::noisy`], about a response with randomly drawn common errors.
     pub fn simulate(&self, response: &[f64], variance: &[f64], stream: &Stream) -> Measurements {
         self.noisy(&self.with_common_errors(response, stream), variance, stream)
     }
 }
 
-/// A part of a variance.
+/// Builds one part of a variance.
 pub fn part(origin: &str, variance: Vec<f64>) -> VariancePart {
-    VariancePart { origin: origin.to_owned(), variance }
+    VariancePart { origin: origin.into(), variance }
 }
 
-/// Where the variance of a group starts: the one of the replicates about their means, or a
-/// hundredth of the mean square where there are no replicates.
+/// Returns the initial value of a group's variance: the variance of the replicates about their means, or a hundredth
+/// of the mean square if there are no replicates.
 pub fn start(groups: &Groups, replicates: &Replicates, scale: &[f64], group: usize) -> f64 {
     let (mut scatter, mut freedom, mut square, mut outputs) = (0.0, 0.0, 0.0, 0.0);
     for (k, &i) in replicates.measured.iter().enumerate() {
@@ -190,7 +181,7 @@ pub fn start(groups: &Groups, replicates: &Replicates, scale: &[f64], group: usi
     if freedom > 0.0 && scatter > 0.0 { scatter / freedom } else { 0.01 * square / outputs }
 }
 
-/// Scatter and degrees of freedom by group.
+/// Scatter and degrees of freedom between replicates, per group.
 struct Pooled {
     scatter: Vec<f64>,
     freedom: Vec<f64>,
@@ -204,8 +195,8 @@ impl Pooled {
         }
     }
 
-    /// The variance of each group; that of all where a group has no replicates; `None` where no
-    /// group has any.
+    /// Returns the variance of each group; the overall variance for a group without replicates; `None` if no group
+    /// has any.
     fn variances(&self) -> Option<Vec<f64>> {
         let freedom: f64 = self.freedom.iter().sum();
         let overall = self.scatter.iter().sum::<f64>() / freedom;
@@ -217,11 +208,11 @@ impl Pooled {
         Some(groups.spread(&self.variances()?))
     }
 
-    /// The variance between the replicates of each output; its group's where an output has fewer than two
-    /// replicates, or two that are equal.
+    /// Returns the variance between the replicates of each output; that of its group if the output has fewer than two
+    /// replicates or equal ones. Fails if no output has two different replicates.
     fn measured(&self, groups: &Groups, replicates: &Replicates) -> Result<Vec<f64>, Stop> {
         let refuse = || {
-            Stop::new("no output has two replicates that differ, which `measured` needs")
+            Stop::new("`measured` needs an output with two different replicates, and there is none")
                 .help("give the variance itself, such as `variance = { half_normal = 1e-6 }`")
         };
         let variances = self.variances().ok_or_else(refuse)?;

@@ -1,41 +1,41 @@
-//! Numbers that a study knows, or of which it knows a prior.
+//! Positive numbers that are known or have a prior.
 
 use std::borrow::Cow;
 use std::fmt;
 
 use lacuna::data::Layout;
 use lacuna::math::distribution::Distribution;
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::de::{self, DeserializeSeed, MapAccess, value::StrDeserializer};
+use serde::de::value::StrDeserializer;
+use serde::de::{self, DeserializeSeed, MapAccess};
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
 
 use super::{By, Groups};
 
-/// A number that is known, `{ known = 2.5e-11 }` (or one for each group,
-/// `{ known = [1e-11, 4e-11] }`), or the prior of one that is not, such as
-/// `{ half_normal = 1e-6 }`.
+/// A positive number: a prior such as `{ half_normal = 1e-6 }` if it is unknown, or `{ known = 2.5e-11 }`, with a
+/// list for one number per group, `{ known = [1e-11, 4e-11] }`.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Quantity {
-    /// The number, or one for each group.
+    /// The known number, or one for each group.
     Known(Vec<f64>),
-    /// The prior of an unknown number.
+    /// Prior of the unknown number.
     Unknown(Distribution),
 }
 
-/// A variance: known, unknown, or an unknown multiple of the one that the replicates show.
+/// A variance: known, unknown, or a multiple of the variance measured between replicates.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Variance {
-    /// In the squared unit of the response.
+    /// Variance in the squared unit of the response.
     Of(Quantity),
-    /// The variance between the replicates of each output, times this.
+    /// Factor on the variance between the replicates of each output.
     Measured(Quantity),
 }
 
 impl Quantity {
-    /// The number of each output of a layout whose outputs share it like this, where it is known.
+    /// Returns the number of each output of a layout grouped by `by`, if it is known.
     pub fn known(&self, layout: &Layout, by: &By) -> Option<Vec<f64>> {
         let Self::Known(values) = self else { return None };
         let groups = Groups::of(layout, by).ok()?;
@@ -47,7 +47,7 @@ impl Quantity {
         Some(groups.spread(&each?))
     }
 
-    /// Complains about a number that is not above zero and about a prior that allows none that is.
+    /// Reports a known number that is not above zero, a wrong count of numbers, and a prior that reaches below zero.
     pub fn check_positive(&self, at: &str, groups: usize, complaints: &mut Complaints<'_>) {
         match self {
             Self::Known(values) => {
@@ -67,7 +67,7 @@ impl Quantity {
                 if low < 0.0 || high <= 0.0 {
                     complaints
                         .at(at)
-                        .say("this is never negative")
+                        .say("this quantity must be positive")
                         .expected("a prior on positive values, such as `{ half_normal = 1e-6 }`")
                         .found(prior);
                 }
@@ -77,14 +77,14 @@ impl Quantity {
 }
 
 impl Variance {
-    /// The standard deviation of each output of a layout, where the variance is known and not the replicates'.
+    /// Returns the standard deviation of each output of a layout, if the variance is known and not measured.
     pub fn known_sd(&self, layout: &Layout, by: &By) -> Option<Vec<f64>> {
         let Self::Of(quantity) = self else { return None };
         let variance = quantity.known(layout, by)?;
         Some(variance.into_iter().map(f64::sqrt).collect())
     }
 
-    /// The prior of the unknown variances or multipliers.
+    /// Returns the prior of the unknown variances or multipliers.
     pub fn prior(&self) -> Option<&Distribution> {
         let (Self::Of(quantity) | Self::Measured(quantity)) = self;
         match quantity {
@@ -93,7 +93,7 @@ impl Variance {
         }
     }
 
-    /// Complains about values and priors that are not positive.
+    /// Reports values and priors that are not positive.
     pub fn check(&self, groups: Option<&Groups>, complaints: &mut Complaints<'_>) {
         let count = groups.map_or(1, Groups::count);
         match self {
@@ -153,7 +153,7 @@ impl<'de> Deserialize<'de> for Variance {
     }
 }
 
-/// Reads a table of one key: `known`, `measured` where it is allowed, or the name of a distribution.
+/// Deserialises a table of one key: `known`, `measured` if allowed, or the name of a distribution.
 struct Table {
     measured: bool,
 }
@@ -185,7 +185,7 @@ impl<'de> de::Visitor<'de> for Table {
     }
 }
 
-/// A table whose first key was looked at.
+/// A table whose first key has been read already.
 struct Replayed<A> {
     first: Option<String>,
     map: A,
@@ -209,7 +209,7 @@ impl<'de, A: MapAccess<'de>> MapAccess<'de> for Replayed<A> {
     }
 }
 
-/// One number or a list of them.
+/// One number or a list of numbers.
 struct Numbers(Vec<f64>);
 
 impl<'de> Deserialize<'de> for Numbers {
@@ -244,7 +244,7 @@ impl<'de> de::Visitor<'de> for NumbersVisitor {
     }
 }
 
-/// The schema of a distribution with further tables to choose from.
+/// Returns the schema of a distribution with further tables as alternatives.
 fn extended(generator: &mut SchemaGenerator, tables: Vec<Value>) -> Schema {
     let mut schema = Distribution::json_schema(generator);
     if let Some(Value::Array(cases)) = schema.get_mut("oneOf") {
@@ -269,12 +269,17 @@ fn known() -> Value {
     let content = json_schema!({
         "anyOf": [{ "type": "number" }, { "type": "array", "items": { "type": "number" } }]
     });
-    table("known", content.to_value(), "A number that is known, or a list: one for each group.")
+    table(
+        "known",
+        content.to_value(),
+        "Known value: one number, or a list with one number per group of outputs.",
+    )
 }
 
 impl JsonSchema for Quantity {
     fn schema_name() -> Cow<'static, str> {
-        "Quantity".into()
+        // `Quantity` is a number with a unit.
+        "PriorOrKnown".into()
     }
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         extended(generator, vec![known()])
@@ -287,8 +292,8 @@ impl JsonSchema for Variance {
     }
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         let content = generator.subschema_for::<Quantity>().to_value();
-        let text = "A multiple of the variance that the replicates of each output show: the prior \
-                    of the multiplier, or `{ known = 1 }`.";
+        let text = "Multiple of the variance between the replicates of each output: the prior of the \
+                    multiplier, or `{ known = 1 }`.";
         extended(generator, vec![known(), table("measured", content, text)])
     }
 }

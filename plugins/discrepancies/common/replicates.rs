@@ -1,25 +1,25 @@
-//! The replicates of each output as counts, means and scatters, and the factor of the common errors.
+//! Replicates of each output reduced to counts, means and scatters, and the factor of the common errors.
 
 use lacuna::data::{Measurements, Unit};
-use lacuna::linalg::{self, Matrix};
 use lacuna::plugin::discrepancy::CommonError;
 use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
 
-/// The outputs that were measured at least once.
+/// Statistics of the outputs that were measured at least once.
 #[derive(Debug, Clone)]
 pub struct Replicates {
-    /// Their flat indices.
+    /// Flat indices of these outputs.
     pub measured: Vec<usize>,
-    /// The number of replicates of each.
+    /// Number of replicates of each.
     pub count: Vec<f64>,
-    /// Their means.
+    /// Mean of the replicates.
     pub mean: Vec<f64>,
-    /// Their sums of squared deviations from the mean.
+    /// Sum of squared deviations from the mean.
     pub scatter: Vec<f64>,
 }
 
 impl Replicates {
-    /// The replicates of data that belong to the layout, with common errors that do.
+    /// Summarises the replicates; fails if data or common errors do not match the layout, or no value is measured.
     pub fn of(data: &Measurements, common: &[CommonError]) -> Result<Self, Stop> {
         check(data, common)?;
         let summaries = data.summaries();
@@ -37,12 +37,12 @@ impl Replicates {
         })
     }
 
-    /// The differences between the means and a response.
+    /// Returns the differences between the means and a response.
     pub fn residual(&self, response: &[f64]) -> Vec<f64> {
         self.measured.iter().zip(&self.mean).map(|(&i, mean)| mean - response[i]).collect()
     }
 
-    /// Derivatives by the measured outputs as derivatives by all.
+    /// Expands derivatives with respect to the measured outputs to all outputs, with zeros.
     pub fn over_all(&self, by_measured: &[f64], outputs: usize) -> Vec<f64> {
         let mut all = vec![0.0; outputs];
         for (&i, g) in self.measured.iter().zip(by_measured) {
@@ -51,8 +51,8 @@ impl Replicates {
         all
     }
 
-    /// The factor of all common errors at the measured outputs, with no more columns than its rank:
-    /// by the singular value decomposition of the factor weighted with the roots of the counts.
+    /// Returns the factor of all common errors at the measured outputs, with as many columns as its rank, by a
+    /// singular value decomposition weighted with the roots of the counts.
     pub fn common_factor(&self, common: &[CommonError]) -> Result<Matrix, Stop> {
         let columns: Vec<(&Matrix, usize)> = common
             .iter()
@@ -66,14 +66,14 @@ impl Replicates {
             let (factor, column) = columns[k];
             self.count[i].sqrt() * factor[(self.measured[i], column)]
         });
-        let svd = linalg::thin_svd(&weighted)
+        let svd = lacuna_linalg::thin_svd(&weighted)
             .map_err(|e| Stop::new(format!("the covariance of the common errors: {e}")))?;
         let rank = svd.values.iter().filter(|&&s| s > 1e-12 * svd.values[0]).count();
         Ok(Matrix::from_fn(rows, rank, |i, k| svd.u[(i, k)] * svd.values[k] / self.count[i].sqrt()))
     }
 }
 
-/// Refuses data and errors that are not on the layout, and values that no density is made for.
+/// Fails if data or errors do not match the layout, or a value is not finite.
 fn check(data: &Measurements, common: &[CommonError]) -> Result<(), Stop> {
     let outputs = data.layout.len();
     for replicate in &data.replicates {
@@ -98,7 +98,7 @@ fn check(data: &Measurements, common: &[CommonError]) -> Result<(), Stop> {
     Ok(())
 }
 
-/// The unit of a variance.
+/// Returns the unit of a variance.
 pub fn squared(unit: &Unit) -> Result<Unit, Stop> {
     let text = unit.to_string();
     let squared = match text.as_str() {

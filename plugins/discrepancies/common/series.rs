@@ -2,21 +2,21 @@
 
 use lacuna::data::{Coordinates, Layout};
 
-/// The outputs along a grid axis, one series for each place of the other axes.
+/// Series of outputs along a numeric axis, one for each combination of the other axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// The flat indices of each series, in the order of the axis.
+    /// Flat indices of each series, in the order of the axis.
     pub outputs: Vec<Vec<usize>>,
-    /// The values of the axis.
+    /// Values of the axis.
     pub grid: Vec<f64>,
-    /// The name of the axis.
+    /// Name of the axis.
     pub axis: String,
-    /// The unit of the axis.
+    /// Unit of the axis.
     pub unit: lacuna::data::Unit,
 }
 
 impl Series {
-    /// The series along the axis of this name, or along the last grid axis.
+    /// Returns the series along the axis of this name, or along the last numeric axis; fails if there is none.
     pub fn of(layout: &Layout, along: Option<&str>) -> Result<Self, String> {
         let is_grid = |c: &Coordinates| matches!(c, Coordinates::Grid { .. });
         let position = match along {

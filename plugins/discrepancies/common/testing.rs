@@ -1,11 +1,11 @@
-//! Densities written out with the dense covariance of all data, for the tests.
+//! Densities computed with the dense covariance of all data, for the tests.
 #![allow(clippy::unwrap_used)]
 
 use lacuna::data::{Axis, Layout, Measurements, Replicate, Unit};
-use lacuna::linalg::{Cholesky, Matrix};
 use lacuna::math::random::{Stream, normal, uniform};
-use lacuna::plugin::discrepancy::{CommonError, Likelihood};
+use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin, Likelihood};
 use lacuna::plugin::{Discrepancy, registry};
+use lacuna_linalg::{Cholesky, Matrix};
 
 pub const SENSORS: usize = 3;
 pub const TIMES: usize = 6;
@@ -24,7 +24,7 @@ pub fn layout() -> Layout {
     }
 }
 
-/// Unequal replicates with gaps; output 4 and all of the last window of sensor G are never measured.
+/// Unequal replicates with gaps; output 4 and the whole last window of sensor G are never measured.
 pub fn data(seed: u64, replicates: usize) -> Measurements {
     let mut rng = Stream::root(seed).generator();
     let replicate = |r: usize, rng: &mut _| {
@@ -49,18 +49,18 @@ pub fn random_matrix(rows: usize, columns: usize, seed: u64) -> Matrix {
 
 pub fn common(seed: u64) -> CommonError {
     let factor = random_matrix(OUTPUTS, 2, seed);
-    CommonError { origin: "emulator".to_owned(), factor, predictive: true }
+    CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }
 }
 
-/// All data as one normal vector: residuals, with the replicate and the output of each.
+/// All data as one normal vector: residuals, with replicate and output of each.
 pub struct Written {
     pub residual: Vec<f64>,
     pub covariance: Matrix,
 }
 
 impl Written {
-    /// With `shared(i, j)` the covariance of outputs that all replicates share, and `own(i, j)` that within
-    /// one replicate.
+    /// Builds the vector; `shared(i, j)` is the covariance of outputs common to all replicates, `own(i, j)` that
+    /// within one replicate.
     pub fn new(
         data: &Measurements,
         response: &[f64],
@@ -90,7 +90,7 @@ impl Written {
         -0.5 * (own + factor.log_determinant() + factor.quadratic(&self.residual))
     }
 
-    /// `log p(y) - log p(y without i)` for each `i`.
+    /// Returns `log p(y) - log p(y without i)` for each `i`.
     pub fn left_out(&self) -> Vec<f64> {
         let all = self.log_density();
         let n = self.residual.len();
@@ -105,7 +105,7 @@ impl Written {
     }
 }
 
-/// `F F'` of all common errors.
+/// Returns `F F'` of all common errors.
 pub fn shared(common: &[CommonError]) -> impl Fn(usize, usize) -> f64 {
     move |i, j| {
         let of = |e: &CommonError| -> f64 {
@@ -119,7 +119,8 @@ pub fn close(found: f64, expected: f64, tolerance: f64) {
     assert!((found - expected).abs() <= tolerance * expected.abs().max(1e-3), "{found} {expected}");
 }
 
-/// Derivatives against central differences, whose own error is of the order of `h^2` of the third derivative.
+/// Asserts that gradients agree with central differences, whose own error is of the order of `h^2` times the third
+/// derivative.
 pub fn has_its_derivatives(likelihood: &dyn Likelihood, response: &[f64], hyper: &[f64]) {
     let (by_response, by_hyper) = likelihood.gradient(response, hyper);
     let difference = |f: &dyn Fn(f64) -> f64, h: f64| (f(h) - f(-h)) / (2.0 * h);
@@ -143,7 +144,7 @@ pub fn has_its_derivatives(likelihood: &dyn Likelihood, response: &[f64], hyper:
     }
 }
 
-/// The options of a plugin as a study writes them.
+/// Parses the options of a plugin as written in a study.
 pub fn options<T: serde::de::DeserializeOwned>(name: &str, text: &str) -> Result<T, String> {
     let built = registry::from_text::<dyn Discrepancy>(name, text)?;
     let json = serde_json::to_value(&built.options).map_err(|e| e.to_string())?;

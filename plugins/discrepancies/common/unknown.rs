@@ -1,4 +1,4 @@
-//! Numbers of groups as hyperparameters.
+//! Hyperparameters with one number per group of outputs.
 
 use lacuna::data::Unit;
 use lacuna::math::distribution::Distribution;
@@ -6,7 +6,7 @@ use lacuna::plugin::discrepancy::Hyperparameter;
 
 use super::{Groups, Quantity};
 
-/// One positive number for each group: known, or a run of the hyperparameters.
+/// One positive number for each group: known, or a range of the hyperparameters.
 #[derive(Debug, Clone)]
 pub struct PerGroup {
     known: Option<Vec<f64>>,
@@ -14,16 +14,16 @@ pub struct PerGroup {
     count: usize,
 }
 
-/// What a positive number is called.
+/// Name and unit of a positive number.
 pub struct Unknown<'a> {
-    /// Its name and symbol, to which the group's name is added.
+    /// Name and symbol, to which the group's name is appended.
     pub name: &'a str,
-    /// Its unit.
+    /// Unit.
     pub unit: Unit,
 }
 
 impl PerGroup {
-    /// The numbers of all groups; those that are unknown become hyperparameters, sampled as logarithms.
+    /// Returns the numbers of all groups; unknown ones become hyperparameters, which are sampled as logarithms.
     pub fn new(
         quantity: &Quantity,
         groups: &Groups,
@@ -34,7 +34,7 @@ impl PerGroup {
         let (first, count) = (hyper.len(), groups.count());
         let prior = match quantity {
             Quantity::Known(values) => {
-                // What is missing is no number, and makes the likelihood zero.
+                // A missing number is NaN, which makes the likelihood zero.
                 let of = |&g: &usize| match values.as_slice() {
                     [one] => *one,
                     many => many.get(g).copied().unwrap_or(f64::NAN),
@@ -55,7 +55,7 @@ impl PerGroup {
         Self { known: None, first, count }
     }
 
-    /// The numbers, given all hyperparameters; `None` where one of them is not above zero.
+    /// Returns the numbers, given all hyperparameters; `None` if one of them is not above zero.
     pub fn values<'a>(&'a self, hyper: &'a [f64]) -> Option<&'a [f64]> {
         let values = match &self.known {
             Some(known) => known,
@@ -64,7 +64,7 @@ impl PerGroup {
         values.iter().all(|v| *v > 0.0).then_some(values)
     }
 
-    /// Adds the derivatives by the numbers to those by the hyperparameters.
+    /// Adds the derivatives with respect to the numbers to those with respect to the hyperparameters.
     pub fn add_gradient(&self, by_value: &[f64], by_hyper: &mut [f64]) {
         if self.known.is_none() {
             let own = &mut by_hyper[self.first..self.first + self.count];
@@ -73,7 +73,7 @@ impl PerGroup {
     }
 }
 
-/// An estimate where the prior allows it, else the prior's median.
+/// Returns the estimate if the prior allows it, else the prior's median.
 fn inside(prior: &Distribution, estimate: f64) -> f64 {
     if prior.log_density(estimate).is_finite() && estimate > 0.0 {
         estimate

@@ -1,53 +1,52 @@
-//! The likelihood reduced to a small form in the basis functions of a linear emulator.
+//! Likelihood reduced to a small form in the basis functions of a linear emulator.
 //!
-//! With `m = C' psi` the weighted residual of a group is `z = -B (psi, 1)`, `B = [W C', -W ybar]`.
-//! Its part along the directions `U` of the common errors is `-(U'B)(psi, 1)`; for the rest, the
-//! thin factorisation `(I - U U') B = Q R` gives `|z_rest| = |R (psi, 1)|` with `R` upper
-//! trapezoidal: exact, since an orthogonal factor does not change a length.
+//! With `m = C' psi` the weighted residual of a group is `z = -B (psi, 1)`, `B = [W C', -W ybar]`. Its part along the
+//! directions `U` of the common errors is `-(U'B)(psi, 1)`; for the rest, the thin factorisation `(I - U U') B = Q R`
+//! gives `|z_rest| = |R (psi, 1)|` with `R` upper trapezoidal. This is exact, since an orthogonal factor preserves
+//! lengths.
 //!
-//! Only the length of the rest matters, and a polynomial basis gives its square as one polynomial.
-//! That form carries the round-off of its largest values into its smallest, so that it is used only
-//! where this cannot be seen: against the scatter of the replicates and what no coefficients can
-//! explain.
+//! Only the length of the rest matters, and with a polynomial basis its square is one polynomial. Expanding the
+//! square carries rounding errors of its largest values into its smallest, so that this form is used only if they are
+//! negligible against the scatter of the replicates and the part of the data that no coefficients can explain.
 
-use lacuna::linalg::vector::dot;
-use lacuna::linalg::{self, Matrix};
 use lacuna::plugin::discrepancy::Compressed;
 use lacuna::plugin::forward::{Linear, SumOfSquares};
+use lacuna_linalg::Matrix;
+use lacuna_linalg::vector::dot;
 
 use super::law::Law;
 use super::likelihood::GaussianLikelihood;
 use super::statistics::{Residual, Spread, Statistics};
 
-/// See the module.
+/// The compressed likelihood (see the module).
 pub(super) struct CompressedGaussian {
     law: Law,
     pub(super) groups: Vec<CompressedGroup>,
 }
 
-/// The residual of one group.
+/// Residual of one group.
 pub(super) struct CompressedGroup {
     spread: Spread,
-    /// `(U'B)'`, `(terms + 1) x rank`.
+    /// `(U'B)'` (`(terms + 1) x rank`).
     along: Matrix,
-    /// `R'`, `(terms + 1) x` at most `terms + 1`, with zeros above its diagonal.
+    /// `R'` (`(terms + 1) x` at most `terms + 1`), with zeros above its diagonal.
     outside: Matrix,
-    /// `|R (psi, 1)|^2` as a function of the point, where it is exact enough.
+    /// `|R (psi, 1)|^2` as a polynomial of the point, if it is accurate enough.
     pub(super) squares: Option<Box<dyn SumOfSquares>>,
 }
 
-/// The residuals of a group at several points, those along the directions but for their sign.
+/// Residuals of a group at several points; those along the directions have the opposite sign.
 struct Residuals {
     along: Matrix,
     squares: Vec<f64>,
 }
 
-/// The largest error of the sum of squares, relative to the least sum that can occur: a tenth of what
-/// the log-likelihood may differ from the sum over all data.
+/// Largest error of the sum of squares relative to the smallest possible sum: a tenth of the allowed difference of
+/// the log-likelihood from the sum over all data.
 const TOLERANCE: f64 = 1e-11;
 
 impl CompressedGroup {
-    fn new(s: &Statistics, linear: &dyn Linear) -> Result<Self, linalg::Error> {
+    fn new(s: &Statistics, linear: &dyn Linear) -> Result<Self, lacuna_linalg::Error> {
         let coefficients = linear.coefficients();
         let terms = coefficients.rows();
         let mut b = Matrix::from_fn(s.measured.len(), terms + 1, |i, j| {
@@ -57,13 +56,13 @@ impl CompressedGroup {
                 -s.weighted_mean[i]
             }
         });
-        let along = linalg::multiply(&s.directions, &b);
-        let explained = linalg::transposed_multiply(&s.directions, &along);
+        let along = lacuna_linalg::multiply(&s.directions, &b);
+        let explained = lacuna_linalg::transposed_multiply(&s.directions, &along);
         for (entry, part) in b.as_mut_slice().iter_mut().zip(explained.as_slice()) {
             *entry -= part;
         }
-        let r = linalg::thin_qr(&b)?.r;
-        // The last entry of a square `R` is the distance of the data from all that the basis can make.
+        let r = lacuna_linalg::thin_qr(&b)?.r;
+        // The last entry of a square `R` is the distance of the data from the span of the basis.
         let distance = if r.rows() > terms { r[(terms, terms)] } else { 0.0 };
         let least = s.spread.scatter + distance * distance;
         let squares = linear.sum_of_squares(&r).filter(|q| q.error() <= TOLERANCE * least);
@@ -72,20 +71,20 @@ impl CompressedGroup {
     }
 
     fn residuals(&self, extended: &Matrix) -> Residuals {
-        let along = linalg::multiply(extended, &self.along);
-        let outside = linalg::multiply_lower(extended, &self.outside);
+        let along = lacuna_linalg::multiply(extended, &self.along);
+        let outside = lacuna_linalg::multiply_lower(extended, &self.outside);
         Residuals { along, squares: outside.iter_rows().map(|row| dot(row, row)).collect() }
     }
 
-    /// The polynomial of the squares, where it holds at all points.
+    /// Returns the polynomial of the squares, if it is valid at all points.
     fn covering(&self, points: &Matrix) -> Option<&dyn SumOfSquares> {
         self.squares.as_deref().filter(|squares| squares.covers_all(points))
     }
 
-    /// What pulls along the directions contribute to the derivatives by the basis functions.
+    /// Returns the contribution of the directions to the derivatives with respect to the basis functions.
     fn pull(&self, along: &[f64], terms: usize) -> Vec<f64> {
         let opposite: Vec<f64> = along.iter().map(|a| -a).collect();
-        let mut pull = linalg::multiply_vector(&self.along, &opposite);
+        let mut pull = lacuna_linalg::multiply_vector(&self.along, &opposite);
         pull.truncate(terms);
         pull
     }
@@ -95,7 +94,7 @@ impl CompressedGaussian {
     pub(super) fn new(
         likelihood: &GaussianLikelihood,
         linear: &dyn Linear,
-    ) -> Result<Self, linalg::Error> {
+    ) -> Result<Self, lacuna_linalg::Error> {
         let groups = likelihood.groups.iter().map(|s| CompressedGroup::new(s, linear));
         Ok(Self { law: likelihood.law.clone(), groups: groups.collect::<Result<_, _>>()? })
     }
@@ -118,7 +117,7 @@ impl CompressedGaussian {
     }
 }
 
-/// The basis with a column of ones: the emulator's coefficients and the data in one factor.
+/// Appends a column of ones to the basis, so that the emulator's coefficients and the data form one factor.
 fn with_one(basis: &Matrix) -> Matrix {
     let terms = basis.columns();
     let mut extended = Matrix::zeros(basis.rows(), terms + 1);
@@ -149,7 +148,7 @@ impl Compressed for CompressedGaussian {
             let along = if group.along.columns() == 0 {
                 Matrix::zeros(points.rows(), 0)
             } else {
-                linalg::multiply(&extended, &group.along)
+                lacuna_linalg::multiply(&extended, &group.along)
             };
             Residuals { along, squares: squares.values(points) }
         };
@@ -161,8 +160,8 @@ impl Compressed for CompressedGaussian {
         let extended: Vec<f64> = basis.iter().copied().chain([1.0]).collect();
         let parts: Vec<(Vec<f64>, Vec<f64>)> = (self.groups.iter())
             .map(|g| {
-                let along = linalg::transposed_multiply_vector(&g.along, &extended);
-                (along, linalg::transposed_multiply_vector(&g.outside, &extended))
+                let along = lacuna_linalg::transposed_multiply_vector(&g.along, &extended);
+                (along, lacuna_linalg::transposed_multiply_vector(&g.outside, &extended))
             })
             .collect();
         let residuals: Vec<Residual<'_>> = parts
@@ -175,7 +174,7 @@ impl Compressed for CompressedGaussian {
         };
         for (g, (group, (_, outside))) in self.groups.iter().zip(&parts).enumerate() {
             let pull = group.pull(&slopes.along[g], basis.len());
-            let rest = linalg::multiply_vector(&group.outside, outside);
+            let rest = lacuna_linalg::multiply_vector(&group.outside, outside);
             for (sum, (p, r)) in by_basis.iter_mut().zip(pull.iter().zip(rest)) {
                 *sum += p - r / slopes.outside[g];
             }
@@ -194,14 +193,14 @@ impl Compressed for CompressedGaussian {
         let Some(squares) = all else {
             let (by_basis, by_hyper) = self.gradient(linear.basis(&row).row(0), hyper);
             let slopes = linear.basis_gradient(point);
-            return (linalg::transposed_multiply_vector(&slopes, &by_basis), by_hyper);
+            return (lacuna_linalg::transposed_multiply_vector(&slopes, &by_basis), by_hyper);
         };
         let directions = self.groups.iter().any(|g| g.along.columns() > 0);
         let extended = directions.then(|| with_one(&linear.basis(&row)));
         let along = |group: &CompressedGroup| {
             let along = extended
                 .as_ref()
-                .map(|e| linalg::transposed_multiply_vector(&group.along, e.row(0)));
+                .map(|e| lacuna_linalg::transposed_multiply_vector(&group.along, e.row(0)));
             along.unwrap_or_default()
         };
         let along: Vec<Vec<f64>> = self.groups.iter().map(along).collect();
@@ -224,7 +223,8 @@ impl Compressed for CompressedGaussian {
             for (group, along) in self.groups.iter().zip(&slopes.along) {
                 pull.iter_mut().zip(group.pull(along, terms)).for_each(|(sum, p)| *sum += p);
             }
-            let added = linalg::transposed_multiply_vector(&linear.basis_gradient(point), &pull);
+            let added =
+                lacuna_linalg::transposed_multiply_vector(&linear.basis_gradient(point), &pull);
             by_point.iter_mut().zip(added).for_each(|(g, a)| *g += a);
         }
         (by_point, slopes.by_hyper)

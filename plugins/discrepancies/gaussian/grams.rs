@@ -1,36 +1,36 @@
 //! Sums of the products `T_g' T_g` of groups, and their traces with an inverse.
 //!
-//! Products that are kept cost the reading of `rank^2 / 2` numbers a group, whatever its size; those
-//! of a group of few rows are made faster than read.
+//! Stored products cost reading `rank^2 / 2` numbers per group, whatever its size; for groups of few rows it is
+//! faster to compute the products than to read them.
 
-use lacuna::linalg::vector::{add_scaled, dot};
-use lacuna::linalg::{self, Cholesky, Matrix};
+use lacuna_linalg::vector::{add_scaled, dot};
+use lacuna_linalg::{Cholesky, Matrix};
 
-/// See the module.
+/// The products, stored or computed on demand (see the module).
 #[derive(Debug, Clone)]
 pub(super) enum Grams {
-    /// The lower triangle of each product, row by row.
+    /// Lower triangle of each product, row by row.
     Kept(Vec<Vec<f64>>),
-    /// All factors side by side, transposed: `rank x rows`.
+    /// All factors side by side, transposed (`rank x rows`).
     Made(Matrix),
 }
 
-/// Up to this mean number of rows products are made and not kept.
+/// Mean number of rows up to which products are computed on demand.
 const FEW: usize = 30;
 
 impl Grams {
-    /// Of the factors `T_g`.
+    /// Prepares the products of the factors `T_g`.
     pub fn of(factors: &[Matrix]) -> Self {
         let rows: usize = factors.iter().map(Matrix::rows).sum();
         if rows > FEW * factors.len() {
-            return Self::Kept(factors.iter().map(|t| lower(&linalg::gram(t))).collect());
+            return Self::Kept(factors.iter().map(|t| lower(&lacuna_linalg::gram(t))).collect());
         }
         let rank = factors.first().map_or(0, Matrix::columns);
         let stacked = Matrix::from_rows(rank, factors.iter().flat_map(Matrix::iter_rows));
         Self::Made(stacked.transposed())
     }
 
-    /// The lower triangle of `sum_g T_g' T_g / v_g`.
+    /// Returns the lower triangle of `sum_g T_g' T_g / v_g`.
     pub fn sum(&self, factors: &[Matrix], variance: &[f64]) -> Matrix {
         let rank = factors.first().map_or(0, Matrix::columns);
         match self {
@@ -54,12 +54,12 @@ impl Grams {
                         row += 1;
                     }
                 }
-                linalg::gram(&weighted)
+                lacuna_linalg::gram(&weighted)
             }
         }
     }
 
-    /// `tr(C^-1 T_g' T_g)` for each group.
+    /// Returns `tr(C^-1 T_g' T_g)` for each group.
     pub fn traces(&self, factors: &[Matrix], capacitance: &Cholesky) -> Vec<f64> {
         match self {
             Self::Kept(grams) => {
@@ -89,12 +89,12 @@ impl Grams {
     }
 }
 
-/// Where a row begins in a lower triangle.
+/// Returns the start of a row in a packed lower triangle.
 fn start(row: usize) -> usize {
     row * (row + 1) / 2
 }
 
-/// The lower triangle of a symmetric matrix.
+/// Packs the lower triangle of a symmetric matrix.
 fn lower(matrix: &Matrix) -> Vec<f64> {
     let rows = matrix.iter_rows().enumerate();
     rows.flat_map(|(i, row)| row[..=i].iter().copied()).collect()
@@ -106,7 +106,7 @@ mod tests {
     use super::*;
     use crate::discrepancies::common::testing::{close, random_matrix};
 
-    /// Against the products written out, for groups of many rows (kept) and of few (made).
+    /// Compares with the explicit products, for groups of many rows (stored) and of few (computed).
     #[test]
     fn sums_and_traces_are_those_of_the_products_written_out() {
         let rank = 45;
@@ -116,7 +116,7 @@ mod tests {
             let grams = Grams::of(&factors);
             assert_eq!(matches!(grams, Grams::Kept(_)), kept);
             let variance = [0.3, 2.0, 0.7];
-            let products: Vec<Matrix> = factors.iter().map(linalg::gram).collect();
+            let products: Vec<Matrix> = factors.iter().map(lacuna_linalg::gram).collect();
             let mut written = Matrix::from_fn(rank, rank, |i, j| {
                 products.iter().zip(variance).map(|(m, v)| m[(i, j)] / v).sum()
             });

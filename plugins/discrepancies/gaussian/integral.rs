@@ -1,19 +1,19 @@
 //! An unknown variance integrated out.
 //!
-//! The integral over the variance of likelihood times prior is taken in `u = log v`, where it is smooth and
-//! falls off to both sides: Gauss and Legendre's rule with ten points on panels from the
-//! maximum outwards, each wider than the one before, until they add nothing.
+//! The integral over the variance of likelihood times prior is computed in `u = log v`, in which the integrand is
+//! smooth and decays on both sides: Gauss-Legendre quadrature with ten points on panels from the maximum outwards,
+//! each wider than the one before, until they contribute nothing.
 
 use lacuna::math::distribution::Distribution;
 use lacuna::math::special::ln_gamma;
 
 use super::statistics::{Residual, Spread};
 
-/// The variance given the data, as points with probabilities.
+/// The posterior of the variance, as a discrete distribution.
 pub(super) struct Integral {
-    /// The logarithm of the integral.
+    /// Logarithm of the integral.
     pub log: f64,
-    /// Variances and their probabilities.
+    /// Grid of variances and their probabilities.
     pub nodes: Vec<(f64, f64)>,
 }
 
@@ -26,12 +26,13 @@ const RULE: [(f64, f64); 5] = [
     (0.973_906_528_517_172, 0.066_671_344_308_688),
 ];
 
-/// How much wider a panel is than its neighbour nearer to the maximum.
+/// Ratio of the widths of a panel and its neighbour nearer to the maximum.
 const GROWTH: f64 = 1.15;
-/// The most panels on one side; more are needed only by laws without an end.
+/// Maximum number of panels on one side; only densities that do not decay need more.
 const PANELS: usize = 400;
 
-/// The integral in closed form: an inverse gamma prior is conjugate to independent normal data.
+/// Returns the log of the integral in closed form, for an inverse gamma prior without common errors (conjugate to
+/// independent normal data); `None` otherwise.
 pub(super) fn conjugate(spread: &Spread, outside: f64, prior: &Distribution) -> Option<f64> {
     let Distribution::InverseGamma([shape, scale]) = *prior else { return None };
     if !spread.eigenvalues.is_empty() {
@@ -42,10 +43,10 @@ pub(super) fn conjugate(spread: &Spread, outside: f64, prior: &Distribution) -> 
     Some(shape * scale.ln() - ln_gamma(shape) + ln_gamma(a) - a * b.ln() - 0.5 * own)
 }
 
-/// The integral, and the variance given the data.
+/// Computes the integral and the posterior of the variance.
 pub(super) fn integrate(spread: &Spread, residual: Residual<'_>, prior: &Distribution) -> Integral {
     let (low, high) = prior.support();
-    // At an end the logarithm and back may lead out of the support.
+    // At the ends of the support, rounding in the logarithm and back may lead outside it.
     let variance = |u: f64| u.exp().clamp(low.max(f64::MIN_POSITIVE), high);
     let density = |u: f64| {
         let v = variance(u);
@@ -73,7 +74,7 @@ pub(super) fn integrate(spread: &Spread, residual: Residual<'_>, prior: &Distrib
     let width = 1.5 / (curvature.max(0.0).sqrt() + slope(top).abs() + 0.2);
     let mut nodes = Vec::new();
     let mut total = 0.0;
-    // A prior with a corner is integrated on both sides of it.
+    // A prior with a corner is integrated separately on its two sides, because the rule needs a smooth integrand.
     let corner = match *prior {
         Distribution::Triangular([_, mode, _]) if mode > 0.0 => Some(mode.ln()),
         _ => None,
@@ -125,7 +126,7 @@ fn panel(
     sum
 }
 
-/// Where a slope changes its sign from above to below zero, or the bound it points to.
+/// Returns the point where a slope changes from positive to negative, or the bound that it points to.
 fn summit(slope: impl Fn(f64) -> f64, start: f64, (low, high): (f64, f64)) -> f64 {
     let start = start.clamp(low, high);
     let first = slope(start);
@@ -142,7 +143,8 @@ fn summit(slope: impl Fn(f64) -> f64, start: f64, (low, high): (f64, f64)) -> f6
     }
     let (mut a, mut b) = (near, far);
     let (mut fa, mut fb) = (slope(a), slope(b));
-    // False position, where every third step halves the bracket; the place of the panels need not be exact.
+    // Regula falsi with a bisection at every third step. Six digits suffice, because the result only places the
+    // panels.
     for k in 0..60 {
         if (b - a).abs() < 1e-6 {
             break;

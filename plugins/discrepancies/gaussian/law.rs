@@ -1,51 +1,50 @@
-//! What is done with the variances of the groups: given, integrated out, or given and coupled by
-//! common errors.
+//! Treatment of the groups' variances: given, integrated out, or given and coupled by common errors.
 
-use lacuna::linalg::vector::dot;
-use lacuna::linalg::{self, Cholesky, Matrix};
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::discrepancy::CommonError;
 use lacuna::run::Stop;
+use lacuna_linalg::vector::dot;
+use lacuna_linalg::{Cholesky, Matrix};
 
 use super::grams::Grams;
 use super::integral::{Integral, conjugate, integrate};
 use super::statistics::{Residual, Spread, Statistics};
 use crate::discrepancies::common::PerGroup;
 
-/// See the module.
+/// Treatment of the groups' variances (see the module).
 #[derive(Debug, Clone)]
 pub(super) enum Law {
-    /// Each group has its own variance, and at most one of them common errors.
+    /// Each group has its own variance, and at most one group has common errors.
     Given(PerGroup),
     /// The variance of each group is integrated out under this prior.
     Integrated(Distribution),
-    /// The common errors reach several groups.
+    /// Common errors reach several groups.
     Coupled(Coupled),
 }
 
-/// Common errors over several groups: with `W F = Q_g T_g` in group `g`, `Q_g` its orthonormal
-/// directions, the least of `sum_g |a_g - T_g zeta|^2 / v_g + |zeta|^2` is the quadratic form and
-/// `C = I + sum_g T_g'T_g / v_g` has the determinant (Woodbury).
+/// Common errors over several groups: with `W F = Q_g T_g` in group `g`, `Q_g` its orthonormal directions, the
+/// minimum of `sum_g |a_g - T_g zeta|^2 / v_g + |zeta|^2` over `zeta` is the quadratic form, and
+/// `C = I + sum_g T_g'T_g / v_g` gives the determinant (Woodbury).
 #[derive(Debug, Clone)]
 pub(super) struct Coupled {
     variance: PerGroup,
-    /// `T_g`.
+    /// `T_g` of each group.
     factors: Vec<Matrix>,
     grams: Grams,
 }
 
-/// How the log-likelihood changes with the residual of each group.
+/// Derivatives of the log-likelihood with respect to the residual of each group.
 pub(super) struct Slopes {
-    /// What a residual outside the directions is divided by.
+    /// Divisor of the residual outside the directions, for each group.
     pub outside: Vec<f64>,
-    /// Half the derivative by each residual along a direction, its sign changed.
+    /// Minus half the derivative with respect to each residual along a direction.
     pub along: Vec<Vec<f64>>,
-    /// The derivatives by the hyperparameters.
+    /// Derivatives with respect to the hyperparameters.
     pub by_hyper: Vec<f64>,
 }
 
 impl Law {
-    /// The log-likelihood; minus infinity where a variance is not above zero.
+    /// Returns the log-likelihood; minus infinity if a variance is not above zero.
     pub fn log_likelihood(
         &self,
         spreads: &[&Spread],
@@ -69,7 +68,7 @@ impl Law {
         }
     }
 
-    /// The derivatives; `None` where a variance is not above zero.
+    /// Returns the derivatives; `None` if a variance is not above zero.
     pub fn slopes(
         &self,
         spreads: &[&Spread],
@@ -118,7 +117,7 @@ impl Law {
         }
     }
 
-    /// The variance of each group as points with probabilities.
+    /// Returns the variance of each group as pairs of values and probabilities.
     pub fn variances(
         &self,
         spreads: &[&Spread],
@@ -137,14 +136,14 @@ impl Law {
     }
 }
 
-/// The common errors that explain the residuals best.
+/// Maximum over the common errors at one set of variances.
 struct Solved<'a> {
     variance: &'a [f64],
     zeta: Vec<f64>,
     capacitance: Cholesky,
-    /// `a_g - T_g zeta`.
+    /// `a_g - T_g zeta` of each group.
     rest: Vec<Vec<f64>>,
-    /// The squared residual of each group without the common errors.
+    /// Squared residual of each group after subtracting the common errors.
     squares: Vec<f64>,
 }
 
@@ -160,7 +159,7 @@ impl Solved<'_> {
 }
 
 impl Coupled {
-    /// The common errors over groups; each group's statistics are given its directions.
+    /// Couples groups by common errors, and sets the directions of each group's statistics.
     pub fn new(
         groups: &mut [Statistics],
         common: &[CommonError],
@@ -170,13 +169,14 @@ impl Coupled {
         let weighted: Vec<Matrix> = groups.iter().map(|g| g.weighted(common)).collect();
         let columns = weighted.first().map_or(0, Matrix::columns);
         let all = Matrix::from_rows(columns, weighted.iter().flat_map(Matrix::iter_rows));
-        // The right singular vectors turn the common errors so that as few as possible are needed.
-        let svd = linalg::thin_svd(&all).map_err(failed)?;
+        // The right singular vectors rotate the common errors to the smallest number of directions that span them.
+        let svd = lacuna_linalg::thin_svd(&all).map_err(failed)?;
         let rank = svd.values.iter().filter(|&&s| s > 1e-12 * svd.values[0]).count();
         let turn = svd.v.select_columns(&(0..rank).collect::<Vec<_>>());
         let mut factors = Vec::new();
         for (group, weighted) in groups.iter_mut().zip(&weighted) {
-            let qr = linalg::thin_qr(&linalg::multiply(weighted, &turn)).map_err(failed)?;
+            let qr = lacuna_linalg::thin_qr(&lacuna_linalg::multiply(weighted, &turn))
+                .map_err(failed)?;
             group.directions = qr.q.transposed();
             factors.push(qr.r);
         }
@@ -189,7 +189,8 @@ impl Coupled {
         let mut capacitance = self.grams.sum(&self.factors, variance);
         let mut zeta = vec![0.0; rank];
         for (g, &v) in variance.iter().enumerate() {
-            let pull = linalg::transposed_multiply_vector(&self.factors[g], residuals[g].along);
+            let pull =
+                lacuna_linalg::transposed_multiply_vector(&self.factors[g], residuals[g].along);
             zeta.iter_mut().zip(pull).for_each(|(z, p)| *z += p / v);
         }
         for k in 0..rank {
@@ -206,7 +207,8 @@ impl Coupled {
         Some(Solved { variance, zeta, capacitance, rest, squares })
     }
 
-    /// By Fisher's identity: the derivative at fixed common errors, averaged over them given the data.
+    /// Returns the derivatives with respect to the variances by Fisher's identity: those at fixed common errors,
+    /// averaged over the errors given the data.
     fn by_variance(&self, solved: &Solved<'_>, spreads: &[&Spread]) -> Vec<f64> {
         let traces = self.grams.traces(&self.factors, &solved.capacitance);
         let one = |(g, spread): (usize, &&Spread)| {

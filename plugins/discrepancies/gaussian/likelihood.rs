@@ -1,13 +1,13 @@
-//! The likelihood in the sufficient statistics of the replicates.
+//! Likelihood in the sufficient statistics of the replicates.
 
 use lacuna::data::Measurements;
-use lacuna::linalg::vector::dot;
-use lacuna::linalg::{self, Matrix};
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::Fact;
 use lacuna::plugin::discrepancy::{Compressed, Hyperparameter, Known, Likelihood, VariancePart};
 use lacuna::plugin::forward::Linear;
 use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
+use lacuna_linalg::vector::dot;
 
 use super::Gaussian;
 use super::compressed::CompressedGaussian;
@@ -15,17 +15,17 @@ use super::law::{Coupled, Law};
 use super::statistics::{Residual, Spread, Statistics};
 use crate::discrepancies::common::{Noise, Normal, Replicates, conditional, values};
 
-/// See the module.
+/// The likelihood (see the module).
 pub(super) struct GaussianLikelihood {
     hyper: Vec<Hyperparameter>,
     noise: Noise,
     pub(super) groups: Vec<Statistics>,
     pub(super) law: Law,
-    /// The density output by output, where common errors couple the groups.
+    /// Density output by output, if common errors couple the groups.
     normal: Option<Normal>,
 }
 
-/// The residual of each group: its components along the directions, and the vector of the rest.
+/// Residual of each group: components along the directions, and the remaining vector.
 type Split = Vec<(Vec<f64>, Vec<f64>)>;
 
 impl GaussianLikelihood {
@@ -33,7 +33,7 @@ impl GaussianLikelihood {
         Self::under(options, known, known.data)
     }
 
-    /// The same where the noise that replicates show is that of `shown`.
+    /// Builds the likelihood of `known.data`, with measured variances taken from the replicates of `shown`.
     pub(super) fn under(
         options: &Gaussian,
         known: &Known<'_>,
@@ -83,14 +83,14 @@ impl GaussianLikelihood {
         self.groups.iter().map(|g| g.split(response)).collect()
     }
 
-    /// The variance of each group given the response, as points with probabilities.
+    /// Returns the variance of each group given the response, as pairs of values and probabilities.
     fn variances(&self, response: &[f64], hyper: &[f64]) -> Option<Vec<Vec<(f64, f64)>>> {
         let split = self.split(response);
         self.law.variances(&self.spreads(), hyper, &residuals(&split))
     }
 
-    /// What the density of a value given all others takes from the common errors: at each variance, for each
-    /// measured output of the group, the error that the residuals suggest and by how much it shrinks.
+    /// Returns the contribution of the common errors to the density of a value given all others, for each variance
+    /// (row) and measured output of the group (column): the expected error, and the reduction of the precision.
     fn shares(group: &Statistics, along: &[f64], nodes: &[(f64, f64)]) -> (Matrix, Matrix) {
         let values = &group.spread.eigenvalues;
         let share =
@@ -101,11 +101,11 @@ impl GaussianLikelihood {
         let squares = Matrix::from_fn(directions.rows(), directions.columns(), |r, k| {
             directions[(r, k)] * directions[(r, k)]
         });
-        (linalg::multiply(&pulled, directions), linalg::multiply(&share, &squares))
+        (lacuna_linalg::multiply(&pulled, directions), lacuna_linalg::multiply(&share, &squares))
     }
 
-    /// The log density of a value of the `k`-th measured output given all others, from its difference to the
-    /// response.
+    /// Returns the log density of a value of the `k`-th measured output given all others; `difference` is the value
+    /// minus the response.
     fn left_out_of(
         group: &Statistics,
         (common, shrink): &(Matrix, Matrix),
@@ -116,7 +116,8 @@ impl GaussianLikelihood {
     ) -> f64 {
         let scale = scale[group.measured[k]];
         let count = group.weight[k].powi(2) * scale;
-        // The density of a value given the others is one over the average of its own inverse density.
+        // With an uncertain variance, the density of a value given the others is the reciprocal of the mean of its
+        // reciprocal density over the variance.
         let inverse = |(n, &(v, p)): (usize, &(f64, f64))| {
             let pull = (difference / scale.sqrt() - common[(n, k)] / count.sqrt()) / v;
             p * (-conditional(pull, (1.0 - shrink[(n, k)] / count) / v)).exp()
@@ -132,7 +133,7 @@ fn residuals(split: &Split) -> Vec<Residual<'_>> {
         .collect()
 }
 
-/// What is wrong with `marginal` for several groups and common errors.
+/// Message for `marginal` with several groups and common errors.
 pub(super) const SEVERAL: &str =
     "several variances cannot be integrated out together with errors that all replicates share";
 
@@ -207,7 +208,7 @@ impl Likelihood for GaussianLikelihood {
         self.noise.setting.parts(&self.noise.by_output(&variance))
     }
 
-    /// Variances that are integrated out are drawn from what the data say of them about this response.
+    /// Variances that are integrated out are drawn from their posterior given the data and this response.
     fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements> {
         let mut rng = stream.named("variance").generator();
         let groups = self.variances(response, hyper).unwrap_or_default();

@@ -14,7 +14,7 @@ use lacuna::data::{Layout, Measurements};
 use lacuna::plugin::component::{Component, Context};
 use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood, StatedNoise};
 use lacuna::run::Stop;
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -22,51 +22,49 @@ use super::common::{By, Groups, Variance};
 use likelihood::GaussianLikelihood;
 use stated::StatedLikelihood;
 
-/// Independent normal differences between data and model, of one unknown variance or of one for
-/// each group of outputs.
+/// Independent normal differences between data and model, with one variance or one for each group of outputs.
 ///
-/// Every measured value is the model's response plus a normal number of mean zero. Its variance is
-/// unknown and the same for all outputs (homoscedastic; Radaideh et al. arXiv 2202.03959, equation
-/// of the likelihood), or by sensor, by time window, or known, as `variance` and `by` say. Errors
-/// that all replicates share, such as the emulator's own, are further normal errors, correlated
-/// between outputs: their covariance is added once to that of the mean curve.
+/// Every measured value is the model's response plus a normal number with zero mean. Its variance is known or
+/// unknown, and the same for all outputs (homoscedastic; Radaideh et al. arXiv 2202.03959, equation of the
+/// likelihood), by sensor or by time window, as `variance` and `by` say. Errors common to all replicates, such as the
+/// emulator's, are further normal errors that are correlated between outputs: their covariance is added once to that
+/// of the mean curve.
 ///
-/// The likelihood uses the count, mean and scatter of the replicates of each output, which are
-/// sufficient; with a linear emulator it is reduced further, by an orthogonal factorisation, to the
-/// size of the emulator's basis. Both are exact.
+/// The likelihood uses count, mean and scatter of the replicates of each output, which are sufficient statistics;
+/// with a linear emulator it is reduced further, by an orthogonal factorisation, to the size of the emulator's basis.
+/// Both are exact.
 ///
-/// **Measurements that state their own noise** (a column `sigma`, or a `covariance`): with `variance = { measured = { known =
-/// 1 } }` that is all there is, which is generalised least squares; with an unknown multiplier, such as `{ measured = {
-/// inverse_gamma = [102, 103] } }`, the stated variances are right but for one factor; every other `variance`, unknown or
-/// known, is added on top of the stated one, as what the model or the statement misses. Beside a `covariance` one variance
-/// is shared by all outputs, and what the replicates share is not estimated from them.
+/// **Measurements that state their own noise** (a column `sigma`, or a `covariance`): with
+/// `variance = { measured = { known = 1 } }` the stated noise is taken as it is, which is generalised least squares;
+/// with an unknown multiplier, such as `{ measured = { inverse_gamma = [102, 103] } }`, the stated variances are
+/// correct up to one factor; any other `variance`, known or unknown, is added to the stated one, for errors that the
+/// statement or the model leaves out. With a `covariance` all outputs must share one variance, and errors common to the
+/// replicates are not estimated from them.
 ///
-/// The variance of a new replicate is told in parts: `measurement` is what the replicates of the
-/// group show, `model_form` is the rest, `emulator` and others are the common errors.
+/// The variance of a new replicate is reported in parts: `measurement` is the variance between the replicates of the
+/// group, `model_form` the rest, `emulator` and others are the common errors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Gaussian {
-    /// The variance. The prior of an unknown one is in the squared unit of the response, such as
-    /// `{ half_normal = 1e-6 }`, `{ uniform = [0, 1e-8] }`, `{ inverse_gamma = [2, 1e-10] }` or
-    /// `{ log_uniform = [1e-14, 1e-6] }`; it is sampled as its logarithm, with the Jacobian, so
-    /// that the prior keeps its meaning. A known one is `{ known = 2.5e-11 }`. With
-    /// `{ measured = { inverse_gamma = [102, 103] } }` the variance of each output is the one
-    /// between its replicates times an unknown `multiplier` (the error multipliers of Dakota, with
-    /// a prior whose mean and mode are about 1); with `{ measured = { known = 1 } }` it is the
-    /// measured variance itself. An output with fewer than two different values takes the measured
-    /// variance of its group. Where the measurements state their noise, `measured` is what they
-    /// state, and any other variance is added to it.
+    /// Variance. An unknown one has a prior in the squared unit of the response, such as `{ half_normal = 1e-6 }`,
+    /// `{ uniform = [0, 1e-8] }`, `{ inverse_gamma = [2, 1e-10] }` or `{ log_uniform = [1e-14, 1e-6] }`; it is sampled
+    /// as its logarithm, with the Jacobian, so that the prior keeps its meaning. A known one is `{ known = 2.5e-11 }`.
+    /// With `{ measured = { inverse_gamma = [102, 103] } }` the variance of each output is the variance between its
+    /// replicates times an unknown `multiplier` (the error multipliers of Dakota, with a prior whose mean and mode are
+    /// about 1); with `{ measured = { known = 1 } }` it is the measured variance itself. An output with fewer than two
+    /// different values takes the measured variance of its group. If the measurements state their noise, `measured` is
+    /// the stated variance, and any other variance is added to it.
     pub variance: Variance,
-    /// Which outputs share a variance, or a multiplier: `"all"`; `"sensor"` or another axis, one
-    /// for each of its values; `["sensor", { axis = "time", windows = 5 }]`, one for each sensor
-    /// and time window. The unknowns are called `variance[B]`, `variance[B, 0.0002..0.0004 s]`
-    /// (first and last value in the window). A group that was not measured has none.
+    /// Groups of outputs with a common variance or multiplier: `"all"`; `"sensor"` or another axis, one for each of
+    /// its values; `["sensor", { axis = "time", windows = 5 }]`, one for each sensor and time window. The unknowns
+    /// are named `variance[B]`, `variance[B, 0.0002..0.0004 s]` (first and last value in the window). A group without
+    /// measurements has no variance.
     #[serde(default)]
     pub by: By,
-    /// Integrates unknown variances out of the likelihood, so that they are not sampled: in closed
-    /// form for an inverse gamma prior without common errors, else by quadrature to ten digits. One
-    /// variance can always be integrated out, several only without common errors. What is predicted
-    /// then uses the mean of the variance given the data.
+    /// If true, unknown variances are integrated out of the likelihood and not sampled: in closed form for an inverse
+    /// gamma prior without common errors, otherwise by quadrature to ten digits. One variance can always be
+    /// integrated out, several only without common errors. Predictions then use the mean of the variance given the
+    /// data.
     #[serde(default)]
     pub marginal: bool,
 }
@@ -79,7 +77,7 @@ impl Component for Gaussian {
             complaints
                 .at("marginal")
                 .say("a known variance cannot be integrated out")
-                .help("leave `marginal` away, or give the variance a prior");
+                .help("leave out `marginal`, or give the variance a prior");
         }
         let several = Groups::of(context.layout, &self.by).is_ok_and(|g| g.count() > 1);
         if self.marginal && several && context.common_errors {

@@ -1,78 +1,79 @@
-//! The likelihood of data that state their own noise: `sigma` of each value, or a covariance of one curve.
+//! Likelihood of data that state their own noise: `sigma` of each value, or the covariance of a curve.
 //!
-//! The noise of a curve has the covariance `S` (of the outputs that it measured), with eigenvectors `Q` and eigenvalues
-//! `l`. The unknown scales it, `s S`, or is added to it, `S + v I`; either way the components `Q' y` are independent, with
-//! the variances `s l` or `l + v` (generalised least squares; Aitken, Proc. Roy. Soc. Edinburgh 55 (1936) 42). Curves
-//! that measured the same outputs with the same noise are reduced to count, mean and scatter of each component.
+//! The noise of a curve has the covariance `S` (of the outputs measured), with eigenvectors `Q` and eigenvalues `l`.
+//! The unknown scales it, `s S`, or is added to it, `S + v I`; in both cases the components `Q' y` are independent,
+//! with the variances `s l` or `l + v` (generalised least squares; Aitken, Proc. Roy. Soc. Edinburgh 55 (1936) 42).
+//! Curves that measured the same outputs with the same noise are reduced to count, mean and scatter of each
+//! component.
 
 use std::collections::BTreeMap;
 
 use lacuna::data::{Measurements, Replicate};
-use lacuna::linalg::{self, Matrix};
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::discrepancy::{CommonError, Hyperparameter, Known, Likelihood, VariancePart};
 use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
 
 use super::Gaussian;
 use crate::discrepancies::common::{
     Groups, Normal, PerGroup, Replicates, Setting, Unknown, Variance, conditional, squared, start,
 };
 
-/// See the module.
+/// Likelihood with stated noise (see the module).
 pub(super) struct StatedLikelihood {
     hyper: Vec<Hyperparameter>,
     setting: Setting,
     groups: Groups,
     variance: PerGroup,
-    /// Whether the unknown scales the stated variances; it is added to them otherwise.
+    /// True if the unknown multiplies the stated variances; false if it is added to them.
     scaled: bool,
     sets: Vec<Set>,
-    /// The set of each replicate; `None` for one without a value.
+    /// Set of each replicate; `None` for one without a value.
     set_of: Vec<Option<usize>>,
-    /// `l` of all components, set by set.
+    /// Eigenvalues `l` of all components, set by set.
     eigenvalues: Vec<f64>,
-    /// The group of each component.
+    /// Group of each component.
     group_of: Vec<usize>,
-    /// The density of the components.
+    /// Density of the components.
     normal: Normal,
 }
 
 /// Curves that measured the same outputs with the same noise.
 struct Set {
     outputs: Vec<usize>,
-    /// `Q`; none where the noise of the values is independent.
+    /// `Q`; `None` if the noise of the values is independent.
     rotation: Option<Matrix>,
-    /// Where its components begin.
+    /// Index of its first component.
     begin: usize,
 }
 
 impl Set {
-    /// `Q' y` of values by output.
+    /// Returns `Q' y` of values by output.
     fn components(&self, by_output: impl Fn(usize) -> f64) -> Vec<f64> {
         let own: Vec<f64> = self.outputs.iter().map(|&i| by_output(i)).collect();
         match &self.rotation {
             None => own,
-            Some(q) => linalg::transposed_multiply_vector(q, &own),
+            Some(q) => lacuna_linalg::transposed_multiply_vector(q, &own),
         }
     }
 
-    /// `Q z`, by measured output.
+    /// Returns `Q z` by measured output.
     fn values(&self, components: &[f64]) -> Vec<f64> {
         match &self.rotation {
             None => components.to_vec(),
-            Some(q) => linalg::multiply_vector(q, components),
+            Some(q) => lacuna_linalg::multiply_vector(q, components),
         }
     }
 }
 
-/// Whether the data state noise that is not one number an output that the unknown scales: that is a scale of the
-/// likelihood without it.
+/// Returns true if this likelihood is needed for the stated noise. It is not if the noise is one number per output
+/// that the unknown multiplies, because that is a scale of the ordinary likelihood.
 pub(super) fn is_needed(options: &Gaussian, data: &Measurements) -> bool {
     let added = matches!(options.variance, Variance::Of(_));
     data.states_noise() && (added || data.covariance.is_some() || differs(data))
 }
 
-/// Whether two replicates state different noise of one output.
+/// Returns true if two replicates state different noise of one output.
 fn differs(data: &Measurements) -> bool {
     (0..data.layout.len()).any(|i| {
         let measured = data.replicates.iter().filter(|r| r.values[i].is_some());
@@ -94,7 +95,7 @@ impl StatedLikelihood {
         let groups = groups.with_data(&replicates.measured);
         if data.covariance.is_some() && groups.count() > 1 {
             let text =
-                "several variances cannot be told apart beside a covariance of the measurements";
+                "several variances cannot be estimated if the measurements state a covariance";
             return Err(Stop::new(text).help("give `by = \"all\"`"));
         }
         let mut hyper = Vec::new();
@@ -156,7 +157,7 @@ impl StatedLikelihood {
         })
     }
 
-    /// The variance of each component.
+    /// Returns the variance of each component.
     fn variances(&self, hyper: &[f64]) -> Option<Vec<f64>> {
         let unknown = self.variance.values(hyper)?;
         let one = |(l, &g): (&f64, &usize)| {
@@ -169,7 +170,7 @@ impl StatedLikelihood {
         self.sets.iter().flat_map(|set| set.components(|i| response[i])).collect()
     }
 
-    /// The variance of a new replicate of each output, without the common errors.
+    /// Returns the variance of a new replicate at each output, without the common errors.
     fn by_output(&self, hyper: &[f64]) -> Vec<f64> {
         let unknown = self
             .variance
@@ -181,7 +182,7 @@ impl StatedLikelihood {
     }
 }
 
-/// The outputs of each set of curves, the set of each replicate, and the replicates of each set.
+/// Outputs of each set of curves, set of each replicate, and replicates of each set.
 type Sets = (Vec<Vec<usize>>, Vec<Option<usize>>, Vec<Vec<usize>>);
 
 fn sets(data: &Measurements) -> Result<Sets, Stop> {
@@ -199,8 +200,9 @@ fn sets(data: &Measurements) -> Result<Sets, Stop> {
             .map(|&i| data.stated_variance(replicate, i).filter(|v| *v > 0.0).map(f64::to_bits))
             .collect();
         let name = &replicate.name;
-        let stated = stated
-            .ok_or_else(|| Stop::new(format!("replicate `{name}` does not state all its noise")))?;
+        let stated = stated.ok_or_else(|| {
+            Stop::new(format!("replicate `{name}` states the noise of only some of its values"))
+        })?;
         let set = *known.entry((measured.clone(), stated)).or_insert(outputs.len());
         if set == outputs.len() {
             outputs.push(measured);
@@ -212,7 +214,8 @@ fn sets(data: &Measurements) -> Result<Sets, Stop> {
     Ok((outputs, set_of, members))
 }
 
-/// The eigenvectors and eigenvalues of the noise of some outputs of a curve.
+/// Returns eigenvectors (`None` if independent) and eigenvalues of the noise of some outputs of a curve; fails if a
+/// covariance is not positive definite.
 fn noise(
     data: &Measurements,
     replicate: &Replicate,
@@ -225,14 +228,14 @@ fn noise(
     let n = outputs.len();
     let own = Matrix::from_fn(n, n, |i, j| covariance[(outputs[i], outputs[j])]);
     let wrong = |what: String| Stop::new(format!("the covariance of the measurements: {what}"));
-    let eigen = linalg::symmetric_eigen(&own).map_err(|e| wrong(e.to_string()))?;
+    let eigen = lacuna_linalg::symmetric_eigen(&own).map_err(|e| wrong(e.to_string()))?;
     if let Some(least) = eigen.values.iter().find(|l| **l <= 0.0) {
         return Err(wrong(format!("not positive definite, its least eigenvalue is {least:e}")));
     }
     Ok((Some(eigen.vectors), eigen.values))
 }
 
-/// A common error as it enters the components.
+/// Rotates a common error into the components.
 fn rotated(error: &CommonError, sets: &[Set]) -> CommonError {
     let columns: Vec<Vec<f64>> = (0..error.factor.columns())
         .map(|k| sets.iter().flat_map(|set| set.components(|i| error.factor[(i, k)])).collect())
@@ -275,7 +278,7 @@ impl Likelihood for StatedLikelihood {
         (by_response, by_hyper)
     }
 
-    /// Of independent noise only.
+    /// Computed only for independent noise.
     fn left_out(&self, response: &[f64], hyper: &[f64]) -> Option<Vec<f64>> {
         if self.sets.iter().any(|set| set.rotation.is_some()) {
             return None;

@@ -1,76 +1,74 @@
-//! The sufficient statistics of outputs that share a variance.
+//! Sufficient statistics of outputs that share a variance.
 //!
-//! With `n_i` replicates of output `i`, mean `ybar_i` and scatter `S_i = sum_r (y_ir - ybar_i)^2`,
-//! and the residual `z_i = sqrt(n_i) (ybar_i - m_i)`, the data are distributed as
+//! With `n_i` replicates of output `i`, mean `ybar_i` and scatter `S_i = sum_r (y_ir - ybar_i)^2`, and the residual
+//! `z_i = sqrt(n_i) (ybar_i - m_i)`, the log-likelihood is
 //!
 //! ```text
 //! log L = -1/2 [ N log(2 pi v) + (sum_i S_i)/v + log det(I + K/v) + z' (v I + K)^-1 z ]
 //! ```
 //!
-//! where `K = W F F' W`, `W = diag(sqrt(n_i))`, is the covariance `F F'` of the common errors as it
-//! enters `z`. The thin singular value decomposition `W F = U diag(s) V'` diagonalises `K` once for
-//! all `v`. A variance that is a multiple of a known one makes all of these those of data divided
-//! by its root.
+//! where `K = W F F' W`, `W = diag(sqrt(n_i))`, is the covariance `F F'` of the common errors as it enters `z`. The
+//! thin singular value decomposition `W F = U diag(s) V'` diagonalises `K` once for all `v`. If the variance is a
+//! multiple of a known one, all of these are statistics of the data divided by its root.
 
-use lacuna::linalg::vector::dot;
-use lacuna::linalg::{self, Matrix};
 use lacuna::plugin::discrepancy::CommonError;
 use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
+use lacuna_linalg::vector::dot;
 
 use crate::discrepancies::common::Replicates;
 
-/// What the likelihood needs of the data of one group, and of the common errors.
+/// Statistics of the data of one group and of the common errors.
 #[derive(Debug, Clone)]
 pub(super) struct Statistics {
-    /// The outputs that were measured at least once.
+    /// Outputs that were measured at least once.
     pub measured: Vec<usize>,
-    /// `sqrt(n_i)` of each of them, over the root of its scale.
+    /// `sqrt(n_i)` of each output over the root of its scale.
     pub weight: Vec<f64>,
-    /// The weight times `ybar_i` of each of them.
+    /// Weight times `ybar_i` of each output.
     pub weighted_mean: Vec<f64>,
-    /// Number of data and total scatter.
+    /// Statistics that do not depend on the response.
     pub spread: Spread,
-    /// `U'`: the directions of the common errors, `rank x measured`.
+    /// `U'`: directions of the common errors (`rank x measured`).
     pub directions: Matrix,
 }
 
-/// The part of the statistics that does not depend on the response.
+/// Statistics that do not depend on the response.
 #[derive(Debug, Clone)]
 pub(super) struct Spread {
-    /// The number of data.
+    /// Number of data.
     pub count: f64,
-    /// The sum of squared deviations of the replicates from their means.
+    /// Sum of squared deviations of the replicates from their means.
     pub scatter: f64,
-    /// The sum of the logarithms of the data's scales.
+    /// Sum of the logarithms of the data's scales.
     pub log_scale: f64,
-    /// The eigenvalues of `K`.
+    /// Eigenvalues of `K`.
     pub eigenvalues: Vec<f64>,
 }
 
-/// The residual of a group: its squared length outside the directions of the common errors, and its
-/// component along each.
+/// Residual of a group: its squared length outside the directions of the common errors, and its component along each
+/// direction.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Residual<'a> {
     pub outside: f64,
     pub along: &'a [f64],
 }
 
-/// How many directions are summed side by side.
+/// Number of directions summed side by side, so that the loop is vectorised.
 const LANES: usize = 8;
 
 impl Spread {
-    /// The log-likelihood given the variance and the residual.
+    /// Returns the log-likelihood given the variance and the residual.
     pub fn log_likelihood(&self, v: f64, residual: Residual<'_>) -> f64 {
         let (log_determinant, squares) = self.common(v, residual.along);
         let own = self.count * (std::f64::consts::TAU * v).ln() + self.log_scale;
         -0.5 * (own + log_determinant + (self.scatter + residual.outside + squares) / v)
     }
 
-    /// `log det(I + K/v)`, and the sum of the squared residuals along the directions, each divided by
+    /// Returns `log det(I + K/v)`, and the sum of the squared residuals along the directions, each divided by
     /// `1 + lambda / v`.
     ///
-    /// Logarithms cost more than all the rest: one is taken of a product of as many factors as cannot
-    /// overflow.
+    /// Logarithms dominate the cost: one is taken of the product of as many factors as cannot overflow.
     fn common(&self, v: f64, along: &[f64]) -> (f64, f64) {
         let largest = 1.0 + self.eigenvalues.iter().copied().fold(0.0, f64::max) / v;
         let factors = ((600.0 / largest.ln()).min(1e6) as usize).max(1);
@@ -96,7 +94,7 @@ impl Spread {
         (log_determinant, squares.iter().sum())
     }
 
-    /// Its derivative by the variance.
+    /// Returns the derivative of the log-likelihood with respect to the variance.
     pub fn by_variance(&self, v: f64, residual: Residual<'_>) -> f64 {
         let mut twice = self.count / v - (self.scatter + residual.outside) / (v * v);
         for (&a, &lambda) in residual.along.iter().zip(&self.eigenvalues) {
@@ -107,8 +105,8 @@ impl Spread {
 }
 
 impl Statistics {
-    /// The statistics of the outputs for which `chosen` holds; directions and eigenvalues are those
-    /// of the common errors of these outputs alone.
+    /// Returns the statistics of the outputs for which `chosen` holds; directions and eigenvalues are those of the
+    /// common errors of these outputs alone.
     pub fn of(
         replicates: &Replicates,
         common: &[CommonError],
@@ -123,7 +121,7 @@ impl Statistics {
         Ok(statistics)
     }
 
-    /// The same without common errors.
+    /// Like [`Statistics::of`], without common errors.
     pub fn without_common(
         replicates: &Replicates,
         scale: &[f64],
@@ -149,12 +147,12 @@ impl Statistics {
         }
     }
 
-    /// The factor of common errors as it enters the residual, `measured x columns`.
+    /// Returns the factor of the common errors as it enters the residual (`measured x columns`).
     pub fn weighted(&self, common: &[CommonError]) -> Matrix {
         weighted_factor(common, &self.measured, &self.weight)
     }
 
-    /// The residual along the directions of the common errors, and what remains of it outside them.
+    /// Returns the residual along the directions of the common errors, and the remaining vector.
     pub fn split(&self, response: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let outputs = self.measured.iter().zip(&self.weight).zip(&self.weighted_mean);
         let mut outside: Vec<f64> = outputs.map(|((&i, w), mean)| mean - w * response[i]).collect();
@@ -182,7 +180,7 @@ fn weighted_factor(common: &[CommonError], measured: &[usize], weight: &[f64]) -
     })
 }
 
-/// The eigenvectors (as rows) and eigenvalues of the covariance `K` of all common errors.
+/// Returns eigenvectors (as rows) and eigenvalues of the covariance `K` of all common errors.
 fn common_directions(
     common: &[CommonError],
     measured: &[usize],
@@ -192,7 +190,7 @@ fn common_directions(
     if weighted.columns() == 0 {
         return Ok((Matrix::zeros(0, measured.len()), Vec::new()));
     }
-    let svd = linalg::thin_svd(&weighted)
+    let svd = lacuna_linalg::thin_svd(&weighted)
         .map_err(|e| Stop::new(format!("the covariance of the common errors: {e}")))?;
     let rank = svd.values.iter().filter(|&&s| s > 1e-12 * svd.values[0]).count();
     let kept: Vec<usize> = (0..rank).collect();

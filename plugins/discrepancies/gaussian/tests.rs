@@ -1,11 +1,11 @@
-//! The likelihood against the multivariate normal density written out, and its parts against each other.
+//! The likelihood against the dense multivariate normal density, and its parts against each other.
 #![allow(clippy::unwrap_used)]
 
 use lacuna::data::{Axis, Layout, Measurements, Replicate, Unit};
-use lacuna::linalg::{self, Cholesky, Matrix};
 use lacuna::math::random::{Stream, normal, uniform};
-use lacuna::plugin::discrepancy::{CommonError, Known, Likelihood};
+use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin, Known, Likelihood};
 use lacuna::plugin::forward::Linear;
+use lacuna_linalg::{Cholesky, Matrix};
 
 use super::Gaussian;
 use super::likelihood::GaussianLikelihood;
@@ -66,10 +66,10 @@ fn random_matrix(rows: usize, columns: usize, seed: u64) -> Matrix {
 
 fn common(seed: u64) -> CommonError {
     let factor = random_matrix(OUTPUTS, 2, seed);
-    CommonError { origin: "emulator".to_owned(), factor, predictive: true }
+    CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }
 }
 
-/// The likelihood of these options.
+/// Builds the likelihood with these options.
 fn build(data: &Measurements, error: &[CommonError], text: &str) -> GaussianLikelihood {
     let chosen: Gaussian = options("gaussian", text).unwrap();
     GaussianLikelihood::new(&chosen, &Known::without_slopes(data, error)).unwrap()
@@ -79,8 +79,8 @@ fn likelihood(data: &Measurements, error: &[CommonError]) -> GaussianLikelihood 
     build(data, error, "variance = { uniform = [0.0, 10.0] }")
 }
 
-/// The log density of all data as one normal vector with covariance `v I + E F F' E'`, where `E` repeats each
-/// output for each of its replicates; by a Cholesky factor of that whole covariance.
+/// Log density of all data as one normal vector with covariance `v I + E F F' E'`, where `E` repeats each output for
+/// each of its replicates, by a Cholesky factor of the whole covariance.
 fn naive(data: &Measurements, error: &[CommonError], response: &[f64], v: f64) -> f64 {
     let mut residual = Vec::new();
     let mut output = Vec::new();
@@ -131,7 +131,7 @@ fn the_compressed_form_equals_the_full_one() {
             let basis = random_matrix(4, terms, seed + 400);
             let hyper = Matrix::from_fn(4, 1, |i, _| 0.2 + i as f64);
             let found = compressed.log_likelihood(&basis, &hyper);
-            let responses = linalg::multiply(&basis, &emulated.coefficients);
+            let responses = lacuna_linalg::multiply(&basis, &emulated.coefficients);
             for (i, found) in found.iter().enumerate() {
                 let expected = full.log_likelihood(responses.row(i), hyper.row(i));
                 assert!((found - expected).abs() < 1e-10 * expected.abs());
@@ -149,7 +149,7 @@ fn gradients_are_the_derivatives() {
     let emulated = Emulated { coefficients: random_matrix(TERMS, OUTPUTS, 6) };
     let compressed = full.compress(&emulated).unwrap();
     let basis = random_matrix(1, TERMS, 7);
-    let response = linalg::multiply(&basis, &emulated.coefficients);
+    let response = lacuna_linalg::multiply(&basis, &emulated.coefficients);
     let (v, h) = (0.6, 1e-5);
     let at = |moved: &[f64], v: f64| full.log_likelihood(moved, &[v]);
     let (by_response, by_hyper) = full.gradient(response.row(0), &[v]);
@@ -165,7 +165,7 @@ fn gradients_are_the_derivatives() {
     assert!((slope - by_hyper[0]).abs() < 1e-6 * (1.0 + slope.abs()));
     let (by_basis, by_variance) = compressed.gradient(basis.row(0), &[v]);
     let chained =
-        linalg::multiply(&emulated.coefficients, &Matrix::from_vec(OUTPUTS, 1, by_response));
+        lacuna_linalg::multiply(&emulated.coefficients, &Matrix::from_vec(OUTPUTS, 1, by_response));
     for j in 0..TERMS {
         assert!((by_basis[j] - chained[(j, 0)]).abs() < 1e-10 * (1.0 + by_basis[j].abs()));
     }

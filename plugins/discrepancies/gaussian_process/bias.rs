@@ -1,55 +1,55 @@
-//! The prior covariance of the bias.
+//! Prior covariance of the bias.
 //!
-//! Each series has its own block `C_s`. With `G` an orthonormal basis of the derivatives by the
-//! parameters, the prior that is orthogonal to them is `C - H S^-1 H'` with `H = C G` and
-//! `S = G' C G`.
+//! Each series has its own block `C_s`. With `G` an orthonormal basis of the derivatives with respect to the
+//! parameters, the prior orthogonal to them is `C - H S^-1 H'` with `H = C G` and `S = G' C G`.
 
-use lacuna::linalg::{self, Cholesky, Matrix};
 use lacuna::run::Stop;
+use lacuna_linalg::{Cholesky, Matrix};
 
 use super::Kernel;
 use crate::discrepancies::common::{Groups, PerGroup, Replicates, Series};
 
-/// One series.
+/// One series of outputs with its bias.
 #[derive(Debug, Clone)]
 pub(super) struct Block {
-    /// Its measured outputs, among the measured ones.
+    /// Indices of its outputs among the measured ones.
     pub rows: Vec<usize>,
-    /// Their values of the axis.
+    /// Values of the axis at these outputs.
     pub grid: Vec<f64>,
-    /// All its outputs.
+    /// Flat indices of all its outputs.
     pub outputs: Vec<usize>,
-    /// The group of its standard deviation and length.
+    /// Group of its standard deviation and correlation length; `None` if the group was never measured.
     pub group: Option<usize>,
-    /// An earlier series on the same grid in the same group.
+    /// Index of an earlier series with the same grid and group, whose covariance is reused.
     pub twin: Option<usize>,
 }
 
-/// The bias of all series.
+/// Bias of all series.
 #[derive(Debug, Clone)]
 pub(super) struct Bias {
     pub kernel: Kernel,
     pub blocks: Vec<Block>,
-    /// The values of the axis of a whole series.
+    /// Values of the axis of a complete series.
     pub grid: Vec<f64>,
-    /// `G` at the measured outputs; without columns where the bias need not be orthogonal.
+    /// `G` at the measured outputs; without columns if the bias need not be orthogonal.
     pub basis: Matrix,
     pub sd: PerGroup,
     pub length: PerGroup,
 }
 
-/// The directions of the derivatives by the parameters at the measured outputs.
+/// Returns an orthonormal basis of the derivatives with respect to the parameters at the measured outputs. `slopes`
+/// is `outputs x parameters`.
 pub(super) fn basis(slopes: &Matrix, replicates: &Replicates) -> Result<Matrix, Stop> {
     let measured = slopes.select_rows(&replicates.measured);
     let failed = |e| Stop::new(format!("the slopes of the model at the best fit: {e}"));
-    let svd = linalg::thin_svd(&measured).map_err(failed)?;
+    let svd = lacuna_linalg::thin_svd(&measured).map_err(failed)?;
     let largest = svd.values.first().copied().unwrap_or(0.0);
-    // A parameter without any effect has no direction.
+    // A parameter without effect defines no direction.
     let rank = svd.values.iter().filter(|&&s| s > 1e-8 * largest).count();
     Ok(svd.u.select_columns(&(0..rank).collect::<Vec<_>>()))
 }
 
-/// The blocks of all series that were measured.
+/// Returns the blocks of all series. `place` is the index of each output among the measured ones.
 pub(super) fn blocks(series: &Series, place: &[usize], groups: &Groups) -> Vec<Block> {
     let mut blocks: Vec<Block> = Vec::new();
     for outputs in &series.outputs {
@@ -65,13 +65,13 @@ pub(super) fn blocks(series: &Series, place: &[usize], groups: &Groups) -> Vec<B
 }
 
 impl Bias {
-    /// The standard deviation and the length of each group.
+    /// Returns the standard deviation and the correlation length of each group; `None` if one is not above zero.
     pub fn values<'a>(&'a self, hyper: &'a [f64]) -> Option<(&'a [f64], &'a [f64])> {
         Some((self.sd.values(hyper)?, self.length.values(hyper)?))
     }
 
-    /// The standard deviation and the length of a series; those of a series never measured are the
-    /// means of all.
+    /// Returns the standard deviation and the correlation length of a series; the means of all groups for a series
+    /// never measured.
     pub fn of_block(block: &Block, (sd, length): (&[f64], &[f64])) -> (f64, f64) {
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         match block.group {
@@ -80,8 +80,8 @@ impl Bias {
         }
     }
 
-    /// The covariance of each series at its measured outputs and its derivative by the length; none
-    /// for a series that has an earlier twin.
+    /// Returns for each series the covariance at its measured outputs and its derivative with respect to the length;
+    /// `None` for a series that has an earlier twin.
     pub fn covariances(&self, values: (&[f64], &[f64])) -> Vec<Option<[Matrix; 2]>> {
         let one = |block: &Block| {
             let (sd, length) = Self::of_block(block, values);
@@ -90,7 +90,8 @@ impl Bias {
         self.blocks.iter().map(one).collect()
     }
 
-    /// The same along one grid: `exp(-x)` of a distance is the product of those of its steps.
+    /// Returns the covariance and its derivative along one grid. `exp(-x)` of a distance is the product of those of
+    /// its steps, which saves most exponentials.
     fn along(&self, grid: &[f64], sd: f64, length: f64) -> [Matrix; 2] {
         let (n, rate) = (grid.len(), self.kernel.rate(length));
         let (mut covariance, mut slope) = (Matrix::zeros(n, n), Matrix::zeros(n, n));
@@ -112,40 +113,40 @@ impl Bias {
         [covariance, slope]
     }
 
-    /// The one among covariances that belongs to a series.
+    /// Returns the covariances that belong to a series.
     pub fn of<'a>(&self, all: &'a [Option<[Matrix; 2]>], series: usize) -> Option<&'a [Matrix; 2]> {
         all[self.blocks[series].twin.unwrap_or(series)].as_ref()
     }
 
-    /// The covariance between two sets of values of the axis.
+    /// Returns the covariance between two sets of values of the axis.
     pub fn covariance(&self, rows: &[f64], columns: &[f64], sd: f64, length: f64) -> Matrix {
         Matrix::from_fn(rows.len(), columns.len(), |i, j| {
             sd * sd * self.kernel.at((rows[i] - columns[j]).abs(), length).0
         })
     }
 
-    /// `G` at the measured outputs of a series.
+    /// Returns `G` at the measured outputs of a series.
     pub fn basis_of(&self, block: &Block) -> Matrix {
         self.basis.select_rows(&block.rows)
     }
 
-    /// `S = sum_s G_s' H_s`, factored; `None` where it is singular.
+    /// Returns the Cholesky factor of `S = sum_s G_s' H_s`; `None` if it is singular.
     pub fn inner(&self, images: &[Matrix]) -> Option<Cholesky> {
         let p = self.basis.columns();
         let mut inner = Matrix::zeros(p, p);
         for (block, image) in self.blocks.iter().zip(images) {
-            let part = linalg::transposed_multiply(&self.basis_of(block), image);
+            let part = lacuna_linalg::transposed_multiply(&self.basis_of(block), image);
             add(&mut inner, 1.0, &part);
         }
         Cholesky::new(&inner).ok()
     }
 
-    /// `H` at the measured outputs, given the covariances.
+    /// Returns `H` at the measured outputs, given the covariances.
     pub fn image(&self, covariances: &[Option<[Matrix; 2]>]) -> Matrix {
         let mut image = Matrix::zeros(self.basis.rows(), self.basis.columns());
         for (s, block) in self.blocks.iter().enumerate() {
             let Some([covariance, _]) = self.of(covariances, s) else { continue };
-            let own = linalg::multiply(covariance, &self.basis_of(block));
+            let own = lacuna_linalg::multiply(covariance, &self.basis_of(block));
             for (&row, values) in block.rows.iter().zip(own.iter_rows()) {
                 image.row_mut(row).copy_from_slice(values);
             }
@@ -153,11 +154,14 @@ impl Bias {
         image
     }
 
-    /// `H` at all outputs of each series, and the factor of `S`.
+    /// Returns `H` at all outputs of each series, and the factor of `S`.
     pub fn projection(&self, values: (&[f64], &[f64])) -> Option<(Vec<Matrix>, Cholesky)> {
         let image = |grid: &[f64], block: &Block| {
             let (sd, length) = Self::of_block(block, values);
-            linalg::multiply(&self.covariance(grid, &block.grid, sd, length), &self.basis_of(block))
+            lacuna_linalg::multiply(
+                &self.covariance(grid, &block.grid, sd, length),
+                &self.basis_of(block),
+            )
         };
         let measured: Vec<Matrix> = self.blocks.iter().map(|b| image(&b.grid, b)).collect();
         let all = self.blocks.iter().map(|b| image(&self.grid, b)).collect();
@@ -165,7 +169,7 @@ impl Bias {
     }
 }
 
-/// `sum += factor * part`.
+/// Adds `factor * part` to `sum`.
 pub(super) fn add(sum: &mut Matrix, factor: f64, part: &Matrix) {
     let entries = sum.as_mut_slice().iter_mut().zip(part.as_slice());
     entries.for_each(|(s, p)| *s += factor * p);

@@ -1,24 +1,24 @@
-//! One series as a Markov process in noise: its covariance `A = C + D` whitened in operations
-//! proportional to its length.
+//! One series as a Markov process observed in noise: its covariance `A = C + D` is whitened at a cost proportional to
+//! the length.
 //!
-//! The Kalman filter of the [state](super::kernel) gives the variances `f` and the gains of the
-//! innovations, which are independent: `A = L diag(f) L'` with `L^-1` the filter. Run backwards it is
-//! `L'^-1`, with the weights `r` of the state and their variance `N` (Durbin and Koopman, Time Series
-//! Analysis by State Space Methods (2012), 4.4 and 4.5):
+//! The Kalman filter of the [state](super::kernel) gives the variances `f` and the gains of the innovations, which
+//! are independent: `A = L diag(f) L'` with `L^-1` the filter. Run backwards it is `L'^-1`, with the weights `r` of
+//! the state and their variance `N` (Durbin and Koopman, Time Series Analysis by State Space Methods (2012), 4.4 and
+//! 4.5):
 //!
 //! ```text
-//! s = Phi' r,  u = e/f - K's,  r = s + h u,     u = A^-1 y,
+//! s = Phi' r,  u = e/f - K's,  r = s + h u,  u = A^-1 y,
 //! M = Phi' N Phi,  N = (I - K h')' M (I - K h') + h h'/f,  (A^-1)_tt = 1/f + K'M K.
 //! ```
 //!
-//! `N` is also the derivative of `log det A = sum log f` by the predicted covariance of the state.
+//! `N` is also the derivative of `log det A = sum log f` with respect to the predicted covariance of the state.
 
-use lacuna::linalg::Matrix;
+use lacuna_linalg::Matrix;
 
 use super::Kernel;
 use super::kernel::Square;
 
-/// See the module.
+/// Kalman filter of one series (see the module).
 #[derive(Debug, Clone)]
 pub(super) struct Filter {
     steps: Vec<Step>,
@@ -28,30 +28,31 @@ pub(super) struct Filter {
 /// One value of the series.
 #[derive(Debug, Clone)]
 struct Step {
-    /// The distance from the value before, times the rate.
+    /// Distance from the value before, times the rate.
     distance: f64,
-    /// From the state at the value before to that here, and its derivative by the distance.
+    /// Transition of the state from the value before, and its derivative with respect to the distance.
     transition: (Square, Square),
-    /// How the state follows the innovation: `K`.
+    /// Kalman gain `K`.
     gain: [f64; 3],
-    /// The variance of the innovation, and its root.
+    /// Variance of the innovation, and its root.
     variance: f64,
     root: f64,
-    /// The covariance of the state given the values so far, less that of the process.
+    /// Covariance of the state given the values so far, minus that of the process. Storing the difference avoids
+    /// cancellation in the prediction.
     known: Square,
 }
 
-/// Traces of the inverse covariance.
+/// Traces with the inverse covariance.
 pub(super) struct Traces {
-    /// The diagonal of `A^-1`.
+    /// Diagonal of `A^-1`.
     pub diagonal: Vec<f64>,
     /// `tr(A^-1 dC/dlength)`.
     pub by_length: f64,
 }
 
 impl Filter {
-    /// The filter of a series at these values of the axis, with these variances of the noise; `None`
-    /// where it leaves the range of numbers.
+    /// Filters a series at these values of the axis, with these variances of the noise; `None` if an innovation
+    /// variance is not positive and finite.
     pub fn new(
         kernel: Kernel,
         grid: &[f64],
@@ -88,12 +89,13 @@ impl Filter {
         Some(Self { steps, length })
     }
 
-    /// `log det A`.
+    /// Returns `log det A`.
     pub fn log_determinant(&self) -> f64 {
         self.steps.iter().map(|step| step.variance.ln()).sum()
     }
 
-    /// Replaces the rows `X` of the series by `diag(f)^-1/2 L^-1 X`, whose products are those with `A^-1`.
+    /// Replaces the rows `X` of the series by `diag(f)^-1/2 L^-1 X`; inner products of its columns are then those
+    /// with `A^-1`.
     pub fn whiten(&self, rows: &[usize], x: &mut Matrix) {
         let width = x.columns();
         let [mut a, mut b, mut c] = [0; 3].map(|_| vec![0.0; width]);
@@ -134,11 +136,11 @@ impl Filter {
         }
     }
 
-    /// What derivatives by the hyperparameters need of `A^-1`.
+    /// Returns the traces with `A^-1` that the derivatives with respect to the hyperparameters need.
     pub fn traces(&self) -> Traces {
         let mut diagonal = vec![0.0; self.steps.len()];
         let mut by_length = 0.0;
-        // `M`.
+        // `M` of the recursion.
         let mut ahead = [[0.0; 3]; 3];
         for (t, step) in self.steps.iter().enumerate().rev() {
             let gain = step.gain;
@@ -183,7 +185,7 @@ fn product(a: &Square, b: &Square) -> Square {
     a.map(|row| [inner(&row, &columns[0]), inner(&row, &columns[1]), inner(&row, &columns[2])])
 }
 
-/// `A X A'`.
+/// Returns `A X A'`.
 fn sandwich(a: &Square, x: &Square) -> Square {
     product(&product(a, x), &transposed(a))
 }

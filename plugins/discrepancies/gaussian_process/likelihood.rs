@@ -1,14 +1,14 @@
-//! The likelihood of the mean curve and of the scatter about it.
+//! Likelihood of the mean curve and of the scatter about it.
 
 use std::f64::consts::TAU;
 
 use lacuna::data::Measurements;
-use lacuna::linalg::vector::dot;
-use lacuna::linalg::{Matrix, symmetric_eigen};
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::Fact;
 use lacuna::plugin::discrepancy::{Hyperparameter, Known, Likelihood, VariancePart};
 use lacuna::run::Stop;
+use lacuna_linalg::vector::dot;
+use lacuna_linalg::{Matrix, symmetric_eigen};
 
 use super::GaussianProcess;
 use super::bias::{Bias, basis, blocks};
@@ -17,12 +17,12 @@ use crate::discrepancies::common::{
     Groups, Noise, PerGroup, Replicates, Series, Unknown, conditional, part, start, values,
 };
 
-/// See the module.
+/// Likelihood with a smooth bias (see the module).
 pub(super) struct BiasedLikelihood {
     noise: Noise,
     hyper: Vec<Hyperparameter>,
     replicates: Replicates,
-    /// The place of each output among the measured ones.
+    /// Index of each output among the measured ones.
     place: Vec<usize>,
     pub(super) bias: Bias,
     factor: Matrix,
@@ -31,11 +31,12 @@ pub(super) struct BiasedLikelihood {
 impl BiasedLikelihood {
     pub(super) fn new(options: &GaussianProcess, known: &Known<'_>) -> Result<Self, Stop> {
         let likelihood = Self::under(options, known, known.data)?;
-        likelihood.ok_or_else(|| Stop::new("the data are no part of themselves"))
+        likelihood
+            .ok_or_else(|| Stop::new("an orthogonal bias depends on outputs that are not measured"))
     }
 
-    /// The same where the noise that replicates show is that of `shown`; `None` where the bias is orthogonal to what the
-    /// parameters do to outputs that only `shown` has: less of them is another law.
+    /// Builds the likelihood of `known.data`, with measured variances taken from the replicates of `shown`. `None` if
+    /// an orthogonal bias depends on outputs measured only in `shown`, because its distribution would then differ.
     pub(super) fn under(
         options: &GaussianProcess,
         known: &Known<'_>,
@@ -77,7 +78,7 @@ impl BiasedLikelihood {
         Ok(Some(Self { noise, hyper, replicates, place, bias, factor }))
     }
 
-    /// The variance of each measured output.
+    /// Returns the variance of each measured output.
     fn variance(&self, hyper: &[f64]) -> Option<Vec<f64>> {
         Some(self.noise.by_measured(&self.replicates, self.noise.variance.values(hyper)?))
     }
@@ -94,7 +95,7 @@ impl BiasedLikelihood {
         Solved::new(&self.bias, self.bias.values(hyper)?, means, &self.factor, residual)
     }
 
-    /// The prior variance of the bias at each output.
+    /// Returns the prior variance of the bias at each output.
     fn bias_variance(&self, hyper: &[f64]) -> Option<Vec<f64>> {
         let values = self.bias.values(hyper)?;
         let (images, inner) = self.bias.projection(values)?;
@@ -108,7 +109,7 @@ impl BiasedLikelihood {
         Some(variance)
     }
 
-    /// A bias as it could be: a process, less the part along the derivatives by the parameters.
+    /// Draws a bias from its prior: a process minus its projection on the derivatives with respect to the parameters.
     fn draw(&self, hyper: &[f64], stream: &Stream) -> Option<Vec<f64>> {
         let values = self.bias.values(hyper)?;
         let mut bias = vec![0.0; self.place.len()];
@@ -144,7 +145,7 @@ impl Likelihood for BiasedLikelihood {
         &self.hyper
     }
 
-    /// The scatter of the replicates knows only the noise; their means have bias and common errors too.
+    /// The scatter of the replicates depends on the noise only; their means also have bias and common errors.
     fn log_likelihood(&self, response: &[f64], hyper: &[f64]) -> f64 {
         let Some(variance) = self.variance(hyper) else { return f64::NEG_INFINITY };
         let Some(solved) = self.solve(response, hyper, &variance) else {
@@ -236,10 +237,10 @@ impl Likelihood for BiasedLikelihood {
 
 #[cfg(test)]
 impl BiasedLikelihood {
-    /// The prior covariance of the bias at the measured outputs, written out.
+    /// Returns the dense prior covariance of the bias at the measured outputs.
     pub(super) fn written_bias(&self, hyper: &[f64]) -> Matrix {
         #![allow(clippy::unwrap_used)]
-        use lacuna::linalg;
+        use lacuna_linalg;
         let values = self.bias.values(hyper).unwrap();
         let n = self.replicates.measured.len();
         let mut plain = Matrix::zeros(n, n);
@@ -255,10 +256,11 @@ impl BiasedLikelihood {
         if self.bias.basis.columns() == 0 {
             return plain;
         }
-        let image = linalg::multiply(&plain, &self.bias.basis);
-        let inner = linalg::transposed_multiply(&self.bias.basis, &image);
-        let solved = linalg::Cholesky::new(&inner).unwrap().solve_matrix(&image.transposed());
-        let taken = linalg::multiply(&image, &solved);
+        let image = lacuna_linalg::multiply(&plain, &self.bias.basis);
+        let inner = lacuna_linalg::transposed_multiply(&self.bias.basis, &image);
+        let solved =
+            lacuna_linalg::Cholesky::new(&inner).unwrap().solve_matrix(&image.transposed());
+        let taken = lacuna_linalg::multiply(&image, &solved);
         super::bias::add(&mut plain, -1.0, &taken);
         plain
     }

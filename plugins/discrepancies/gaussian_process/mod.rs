@@ -1,4 +1,4 @@
-//! `gaussian_process`: a smooth bias of the model, and independent noise.
+//! `gaussian_process`: a smooth model bias, and independent noise.
 
 mod bias;
 mod filter;
@@ -13,61 +13,61 @@ use lacuna::data::{Layout, Measurements};
 use lacuna::plugin::component::{Component, Context};
 use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood, StatedNoise};
 use lacuna::run::Stop;
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::common::{By, Groups, Quantity, Series, Variance};
-pub use kernel::Kernel;
 use likelihood::BiasedLikelihood;
+
+pub use kernel::Kernel;
 
 /// A smooth bias of the model, the same in all replicates, plus independent normal noise.
 ///
-/// A measured value is the model's response, plus a bias that is a smooth random function along an
-/// axis (of time, for each sensor its own), plus noise of the given `variance` that is new in each
-/// replicate (Kennedy and O'Hagan, J. Royal Statistical Society B 63 (2001) 425). The bias is a
-/// Gaussian process of mean zero with a Matérn covariance. Averaging over replicates makes the
-/// noise smaller, but not the bias: this is how a study says that the model is wrong by more than
-/// chance.
+/// A measured value is the model's response, plus a bias that is a smooth random function along an axis (of time,
+/// say, with a separate function for each sensor), plus noise of the given `variance` that is independent in each
+/// replicate (Kennedy and O'Hagan, J. Royal Statistical Society B 63 (2001) 425). The bias is a Gaussian process with
+/// zero mean and a Matérn covariance. Averaging over replicates reduces the noise, but not the bias. Choose this
+/// discrepancy if the model deviates from the data systematically.
 ///
-/// A bias that may take the shape of what the parameters do to the response leaves the parameters
-/// unknown. With `orthogonal = true` its prior is conditioned to be orthogonal to the derivatives
-/// of the response by the parameters at the best fit, over all measured outputs (Plumlee, J.
-/// American Statistical Association 112 (2017) 1274): what the parameters can explain is explained
-/// by them. The covariance `C` becomes `C - C G (G'CG)^-1 G'C` with `G` the derivatives.
+/// A bias that can imitate the effects of the parameters on the response makes the parameters unidentifiable. With
+/// `orthogonal = true` its prior is conditioned to be orthogonal to the derivatives of the response with respect to
+/// the parameters at the best fit, over all measured outputs (Plumlee, J. American Statistical Association 112 (2017)
+/// 1274): whatever the parameters can explain is attributed to them. The covariance `C` becomes
+/// `C - C G (G'CG)^-1 G'C` with `G` the derivatives.
 ///
-/// The variance of a new replicate is told as `measurement` (the noise), `model_form` (the bias
-/// before data), and the common errors. The process is Markov in its derivatives, so that a Kalman
-/// filter factors the covariance of a series in operations proportional to its length.
+/// The variance of a new replicate is reported as `measurement` (the noise), `model_form` (the prior variance of the
+/// bias), and the common errors. The process is Markov in its derivatives, so that a Kalman filter factors the
+/// covariance of a series at a cost proportional to its length.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GaussianProcess {
-    /// The standard deviation of the bias in the unit of the response: a prior such as
-    /// `{ half_normal = 1e-5 }`, or `{ known = 1e-5 }`. Unknown ones are called `bias`, or
-    /// `bias[B]`.
+    /// Standard deviation of the bias, in the unit of the response: a prior such as `{ half_normal = 1e-5 }`, or
+    /// `{ known = 1e-5 }`. Unknown ones are named `bias`, or `bias[B]`.
     pub bias: Quantity,
-    /// The length over which the bias is correlated, in the unit of the axis: a prior such as
-    /// `{ log_normal = [-9.2, 0.7] }`, or `{ known = 1e-4 }`. Unknown ones are called
-    /// `correlation_length`, or `correlation_length[B]`.
+    /// Correlation length of the bias, in the unit of the axis: a prior such as `{ log_normal = [-9.2, 0.7] }`, or
+    /// `{ known = 1e-4 }`. Unknown ones are named `correlation_length`, or `correlation_length[B]`.
     pub correlation_length: Quantity,
-    /// Which series share the standard deviation and the length of their biases: `"all"`, or
-    /// another axis than the one they run along, such as `"sensor"`.
+    /// Groups of series with a common standard deviation and correlation length of the bias: `"all"`, or one per
+    /// value of another axis than the one they run along, such as `"sensor"`.
     #[serde(default)]
     pub bias_by: By,
-    /// How smooth the bias is.
+    /// Smoothness of the bias.
     #[serde(default)]
     pub kernel: Kernel,
-    /// Whether the bias is orthogonal to what the parameters do to the response.
+    /// If true, the bias is orthogonal to the effects of the parameters on the response, so that it cannot take their
+    /// place.
     #[serde(default = "yes")]
     pub orthogonal: bool,
-    /// The axis of numbers along which the bias is smooth; the last one when it is left away.
+    /// Name of the numeric axis along which the bias is smooth. Default: the last numeric axis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub along: Option<String>,
-    /// The variance of the noise: a prior such as `{ half_normal = 1e-6 }`, `{ known = 2.5e-11 }`,
-    /// or a multiple of the measured one, `{ measured = { known = 1 } }`, as for `gaussian`.
+    /// Variance of the noise, in the squared unit of the response: a prior such as `{ half_normal = 1e-6 }`,
+    /// `{ known = 2.5e-11 }`, or a multiple of the measured variance, `{ measured = { known = 1 } }`, as for
+    /// `gaussian`.
     pub variance: Variance,
-    /// Which outputs share a variance of the noise: `"all"`, an axis such as `"sensor"`, windows,
-    /// or a list of these.
+    /// Groups of outputs with a common variance of the noise: `"all"`, one per value of an axis such as `"sensor"`,
+    /// windows of an axis, or a list of these.
     #[serde(default)]
     pub by: By,
 }
@@ -92,7 +92,7 @@ impl Component for GaussianProcess {
             Ok(series) if self.bias_by.divides(&series.axis) => {
                 complaints
                     .at("bias_by")
-                    .say("a bias belongs to a whole series")
+                    .say("a bias applies to a whole series")
                     .expected(format!("another axis than `{}`", series.axis));
             }
             Ok(_) => {}

@@ -1,18 +1,18 @@
-//! The inverse covariance of the mean curve, as far as derivatives need it.
+//! The parts of the inverse covariance of the mean curve that derivatives need.
 
-use lacuna::linalg::vector::{add_scaled, dot};
-use lacuna::linalg::{self, Cholesky, Matrix};
+use lacuna_linalg::vector::{add_scaled, dot};
+use lacuna_linalg::{Cholesky, Matrix};
 
 use super::bias::{Bias, Block};
 use super::filter::{Filter, Traces};
 use super::solve::Solved;
 
-/// `V^-1 = A^-1 + E E' - K K'` in the terms of [`Solved`].
+/// `V^-1 = A^-1 + E E' - K K'`, in the notation of [`Solved`].
 pub(super) struct Precision<'a> {
     solved: &'a Solved<'a>,
     /// `V^-1 d` for the residual `d` of the means.
     pub pull: Vec<f64>,
-    /// The diagonal of `V^-1`.
+    /// Diagonal of `V^-1`.
     pub diagonal: Vec<f64>,
     traces: Vec<Traces>,
     /// `Y`.
@@ -23,13 +23,13 @@ pub(super) struct Precision<'a> {
     taken: Matrix,
 }
 
-/// `X L^-1'` for the factor `L L'`.
+/// Returns `X L^-1'` for the factor `L L'`.
 fn half(x: &Matrix, factor: &Cholesky) -> Matrix {
-    linalg::multiply_transposed(x, &factor.lower_inverse())
+    lacuna_linalg::multiply_transposed(x, &factor.lower_inverse())
 }
 
 impl Solved<'_> {
-    /// See [`Precision`].
+    /// Computes the [`Precision`].
     pub fn precision(&self) -> Precision<'_> {
         let (n, r) = (self.residual.len(), self.factor.columns());
         let (mut inverse_image, mut added) = (Matrix::zeros(n, 0), Matrix::zeros(n, 0));
@@ -62,8 +62,8 @@ impl Solved<'_> {
 }
 
 impl Precision<'_> {
-    /// The derivatives of the log density by the standard deviation and the length of each series:
-    /// half the trace of `P' (pull pull' - V^-1) P` with that of `C`, for the projection
+    /// Returns the derivatives of the log density with respect to the standard deviation and the correlation length
+    /// of each series: half the trace of `P' (pull pull' - V^-1) P` with the derivative of `C`, for the projection
     /// `P = I - H S^-1 G'`.
     pub fn by_process(&self) -> Vec<[f64; 2]> {
         let solved = self.solved;
@@ -74,7 +74,7 @@ impl Precision<'_> {
             let Some([covariance, slope]) = bias.of(&solved.covariances, s) else { continue };
             let (sd, _) = Bias::of_block(block, solved.values);
             let (left, right) = self.columns(block, turned.as_ref());
-            let by = linalg::multiply_transposed(&left, &right);
+            let by = lacuna_linalg::multiply_transposed(&left, &right);
             // tr(A^-1 C) = tr(I - A^-1 D).
             let noisy = block.rows.iter().zip(&self.traces[s].diagonal);
             let own: f64 = noisy.map(|(&row, d)| 1.0 - solved.noise[row] * d).sum();
@@ -86,7 +86,7 @@ impl Precision<'_> {
         found
     }
 
-    /// What the projection makes of `pull`, `E`, `K` and `A^-1`; `None` where there is none.
+    /// Applies the projection to `pull`, `E`, `K` and `A^-1`; `None` without projection.
     fn turned(&self) -> Option<Turned> {
         let inner = self.solved.inner.as_ref()?;
         let (p, q, r) = (inner.image.columns(), self.added.columns(), self.taken.columns());
@@ -100,12 +100,12 @@ impl Precision<'_> {
             }
         }
         let inverse = inner.outer.solve_matrix(&self.inverse_image.transposed()).transposed();
-        let middle = linalg::transposed_multiply(&inner.image, &inverse);
+        let middle = lacuna_linalg::transposed_multiply(&inner.image, &inverse);
         let middle = inner.outer.solve_matrix(&middle);
         Some(Turned { along: inner.outer.solve_matrix(&along), inverse, middle })
     }
 
-    /// `X` and `Z` with `X Z' = P' (pull pull' - V^-1) P + A^-1` at a series.
+    /// Returns `X` and `Z` with `X Z' = P' (pull pull' - V^-1) P + A^-1` at a series.
     fn columns(&self, block: &Block, turned: Option<&Turned>) -> (Matrix, Matrix) {
         let basis = &self.solved.bias.basis;
         let (p, q, r) = (basis.columns(), self.added.columns(), self.taken.columns());
@@ -138,7 +138,7 @@ impl Precision<'_> {
     }
 }
 
-/// See [`Precision::turned`].
+/// Projected matrices (see [`Precision::turned`]).
 struct Turned {
     /// `S^-1 H' X` for the columns `X` of `pull`, `E` and `K`.
     along: Matrix,

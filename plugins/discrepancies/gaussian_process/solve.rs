@@ -1,64 +1,65 @@
-//! The covariance of the mean curve, factored without ever being formed.
+//! Covariance of the mean curve, factored without being formed.
 //!
-//! With `A = C + D` (`D` the noise of the means, both block-diagonal by series) the covariance of
-//! the mean curve is `V = A - H S^-1 H' + F F'`. Twice Woodbury (Rasmussen and Williams 2006, A.3):
+//! With `A = C + D` (`D` the noise of the means, both block-diagonal by series) the covariance of the mean curve is
+//! `V = A - H S^-1 H' + F F'`. Applying Woodbury's identity twice (Rasmussen and Williams 2006, A.3):
 //!
 //! ```text
 //! B = A - H S^-1 H':   B^-1 = A^-1 + Y N^-1 Y',  Y = A^-1 H,  N = S - H'A^-1 H = (A^-1 D G)' H,
-//! V = B + F F':        V^-1 = B^-1 - (B^-1 F) Q^-1 (B^-1 F)',  Q = I + F'B^-1 F,
+//! V = B + F F':  V^-1 = B^-1 - (B^-1 F) Q^-1 (B^-1 F)',  Q = I + F'B^-1 F,
 //! log det V = log det A + log det N - log det S + log det Q.
 //! ```
 //!
-//! Columns whitened by the [filter](super::filter) of `A` and, in rows below those, by
-//! `N^-1/2 Y'`, have the products of `B^-1`; the quadratic form is then a sum of squares.
+//! Columns whitened by the [filter](super::filter) of `A`, extended below by rows whitened with `N^-1/2 Y'`, have the
+//! inner products of `B^-1`; the quadratic form is then a sum of squares.
 
-use lacuna::linalg::vector::{add_scaled, dot};
-use lacuna::linalg::{self, Cholesky, Matrix};
+use lacuna_linalg::vector::{add_scaled, dot};
+use lacuna_linalg::{Cholesky, Matrix};
 
 use super::bias::Bias;
 use super::filter::Filter;
 
-/// See the module. Matrices have the rows of the measured outputs.
+/// The factors at one response and one set of hyperparameters (see the module). Matrices have one row per measured
+/// output.
 pub(super) struct Solved<'a> {
     pub bias: &'a Bias,
-    /// Standard deviations and lengths by group.
+    /// Standard deviations and correlation lengths by group.
     pub values: (&'a [f64], &'a [f64]),
-    /// The noise of the means.
+    /// Variance of the noise of the means.
     pub noise: Vec<f64>,
     pub factor: &'a Matrix,
-    /// The residual of the means.
+    /// Residual of the means.
     pub residual: Vec<f64>,
     /// `A` by series.
     pub filters: Vec<Filter>,
-    /// `C` by series and its derivative by the length.
+    /// `C` by series, and its derivative with respect to the length.
     pub covariances: Vec<Option<[Matrix; 2]>>,
-    /// `H`, `S` and `N`; `None` where the bias need not be orthogonal.
+    /// `H`, `S` and `N`; `None` if the bias need not be orthogonal.
     pub inner: Option<Inner>,
     /// `F` whitened with `B`.
     pub white: Matrix,
     /// `Q`.
     pub capacitance: Cholesky,
-    /// The common errors that explain the residual best.
+    /// Weights of the common errors that explain the residual best.
     pub zeta: Vec<f64>,
     /// `log det V + d' V^-1 d` for the residual `d`.
     pub twice: f64,
 }
 
-/// What makes the bias orthogonal.
+/// Matrices of the orthogonality condition.
 pub(super) struct Inner {
-    /// `H`, and as whitened with `A`.
+    /// `H`, plain and whitened with `A`.
     pub image: Matrix,
     pub white: Matrix,
-    /// `S` and `N`.
+    /// Factors of `S` and `N`.
     pub outer: Cholesky,
     pub reduced: Cholesky,
 }
 
 impl Inner {
-    /// With `H` and the filters of `A`.
+    /// Computes the matrices from `H` and the filters of `A`.
     fn new(bias: &Bias, image: Matrix, filters: &[Filter], noise: &[f64]) -> Option<Self> {
         let basis = &bias.basis;
-        let outer = Cholesky::new(&linalg::transposed_multiply(basis, &image)).ok()?;
+        let outer = Cholesky::new(&lacuna_linalg::transposed_multiply(basis, &image)).ok()?;
         let p = basis.columns();
         let mut both = Matrix::from_fn(basis.rows(), 2 * p, |i, j| {
             if j < p { image[(i, j)] } else { noise[i] * basis[(i, j - p)] }
@@ -66,7 +67,7 @@ impl Inner {
         whiten(bias, filters, &mut both);
         let split = |from: usize| both.select_columns(&(from..from + p).collect::<Vec<_>>());
         let (white, noisy) = (split(0), split(p));
-        let reduced = Cholesky::new(&linalg::transposed_multiply(&noisy, &white)).ok()?;
+        let reduced = Cholesky::new(&lacuna_linalg::transposed_multiply(&noisy, &white)).ok()?;
         Some(Self { image, white, outer, reduced })
     }
 }
@@ -78,7 +79,7 @@ fn whiten(bias: &Bias, filters: &[Filter], columns: &mut Matrix) {
     }
 }
 
-/// Columns whitened with `B`: so many rows more, by `N^-1/2 Y'`, as the bias is orthogonal to.
+/// Whitens columns with `B`; `below` rows are appended, one for each direction to which the bias is orthogonal.
 fn whitened(
     bias: &Bias,
     filters: &[Filter],
@@ -103,7 +104,8 @@ fn whitened(
 }
 
 impl<'a> Solved<'a> {
-    /// The factors at a residual of the means, for these variances of the means.
+    /// Computes the factors for a residual of the means and the variances of the means; `None` if a matrix cannot be
+    /// factored.
     pub fn new(
         bias: &'a Bias,
         values: (&'a [f64], &'a [f64]),
@@ -135,10 +137,10 @@ impl<'a> Solved<'a> {
         let column = Matrix::from_vec(residual.len(), 1, residual.clone());
         let last = whitened(bias, &filters, inner.as_ref(), &column, below).into_vec();
         let r = factor.columns();
-        let mut capacitance = linalg::gram(&white);
+        let mut capacitance = lacuna_linalg::gram(&white);
         (0..r).for_each(|k| capacitance[(k, k)] += 1.0);
         let capacitance = Cholesky::new(&capacitance).ok()?;
-        let mut zeta = linalg::transposed_multiply_vector(&white, &last);
+        let mut zeta = lacuna_linalg::transposed_multiply_vector(&white, &last);
         capacitance.solve(&mut zeta);
         for (x, row) in last.iter().zip(white.iter_rows()) {
             twice += (x - dot(row, &zeta)).powi(2);
@@ -160,14 +162,14 @@ impl<'a> Solved<'a> {
         })
     }
 
-    /// `A^-1 X` for `X` whitened with `A`.
+    /// Replaces `X`, whitened with `A`, by `A^-1 X`.
     pub fn back(&self, columns: &mut Matrix) {
         for (block, filter) in self.bias.blocks.iter().zip(&self.filters) {
             filter.back(&block.rows, columns);
         }
     }
 
-    /// `V^-1 d = B^-1 (d - F zeta)`.
+    /// Returns `V^-1 d = B^-1 (d - F zeta)`.
     pub fn pull(&self, added: &Matrix) -> Vec<f64> {
         let rest: Vec<f64> = (self.residual.iter().zip(self.factor.iter_rows()))
             .map(|(d, row)| d - dot(row, &self.zeta))
@@ -175,14 +177,15 @@ impl<'a> Solved<'a> {
         let mut column = Matrix::from_vec(rest.len(), 1, rest);
         whiten(self.bias, &self.filters, &mut column);
         let along = self.inner.as_ref().map(|inner| {
-            let mut along = linalg::transposed_multiply_vector(&inner.white, column.as_slice());
+            let mut along =
+                lacuna_linalg::transposed_multiply_vector(&inner.white, column.as_slice());
             inner.reduced.whiten(&mut along);
             along
         });
         self.back(&mut column);
         let mut pull = column.into_vec();
         if let Some(along) = along {
-            add_scaled(&mut pull, 1.0, &linalg::multiply_vector(added, &along));
+            add_scaled(&mut pull, 1.0, &lacuna_linalg::multiply_vector(added, &along));
         }
         pull
     }

@@ -1,11 +1,11 @@
-//! The likelihood against the multivariate normal density written out with the dense covariance.
+//! The likelihood against the multivariate normal density with the dense covariance.
 #![allow(clippy::unwrap_used)]
 
 use lacuna::data::Measurements;
-use lacuna::linalg::{self, Matrix};
 use lacuna::math::random::Stream;
 use lacuna::plugin::discrepancy::{CommonError, Known, Likelihood};
 use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
 
 use super::likelihood::BiasedLikelihood;
 use super::{GaussianProcess, Kernel};
@@ -34,7 +34,7 @@ const SHARED: &str = "bias = { half_normal = 1 }\ncorrelation_length = { half_no
 const SEPARATE: &str = "bias = { half_normal = 1 }\ncorrelation_length = { half_normal = 1 }\n\
     bias_by = \"sensor\"\nkernel = \"matern_3_2\"\nvariance = { half_normal = 1 }\nby = \"sensor\"";
 
-/// Times in units of a ten-thousandth of a second.
+/// Times in units of 1e-4 s.
 fn rescaled(seed: u64, replicates: usize) -> Measurements {
     let mut data = data(seed, replicates);
     let grid = (0..TIMES).map(|j| j as f64 + 0.1 * (j * j) as f64).collect();
@@ -105,9 +105,9 @@ fn the_bias_is_orthogonal_to_what_the_parameters_do() {
     assert_eq!(likelihood.bias.basis.columns(), 2);
     let kept: Vec<usize> = (0..OUTPUTS).filter(|&i| !data.values(i).is_empty()).collect();
     let slopes = slopes().unwrap().select_rows(&kept);
-    let product = linalg::transposed_multiply(&slopes, &bias);
+    let product = lacuna_linalg::transposed_multiply(&slopes, &bias);
     assert!(product.as_slice().iter().all(|x| x.abs() < 1e-12));
-    // Draws are orthogonal too, and have the variance that is told.
+    // Draws are orthogonal too, and have the predicted variance.
     let told = &likelihood.predictive(&[0.0; OUTPUTS], &hyper)[1].variance;
     for (&i, k) in kept.iter().zip(0..) {
         close(told[i], bias[(k, k)], 1e-10);
@@ -118,11 +118,11 @@ fn the_bias_is_orthogonal_to_what_the_parameters_do() {
     let values: Vec<Option<f64>> =
         kept.iter().map(|&i| drawn[0].replicates.iter().find_map(|r| r.values[i])).collect();
     let values: Vec<f64> = values.into_iter().flatten().collect();
-    let along = linalg::transposed_multiply_vector(&slopes, &values);
+    let along = lacuna_linalg::transposed_multiply_vector(&slopes, &values);
     assert!(along.iter().all(|x| x.abs() < 1e-9), "{along:?}");
 }
 
-/// Matérn with index 1/2, 3/2, 5/2 at the distance of one length: Rasmussen and Williams (2006), 4.17.
+/// Matérn with index 1/2, 3/2, 5/2 at a distance of one length: Rasmussen and Williams (2006), 4.17.
 #[test]
 fn kernels_have_their_closed_forms() {
     let (a, b) = (3.0_f64.sqrt(), 5.0_f64.sqrt());

@@ -10,35 +10,35 @@ use lacuna::plugin::discrepancy::{
     Discrepancy, Hyperparameter, Known, Likelihood, StatedNoise, VariancePart,
 };
 use lacuna::run::Stop;
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::common::{By, Groups, Normal, PerGroup, Quantity, Replicates, Setting, Unknown, start};
 
-/// Normal differences in proportion to the model's response, with a floor.
+/// Normal differences in proportion to the model's response, with an optional floor.
 ///
-/// Every measured value is `y = m (1 + e1) + e0` with the model's response `m`, a relative error
-/// `e1` of mean zero and standard deviation `relative`, and an absolute one `e0` of standard
-/// deviation `floor`: a normal number of variance `relative^2 m^2 + floor^2` (the proportional and
-/// the combined error model of Gelman et al., Bayesian Data Analysis (2013), and of
-/// pharmacometrics). Take it for sensors and models whose errors are a share of the signal.
+/// Every measured value is `y = m (1 + e1) + e0` with the model's response `m`, a relative error `e1` with zero mean
+/// and standard deviation `relative`, and an absolute error `e0` with standard deviation `floor`: a normal number of
+/// variance `relative^2 m^2 + floor^2` (the proportional and the combined error model of Gelman et al., Bayesian Data
+/// Analysis (2013), and of pharmacometrics). Choose it for sensors and models whose errors are a fraction of the
+/// signal.
 ///
-/// Without a floor a response of exactly zero has no error, and its likelihood is zero unless the
-/// data are zero as well: give a floor where a signal starts at rest. Since the variance follows
-/// the response, the likelihood is not reduced to an emulator's basis.
+/// Without a floor a response of exactly zero has no error, and the likelihood is zero unless the data are zero as
+/// well: give a floor if a signal starts from rest. Since the variance depends on the response, the likelihood is not
+/// reduced to the emulator's basis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MultiplicativeGaussian {
-    /// The relative standard deviation: a prior such as `{ half_normal = 0.2 }`, or
-    /// `{ known = 0.05 }`. Unknown ones are called `relative`, or `relative[B]`.
+    /// Relative standard deviation, a fraction of the response: a prior such as `{ half_normal = 0.2 }`, or
+    /// `{ known = 0.05 }`. Unknown ones are named `relative`, or `relative[B]`.
     pub relative: Quantity,
-    /// Which outputs share a relative standard deviation: `"all"`, an axis such as `"sensor"`,
-    /// windows, or a list of these.
+    /// Groups of outputs with a common relative standard deviation: `"all"`, one per value of an axis such as
+    /// `"sensor"`, windows of an axis, or a list of these.
     #[serde(default)]
     pub by: By,
-    /// The absolute standard deviation, in the unit of the response, called `floor`; none when it
-    /// is left away.
+    /// Absolute standard deviation, in the unit of the response; an unknown one is named `floor`. Default: no
+    /// absolute error.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub floor: Option<Quantity>,
 }
@@ -89,7 +89,7 @@ impl Discrepancy for MultiplicativeGaussian {
         known: &Known<'_>,
         part: &Measurements,
     ) -> Result<Option<Box<dyn Likelihood>>, Stop> {
-        // Nothing of the law comes from the replicates.
+        // No parameter of the distribution is taken from the replicates.
         self.likelihood(&Known { data: part, ..*known }).map(Some)
     }
 
@@ -115,7 +115,7 @@ struct Proportional {
 }
 
 impl Proportional {
-    /// The relative standard deviations of the groups and the floor; `None` where one is not above zero.
+    /// Returns the relative standard deviations of the groups and the floor; `None` if one is not above zero.
     fn values<'a>(&'a self, hyper: &'a [f64]) -> Option<(&'a [f64], f64)> {
         let floor = match &self.floor {
             Some(floor) => floor.values(hyper)?[0],
@@ -124,7 +124,7 @@ impl Proportional {
         Some((self.relative.values(hyper)?, floor))
     }
 
-    /// The variance of each output.
+    /// Returns the variance of each output.
     fn variance(&self, response: &[f64], hyper: &[f64]) -> Option<Vec<f64>> {
         let (relative, floor) = self.values(hyper)?;
         let relative = self.groups.spread(relative);

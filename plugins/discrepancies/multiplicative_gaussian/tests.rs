@@ -1,4 +1,4 @@
-//! The likelihood against the multivariate normal density written out.
+//! The likelihood against the dense multivariate normal density.
 #![allow(clippy::unwrap_used)]
 
 use lacuna::plugin::Discrepancy;

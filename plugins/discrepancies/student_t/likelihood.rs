@@ -1,4 +1,4 @@
-//! The likelihood, value by value.
+//! Likelihood of independent Student's t values.
 
 use std::f64::consts::PI;
 
@@ -7,28 +7,29 @@ use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal};
 use lacuna::math::special::ln_gamma;
 use lacuna::plugin::Fact;
-use lacuna::plugin::discrepancy::{Hyperparameter, Known, Likelihood, VariancePart};
+use lacuna::plugin::discrepancy::{Hyperparameter, Known, Likelihood, SampledErrors, VariancePart};
 use lacuna::run::Stop;
 
 use super::StudentT;
-use super::latent::Latent;
+use super::latent::{Latent, Noise};
 use crate::discrepancies::common::{
-    By, Groups, PerGroup, Replicates, Setting, Unknown, part, start, values,
+    By, Groups, PerGroup, Quantity, Replicates, Setting, Unknown, start, values,
 };
 
-/// See the module.
+/// Student's t likelihood (see the module).
 pub(super) struct StudentLikelihood {
     setting: Setting,
     hyper: Vec<Hyperparameter>,
     groups: Groups,
     scale: PerGroup,
     freedom: PerGroup,
-    latent: Vec<Latent>,
-    /// The measured outputs with all their values.
+    latent: Option<Latent>,
+    replicates: Replicates,
+    /// Measured outputs with all their values.
     outputs: Vec<(usize, Vec<f64>)>,
 }
 
-/// The mean of each output, the scale of each group and the degrees of freedom.
+/// Mean of each output, scale of each group, and degrees of freedom.
 struct At<'a> {
     mean: Vec<f64>,
     scale: &'a [f64],
@@ -40,7 +41,7 @@ impl StudentLikelihood {
         Self::of_part(options, known, known.data)
     }
 
-    /// The likelihood of a part of the data, with the directions of the common errors that all data have.
+    /// Builds the likelihood of a part of the data, with the directions of the common errors chosen for all data.
     pub(super) fn of_part(
         options: &StudentT,
         known: &Known<'_>,
@@ -58,17 +59,21 @@ impl StudentLikelihood {
         let one = Groups::of(layout, &By::default()).map_err(Stop::new)?;
         let name = Unknown { name: "degrees_of_freedom", unit: Unit::dimensionless() };
         let freedom = PerGroup::new(&options.degrees_of_freedom, &one, &name, |_| 5.0, &mut hyper);
-        let latent = known.common.iter().filter(|error| error.factor.columns() > 0);
-        let latent: Vec<Latent> = latent
-            .map(|error| Latent::new(error, &replicates, options.common, &mut hyper))
-            .collect::<Result<_, _>>()?;
+        let starts: Vec<f64> = hyper.iter().map(|h| h.start).collect();
+        let degrees = freedom.values(&starts).map_or(f64::NAN, |f| f[0]);
+        let noise = Noise {
+            variance: of_the_mean(&replicates, &groups, scale.values(&starts), degrees),
+            sizes: sizes(&options.scale, &replicates).to_vec(),
+        };
+        let latent = Latent::new(known, &replicates, &noise, options.common, &mut hyper)?;
         let outputs = replicates.measured.iter().map(|&i| (i, part.values(i))).collect();
         let known = Known { data: part, ..*known };
         let setting = Setting::new(&known, &replicates, &groups);
-        Ok(Self { setting, hyper, groups, scale, freedom, latent, outputs })
+        Ok(Self { setting, hyper, groups, scale, freedom, latent, replicates, outputs })
     }
 
-    /// `None` where a scale is not above zero or there is no variance.
+    /// Evaluates mean, scales and degrees of freedom; `None` if a scale is not above zero or the variance is
+    /// infinite.
     fn at<'a>(&'a self, response: &[f64], hyper: &'a [f64]) -> Option<At<'a>> {
         let freedom = self.freedom.values(hyper)?[0];
         let scale = self.scale.values(hyper)?;
@@ -78,10 +83,10 @@ impl StudentLikelihood {
         Some(At { mean: self.mean(response, hyper), scale, freedom })
     }
 
-    /// The response with the common errors.
-    fn mean(&self, response: &[f64], hyper: &[f64]) -> Vec<f64> {
+    /// Returns the response plus the common errors.
+    pub(super) fn mean(&self, response: &[f64], hyper: &[f64]) -> Vec<f64> {
         let mut mean = response.to_vec();
-        for latent in &self.latent {
+        if let Some(latent) = &self.latent {
             mean.iter_mut().zip(latent.error(hyper)).for_each(|(m, e)| *m += e);
         }
         mean
@@ -91,7 +96,7 @@ impl StudentLikelihood {
         self.groups.of[output].map_or(f64::NAN, |g| at.scale[g])
     }
 
-    /// The variance of each output without the common errors.
+    /// Returns the variance of each output without the common errors.
     fn variance(&self, hyper: &[f64]) -> Option<Vec<f64>> {
         let freedom = self.freedom.values(hyper)?[0];
         let squares: Vec<f64> = self.scale.values(hyper)?.iter().map(|s| s * s).collect();
@@ -100,12 +105,38 @@ impl StudentLikelihood {
     }
 }
 
-/// The logarithm of the density at its centre, for scale one.
+/// Returns the variance of an efficient estimate of the centre at each measured output: `(d + 3) / (d + 1) s^2 / n`,
+/// from the Fisher information of Student's t distribution (Lange, Little and Taylor 1989, appendix B).
+fn of_the_mean(
+    replicates: &Replicates,
+    groups: &Groups,
+    scale: Option<&[f64]>,
+    freedom: f64,
+) -> Vec<f64> {
+    let factor = (freedom + 3.0) / (freedom + 1.0);
+    let one = |(k, &i): (usize, &usize)| {
+        let scale = groups.of[i].and_then(|g| scale.map(|s| s[g])).unwrap_or(f64::NAN);
+        factor * scale * scale / replicates.count[k]
+    };
+    replicates.measured.iter().enumerate().map(one).collect()
+}
+
+/// Returns the ratios of the actual scale to its initial value that must be expected: 1 if it is known, a narrow
+/// range if replicates show it, and a wide one for single values.
+fn sizes(scale: &Quantity, replicates: &Replicates) -> &'static [f64] {
+    match scale {
+        Quantity::Known(_) => &[1.0],
+        Quantity::Unknown(_) if replicates.count.iter().any(|&n| n > 1.0) => &[0.5, 1.0, 2.0],
+        Quantity::Unknown(_) => &[0.1, 0.3, 1.0, 3.0, 10.0],
+    }
+}
+
+/// Returns the log density at the centre, for scale 1.
 fn log_height(freedom: f64) -> f64 {
     ln_gamma(0.5 * (freedom + 1.0)) - ln_gamma(0.5 * freedom) - 0.5 * (freedom * PI).ln()
 }
 
-/// `sum log(1 + (y - m)^2 / w)`, with one logarithm for as many factors as cannot overflow.
+/// Returns `sum log(1 + (y - m)^2 / w)`, with one logarithm for as many factors as cannot overflow.
 fn log_factors(values: &[f64], mean: f64, w: f64) -> f64 {
     let (mut sum, mut product) = (0.0, 1.0_f64);
     for y in values {
@@ -123,7 +154,7 @@ fn log_factors(values: &[f64], mean: f64, w: f64) -> f64 {
     sum + product.ln()
 }
 
-/// The derivative of `ln_gamma` (Abramowitz and Stegun 6.3.5 and 6.3.18).
+/// Returns the derivative of `ln_gamma` (Abramowitz and Stegun 6.3.5 and 6.3.18).
 fn digamma(x: f64) -> f64 {
     let (mut x, mut sum) = (x, 0.0);
     while x < 10.0 {
@@ -173,7 +204,7 @@ impl Likelihood for StudentLikelihood {
         }
         self.scale.add_gradient(&by_scale, &mut by_hyper);
         self.freedom.add_gradient(&[by_freedom], &mut by_hyper);
-        for latent in &self.latent {
+        if let Some(latent) = &self.latent {
             latent.add_gradient(&by_mean, &mut by_hyper);
         }
         (by_mean, by_hyper)
@@ -191,19 +222,23 @@ impl Likelihood for StudentLikelihood {
         Some(values(&self.setting.data).map(one).collect())
     }
 
-    /// Since the weights of the common errors are known here, their parts are the squares of the
-    /// errors themselves.
+    /// The common errors contribute the square of the sampled part, and the variance of the rest.
     fn predictive(&self, _response: &[f64], hyper: &[f64]) -> Vec<VariancePart> {
         let mut parts = self.setting.own_parts(&self.variance(hyper).unwrap_or_default());
-        for latent in self.latent.iter().filter(|l| l.predictive) {
-            parts.push(part(&latent.origin, latent.error(hyper).iter().map(|e| e * e).collect()));
+        if let Some(latent) = &self.latent {
+            parts.extend(latent.predictive(hyper));
         }
         parts
     }
 
-    /// Student's number is a normal one over the root of a chi-squared one over its degrees of freedom.
+    /// A Student's t number is a normal number divided by the root of a chi-squared number over its degrees of
+    /// freedom.
     fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements> {
-        let mean = self.mean(response, hyper);
+        let mut mean = self.mean(response, hyper);
+        if let Some(latent) = &self.latent {
+            let rest = latent.rest(&stream.named("common"));
+            mean.iter_mut().zip(rest).for_each(|(m, e)| *m += e);
+        }
         let freedom = self.freedom.values(hyper).map_or(f64::NAN, |f| f[0]);
         let scale = self.groups.spread(self.scale.values(hyper).unwrap_or_default());
         let law = Distribution::Gamma([0.5 * freedom, 2.0 / freedom]);
@@ -217,14 +252,28 @@ impl Likelihood for StudentLikelihood {
         })]
     }
 
+    fn sampled_errors(&self, hyper: &[f64]) -> Option<SampledErrors> {
+        let latent = self.latent.as_ref()?;
+        let freedom = self.freedom.values(hyper)?;
+        let mean =
+            of_the_mean(&self.replicates, &self.groups, self.scale.values(hyper), freedom[0]);
+        let mut noise = vec![f64::INFINITY; self.setting.data.layout.len()];
+        for (&i, variance) in self.replicates.measured.iter().zip(mean) {
+            noise[i] = variance;
+        }
+        Some(SampledErrors { noise, sampled: latent.sampled(), left_out: latent.left_out() })
+    }
+
     fn facts(&self) -> Vec<Fact> {
         let count: usize = self.outputs.iter().map(|(_, values)| values.len()).sum();
         let mut facts =
             vec![Fact::new("data", count), Fact::new("measured outputs", self.outputs.len())];
         facts.extend(self.latent.iter().map(|l| {
-            let (kept, share) = (l.directions.rows(), 100.0 * l.share);
-            let name = format!("directions of the common error `{}`", l.origin);
-            Fact::new(name, format!("{kept}, with {share:.1} % of its variance"))
+            let (kept, share) = (l.count(), 100.0 * l.share);
+            Fact::new(
+                "directions of the common errors",
+                format!("{kept}, with {share:.1} % of their variance"),
+            )
         }));
         facts
     }

@@ -10,56 +10,60 @@ use lacuna::math::distribution::Distribution;
 use lacuna::plugin::component::{Component, Context};
 use lacuna::plugin::discrepancy::{Discrepancy, Known, Likelihood, StatedNoise};
 use lacuna::run::Stop;
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::common::{By, Groups, Quantity};
 use likelihood::StudentLikelihood;
 
-/// Independent differences with heavy tails: Student's t, of one unknown scale or of one for each
-/// group of outputs.
+/// Independent differences with heavy tails: Student's t distribution, with one scale or one for each group of
+/// outputs.
 ///
-/// Every measured value is the model's response, plus the errors that all replicates share, plus
-/// `scale` times a number with Student's t law of `degrees_of_freedom` (Lange, Little and Taylor,
-/// J. American Statistical Association 84 (1989) 881). A single wild value then pulls the
-/// parameters less than under the normal law, to which Student's law tends for many degrees of
-/// freedom.
+/// Every measured value is the model's response, plus the errors common to all replicates, plus `scale` times a
+/// number from Student's t distribution with `degrees_of_freedom` (Lange, Little and Taylor, J. American Statistical
+/// Association 84 (1989) 881). An outlier then affects the parameters less than under the normal distribution, which
+/// is the limit of many degrees of freedom.
 ///
-/// The errors that all replicates share stay normal. They are sampled: the standard normal weights
-/// of their leading directions are unknowns of the study, called `emulator[1]`, `emulator[2]`, ….
-/// That is exact for the directions that are kept; the rest, the part of their variance beyond
-/// `common.share`, is left out, and the report says how much that is. All values enter one by one,
-/// since Student's law has no sufficient statistics.
+/// The errors common to all replicates stay normal, and with them the likelihood has no closed form. They are
+/// sampled: the standard normal weights of some of their directions are unknowns of the study, named `common[1]`,
+/// `common[2]`, …. These are the leading directions, at most `common.most`, and those on which the estimates depend:
+/// with as many of the latter as there are parameters, the posterior of a linear model under normal noise of known
+/// variance is that with the full covariance. For noise of unknown variance, directions are kept for several sizes of
+/// the noise: three per parameter with replicates and five without. Errors along other directions count as noise, and
+/// the assessment reports where that shifts the estimates (`sampled_errors`). Predictions of new data include all of
+/// these errors. Every value enters the likelihood separately, since Student's t distribution has no sufficient
+/// statistics.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StudentT {
-    /// The scale, in the unit of the response: a prior such as `{ half_normal = 1e-5 }`, or
-    /// `{ known = 5e-6 }`. Unknown ones are called `scale`, or `scale[B]`, and are sampled as
-    /// logarithms, with the Jacobian. The standard deviation is `sqrt(d / (d - 2))` times the scale
-    /// for `d` degrees of freedom.
+    /// Scale, in the unit of the response: a prior such as `{ half_normal = 1e-5 }`, or `{ known = 5e-6 }`. Unknown
+    /// ones are named `scale`, or `scale[B]`, and are sampled as logarithms, with the Jacobian. The standard
+    /// deviation is `sqrt(d / (d - 2))` times the scale for `d` degrees of freedom.
     pub scale: Quantity,
-    /// Which outputs share a scale: `"all"`, an axis such as `"sensor"`, windows, or a list of these.
+    /// Groups of outputs with a common scale: `"all"`, one per value of an axis such as `"sensor"`, windows of an
+    /// axis, or a list of these.
     #[serde(default)]
     pub by: By,
-    /// The degrees of freedom: `{ known = 4 }` or a prior. The default is that of Juárez and Steel
-    /// (J. Business and Economic Statistics 28 (2010) 52). Values of 2 and less, for which there is
-    /// no variance, are excluded.
+    /// Degrees of freedom, above 2: `{ known = 4 }` or a prior. The default prior is that of Juárez and Steel (J.
+    /// Business and Economic Statistics 28 (2010) 52). Values of 2 and less, for which the variance is infinite, are
+    /// excluded.
     #[serde(default = "degrees_of_freedom")]
     pub degrees_of_freedom: Quantity,
-    /// How many directions of the errors that all replicates share are sampled.
+    /// Number of leading directions of the common errors that are sampled.
     #[serde(default)]
     pub common: Directions,
 }
 
-/// How many directions of each common error are kept.
+/// Number of leading directions of the common errors that are sampled, in addition to those on which the estimates
+/// depend.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Directions {
-    /// The share of an error's variance, in units of the noise of the mean curve, that the
-    /// directions must carry.
+    /// Fraction of the common errors' variance, in units of the noise of the mean curve, that the leading directions
+    /// must carry; from 0 to 1.
     pub share: f64,
-    /// The most directions of one error.
+    /// Maximum number of leading directions. Each adds an unknown.
     pub most: usize,
 }
 
@@ -93,7 +97,7 @@ impl Component for StudentT {
         if !(0.0..=1.0).contains(&self.common.share) {
             complaints
                 .at("common.share")
-                .say("a share is a number from 0 to 1")
+                .say("the fraction must be from 0 to 1")
                 .found(self.common.share);
         }
     }
@@ -120,4 +124,4 @@ impl Discrepancy for StudentT {
     }
 }
 
-lacuna::register!(Discrepancy, "student_t", StudentT, aliases: ["t", "student"]);
+lacuna::register!(Discrepancy, "student_t", StudentT, aliases: ["t", "student"], revision = 2);

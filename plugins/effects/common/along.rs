@@ -1,38 +1,40 @@
-//! Outputs that stand beside each other along an axis.
+//! Outputs that are neighbours along an axis.
 
 use std::collections::BTreeMap;
 
 use lacuna::data::{Axis, Coordinates, Layout};
-use lacuna::study::nearest::one_of;
-use lacuna::study::problem::Complaints;
+use lacuna::text::nearest::one_of;
+use lacuna::text::problem::Complaints;
 
-/// The value at a place as a sum over places of an axis, each with its weight.
+/// Value at a place as a weighted sum of the values at three places of an axis: index and weight of each.
 pub type Row = [(usize, f64); 3];
 
-/// An axis of a layout: how far apart its places stand in a response.
+/// An axis of a layout, with the stride between its places in a response.
 #[derive(Debug, Clone, Copy)]
 pub struct Along<'a> {
-    /// The axis.
+    /// The axis itself.
     pub axis: &'a Axis,
     stride: usize,
 }
 
 impl<'a> Along<'a> {
-    /// The axis of this name, if the layout has it.
+    /// Returns the axis of this name; `None` if the layout does not have it.
     pub fn new(layout: &'a Layout, name: &str) -> Option<Self> {
         let (position, axis) = layout.axis(name)?;
         let stride = layout.axes[position + 1..].iter().map(Axis::len).product();
         Some(Self { axis, stride })
     }
 
-    /// The response in which the values at each place are sums over places of the axis; without a row they stay.
+    /// Response in which the value at each place of the axis is the weighted sum of its row; a place without a row is
+    /// unchanged.
     pub fn combine(&self, response: &[f64], rows: &[Option<Row>]) -> Vec<f64> {
         let mut out = response.to_vec();
         self.sums(response, rows, &mut out);
         out
     }
 
-    /// The same sums, zero without a row.
+    /// Like [`Along::combine`], but zero at a place without a row: the derivative of the combined response, from rows
+    /// of derivatives.
     pub fn combine_slopes(&self, response: &[f64], rows: &[Option<Row>]) -> Vec<f64> {
         let mut out = vec![0.0; response.len()];
         self.sums(response, rows, &mut out);
@@ -52,7 +54,7 @@ impl<'a> Along<'a> {
         }
     }
 
-    /// Complains of an axis that the response has not.
+    /// Reports an axis that the response does not have.
     pub fn check(layout: &'a Layout, name: &str, complaints: &mut Complaints<'_>) -> Option<Self> {
         let found = Self::new(layout, name);
         if found.is_none() {
@@ -64,7 +66,7 @@ impl<'a> Along<'a> {
         found
     }
 
-    /// Complains of a label that the axis has not.
+    /// Reports a label that the axis does not have.
     pub fn check_label(&self, key: &str, label: &str, complaints: &mut Complaints<'_>) {
         if self.axis.position(label).is_some() {
             return;
@@ -80,16 +82,16 @@ impl<'a> Along<'a> {
     }
 }
 
-/// Where the places of an axis stand on a line.
+/// Coordinates of the places of an axis on a line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stations {
-    /// The places that have a coordinate, with it, in the order of the coordinates.
+    /// Indices and coordinates of the places that have one, sorted by coordinate.
     sorted: Vec<(usize, f64)>,
     places: usize,
 }
 
 impl Stations {
-    /// Of labels by their coordinates, or of a grid by its own.
+    /// Takes the coordinates of labels from `positions`, and those of an axis of numbers from its grid.
     pub fn new(axis: &Axis, positions: &BTreeMap<String, f64>) -> Self {
         let mut sorted: Vec<(usize, f64)> = match &axis.coordinates {
             Coordinates::Grid { values, .. } => values.iter().copied().enumerate().collect(),
@@ -102,17 +104,17 @@ impl Stations {
         Self { sorted, places: axis.len() }
     }
 
-    /// How many there are.
+    /// Number of places with a coordinate.
     pub fn count(&self) -> usize {
         self.sorted.len()
     }
 
-    /// Whether two share a coordinate.
+    /// Returns true if two places share a coordinate.
     pub fn coincide(&self) -> bool {
         self.sorted.windows(2).any(|w| w[0].1 >= w[1].1)
     }
 
-    /// The mean distance between neighbours.
+    /// Mean distance between neighbours.
     pub fn spacing(&self) -> f64 {
         match (self.sorted.first(), self.sorted.last()) {
             (Some(first), Some(last)) if self.count() > 1 => {
@@ -122,8 +124,8 @@ impl Stations {
         }
     }
 
-    /// For each place of the axis the sum that `weights` gives, from the coordinates of two or three stations nearby
-    /// and that of the place itself; none for a place without coordinate.
+    /// Returns for each place of the axis its row of weights: `weights` computes them from the coordinates of two or
+    /// three nearby places and that of the place itself. `None` for a place without a coordinate.
     pub fn rows(&self, weights: impl Fn(&[f64], f64) -> [f64; 3]) -> Vec<Option<Row>> {
         let mut rows = vec![None; self.places];
         let near = self.count().min(3);
@@ -142,7 +144,7 @@ impl Stations {
         rows
     }
 
-    /// Complains of coordinates that are missing, of no place, or of two places.
+    /// Reports coordinates that are missing, that belong to no place, or that two places share.
     pub fn check(
         along: &Along<'_>,
         positions: &BTreeMap<String, f64>,
@@ -172,7 +174,8 @@ impl Stations {
     }
 }
 
-/// The weights of the values at two or three nodes in their polynomial at `x`, in its slope and in its curvature.
+/// Weights of the values at two or three nodes in their interpolating polynomial at `x` (first row), in its first
+/// derivative and in its second derivative (Lagrange).
 pub fn lagrange(nodes: &[f64], x: f64) -> [[f64; 3]; 3] {
     let mut weights = [[0.0; 3]; 3];
     for (k, &node) in nodes.iter().enumerate() {

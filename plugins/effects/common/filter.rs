@@ -1,8 +1,9 @@
 //! A first-order lag on curves.
 
 use lacuna::data::Layout;
+use lacuna::plugin::effect::each_curve;
 
-use super::{Knots, each_curve};
+use super::Knots;
 
 /// The lag `T z' = y - z` between the points of a grid, exactly for an input that is a cubic between two points.
 ///

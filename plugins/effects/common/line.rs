@@ -1,23 +1,23 @@
-//! Effects that need to know how the response changes along a line of places.
+//! Effects that depend on the variation of the response along a line of places.
 
 use std::collections::BTreeMap;
 
 use lacuna::data::{Axis, Coordinates, Layout, Unit};
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::effect::Situation;
+use lacuna::matrix::Matrix;
+use lacuna::plugin::effect::{Situation, propose};
 use toml::{Table, Value};
 
-use super::{Along, Stations, propose};
+use super::{Along, Stations};
 
-/// A line: an axis of the response, and where its places stand.
+/// A line: an axis of the response with the coordinates of its places.
 #[derive(Debug, Clone, Copy)]
 pub struct Line<'a> {
-    /// The name of the axis.
+    /// Name of the axis.
     pub axis: &'a str,
-    /// The coordinates of its labels.
+    /// Coordinates of the axis labels, in `unit`.
     pub positions: &'a BTreeMap<String, f64>,
-    /// Their unit.
+    /// Unit of the coordinates.
     pub unit: &'a Unit,
 }
 
@@ -28,16 +28,8 @@ impl<'a> Line<'a> {
         Some((along, Stations::new(along.axis, self.positions)))
     }
 
-    /// The unit of coordinates: that of the axis where it is a grid.
-    pub fn unit(&self, layout: &Layout) -> Unit {
-        match layout.axis(self.axis).map(|(_, axis)| &axis.coordinates) {
-            Some(Coordinates::Grid { unit, .. }) => unit.clone(),
-            _ => self.unit.clone(),
-        }
-    }
-
-    /// The response in which each place shows what `weights` make of the places nearby, given their coordinates and its own;
-    /// as it is where the layout has no such line.
+    /// Response in which each place shows the sum that `weights` gives, from the coordinates of the neighbouring places
+    /// and its own; unchanged if the layout has no such line.
     pub fn combined(
         &self,
         layout: &'a Layout,
@@ -64,8 +56,9 @@ impl<'a> Line<'a> {
         Matrix::from_vec(response.len(), 1, column)
     }
 
-    /// What to try: along the places whose coordinates are known, and along every axis of lengths. `prior` is that of
-    /// the unknown `key`, given the mean distance between places.
+    /// Options of the effect that a search should try: along the places whose coordinates are known, and along every
+    /// axis of lengths. `prior` returns the prior of the unknown `key` for the mean distance between places; lines of
+    /// fewer than `least` places are skipped.
     pub fn proposals(
         &self,
         situation: &Situation<'_>,

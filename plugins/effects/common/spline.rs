@@ -1,8 +1,7 @@
 //! Curves between their points: cubic splines on any increasing grid.
 
 use lacuna::data::Layout;
-
-use super::grid;
+use lacuna::plugin::effect::grid;
 
 /// The factored equations of a cubic spline with continuous curvature through points on a grid.
 ///

@@ -2,8 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use lacuna::data::{Axis, Layout, Unit};
-use lacuna::plugin::Effect;
-use lacuna::plugin::registry;
+use lacuna::plugin::{Effect, registry};
 
 /// An effect from its options.
 pub fn effect(name: &str, options: &str) -> Box<dyn Effect> {

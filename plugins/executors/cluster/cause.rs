@@ -1,35 +1,35 @@
-//! Why a run that was handed to a scheduler has no result, and how often it is tried again.
+//! Causes of runs without a result, and the number of resubmissions for each.
 
 use std::fmt;
 
-use lacuna::study::values::Positive;
+use lacuna::text::values::Positive;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Why a job ended without a result of a run.
+/// Cause of a job's end without a result of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Cause {
-    /// The machine failed.
+    /// The node failed.
     NodeFailure,
-    /// The scheduler needed the machine for something else.
+    /// The scheduler took the node for another job.
     Preempted,
-    /// The time limit.
+    /// The time limit was reached.
     Timeout,
-    /// The memory limit.
+    /// The memory limit was reached.
     OutOfMemory,
-    /// Somebody cancelled it.
+    /// A user or administrator cancelled the job.
     Cancelled,
-    /// It ended before it had begun a run.
+    /// The job ended before its first run began.
     Start,
-    /// It ended by itself: with an exit code, or by a signal.
+    /// The job ended by itself, with an exit code or by a signal.
     Failure,
-    /// The scheduler does not know of it any more, and it left no word.
+    /// The scheduler no longer knows the job, and it left no result.
     Lost,
 }
 
 impl Cause {
-    /// Whether all runs of a job share it, those that were not begun too.
+    /// Returns true if the cause affects all runs of a job, including those that had not begun.
     pub fn concerns_all(self) -> bool {
         self == Self::Cancelled
     }
@@ -45,31 +45,32 @@ impl fmt::Display for Cause {
             Self::Cancelled => "it was cancelled",
             Self::Start => "it ended before it began a run",
             Self::Failure => "it failed",
-            Self::Lost => "the scheduler does not know of it any more",
+            Self::Lost => "the scheduler has no record of it any more",
         })
     }
 }
 
-/// How often a run is submitted again, by the cause of its end; a model that refuses inputs is not asked again.
+/// Number of times that a run is submitted again, by the cause of its end. A run whose inputs the model rejects is
+/// not repeated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Retry {
-    /// After a failure of the node.
+    /// Resubmissions after a node failure.
     pub node_failure: usize,
-    /// When the scheduler took the node for something else.
+    /// Resubmissions after preemption.
     pub preempted: usize,
-    /// When the time limit was reached.
+    /// Resubmissions after the time limit was reached; see `grow` for a longer limit.
     pub timeout: usize,
-    /// When memory ran out.
+    /// Resubmissions after memory ran out; see `grow` for more memory.
     pub out_of_memory: usize,
-    /// When somebody cancelled the job.
+    /// Resubmissions after somebody cancelled the job.
     pub cancelled: usize,
-    /// When a job ended by itself before it began a run, though others began theirs: a node that lacks something. After that the
-    /// study stops, and no run is charged.
+    /// Resubmissions of a job that ended by itself before its first run began, although other jobs began theirs:
+    /// something is missing on a node. If they are used up the study stops, and no run counts as failed.
     pub start: usize,
-    /// When the job ended without a word of the run, by an exit code or a signal.
+    /// Resubmissions after the job ended, by an exit code or a signal, without a result of the run.
     pub failure: usize,
-    /// When the scheduler does not know of the job any more.
+    /// Resubmissions if the scheduler no longer knows the job.
     pub lost: usize,
 }
 
@@ -89,7 +90,7 @@ impl Default for Retry {
 }
 
 impl Retry {
-    /// How often a run is submitted again after this.
+    /// Returns the number of resubmissions for a cause.
     pub fn after(&self, cause: Cause) -> usize {
         match cause {
             Cause::NodeFailure => self.node_failure,
@@ -104,13 +105,13 @@ impl Retry {
     }
 }
 
-/// What a job that is submitted again gets more of.
+/// Increase of the limits of a job that is submitted again.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Growth {
-    /// The factor on the time limit after each time limit that was reached.
+    /// Factor on the time limit for each time that it was reached.
     pub time: Positive,
-    /// The factor on the memory after each time that it ran out.
+    /// Factor on the memory for each time that it ran out.
     pub memory: Positive,
 }
 

@@ -1,63 +1,63 @@
-//! The submissions of a folder of runs, as they are written down.
+//! Record of the submissions of a folder of runs.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use lacuna::run::{Stop, files};
-use lacuna::work::{self, Order};
+use lacuna_run::work::{self, Order};
 use serde::{Deserialize, Serialize};
 
 use super::Cause;
 
-/// Runs that were handed to a scheduler together.
+/// Runs that were submitted to a scheduler together.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Submission {
-    /// The executor that made it.
+    /// Name of the executor that made the submission.
     pub executor: String,
-    /// Its number: the name of its folder in `campaign`.
+    /// Number of the submission: the name of its folder in `campaign`.
     pub number: usize,
-    /// The name by which it can be found in the scheduler.
+    /// Name under which the scheduler knows it.
     pub name: String,
-    /// The folder as the jobs have it; empty in one that an older version made.
+    /// Path of the folder as given to the jobs; empty in a submission made by an older version.
     #[serde(default)]
     pub place: PathBuf,
-    /// The scheduler's number; `None` until it is known.
+    /// Job number given by the scheduler; `None` until it is known.
     pub job: Option<String>,
-    /// When it was made, in seconds since 1970 (UTC).
+    /// Time of the submission, in seconds since 1970 (UTC).
     pub submitted: u64,
-    /// The factor on the time limit.
+    /// Factor on the time limit.
     pub time: f64,
-    /// The factor on the memory.
+    /// Factor on the memory.
     pub memory: f64,
-    /// The runs of each task.
+    /// Names of the runs of each task.
     pub tasks: Vec<Vec<String>>,
-    /// How its runs ended, as far as they have.
+    /// Outcome of each run that has ended.
     pub settled: BTreeMap<String, Settled>,
 }
 
-/// How the part of a submission ended that was one run.
+/// Outcome of one run within a submission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Settled {
-    /// It left a marker.
+    /// The run left a marker.
     Marked,
-    /// It had not begun when its job ended.
+    /// The run had not begun when its job ended.
     NotBegun,
-    /// It left none, for this cause, and is submitted again.
+    /// The run left no marker, for this cause, and is submitted again.
     Repeated(Cause),
-    /// It left none, for this cause, and was handed over as failed.
+    /// The run left no marker, for this cause, and was reported as failed.
     GivenUp(Cause),
 }
 
-/// Whether jobs find the folder that they were given.
+/// Relation of the folder to the path that the jobs were given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Whereabouts {
-    /// They do.
+    /// The jobs have the right path.
     Same,
-    /// The run directory has another path now.
+    /// The run directory has been moved to another path.
     Moved,
-    /// This is a copy; the jobs belong to the other one.
+    /// The run directory is a copy; the jobs belong to the original.
     Copied,
 }
 
@@ -65,40 +65,42 @@ const FILE: &str = "submission.json";
 const WITHDRAWN: &str = "withdrawn";
 
 impl Submission {
-    /// Its folder in that of the runs.
+    /// Returns the folder of the submission.
     pub fn folder(&self, runs: &Path) -> PathBuf {
         folder(runs, self.number)
     }
 
-    /// Writes it down.
+    /// Writes the record to its folder.
     pub fn write(&self, runs: &Path) -> Result<(), Stop> {
         files::write_json(&self.folder(runs).join(FILE), self)
     }
 
-    /// The runs that have not ended, with their tasks.
+    /// Iterates over the runs that have not ended, with the index of their task.
     pub fn open(&self) -> impl Iterator<Item = (usize, &String)> {
         let tasks = self.tasks.iter().enumerate();
         let runs = tasks.flat_map(|(task, runs)| runs.iter().map(move |run| (task, run)));
         runs.filter(|(_, run)| !self.settled.contains_key(*run))
     }
 
-    /// Notes that its jobs are being ended, so that whoever goes on submits its runs again and calls none of them failed.
+    /// Records that the jobs of the submission are being cancelled, so that the process that continues submits their
+    /// runs again and counts none of them as failed.
     pub fn withdraw(&self, runs: &Path) -> Result<(), Stop> {
         files::write_atomic(&self.folder(runs).join(WITHDRAWN), b"")
     }
 
-    /// Whether its jobs were being ended, by `lacuna campaign cancel` or because no run could have a result.
+    /// Returns true if the jobs were being cancelled, by `lacuna campaign cancel` or because no run could have a
+    /// result.
     pub fn is_withdrawn(&self, runs: &Path) -> bool {
         self.folder(runs).join(WITHDRAWN).exists()
     }
 
-    /// Takes it back: the scheduler has nothing of it.
+    /// Deletes the record, because the scheduler did not accept the submission.
     pub fn forget(&self, runs: &Path) -> Result<(), Stop> {
         let path = self.folder(runs).join(FILE);
         fs::remove_file(&path).map_err(|error| files::cannot_write(&path, &error))
     }
 
-    /// Where its folder is, seen from its jobs.
+    /// Compares the path of the folder with that given to the jobs.
     pub fn whereabouts(&self, runs: &Path) -> Whereabouts {
         let here = self.folder(runs).canonicalize().unwrap_or_default();
         let there = self.place.canonicalize().unwrap_or_default();
@@ -111,25 +113,25 @@ impl Submission {
         }
     }
 
-    /// Takes open runs out, without a word on how they ended.
+    /// Marks open runs as not begun.
     pub fn close(&mut self, which: impl Fn(&str) -> bool) {
         let open = self.open().map(|(_, run)| run.clone());
         let runs: Vec<String> = open.filter(|run| which(run)).collect();
         self.settled.extend(runs.into_iter().map(|run| (run, Settled::NotBegun)));
     }
 
-    /// Whether all its runs have ended.
+    /// Returns true if all runs have ended.
     pub fn is_over(&self) -> bool {
         self.open().next().is_none()
     }
 }
 
-/// The folder of a submission.
+/// Returns the folder of a submission.
 pub fn folder(runs: &Path, number: usize) -> PathBuf {
     work::folder(runs).join(number.to_string())
 }
 
-/// The submissions that one executor made for a folder of runs, oldest first; and the number that is free.
+/// Reads the submissions that one executor made for a folder of runs, oldest first, and returns the next free number.
 pub fn read(runs: &Path, executor: &str) -> Result<(Vec<Submission>, usize), Stop> {
     let campaign = work::folder(runs);
     let mut numbers: Vec<usize> = fs::read_dir(&campaign)
@@ -143,7 +145,7 @@ pub fn read(runs: &Path, executor: &str) -> Result<(Vec<Submission>, usize), Sto
     let mut all = Vec::new();
     for number in numbers {
         let path = folder(runs, number).join(FILE);
-        // A folder without the file was never handed over.
+        // A folder without the file was never submitted.
         if path.is_file() {
             all.push(files::read_json::<Submission>(&path)?);
         }
@@ -152,7 +154,7 @@ pub fn read(runs: &Path, executor: &str) -> Result<(Vec<Submission>, usize), Sto
     Ok((all, free))
 }
 
-/// How often a run was submitted again for each cause since it was last handed over.
+/// Returns the number of resubmissions of a run for each cause, since it was last reported.
 pub fn repeats(submissions: &[Submission], run: &str) -> BTreeMap<Cause, usize> {
     let mut counts = BTreeMap::new();
     for submission in submissions {
@@ -165,7 +167,7 @@ pub fn repeats(submissions: &[Submission], run: &str) -> BTreeMap<Cause, usize> 
     counts
 }
 
-/// The order of a submission with the names of the runs of its tasks.
+/// Returns the names of the runs of each task of an order.
 pub fn tasks_of(order: &Order) -> Vec<Vec<String>> {
     let name = |i: &usize| order.jobs[*i].name.clone();
     order.tasks.iter().map(|task| task.iter().map(name).collect()).collect()

@@ -1,4 +1,4 @@
-//! What can be said and done of a campaign from its folder alone.
+//! State and cancellation of a campaign, from its folder alone.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,7 +9,7 @@ use lacuna::run::Stop;
 use super::ledger::{self, Submission};
 use super::{Scheduler, TaskState};
 
-/// The runs that the scheduler has.
+/// Returns the runs that the scheduler has, with their phase.
 pub fn look(scheduler: &dyn Scheduler, runs: &Path) -> Result<Vec<Seen>, Stop> {
     let (mut all, _) = ledger::read(runs, scheduler.name())?;
     all.retain(|submission| !submission.is_over());
@@ -33,11 +33,11 @@ fn sight(state: Option<&TaskState>) -> (Phase, String) {
         Some(TaskState::Running(place)) => (Phase::Runs, format!(" on {place}")),
         Some(TaskState::Failed(cause, _)) => (Phase::Ended, format!(" has ended: {cause}")),
         Some(TaskState::Ended) => (Phase::Ended, " has ended".to_owned()),
-        None => (Phase::Ended, ": the scheduler does not know of it".to_owned()),
+        None => (Phase::Ended, ": the scheduler has no record of it".to_owned()),
     }
 }
 
-/// Ends all that the scheduler has.
+/// Cancels all jobs of a campaign; returns the number of runs affected.
 pub fn cancel(scheduler: &dyn Scheduler, runs: &Path) -> Result<usize, Stop> {
     let (mut all, _) = ledger::read(runs, scheduler.name())?;
     all.retain(|submission| !submission.is_over());
@@ -49,7 +49,7 @@ pub fn cancel(scheduler: &dyn Scheduler, runs: &Path) -> Result<usize, Stop> {
     Ok(open.iter().map(|submission| submission.open().count()).sum())
 }
 
-/// Ends the jobs of some submissions and notes that they were ended.
+/// Cancels the jobs of some submissions, and records it.
 pub fn end(
     scheduler: &dyn Scheduler,
     submissions: &[&Submission],

@@ -1,4 +1,4 @@
-//! Runs into tasks, tasks into submissions.
+//! Grouping of runs into tasks, and of tasks into submissions.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,13 +6,13 @@ use std::time::{Duration, Instant};
 
 use lacuna::plugin::executor::{Batch, Job};
 use lacuna::run::{Stop, files};
-use lacuna::work::{self, Order};
+use lacuna_run::work::{self, Order};
 
 use super::ledger::{self, Submission};
 use super::{Cause, Plan, Scheduler, script};
 
-/// Hands runs to the scheduler: those that need the same limits together. `next` is a free number, and is moved on. When it
-/// fails, what was handed over before, or may have been, is among `earlier`.
+/// Submits runs to the scheduler, grouped by the limits they need. `next` is a free number and is advanced. On
+/// failure, `earlier` contains everything that was, or may have been, submitted.
 pub fn submit(
     scheduler: &dyn Scheduler,
     batch: &Batch<'_>,
@@ -44,8 +44,8 @@ pub fn submit(
     Ok(())
 }
 
-/// Makes one submission; `None` with the reason when the scheduler refuses it. It is on disk under a name of its own before
-/// the scheduler hears of it, so that it is found again whenever this process is killed.
+/// Makes one submission; `None` with the reason if the scheduler refuses it. It is written to disk under a unique
+/// name before the scheduler sees it, so that it can be found again whenever this process is killed.
 fn one(
     scheduler: &dyn Scheduler,
     batch: &Batch<'_>,
@@ -95,7 +95,7 @@ fn noted(
     (time, memory): (f64, f64),
 ) -> Submission {
     let submitted = work::now();
-    // Two campaigns of one user must not take each other's jobs for their own.
+    // Two campaigns of one user must not mistake each other's jobs for their own.
     let mark =
         files::hash(format!("{}{submitted}{}", folder.display(), std::process::id()).as_bytes());
     Submission {
@@ -112,8 +112,8 @@ fn noted(
     }
 }
 
-/// The number of a submission whose command failed, if the scheduler has it all the same. Where the answer was lost on its
-/// way, the scheduler may still be at it: it is asked until its patience is over.
+/// Returns the number of a submission whose command failed, if the scheduler has accepted it nevertheless. If the
+/// answer may have been lost on its way, the scheduler is asked again until the patience is used up.
 fn heard(scheduler: &dyn Scheduler, name: &str, failure: &Stop) -> Result<Option<String>, Stop> {
     let patience = Duration::from_secs_f64(scheduler.rules().patience);
     let begun = Instant::now();
@@ -126,9 +126,9 @@ fn heard(scheduler: &dyn Scheduler, name: &str, failure: &Stop) -> Result<Option
     }
 }
 
-/// Whether a command failed on its way to the scheduler or back, and not by the scheduler's word.
+/// Returns true if a command failed in communication with the scheduler, and not by the scheduler's refusal.
 fn was_lost(words: &str) -> bool {
-    // What stands before it are the words of the command, with paths.
+    // The part before repeats the command, whose paths may contain any of these words.
     let words = words.rsplit_once("` failed").map_or(words, |(_, said)| said).to_lowercase();
     let of_the_way = [
         "timed out",
@@ -147,8 +147,8 @@ fn was_lost(words: &str) -> bool {
 
 fn unsure(failure: &Stop, silent: &Stop) -> Stop {
     Stop::new(format!(
-        "the scheduler may have the jobs or not: {}; and then: {}",
+        "it is unknown whether the scheduler has the jobs: {}; and then: {}",
         failure.message, silent.message
     ))
-    .help("when it answers again, run the same command: jobs that it has are found, and nothing is submitted twice")
+    .help("when the scheduler answers again, run the same command: jobs that it has are found, and nothing is submitted twice")
 }

@@ -1,4 +1,4 @@
-//! What a scheduler is asked.
+//! Interface to a scheduler.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,88 +10,88 @@ use super::{Cause, Growth, Retry, Submission};
 
 /// A scheduler that runs arrays of tasks.
 pub trait Scheduler {
-    /// What it is called in a study.
+    /// Returns its name in a study.
     fn name(&self) -> &'static str;
 
-    /// How runs are packed, followed and repeated.
+    /// Returns the rules for grouping, polling and resubmission.
     fn rules(&self) -> Rules<'_>;
 
-    /// How a task starts the program that makes its runs.
+    /// Returns the settings of the program that makes the runs of a task.
     fn worker(&self) -> Worker<'_>;
 
-    /// The greatest number of tasks of one submission.
+    /// Returns the maximum number of tasks of one submission.
     fn most_tasks(&self) -> Result<usize, Stop>;
 
-    /// What the script of a submission has that is the scheduler's own.
+    /// Returns the scheduler's own part of the script of a submission.
     fn frame(&self, plan: &Plan<'_>) -> Frame;
 
-    /// Hands a submission over, whose script is this; returns the number by which the scheduler knows it. An error does
-    /// not say that the scheduler has it not: the answer may have been lost.
+    /// Submits the script and returns the job number. After an error the scheduler may still have accepted it: the
+    /// answer may have been lost.
     fn submit(&self, plan: &Plan<'_>, script: &Path) -> Result<String, Stop>;
 
-    /// The number of a submission of this name, if the scheduler has one: after a process was killed between handing
-    /// over and writing down.
+    /// Returns the number of the submission of this name, if the scheduler has one. Needed after a process was killed
+    /// between submitting and recording.
     fn find(&self, name: &str) -> Result<Option<String>, Stop>;
 
-    /// The state of the tasks of some submissions; what the scheduler does not know is left out.
+    /// Returns the state of the tasks of some submissions, without those unknown to the scheduler.
     fn states(&self, submissions: &[&Submission]) -> Result<States, Stop>;
 
-    /// Ends all tasks of the submissions with these numbers, of which some may have ended.
+    /// Cancels all tasks of the submissions with these numbers; some may have ended.
     fn cancel(&self, jobs: &[&str]) -> Result<(), Stop>;
 }
 
-/// How runs are packed, followed and repeated.
+/// Rules for grouping, polling and resubmission.
 #[derive(Debug, Clone, Copy)]
 pub struct Rules<'a> {
-    /// Runs of a task.
+    /// Number of runs per task.
     pub pack: usize,
-    /// How often a run is submitted again.
+    /// Number of resubmissions by cause.
     pub retry: &'a Retry,
-    /// What it then gets more of.
+    /// Increase of the limits at resubmission.
     pub grow: &'a Growth,
-    /// The longest pause between two questions to the scheduler, in seconds.
+    /// Longest interval between two queries to the scheduler, in seconds.
     pub poll: f64,
-    /// How long files and accounts may lag behind the end of a job, in seconds.
+    /// Time by which files and accounting may lag behind the end of a job, in seconds.
     pub patience: f64,
 }
 
-/// A submission that is about to be made.
+/// A submission about to be made.
 #[derive(Debug, Clone, Copy)]
 pub struct Plan<'a> {
-    /// Its folder, from the root.
+    /// Absolute path of its folder.
     pub folder: &'a Path,
-    /// The folder of the study.
+    /// Folder of the study.
     pub study: &'a Path,
-    /// A name that no other submission has.
+    /// Unique name.
     pub name: &'a str,
-    /// How many tasks it has.
+    /// Number of tasks.
     pub tasks: usize,
-    /// The factor on the time limit.
+    /// Factor on the time limit.
     pub time: f64,
-    /// The factor on the memory.
+    /// Factor on the memory.
     pub memory: f64,
 }
 
-/// Where tasks are, by the submission's number in the ledger and the task.
+/// States of tasks, by the number of the submission in the ledger and the index of the task.
 pub type States = BTreeMap<(usize, usize), TaskState>;
 
-/// Where a task is.
+/// State of a task.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TaskState {
-    /// It waits for its turn; in the scheduler's words.
+    /// Waits for its turn, with the scheduler's words.
     Waiting(String),
-    /// It waits for something that time alone may not bring: for this reason.
+    /// Waits for a reason that time alone may not remove.
     Held(String),
-    /// It runs, here.
+    /// Runs on this node.
     Running(String),
-    /// It has ended as it should.
+    /// Ended normally.
     Ended,
-    /// It has ended for this cause; in the scheduler's words.
+    /// Ended for this cause, with the scheduler's words.
     Failed(Cause, String),
 }
 
 impl TaskState {
-    /// Whether it may still make runs.
+    /// Returns true if the task may still make runs.
     pub fn is_open(&self) -> bool {
         matches!(self, Self::Waiting(_) | Self::Held(_) | Self::Running(_))
     }

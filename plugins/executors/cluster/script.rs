@@ -1,4 +1,4 @@
-//! The shell script of a task: the user's lines around `lacuna work`, and the exit code on disk whatever happens.
+//! Shell script of a task: the user's lines, `lacuna work`, and the exit code written to disk in every case.
 
 use std::path::{Path, PathBuf};
 
@@ -7,41 +7,42 @@ use lacuna::run::{Stop, files};
 use super::Plan;
 use crate::executors::program;
 
-/// What a script has that is the scheduler's own.
+/// The scheduler's own part of a script.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Frame {
-    /// The name of the file.
+    /// File name of the script.
     pub file: &'static str,
-    /// Lines for the scheduler, after the first.
+    /// Directives for the scheduler, after the first line.
     pub directives: Vec<String>,
-    /// The variable that holds the number of the task.
+    /// Environment variable with the index of the task.
     pub task: &'static str,
-    /// Whether the script itself keeps what is printed, as `taskN.txt`.
+    /// True if the script itself redirects its output to `taskN.txt`.
     pub log: bool,
 }
 
-/// How a task starts the program that makes its runs.
+/// Settings of the program that makes the runs of a task.
 #[derive(Debug, Clone, Copy)]
 pub struct Worker<'a> {
-    /// Environment modules that are loaded first.
+    /// Environment modules, loaded first.
     pub modules: &'a [String],
-    /// Lines of shell after them.
+    /// Shell lines after the modules.
     pub setup: &'a [String],
-    /// The program as the study has it.
+    /// Program as given in the study.
     pub program: Option<&'a Path>,
-    /// How many runs of the task are made at a time.
+    /// Number of runs of the task made at a time.
     pub parallel: usize,
 }
 
-/// Writes the script of a submission into its folder; returns its path.
+/// Writes the script of a submission into its folder and returns its path; fails if a path cannot be written in a
+/// script.
 pub fn write(frame: &Frame, worker: &Worker<'_>, plan: &Plan<'_>) -> Result<PathBuf, Stop> {
     for (what, path) in [("run directory", plan.folder), ("study", plan.study)] {
         if path.to_str().is_none_or(|text| text.contains(['\n', '\r'])) {
             let path = path.to_string_lossy().replace(['\n', '\r'], "\u{23ce}");
             return Err(Stop::new(format!(
-                "no job script can have the path of the {what}: {path}"
+                "a job script cannot contain the path of the {what}: {path}"
             ))
-            .help("let it be UTF-8 without line breaks"));
+            .help("move it to a path in UTF-8 without line breaks"));
         }
     }
     let program = program::on_nodes(worker.program, plan.study)?;
@@ -50,8 +51,8 @@ pub fn write(frame: &Frame, worker: &Worker<'_>, plan: &Plan<'_>) -> Result<Path
     Ok(path)
 }
 
-/// What every script begins with. The exit code is written under another name and renamed, so that a file that is there is
-/// whole; a shell that is told to end would call it 0.
+/// Beginning of every script. The exit code is written under another name and renamed, so that an existing file is
+/// complete. The trap for TERM is needed because a shell that is terminated would otherwise record the exit code 0.
 const HEAD: &str = r#"
 note() {
     printf '%s\n' "$1" > "$folder/task$task.exit.part" &&
@@ -80,7 +81,7 @@ fn text(frame: &Frame, worker: &Worker<'_>, program: &Path, folder: &Path) -> St
     let modules = worker.modules.iter().map(|name| (format!("module load {name}"), "modules"));
     let setup = worker.setup.iter().map(|line| (line.clone(), "setup"));
     for (line, key) in modules.chain(setup) {
-        // Runs that are made without what should come before them would be wrong or fail one by one.
+        // A failing line ends the job: runs without the preparation before them would be wrong, or fail one by one.
         let named = word(&format!("`{}` of `{key}`", line.trim()));
         text.push_str(&format!("{line}\ncheck $? {named}\n"));
     }
@@ -96,18 +97,18 @@ fn text(frame: &Frame, worker: &Worker<'_>, program: &Path, folder: &Path) -> St
     text
 }
 
-/// The exit code that a task left behind.
+/// Reads the exit code that a task left behind.
 pub fn exit_code(folder: &Path, task: usize) -> Option<i32> {
     let text = std::fs::read_to_string(folder.join(format!("task{task}.exit"))).ok()?;
     text.trim().parse().ok()
 }
 
-/// A path as one word of a shell.
+/// Quotes a path as one shell word.
 pub fn quoted(path: &Path) -> String {
     word(&path.display().to_string())
 }
 
-/// A text as one word of a shell.
+/// Quotes a text as one shell word.
 pub fn word(text: &str) -> String {
     format!("'{}'", text.replace('\'', "'\\''"))
 }
@@ -121,7 +122,7 @@ mod tests {
 
     use super::*;
 
-    /// Runs a script with these lines of setup; what it prints, and the exit code that it leaves.
+    /// Runs a script with these lines of setup; returns its output and the recorded exit code.
     fn ran(program: &str, setup: &[&str]) -> (String, i32) {
         let folder = tempfile::tempdir().unwrap();
         let place = folder.path().join("it's 100% \"fine\"");

@@ -1,59 +1,60 @@
-//! Nodes that the server takes from a cluster by itself.
+//! Nodes that the server requests from a cluster by itself.
 
 use lacuna::run::{Stop, files};
-use lacuna::study::values::Count;
+use lacuna::text::values::Count;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::executors::amount::Span;
 
-/// A queue of allocations: the server submits jobs to the cluster, each of which becomes a worker, as long as there are tasks.
+/// A queue of allocations: as long as there are tasks, the server submits jobs to the cluster, each of which becomes
+/// a worker.
 ///
-/// The queue is made when the study first submits, under a name that is made of its options, and used again by whoever
-/// has the same; `hq alloc list` shows it, `hq alloc remove` ends it.
+/// The queue is created at the first submission of the study, under a name derived from its options, and is shared by
+/// studies with the same options; `hq alloc list` shows it, `hq alloc remove` ends it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Allocation {
-    /// The cluster's own scheduler.
+    /// Scheduler of the cluster.
     pub manager: Manager,
-    /// The time limit of each allocation. It must be longer than that of a task.
+    /// Time limit of each allocation; must be longer than that of a task.
     pub time: Span,
-    /// How many allocations wait in the queue at a time; 1 when left out.
+    /// Number of allocations waiting in the queue at a time. Default: 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub backlog: Option<Count>,
-    /// Nodes of an allocation at most; 1 when left out.
+    /// Maximum number of nodes of an allocation. Default: 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nodes: Option<Count>,
-    /// Workers at a time at most; no limit when left out.
+    /// Maximum number of workers at a time. Default: no limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at_most: Option<Count>,
-    /// Cores of each worker; those of its node when left out.
+    /// Number of cores of each worker. Default: those of its node.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cpus: Option<Count>,
-    /// How long a worker without tasks is kept.
+    /// Time for which a worker without tasks is kept. Default: that of the server.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub idle: Option<Span>,
-    /// A line of shell that each node runs before its worker.
+    /// Shell line that each node executes before its worker starts.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub setup: Option<String>,
-    /// Options of `sbatch` or `qsub`: partition, account and the like; neither nodes nor time.
+    /// Options of `sbatch` or `qsub`, such as partition and account, but neither nodes nor time.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub arguments: Vec<String>,
 }
 
-/// The scheduler of a cluster.
+/// Scheduler of a cluster.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Manager {
-    /// Slurm.
+    /// Slurm, with `sbatch`.
     Slurm,
-    /// PBS, or one that has its `qsub`.
+    /// PBS, or another scheduler with the `qsub` of PBS.
     Pbs,
 }
 
 impl Allocation {
-    /// Makes the queue where the server has none of its name.
+    /// Creates the queue if the server has none of its name.
     pub fn ensure(&self, ask: impl Fn(&[String]) -> Result<String, Stop>) -> Result<(), Stop> {
         let name = self.name();
         let queues = ask(&["alloc", "list"].map(str::to_owned))?;
@@ -70,7 +71,7 @@ impl Allocation {
         format!("lacuna-{}", &files::hash(format!("{self:?}").as_bytes())[..10])
     }
 
-    /// The words after `hq`.
+    /// Returns the arguments of `hq`.
     pub fn words(&self, name: &str) -> Vec<String> {
         let manager = match self.manager {
             Manager::Slurm => "slurm",

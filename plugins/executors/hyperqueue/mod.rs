@@ -1,4 +1,4 @@
-//! `hyperqueue`: task arrays through the `hq` of the user's installation.
+//! `hyperqueue`: task arrays through the user's own `hq`.
 
 mod allocation;
 mod state;
@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use lacuna::plugin::executor::{Batch, Finished, Seen};
 use lacuna::plugin::{Component, Context, Executor};
 use lacuna::run::Stop;
-use lacuna::study::problem::Complaints;
-use lacuna::study::values::{Count, Positive};
+use lacuna::text::problem::Complaints;
+use lacuna::text::values::{Count, Positive};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +20,7 @@ use super::cluster::{self, Frame, Growth, Plan, Retry, Scheduler, States, Submis
 use super::command::said;
 use super::program;
 use crate::models::process;
+
 pub use allocation::{Allocation, Manager};
 
 /// Runs the model on the workers of a HyperQueue server, as task arrays.
@@ -32,34 +33,36 @@ pub use allocation::{Allocation, Manager};
 /// allocation = { manager = "slurm", time = "12 h", arguments = ["--partition=batch", "--account=abc123"] }
 /// ```
 ///
-/// Good for many runs that are short or need a part of a node only: HyperQueue takes whole nodes from Slurm or PBS and deals
-/// the runs out to them itself. The server must run (`hq server start`, best with a journal, so that it survives a
-/// restart); workers are those that you start, or those of `allocation`. Needs `hq` 0.18 or later.
+/// Suitable for many runs that are short or need only a part of a node: HyperQueue takes whole nodes from Slurm or
+/// PBS and distributes the runs among them itself. The server must be running (`hq server start`, preferably with a
+/// journal, so that it survives a restart); workers are those that you start, or those of `allocation`. Needs `hq`
+/// 0.18 or later.
 ///
-/// Submitting, waiting, stopping and going on is as with `slurm`: state is in the run directory and in the server, and the
-/// marker that each run leaves is what counts. The exit code of `hq job wait` is not asked: it says nothing of
-/// failed tasks.
+/// Submitting, waiting, stopping and resuming work as with `slurm`: the state is in the run directory and in the
+/// server, and the marker that each run leaves decides. The exit code of `hq job wait` is not used, because it does
+/// not tell about failed tasks.
 ///
 /// Reference: Beránek et al., `SoftwareX` 27 (2024) 101814.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct HyperQueue {
-    /// The `hq` command: a name in `PATH`, or a path from the study's folder.
+    /// `hq` command: a name in `PATH`, or a path from the study's folder.
     pub command: String,
-    /// The server's folder (`--server-dir`); that of `HQ_SERVER_DIR` or of the home folder when left out.
+    /// Folder of the server (`--server-dir`). Default: that of `HQ_SERVER_DIR` or of the home folder.
     pub server: Option<PathBuf>,
-    /// Cores of each task.
+    /// Number of cores of each task. Default: that of the server.
     pub cpus: Option<Count>,
-    /// Whole nodes of each task, for a model that starts its own processes on several.
+    /// Number of whole nodes of each task, for a model that starts its own processes on several nodes. Not together
+    /// with `cpus`.
     pub nodes: Option<Count>,
     /// Other resources of each task by name, such as `{ "gpus/nvidia" = "1", mem = "16000" }`.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub resources: BTreeMap<String, String>,
-    /// The time limit of a task, such as `2 h`: that of a whole pack.
+    /// Time limit of a task, such as `2 h`; it applies to the whole pack. Default: no limit.
     pub time: Option<Span>,
-    /// The time that a worker must have left to be given a task; that of `time` when left out.
+    /// Time that a worker must have left to be given a task. Default: the value of `time`.
     pub time_request: Option<Span>,
-    /// Tasks of a greater priority go first.
+    /// Priority of the tasks; higher values go first.
     pub priority: i32,
     /// Further options of `hq submit`, such as `--pin=taskset`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -67,26 +70,26 @@ pub struct HyperQueue {
     /// Environment modules that each task loads.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub modules: Vec<String>,
-    /// Lines of shell that each task runs before its first run, after the modules. Each is a whole command; one that fails ends
-    /// the task, and with `|| true` behind it may fail.
+    /// Shell lines that each task executes before its first run, after the modules. Each must be a complete command;
+    /// a failing line ends the task, unless `|| true` is appended.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub setup: Vec<String>,
-    /// Runs of a task.
+    /// Number of runs per task. Packing amortises the start of a task over short runs.
     pub pack: Count,
-    /// How many runs of a task are made at a time.
+    /// Number of runs of a task made at a time.
     pub parallel: Count,
-    /// How often a run is submitted again, by cause. A worker that is lost is a failure of the node; the server itself tries
-    /// such tasks again a few times (`--crash-limit`).
+    /// Number of resubmissions of a run, by cause. A lost worker counts as a node failure; the server itself repeats
+    /// such tasks a few times (`--crash-limit`).
     pub retry: Retry,
-    /// What it then gets more of; of memory there is nothing to give.
+    /// Increase of the limits at resubmission; only `time` has an effect here.
     pub grow: Growth,
-    /// The longest pause between two questions to the server, in seconds. The first pauses are shorter.
+    /// Longest interval between two queries to the server, in seconds; the first intervals are shorter.
     pub poll: Positive,
-    /// How long files may lag behind the end of a task, in seconds.
+    /// Time by which files may lag behind the end of a task, in seconds.
     pub patience: Positive,
-    /// `lacuna` as the nodes find it: a path from the root is theirs alone; the running program when left out.
+    /// Path of `lacuna` on the nodes; an absolute path need not exist on this machine. Default: the running program.
     pub program: Option<PathBuf>,
-    /// Nodes that the server takes from a cluster by itself; none when left out.
+    /// Allocations that the server requests from a cluster by itself. Default: none.
     pub allocation: Option<Allocation>,
 }
 
@@ -121,12 +124,12 @@ impl Component for HyperQueue {
         if self.cpus.is_some() && self.nodes.is_some() {
             complaints
                 .at("nodes")
-                .say("a task has whole nodes or some cores")
+                .say("a task uses either whole nodes or some cores")
                 .expected("`nodes` or `cpus`")
                 .found("both");
         }
         if self.grow.time.get() != 1.0 && self.time.is_none() {
-            complaints.at("grow.time").say("there is no `time` that could grow");
+            complaints.at("grow.time").say("`grow.time` has no effect without `time`");
         }
     }
 
@@ -183,7 +186,7 @@ impl Scheduler for HyperQueue {
     }
 
     fn most_tasks(&self) -> Result<usize, Stop> {
-        // The server has no limit of its own; a file of job information should stay readable.
+        // The server has no limit of its own; this one keeps a listing of the job readable.
         Ok(100_000)
     }
 
@@ -228,7 +231,7 @@ impl Scheduler for HyperQueue {
 }
 
 impl HyperQueue {
-    /// What `hq` answers, as JSON text.
+    /// Runs `hq` and returns its answer, a JSON text.
     fn ask(&self, words: &[String]) -> Result<String, Stop> {
         let mut all: Vec<String> = vec!["--output-mode=json".to_owned()];
         all.extend(self.server.as_ref().map(|folder| format!("--server-dir={}", folder.display())));
@@ -238,14 +241,14 @@ impl HyperQueue {
             .map_err(|stop| stop.help("is the server running? `hq server info` tells"))
     }
 
-    /// The words after `hq`.
+    /// Returns the arguments of `hq submit`.
     fn words(&self, plan: &Plan<'_>, script: &Path) -> Vec<String> {
         let mut words = vec!["submit".to_owned()];
         let mut add = |option: &str, value: String| words.push(format!("--{option}={value}"));
         add("name", plan.name.to_owned());
         add("array", format!("0-{}", plan.tasks.saturating_sub(1)));
         add("cwd", plan.study.display().to_string());
-        // The script keeps what is printed.
+        // The script itself redirects its output.
         add("stdout", "none".to_owned());
         add("stderr", "none".to_owned());
         if let Some(cpus) = self.cpus {

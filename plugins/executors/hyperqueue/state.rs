@@ -1,4 +1,4 @@
-//! What `hq` answers in JSON.
+//! JSON answers of `hq`.
 
 use lacuna::run::Stop;
 use serde_json::Value;
@@ -12,12 +12,12 @@ fn json(text: &str) -> Result<Value, Stop> {
     })
 }
 
-/// The number of a job from `{"id": 1}`.
+/// Returns the number of a job from `{"id": 1}`.
 pub fn submitted(text: &str) -> Option<String> {
     json(text).ok()?["id"].as_u64().map(|id| id.to_string())
 }
 
-/// The number of the job of this name in the list of all jobs.
+/// Returns the number of the job of this name in the list of all jobs.
 pub fn find(text: &str, name: &str) -> Result<Option<String>, Stop> {
     let jobs = json(text)?;
     let mut jobs = jobs.as_array().into_iter().flatten();
@@ -25,10 +25,10 @@ pub fn find(text: &str, name: &str) -> Result<Option<String>, Stop> {
     Ok(ours.and_then(|job| job["id"].as_u64()).map(|id| id.to_string()))
 }
 
-/// The tasks of a submission from the information on its job.
+/// Reads the states of a submission's tasks from the information on its job.
 pub fn read(text: &str, submission: &Submission, states: &mut States) -> Result<(), Stop> {
     let jobs = json(text)?;
-    // A server that was started anew counts from one again: another job may have our number.
+    // A restarted server may count from one again: another job may have this number.
     let mut jobs = jobs.as_array().into_iter().flatten();
     let Some(job) = jobs.find(|job| job["info"]["name"] == submission.name.as_str()) else {
         return Ok(());
@@ -38,7 +38,7 @@ pub fn read(text: &str, submission: &Submission, states: &mut States) -> Result<
             states.insert((submission.number, number as usize), state(task));
         }
     }
-    // Versions that list only the tasks that have begun leave out those that wait.
+    // Some versions list only the tasks that have begun and omit those that wait.
     for task in 0..submission.tasks.len() {
         let waits = || TaskState::Waiting("waiting".to_owned());
         states.entry((submission.number, task)).or_insert_with(waits);
@@ -53,7 +53,7 @@ fn state(task: &Value) -> TaskState {
         "finished" => TaskState::Ended,
         "running" => TaskState::Running(place(task)),
         "failed" => TaskState::Failed(cause(error), error.to_owned()),
-        // A job that was stopped because too many of its tasks failed aborts the others.
+        // A job that was stopped because too many of its tasks failed aborts its other tasks.
         "canceled" | "aborted" => TaskState::Failed(Cause::Cancelled, word.to_owned()),
         _ => TaskState::Waiting(word.to_owned()),
     }

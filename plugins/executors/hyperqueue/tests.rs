@@ -1,5 +1,6 @@
 #![allow(clippy::unwrap_used)]
-//! Answers as HyperQueue gave them (0.26, built from its source); `tests/hyperqueue` of the workspace asks a server.
+//! Answers recorded from HyperQueue (0.26, built from source); `tests/hyperqueue` of the workspace uses a real
+//! server.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -55,7 +56,7 @@ fn information_on_a_job_is_understood() {
     assert_eq!(states[&(1, 0)], TaskState::Ended);
     assert_eq!(states[&(1, 4)], TaskState::Running("worker 2".to_owned()));
     assert_eq!(states[&(1, 6)], TaskState::Waiting("waiting".to_owned()));
-    // The number of a job of another server is not ours.
+    // The same job number on another server is not ours.
     states.clear();
     state::read(INFO, &submission("lacuna-1-cd"), &mut states).unwrap();
     assert!(states.is_empty());

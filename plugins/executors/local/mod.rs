@@ -1,4 +1,4 @@
-//! `local`: this machine.
+//! `local`: runs on this machine.
 
 mod processes;
 mod threads;
@@ -9,34 +9,35 @@ use std::path::PathBuf;
 use lacuna::plugin::executor::{Batch, Finished};
 use lacuna::plugin::{Component, Context, Executor};
 use lacuna::run::Stop;
-use lacuna::study::problem::Complaints;
-use lacuna::work::Limits;
+use lacuna::text::problem::Complaints;
+use lacuna_run::work::Limits;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::amount::Memory;
 use super::program;
 
-/// Runs the model on this machine, one run a thread or one run a process.
+/// Runs the model on this machine, one run per thread or one run per process.
 ///
-/// Each run's result file is written as the run finishes, so a killed study loses at most the
-/// runs under way. The number of threads or processes changes the time and nothing else.
+/// The result file of each run is written as the run finishes, so that a killed study loses at most the runs in
+/// progress. The number of threads or processes changes only the time, not the results.
 ///
-/// With `processes` every run is made in a process of its own kind (`lacuna work ORDER`): one that crashes or takes more
-/// memory than it may costs its own run and no other, and processes can be pinned to processors.
+/// With `processes` the runs are made in separate processes (`lacuna work ORDER`): one that crashes or exceeds its
+/// memory costs only its own run, and processes can be pinned to processors.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Local {
-    /// Number of runs at a time; when left out, that of the command line's `--threads`, or all cores.
+    /// Number of runs at a time. Default: that of the command line's `--threads`, or all cores.
     pub threads: Option<NonZeroUsize>,
-    /// Number of processes, each of which makes one run at a time, in place of threads.
+    /// Number of processes that make one run each at a time, in place of threads.
     pub processes: Option<NonZeroUsize>,
-    /// Whether each process keeps to its own share of the processors (on Linux).
+    /// If true, each process is restricted to its own share of the processors (Linux only).
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub pin: bool,
-    /// The memory that each process may allocate, such as `2 GB`, what it starts counted alone (on Linux).
+    /// Maximum memory that each process may allocate, such as `2 GB`; processes that it starts have this limit each
+    /// (Linux only). A run that exceeds it fails.
     pub memory: Option<Memory>,
-    /// The program that makes the runs of `processes`; the running one when left out.
+    /// Program that makes the runs of `processes`. Default: the running program.
     pub program: Option<PathBuf>,
 }
 
@@ -60,9 +61,7 @@ impl Component for Local {
         for (key, _) in of_processes.iter().filter(|(_, given)| *given) {
             complaints
                 .at(key)
-                .say(format!(
-                    "`{key}` says something of processes, and the runs are made by threads"
-                ))
+                .say(format!("`{key}` applies to processes, but the runs are made by threads"))
                 .help("add `processes = N`");
         }
     }
@@ -74,7 +73,7 @@ impl Component for Local {
         program::check(program::program(self.program.as_deref(), context.directory), complaints);
         for (key, given) in [("pin", self.pin), ("memory", self.memory.is_some())] {
             if given && !Limits::are_known() {
-                complaints.at(key).say(format!("`{key}` is not known on this system"));
+                complaints.at(key).say(format!("`{key}` is not supported on this system"));
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Processes of this machine: one run at a time each, handed out as they get free.
+//! Processes of this machine, each of which makes one run at a time.
 
 use std::collections::VecDeque;
 use std::fs::File;
@@ -9,13 +9,13 @@ use std::sync::{Mutex, PoisonError, mpsc};
 
 use lacuna::plugin::executor::{Batch, Finished, Job};
 use lacuna::run::{Stop, files};
-use lacuna::work::{Begun, Marker, Order, Outcome, folder};
+use lacuna_run::work::{Begun, Marker, Order, Outcome, folder};
 
 use super::Local;
 use crate::executors::program::program;
 use crate::models::process::{Process, tail_of_file};
 
-/// Runs the jobs of a batch in some processes.
+/// Runs the jobs of a batch in several processes and reports each as it ends.
 pub fn submit(
     options: &Local,
     processes: usize,
@@ -28,7 +28,7 @@ pub fn submit(
     let order_folder = folder(batch.directory).join("local");
     let order = Order::new(batch, batch.jobs.to_vec(), Vec::new());
     order.write(&order_folder)?;
-    // An earlier attempt may have ended because no run could have a result; that may have been mended since.
+    // An earlier attempt may have ended because no run could have a result; the cause may have been corrected since.
     batch.jobs.iter().try_for_each(|job| Marker::clear_hopeless(batch.directory, &job.name))?;
     let processes = processes.min(batch.jobs.len());
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
@@ -55,18 +55,18 @@ pub fn submit(
         drop(sender);
         let result = receiver.iter().try_for_each(|ended| finished(ended?));
         office.close();
-        // What is still under way is of no use to anybody, but a run that ends now leaves its marker.
+        // Runs in progress are no longer needed, but one that ends now still leaves its marker.
         result
     })
 }
 
-/// The jobs as they are handed out: as many in one go as is best for the model.
+/// Returns the jobs in groups of the model's preferred batch size.
 fn packed(batch: &Batch<'_>) -> VecDeque<Vec<usize>> {
     let all: Vec<usize> = (0..batch.jobs.len()).collect();
     all.chunks(batch.model.batch().max(1)).map(<[usize]>::to_vec).collect()
 }
 
-/// Hands out runs.
+/// Distribution of the runs to the processes.
 struct Office<'a> {
     program: PathBuf,
     order: PathBuf,
@@ -81,7 +81,7 @@ struct Office<'a> {
 type Sender = mpsc::Sender<Result<Finished, Stop>>;
 
 impl Office<'_> {
-    /// Lets one process after the other make runs, until there are none; a process that dies is replaced.
+    /// Makes runs in one process after the other until none are left; a process that dies is replaced.
     fn serve(&self, part: usize, sender: &Sender) -> Result<(), Stop> {
         let mut worker = None;
         while let Some(jobs) = self.take() {
@@ -91,7 +91,7 @@ impl Office<'_> {
             };
             if mine.ask(jobs.iter().map(|&i| &self.batch.jobs[i])) {
                 worker = Some(mine);
-                self.hand_over(&jobs, "its process left no word of it", sender)?;
+                self.hand_over(&jobs, "its process did not report it", sender)?;
             } else {
                 self.bury(mine, &jobs, sender)?;
             }
@@ -107,7 +107,7 @@ impl Office<'_> {
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner).clear();
     }
 
-    /// A process has ended before it had made its runs.
+    /// Handles a process that ended before it had made its runs.
     fn bury(&self, worker: Worker, jobs: &[usize], sender: &Sender) -> Result<(), Stop> {
         let (number, log) = (worker.process_number, worker.log.clone());
         let status = worker.end().map_err(|error| self.cannot_start(&error))?;
@@ -118,7 +118,7 @@ impl Office<'_> {
         };
         let marked = |i: &usize| self.marker(*i).is_some();
         if !jobs.iter().any(|i| begun(i) || marked(i)) {
-            // It died of something else than a run, and so would the next.
+            // The process died for a reason other than a run, and so would the next one.
             return Err(Stop::new(format!(
                 "`{} work` {}: {said}",
                 self.program.display(),
@@ -127,7 +127,7 @@ impl Office<'_> {
         }
         let lost: Vec<usize> = jobs.iter().copied().filter(|i| !marked(i)).collect();
         if jobs.len() > 1 && lost.len() > 1 {
-            // Whose fault it was shows when each is made alone.
+            // Made one by one, the runs show which of them is at fault.
             let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
             lost.iter().rev().for_each(|&i| waiting.push_front(vec![i]));
             drop(waiting);
@@ -141,7 +141,7 @@ impl Office<'_> {
         Marker::read(self.batch.directory, &self.batch.jobs[i].name, &self.asked[i])
     }
 
-    /// Hands over what the markers of some runs say, and of those that have none this reason.
+    /// Reports the outcomes in the markers of some runs; runs without a marker fail with the reason `lost`.
     fn hand_over(&self, jobs: &[usize], lost: &str, sender: &Sender) -> Result<(), Stop> {
         for &index in jobs {
             let (outcome, seconds) = match self.marker(index) {
@@ -176,7 +176,7 @@ impl Office<'_> {
         if let Some(memory) = &self.options.memory {
             command.args(["--memory", &memory.bytes().to_string()]);
         }
-        // What a run does in several threads shares the machine with the other processes.
+        // Threads within a run share the machine with the other processes.
         command.env("RAYON_NUM_THREADS", self.threads.to_string());
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(file);
         let started = Worker::start(&mut command, log);
@@ -189,7 +189,7 @@ impl Office<'_> {
     }
 }
 
-/// A process that makes runs as they are named.
+/// A process that makes the runs it is asked for.
 struct Worker {
     process: Process,
     process_number: u32,
@@ -210,7 +210,7 @@ impl Worker {
         Ok(Self { process, process_number, questions, answers: BufReader::new(answers), log })
     }
 
-    /// Has some runs made; `false` when the process has ended.
+    /// Has some runs made; returns false if the process has ended.
     fn ask<'a>(&mut self, jobs: impl Iterator<Item = &'a Job>) -> bool {
         let names: Vec<&str> = jobs.map(|job| job.name.as_str()).collect();
         let (question, answer) = (names.join(" ") + "\n", format!("done {}", names.join(" ")));
@@ -218,7 +218,7 @@ impl Worker {
             return false;
         }
         let mut line = String::new();
-        // Lines between are what a model printed.
+        // Other lines are output of the model.
         while self.answers.read_line(&mut line).is_ok_and(|bytes| bytes > 0) {
             if line.trim_end() == answer {
                 return true;
@@ -229,7 +229,7 @@ impl Worker {
     }
 
     fn end(mut self) -> io::Result<ExitStatus> {
-        // It closed its pipe, so that it has ended or is about to.
+        // The process has closed its pipe, so that it has ended or is about to.
         let status = self.process.wait(Some(std::time::Duration::from_secs(5)))?;
         status.map_or_else(|| self.process.end(), Ok)
     }
@@ -243,7 +243,7 @@ fn how_it_ended(status: ExitStatus) -> String {
     status.code().map_or("ended".to_owned(), |code| format!("ended with exit code {code}"))
 }
 
-/// Why a run has no result, as far as that is known.
+/// Returns the reason for which a run has no result, as far as it is known.
 fn reason(status: ExitStatus, said: &str, options: &Local) -> String {
     let how = how_it_ended(status);
     let lines = if said.is_empty() { String::new() } else { format!(": {said}") };

@@ -7,9 +7,9 @@ use std::sync::mpsc;
 use lacuna::plugin::executor::{Batch, Finished};
 use lacuna::plugin::model::EvalError;
 use lacuna::run::Stop;
-use lacuna::work::{Ended, evaluate};
+use lacuna_run::work::{Ended, evaluate};
 
-/// Runs the jobs of a batch, as many at a time as there are threads.
+/// Runs the jobs of a batch, as many at a time as there are threads, and reports each as it ends.
 pub fn submit(
     threads: Option<NonZeroUsize>,
     batch: &Batch<'_>,

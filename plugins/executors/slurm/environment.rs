@@ -1,8 +1,9 @@
-//! What `sbatch` must not take from the environment.
+//! Variables that `sbatch` must not inherit from the environment.
 
 use super::Slurm;
 
-/// Variables that `sbatch` would obey before what the script says; `inside` when this process itself is in a job.
+/// Returns true for variables that would override the script in `sbatch`; `inside` if this process itself runs in a
+/// job.
 pub fn is_hidden(name: &str, options: &Slurm, inside: bool) -> bool {
     let said = match name {
         "SBATCH_ARRAY_INX" | "SBATCH_JOB_NAME" | "SBATCH_OUTPUT" | "SBATCH_REQUEUE"
@@ -17,7 +18,7 @@ pub fn is_hidden(name: &str, options: &Slurm, inside: bool) -> bool {
         }
         _ => false,
     };
-    // The sizes of the job in which this process runs are not those of the jobs that it submits.
+    // The sizes of the job in which this process runs do not apply to the jobs that it submits.
     let of_this_job =
         name.starts_with("SLURM_") && !["SLURM_CONF", "SLURM_CLUSTERS"].contains(&name);
     said || inside && of_this_job

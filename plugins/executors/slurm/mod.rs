@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use lacuna::plugin::executor::{Batch, Finished, Seen};
 use lacuna::plugin::{Component, Context, Executor};
 use lacuna::run::Stop;
-use lacuna::study::problem::Complaints;
-use lacuna::study::values::{Count, Positive};
+use lacuna::text::problem::Complaints;
+use lacuna::text::values::{Count, Positive};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -18,8 +18,7 @@ use super::amount::{Memory, Span, as_clock};
 use super::cluster::scheduler::Rules;
 use super::cluster::script::{quoted, word};
 use super::cluster::{self, Frame, Growth, Plan, Retry, Scheduler, States, Submission, Worker};
-use super::command;
-use super::program;
+use super::{command, program};
 use crate::models::process;
 
 /// Runs the model on a cluster with Slurm, as job arrays.
@@ -36,63 +35,64 @@ use crate::models::process;
 /// at_most = 40
 /// ```
 ///
-/// `lacuna run STUDY` submits all runs as arrays (as many as the largest array of the cluster asks for), waits, and reads the
-/// results as they come. Stop it whenever you like: the jobs go on, and `lacuna resume RUN` finds them again, days later if
-/// need be; nothing is submitted twice. The job scripts are in the run directory, `2-simulate/campaign/NUMBER/job.sh`.
+/// `lacuna run STUDY` submits all runs as arrays (as many as the maximum array size of the cluster requires), waits,
+/// and reads the results as they arrive. It may be stopped at any time: the jobs continue, and `lacuna resume RUN`
+/// finds them again, even days later; nothing is submitted twice. The job scripts are in the run directory,
+/// `2-simulate/campaign/NUMBER/job.sh`.
 ///
-/// A job makes `pack` runs, one after the other or `parallel` at a time, by the same program that submitted it. Every
-/// run leaves a marker with its outcome: what counts is the marker; the scheduler is asked only why there is none. A wait in
-/// the queue is never a time-out. A job that ended without a marker is submitted again as `retry` says for the cause;
-/// runs of a pack that were not begun are always submitted again.
+/// A job makes `pack` runs, one after the other or `parallel` at a time, with the same program that submitted it.
+/// Every run leaves a marker with its outcome. The marker decides; the scheduler is only asked why there is none.
+/// Time in the queue never counts as a time-out. The run of a job that ended without a marker is submitted again as
+/// `retry` says for the cause; runs of a pack that had not begun are always submitted again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Slurm {
-    /// The partition (`--partition`).
+    /// Partition (`--partition`).
     pub partition: Option<String>,
-    /// The account that is charged (`--account`).
+    /// Account to be charged (`--account`).
     pub account: Option<String>,
-    /// The quality of service (`--qos`).
+    /// Quality of service (`--qos`).
     pub qos: Option<String>,
     /// Features that the nodes must have (`--constraint`).
     pub constraint: Option<String>,
-    /// The time limit of a job (`--time`), such as `26 h` or `1-02:00:00`: that of a whole pack.
+    /// Time limit of a job (`--time`), such as `26 h` or `1-02:00:00`; it applies to the whole pack.
     pub time: Option<Span>,
-    /// Nodes of a job (`--nodes`).
+    /// Number of nodes of a job (`--nodes`).
     pub nodes: Option<Count>,
-    /// Processes of a job (`--ntasks`), for a model that starts its own with `srun` or `mpirun`.
+    /// Number of processes of a job (`--ntasks`), for a model that starts its own with `srun` or `mpirun`.
     pub tasks: Option<Count>,
-    /// Cores of each process (`--cpus-per-task`).
+    /// Number of cores of each process (`--cpus-per-task`).
     pub cpus: Option<Count>,
     /// Memory of a job on each node (`--mem`), such as `180 GB`.
     pub memory: Option<Memory>,
-    /// Further options of `sbatch`, one line each, such as `--exclusive`.
+    /// Further options of `sbatch`, one per element, such as `--exclusive`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub extra: Vec<String>,
     /// Environment modules that each job loads.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub modules: Vec<String>,
-    /// Lines of shell that each job runs before its first run, after the modules. Each is a whole command; one that fails ends
-    /// the job, and with `|| true` behind it may fail.
+    /// Shell lines that each job executes before its first run, after the modules. Each must be a complete command; a
+    /// failing line ends the job, unless `|| true` is appended.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub setup: Vec<String>,
-    /// Runs of a job.
+    /// Number of runs per job. Packing amortises queueing and start-up over short runs.
     pub pack: Count,
-    /// How many runs of a job are made at a time.
+    /// Number of runs of a job made at a time.
     pub parallel: Count,
-    /// The greatest number of jobs of one array that run at a time; no limit when left out.
+    /// Maximum number of jobs of one array that run at a time. Default: no limit.
     pub at_most: Option<Count>,
-    /// The greatest number of jobs of one array, for whoever may have only so many at a time; that of the cluster when left
-    /// out. What is more becomes further arrays, which are submitted as soon as the cluster takes them.
+    /// Maximum number of jobs of one array, for users whose number of jobs is limited. Default: that of the cluster.
+    /// The remaining runs form further arrays, which are submitted as soon as the cluster accepts them.
     pub array: Option<Count>,
-    /// How often a run is submitted again, by cause.
+    /// Number of resubmissions of a run, by cause.
     pub retry: Retry,
-    /// What it then gets more of.
+    /// Increase of the limits at resubmission.
     pub grow: Growth,
-    /// The longest pause between two questions to the scheduler, in seconds. The first pauses are shorter.
+    /// Longest interval between two queries to the scheduler, in seconds; the first intervals are shorter.
     pub poll: Positive,
-    /// How long files and accounting may lag behind the end of a job, in seconds.
+    /// Time by which files and accounting may lag behind the end of a job, in seconds.
     pub patience: Positive,
-    /// `lacuna` as the nodes find it: a path from the root is theirs alone; the running program when left out.
+    /// Path of `lacuna` on the nodes; an absolute path need not exist on this machine. Default: the running program.
     pub program: Option<PathBuf>,
 }
 
@@ -134,10 +134,10 @@ impl Component for Slurm {
         }
         self.check_extra(complaints);
         if self.grow.time.get() != 1.0 && self.time.is_none() {
-            complaints.at("grow.time").say("there is no `time` that could grow");
+            complaints.at("grow.time").say("`grow.time` has no effect without `time`");
         }
         if self.grow.memory.get() != 1.0 && self.memory.is_none() {
-            complaints.at("grow.memory").say("there is no `memory` that could grow");
+            complaints.at("grow.memory").say("`grow.memory` has no effect without `memory`");
         }
     }
 
@@ -231,7 +231,7 @@ impl Scheduler for Slurm {
         if let Some(job) = queue.split_whitespace().next() {
             return Ok(Some(job.to_owned()));
         }
-        // Without accounting there is nobody else to ask.
+        // Without accounting there is no other source.
         let of_accounts = command::said(
             "sacct",
             &["-X", "-n", "-P", "--name", name, "-S", "now-100days", "-o", "JobID"],
@@ -248,13 +248,13 @@ impl Scheduler for Slurm {
     }
 
     fn cancel(&self, jobs: &[&str]) -> Result<(), Stop> {
-        // Quietly: a job that has ended meanwhile is none to complain of.
+        // `--quiet`, because a job may have ended in the meantime.
         let words: Vec<&str> = std::iter::once("--quiet").chain(jobs.iter().copied()).collect();
         command::said("scancel", &words).map(drop)
     }
 }
 
-/// Options of `sbatch` by which jobs would not be found again, with their short forms.
+/// Options of `sbatch` that would prevent jobs from being found again, with their short forms.
 const OWN: [(&str, &str); 9] = [
     ("--array", "-a"),
     ("--job-name", "-J"),
@@ -267,7 +267,7 @@ const OWN: [(&str, &str); 9] = [
     ("--test-only", ""),
 ];
 
-/// The option among [`OWN`] that a line of `extra` has.
+/// Returns the option among [`OWN`] that a line of `extra` sets.
 fn own_option(line: &str) -> Option<&'static str> {
     let is = |(long, short): &&(&str, &str)| {
         line.split(['=', ' ']).next() == Some(long)
@@ -281,21 +281,21 @@ impl Slurm {
         if let Some(line) = self.extra.iter().find(|line| !line.starts_with('-')) {
             complaints
                 .at("extra")
-                .say("this is no option of `sbatch`")
+                .say("this is not an option of `sbatch`")
                 .expected("an option such as `--exclusive`")
                 .found(format!("`{line}`"));
         }
         if let Some(option) = self.extra.iter().find_map(|line| own_option(line)) {
             complaints
                 .at("extra")
-                .say(format!("with `{option}` the jobs of a study would not be found again"))
+                .say(format!("with `{option}` Lacuna could not find the jobs of a study again"))
                 .help(
-                    "leave it out; another cluster is named by the variable `SLURM_CLUSTERS`, which all commands of Slurm obey",
+                    "leave it out; to use another cluster, set the environment variable `SLURM_CLUSTERS`, which all commands of Slurm read",
                 );
         }
     }
 
-    /// The lines that `sbatch` reads.
+    /// Returns the directives that `sbatch` reads.
     fn directives(&self, plan: &Plan<'_>) -> Vec<String> {
         let throttle = self.at_most.map_or(String::new(), |most| format!("%{most}"));
         let log = plan.folder.join("task").display().to_string().replace('%', "%%");
@@ -304,7 +304,7 @@ impl Slurm {
             format!("--array=0-{}{throttle}", plan.tasks.saturating_sub(1)),
             format!("--output={}", word(&format!("{log}%a.txt"))),
             format!("--chdir={}", quoted(plan.study)),
-            // What is submitted again is decided by the study.
+            // Resubmission is decided by the study.
             "--no-requeue".to_owned(),
         ];
         let mut add = |option: &str, value: Option<String>| {

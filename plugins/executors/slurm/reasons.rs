@@ -1,6 +1,6 @@
-//! Why Slurm lets a job wait.
+//! Reasons for which Slurm lets a job wait.
 
-/// Reasons that go by themselves: the queue moves on.
+/// Reasons that disappear by themselves as the queue advances.
 const PASSING: [&str; 16] = [
     "",
     "None",
@@ -20,7 +20,7 @@ const PASSING: [&str; 16] = [
     "BurstBufferStageIn",
 ];
 
-/// What others mean for whoever waits, by how they begin.
+/// Explanations of other reasons, by their beginnings.
 const MEANING: [(&str, &str); 17] = [
     ("BadConstraints", "no node has what the job asks for"),
     ("PartitionTimeLimit", "`time` is more than the partition allows"),
@@ -32,7 +32,7 @@ const MEANING: [(&str, &str); 17] = [
     ("Nodes required", "nodes that it needs are down or reserved"),
     ("JobHeldUser", "it is held: `scontrol release` lets it go"),
     ("JobHeldAdmin", "an administrator holds it"),
-    ("DependencyNeverSatisfied", "what it depends on did not end well"),
+    ("DependencyNeverSatisfied", "a job that it depends on has failed"),
     ("launch failed", "it could not be started on its node, and is held"),
     ("InvalidAccount", "the account may not be used"),
     ("InvalidQOS", "the quality of service may not be used"),
@@ -41,12 +41,12 @@ const MEANING: [(&str, &str); 17] = [
     ("QOS", "a limit of the quality of service is reached"),
 ];
 
-/// Whether a job with this reason only waits for its turn.
+/// Returns true if a job with this reason only waits for its turn.
 pub fn is_passing(reason: &str) -> bool {
     PASSING.contains(&reason)
 }
 
-/// The reason, and what it means where that is known.
+/// Returns the reason, with its explanation if known.
 pub fn explained(reason: &str) -> String {
     let known = MEANING.iter().find(|(begin, _)| reason.starts_with(begin));
     known.map_or_else(|| reason.to_owned(), |(_, meaning)| format!("{reason}: {meaning}"))

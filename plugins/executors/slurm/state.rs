@@ -1,4 +1,4 @@
-//! What Slurm says of tasks, in texts of our own format: its JSON changes from version to version.
+//! States of tasks from Slurm's output in formats defined here: its JSON output changes between versions.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,8 +8,8 @@ use super::reasons;
 use crate::executors::cluster::{Cause, States, Submission, TaskState};
 use crate::executors::command::said;
 
-/// The number in what `sbatch --parsable` prints: the last line, `12` or `12;cluster`. Plugins and wrappers of a site may print
-/// before it.
+/// Returns the job number from the output of `sbatch --parsable`: the last line, `12` or `12;cluster`. Plugins and
+/// wrappers of a site may print other lines before it.
 pub fn submitted(text: &str) -> Option<String> {
     let last = text.lines().map(str::trim).rfind(|line| !line.is_empty())?;
     let number = last.split(';').next()?;
@@ -17,10 +17,10 @@ pub fn submitted(text: &str) -> Option<String> {
     is_number.then(|| number.to_owned())
 }
 
-/// The state of the tasks of some submissions.
+/// Queries the states of the tasks of some submissions.
 pub fn states(submissions: &[&Submission]) -> Result<States, Stop> {
     let names: Vec<&str> = submissions.iter().map(|s| s.name.as_str()).collect();
-    // By name: asking for the number of a job that is forgotten is an error.
+    // By name, because asking for a job number that Slurm has forgotten is an error.
     let queue = said(
         "squeue",
         &["-h", "-r", "-t", "all", "--name", &names.join(","), "-o", "%j|%i|%T|%N|%r"],
@@ -32,7 +32,7 @@ pub fn states(submissions: &[&Submission]) -> Result<States, Stop> {
     let missing: Vec<&Submission> = submissions.iter().copied().filter(is_missing).collect();
     if !missing.is_empty() {
         let jobs: Vec<&str> = missing.iter().filter_map(|s| s.job.as_deref()).collect();
-        // Without accounting this fails, and the exit codes on disk have to do.
+        // Without accounting this fails, and the exit codes on disk must suffice.
         let accounts = said(
             "sacct",
             &["-X", "-n", "-P", "-j", &jobs.join(","), "-o", "JobID,JobName,State,ExitCode"],
@@ -47,7 +47,7 @@ pub fn states(submissions: &[&Submission]) -> Result<States, Stop> {
     Ok(states)
 }
 
-/// Lines `name|job_task|STATE|node|reason`.
+/// Parses lines `name|job_task|STATE|node|reason`.
 pub fn of_queue(text: &str, submissions: &[&Submission]) -> States {
     let mut states = States::new();
     for line in text.lines() {
@@ -60,13 +60,13 @@ pub fn of_queue(text: &str, submissions: &[&Submission]) -> States {
     states
 }
 
-/// Lines `job_task|name|STATE and more|code:signal`; what has not ended is left to the queue.
+/// Parses lines `job_task|name|STATE and more|code:signal`; tasks that have not ended are left to the queue.
 pub fn of_accounts(text: &str, submissions: &[&Submission]) -> States {
     let mut states = States::new();
     for line in text.lines() {
         let cells: Vec<&str> = line.splitn(4, '|').collect();
         let [id, name, state, code] = cells[..] else { continue };
-        // Numbers of jobs come round again; names do not.
+        // Job numbers are reused; names are unique.
         let Some(submission) = submissions.iter().find(|s| s.name == name) else { continue };
         let Some(task) = task_of(id) else { continue };
         let state = state_of(state, "", code);
@@ -77,13 +77,13 @@ pub fn of_accounts(text: &str, submissions: &[&Submission]) -> States {
     states
 }
 
-/// `12_4` is task 4; `12_[5-9%2]` stands for tasks that wait.
+/// Returns the index of a task: `12_4` is task 4; `12_[5-9%2]` stands for several waiting tasks.
 fn task_of(id: &str) -> Option<usize> {
     id.split_once('_')?.1.parse().ok()
 }
 
 fn state_of(state: &str, node: &str, reason: &str) -> TaskState {
-    // `CANCELLED by 0`
+    // Such as `CANCELLED by 0`.
     let word = state.split_whitespace().next().unwrap_or_default().trim_end_matches('+');
     let words = || {
         let reason = if reason == "None" { "" } else { reason };
@@ -106,12 +106,12 @@ fn state_of(state: &str, node: &str, reason: &str) -> TaskState {
         "REVOKED" => {
             TaskState::Held("REVOKED: another cluster of the federation has it".to_owned())
         }
-        // States that later versions know: it has not ended.
+        // States of later versions: the task has not ended.
         _ => TaskState::Waiting(words()),
     }
 }
 
-/// Adds the exit code or the signal to tasks that failed, as far as the scheduler still knows it.
+/// Adds the exit code or the signal to tasks that failed, if the scheduler still knows it.
 fn explain(states: &mut States, submissions: &[&Submission]) {
     for submission in submissions {
         let Some(job) = &submission.job else { continue };
@@ -123,7 +123,7 @@ fn explain(states: &mut States, submissions: &[&Submission]) {
         if !open.iter().any(failed) {
             continue;
         }
-        // One question for the whole array.
+        // One query for the whole array.
         let Ok(text) = said("scontrol", &["-o", "show", "job", job]) else { continue };
         for (task, code) in exit_codes(&text) {
             if let Some(TaskState::Failed(Cause::Failure, words)) = states.get_mut(&(number, task))
@@ -134,7 +134,7 @@ fn explain(states: &mut States, submissions: &[&Submission]) {
     }
 }
 
-/// How the tasks of an array ended, from one line for each.
+/// Returns the exit codes of the tasks of an array, from one line for each.
 pub fn exit_codes(text: &str) -> BTreeMap<usize, String> {
     let task = |line: &str| {
         let mut words = line.split_whitespace();
@@ -143,7 +143,7 @@ pub fn exit_codes(text: &str) -> BTreeMap<usize, String> {
     text.lines().filter_map(|line| Some((task(line)?, exit_code(line)?))).collect()
 }
 
-/// `ExitCode=7:0` is an exit code, `ExitCode=0:9` a signal.
+/// Parses `ExitCode=7:0` as an exit code and `ExitCode=0:9` as a signal.
 fn exit_code(text: &str) -> Option<String> {
     let value = text.split_whitespace().find_map(|word| word.strip_prefix("ExitCode="))?;
     let (code, signal) = value.split_once(':')?;
@@ -154,7 +154,7 @@ fn exit_code(text: &str) -> Option<String> {
     }
 }
 
-/// The number of tasks that an array may have.
+/// Returns the maximum array size from Slurm's configuration.
 pub fn max_array_size(config: &str) -> Option<usize> {
     let line = config.lines().find(|line| line.trim_start().starts_with("MaxArraySize"))?;
     line.split_once('=')?.1.trim().parse().ok()

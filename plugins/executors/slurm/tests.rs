@@ -1,5 +1,5 @@
 #![allow(clippy::unwrap_used)]
-//! Answers as Slurm 22.05 gave them; a real one is asked in the tests of the whole.
+//! Answers recorded from Slurm 22.05; a real one is used in the tests of the workspace.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -145,7 +145,7 @@ fn states_that_are_seldom_seen_are_understood() {
     for word in ["COMPLETING", "SUSPENDED", "CONFIGURING"] {
         assert_eq!(state(word, "None"), TaskState::Running("n1".to_owned()));
     }
-    // A requeued job will run again, and one that was revoked runs in another cluster.
+    // A requeued job will run again, and a revoked one runs in another cluster.
     for (word, reason) in [("REQUEUED", "BeginTime"), ("PENDING", "Priority")] {
         assert!(matches!(state(word, reason), TaskState::Waiting(_)), "{word}");
     }
@@ -158,7 +158,7 @@ fn states_that_are_seldom_seen_are_understood() {
         "PENDING PartitionTimeLimit: `time` is more than the partition allows".to_owned(),
     );
     assert_eq!(state("PENDING", "PartitionTimeLimit"), held);
-    // The number of a task in all the ways in which it is written.
+    // The index of a task in all the ways in which it is written.
     let text = "lacuna-1-ab|2_[3-5%2]|PENDING||None\nlacuna-1-ab|2|PENDING||None\n";
     assert_eq!(of_queue(text, &[&ours]), BTreeMap::new());
 }

@@ -1,4 +1,4 @@
-//! `composed`: models in a chain, the output of one being an input of those after it.
+//! `composed`: models in a chain, in which the output of one is an input of those after it.
 
 mod part;
 
@@ -7,47 +7,49 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use lacuna::data::{Condition, Coordinates, Function, Layout, Scenario, Unit};
-use lacuna::plugin::abi::Library;
 use lacuna::plugin::model::{Call, EvalError, Input, Response, Signature};
-use lacuna::plugin::{Component, Context, Fact, Fault, Given, Model};
-use lacuna::study::problem::Complaints;
+use lacuna::plugin::{Component, Context, Fact, Given, Library, Model};
+use lacuna::run::Fault;
+use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{given, nested};
 use part::{Part, pass_on};
 
-/// Models in a chain: what one gives is an input of those after it, as from load to response to sensor. A part is
-/// swapped by changing its `use`.
+/// Models in a chain, in which the output of each is an input of those after it, as from load to response to sensor.
+/// A part is exchanged by changing its `use`.
 ///
-/// Each entry of `parts` is a model of any kind with its options, a `name`, and, for all but the last, what it `gives`:
-/// `name`, `unit` and `axes` as in `[response]`. The parts after it see that output
+/// Each entry of `parts` is a model of any kind with its options, a `name`, and, for all but the last, its output
+/// `gives`: `name`, `unit` and `axes` as in `[response]`. The parts after it receive that output
 ///
-/// - as an input of the output's name, where it has no axes; of each label's name, where it has an axis of labels;
-/// - as a function of the output's name, where it has one axis of numbers (in `equations` it is called as `force(t)`; a
-///   command finds it in its JSON); of each label's name, where it has an axis of labels before that.
+/// - as an input with the output's name, if it has no axes; with the name of each label, if it has one axis of
+///   labels;
+/// - as a function with the output's name, if it has one numeric axis (in `equations` it is called as `force(t)`; a
+///   command finds it in its JSON); with the name of each label, if an axis of labels precedes the numeric one.
 ///
-/// An input of a part that no part before it gives is an input of the chain. A model that takes whatever there is (a
-/// command, a Python function, a server) says by `takes` what it is to see. The last part gives the response.
-/// Derivatives are taken by differences.
+/// An input of a part that no earlier part gives is an input of the chain. For a model that accepts any inputs (a
+/// command, a Python function, a server) `takes` lists those it receives. The last part gives the response.
+/// Derivatives are computed by finite differences.
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Composed {
-    /// The parts, in the order in which they are computed.
+    /// Parts, in the order in which they are computed.
     pub parts: Vec<Part>,
 }
 
-/// One thing that a part hands on.
+/// One quantity that a part passes on.
 struct Handed {
     name: String,
     unit: Unit,
-    /// The axis of numbers, where it is a function.
+    /// Numeric axis and its unit, if the quantity is a function.
     grid: Option<(Vec<f64>, Unit)>,
-    /// Where its values begin in the response of the part, and how many there are.
+    /// Index of its first value in the response of the part.
     begin: usize,
 }
 
-/// What an output of this shape is to the parts after it.
+/// Converts an output of this shape to the quantities that the parts after it receive; fails if the shape is not
+/// supported.
 fn handed(layout: &Layout) -> Result<Vec<Handed>, String> {
     let labels = |i: usize| match layout.axes.get(i).map(|axis| &axis.coordinates) {
         Some(Coordinates::Labels(labels)) => Some(labels.clone()),
@@ -80,7 +82,7 @@ fn handed(layout: &Layout) -> Result<Vec<Handed>, String> {
 }
 
 impl Handed {
-    /// The function that it is with these values, where it is one.
+    /// Returns the function with these values; `None` if the quantity is a number.
     fn function(&self, values: &[f64]) -> Option<Function> {
         let (at, at_unit) = self.grid.as_ref()?;
         Some(Function {
@@ -93,7 +95,7 @@ impl Handed {
     }
 }
 
-/// Makes known what the parts after will see: numbers by their names, functions by their points.
+/// Announces the quantities to the parts after: numbers by name, functions by name and points.
 fn announce(handed: &[Handed], given: &mut Vec<Given>, scenarios: &mut [Scenario]) {
     for output in handed {
         let zeros = output.grid.as_ref().map_or_else(Vec::new, |(at, _)| vec![0.0; at.len()]);
@@ -109,19 +111,20 @@ fn announce(handed: &[Handed], given: &mut Vec<Given>, scenarios: &mut [Scenario
     }
 }
 
-/// A part with all that it is asked with.
+/// A part with everything needed to evaluate it.
 struct Link<'a> {
     model: &'a dyn Model,
     name: String,
-    /// What it is asked for; the study's own layout for the last.
+    /// Layout requested from the part; the study's own for the last.
     asked: Layout,
     signature: Signature,
-    /// What it hands on; nothing for the last.
+    /// Quantities that it passes on; none for the last.
     handed: Vec<Handed>,
 }
 
 impl Composed {
-    /// The first parts in a study of this context, as far as their options are right, or what does not fit.
+    /// Links the leading parts whose options are valid, in the context of the study; the error describes what does
+    /// not fit.
     fn links<'a>(&'a self, context: &Context<'_>) -> Result<Vec<Link<'a>>, String> {
         let mut given = context.given.to_vec();
         let mut scenarios = context.scenarios.to_vec();
@@ -133,10 +136,12 @@ impl Composed {
             let asked = match (part.gives()?, last) {
                 (Some(layout), false) => layout,
                 (None, true) => context.layout.clone(),
-                (None, false) => return Err(format!("part `{name}` does not say what it `gives`")),
+                (None, false) => {
+                    return Err(format!("part `{name}` needs the option `gives`, its response"));
+                }
                 (Some(_), true) => {
                     return Err(format!(
-                        "part `{name}` is the last and gives the study's response: leave `gives` out"
+                        "part `{name}` is the last and gives the study's response: leave out `gives`"
                     ));
                 }
             };
@@ -156,7 +161,7 @@ impl Composed {
         Ok(links)
     }
 
-    /// The inputs of the chain: those of the parts that no part before gives.
+    /// Returns the inputs of the chain: those of the parts that no earlier part gives.
     fn inputs(links: &[Link<'_>]) -> Vec<Input> {
         let mut known: Vec<&str> = Vec::new();
         let mut inputs: Vec<Input> = Vec::new();
@@ -173,15 +178,15 @@ impl Composed {
     }
 }
 
-/// What is there to the part that is asked next.
+/// Data available to the next part.
 struct State {
-    /// Names, values and units of what sets inputs.
+    /// Names, values and units of the quantities that set inputs.
     values: Vec<(String, f64, Unit)>,
     scenario: Scenario,
 }
 
 impl Link<'_> {
-    /// The answer of the part.
+    /// Evaluates the part.
     fn answer(
         &self,
         state: &State,
@@ -227,7 +232,7 @@ impl Link<'_> {
         Ok(response)
     }
 
-    /// Makes the answer known to the parts after it.
+    /// Makes the response available to the parts after.
     fn hand_on(&self, response: &Response, state: &mut State) {
         for output in &self.handed {
             let length = output.grid.as_ref().map_or(1, |(at, _)| at.len());
@@ -284,7 +289,7 @@ impl Component for Composed {
     }
 }
 
-/// Looks at each part in the context that it sees: what the parts before it hand on is given.
+/// Visits each part in its own context, in which the outputs of the parts before it are given.
 fn each(
     links: &[Link<'_>],
     context: &Context<'_>,
@@ -293,7 +298,7 @@ fn each(
     let mut scenarios = context.scenarios.to_vec();
     let mut outputs: Vec<Given> = Vec::new();
     for (i, link) in links.iter().enumerate() {
-        // A part sees those of the chain's inputs that it takes.
+        // A part receives only those of the chain's inputs that it takes.
         let takes = |given: &&Given| link.signature.inputs.iter().any(|x| x.name == given.name);
         let all = context.given.iter().chain(&outputs);
         let given: Vec<Given> = all.filter(takes).cloned().collect();
@@ -317,7 +322,7 @@ impl Model for Composed {
                 layout: last.signature.layout.clone(),
                 resamples: last.signature.resamples,
             },
-            // Of a chain with a wrong part the check says enough.
+            // For a chain with an invalid part the check reports the cause.
             _ => given::signature(context, &BTreeMap::new()),
         }
     }

@@ -1,52 +1,54 @@
-//! One part of a chain: a model of any kind with the shape of what it hands on.
+//! One part of a chain: a model of any kind with the shape of its output.
 
 use std::borrow::Cow;
 
 use lacuna::data::Layout;
 use lacuna::plugin::registry::entries;
 use lacuna::plugin::{Given, Model};
-use lacuna::study::problem::{Complaints, Problem};
-use lacuna::study::response::ResponseSection;
-use lacuna::study::values::Name;
+use lacuna::text::problem::{Complaints, Problem};
+use lacuna::text::response::ResponseSection;
+use lacuna::text::values::Name;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 use crate::models::given::listed;
 use crate::models::nested::{self, Nested};
 
-/// A part as a study writes it.
+/// A part as written in a study.
 pub type Part = Nested<dyn Model, PartKeys>;
 
-/// The keys beside the model's own.
+/// Keys next to the model's own options.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PartKeys {
-    /// What the part is called.
+    /// Name of the part.
     pub name: Name,
-    /// The inputs of the study and of the parts before it that it takes; all when left out, which suits models that choose
-    /// for themselves, such as `equations`. Functions are seen by all parts.
+    /// Inputs of the study and outputs of earlier parts that the part receives. Default: all, which suits models that
+    /// select for themselves, such as `equations`. Functions are available to all parts.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub takes: Option<Vec<Name>>,
-    /// What it hands on to the parts after it: name, unit and axes, as in `[response]`. The last part has none: it
-    /// gives the response of the study.
+    /// Output that the part passes on to the parts after it: name, unit and axes, as in `[response]`. The last part
+    /// has none: it gives the response of the study.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gives: Option<ResponseSection>,
 }
 
 impl Part {
-    /// The shape of what it hands on, or what is wrong with it.
+    /// Returns the layout of its output; `None` if it has none. The error describes what is wrong with it.
     pub fn gives(&self) -> Result<Option<Layout>, String> {
         let Some(given) = self.section().ok().and_then(|s| s.common.gives.as_ref()) else {
             return Ok(None);
         };
-        let unknown = |_: &_| Err("the measurements are of the study's response".to_owned());
+        let unknown = |_: &_| {
+            Err("the axes of a part's response cannot be taken from the measurements".to_owned())
+        };
         let axes: Result<Vec<_>, String> =
             given.axes.0.iter().map(|(name, axis)| axis.axis(name.as_str(), unknown)).collect();
         let name = given.name.as_str().to_owned();
         Ok(Some(Layout { name, unit: given.unit.clone(), axes: axes? }))
     }
 
-    /// What it sees of what is given.
+    /// Selects the inputs that the part receives; fails if one of them does not exist.
     pub fn seen(&self, given: &[Given]) -> Result<Vec<Given>, String> {
         let Some(takes) = self.section().ok().and_then(|s| s.common.takes.as_ref()) else {
             return Ok(given.to_vec());
@@ -61,7 +63,7 @@ impl Part {
         takes.iter().map(find).collect()
     }
 
-    /// Complains of the options of the part at position `place`.
+    /// Reports problems in the options of the part at index `place`.
     pub fn check(&self, place: usize, complaints: &mut Complaints<'_>) {
         if let Err(problems) = self.section() {
             pass_on(place, problems, complaints);
@@ -72,7 +74,7 @@ impl Part {
     }
 }
 
-/// Repeats complaints about the options of the part at position `place` where they stand in the study.
+/// Repeats problems in the options of the part at index `place` at their position in the study.
 pub fn pass_on(place: usize, problems: &[Problem], complaints: &mut Complaints<'_>) {
     let who = format!("part {}: ", place + 1);
     nested::pass_on(&format!("parts.{place}"), &who, problems, complaints);
@@ -86,17 +88,17 @@ impl JsonSchema for Part {
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         let names: Vec<&str> = entries::<dyn Model>().into_iter().map(|entry| entry.name).collect();
         let gives = generator.subschema_for::<ResponseSection>();
-        // The options are those of the model; a part may be a chain itself, whose schema has no end.
+        // The options are those of the model; a part may itself be a chain, whose schema would be infinite.
         json_schema!({
             "type": "object",
             "required": ["use", "name"],
             "properties": {
                 "use": { "enum": names, "description": "The model." },
-                "name": { "type": "string", "description": "What the part is called." },
+                "name": { "type": "string", "description": "Name of the part." },
                 "takes": {
                     "type": "array",
                     "items": { "type": "string" },
-                    "description": "The inputs that it takes; all when left out.",
+                    "description": "Inputs that the part receives. Default: all.",
                 },
                 "gives": gives,
             }

@@ -1,4 +1,4 @@
-//! Equations with further terms.
+//! Addition of terms to the equations of a model.
 
 use std::collections::BTreeMap;
 
@@ -9,19 +9,18 @@ use lacuna::plugin::model::{Call, EvalError};
 use lacuna::plugin::{Amend, Context};
 use toml::{Table, Value};
 
-use super::Equations;
 use super::options::{Formula, Observe, State, StateTable};
 use super::system::{self, Names, System, key, scope};
-use super::units;
+use super::{Equations, units};
 
-/// The key under which an expression stands whose unit is asked for.
+/// Option name of an expression whose unit is requested.
 const ASKED: &str = "asked";
 
-/// The axis of what is observed for its size.
+/// Name of the axis of expressions whose sizes are requested.
 const SIZES: &str = "size";
 
 impl Equations {
-    /// The states on which the rate of a state depends.
+    /// Returns the states on which the rate of a state depends.
     fn used(&self, scope: &Scope, names: &Names, state: &str) -> Vec<String> {
         let Ok(rate) = system::program(scope, &[format!("rate.{state}")]) else {
             return Vec::new();
@@ -31,7 +30,7 @@ impl Equations {
         states.filter(|(i, _)| rate.depends_on(first + i)).map(|(_, name)| name.clone()).collect()
     }
 
-    /// The same with further states.
+    /// Returns a copy with further states.
     fn with(&self, further: &[Given]) -> Self {
         let mut wider = self.clone();
         for state in further {
@@ -72,12 +71,12 @@ impl Amend for Equations {
     ) -> Result<Option<Unit>, Fault> {
         let wider = self.with(further);
         let names = Names::of(context);
-        // Where the expression stands the caller knows better.
+        // The caller knows the position of the expression.
         let bare = |fault: Fault| Fault { definition: String::new(), ..fault };
         let first = |mut faults: Vec<(String, Fault)>| bare(faults.remove(0).1);
         let mut scope = scope(&wider, &names).map_err(first)?;
         scope.result(&key(ASKED), expression).map_err(bare)?;
-        // A name that is not there is found before its unit is asked for.
+        // An unknown name is reported before its unit is requested.
         scope.compile(&[&key(ASKED)]).map_err(|mut faults| bare(faults.remove(0)))?;
         let (found, faults) = scope.find_units(&units::known(&wider, &scope, context));
         match faults.into_iter().find(|fault| fault.definition == key(ASKED)) {

@@ -1,15 +1,14 @@
-//! Equations against the rest of their study.
+//! Checks of equations against the rest of their study.
 
 use lacuna::data::{Axis, Coordinates, Layout, Unit};
 use lacuna::plugin::Context;
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
 
-use super::Equations;
 use super::options::{Formula, Observe};
 use super::system::{Located, Names, START_TIME, System, scope};
-use super::units;
+use super::{Equations, units};
 
-/// Complains of all that is wrong.
+/// Reports everything that is wrong with the equations.
 pub fn check(equations: &Equations, context: &Context<'_>, complaints: &mut Complaints<'_>) {
     axes(equations, context.layout, complaints);
     times(equations, context.layout, complaints);
@@ -27,7 +26,7 @@ pub fn check(equations: &Equations, context: &Context<'_>, complaints: &mut Comp
     }
 }
 
-/// Complains of a fault in the text of an option, or of the option.
+/// Reports a fault at its position in the text of an option, or at the option.
 fn tell((option, fault): Located, complaints: &mut Complaints<'_>) {
     let spot = complaints.at(&option);
     let spot =
@@ -38,14 +37,15 @@ fn tell((option, fault): Located, complaints: &mut Complaints<'_>) {
     problem.help.extend(fault.help.map(String::from));
 }
 
-/// The unit of what is observed, or that of the response where the equations are wrong.
+/// Returns the unit of the observed quantities, or that of the response if the equations are invalid.
 pub fn unit(equations: &Equations, names: &Names, context: &Context<'_>) -> Unit {
     let scope = scope(equations, names).ok();
     let unit = scope.and_then(|scope| units::check(equations, &scope, context).ok());
     unit.unwrap_or_else(|| context.layout.unit.clone())
 }
 
-/// The layout that the equations have: all that is observed on the study's axis of labels, the study's numbers.
+/// Returns the layout of the equations: all observed quantities on the study's axis of labels, and the study's
+/// numeric axes.
 pub fn layout(equations: &Equations, layout: &Layout) -> Layout {
     let axis = |axis: &Axis| match (&axis.coordinates, &equations.observe) {
         (Coordinates::Labels(_), Observe::Each(labels)) if !labels.is_empty() => {
@@ -60,7 +60,7 @@ fn is_grid(axis: &Axis) -> bool {
     matches!(axis.coordinates, Coordinates::Grid { .. })
 }
 
-/// The axes of the response against what is observed and what time is needed.
+/// Checks the axes of the response against the observed quantities and the need for a time axis.
 fn axes(equations: &Equations, layout: &Layout, complaints: &mut Complaints<'_>) {
     let grids = layout.axes.iter().filter(|axis| is_grid(axis)).count();
     let labels: Vec<&Axis> = layout.axes.iter().filter(|axis| !is_grid(axis)).collect();
@@ -99,7 +99,7 @@ fn axes(equations: &Equations, layout: &Layout, complaints: &mut Complaints<'_>)
     }
 }
 
-/// No point before the start.
+/// Checks that no point of the response is before the start.
 fn times(equations: &Equations, layout: &Layout, complaints: &mut Complaints<'_>) {
     let Some((name, values, unit)) = layout.abscissa() else { return };
     let (Formula::Number(start), Some(first)) = (&equations.start_time, values.first()) else {
@@ -114,21 +114,24 @@ fn times(equations: &Equations, layout: &Layout, complaints: &mut Complaints<'_>
     }
 }
 
-/// All scenarios have the same tables, in the same units.
+/// Checks that all scenarios have the same tables, in the same units.
 fn tables(context: &Context<'_>, complaints: &mut Complaints<'_>) {
     let Some((first, others)) = context.scenarios.split_first() else { return };
     for other in others {
         for function in &first.functions {
             let wrong = match other.function(&function.name) {
-                None => format!("has no table `{}`", function.name),
+                None => format!("has no table `{}`, which `{}` has", function.name, first.name),
                 Some(same) if same.unit != function.unit || same.at_unit != function.at_unit => {
-                    format!("has the table `{}` in other units", function.name)
+                    format!(
+                        "has the table `{}` in other units than `{}`",
+                        function.name, first.name
+                    )
                 }
                 Some(_) => continue,
             };
             complaints
                 .at("")
-                .say(format!("the scenario `{}` {wrong} than `{}`", other.name, first.name))
+                .say(format!("the scenario `{}` {wrong}", other.name))
                 .expected(format!("`{}` over `{}`", function.unit, function.at_unit));
         }
     }

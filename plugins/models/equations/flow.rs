@@ -1,4 +1,4 @@
-//! The rates of a system at a state and time, and their derivatives.
+//! Rates of a system at a state and time, and their derivatives.
 
 use std::cell::RefCell;
 
@@ -6,14 +6,14 @@ use lacuna::expression::{DIRECTIONS, Evaluator, Program};
 
 use super::system::System;
 
-/// Stands in for a rate that is no number: so large that every method refuses the step and tries a shorter one.
+/// Replacement for a rate that is not finite: so large that every method rejects the step and tries a shorter one.
 const UNDEFINED: f64 = 1e150;
 
-/// The rates for given inputs.
+/// Rates for given inputs.
 pub struct Flow<'s> {
     pub system: &'s System,
     inputs: &'s [f64],
-    /// The inputs by which derivatives are taken.
+    /// Indices of the inputs with respect to which derivatives are taken.
     channels: &'s [usize],
     work: RefCell<Work<'s>>,
 }
@@ -22,23 +22,23 @@ struct Work<'s> {
     rates: Evaluator<'s>,
     point: Vec<f64>,
     direction: Vec<f64>,
-    /// The shares of each coordinate in several directions, and the slopes of each rate along them.
+    /// Components of several directions by coordinate, and the slopes of each rate along them.
     directions: Vec<[f64; DIRECTIONS]>,
     slopes: Vec<[f64; DIRECTIONS]>,
-    /// The last rate that was no number: its state, its value and where.
+    /// Last rate that was not finite.
     undefined: Option<Undefined>,
 }
 
-/// A rate that is no number.
+/// A rate that is not finite, and where it occurred.
 #[derive(Debug, Clone)]
 pub struct Undefined {
-    /// The index of the state.
+    /// Index of the state.
     pub state: usize,
-    /// What the rate is instead.
+    /// Value of the rate.
     pub value: f64,
-    /// When.
+    /// Time.
     pub time: f64,
-    /// At which states.
+    /// States.
     pub states: Vec<f64>,
 }
 
@@ -60,28 +60,28 @@ impl<'s> Flow<'s> {
         Self { system, inputs, channels, work: RefCell::new(work) }
     }
 
-    /// The number of inputs by which derivatives are taken.
+    /// Returns the number of inputs with respect to which derivatives are taken.
     pub fn channels(&self) -> usize {
         self.channels.len()
     }
 
-    /// A point of the system's programs.
+    /// Returns a point of the system's programs: time, inputs and states.
     pub fn point(&self, time: f64, states: &[f64]) -> Vec<f64> {
         [&[time], self.inputs, states].concat()
     }
 
-    /// The coordinate of a channel's input.
+    /// Returns the coordinate of a channel's input in a point.
     pub fn coordinate(&self, channel: usize) -> usize {
         self.system.variables.len() + self.channels[channel]
     }
 
-    /// The magnitude of a channel's input, by which the size of its sensitivities is judged.
+    /// Returns the magnitude of a channel's input, which scales its sensitivities.
     pub fn size(&self, channel: usize) -> f64 {
         let size = self.inputs[self.channels[channel]].abs();
         if size == 0.0 { 1.0 } else { size }
     }
 
-    /// The rates; what is no number becomes [`UNDEFINED`] and is remembered.
+    /// Computes the rates; one that is not finite is replaced by [`UNDEFINED`] and recorded.
     pub fn rates(&self, time: f64, states: &[f64], out: &mut [f64]) {
         let mut work = self.work.borrow_mut();
         work.go(time, states);
@@ -89,7 +89,7 @@ impl<'s> Flow<'s> {
         for (state, rate) in out.iter_mut().enumerate() {
             if !rate.is_finite() {
                 let (value, states) = (*rate, states.to_vec());
-                // Of a trial step that went astray nothing is to be told.
+                // States that are not finite belong to a failed trial step and are not recorded.
                 if states.iter().all(|x| x.is_finite()) {
                     work.undefined = Some(Undefined { state, value, time, states });
                 }
@@ -98,7 +98,7 @@ impl<'s> Flow<'s> {
         }
     }
 
-    /// The derivatives of the rates along a direction of the states.
+    /// Computes the derivatives of the rates along a direction of the states.
     pub fn along(&self, time: f64, states: &[f64], direction: &[f64], out: &mut [f64]) {
         let mut work = self.work.borrow_mut();
         let first = work.direction.len() - states.len();
@@ -107,7 +107,7 @@ impl<'s> Flow<'s> {
         work.slopes(time, states, out);
     }
 
-    /// The derivatives of the rates along a direction of the channels.
+    /// Computes the derivatives of the rates along a direction of the channels.
     pub fn by_channels(&self, time: f64, states: &[f64], direction: &[f64], out: &mut [f64]) {
         let mut work = self.work.borrow_mut();
         work.direction.fill(0.0);
@@ -117,7 +117,7 @@ impl<'s> Flow<'s> {
         work.slopes(time, states, out);
     }
 
-    /// The rate of a channel's sensitivity: `∂f/∂y s + ∂f/∂p`.
+    /// Computes the rate of a channel's sensitivity, `∂f/∂y s + ∂f/∂p`.
     pub fn sensitivity_rate(
         &self,
         time: f64,
@@ -134,7 +134,7 @@ impl<'s> Flow<'s> {
         work.slopes(time, states, out);
     }
 
-    /// The rates of the states and behind them those of the sensitivities, channel by channel.
+    /// Computes the rates of the states followed by those of the sensitivities, channel by channel.
     pub fn all(&self, time: f64, values: &[f64], out: &mut [f64]) {
         let count = self.system.states.len();
         let (states, sensitivities) = values.split_at(count);
@@ -165,7 +165,7 @@ impl<'s> Flow<'s> {
         }
     }
 
-    /// The last rate that was no number.
+    /// Returns the last rate that was not finite.
     pub fn undefined(&self) -> Option<Undefined> {
         self.work.borrow().undefined.clone()
     }
@@ -188,23 +188,23 @@ impl Work<'_> {
     }
 }
 
-/// A slope that is no number counts as none: the rate there is none either, or the slope is infinite at the edge of
-/// where the rate is defined.
+/// Replaces a slope that is not finite by zero: either the rate is not finite there, or the slope is infinite at the
+/// edge of the domain of the rate.
 fn defined(slope: f64) -> f64 {
     if slope.is_finite() { slope } else { 0.0 }
 }
 
-/// The start of a run.
+/// Start of a run.
 pub struct Start {
     pub time: f64,
     pub states: Vec<f64>,
-    /// The derivative of the states by each channel, channel by channel.
+    /// Derivative of the states with respect to each channel, channel by channel.
     pub sensitivities: Vec<f64>,
 }
 
 impl Start {
-    /// The start values and their derivatives at the fixed start time: a start that comes later by `dt` leaves the
-    /// states behind by their rates times `dt`.
+    /// Computes the initial values and their derivatives at a fixed time: a start later by `dt` means that the states
+    /// lag by their rates times `dt`. Fails if a value is not finite.
     pub fn of(flow: &Flow<'_>) -> Result<Self, String> {
         let system = flow.system;
         let states = system.states.len();
@@ -239,7 +239,7 @@ impl Start {
         Ok(Self { time, states: values, sensitivities })
     }
 
-    /// The derivative of the states along a direction of the channels.
+    /// Computes the derivative of the states along a direction of the channels.
     pub fn along(&self, direction: &[f64], out: &mut [f64]) {
         out.fill(0.0);
         for (share, sensitivity) in direction.iter().zip(self.sensitivities.chunks(out.len())) {
@@ -249,7 +249,7 @@ impl Start {
 }
 
 impl Undefined {
-    /// In words.
+    /// Describes the rate for a message.
     pub fn describe(&self, system: &System) -> String {
         let name = &system.states[self.state];
         let at = describe(system, self.time, &self.states);
@@ -257,7 +257,7 @@ impl Undefined {
     }
 }
 
-/// A time and states in words, such as `t = 0.5, x = 1, y = 2`; of many states the first ones.
+/// Formats a time and states, such as `t = 0.5, x = 1, y = 2`; of many states only the first.
 pub fn describe(system: &System, time: f64, states: &[f64]) -> String {
     const SHOWN: usize = 6;
     let each = system.states.iter().zip(states).take(SHOWN);
@@ -266,7 +266,7 @@ pub fn describe(system: &System, time: f64, states: &[f64]) -> String {
     format!("{} = {time}, {}{rest}", system.variables[0], each.join(", "))
 }
 
-/// Evaluates the one output of a program and its derivatives.
+/// Evaluator of a program with one output and its derivatives.
 pub struct Quantity<'p>(pub Evaluator<'p>);
 
 impl<'p> Quantity<'p> {
@@ -274,7 +274,7 @@ impl<'p> Quantity<'p> {
         Self(Evaluator::new(program))
     }
 
-    /// The value at a point.
+    /// Returns the value at a point.
     pub fn value(&mut self, point: &[f64]) -> f64 {
         let mut out = [0.0];
         self.0.at(point);
@@ -282,7 +282,7 @@ impl<'p> Quantity<'p> {
         out[0]
     }
 
-    /// The derivative at a point along a direction.
+    /// Returns the derivative at a point along a direction.
     pub fn slope(&mut self, point: &[f64], direction: &[f64]) -> f64 {
         let mut out = [0.0];
         self.0.at(point);

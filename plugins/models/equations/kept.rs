@@ -1,18 +1,19 @@
-//! Compiled equations, kept from call to call.
+//! Compiled equations, cached between calls.
 
 use std::sync::{Arc, PoisonError, RwLock};
 
 use super::system::{Located, Names, System};
 
-/// How many are kept: more than a study has scenarios, as a rule.
+/// Maximum number of cached systems; usually more than the scenarios of a study.
 const MOST: usize = 64;
 
-/// Systems by the names they were compiled for. It is no part of the options: copies begin empty, and all are equal.
+/// Systems by the names they were compiled for. The cache is not part of the options: copies start empty, and all
+/// compare equal.
 #[derive(Debug, Default)]
 pub struct Kept(RwLock<Vec<(Names, Arc<System>)>>);
 
 impl Kept {
-    /// The system for these names.
+    /// Returns the system for these names; compiles it if it is not cached.
     pub fn get(
         &self,
         names: &Names,
@@ -34,7 +35,8 @@ impl Kept {
     }
 }
 
-/// Whether the names are the same; tables only where they are shared, as comparing long ones is dear.
+/// Returns true if the names are the same. Tables are compared by reference only, because comparing long tables is
+/// expensive.
 fn same(a: &Names, b: &Names) -> bool {
     a.variables == b.variables
         && a.inputs == b.inputs

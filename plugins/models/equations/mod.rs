@@ -19,21 +19,22 @@ use std::sync::Arc;
 
 use lacuna::data::Layout;
 use lacuna::expression::Fault;
-use lacuna::linalg::Matrix;
 use lacuna::plugin::model::{Call, EvalError, Gradient, Input, Response, Signature};
 use lacuna::plugin::{Amend, Component, Context, Model};
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
+use lacuna_linalg::Matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use kept::Kept;
-pub use options::{Formula, Method, Observe, Solver, State, StateTable};
 use respond::{Answer, Responder};
 use shape::Shape;
 use system::{Names, System};
 
-/// A model written in the study: ordinary differential equations for states over time and what is observed of them, or
-/// formulas alone.
+pub use options::{Formula, Method, Observe, Solver, State, StateTable};
+
+/// A model written in the study: ordinary differential equations for states over time and expressions for the
+/// observed quantities, or formulas alone.
 ///
 /// ```toml
 /// [study]
@@ -69,37 +70,39 @@ use system::{Names, System};
 /// use = "polynomial_chaos"
 /// ```
 ///
-/// Expressions use the parameters of the study, `fixed` values and the values of scenarios by their names, the states,
-/// the definitions of `where`, and the response's axes of numbers: the axis is the time, here `t`. Tables of a
-/// scenario, such as a measured force, are called as functions: `force(t)`, straight between their points, constant
-/// beyond the first and the last. An axis of labels names what is observed: `observe = { position = "x", speed =
-/// "abs(v)" }`. Without states the response is the expression at each point of its axes.
+/// Expressions use the parameters of the study, `fixed` values and the values of scenarios by their names, the
+/// states, the definitions of `where`, and the response's numeric axes: the axis is the time, here `t`. Tables of a
+/// scenario, such as a measured force, are called as functions: `force(t)`, with linear interpolation between their
+/// points and constant values beyond the first and the last. An axis of labels names the observed quantities:
+/// `observe = { position = "x", speed = "abs(v)" }`. Without states the response is the expression at each point of
+/// its axes.
 ///
-/// Units are checked before anything runs and never converted inside expressions: a number with its unit is written
-/// `9.81 {m/s2}`, a plain number has none. What is observed is converted to the unit of the response.
+/// Units are checked before anything runs and never converted inside expressions: a number with a unit is written
+/// `9.81 {m/s2}`, a plain number has none. The observed quantities are converted to the unit of the response.
 ///
-/// Rates may break: where a condition changes with time, or a table has a point, integration stops and goes on behind,
-/// and the derivatives by parameters are corrected where the rates jump. The guide `docs/equations.md` has all functions,
-/// the solvers and their limits.
+/// Rates may be discontinuous: at a condition that changes with time, or at a point of a table, the integration stops
+/// and restarts, and the derivatives with respect to the parameters are corrected where the rates jump. The guide
+/// `docs/equations.md` lists all functions, the solvers and their limits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Equations {
-    /// The states: for each a start value (a number, or an expression of the inputs), or a table `{ start = …, unit = …
-    /// }`. A start that is an expression brings its unit; one that is a number has the `unit`, or none.
+    /// States: for each an initial value (a number, or an expression of the inputs), or a table
+    /// `{ start = …, unit = … }`. An expression has its own unit; a number has the `unit`, or none.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub state: BTreeMap<String, State>,
-    /// The rate of each state by time: an expression.
+    /// Time derivative of each state, as an expression.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub rate: BTreeMap<String, String>,
-    /// When the states have their start values: a number in the unit of the time axis, or an expression of the inputs.
+    /// Time at which the states have their initial values: a number in the unit of the time axis, or an expression of
+    /// the inputs.
     #[serde(default = "zero")]
     pub start_time: Formula,
     /// Definitions: names for expressions that other expressions use. Their order does not matter.
     #[serde(default, rename = "where", skip_serializing_if = "BTreeMap::is_empty")]
     pub definitions: BTreeMap<String, String>,
-    /// What is observed: one expression, or one for each label of the response's axis of labels.
+    /// Observed quantities: one expression, or one for each label of the response's axis of labels.
     pub observe: Observe,
-    /// How the states are integrated.
+    /// Integration method and tolerances.
     #[serde(default)]
     pub solver: Solver,
     #[serde(skip)]
@@ -112,14 +115,14 @@ fn zero() -> Formula {
 }
 
 impl Equations {
-    /// The options under which the start time and the start values stand.
+    /// Returns the options that contain the start time and the initial values.
     fn starts(&self) -> Vec<String> {
         let states = self.state.iter();
         let states = states.map(|(name, state)| format!("state.{name}{}", state.start().1));
         [system::START_TIME.to_owned()].into_iter().chain(states).collect()
     }
 
-    /// The system that a call is made of.
+    /// Returns the compiled system for the names of a call.
     fn system(&self, call: &Call<'_>) -> Result<Arc<System>, EvalError> {
         let names = Names {
             variables: Names::variables(call.layout),
@@ -128,7 +131,7 @@ impl Equations {
         };
         self.kept.get(&names, || System::compile(self, &names)).map_err(|faults| {
             let lines = faults.into_iter().map(|(option, fault)| {
-                // The fault of a definition names it already.
+                // The option already names the definition.
                 let fault = Fault { definition: String::new(), ..fault };
                 format!("`model.{option}`: {fault}")
             });
@@ -177,7 +180,7 @@ impl Model for Equations {
     fn signature(&self, context: &Context<'_>) -> Signature {
         let names = Names::of(context);
         let system = System::compile(self, &names).ok();
-        // Of equations that are wrong the check tells; their inputs are not to be complained of again.
+        // If the equations are invalid, the check reports the cause; their inputs are then not reported as well.
         let uses = |name: &str| match (&system, names.inputs.iter().position(|n| n == name)) {
             (Some(system), Some(i)) => system.uses(i),
             (None, _) => true,

@@ -1,32 +1,32 @@
-//! What a study writes of equations besides their expressions.
+//! Options of `equations` other than expressions.
 
 use std::collections::BTreeMap;
 use std::fmt;
 
 use lacuna::data::Unit;
-use lacuna::study::values::Positive;
+use lacuna::text::values::Positive;
 use schemars::JsonSchema;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, Deserializer};
 use serde::{Deserialize, Serialize};
 
-/// A number, or an expression that gives one.
+/// Number, or expression that is evaluated to a number.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Formula {
-    /// A number, in the unit that is wanted.
+    /// A number, in the expected unit.
     Number(f64),
-    /// An expression.
+    /// Text of an expression.
     Text(String),
 }
 
-/// A state: its start value, or a table `{ start = …, unit = … }`.
+/// A state: its initial value, or a table `{ start = …, unit = … }`.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum State {
-    /// The start value; the state has its unit.
+    /// Initial value, which determines the unit of the state.
     Start(Formula),
-    /// The start value and the unit.
+    /// Initial value and unit.
     Table(StateTable),
 }
 
@@ -34,14 +34,14 @@ pub enum State {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StateTable {
-    /// Its value at the start: a number in its unit, or an expression of the inputs.
+    /// Initial value: a number in the unit of the state, or an expression of the inputs.
     pub start: Formula,
-    /// Its unit; that of `start` when not given.
+    /// Unit of the state. Default: the unit of `start`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<Unit>,
 }
 
-/// What is observed: one expression, or one for each label of the response's axis of labels.
+/// Observed quantities: one expression, or one for each label of the response's axis of labels.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Observe {
@@ -51,37 +51,37 @@ pub enum Observe {
     Each(BTreeMap<String, String>),
 }
 
-/// A method of integration.
+/// Integration method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// `runge_kutta`; from the start again with an implicit method where the system proves stiff or the explicit
-    /// one fails: `bdf`, or `esdirk` where the rates break more than fifty times.
+    /// `runge_kutta`; if the system proves stiff or the explicit method fails, the run is repeated with an implicit
+    /// method: `bdf`, or `esdirk` if the rates have more than fifty discontinuities.
     #[default]
     Auto,
-    /// Explicit Runge-Kutta of order 5 (Tsitouras 2011): systems that are not stiff.
+    /// Explicit Runge-Kutta method of order 5 (Tsitouras 2011): for systems that are not stiff.
     RungeKutta,
-    /// Backward differentiation of orders 1 to 5 (Byrne and Hindmarsh 1975, Shampine and Reichelt 1997): stiff systems
-    /// with smooth rates.
+    /// Backward differentiation formulas of orders 1 to 5 (Byrne and Hindmarsh 1975, Shampine and Reichelt 1997): for
+    /// stiff systems with smooth rates.
     Bdf,
-    /// Diagonally implicit Runge-Kutta of order 4 with an explicit first stage (Jørgensen, Kristensen and Thomsen
-    /// 2018): stiff systems whose rates often break.
+    /// Diagonally implicit Runge-Kutta method of order 4 with an explicit first stage (Jørgensen, Kristensen and
+    /// Thomsen 2018): for stiff systems with frequent discontinuities.
     Esdirk,
 }
 
-/// How the states are integrated.
+/// Settings of the integration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Solver {
-    /// The method.
+    /// Integration method.
     pub method: Method,
-    /// The error of a step as a share of each state.
+    /// Relative tolerance of the error per step. A smaller value is more accurate and takes more steps.
     pub relative_tolerance: Positive,
-    /// The error of a step that is no matter, one number for all states, each in its unit. Without it: a hundredth of
+    /// Absolute tolerance of the error per step: one number for all states, each in its unit. Default: a hundredth of
     /// each state's largest magnitude in the run times `relative_tolerance`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub absolute_tolerance: Option<Positive>,
-    /// The most steps of a run; one that needs more fails.
+    /// Maximum number of steps; a run that needs more fails.
     pub steps: usize,
 }
 
@@ -97,7 +97,7 @@ impl Default for Solver {
 }
 
 impl Method {
-    /// As a study writes it.
+    /// Returns the name of the method in a study.
     pub fn name(self) -> &'static str {
         match self {
             Self::Auto => "auto",
@@ -109,7 +109,7 @@ impl Method {
 }
 
 impl Formula {
-    /// As an expression.
+    /// Returns the formula as an expression.
     pub fn text(&self) -> String {
         match self {
             Self::Number(x) => format!("{x:?}"),
@@ -119,7 +119,7 @@ impl Formula {
 }
 
 impl State {
-    /// The start value and the key under which it stands in the state's section.
+    /// Returns the initial value, and its key relative to the state's section.
     pub fn start(&self) -> (&Formula, &'static str) {
         match self {
             Self::Start(start) => (start, ""),
@@ -127,7 +127,7 @@ impl State {
         }
     }
 
-    /// The unit that is written.
+    /// Returns the unit if it is given.
     pub fn unit(&self) -> Option<&Unit> {
         match self {
             Self::Start(_) => None,
@@ -137,7 +137,8 @@ impl State {
 }
 
 impl Observe {
-    /// Each observed quantity: its label (empty for the one), the key of the section, the expression.
+    /// Returns for each observed quantity its label (empty if there is only one), its key in the section, and its
+    /// expression.
     pub fn each(&self) -> Vec<(&str, String, &str)> {
         match self {
             Self::One(text) => vec![("", "observe".to_owned(), text)],
@@ -170,7 +171,7 @@ impl<'de> Deserialize<'de> for Observe {
     }
 }
 
-/// These read by the kind of value that stands there, so that errors inside keep their own place and words.
+/// Visitors that deserialise by the type of the value, so that errors inside keep their own position and message.
 struct FormulaVisitor;
 struct StateVisitor;
 struct ObserveVisitor;

@@ -1,8 +1,8 @@
-//! The response of compiled equations to inputs, with its derivatives.
+//! Response of compiled equations to inputs, and its derivatives.
 
 use lacuna::expression::Evaluator;
-use lacuna::linalg::Matrix;
 use lacuna::plugin::Fact;
+use lacuna_linalg::Matrix;
 
 use super::flow::Flow;
 use super::integrate::integrate;
@@ -10,28 +10,28 @@ use super::options::Solver;
 use super::shape::Shape;
 use super::system::System;
 
-/// What equations answer.
+/// Answer of the equations.
 pub struct Answer {
-    /// The values on the layout.
+    /// Values on the layout.
     pub values: Vec<f64>,
-    /// Their derivatives by each input, where they were asked for.
+    /// Derivatives with respect to each input, if requested (`values x inputs`).
     pub jacobian: Option<Matrix>,
-    /// What the run cost.
+    /// Facts about the run.
     pub facts: Vec<Fact>,
 }
 
-/// Evaluates equations on a layout.
+/// Evaluator of equations on a layout.
 pub struct Responder<'a> {
     pub system: &'a System,
     pub shape: &'a Shape<'a>,
     pub solver: &'a Solver,
     pub inputs: &'a [f64],
-    /// The number of values of the layout.
+    /// Number of values of the layout.
     pub length: usize,
 }
 
 impl Responder<'_> {
-    /// The response; with derivatives where they are wanted.
+    /// Computes the response, and its derivatives if requested.
     pub fn answer(&self, derivatives: bool) -> Result<Answer, String> {
         let system = self.system;
         let moving = (0..system.inputs).filter(|i| derivatives && system.moves_states(*i));
@@ -51,14 +51,14 @@ impl Responder<'_> {
     }
 }
 
-/// Puts what is observed at each point in its places.
+/// Writes the observed quantities at each point to their positions in the response.
 struct Observer<'o> {
     of: &'o Responder<'o>,
     channels: &'o [usize],
     observed: Evaluator<'o>,
     point: Vec<f64>,
     direction: Vec<f64>,
-    /// What is observed at one point, or its slopes.
+    /// Observed quantities at one point, or their slopes.
     row: Vec<f64>,
     values: Vec<f64>,
     jacobian: Option<Matrix>,
@@ -82,7 +82,8 @@ impl<'o> Observer<'o> {
         }
     }
 
-    /// Observes the point of this index at these states and their derivatives by the channels.
+    /// Evaluates the observed quantities at point `index`, for these states and their derivatives with respect to the
+    /// channels.
     fn observe(&mut self, index: usize, states: &[f64], sensitivities: &[f64]) {
         let (system, shape) = (self.of.system, self.of.shape);
         let variables = system.variables.len();

@@ -1,20 +1,21 @@
-//! Where the values of a response stand: one a label and a point of the axes of numbers.
+//! Positions of the values of a response: one per label and point of the numeric axes.
 
 use lacuna::data::{Coordinates, Layout};
 
-/// A layout as equations see it.
+/// A layout as seen by the equations.
 #[derive(Debug)]
 pub struct Shape<'a> {
-    /// The axes of numbers: their coordinates and the distance of neighbours in the response.
+    /// Numeric axes: their coordinates and their strides in the response.
     grids: Vec<(&'a [f64], usize)>,
-    /// For each label of the layout the index of what is observed.
+    /// Index of the observed quantity for each label of the layout.
     pub observed: Vec<usize>,
-    /// The distance of labels in the response.
+    /// Stride of the labels in the response.
     label_stride: usize,
 }
 
 impl<'a> Shape<'a> {
-    /// The shape of a layout with these variables and labels, or what does not fit.
+    /// Returns the shape of a layout for `variables` numeric axes and these labels; the error describes what does not
+    /// fit.
     pub fn of(layout: &'a Layout, variables: usize, labels: &[String]) -> Result<Self, String> {
         let lengths = layout.shape();
         let mut shape = Self { grids: Vec::new(), observed: vec![0], label_stride: 0 };
@@ -44,17 +45,17 @@ impl<'a> Shape<'a> {
         Ok(shape)
     }
 
-    /// The coordinates of the first axis of numbers.
+    /// Returns the coordinates of the first numeric axis.
     pub fn times(&self) -> &'a [f64] {
         self.grids.first().map_or(&[], |grid| grid.0)
     }
 
-    /// The number of points of the axes of numbers.
+    /// Returns the number of points of the numeric axes.
     pub fn points(&self) -> usize {
         self.grids.iter().map(|(values, _)| values.len()).product()
     }
 
-    /// Writes the coordinates of a point, the last axis fastest, and gives its first place in the response.
+    /// Writes the coordinates of a point, the last axis fastest, and returns its first position in the response.
     pub fn point(&self, index: usize, coordinates: &mut [f64]) -> usize {
         let (mut rest, mut place) = (index, 0);
         for ((values, stride), x) in self.grids.iter().zip(coordinates).rev() {
@@ -66,7 +67,7 @@ impl<'a> Shape<'a> {
         place
     }
 
-    /// The places of the labels of a point, with the index of what is observed at each.
+    /// Iterates over the positions of the labels of a point, with the index of the observed quantity at each.
     pub fn places(&self, first: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
         let stride = self.label_stride;
         self.observed.iter().enumerate().map(move |(i, observed)| (first + i * stride, *observed))

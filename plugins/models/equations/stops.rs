@@ -1,19 +1,19 @@
-//! Times at which the rates of a run break, whatever its states do.
+//! Times at which the rates are discontinuous, whatever the states.
 
 use lacuna::expression::Break;
 
 use super::flow::{Flow, Quantity};
 
-/// A time at which integration stops and starts again.
+/// A time at which the integration stops and restarts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stop {
-    /// The last moment before the break.
+    /// Last time before the discontinuity.
     pub before: f64,
-    /// For a jump: the first moment behind it and the index of its break.
+    /// For a jump: the first time after it, and the index of its break.
     pub jump: Option<(f64, usize)>,
 }
 
-/// All stops between two times, ascending, each once.
+/// Returns all stops within a time span, in ascending order and without repetition.
 pub fn stops(flow: &Flow<'_>, span: (f64, f64), samples: &[f64]) -> Vec<Stop> {
     let mut stops = Vec::new();
     for (index, broken) in flow.system.breaks.iter().enumerate() {
@@ -29,13 +29,13 @@ pub fn stops(flow: &Flow<'_>, span: (f64, f64), samples: &[f64]) -> Vec<Stop> {
     stops
 }
 
-/// Whether a break happens at certain states.
+/// Returns true if the position of a break depends on the states.
 pub fn depends_on_states(broken: &Break, flow: &Flow<'_>) -> bool {
     let coordinates = flow.system.coordinates();
     (coordinates - flow.system.states.len()..coordinates).any(|i| broken.quantity.depends_on(i))
 }
 
-/// The times at which the quantity of a break takes its values.
+/// Search for the times at which the quantity of a break takes its values.
 struct Crossings<'a> {
     broken: &'a Break,
     quantity: Quantity<'a>,
@@ -68,7 +68,7 @@ impl<'a> Crossings<'a> {
         }
     }
 
-    /// Looks for changes of side between neighbouring samples and the points halfway.
+    /// Looks for changes of side between neighbouring samples and their midpoints.
     fn search(
         &mut self,
         index: usize,
@@ -77,7 +77,7 @@ impl<'a> Crossings<'a> {
         stops: &mut Vec<Stop>,
     ) {
         let value = self.broken.at[0];
-        // Wide enough that no rounding of a step's end reaches across.
+        // Wide enough that rounding of a step's end cannot reach across the jump.
         let gap = 1e-13 * (last - first).max(first.abs()).max(last.abs());
         let inside = samples.iter().copied().filter(|t| first < *t && *t < last);
         let mut left = (first, self.at(first) > value);
@@ -94,7 +94,7 @@ impl<'a> Crossings<'a> {
         }
     }
 
-    /// The neighbouring numbers between which the quantity changes side.
+    /// Returns the neighbouring floating-point numbers between which the quantity changes side.
     fn edge(&mut self, value: f64, mut low: f64, mut high: f64, side: bool) -> (f64, f64) {
         loop {
             let middle = 0.5 * (low + high);

@@ -1,4 +1,4 @@
-//! Equations with their names looked up: programs for the start, the rates and what is observed.
+//! Equations with resolved names: programs for the start, the rates and the observed quantities.
 
 use std::sync::Arc;
 
@@ -8,55 +8,55 @@ use lacuna::plugin::Context;
 
 use super::Equations;
 
-/// The names that equations may use besides their own.
+/// Names that equations may use in addition to their own.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Names {
-    /// The axes of numbers of the response.
+    /// Numeric axes of the response.
     pub variables: Vec<String>,
-    /// What the study sets.
+    /// Inputs given by the study.
     pub inputs: Vec<String>,
     /// Tables that are called as functions.
     pub functions: Vec<Arc<Function>>,
 }
 
-/// The option that says when the start is.
+/// Name of the option for the start time.
 pub const START_TIME: &str = "start_time";
 
-/// Points at which rates are tried for being linear.
+/// Number of points at which rates are tested for linearity.
 const POINTS: usize = 5;
 
-/// A fault and the option it is in.
+/// A fault and the option that contains it.
 pub type Located = (String, Fault);
 
 /// Compiled equations. A point holds the variables, the inputs and the states, in this order.
 #[derive(Debug)]
 pub struct System {
-    /// The variables; the one of a system with states is its time.
+    /// Names of the variables; the only one of a system with states is its time.
     pub variables: Vec<String>,
-    /// The states.
+    /// Names of the states.
     pub states: Vec<String>,
-    /// How many inputs there are.
+    /// Number of inputs.
     pub inputs: usize,
-    /// The start time and the start value of each state; of the inputs only.
+    /// Start time and initial value of each state; functions of the inputs only.
     pub start: Program,
-    /// The rate of each state.
+    /// Rate of each state.
     pub rates: Program,
-    /// What is observed, a value a label.
+    /// Observed quantities, one per label.
     pub observed: Program,
-    /// The labels; one that is empty for a response without labels.
+    /// Labels; a single empty one for a response without labels.
     pub labels: Vec<String>,
-    /// Where the rates break.
+    /// Discontinuities of the rates.
     pub breaks: Vec<Break>,
 }
 
 impl Names {
-    /// The names of a layout's axes of numbers.
+    /// Returns the names of a layout's numeric axes.
     pub fn variables(layout: &Layout) -> Vec<String> {
         let grid = |axis: &&Axis| matches!(axis.coordinates, Coordinates::Grid { .. });
         layout.axes.iter().filter(grid).map(|axis| axis.name.clone()).collect()
     }
 
-    /// The names of a study. One that no expression can write is none that an expression uses.
+    /// Returns the names of a study. A name that cannot be written in an expression is left out.
     pub fn of(context: &Context<'_>) -> Self {
         let mut inputs: Vec<String> = Vec::new();
         for given in context.given.iter().filter(|given| is_name(&given.name)) {
@@ -73,7 +73,7 @@ impl Names {
     }
 }
 
-/// The scope of equations, or all that is wrong with their form.
+/// Builds the scope of the equations; on failure returns all faults of their form.
 pub fn scope(equations: &Equations, names: &Names) -> Result<Scope, Vec<Located>> {
     let mut scope = Scope::new();
     let mut faults = Vec::new();
@@ -129,7 +129,7 @@ fn states_without_rates(equations: &Equations) -> Vec<Located> {
 }
 
 impl System {
-    /// Looks up all names.
+    /// Compiles the equations; on failure returns all faults.
     pub fn compile(equations: &Equations, names: &Names) -> Result<Self, Vec<Located>> {
         let scope = scope(equations, names)?;
         let states: Vec<String> = equations.state.keys().cloned().collect();
@@ -151,26 +151,26 @@ impl System {
         Ok(system)
     }
 
-    /// Whether any expression uses the input of this index.
+    /// Returns true if any expression uses this input.
     pub fn uses(&self, input: usize) -> bool {
         let coordinate = self.variables.len() + input;
         [&self.start, &self.rates, &self.observed].iter().any(|p| p.depends_on(coordinate))
     }
 
-    /// Whether the states depend on the input of this index.
+    /// Returns true if the states depend on this input.
     pub fn moves_states(&self, input: usize) -> bool {
         let coordinate = self.variables.len() + input;
         self.start.depends_on(coordinate) || self.rates.depends_on(coordinate)
     }
 
-    /// Whether the rates are linear in the input of this index, and nothing else depends on it.
+    /// Returns true if the rates are linear in this input, and nothing else depends on it.
     pub fn is_factor(&self, input: usize) -> bool {
         let coordinate = self.variables.len() + input;
         let elsewhere = [&self.start, &self.observed].iter().any(|p| p.depends_on(coordinate));
         !elsewhere && self.rates.depends_on(coordinate) && self.are_linear_in(coordinate)
     }
 
-    /// Whether the rates at a few points with the coordinate at 0, 1 and 2 lie on lines.
+    /// Returns true if, at several points, the rates with the coordinate at 0, 1 and 2 lie on straight lines.
     fn are_linear_in(&self, coordinate: usize) -> bool {
         let mut rates = Evaluator::new(&self.rates);
         let mut at = |point: &[f64]| {
@@ -180,7 +180,7 @@ impl System {
             row
         };
         (1..=POINTS).all(|k| {
-            // Any numbers of ordinary size do, as long as they have nothing to do with each other.
+            // Any unrelated numbers of ordinary size serve as test points.
             let number = |i: usize| 0.5 + (0.618_034 * (i + 1) as f64 * k as f64).fract();
             let mut point: Vec<f64> = (0..self.coordinates()).map(number).collect();
             let [none, one, two] = [0.0, 1.0, 2.0].map(|x| {
@@ -194,12 +194,12 @@ impl System {
         })
     }
 
-    /// The number of coordinates of a point.
+    /// Returns the number of coordinates of a point.
     pub fn coordinates(&self) -> usize {
         self.variables.len() + self.inputs + self.states.len()
     }
 
-    /// Refuses start values that depend on what is known only after the start.
+    /// Fails if an initial value depends on a variable or a state, which are known only after the start.
     fn start_is_of_inputs(
         &self,
         equations: &Equations,
@@ -226,7 +226,7 @@ impl System {
     }
 }
 
-/// The program of these results, one number each.
+/// Compiles these results; fails if one of them is not a single number.
 pub fn program(scope: &Scope, results: &[String]) -> Result<Program, Vec<Located>> {
     let keys: Vec<String> = results.iter().map(|option| key(option)).collect();
     let keys: Vec<&str> = keys.iter().map(String::as_str).collect();
@@ -245,12 +245,12 @@ pub fn program(scope: &Scope, results: &[String]) -> Result<Program, Vec<Located
     if faults.is_empty() { Ok(program) } else { Err(faults) }
 }
 
-/// The key of the result that is written under an option: no name, so that no expression can use it.
+/// Returns the key of the result of an option. It is not a valid name, so that no expression can use it.
 pub fn key(option: &str) -> String {
     format!("={option}")
 }
 
-/// The option in which a definition stands.
+/// Returns the option that contains a definition.
 pub fn option_of(definition: &str) -> String {
     match definition.strip_prefix('=') {
         Some(option) => option.to_owned(),

@@ -1,4 +1,4 @@
-//! Units of equations, against each other and against the study.
+//! Unit checks of equations, among themselves and against the study.
 
 use std::collections::BTreeMap;
 
@@ -10,10 +10,10 @@ use super::Equations;
 use super::options::Formula;
 use super::system::{Located, START_TIME, key, option_of};
 
-/// The unit of every result; `None` for what is zero and has every unit.
+/// Unit of every result; `None` for zero, which has every unit.
 type Found = BTreeMap<String, Option<Unit>>;
 
-/// The unit of what is observed, or what disagrees.
+/// Checks all units; returns the unit of the observed quantities.
 pub fn check(
     equations: &Equations,
     scope: &Scope,
@@ -29,7 +29,7 @@ pub fn check(
     if faults.is_empty() { Ok(unit) } else { Err(faults) }
 }
 
-/// The units of variables, inputs and states.
+/// Returns the units of variables, inputs and states.
 pub fn known(
     equations: &Equations,
     scope: &Scope,
@@ -49,7 +49,7 @@ pub fn known(
     known
 }
 
-/// The units of variables and inputs.
+/// Returns the units of variables and inputs.
 fn given(context: &Context<'_>) -> BTreeMap<String, Unit> {
     let inputs = context.given.iter();
     let inputs = inputs.map(|given| (given.name.clone(), given.unit.clone().unwrap_or_default()));
@@ -60,7 +60,7 @@ fn given(context: &Context<'_>) -> BTreeMap<String, Unit> {
     inputs.chain(axes).collect()
 }
 
-/// Start values in the units of the states, rates in those by the unit of time.
+/// Checks that initial values have the units of the states, and rates these units per unit of time.
 fn states(
     equations: &Equations,
     found: &Found,
@@ -94,7 +94,7 @@ fn states(
     faults
 }
 
-/// A unit by another, written as people do where that is a unit.
+/// Returns the quotient of two units, written in the usual form if that parses.
 pub fn ratio(unit: &Unit, time: &Unit) -> Option<Unit> {
     let simple = |text: &str| text.chars().all(char::is_alphanumeric);
     let wrapped = |unit: &Unit| match unit.as_str() {
@@ -115,7 +115,7 @@ fn mismatch(fault: Fault, wanted: &Unit, found: &Unit) -> Fault {
     }
 }
 
-/// The one unit of all that is observed, which converts to that of the response.
+/// Returns the common unit of all observed quantities, which must convert to that of the response.
 fn observed(equations: &Equations, found: &Found, response: &Unit) -> (Unit, Vec<Located>) {
     let mut common: Option<Unit> = None;
     let mut faults = Vec::new();

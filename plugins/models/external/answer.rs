@@ -3,7 +3,7 @@
 use lacuna::data::{Axis, Coordinates, Layout};
 use serde_json::Value;
 
-/// The response in what a program printed: all of it, or its last line.
+/// Parses the response from the output of a program: all of it, or its last line.
 pub fn printed(text: &str, layout: &Layout) -> Result<Vec<f64>, String> {
     let last = text.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or_default();
     let document = serde_json::from_str(text).or_else(|_| serde_json::from_str(last));
@@ -14,7 +14,7 @@ pub fn printed(text: &str, layout: &Layout) -> Result<Vec<f64>, String> {
     values(&document, layout)
 }
 
-/// The response in a document.
+/// Extracts the response from a document.
 pub fn values(document: &Value, layout: &Layout) -> Result<Vec<f64>, String> {
     let mut values = Vec::with_capacity(layout.len());
     match document {
@@ -70,7 +70,7 @@ fn number(value: &Value) -> Result<f64, String> {
     value.as_f64().ok_or_else(|| format!("expected a number, found `{}`", cut(&value.to_string())))
 }
 
-/// The beginning of a text.
+/// Returns the beginning of a text.
 fn cut(text: &str) -> String {
     const LONGEST: usize = 60;
     match text.char_indices().nth(LONGEST) {

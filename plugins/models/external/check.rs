@@ -1,12 +1,12 @@
-//! What can be wrong with the options of `external`.
+//! Checks of the options of `external`.
 
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
 use lacuna::plugin::Context;
-use lacuna::study::nearest::nearest;
-use lacuna::study::problem::{Complaints, Problem};
+use lacuna::text::nearest::nearest;
+use lacuna::text::problem::{Complaints, Problem};
 
 use super::folder::stays_inside;
 use super::run::{NOT_INPUTS, STDERR, STDIN, STDOUT, of_the_study};
@@ -14,7 +14,7 @@ use super::template::{Place, Template};
 use super::{External, Input, Output, given};
 use crate::models::process;
 
-/// The options against the rest of the study.
+/// Checks the options against the rest of the study.
 pub fn options(model: &External, context: &Context<'_>, complaints: &mut Complaints<'_>) {
     if model.command.first().is_none_or(|word| word.as_str().trim().is_empty()) {
         complaints
@@ -26,7 +26,7 @@ pub fn options(model: &External, context: &Context<'_>, complaints: &mut Complai
         if context.given.iter().any(|input| input.name == name) {
             complaints
                 .at("")
-                .say(format!("the input `{name}` has a name that templates use for something else"))
+                .say(format!("the input name `{name}` is reserved for another value in templates"))
                 .help(format!(
                     "give it another name than {}",
                     given::listed(NOT_INPUTS.into_iter())
@@ -53,7 +53,7 @@ pub fn options(model: &External, context: &Context<'_>, complaints: &mut Complai
     }
 }
 
-/// The options against the machine.
+/// Checks the options against the files and programs of the machine.
 pub fn files(model: &External, context: &Context<'_>, complaints: &mut Complaints<'_>) {
     program(model, context, complaints);
     let mut read = Some(BTreeSet::new());
@@ -77,14 +77,14 @@ pub fn files(model: &External, context: &Context<'_>, complaints: &mut Complaint
     }
 }
 
-/// The templates that stand in the study itself, with their places in the section.
+/// Iterates over the templates in the study itself, with their paths in the section.
 fn texts(model: &External) -> impl Iterator<Item = (String, &Template)> {
     let words = model.command.iter().enumerate().map(|(i, word)| (format!("command.{i}"), word));
     let variables = model.environment.iter();
     words.chain(variables.map(|(key, text)| (format!("environment.{key}"), text)))
 }
 
-/// A name in a template that means nothing, or a format that means nothing there.
+/// An unknown name in a template, or a format where none is allowed.
 struct Unknown<'a> {
     place: &'a Place,
     names: Vec<&'a str>,
@@ -117,7 +117,7 @@ impl<'a> Unknown<'a> {
     }
 }
 
-/// The inputs that a template uses; `None` when it is wrong.
+/// Returns the inputs that a template file uses; `None` if it is invalid.
 fn template_file(
     path: &Path,
     spot: &str,
@@ -157,7 +157,7 @@ fn template_file(
     all_known.then(|| template.places().map(|place| place.name.clone()).collect())
 }
 
-/// Complains of inputs that reach the command in no way: the response could not depend on them.
+/// Reports inputs that do not reach the command, because the response could not depend on them.
 fn unused(
     model: &External,
     mut used: BTreeSet<String>,
@@ -180,7 +180,7 @@ fn unused(
     }
 }
 
-/// Complains of files of a run's folder that would not be there, or be one.
+/// Reports files that would lie outside the run's folder, or coincide.
 fn places(model: &External, complaints: &mut Complaints<'_>) {
     let mut taken: Vec<&Path> = [STDOUT, STDERR, STDIN].map(Path::new).to_vec();
     let copied =
@@ -197,7 +197,7 @@ fn places(model: &External, complaints: &mut Complaints<'_>) {
         if !stays_inside(path) {
             outside(&spot, written, complaints);
         } else if taken.contains(&path) {
-            let text = format!("a run's folder has another file `{}`", path.display());
+            let text = format!("a run's folder already has a file `{}`", path.display());
             complaints.at(&spot).say(text);
         }
         taken.push(path);
@@ -216,12 +216,12 @@ fn places(model: &External, complaints: &mut Complaints<'_>) {
 fn outside(spot: &str, path: &Path, complaints: &mut Complaints<'_>) {
     complaints
         .at(spot)
-        .say("this is no file in a run's folder")
+        .say("this is not a path inside a run's folder")
         .expected("a relative path without `..`")
         .found(format!("`{}`", path.display()));
 }
 
-/// Complains of a command that is not there.
+/// Reports a command that does not exist.
 fn program(model: &External, context: &Context<'_>, complaints: &mut Complaints<'_>) {
     let fill = |template: &Template| template.fill(|name| of_the_study(name, context.directory));
     let Some(Ok(name)) = model.command.first().map(fill) else { return };
@@ -233,7 +233,7 @@ fn program(model: &External, context: &Context<'_>, complaints: &mut Complaints<
     if Path::new(&name).components().count() > 1 {
         let path = context.directory.join(&name);
         if path.is_file() {
-            spot.say(format!("`{}` is no program: it may not be executed", path.display()));
+            spot.say(format!("`{}` is not an executable file", path.display()));
         } else {
             spot.say(format!("there is no file `{}`: the command is not there", path.display()));
         }

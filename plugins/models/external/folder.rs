@@ -1,4 +1,4 @@
-//! The folder in which a command runs.
+//! Folder in which a command runs.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};
@@ -7,16 +7,16 @@ use lacuna::plugin::model::{Call, EvalError};
 use lacuna::run::files::in_words;
 use tempfile::TempDir;
 
-/// A run's folder.
+/// Folder of a run.
 pub enum Folder {
-    /// One that the study keeps.
+    /// A folder kept by the study.
     Kept(PathBuf),
-    /// One for an evaluation of which nothing is kept.
+    /// A temporary folder for an evaluation of which nothing is kept.
     Passing(TempDir),
 }
 
 impl Folder {
-    /// An empty folder for a call; files of an earlier, interrupted run in it are removed.
+    /// Creates an empty folder for a call; files of an earlier, interrupted run are removed.
     pub fn of(call: &Call<'_>) -> Result<Self, EvalError> {
         let Some(directory) = call.directory else {
             let folder = tempfile::Builder::new().prefix("lacuna-run-").tempdir();
@@ -33,7 +33,7 @@ impl Folder {
         Ok(Self::Kept(folder))
     }
 
-    /// Where it is, from the root.
+    /// Returns the absolute path.
     pub fn path(&self) -> &Path {
         match self {
             Self::Kept(path) => path,
@@ -41,27 +41,27 @@ impl Folder {
         }
     }
 
-    /// Leaves it after the run.
+    /// Leaves the folder after the run; it is removed unless `keep` is true.
     pub fn leave(self, keep: bool) {
         if let (Self::Kept(path), false) = (&self, keep) {
-            // A file that somebody holds open costs some space and no result.
+            // A file held open by another process costs some space and no result.
             let _ = fs::remove_dir_all(path);
         }
     }
 }
 
-/// What cannot be done with a file: no run can be made.
+/// Returns the error for a failed file operation: no run can be made.
 pub fn cannot(what: &str, path: &Path, error: &std::io::Error) -> EvalError {
     EvalError::Fatal(format!("cannot {what} {}: {}", path.display(), in_words(error)))
 }
 
-/// Whether a relative path stays in the folder from which it starts.
+/// Returns true if a relative path stays inside the folder it starts from.
 pub fn stays_inside(path: &Path) -> bool {
     let normal = |component| matches!(component, Component::Normal(_) | Component::CurDir);
     path.components().all(normal) && path.file_name().is_some()
 }
 
-/// Copies a file, or a folder with all that is in it.
+/// Copies a file, or a folder with its contents.
 pub fn copy(from: &Path, to: &Path) -> std::io::Result<()> {
     if !from.is_dir() {
         return fs::copy(from, to).map(|_| ());
@@ -74,7 +74,7 @@ pub fn copy(from: &Path, to: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Makes a link, or a copy where there are no links.
+/// Makes a symbolic link, or a copy on systems without links.
 pub fn link(from: &Path, to: &Path) -> std::io::Result<()> {
     #[cfg(unix)]
     return std::os::unix::fs::symlink(from, to);

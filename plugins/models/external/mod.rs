@@ -13,18 +13,19 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use lacuna::data::Unit;
-use lacuna::plugin::abi::Library;
 use lacuna::plugin::model::{Call, EvalError, Response, Signature};
-use lacuna::plugin::{Component, Context, Fact, Fault, Model};
-use lacuna::study::problem::Complaints;
-use lacuna::study::values::Positive;
+use lacuna::plugin::{Component, Context, Fact, Library, Model};
+use lacuna::run::Fault;
+use lacuna::text::problem::Complaints;
+use lacuna::text::values::Positive;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use self::folder::Folder;
+use super::given;
+
 pub use self::output::Output;
 pub use self::template::Template;
-use super::given;
 
 /// Runs any command as the simulator: Sierra, ABAQUS, an in-house code, a script.
 ///
@@ -39,96 +40,97 @@ use super::given;
 /// success = { file = "deck.log", contains = ["Normal termination"] }
 /// ```
 ///
-/// Every run has a folder of its own, in which the command is started; what it prints is kept there in
-/// `stdout.txt` and `stderr.txt`. The inputs are all that the study gives (parameters, fixed values, values of a
-/// scenario), in the study's units or in those of `units`. They reach the command through **templates**,
-/// in which `{{ density }}` stands for a value and `{{ density | %.6e }}` for the same in a format of C's `printf`
-/// (flags, width and precision with `e`, `f`, `g`, `E`, `G`); without a format it is the shortest text that reads
-/// back as the same number. `{{ run }}` is the run's name, `{{ scenario }}` the scenario's, `{{ study }}` the
-/// folder of the study. The words of `command` and the values of `environment` are templates too. Or
-/// they reach it as **JSON** on standard input: `{"run": …, "inputs": {name: value}, "scenario": {"name": …,
-/// "values": {…}, "functions": {…}}, "layout": {"name": …, "unit": …, "axes": […]}}`.
+/// Every run has a folder of its own, in which the command is started; its output is kept there in `stdout.txt` and
+/// `stderr.txt`. The inputs are all that the study gives (parameters, fixed values, values of a scenario), in the
+/// study's units or in those of `units`. They reach the command through **templates**, in which `{{ density }}` is
+/// replaced by a value and `{{ density | %.6e }}` by the value in a format of C's `printf` (flags, width and
+/// precision with `e`, `f`, `g`, `E`, `G`); without a format it is the shortest text that reads back as the same
+/// number. `{{ run }}` is the name of the run, `{{ scenario }}` that of the scenario, `{{ study }}` the folder of the
+/// study. The words of `command` and the values of `environment` are templates too. Alternatively the inputs are
+/// passed as **JSON** on standard input:
+/// `{"run": …, "inputs": {name: value}, "scenario": {"name": …, "values": {…}, "functions": {…}}, "layout": {"name": …, "unit": …, "axes": […]}}`.
 ///
-/// A run that does not end well (exit code, `success`, `timeout`, output that is missing, damaged or not
-/// finite) is tried again `retries` times, then counts as failed with its reason; the study goes on.
-/// When a run has ended, for whatever reason, all processes that it started are ended.
+/// A run that fails (exit code, `success`, `timeout`, output that is missing, damaged or not finite) is repeated up
+/// to `retries` times, then counts as failed with its reason; the study continues. When a run has ended, for whatever
+/// reason, all processes that it started are terminated.
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct External {
-    /// The program and its arguments, one word each. A program with a `/` is relative to the study file,
-    /// any other is looked up in `PATH`. No shell is involved unless it is named: `["sh", "-c", "…"]`.
+    /// Program and its arguments, one word per element. A program with a `/` is relative to the study file, any other
+    /// is looked up in `PATH`. No shell is involved unless it is named: `["sh", "-c", "…"]`.
     pub command: Vec<Template>,
-    /// Where the response is: `"json"`, or a table with a reader and the file: `use`, `path` relative to the run's
-    /// folder, and the reader's options. JSON is printed to standard output as the only or the last line: nested lists
-    /// in the order of the axes, one flat list, or objects by label.
+    /// Location of the response: `"json"`, or a table with a reader and the file: `use`, `path` relative to the run's
+    /// folder, and the reader's options. JSON must be printed to standard output as the only or the last line: nested
+    /// lists in the order of the axes, one flat list, or objects by label.
     pub output: Output,
     /// Files made from templates: a list of `{ from = "deck.template", to = "deck.i" }`, the first relative to the
     /// study file, the second to the run's folder.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub templates: Vec<TemplateFile>,
-    /// What the command finds on its standard input.
+    /// Standard input of the command.
     #[serde(default)]
     pub input: Input,
-    /// Files and folders that are copied into each run's folder, relative to the study file.
+    /// Files and folders to be copied into each run's folder, relative to the study file.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub copy: Vec<PathBuf>,
-    /// Files and folders to which each run's folder has a link, such as a large mesh, relative to the study file.
+    /// Files and folders to which each run's folder gets a link, such as a large mesh, relative to the study file.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub link: Vec<PathBuf>,
-    /// Variables of the command's environment, beside those that Lacuna was started with.
+    /// Environment variables of the command, in addition to those with which Lacuna was started.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub environment: BTreeMap<String, Template>,
-    /// Units in which the command takes inputs, where they are not the study's.
+    /// Units in which the command expects inputs, if they differ from the study's.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub units: BTreeMap<String, Unit>,
-    /// Seconds after which an attempt is stopped; no limit when left out.
+    /// Time limit of an attempt in seconds; an attempt that exceeds it is stopped and counts as failed. Default: no
+    /// limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub timeout: Option<Positive>,
-    /// When an attempt has gone well.
+    /// Conditions for a successful attempt.
     #[serde(default)]
     pub success: Success,
-    /// How often a run that failed is tried again. With retries the attempts have folders `attempt1`, `attempt2`, …
+    /// Number of further attempts after a failure. With retries the attempts have folders `attempt1`, `attempt2`, …
     /// in the run's folder.
     #[serde(default)]
     pub retries: usize,
-    /// Which folders of runs stay when the run has ended.
+    /// Folders of runs that are kept after the run.
     #[serde(default)]
     pub keep: Keep,
 }
 
-/// A file that is made for each run.
+/// A file made for each run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TemplateFile {
-    /// The template, relative to the study file.
+    /// Template, relative to the study file.
     pub from: PathBuf,
-    /// The file that is made of it, relative to the run's folder.
+    /// Resulting file, relative to the run's folder.
     pub to: PathBuf,
 }
 
-/// What a command finds on its standard input.
+/// Standard input of a command.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Input {
-    /// Nothing.
+    /// Empty.
     #[default]
     None,
-    /// One JSON object with the inputs.
+    /// One JSON object with the inputs by name.
     Json,
 }
 
-/// When an attempt has gone well.
+/// Conditions for a successful attempt.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Success {
-    /// The exit codes of a run that went well.
+    /// Exit codes of a successful run.
     pub exit_codes: Vec<i32>,
-    /// The file that tells, relative to the run's folder.
+    /// File that shows success, relative to the run's folder.
     pub file: PathBuf,
-    /// Texts each of which stands in that file when all went well.
+    /// Texts that this file must all contain.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub contains: Vec<String>,
-    /// Texts none of which stands in that file when all went well.
+    /// Texts of which this file must contain none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lacks: Vec<String>,
 }
@@ -140,16 +142,16 @@ impl Default for Success {
     }
 }
 
-/// Which folders of runs stay.
+/// Folders of runs that are kept after the run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Keep {
-    /// Those of all runs.
+    /// Keep the folders of all runs.
     #[default]
     All,
-    /// Those of runs that failed.
+    /// Keep the folders of failed runs only.
     Failed,
-    /// None.
+    /// Keep no folder.
     None,
 }
 
@@ -196,7 +198,7 @@ impl Model for External {
     fn files(&self, directory: &Path) -> Vec<PathBuf> {
         let templates = self.templates.iter().map(|template| &template.from);
         let named = templates.chain(&self.copy).chain(&self.link).map(|path| directory.join(path));
-        // A script of the user's own stands among the words.
+        // A script of the user's own may be among the words.
         let words = self.command.iter().filter_map(|word| {
             let word = word.fill(|name| run::of_the_study(name, directory)).ok()?;
             let path = directory.join(&word);
@@ -207,7 +209,7 @@ impl Model for External {
 }
 
 impl External {
-    /// Tries until an attempt goes well or none is left.
+    /// Repeats attempts until one succeeds or none is left.
     fn attempts(&self, call: &Call<'_>, folder: &Path) -> Result<Response, EvalError> {
         let most = self.retries + 1;
         let mut attempt = 1;

@@ -1,12 +1,12 @@
-//! Numbers as an input deck wants them: the shortest text that reads back the same, or C's `printf` formats.
+//! Numbers as required by input decks: the shortest text that reads back the same, or C's `printf` formats.
 
 use std::iter::Peekable;
 use std::str::Chars;
 
-/// How a number is written: a conversion of C's `printf` for one floating-point number.
+/// Number format: a conversion of C's `printf` for one floating-point number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Format {
-    /// What stands before a number that is not negative.
+    /// Text in front of a number that is not negative.
     positive: &'static str,
     fill: Fill,
     width: usize,
@@ -15,7 +15,7 @@ pub struct Format {
     capital: bool,
 }
 
-/// What makes a text as wide as it is to be.
+/// Padding up to the width.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Fill {
     BlanksBefore,
@@ -30,11 +30,11 @@ enum Conversion {
     General,
 }
 
-/// Widths and precisions above this are slips.
+/// Largest accepted width and precision; larger values are taken to be mistakes.
 const MOST: usize = 100;
 
 impl Format {
-    /// Reads a format: `%`, flags among `-+ 0`, a width, a point with a precision, and one of `e E f F g G`.
+    /// Parses a format: `%`, flags among `-+ 0`, a width, a point with a precision, and one of `e E f F g G`.
     pub fn parse(text: &str) -> Option<Self> {
         let mut rest = text.strip_prefix('%')?.chars().peekable();
         let mut flags = [false; 4];
@@ -72,7 +72,7 @@ impl Format {
         })
     }
 
-    /// A finite number in this format.
+    /// Formats a finite number.
     pub fn write(self, x: f64) -> String {
         let size = x.abs();
         let mut digits = match self.conversion {
@@ -102,7 +102,7 @@ fn digits(rest: &mut Peekable<Chars<'_>>) -> Option<usize> {
     number
 }
 
-/// One digit, a point and `precision` digits, and an exponent of two digits or more.
+/// Formats one digit, a point and `precision` digits, and an exponent of at least two digits.
 fn exponential(size: f64, precision: usize) -> String {
     let text = format!("{size:.precision$e}");
     let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
@@ -110,8 +110,8 @@ fn exponential(size: f64, precision: usize) -> String {
     format!("{mantissa}e{sign}{exponent:0>2}")
 }
 
-/// C11, 7.21.6.1: the style of `%e` where the exponent is below -4 or not below the precision, else that of
-/// `%f`; zeros at the end left out.
+/// Formats as in C11, 7.21.6.1: in the style of `%e` if the exponent is below -4 or not below the precision, else in
+/// that of `%f`; without trailing zeros.
 fn general(size: f64, precision: usize) -> String {
     let rounded = format!("{size:.*e}", precision - 1);
     let exponent: i32 = rounded.rsplit('e').next().and_then(|e| e.parse().ok()).unwrap_or(0);
@@ -127,7 +127,7 @@ fn general(size: f64, precision: usize) -> String {
     bare(&format!("{size:.*}", (precision as i32 - 1 - exponent) as usize))
 }
 
-/// The shortest decimal that reads back as the same number.
+/// Returns the shortest decimal that reads back as the same number.
 pub fn shortest(x: f64) -> String {
     format!("{x:?}")
 }

@@ -1,4 +1,4 @@
-//! Where the response of a command is: in what it printed, or in a file of any reader's format.
+//! Location of a command's response: its output, or a file in any reader's format.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use lacuna::data::Layout;
 use lacuna::plugin::reader::ReadError;
+use lacuna::plugin::schema;
 use lacuna::plugin::{Context, Reader};
-use lacuna::study::problem::{Complaints, Problem};
-use lacuna::study::schema;
+use lacuna::text::problem::{Complaints, Problem};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error as _, MapAccess, Visitor};
@@ -16,10 +16,10 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::models::nested::{self, Nested};
 
-/// Where the response is.
+/// Location of the response.
 #[derive(Debug)]
 pub enum Output {
-    /// JSON on standard output.
+    /// JSON on the command's standard output.
     Json,
     /// A file in the run's folder.
     File(Box<File>),
@@ -28,16 +28,16 @@ pub enum Output {
 /// A file with a response, and the reader of its format.
 pub type File = Nested<dyn Reader, FileKeys>;
 
-/// The keys beside the reader's own.
+/// Keys next to the reader's own options.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FileKeys {
-    /// The file with the response, relative to the run's folder.
+    /// File with the response, relative to the run's folder.
     pub path: PathBuf,
 }
 
 impl Output {
-    /// The file, if it is one.
+    /// Returns the file, if the response is in one.
     pub fn file(&self) -> Option<&File> {
         match self {
             Self::Json => None,
@@ -47,12 +47,12 @@ impl Output {
 }
 
 impl File {
-    /// The file, relative to the run's folder.
+    /// Returns the path of the file, relative to the run's folder.
     pub fn path(&self) -> &Path {
         self.section().map_or(Path::new(""), |section| &section.common.path)
     }
 
-    /// The response in the file of a run.
+    /// Reads the response from the file of a run.
     pub fn read(&self, folder: &Path, layout: &Layout) -> Result<Vec<f64>, ReadError> {
         let path = folder.join(self.path());
         match self.section() {
@@ -61,14 +61,14 @@ impl File {
         }
     }
 
-    /// Complains of the reader's options, at `output`.
+    /// Reports problems of the reader's options, at `output`.
     pub fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
         match self.section() {
             Err(problems) => pass_on(problems, complaints),
             Ok(section) if section.built.plugin.names_files() => {
                 complaints
                     .at("output")
-                    .say("the reader is given files of finished runs")
+                    .say("the reader's options name files of finished runs")
                     .help("leave them out: each run's file is `path`, in the run's folder");
             }
             Ok(section) => {
@@ -79,7 +79,7 @@ impl File {
     }
 }
 
-/// Repeats complaints about the reader's options where they stand in the study.
+/// Repeats problems of the reader's options at their position in the study.
 fn pass_on(problems: &[Problem], complaints: &mut Complaints<'_>) {
     nested::pass_on("output", "", problems, complaints);
 }

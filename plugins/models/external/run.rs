@@ -1,4 +1,4 @@
-//! One attempt at a run.
+//! Execution of one attempt at a run.
 
 use std::fs::{self, File};
 use std::path::Path;
@@ -15,22 +15,22 @@ use super::template::{Filling, Template};
 use super::{External, Input, answer, given};
 use crate::models::process::{self, Process, tail_of_file};
 
-/// What the command prints.
+/// File with the standard output of the command.
 pub const STDOUT: &str = "stdout.txt";
-/// What the command prints as errors.
+/// File with the standard error of the command.
 pub const STDERR: &str = "stderr.txt";
-/// What the command finds on its standard input.
+/// File with the standard input of the command.
 pub const STDIN: &str = "input.json";
-/// The names in templates that are no inputs.
+/// Names in templates that are not inputs.
 pub const NOT_INPUTS: [&str; 3] = ["run", "scenario", "study"];
 
-/// The value of a name that is the same in all runs.
+/// Returns the value of a name that is the same in all runs.
 pub fn of_the_study(name: &str, directory: &Path) -> Option<Filling> {
     let folder = std::path::absolute(directory).unwrap_or_else(|_| directory.to_owned());
     (name == "study").then(|| Filling::Text(folder.display().to_string()))
 }
 
-/// The value of a name in a run.
+/// Returns the value of a name in a run.
 fn value(name: &str, call: &Call<'_>) -> Option<Filling> {
     if let Some(i) = call.names.iter().position(|input| input == name) {
         return Some(Filling::Number(call.inputs[i]));
@@ -42,7 +42,7 @@ fn value(name: &str, call: &Call<'_>) -> Option<Filling> {
     }
 }
 
-/// The name of the run's folder; `run` for an evaluation of which nothing is kept.
+/// Returns the name of the run's folder; `run` for an evaluation of which nothing is kept.
 fn run_name<'a>(call: &Call<'a>) -> &'a str {
     call.directory.and_then(Path::file_name).and_then(|name| name.to_str()).unwrap_or("run")
 }
@@ -54,7 +54,7 @@ fn fill(template: &Template, call: &Call<'_>) -> Result<String, EvalError> {
 }
 
 impl External {
-    /// Runs the command in a fresh folder and reads the response.
+    /// Runs the command in a new folder and reads the response.
     pub(super) fn attempt(&self, call: &Call<'_>, folder: &Path) -> Result<Vec<f64>, EvalError> {
         fs::create_dir_all(folder).map_err(|error| cannot("make the folder", folder, &error))?;
         self.provide(call, folder)?;
@@ -63,7 +63,7 @@ impl External {
         self.response(call, folder)
     }
 
-    /// Fills the folder with what the command needs.
+    /// Fills the folder with the files that the command needs.
     fn provide(&self, call: &Call<'_>, folder: &Path) -> Result<(), EvalError> {
         let study = std::path::absolute(call.study).unwrap_or_else(|_| call.study.to_owned());
         for (paths, put) in [(&self.copy, copy as fn(&Path, &Path) -> _), (&self.link, link)] {
@@ -86,7 +86,7 @@ impl External {
         }
     }
 
-    /// Runs the command to its end.
+    /// Runs the command to its end; fails if it exceeds the time limit.
     fn execute(&self, call: &Call<'_>, folder: &Path) -> Result<ExitStatus, EvalError> {
         let words: Vec<String> =
             self.command.iter().map(|word| fill(word, call)).collect::<Result<_, _>>()?;
@@ -119,12 +119,12 @@ impl External {
         });
         let ended = ended.map_err(|error| cannot("run", &program, &error))?;
         ended.ok_or_else(|| {
-            let limit = self.timeout.map_or(0.0, lacuna::study::values::Positive::get);
+            let limit = self.timeout.map_or(0.0, lacuna::text::values::Positive::get);
             rejected(folder, format!("`{name}` was stopped after {limit} s"))
         })
     }
 
-    /// Whether the run went well.
+    /// Fails unless the run satisfies the conditions for success.
     fn judge(&self, status: ExitStatus, folder: &Path) -> Result<(), EvalError> {
         let name = self.name();
         match status.code() {
@@ -174,7 +174,7 @@ impl External {
         }
     }
 
-    /// The program as the study names it.
+    /// Returns the program as named in the study.
     fn name(&self) -> &str {
         self.command.first().map_or("", Template::as_str)
     }
@@ -190,7 +190,7 @@ fn write(path: &Path, text: &str) -> Result<(), EvalError> {
     make().map_err(|error| cannot("write", path, &error))
 }
 
-/// The inputs as a document.
+/// Returns the inputs as a JSON document.
 fn document(call: &Call<'_>) -> Value {
     let pairs = call.names.iter().zip(call.inputs);
     let inputs: Map<String, Value> = pairs.map(|(name, x)| (name.clone(), json!(x))).collect();
@@ -202,7 +202,7 @@ fn document(call: &Call<'_>) -> Value {
     })
 }
 
-/// Why a run failed, with the end of what it printed.
+/// Builds the error of a failed run, with the end of its output.
 fn rejected(folder: &Path, reason: String) -> EvalError {
     let printed = [STDERR, STDOUT].map(|file| tail_of_file(&folder.join(file)));
     let tail = printed.into_iter().find(|tail| !tail.is_empty());
@@ -212,7 +212,7 @@ fn rejected(folder: &Path, reason: String) -> EvalError {
     })
 }
 
-/// A text in which paths in the run's folder begin there: where a run was made is no part of its result.
+/// Makes paths inside the run's folder relative to it, because the location of a run is not part of its result.
 fn inside(folder: &Path, text: &str) -> String {
     let text = text.replace(&format!("{}/", folder.display()), "");
     text.chars().filter(|c| !c.is_control() || *c == '\n').collect()

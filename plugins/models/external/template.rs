@@ -1,7 +1,7 @@
-//! Texts with places for values: `density = {{ density | %.6e }}`.
+//! Texts with placeholders for values: `density = {{ density | %.6e }}`.
 //!
-//! A place is `{{`, a name, if wanted `|` and a format, and `}}`, all on one line. There is nothing else: no
-//! expressions and no conditions. A text that is to hold `{{` cannot be written.
+//! A placeholder is `{{`, a name, optionally `|` and a format, and `}}`, all on one line. There are no expressions
+//! and no conditions. A text that contains a literal `{{` cannot be written.
 
 use std::fmt;
 use std::ops::Range;
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::number::{Format, shortest};
 
-/// A text with places for values.
+/// A text with placeholders for values.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Template {
@@ -39,37 +39,37 @@ enum Piece {
     Place(Place),
 }
 
-/// A place for a value.
+/// A placeholder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Place {
-    /// The name of the value.
+    /// Name of the value.
     pub name: String,
-    /// How it is written, where that is said.
+    /// Format of the value, if given.
     pub format: Option<Format>,
-    /// The bytes of the text in which the name stands.
+    /// Byte range of the name in the text.
     pub at: Range<usize>,
 }
 
-/// A value for a place.
+/// A value for a placeholder.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Filling {
-    /// A number.
+    /// Number, written in the placeholder's format.
     Number(f64),
-    /// A text, which takes no format.
+    /// Text, for placeholders without a format.
     Text(String),
 }
 
-/// What is wrong with a template, and where.
+/// An error in a template, with its position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TemplateError {
-    /// What is wrong.
+    /// Description.
     pub message: String,
-    /// Where the fault begins in the text, in bytes.
+    /// Start of the error in the text, in bytes.
     pub at: usize,
 }
 
 impl Template {
-    /// Finds the places of a text.
+    /// Parses a text with its placeholders.
     pub fn parse(text: impl Into<String>) -> Result<Self, TemplateError> {
         let text = text.into();
         let mut pieces = Vec::new();
@@ -88,12 +88,12 @@ impl Template {
         Ok(Self { text, pieces })
     }
 
-    /// The text with its places.
+    /// Returns the text with its placeholders.
     pub fn as_str(&self) -> &str {
         &self.text
     }
 
-    /// The places in their order.
+    /// Iterates over the placeholders in order.
     pub fn places(&self) -> impl Iterator<Item = &Place> {
         self.pieces.iter().filter_map(|piece| match piece {
             Piece::Place(place) => Some(place),
@@ -101,7 +101,7 @@ impl Template {
         })
     }
 
-    /// The text with values in its places; the error is a name without a value.
+    /// Replaces the placeholders by values; the error is a name without a value.
     pub fn fill(&self, value: impl Fn(&str) -> Option<Filling>) -> Result<String, String> {
         let mut filled = String::with_capacity(self.text.len());
         for piece in &self.pieces {
@@ -119,7 +119,7 @@ impl Template {
         Ok(filled)
     }
 
-    /// The line and the column, both from 1, of a byte of the text.
+    /// Returns line and column, both counted from 1, of a byte of the text.
     pub fn position(text: &str, at: usize) -> (usize, usize) {
         let before = &text[..at];
         let start = before.rfind('\n').map_or(0, |newline| newline + 1);
@@ -127,7 +127,7 @@ impl Template {
     }
 }
 
-/// What stands between the braces.
+/// Parses the text between the braces.
 fn place(text: &str, range: Range<usize>) -> Result<Place, String> {
     let inside = &text[range.clone()];
     let (name, format) = match inside.split_once('|') {

@@ -1,28 +1,27 @@
-//! How forces become velocities: masses, held motions, the sliding contact between fluid and
-//! wall, a rigid plate, and the rear end that lets waves leave.
+//! Conversion of forces to velocities: masses, held motions, the sliding contact between fluid and wall, a rigid
+//! plate, and the absorbing rear end.
 //!
-//! The fluid slips along the wall: a wall node and its fluid node share the acceleration along
-//! the normal, `a_n = (F_fluid + F_wall)·n / (m_fluid + m_wall)`, and keep their own along the
-//! meridian. The normal is that of the fluid's discrete surface, so that a uniform pressure
-//! pushes along it exactly.
+//! The fluid slips along the wall: a wall node and its fluid node share the acceleration along the normal,
+//! `a_n = (F_fluid + F_wall)·n / (m_fluid + m_wall)`, and have separate accelerations along the meridian. The normal is
+//! that of the fluid's discrete surface, so that a uniform pressure acts exactly along it.
 
-/// A value for every motion: velocities, forces or masses.
+/// One value for every motion of fluid and wall: velocities (m/s, rad/s), forces (N, N m) or masses (kg, kg m²).
 #[derive(Debug, Clone, Default)]
 pub struct Field {
-    /// Radial, of each fluid node.
+    /// Radial component at each fluid node, indexed as in the mesh.
     pub fluid_r: Vec<f64>,
-    /// Axial, of each fluid node.
+    /// Axial component at each fluid node.
     pub fluid_z: Vec<f64>,
-    /// Radial, of each wall node.
+    /// Radial component at each wall node, from the apex of the cap.
     pub shell_r: Vec<f64>,
-    /// Axial, of each wall node.
+    /// Axial component at each wall node.
     pub shell_z: Vec<f64>,
-    /// Rotation of each wall node.
+    /// Rotation component at each wall node.
     pub shell_turn: Vec<f64>,
 }
 
 impl Field {
-    /// All zero.
+    /// A field of zeros.
     pub fn zeros(fluid_nodes: usize, shell_nodes: usize) -> Self {
         Self {
             fluid_r: vec![0.0; fluid_nodes],
@@ -33,12 +32,12 @@ impl Field {
         }
     }
 
-    /// The five parts in order.
+    /// The five components, in the order of the fields.
     pub fn parts(&self) -> [&Vec<f64>; 5] {
         [&self.fluid_r, &self.fluid_z, &self.shell_r, &self.shell_z, &self.shell_turn]
     }
 
-    /// The five parts in order, to change.
+    /// The five components, mutable, in the order of the fields.
     pub fn parts_mut(&mut self) -> [&mut Vec<f64>; 5] {
         [
             &mut self.fluid_r,
@@ -53,29 +52,29 @@ impl Field {
 /// Motions that are held at zero.
 #[derive(Debug, Clone)]
 pub struct Held {
-    /// (r, z) of each fluid node.
+    /// Held motions (r, z) of each fluid node.
     pub fluid: Vec<[bool; 2]>,
-    /// (r, z, rotation) of each wall node.
+    /// Held motions (r, z, rotation) of each wall node.
     pub shell: Vec<[bool; 3]>,
 }
 
 /// Contact between a fluid node and a wall node.
 #[derive(Debug, Clone, Copy)]
 pub enum Contact {
-    /// They share the motion along the normal.
+    /// Shared motion along the normal, separate motions along the meridian.
     Slip,
-    /// They share both components: a corner, which has no single normal.
+    /// Shared motion in both components: for a corner, which has no single normal.
     Stick,
 }
 
-/// What joins the parts.
+/// Connections between fluid, wall, plate and the mercury behind the rear end.
 #[derive(Debug, Clone, Default)]
 pub struct Joints {
-    /// Fluid node, wall node, kind of contact.
+    /// Contacts: fluid node, wall node, kind of contact.
     pub contacts: Vec<(usize, usize, Contact)>,
-    /// Fluid nodes that move axially as one, and the mass of the plate they carry, kg.
+    /// Rigid plate: the fluid nodes that move axially with it, and its mass, kg.
     pub plate: Option<(Vec<usize>, f64)>,
-    /// Fluid nodes of a rear end behind which the fluid continues.
+    /// Fluid nodes of an absorbing rear end, behind which the fluid continues.
     pub open_end: Vec<usize>,
 }
 
@@ -96,10 +95,10 @@ struct Absorber {
     resistance: f64,
 }
 
-/// Everything needed to turn forces into velocities.
+/// Data for the conversion of forces to velocities.
 #[derive(Debug, Clone)]
 pub struct Motion {
-    /// Mass of every motion, a plate's share included.
+    /// Mass of every motion, with the plate's mass distributed over its nodes; kg, and kg m² for rotations.
     pub mass: Field,
     inverse: Field,
     links: Vec<Link>,
@@ -109,7 +108,8 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// `area` is the outward area vector of each fluid node (zero inside), `impedance` = `ρc`.
+    /// The motion of a system with the given masses. `area` is the outward area vector (r, z) of each fluid node, m²,
+    /// zero at inner nodes; `impedance` is `ρc`, kg/(m² s).
     pub fn new(
         mut mass: Field,
         area: &[Vec<f64>; 2],
@@ -141,8 +141,8 @@ impl Motion {
         Self { mass, inverse, links, plate, plate_inverse, absorbers }
     }
 
-    /// Changes the velocities by the forces over `dt`; returns the energy that the open end
-    /// takes out, in J.
+    /// Changes the velocities by the forces over `dt`, s. Returns the energy that leaves through the absorbing end,
+    /// J.
     pub fn kick(&self, velocity: &mut Field, force: &Field, dt: f64) -> f64 {
         let parts = velocity.parts_mut().into_iter().zip(force.parts()).zip(self.inverse.parts());
         for ((v, f), inverse) in parts {
@@ -162,7 +162,7 @@ impl Motion {
         let mut radiated = 0.0;
         for end in &self.absorbers {
             let v = &mut velocity.fluid_z[end.node];
-            // The resistance acts on the mean of old and new velocity: stable for any step.
+            // The resistance acts on the mean of the old and the new velocity, which is stable for any step.
             let half = 0.5 * dt * end.resistance * end.inverse_mass;
             let new = (*v * (1.0 - half) + dt * force.fluid_z[end.node] * end.inverse_mass)
                 / (1.0 + half);
@@ -173,7 +173,7 @@ impl Motion {
         radiated
     }
 
-    /// Power taken out by the open end at the mean of two velocities, tested with the first, W.
+    /// Power that leaves through the absorbing end at the mean of the two velocities, projected on the first, W.
     pub fn radiated_power(&self, before: &Field, after: &Field) -> f64 {
         let power = |end: &Absorber| {
             let (v, w) = (before.fluid_z[end.node], after.fluid_z[end.node]);
@@ -182,7 +182,7 @@ impl Motion {
         self.absorbers.iter().map(power).sum()
     }
 
-    /// Kinetic energy `½ m v·w` of the leapfrog's velocities half a step before and after, J.
+    /// Kinetic energy `½ m v·w` of the leapfrog's velocities half a step before (`v`) and after (`w`), J.
     pub fn kinetic(&self, before: &Field, after: &Field) -> f64 {
         let parts = self.mass.parts().into_iter().zip(before.parts()).zip(after.parts());
         let part = |((m, v), w): ((&Vec<f64>, &Vec<f64>), &Vec<f64>)| -> f64 {
@@ -235,7 +235,7 @@ fn inverse_masses(mass: &Field, held: &Held) -> Field {
     inverse
 }
 
-/// The links of a contact; they take over the two nodes from the free motion.
+/// The links of a contact. They replace the free motion of the two nodes.
 fn links(
     (fluid, shell, contact): (usize, usize, Contact),
     mass: &Field,
@@ -268,8 +268,8 @@ fn links(
         }
         Contact::Slip => {
             let (a_r, a_z) = (area[0][fluid], area[1][fluid]);
-            // On the axis the radial motion is held and the normal is the axis; on a straight
-            // wall with held ends the axial motion is held and the normal is radial.
+            // On the axis the radial motion is held and the normal is the axis. On a straight wall with held ends the
+            // axial motion is held and the normal is radial.
             let normal = match free[0] {
                 [0.0, _] => [0.0, a_z.signum()],
                 [_, 0.0] => [1.0, 0.0],

@@ -1,14 +1,14 @@
 //! Equations of state of the fluid.
 
-/// Pressure as a function of the volumetric strain, cell by cell, with whatever state the law
-/// needs in each cell. The solver is compiled once for each law, so that adding one leaves the
-/// others' results as they are, bit for bit.
+/// Pressure as a function of the volumetric strain, cell by cell, with any state that the law needs in each cell. The
+/// solver is compiled separately for each law, so that an additional law leaves the results of the others unchanged
+/// to the last bit.
 pub trait EquationOfState {
-    /// Advances the cells `first..first + strain.len()` by `dt` to the given volumetric strains
-    /// (total since the pulse); writes their pressures (Pa, relative to the static state) and the
-    /// present speed of small waves as a share of [`Self::sound_speed`]: 1 where the liquid is
-    /// whole, 0 where it is cavitated. The solver first asks for the state just after the pulse, no
-    /// strain and `dt = 0`, and for that half a step later: the pressure that starts the motion.
+    /// Advances the cells `first..first + strain.len()` by `dt`, s, to the given volumetric strains (total since the
+    /// pulse). Writes into the cells' entries the pressures (Pa, relative to the static state) and the current speed
+    /// of small waves divided by [`Self::sound_speed`]: 1 in pure liquid, 0 where the liquid is cavitated. The solver
+    /// first calls this just after the pulse with zero strain and `dt = 0`, then with half a step: the second
+    /// pressure starts the motion.
     fn update(
         &mut self,
         first: usize,
@@ -24,14 +24,14 @@ pub trait EquationOfState {
     /// Energy stored in a cell at a volumetric strain, J/m³.
     fn stored_energy(&self, cell: usize, strain: f64) -> f64;
 
-    /// Energy that the law itself has turned into heat in a cell so far, J/m³.
+    /// Energy that the law has converted to heat in a cell so far, J/m³; 0 for a reversible law.
     fn lost_energy(&self, _cell: usize) -> f64 {
         0.0
     }
 }
 
-/// `p = max(p₀ - K ε, -p_c)` with `K = ρc²`: linear, reversible, with a tensile cutoff (the
-/// bilinear fluid of Bleich and Sandler 1970).
+/// `p = max(p₀ - K ε, -p_c)` with `K = ρc²`: linear and reversible, with a tensile cutoff (the bilinear fluid of
+/// Bleich and Sandler, Int. J. Solids Structures 6, 1970, 617).
 #[derive(Debug, Clone)]
 pub struct TensileCutoff {
     initial: Vec<f64>,
@@ -41,23 +41,24 @@ pub struct TensileCutoff {
 }
 
 impl TensileCutoff {
-    /// The law for cells that start at the given pressures, Pa.
+    /// The law for cells with the given pressures after the pulse, Pa. `density` is in kg/m³, `sound_speed` in m/s,
+    /// `cutoff` in Pa.
     pub fn new(density: f64, sound_speed: f64, cutoff: f64, initial: Vec<f64>) -> Self {
         let bulk_modulus = density * sound_speed * sound_speed;
         Self { initial, bulk_modulus, sound_speed, cutoff }
     }
 
-    /// Pressure of a cell at a volumetric strain as if the liquid bore any tension, Pa.
+    /// Pressure of a cell at a volumetric strain, Pa, without the cutoff.
     pub(super) fn trial(&self, cell: usize, strain: f64) -> f64 {
         self.initial[cell] - self.bulk_modulus * strain
     }
 
-    /// `K = ρc²`, Pa.
+    /// Bulk modulus `K = ρc²`, Pa.
     pub(super) fn bulk_modulus(&self) -> f64 {
         self.bulk_modulus
     }
 
-    /// The lowest pressure, `-p_c`, Pa.
+    /// Lowest pressure, `-p_c`, Pa.
     pub(super) fn floor(&self) -> f64 {
         -self.cutoff
     }
@@ -87,8 +88,8 @@ impl EquationOfState for TensileCutoff {
         self.sound_speed
     }
 
-    /// `p²/2K` above the cutoff and `p_c²/2K + p_c (ε - ε_c)` below; without stiffness (`K = 0`)
-    /// the work `-p₀ ε` of the constant pressure.
+    /// Energy `p²/2K` above the cutoff and `p_c²/2K + p_c (ε - ε_c)` below; without stiffness (`K = 0`) the work
+    /// `-p₀ ε` of the constant pressure.
     fn stored_energy(&self, cell: usize, strain: f64) -> f64 {
         let (p0, k, pc) = (self.initial[cell], self.bulk_modulus, self.cutoff);
         if k == 0.0 {

@@ -1,40 +1,41 @@
 //! The fluid: strains, pressures, artificial viscosity, hourglass control and nodal forces.
 //!
-//! Small displacements on a frozen mesh, inviscid: `ρ v' = -grad p`, `ε' = div v`. Shocks are
-//! spread by `q = -b₁ρcl d + ρ(b₂l d)²` (the second term in compression only), `d = div v`, in
-//! proportion to the present speed of small waves: none where the fluid is cavitated. The loops run along mesh rows over slices of equal length.
+//! Small displacements on a fixed mesh, inviscid: `ρ v' = -grad p`, `ε' = div v`. Shocks are spread by
+//! `q = -b₁ρcl d + ρ(b₂l d)²` (the second term in compression only), `d = div v`, multiplied by the current relative
+//! speed of small waves: zero where the fluid is cavitated. The loops run along mesh rows over slices of equal length,
+//! which the compiler vectorises.
 
 use super::coupling::Field;
 use super::eos::EquationOfState;
 use super::mesh::{CORNERS, Corner, Mesh};
 
-/// Density and numerical damping.
+/// Density and numerical damping of the fluid.
 #[derive(Debug, Clone, Copy)]
 pub struct FluidConstants {
     /// Density, kg/m³.
     pub density: f64,
-    /// Linear artificial viscosity `b₁`.
+    /// Linear artificial viscosity `b₁`, dimensionless.
     pub linear_viscosity: f64,
-    /// Quadratic artificial viscosity `b₂`.
+    /// Quadratic artificial viscosity `b₂`, dimensionless.
     pub quadratic_viscosity: f64,
-    /// Hourglass coefficient.
+    /// Hourglass coefficient, dimensionless.
     pub hourglass: f64,
 }
 
-/// State of the fluid's cells.
+/// State of the fluid's cells. Every vector has one entry per cell.
 #[derive(Debug, Clone)]
 pub struct Fluid<E> {
     /// Equation of state with its own state.
     pub eos: E,
     /// Volumetric strain since the pulse.
     pub strain: Vec<f64>,
-    /// Pressure, Pa.
+    /// Pressure relative to the static state, Pa.
     pub pressure: Vec<f64>,
-    /// Present speed of small waves as a share of the sound speed; 0 where the fluid is cavitated.
+    /// Current speed of small waves divided by the sound speed; 0 where the fluid is cavitated.
     pub speed: Vec<f64>,
     /// Longest uninterrupted time at the cutoff so far, s.
     pub longest_saturation: Vec<f64>,
-    /// Largest size of the volumetric strain so far.
+    /// Largest magnitude of the volumetric strain so far.
     pub largest_strain: Vec<f64>,
     /// Energy lost to the artificial viscosity so far, J.
     pub viscous_loss: Vec<f64>,
@@ -51,7 +52,7 @@ pub struct Fluid<E> {
     resistance: Vec<f64>,
 }
 
-/// The same quantity at the four corners of each cell of mesh row `j`.
+/// The values of a nodal quantity at the four corners of each cell of mesh row `j`.
 fn corners<'a>(mesh: &Mesh, nodal: &'a [f64], j: usize) -> [&'a [f64]; CORNERS] {
     let (nz, row) = (mesh.nz, mesh.nz + 1);
     let inner = &nodal[j * row..][..row];
@@ -65,7 +66,7 @@ fn weights<'a>(mesh: &Mesh, b: &'a Corner, j: usize) -> [&'a [f64]; CORNERS] {
     std::array::from_fn(|k| &b[k][j * nz..][..nz])
 }
 
-/// Longest stable time step of the fluid, viscosity included, s; infinite without sound speed.
+/// Longest stable time step of the fluid with its linear viscosity, s; infinite at zero sound speed.
 pub fn stable_step(mesh: &Mesh, sound_speed: f64, linear_viscosity: f64) -> f64 {
     mesh.wave_number2
         .iter()
@@ -78,15 +79,15 @@ pub fn stable_step(mesh: &Mesh, sound_speed: f64, linear_viscosity: f64) -> f64 
 }
 
 impl<E: EquationOfState> Fluid<E> {
-    /// The fluid at rest at the moment of the pulse.
+    /// The fluid at rest just after the pulse. `dt` is the time step, s.
     pub fn new(mesh: &Mesh, constants: FluidConstants, eos: E, dt: f64) -> Self {
         let FluidConstants { density, linear_viscosity: b1, quadratic_viscosity: b2, hourglass } =
             constants;
         let c = eos.sound_speed();
         let zeros = || vec![0.0; mesh.volume.len()];
         let by_thickness = |f: &dyn Fn(f64) -> f64| mesh.thickness.iter().map(|&l| f(l)).collect();
-        // Leapfrog with the damping of the step before is stable while
-        // `c²k²dt²/4 + νk²dt/2 <= 1`; the viscosity `ν` is held below that.
+        // The leapfrog, whose damping is that of the previous step, is stable while `c²k²dt²/4 + νk²dt/2 <= 1`; the
+        // viscosity `ν` is limited accordingly.
         let ceiling = |&k2: &f64| 1.8 * (1.0 - c * c * k2 * dt * dt / 4.0).max(0.0) / (k2 * dt);
         let mut fluid = Self {
             linear: by_thickness(&|l| b1 * c * l),
@@ -118,7 +119,7 @@ impl<E: EquationOfState> Fluid<E> {
         fluid
     }
 
-    /// Moves on by `dt` with the given velocities.
+    /// Advances the fluid by `dt`, s, with the given velocities, m/s.
     pub fn advance(&mut self, mesh: &Mesh, velocity: &Field, dt: f64) {
         for j in 0..mesh.nr {
             self.strain_row(mesh, velocity, j, dt);
@@ -200,7 +201,7 @@ impl<E: EquationOfState> Fluid<E> {
         }
     }
 
-    /// Writes the nodal forces `(p + q) B + γh`.
+    /// Writes the nodal forces `(p + q) B + γh`, N.
     pub fn forces(&self, mesh: &Mesh, force: &mut Field) {
         spread(mesh, self, &mesh.b_r, &self.hourglass_r, &mut force.fluid_r);
         spread(mesh, self, &mesh.b_z, &self.hourglass_z, &mut force.fluid_z);
@@ -212,12 +213,12 @@ impl<E: EquationOfState> Fluid<E> {
         cells.map(|(cell, (&v, &strain))| v * self.eos.stored_energy(cell, strain)).sum()
     }
 
-    /// Energy that the equation of state has turned into heat so far, J.
+    /// Energy that the equation of state has converted to heat so far, J.
     pub fn lost_energy(&self, mesh: &Mesh) -> f64 {
         mesh.volume.iter().enumerate().map(|(cell, v)| v * self.eos.lost_energy(cell)).sum()
     }
 
-    /// Share of the volume at the cutoff.
+    /// Volume fraction of the fluid at the cutoff, between 0 and 1.
     pub fn cavitated_fraction(&self, mesh: &Mesh) -> f64 {
         let volume: f64 = mesh.volume.iter().sum();
         mesh.volume.iter().zip(&self.speed).map(|(v, &speed)| v * cavitated(speed)).sum::<f64>()
@@ -225,12 +226,12 @@ impl<E: EquationOfState> Fluid<E> {
     }
 }
 
-/// 1 where no small wave runs, else 0.
+/// 1 at zero wave speed, else 0.
 fn cavitated(speed: f64) -> f64 {
     if speed == 0.0 { 1.0 } else { 0.0 }
 }
 
-/// One component of the nodal forces.
+/// Writes one component of the nodal forces, N.
 fn spread<E>(mesh: &Mesh, fluid: &Fluid<E>, b: &Corner, hourglass: &[f64], force: &mut [f64]) {
     let (n, row) = (mesh.nz, mesh.nz + 1);
     force.fill(0.0);

@@ -1,45 +1,45 @@
 //! Mercury with gas bubbles: an equation of state with the volume of the gas in each cell.
 //!
-//! The strain of a cell is that of the liquid plus the change of the gas volume fraction,
-//! `ε = ε_l + a - a₀`, `p = max(p₀ - K ε_l, -p_c)`. With `w = a/a₀` and the gas at
-//! `p_g = P w^-κ` (`P` the ambient pressure, `κ` the polytropic index) the gas follows by
-//! `κ P τ w' = p_g - (p + P)`: at once (`τ = 0`, the equilibrium law), or as over-damped bubbles
-//! of the relaxation time `τ`. Small changes obey `τ δ' + δ = -a₀ (p - p_s)/(κ P)`, so that long
-//! waves run at Wood's speed, `1/ρc_m² = 1/ρc² + a₀/κP`. The gas adds no mass.
+//! The strain of a cell is that of the liquid plus the change of the gas volume fraction, `ε = ε_l + a - a₀`, and
+//! `p = max(p₀ - K ε_l, -p_c)`. With `w = a/a₀` and the gas at `p_g = P w^-κ` (`P` the ambient pressure, `κ` the
+//! polytropic index) the gas obeys `κ P τ w' = p_g - (p + P)`. With `τ = 0` the gas is always in equilibrium; with
+//! `τ > 0` the bubbles are over-damped and have the relaxation time `τ`. Small changes obey
+//! `τ δ' + δ = -a₀ (p - p_s)/(κP)`, so that long waves propagate at Wood's speed, `1/ρc_m² = 1/ρc² + a₀/κP`. The mass of
+//! the gas is neglected.
 //!
-//! The step is implicit: with `w` the unknown, both sides are monotone, the root is unique, and
-//! the relaxation only takes energy.
+//! The step is implicit. In the unknown `w` both sides are monotone, hence the root is unique, and the relaxation
+//! only dissipates energy.
 
 use super::SimulationError;
 use super::eos::{EquationOfState, TensileCutoff};
 use super::settings::{Geometry, check};
 
-/// The iteration ends with a relative change below this; the error left is about its cube.
+/// Relative change below which the iteration ends; the remaining error is about its cube.
 const CLOSE: f64 = 5e-3;
 
-/// Up to this relative change steps are of third order.
+/// Relative change below which the iteration takes steps of third order.
 const NEAR: f64 = 0.1;
 
-/// No iteration takes nearly so many rounds.
+/// Limit on the number of iterations, far above the number that any case needs.
 const MOST_ROUNDS: usize = 200;
 
-/// The gas in the vessel, at rest.
+/// The gas in the vessel at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gas {
-    /// Volume fraction, mean over a cross section far behind the window.
+    /// Volume fraction of the gas, mean over a cross section far behind the window; in [0, 1).
     pub void_fraction: f64,
-    /// Stratification over the radius `a` of the vessel, in [-1, 1]: the fraction goes as
-    /// `1 + gradient (2r²/a² - 1)`, the mean over the cross section kept.
+    /// Stratification over the radius `a` of the vessel, in [-1, 1]: the volume fraction varies as
+    /// `1 + gradient (2r²/a² - 1)`, with the same mean over the cross section.
     pub gradient: f64,
-    /// Share of the gas that is missing at the window, in [0, 1].
+    /// Fraction of the gas that is missing at the window, in [0, 1].
     pub depletion: f64,
-    /// Length behind the window over which the missing share falls to 1/e, m.
+    /// Length behind the window over which the missing fraction decays to 1/e, m.
     pub depletion_length: f64,
-    /// Radius of the bubbles, m; zero when the gas is in equilibrium at any time.
+    /// Radius of the bubbles, m; 0 for gas that is always in equilibrium.
     pub bubble_radius: f64,
     /// Static pressure, Pa.
     pub ambient_pressure: f64,
-    /// Polytropic index of the gas: 1 isothermal, 5/3 adiabatic for helium.
+    /// Polytropic index of the gas: 1 for isothermal changes, 5/3 for adiabatic helium.
     pub polytropic_index: f64,
 }
 
@@ -70,7 +70,7 @@ impl Gas {
         check("polytropic_index", self.polytropic_index, |x| x >= 1.0, "at least 1")
     }
 
-    /// Gas volume fraction at rest at (r, z).
+    /// Gas volume fraction at rest at (r, z), with coordinates in m.
     pub fn share(&self, geometry: &Geometry, r: f64, z: f64) -> f64 {
         let depth = (z - geometry.nose(r)).max(0.0);
         let across = 1.0 + self.gradient * (2.0 * (r / geometry.radius).powi(2) - 1.0);
@@ -78,8 +78,9 @@ impl Gas {
         self.void_fraction * across * along
     }
 
-    /// The bubbles in a liquid of the given density. Their relaxation time is `1/2πf₀` of
-    /// Minnaert (1933), `R √(ρ/3κP)`: no bubble follows faster than its liquid's inertia allows.
+    /// The bubbles in a liquid of the given density, kg/m³. Their relaxation time is `1/2πf₀` with the resonance
+    /// frequency `f₀` of Minnaert (Phil. Mag. 16, 1933, 235), that is `R √(ρ/3κP)`: the inertia of the liquid permits
+    /// no faster response.
     pub fn bubbles(&self, density: f64) -> Bubbles {
         let Self { ambient_pressure, polytropic_index, bubble_radius, .. } = *self;
         let stiffness = 3.0 * polytropic_index * ambient_pressure;
@@ -91,14 +92,14 @@ impl Gas {
     }
 }
 
-/// How bubbles respond to pressure.
+/// Response of bubbles to pressure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bubbles {
-    /// Pressure of the gas at rest, `P`, Pa.
+    /// Pressure `P` of the gas at rest, Pa.
     pub ambient_pressure: f64,
     /// Polytropic index `κ`.
     pub polytropic_index: f64,
-    /// Relaxation time of small changes, `τ`, s; zero for equilibrium.
+    /// Relaxation time `τ` of small changes, s; 0 for gas that is always in equilibrium.
     pub relaxation: f64,
 }
 
@@ -109,31 +110,31 @@ pub struct Bubbly {
     bubbles: Bubbles,
     /// `1/κ`.
     inverse_index: f64,
-    /// Each term of the binomial series of the power `-1/κ` over the one before.
+    /// Ratio of each term of the binomial series of the power `-1/κ` to the previous term.
     ratios: [f64; 5],
-    /// Gas volume fraction at rest, of each cell.
+    /// Gas volume fraction at rest in each cell.
     share: Vec<f64>,
-    /// Size and compression of each cell's gas.
+    /// Volume and pressure of the gas in each cell.
     gas: Vec<State>,
-    /// Work done on each cell's gas so far, J/m³.
+    /// Work done on the gas of each cell so far, J/m³.
     work: Vec<f64>,
 }
 
-/// The gas of a cell relative to its state at rest.
+/// Gas of a cell relative to its state at rest.
 #[derive(Debug, Clone, Copy)]
 struct State {
-    /// Volume, `w`.
+    /// Relative volume `w`.
     volume: f64,
-    /// Pressure, `w^-κ`.
+    /// Relative pressure `w^-κ`.
     pressure: f64,
 }
 
-/// What the gas of a cell meets in a step.
+/// Conditions that the liquid sets for the gas of a cell in one step.
 #[derive(Debug, Clone, Copy)]
 struct Surroundings {
-    /// Pressure that the liquid would have with the gas at rest, Pa.
+    /// Pressure of the liquid with the gas at its volume at rest, Pa.
     trial: f64,
-    /// `K a₀`: how the liquid stiffens against the gas, Pa.
+    /// `K a₀`: increase of the liquid's pressure per relative volume of the gas, Pa.
     stiffness: f64,
     /// `κ P τ / dt`, Pa.
     resistance: f64,
@@ -151,13 +152,13 @@ impl Bubbly {
         Self { liquid, bubbles, inverse_index, ratios, share, gas, work }
     }
 
-    /// The gas after a step, and the share of the liquid's stiffness `K` that the mixture has
-    /// (where the liquid is whole).
+    /// The gas after a step, and the stiffness of the mixture divided by that of the liquid, `K` (where the liquid is
+    /// not cavitated).
     ///
-    /// Newton's method on `κPτ/dt (w - w_old) + p(w) + P (1 - w^-κ) = 0`. Written in the gas
-    /// pressure `w^-κ` the function is convex, written in `w` concave on each side of the cutoff:
-    /// far steps of compression are taken in the first, of expansion in the second, so that none
-    /// leaves the positive numbers or runs past the root twice. Near steps are Halley's.
+    /// Solves `κPτ/dt (w - w_old) + p(w) + P (1 - w^-κ) = 0` by Newton's method. As a function of the gas pressure
+    /// `w^-κ` the left side is convex; as a function of `w` it is concave on each side of the cutoff. Long steps of
+    /// compression therefore use the first variable and long steps of expansion the second, so that no iterate
+    /// becomes negative or passes the root twice. Short steps are Halley's.
     fn follow(&self, old: State, around: &Surroundings) -> (State, f64) {
         let Bubbles { ambient_pressure: ambient, polytropic_index: index, .. } = self.bubbles;
         let Surroundings { trial, stiffness, resistance, floor } = *around;
@@ -167,7 +168,7 @@ impl Bubbly {
             let liquid = trial + stiffness * (volume - 1.0);
             let (held, slope) = if liquid < floor { (floor, 0.0) } else { (liquid, stiffness) };
             let excess = resistance * (volume - old.volume) + held + ambient * (1.0 - pressure);
-            // All slopes here are times the volume.
+            // All slopes here are multiplied by the volume.
             let own = resistance * volume + index * ambient * pressure;
             let inverse = 1.0 / (own + slope * volume);
             let change = excess * inverse;
@@ -185,7 +186,8 @@ impl Bubbly {
                 now.pressure *= 1.0 + index * change;
                 now.volume = now.pressure.powf(-self.inverse_index);
             } else {
-                // Past the kink the liquid helps; a little more, lest rounding stay below.
+                // Beyond the kink the liquid adds stiffness. The factor prevents that rounding leaves the iterate
+                // below it.
                 let kink = if liquid < floor { (floor - trial) / stiffness } else { f64::INFINITY };
                 now.volume = (volume * (1.0 - change)).min((1.0 + kink) * (1.0 + 1e-9));
                 now.pressure = now.volume.powf(-index);
@@ -199,8 +201,8 @@ impl Bubbly {
         self.ratios.iter().rev().fold(1.0, |sum, ratio| 1.0 + ratio * grown * sum)
     }
 
-    /// Energy of the gas of a cell, J/m³: `P a₀ ((w^(1-κ) - 1)/(κ - 1) + w - 1)`, the work on
-    /// it less that of the ambient pressure.
+    /// Energy of the gas of a cell, J/m³: `P a₀ ((w^(1-κ) - 1)/(κ - 1) + w - 1)`, the work done on it minus that of
+    /// the ambient pressure.
     fn gas_energy(&self, cell: usize) -> f64 {
         let Bubbles { ambient_pressure, polytropic_index, .. } = self.bubbles;
         let volume = self.gas[cell].volume;
@@ -234,7 +236,7 @@ impl EquationOfState for Bubbly {
                 let old = self.gas[cell];
                 let (new, left) = self.follow(old, &around);
                 liquid = trial + around.stiffness * (new.volume - 1.0);
-                // While the strain stands still the liquid's pressure is linear in the volume.
+                // At constant strain the pressure of the liquid is linear in the gas volume.
                 let mean = 0.5 * (pressure[i] + liquid.max(floor));
                 self.work[cell] -= mean * share * (new.volume - old.volume);
                 self.gas[cell] = new;
@@ -250,14 +252,14 @@ impl EquationOfState for Bubbly {
         self.liquid.sound_speed()
     }
 
-    /// That of the liquid and of the gas.
+    /// Energy of the liquid and of the gas.
     fn stored_energy(&self, cell: usize, strain: f64) -> f64 {
         let change = self.share[cell] * (self.gas[cell].volume - 1.0);
         self.liquid.stored_energy(cell, strain - change) + self.gas_energy(cell)
     }
 
-    /// What of the work on the gas it does not hold: in equilibrium the sudden collapse at the
-    /// pulse, else the resistance too.
+    /// Work done on the gas that the gas does not store. In equilibrium this is the loss in the sudden collapse at
+    /// the pulse; otherwise it includes the work against the resistance.
     fn lost_energy(&self, cell: usize) -> f64 {
         self.work[cell] - self.gas_energy(cell)
     }

@@ -1,9 +1,9 @@
-//! Strain gauges: position, direction and averaging length turned into weights of wall elements.
+//! Strain gauges: conversion of position, direction and averaging length to weights of wall elements.
 
 use super::settings::{Gauge, Place};
 use super::shell::Shell;
 
-/// Number of points that represent a gauge's length.
+/// Number of points that represent the length of a gauge.
 const POINTS: usize = 16;
 
 /// A gauge on the outer face of the wall.
@@ -14,19 +14,19 @@ pub struct Sensor {
     hoop: f64,
 }
 
-/// The wall's nodes along the meridian and where the cap ends.
+/// The nodes of the wall along the meridian, and the end of the cap.
 #[derive(Debug, Clone, Copy)]
 pub struct Meridian<'a> {
-    /// (r, z) of the wall nodes, from the apex of the cap.
+    /// Coordinates (r, z) of the wall nodes, m, from the apex of the cap.
     pub nodes: &'a [[f64; 2]],
-    /// Node at which cap and cylinder meet.
+    /// Index of the node at which cap and cylinder meet.
     pub rim: usize,
 }
 
 impl Sensor {
-    /// The gauge on the given wall. Strains live in the middle of the elements and are
-    /// interpolated linearly along the meridian within the cap or the cylinder; a gauge of
-    /// length `L` at angle `θ` covers `L cos θ` of the meridian.
+    /// The gauge on the given wall. Strains belong to the middle of the elements and are interpolated linearly along
+    /// the meridian within the cap or the cylinder; a gauge of length `L` at angle `θ` covers the length `L cos θ` of
+    /// the meridian.
     pub fn new(gauge: &Gauge, wall: Meridian<'_>) -> Self {
         let (first, last, axis) = match gauge.place {
             Place::Cap => (0, wall.rim, 0),
@@ -60,7 +60,7 @@ impl Sensor {
         }
     }
 
-    /// Strain that the gauge shows now.
+    /// Current strain at the gauge, dimensionless.
     pub fn read(&self, shell: &Shell) -> f64 {
         let at = |&(s, weight): &(usize, f64)| {
             let (strain, half) = (shell.strain(s), 0.5 * shell.elements[s].thickness);

@@ -1,8 +1,8 @@
-//! The inputs of the models on this vessel.
+//! Inputs of the models of this vessel.
 //!
-//! Each model lists its own. Of the others it takes those that a study sets, so that a study
-//! changes from one model to another by its name: what belongs to the vessel and the pulse acts in
-//! all of them, what belongs to a gas that the model does not have is read and changes nothing.
+//! Each model lists its own inputs. Of the other models' inputs it accepts those that a study sets, so that a study
+//! can change its model by name alone: inputs of the vessel and the pulse have an effect in all models; inputs of a
+//! gas that the model does not have are accepted and have no effect.
 
 use lacuna::plugin::Context;
 use lacuna::plugin::model::{Call, EvalError, Input};
@@ -10,18 +10,18 @@ use lacuna::plugin::model::{Call, EvalError, Input};
 use super::model::unit;
 use super::{Gas, Mercury, MercuryTarget, Outcome, Settings, SimulationError, Target};
 
-/// What fills the vessel.
+/// Content of the vessel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Filling {
     /// Pure mercury.
     Mercury,
     /// Mercury with gas in pressure equilibrium.
     EquilibriumGas,
-    /// Mercury with bubbles that take time to follow.
+    /// Mercury with bubbles that respond with a delay.
     Bubbles,
 }
 
-/// The values of a run.
+/// Input values of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Values {
     mercury: Mercury,
@@ -44,7 +44,7 @@ impl Values {
         }
     }
 
-    /// A run with these settings.
+    /// Runs the simulation with these values in place of the corresponding settings.
     pub fn simulate(
         &self,
         filling: Filling,
@@ -72,11 +72,11 @@ impl Values {
     }
 }
 
-/// Which models have an input.
+/// Group of models that have an input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Part {
     Mercury,
-    /// Vessel and pulse: all models have it, the one without gas lists it when it is set.
+    /// Vessel and pulse: the input acts in all models; the model without gas lists it only if the study sets it.
     Vessel,
     Gas,
     Bubbles,
@@ -146,7 +146,7 @@ const ENTRIES: [Entry; 14] = [
         "void_fraction",
         "1",
         (0.0, 0.05),
-        "volume of the gas at rest as a share of the mixture's, away from the window",
+        "volume fraction of the gas at rest, away from the window",
         |v| &mut v.gas.void_fraction,
     ),
     entry(
@@ -154,7 +154,7 @@ const ENTRIES: [Entry; 14] = [
         "void_gradient",
         "1",
         (-1.0, 1.0),
-        "stratification g over the radius: the gas goes as 1 + g (2r²/a² - 1), towards the wall for g > 0",
+        "stratification g over the radius: the gas varies as 1 + g (2r²/a² - 1); more near the wall for g > 0",
         |v| &mut v.gas.gradient,
     ),
     entry(
@@ -162,7 +162,7 @@ const ENTRIES: [Entry; 14] = [
         "void_depletion",
         "1",
         (0.0, 1.0),
-        "stratification d along the axis: the gas goes as 1 - d exp(-z'/l) behind the window",
+        "stratification d along the axis: the gas varies as 1 - d exp(-z'/l) behind the window",
         |v| &mut v.gas.depletion,
     ),
     entry(
@@ -170,7 +170,7 @@ const ENTRIES: [Entry; 14] = [
         "depletion_length",
         "m",
         (1e-4, 10.0),
-        "length l over which the gas missing at the window returns",
+        "decay length l of the gas that is missing at the window",
         |v| &mut v.gas.depletion_length,
     ),
     entry(
@@ -178,7 +178,7 @@ const ENTRIES: [Entry; 14] = [
         "bubble_radius",
         "m",
         (0.0, 0.01),
-        "radius of the bubbles; 0 follows at once",
+        "radius of the bubbles; 0 for gas that is always in equilibrium",
         |v| &mut v.gas.bubble_radius,
     ),
     entry(
@@ -202,7 +202,7 @@ const ENTRIES: [Entry; 14] = [
         "damping",
         "1/s",
         (0.0, 1e6),
-        "damping in proportion to mass: vibrations fall off as exp(-damping t / 2)",
+        "damping in proportion to mass: vibrations decay as exp(-damping t / 2)",
         |v| &mut v.damping,
     ),
     entry(
@@ -210,7 +210,7 @@ const ENTRIES: [Entry; 14] = [
         "pulse_energy",
         "1",
         (0.0, 100.0),
-        "energy of the pulse relative to that of the options",
+        "energy of the pulse divided by that of the options",
         |v| &mut v.pulse_energy,
     ),
     entry(
@@ -226,7 +226,7 @@ const ENTRIES: [Entry; 14] = [
         "wall_thickness",
         "1",
         (0.05, 20.0),
-        "thickness of the walls relative to that of the options",
+        "thickness of the walls divided by that of the options",
         |v| &mut v.wall_thickness,
     ),
 ];
@@ -255,14 +255,14 @@ pub(super) fn inputs(
     listed.chain(others).map(input).collect()
 }
 
-/// The inputs that a study sets and that have no effect.
+/// The names of the inputs that a study sets and that have no effect in the model.
 pub(crate) fn unused(filling: Filling, context: &Context<'_>) -> Vec<String> {
     let idle = |name: &str| ENTRIES.iter().any(|e| e.name == name && !e.part.acts(filling));
     let names = context.given.iter().map(|given| given.name.clone());
     names.filter(|name| idle(name)).collect()
 }
 
-/// The values of a call, and the names of those without effect.
+/// The values of a call, and the names of the inputs without effect. Fails if an input is unknown or out of range.
 pub(super) fn values(
     target: &MercuryTarget,
     filling: Filling,
@@ -279,7 +279,7 @@ pub(super) fn values(
             return Err(EvalError::Fatal(format!("the model has no input `{name}`")));
         };
         let (low, high) = entry.range;
-        // Mercury has messages of its own.
+        // The settings of mercury have their own messages.
         if entry.part != Part::Mercury && !(low..=high).contains(&value) {
             let unit = if entry.unit == "1" { String::new() } else { format!(" {}", entry.unit) };
             return Err(EvalError::Fatal(format!(
@@ -295,7 +295,7 @@ pub(super) fn values(
     Ok((values, idle))
 }
 
-/// The inputs of a call with their units, one a line.
+/// The inputs of a call with their units, one per line.
 pub(super) fn deck<'a>(call: &'a Call<'_>) -> impl Iterator<Item = String> + 'a {
     let unit = |name: &str| {
         let entry = ENTRIES.iter().find(|entry| entry.name == name);

@@ -1,11 +1,11 @@
-//! What the proton pulse leaves behind: the fluid's initial pressure and the cap's expansion.
+//! State after the proton pulse: initial pressure of the fluid and thermal expansion of the cap.
 
 use super::Mercury;
 use super::mesh::Mesh;
 use super::settings::{Geometry, Load, Pulse};
 
 impl Pulse {
-    /// Deposited energy at (r, z) relative to its peak.
+    /// Deposited energy density at (r, z) divided by its peak; coordinates in m.
     pub fn shape(&self, geometry: &Geometry, r: f64, z: f64) -> f64 {
         let depth = (z - geometry.nose(r)).max(0.0);
         let along = |depth: f64| (1.0 - (-depth / self.rise).exp()) * (-depth / self.decay).exp();
@@ -13,7 +13,7 @@ impl Pulse {
         self.across(r) * along(depth) / peak
     }
 
-    /// Share of the beam's peak at radius `r`.
+    /// Intensity of the beam at radius `r`, m, divided by its peak.
     pub fn across(&self, r: f64) -> f64 {
         (-r * r / (2.0 * self.width * self.width)).exp()
     }
@@ -31,7 +31,7 @@ impl Pulse {
     }
 }
 
-/// Relative energy deposition in each cell.
+/// Relative energy deposition at the centre of each cell.
 pub fn cell_shapes(mesh: &Mesh, geometry: &Geometry, pulse: &Pulse) -> Vec<f64> {
     mesh.centres().map(|[r, z]| pulse.shape(geometry, r, z)).collect()
 }

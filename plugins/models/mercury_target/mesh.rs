@@ -1,26 +1,25 @@
 //! Structured axisymmetric mesh of the fluid: volumes, their derivatives, masses, shapes.
 //!
 //! A cell is the body of revolution of a quadrilateral. Its volume is the sum over the edges of
-//! `π/3 (r₁² + r₁r₂ + r₂²)(z₂ - z₁)`, so the derivative `B = ∂V/∂x` by each corner is exact, and
-//! `div v = Σ B·v / V` and the nodal force `p B` conserve energy together (compatible
-//! discretisation). The lumped mass of a corner is `ρ ∫ N 2πr dA`, which balances a linear
-//! pressure exactly, the axis included.
+//! `π/3 (r₁² + r₁r₂ + r₂²)(z₂ - z₁)`, so that the derivative `B = ∂V/∂x` with respect to each corner is exact, and
+//! `div v = Σ B·v / V` and the nodal force `p B` together conserve energy (compatible discretisation). The lumped mass
+//! of a corner is `ρ ∫ N 2πr dA`, which balances a linear pressure exactly, on the axis also.
 
 use std::f64::consts::PI;
 
-/// Number of corners of a cell, in the order (i, j), (i, j+1), (i+1, j+1), (i+1, j), where `i`
-/// counts along the axis and `j` outwards.
+/// Number of corners of a cell, in the order (i, j), (i, j+1), (i+1, j+1), (i+1, j), where `i` counts along the axis
+/// and `j` outwards.
 pub const CORNERS: usize = 4;
 
 /// One value for each corner of each cell.
 pub type Corner = [Vec<f64>; CORNERS];
 
-/// The mesh; nodes and cells are numbered along the axis first, so that inner loops run over `i`.
+/// The mesh. Nodes and cells are numbered along the axis first, so that inner loops run over `i`.
 #[derive(Debug, Clone)]
 pub struct Mesh {
-    /// Radial cells.
+    /// Number of cells along the radius.
     pub nr: usize,
-    /// Axial cells.
+    /// Number of cells along the axis.
     pub nz: usize,
     /// Radius of each node, m.
     pub r: Vec<f64>,
@@ -28,22 +27,23 @@ pub struct Mesh {
     pub z: Vec<f64>,
     /// Volume of each cell, m³.
     pub volume: Vec<f64>,
-    /// `∂V/∂r` of each corner, m².
+    /// Derivative `∂V/∂r` with respect to each corner, m².
     pub b_r: Corner,
-    /// `∂V/∂z` of each corner, m².
+    /// Derivative `∂V/∂z` with respect to each corner, m².
     pub b_z: Corner,
-    /// Hourglass shape of Flanagan and Belytschko (1981), orthogonal to linear fields.
+    /// Hourglass shape of Flanagan and Belytschko (Int. J. Numer. Methods Eng. 17, 1981, 679), orthogonal to linear
+    /// fields.
     pub gamma: Corner,
-    /// Thickness of each cell: area over longest side, m.
+    /// Thickness of each cell: area divided by longest side, m.
     pub thickness: Vec<f64>,
-    /// Volume that each node carries, `∫ N 2πr dA`, m³.
+    /// Volume assigned to each node, `∫ N 2πr dA`, m³.
     pub node_volume: Vec<f64>,
-    /// Bound on the squared wave number a cell resolves, `ω²/c²`, 1/m².
+    /// Bound on the squared wave number that a cell resolves, `ω²/c²`, 1/m².
     pub wave_number2: Vec<f64>,
 }
 
 impl Mesh {
-    /// A mesh of `nr` by `nz` cells whose node (i, j) lies at `place(i, j)` = (r, z).
+    /// A mesh of `nr` by `nz` cells whose node (i, j) lies at `place(i, j)` = (r, z), m.
     pub fn new(nr: usize, nz: usize, place: impl Fn(usize, usize) -> [f64; 2]) -> Self {
         let nodes = (nr + 1) * (nz + 1);
         let column = || -> Corner { std::array::from_fn(|_| Vec::with_capacity(nr * nz)) };
@@ -80,7 +80,7 @@ impl Mesh {
         j * (self.nz + 1) + i
     }
 
-    /// Centre (r, z) of each cell, in the order of the cells.
+    /// Centre (r, z) of each cell, m, in the order of the cells.
     pub fn centres(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
         (0..self.nr).flat_map(move |j| {
             (0..self.nz).map(move |i| {
@@ -90,7 +90,7 @@ impl Mesh {
         })
     }
 
-    /// Outward area vector of each boundary node, zero inside: the sum of its `B`, m².
+    /// Outward area vector (r, z) of each boundary node, the sum of its `B`, m²; zero at inner nodes.
     pub fn area(&self) -> [Vec<f64>; 2] {
         [&self.b_r, &self.b_z].map(|b| {
             let mut area = vec![0.0; self.r.len()];
@@ -118,8 +118,8 @@ impl Mesh {
         let gamma = hourglass_shape(r, z);
         for k in 0..CORNERS {
             self.node_volume[nodes[k]] += weight[k];
-            // The largest eigenvalue of one cell bounds that of the mesh; its stiffness has rank
-            // one. On the axis the radial motion is held.
+            // The largest eigenvalue of one cell bounds that of the mesh; the cell's stiffness has rank one. On the
+            // axis the radial motion is held.
             let radial = if r[k] > 0.0 { b_r[k] } else { 0.0 };
             wave_number2 += (radial * radial + b_z[k] * b_z[k]) / (weight[k] * volume);
             self.b_r[k].push(b_r[k]);
@@ -135,7 +135,7 @@ impl Mesh {
     }
 }
 
-/// Volume of a revolved quadrilateral and its derivatives by the corners' `r` and `z`.
+/// Volume of a revolved quadrilateral and its derivatives with respect to the corners' `r` and `z`.
 fn revolved(r: [f64; 4], z: [f64; 4]) -> (f64, [f64; 4], [f64; 4]) {
     let (mut volume, mut b_r, mut b_z) = (0.0, [0.0; 4], [0.0; 4]);
     for k in 0..CORNERS {
@@ -151,7 +151,7 @@ fn revolved(r: [f64; 4], z: [f64; 4]) -> (f64, [f64; 4], [f64; 4]) {
     (volume, b_r, b_z)
 }
 
-/// Plane area and its derivatives by the corners' `r` and `z`.
+/// Plane area and its derivatives with respect to the corners' `r` and `z`.
 fn section(r: [f64; 4], z: [f64; 4]) -> (f64, [f64; 4], [f64; 4]) {
     let (mut area, mut a_r, mut a_z) = (0.0, [0.0; 4], [0.0; 4]);
     for k in 0..CORNERS {

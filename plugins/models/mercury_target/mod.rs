@@ -1,63 +1,60 @@
-//! An open stand-in for the simulation of the liquid mercury target of the Spallation Neutron
-//! Source: strains of a steel vessel after a proton pulse has heated the mercury inside.
+//! An open stand-in for the simulation of the liquid mercury target of the Spallation Neutron Source: strains of a
+//! steel vessel after a proton pulse has heated the mercury inside.
 //!
-//! # What it is, and is not
+//! # Scope
 //!
-//! The calibration study that this project follows (Radaideh et al., arXiv 2202.03959) used a
-//! Sierra/SolidMechanics model. That model, its input decks and the strain measurements are not
-//! public. This is a much simpler vessel with the same ingredients: the same equation of state
-//! with the same three unknowns, wave speeds and impedances of mercury and 316L steel, a pulse of
-//! the right size and shape, ten gauges with the same names, and traces over 1 ms in steps of
-//! 10 µs. Peaks, times and frequencies are of the right kind; no number is a prediction for SNS.
+//! The calibration study that this project follows (Radaideh et al., arXiv 2202.03959) used a Sierra/SolidMechanics
+//! model. That model, its input decks and the strain measurements are not public. This is a much simpler vessel with
+//! the same ingredients: the same equation of state with the same three unknowns, wave speeds and impedances of
+//! mercury and 316L steel, a pulse of the right size and shape, ten gauges with the same names, and traces over 1 ms
+//! in steps of 10 µs. Peaks, times and frequencies are realistic; no number is a prediction for SNS.
 //!
 //! # Vessel and load
 //!
-//! A cylinder (radius 100 mm, length 450 mm) with a spherical cap (radius 160 mm) as beam window,
-//! walls of 3 mm, axially symmetric, in vacuum, the wall clamped at the rear. The pulse is
-//! instantaneous: `p₀ = P₀ exp(-r²/2s²) f(z')/max f`, `f = (1 - exp(-z'/l₁)) exp(-z'/l₂)` with
-//! `s` = 32 mm, `l₁` = 20 mm, `l₂` = 160 mm behind the window, `P₀` = 36e6 Pa at Riemer's values
-//! (13500 kg/m³, 1456 m/s); the cap expands by 20 microstrain on the axis. Under `thermal_strain`
-//! (the default) the deposited energy fixes the expansion, so `p₀` grows with `ρc²`; under
-//! `fixed_pressure` it does not depend on the mercury. The published work does not say which
-//! holds there. `fixed_pressure` makes soft mercury (`c` → 0) deform without bound: see `valid`.
+//! A cylinder (radius 100 mm, length 450 mm) with a spherical cap (radius 160 mm) as beam window, walls of 3 mm,
+//! axially symmetric, in vacuum, with the wall clamped at the rear. The pulse is instantaneous:
+//! `p₀ = P₀ exp(-r²/2s²) f(z')/max f`, `f = (1 - exp(-z'/l₁)) exp(-z'/l₂)` with `s` = 32 mm, `l₁` = 20 mm, `l₂` = 160
+//! mm behind the window, `P₀` = 36e6 Pa at Riemer's values (13500 kg/m³, 1456 m/s); the cap expands by 20 microstrain
+//! on the axis. Under `thermal_strain` (the default) the deposited energy fixes the expansion, so that `p₀` grows with
+//! `ρc²`; under `fixed_pressure` it does not depend on the mercury. The published work does not say which of these it
+//! used. With `fixed_pressure` soft mercury (`c` → 0) deforms without bound: see `valid`.
 //!
 //! # Equations
 //!
-//! - Fluid: `ρ v' = -grad p`, `ε' = div v`, `p = max(p₀ - K ε, -p_c)`, `K = ρc²`, small
-//!   displacements; pressures count from the static state. The law is single-valued, hence
-//!   reversible (Bleich & Sandler, Int. J. Solids Structures 6, 1970).
-//! - Wall: Mindlin shell of revolution; its equations stand in the module `shell`.
-//! - Gas, in the models `mercury_target_equilibrium_gas` and `mercury_target_bubbles`: the strain is
-//!   that of the liquid and of bubbles, in equilibrium or over-damped; see the module `gas`.
+//! - Fluid: `ρ v' = -grad p`, `ε' = div v`, `p = max(p₀ - K ε, -p_c)`, `K = ρc²`, small displacements; pressures are
+//!   relative to the static state. The law is single-valued and hence reversible (Bleich & Sandler, Int. J. Solids
+//!   Structures 6, 1970).
+//! - Wall: Mindlin shell of revolution; its equations are in the module `shell`.
+//! - Gas, in the models `mercury_target_equilibrium_gas` and `mercury_target_bubbles`: the strain is that of the
+//!   liquid and of bubbles, in equilibrium or over-damped; see the module `gas`.
 //! - Contact: fluid and wall share the motion along the normal and slip along the meridian.
-//! - Rear: mercury without end (absorbing) or rigid.
+//! - Rear: semi-infinite mercury (absorbing) or rigid.
 //!
 //! # Numerics
 //!
-//! Explicit leapfrog on a structured mesh of 20 x 90 quadrilaterals with one pressure each;
-//! forces are the exact derivatives of the cells' volumes, so that without damping the linear
-//! scheme conserves energy to rounding. Artificial viscosity (`b₁` = 0.25, `b₂` = 1.2) spreads the
-//! shocks of closing cavities; hourglass viscosity 0.01. The step is 0.7 of the stability limit
-//! of the worst element (an upper bound for the mesh), rounded so that outputs fall on steps.
+//! Explicit leapfrog on a structured mesh of 20 x 90 quadrilaterals with one pressure each; forces are the exact
+//! derivatives of the cells' volumes, so that without damping the linear scheme conserves energy to rounding.
+//! Artificial viscosity (`b₁` = 0.25, `b₂` = 1.2) spreads the shocks of closing cavities; the hourglass viscosity is
+//! 0.01. The step is 0.7 of the stability limit of the worst element (a bound for the whole mesh), rounded so that
+//! outputs fall on steps.
 //!
 //! # Limits
 //!
-//! - Closing cavities make the traces sensitive: changing a parameter by 0.1 % scatters them by
-//!   about 1 microstrain rms, refining the mesh twice changes them by about 9 (no surrogate can
-//!   be better than that). The linear viscosity decides this noise floor.
-//! - `valid` is false when any volumetric strain reaches 0.1: displacements are then no longer
-//!   small. The largest values are on the axis, where cavities gather.
-//! - One cross section stands for the 400 mm x 100 mm one: no difference between top and bottom,
-//!   no baffles, no flow, no second wall.
-//! - Gauge positions, thicknesses and the beam's shape are plausible, not measured.
+//! - Closing cavities make the traces sensitive: changing a parameter by 0.1 % scatters them by about 1 microstrain
+//!   rms, and refining the mesh by a factor of two changes them by about 9 (no surrogate can be more accurate than
+//!   that). The linear viscosity determines this noise floor.
+//! - `valid` is false if any volumetric strain reaches 0.1: displacements are then no longer small. The largest
+//!   values are on the axis, where cavities gather.
+//! - One cross section represents that of 400 mm x 100 mm: there is no difference between top and bottom, and there
+//!   are no baffles, no flow and no second wall.
+//! - Gauge positions, thicknesses and the shape of the beam are plausible, not measured.
 //!
 //! # Tests
 //!
-//! Breathing modes of the filled tube, ring frequency, Korteweg's speed, Taylor's plate,
-//! cavitation and closure under a floating plate (against an independent computation by
-//! characteristics), water hammer into a cavitated column, plate and cylinder theory for the
-//! wall, rigid acoustics of second order, balances of energy and momentum, reversal, scaling
-//! invariances, mesh convergence and survival over the whole design box. Bubbly mercury: Wood's
+//! Breathing modes of the filled tube, ring frequency, Korteweg's speed, Taylor's plate, cavitation and closure under
+//! a floating plate (against an independent computation by characteristics), water hammer into a cavitated column,
+//! plate and cylinder theory for the wall, rigid acoustics of second order, balances of energy and momentum,
+//! reversal, scaling invariances, mesh convergence and survival over the whole design box. Bubbly mercury: Wood's
 //! speed, the linear waves of the relaxation and of Commander and Prosperetti, its limits.
 
 mod coupling;
@@ -93,14 +90,14 @@ pub use shell::{Element, Shell, Steel};
 pub use solver::{EnergyBalance, Solver, Vessel};
 pub use target::{Target, simulate};
 
-/// The calibrated quantities.
+/// Calibrated quantities of the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mercury {
-    /// Density, kg/m³.
+    /// Density in kg/m³.
     pub density: f64,
-    /// Sound speed, m/s.
+    /// Sound speed in m/s.
     pub sound_speed: f64,
-    /// Tensile cutoff: the fluid bears no pressure below minus this, Pa.
+    /// Tensile cutoff in Pa: the pressure is limited to minus this value.
     pub tensile_cutoff: f64,
 }
 
@@ -123,24 +120,24 @@ impl Mercury {
     }
 }
 
-/// What a run gives.
+/// Result of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// Output times, s.
+    /// Output times in s.
     pub times: Vec<f64>,
     /// Strain of each gauge (in the order of the gauge table) at each time; dimensionless.
     pub strain: Vec<Vec<f64>>,
-    /// Whether all volumetric strains stayed below 0.1 in size, as small displacements demand.
+    /// True if all volumetric strains stayed below 0.1 in magnitude, as small displacements require.
     pub valid: bool,
-    /// Largest size of the volumetric strain in any cell at any step.
+    /// Largest magnitude of the volumetric strain in any cell at any step.
     pub largest_volumetric_strain: f64,
-    /// Longest uninterrupted time that any cell spent at the cutoff, s.
+    /// Longest uninterrupted time that any cell spent at the cutoff, in s.
     pub saturation_time: f64,
-    /// Share of the fluid's volume at the cutoff, at each output time.
+    /// Fraction of the fluid's volume at the cutoff, at each output time.
     pub cavitated_fraction: Vec<f64>,
     /// Energies at the last output.
     pub energy: EnergyBalance,
-    /// Time steps taken.
+    /// Number of time steps.
     pub steps: usize,
 }
 
@@ -159,19 +156,19 @@ impl Outcome {
     }
 }
 
-/// Why a run gives nothing.
+/// Reason for which a run gives no result.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SimulationError {
-    /// A setting or parameter without meaning.
+    /// An invalid setting or parameter.
     Settings(String),
-    /// The time step would be too small to finish.
+    /// Too many time steps would be needed.
     TooManySteps {
-        /// Steps needed.
+        /// Number of steps needed.
         steps: f64,
     },
-    /// A strain left the range of numbers.
+    /// A strain is not finite.
     NotFinite {
-        /// Output time at which it was found, s.
+        /// Output time at which it was found, in s.
         time: f64,
     },
 }
@@ -186,7 +183,7 @@ impl fmt::Display for SimulationError {
                  coarser `mesh`, a shorter time or a smaller `sound_speed`"
             ),
             Self::NotFinite { time } => {
-                write!(f, "the simulation left the range of numbers before t = {time} s")
+                write!(f, "a value of the simulation is not finite before t = {time} s")
             }
         }
     }

@@ -5,7 +5,7 @@ use std::path::Path;
 use lacuna::data::{Axis, Coordinates, Layout, Unit};
 use lacuna::plugin::model::{Call, EvalError, Response, Signature};
 use lacuna::plugin::{Component, Context, Fact};
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -14,20 +14,21 @@ use super::settings::{Gauges, Geometry, Numerics, Pulse, Sampling, Settings, Wal
 use super::{Outcome, SimulationError};
 use crate::readers::sierra::write::{History, Origin, write_history};
 
-/// Strain of a mercury-filled steel vessel after a proton pulse: an open stand-in for the Sierra
-/// model of the Spallation Neutron Source's target, whose decks and data are not public.
+/// Strain of a mercury-filled steel vessel after a proton pulse: an open stand-in for the Sierra model of the
+/// Spallation Neutron Source's target, whose input decks and data are not public.
 ///
-/// Axisymmetric explicit dynamics. The mercury is inviscid with pressure = bulk modulus x volumetric strain,
-/// held at minus the tensile cutoff while tension grows; the wall is a Mindlin shell. Inputs: `density`,
-/// `sound_speed`, `tensile_cutoff`. Response: `strain` over `sensor` (the gauges) and `time`.
+/// Axisymmetric explicit dynamics. The mercury is inviscid, with pressure = bulk modulus x volumetric strain, limited
+/// to minus the tensile cutoff while tension grows. The wall is a Mindlin shell. Inputs: `density` (kg/m³),
+/// `sound_speed` (m/s), `tensile_cutoff` (Pa). Response: `strain` (dimensionless) over `sensor` (the gauges) and
+/// `time` (s).
 ///
-/// Further inputs count as soon as a study sets them: `damping` (1/s: vibrations fall off as
-/// exp(-damping t / 2)), `pulse_energy` and `wall_thickness` (relative to the options), `beam_width` (m).
-/// A study may also set inputs of `mercury_target_equilibrium_gas` and `mercury_target_bubbles`, so that the model
-/// can be changed by its name alone; there is no gas here, and they have no effect.
+/// A study may also set the inputs `damping` (1/s: vibrations decay as exp(-damping t / 2)), `pulse_energy` and
+/// `wall_thickness` (relative to the options) and `beam_width` (m); otherwise the options and zero damping apply. The
+/// inputs of `mercury_target_equilibrium_gas` and `mercury_target_bubbles` are accepted without effect, so that a
+/// study can change the model by its name alone.
 ///
-/// The output times must be whole multiples of the smallest step between them. Each run is written as an
-/// Exodus II history file with the signals `strain_NAME`, as Sierra writes them.
+/// The output times must be whole multiples of the smallest step between them. Each run is written as an Exodus II
+/// history file with the signals `strain_NAME`, as Sierra writes them.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MercuryTarget {
@@ -39,11 +40,12 @@ pub struct MercuryTarget {
     pub pulse: Pulse,
     /// Mesh, time step and numerical damping.
     pub numerics: Numerics,
-    /// Strain gauges on the outer face of the wall.
+    /// Strain gauges on the outer face of the wall, in the order of the response's `sensor` axis; names must differ.
+    /// Default: the ten gauges of the single-pulse tests at WNR in 1999.
     pub gauges: Gauges,
 }
 
-/// The dimensionless unit of strain.
+/// The dimensionless unit, used for strain.
 fn dimensionless() -> Unit {
     Unit::dimensionless()
 }
@@ -78,13 +80,13 @@ impl MercuryTarget {
         }
     }
 
-    /// The signature with the inputs of a model on this vessel.
+    /// The signature with the inputs of a model of this vessel.
     pub(crate) fn signed(&self, filling: Filling, context: &Context<'_>) -> Signature {
         let inputs = inputs(self, filling, context);
         Signature { inputs, layout: self.layout(), resamples: true }
     }
 
-    /// A run of a model on this vessel.
+    /// Runs a model of this vessel.
     pub(crate) fn respond(&self, filling: Filling, call: &Call<'_>) -> Result<Response, EvalError> {
         let times = times(call.layout).map_err(EvalError::Fatal)?;
         let (sampling, steps) = sampling(times).map_err(EvalError::Fatal)?;
@@ -105,7 +107,7 @@ impl MercuryTarget {
         Ok(Response { values, valid: outcome.valid, facts })
     }
 
-    /// Writes a run of a model of this name as a history file.
+    /// Writes a run of the model of this name as an Exodus II history file.
     pub(crate) fn write_run(
         &self,
         model: &str,
@@ -122,7 +124,7 @@ impl MercuryTarget {
         let facts = response.facts.iter().map(|fact| format!("{} = {}", fact.name, fact.value));
         let origin = Origin {
             title: format!("{run}: {model}, a stand-in for the SNS target"),
-            // A fixed date keeps equal runs equal to the byte.
+            // A fixed date, so that equal runs give files that are equal to the byte.
             qa: ["lacuna", env!("CARGO_PKG_VERSION"), "1970/01/01", "00:00:00"].map(str::to_owned),
             info: deck(call).chain(facts).chain([format!("valid = {}", response.valid)]).collect(),
         };
@@ -132,7 +134,7 @@ impl MercuryTarget {
         Ok(Some(file))
     }
 
-    /// The indices of the gauges that a layout asks for.
+    /// The indices of the gauges in the layout's first axis.
     fn asked(&self, layout: &Layout) -> Result<Vec<usize>, EvalError> {
         let sensors = layout.axes.first().map(|axis| &axis.coordinates);
         let Some(Coordinates::Labels(labels)) = sensors else {
@@ -164,7 +166,8 @@ fn times(layout: &Layout) -> Result<&[f64], String> {
     }
 }
 
-/// The sampling whose outputs contain all `times`, and the number of the output at each of them.
+/// The sampling whose outputs contain all `times`, s, and the number of the output at each of them. Fails if the
+/// times are no whole multiples of their smallest step.
 fn sampling(times: &[f64]) -> Result<(Sampling, Vec<usize>), String> {
     let gaps = times.windows(2).map(|pair| pair[1] - pair[0]);
     let interval = gaps.fold(times.first().copied().unwrap_or(0.0), f64::min);
@@ -176,7 +179,7 @@ fn sampling(times: &[f64]) -> Result<(Sampling, Vec<usize>), String> {
         let step = (time / interval).round();
         if (time / interval - step).abs() > 1e-6 * step {
             return Err(format!(
-                "the output time {time} s is no whole multiple of the smallest step {interval} s"
+                "the output time {time} s is not a whole multiple of the smallest step {interval} s"
             ));
         }
         steps.push(step as usize);
@@ -207,7 +210,7 @@ impl Component for MercuryTarget {
     }
 }
 
-/// Makes a model of a type that holds the vessel: what fills it and what it is called is all that differs.
+/// Implements a model for a type that holds the vessel. Models differ in filling and name only.
 macro_rules! filled {
     ($model:ident, $name:literal, $filling:ident $(, $field:tt)?) => {
         impl lacuna::plugin::Model for $model {

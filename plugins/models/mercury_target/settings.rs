@@ -1,11 +1,11 @@
-//! What a user can set: geometry, wall, pulse, numerics, gauges and sampling, with their defaults.
+//! Options of the model with their defaults: geometry, wall, pulse, numerics, gauges and sampling.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::SimulationError;
 
-/// Every setting of the stand-in; the calibrated quantities are in [`super::Mercury`].
+/// All settings of the model; the calibrated quantities are in [`super::Mercury`].
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
@@ -21,8 +21,8 @@ pub struct Settings {
     pub gauges: Gauges,
     /// Output times.
     pub sampling: Sampling,
-    /// Decay of all motion in proportion to its mass, 1/s: free vibrations of any frequency lose
-    /// amplitude as `exp(-damping t / 2)`.
+    /// Decay of all motion in proportion to its mass, 1/s: free vibrations of any frequency decay in amplitude as
+    /// `exp(-damping t / 2)`.
     pub damping: f64,
 }
 
@@ -30,11 +30,11 @@ pub struct Settings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Geometry {
-    /// Inner radius of the cylinder, m.
+    /// Inner radius of the cylinder, m, above 0.
     pub radius: f64,
-    /// Distance from the apex of the cap to the rear end, m.
+    /// Distance from the apex of the cap to the rear end, m, above 1.5 times the depth of the cap.
     pub length: f64,
-    /// Radius of curvature of the cap, m; at least `radius`.
+    /// Radius of curvature of the cap, m, at least `radius`.
     pub cap_radius: f64,
 }
 
@@ -44,19 +44,19 @@ impl Default for Geometry {
     }
 }
 
-/// The wall, a thin shell; defaults are 316L stainless steel.
+/// The wall, a thin shell; the defaults are those of 316L stainless steel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Wall {
-    /// Thickness of the cap, m.
+    /// Thickness of the cap, m, above 0.
     pub cap_thickness: f64,
-    /// Thickness of the cylinder, m.
+    /// Thickness of the cylinder, m, above 0.
     pub cylinder_thickness: f64,
-    /// Young's modulus, Pa.
+    /// Young's modulus, Pa, above 0.
     pub young_modulus: f64,
-    /// Poisson's ratio.
+    /// Poisson's ratio, in [0, 0.5).
     pub poisson_ratio: f64,
-    /// Density, kg/m³.
+    /// Density, kg/m³, above 0.
     pub density: f64,
 }
 
@@ -72,37 +72,39 @@ impl Default for Wall {
     }
 }
 
-/// What stays the same when the mercury's density and sound speed change.
+/// Quantity of the load that does not depend on the mercury's density and sound speed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Load {
-    /// The thermal expansion: the initial pressure is proportional to the bulk modulus.
+    /// The thermal expansion; the initial pressure is proportional to the bulk modulus.
     ThermalStrain,
     /// The initial pressure.
     FixedPressure,
 }
 
-/// Initial state left by a pulse much shorter than the response:
-/// `p = P₀ exp(-r²/2s²) f(z')/max f` with `f = (1 - exp(-z'/l₁)) exp(-z'/l₂)` and `z'` the
-/// distance behind the window.
+/// Initial state after a pulse much shorter than the response: `p = P₀ exp(-r²/2s²) f(z')/max f` with
+/// `f = (1 - exp(-z'/l₁)) exp(-z'/l₂)` and `z'` the distance behind the window.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Pulse {
-    /// Which quantity the mercury's properties leave unchanged.
+    /// Quantity that does not depend on the mercury's density and sound speed: the thermal expansion
+    /// (`"thermal_strain"`, default) or the initial pressure (`"fixed_pressure"`).
     pub load: Load,
-    /// Peak initial pressure `P₀` at the reference density and sound speed, Pa.
+    /// Peak initial pressure `P₀`, Pa, at least 0; under `load = "thermal_strain"` it applies at the reference
+    /// density and sound speed and varies with the bulk modulus.
     pub peak_pressure: f64,
-    /// Density at which `peak_pressure` holds under `load = "thermal_strain"`, kg/m³.
+    /// Density for which `peak_pressure` is given under `load = "thermal_strain"`, kg/m³, above 0.
     pub reference_density: f64,
-    /// Sound speed at which `peak_pressure` holds under `load = "thermal_strain"`, m/s.
+    /// Sound speed for which `peak_pressure` is given under `load = "thermal_strain"`, m/s, above 0.
     pub reference_sound_speed: f64,
-    /// Standard deviation `s` of the beam, m.
+    /// Standard deviation `s` of the beam, m, above 0.
     pub width: f64,
-    /// Build-up length `l₁` behind the window, m.
+    /// Build-up length `l₁` behind the window, m, above 0.
     pub rise: f64,
-    /// Decay length `l₂` along the beam, m.
+    /// Decay length `l₂` along the beam, m, above 0.
     pub decay: f64,
-    /// Thermal strain of the cap on the axis, falling off like the beam; dimensionless.
+    /// Thermal strain of the cap on the axis, dimensionless, below 0.1 in magnitude; it decreases with the radius
+    /// like the beam.
     pub wall_strain: f64,
 }
 
@@ -121,11 +123,11 @@ impl Default for Pulse {
     }
 }
 
-/// What the fluid meets at the rear end.
+/// Boundary condition of the fluid at the rear end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Rear {
-    /// Mercury continuing without end, at rest: plane waves leave.
+    /// Semi-infinite mercury at rest: plane waves leave without reflection.
     Absorbing,
     /// A rigid wall.
     Rigid,
@@ -152,7 +154,7 @@ pub enum Cells {
 }
 
 impl Cells {
-    /// Radial and axial number of cells.
+    /// Number of cells along the radius and along the axis.
     pub fn counts(self) -> [usize; 2] {
         match self {
             Self::Named(NamedMesh::Default) => [20, 90],
@@ -166,17 +168,21 @@ impl Cells {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Numerics {
-    /// `"default"` (20 x 90 cells), `"fine"` (40 x 180) or `[radial, axial]`.
+    /// Number of cells: `"default"` (20 x 90), `"fine"` (40 x 180) or `[radial, axial]` with 2 to 200 radial and 4 to
+    /// 2000 axial cells. Twice the cells in both directions take about eight times as long.
     pub mesh: Cells,
-    /// Time step as a share of the stability limit, in (0, 1].
+    /// Time step divided by the stability limit, in (0, 1].
     pub cfl: f64,
-    /// Linear artificial viscosity `b₁`.
+    /// Linear artificial viscosity `b₁`, dimensionless, in [0, 2]. Larger values damp oscillations behind shocks and
+    /// smooth the traces more.
     pub linear_viscosity: f64,
-    /// Quadratic artificial viscosity `b₂`.
+    /// Quadratic artificial viscosity `b₂`, dimensionless, in [0, 2]. Larger values spread strong shocks over more
+    /// cells.
     pub quadratic_viscosity: f64,
-    /// Viscous hourglass control.
+    /// Coefficient of the viscous hourglass control, dimensionless, in [0, 0.2]; it suppresses zero-energy motions of
+    /// the cells.
     pub hourglass: f64,
-    /// Rear end of the fluid.
+    /// Boundary condition of the fluid at the rear end.
     pub rear: Rear,
 }
 
@@ -193,7 +199,7 @@ impl Default for Numerics {
     }
 }
 
-/// The part of the wall that carries a gauge.
+/// Part of the wall that carries a gauge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Place {
@@ -207,25 +213,25 @@ pub enum Place {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Gauge {
-    /// Name of the signal.
+    /// Name of the gauge and its label on the response's `sensor` axis.
     pub name: String,
-    /// Part of the wall.
+    /// Part of the wall: `"cap"` or `"cylinder"`.
     pub place: Place,
-    /// Radius (cap) or distance from the apex (cylinder) of the gauge's middle, m.
+    /// Position of the gauge's middle, m: radius on the cap, distance from the apex on the cylinder.
     pub position: f64,
-    /// Angle between the gauge and the meridian, degrees: 0 axial, 90 hoop.
+    /// Angle between the gauge and the meridian, degrees: 0 measures the axial strain, 90 the hoop strain.
     pub angle: f64,
-    /// Length over which the gauge averages, m.
+    /// Length over which the gauge averages, m, from 0 to the length of the vessel.
     #[serde(default = "default_gauge_length")]
     pub length: f64,
 }
 
-/// The gauge table; the strain traces come in its order.
+/// The gauges, in the order of the response's strain traces.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 pub struct Gauges(pub Vec<Gauge>);
 
-/// Fibre gauges of the 1999 single-pulse tests at WNR.
+/// Length of the fibre gauges of the single-pulse tests at WNR in 1999, m.
 fn default_gauge_length() -> f64 {
     12.7e-3
 }
@@ -272,7 +278,8 @@ impl Default for Sampling {
     }
 }
 
-/// A value that `keep` refuses is reported under its name.
+/// Checks that a value is finite and that `keep` accepts it; the error states its name, the value and `right`, the
+/// permitted range.
 pub(super) fn check(
     name: &str,
     value: f64,
@@ -287,7 +294,7 @@ pub(super) fn check(
 }
 
 impl Settings {
-    /// Reports the first setting that has no meaning.
+    /// Checks all settings. The error names the first setting that is out of range.
     pub fn validate(&self) -> Result<(), SimulationError> {
         self.validate_vessel()?;
         self.validate_numerics()?;

@@ -1,11 +1,11 @@
 //! The wall: two-node conical frustum shells (Mindlin) with reduced integration.
 //!
-//! Unknowns are the mid-surface displacements `u_r`, `u_z` and the rotation `β`. With the
-//! meridian's tangent `t`, outward normal `n`, element length `l` and mean radius `r`:
-//! `e_s = Δu·t/l`, `e_t = u_r/r`, `k_s = Δβ/l`, `k_t = β t_r/r`, `γ = β + Δu·n/l`;
-//! `N = C(e + νe')`, `M = D(k + νk')`, `Q = 5/6 G h γ`, `C = Eh/(1-ν²)`, `D = Ch²/12`.
-//! One point under-integrates shear and so avoids locking (Zienkiewicz et al. 1977); only the
-//! hoop membrane strain is taken at both ends, which keeps short waves from being too soft.
+//! The unknowns are the mid-surface displacements `u_r`, `u_z` and the rotation `β`. With the meridian's tangent `t`,
+//! outward normal `n`, element length `l` and mean radius `r`: `e_s = Δu·t/l`, `e_t = u_r/r`, `k_s = Δβ/l`,
+//! `k_t = β t_r/r`, `γ = β + Δu·n/l`; `N = C(e + νe')`, `M = D(k + νk')`, `Q = 5/6 G h γ`, `C = Eh/(1-ν²)`,
+//! `D = Ch²/12`. One-point integration of the shear avoids locking (Zienkiewicz et al., Int. J. Numer. Methods Eng. 11,
+//! 1977, 1545). Only the hoop membrane strain is evaluated at both ends, because its mean would make short waves too
+//! soft.
 
 use std::f64::consts::PI;
 
@@ -24,7 +24,7 @@ pub struct Steel {
     pub density: f64,
 }
 
-/// Strains of the mid-surface: membrane and bending, along the meridian and around.
+/// Strains of the mid-surface: membrane and bending, along the meridian and around the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallStrain {
     /// Meridional membrane strain `e_s`.
@@ -49,7 +49,7 @@ pub struct Element {
     pub thickness: f64,
     tangent: [f64; 2],
     radius: f64,
-    /// Radius and share of the area of both ends.
+    /// Radius, m, and fraction of the element's area of both ends.
     ends: [(f64, f64); 2],
     membrane: f64,
     bending: f64,
@@ -65,16 +65,16 @@ pub struct Element {
 pub struct Shell {
     /// Elements in order; element `s` joins nodes `s` and `s + 1`.
     pub elements: Vec<Element>,
-    /// Displacements of the mid-surface, m and rad.
+    /// Radial displacement of the mid-surface at each node, m.
     pub r: Vec<f64>,
-    /// Axial displacement, m.
+    /// Axial displacement of the mid-surface at each node, m.
     pub z: Vec<f64>,
-    /// Rotation.
+    /// Rotation at each node, rad.
     pub turn: Vec<f64>,
 }
 
 impl Element {
-    /// The frustum between `a` and `b` (r, z) with an isotropic membrane eigenstrain.
+    /// The frustum between the nodes `a` and `b` (r, z), m, with an isotropic membrane eigenstrain.
     pub fn new(a: [f64; 2], b: [f64; 2], thickness: f64, steel: Steel, eigenstrain: f64) -> Self {
         let (dr, dz) = (b[0] - a[0], b[1] - a[1]);
         let length = dr.hypot(dz);
@@ -104,7 +104,7 @@ impl Element {
         }
     }
 
-    /// Strains of displacements and rotation `(u_r, u_z, β)` at both ends.
+    /// Strains due to displacements and rotation `(u_r, u_z, β)` at both ends.
     fn strain(&self, a: [f64; 3], b: [f64; 3]) -> WallStrain {
         let ([tr, tz], l) = (self.tangent, self.length);
         let (du_r, du_z) = (b[0] - a[0], b[1] - a[1]);
@@ -129,7 +129,7 @@ impl Element {
         2.0 * PI * self.radius * self.length
     }
 
-    /// Forces and moments on both ends.
+    /// Forces (r, z), N, and moment, N m, on both ends.
     fn forces(&self, strain: &WallStrain) -> [[f64; 3]; 2] {
         let ([tr, tz], l, nu) = (self.tangent, self.length, self.poisson);
         let (e_s, e_t) = (strain.meridional - self.eigenstrain, strain.hoop - self.eigenstrain);
@@ -147,8 +147,8 @@ impl Element {
         ]
     }
 
-    /// Radial forces of the hoop stress, taken at each end by itself: the mean over an element
-    /// would make short waves too soft. At the axis the strain is that of the element.
+    /// Radial forces of the hoop stress, evaluated at each end: the mean over an element would make short waves too
+    /// soft. At the axis the strain is that of the element.
     fn hoop_forces(&self, strain: &WallStrain, e_s: f64) -> [f64; 2] {
         let stress = |e_t: f64| self.membrane * (e_t - self.eigenstrain + self.poisson * e_s);
         let area = self.area();
@@ -208,7 +208,7 @@ impl Shell {
         self.r.len()
     }
 
-    /// Adds the lumped masses and rotary inertias.
+    /// Adds the lumped masses, kg, and rotary inertias, kg m².
     pub fn add_masses(&self, mass: &mut Field) {
         for (s, element) in self.elements.iter().enumerate() {
             for end in 0..2 {
@@ -227,7 +227,7 @@ impl Shell {
         2.0 / highest.sqrt()
     }
 
-    /// Moves on by `dt` with the given velocities.
+    /// Advances the wall by `dt`, s, with the given velocities.
     pub fn advance(&mut self, velocity: &Field, dt: f64) {
         for (u, v) in [
             (&mut self.r, &velocity.shell_r),
@@ -244,7 +244,7 @@ impl Shell {
         self.elements[s].strain(at(s), at(s + 1))
     }
 
-    /// Writes the nodal forces and moments.
+    /// Writes the nodal forces, N, and moments, N m.
     pub fn forces(&self, force: &mut Field) {
         force.shell_r.fill(0.0);
         force.shell_z.fill(0.0);

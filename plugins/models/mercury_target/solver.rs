@@ -1,4 +1,4 @@
-//! The leapfrog that joins fluid and wall.
+//! Leapfrog integration of fluid and wall together.
 
 use super::coupling::{Field, Held, Joints, Motion};
 use super::eos::EquationOfState;
@@ -6,7 +6,7 @@ use super::fluid::{self, Fluid, FluidConstants};
 use super::mesh::Mesh;
 use super::shell::Shell;
 
-/// A vessel before a material fills it: what every run shares.
+/// The vessel without its content: everything that is the same for all runs.
 #[derive(Debug, Clone)]
 pub struct Vessel {
     /// Mesh of the fluid.
@@ -15,20 +15,20 @@ pub struct Vessel {
     pub shell: Shell,
     /// Motions held at zero.
     pub held: Held,
-    /// Contacts, plate and open end.
+    /// Contacts, plate and absorbing end.
     pub joints: Joints,
 }
 
 impl Vessel {
-    /// Longest stable time step, s. The frequencies of the coupled system lie below the larger
-    /// of the parts' (Rayleigh quotient), so that the contact adds no limit.
+    /// Longest stable time step, s. By Rayleigh's quotient the frequencies of the coupled system do not exceed the
+    /// larger of the two parts' highest frequencies, so that the contact adds no limit.
     pub fn stable_step(&self, sound_speed: f64, linear_viscosity: f64) -> f64 {
         let fluid = fluid::stable_step(&self.mesh, sound_speed, linear_viscosity);
         fluid.min(self.shell.stable_step(&self.held.shell))
     }
 }
 
-/// Where the energy is, in J.
+/// Terms of the energy balance, J.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct EnergyBalance {
     /// Energy at the start: stored in fluid and wall, and kinetic.
@@ -39,20 +39,21 @@ pub struct EnergyBalance {
     pub fluid: f64,
     /// Energy stored in the wall.
     pub wall: f64,
-    /// Lost to the artificial viscosity.
+    /// Energy lost to the artificial viscosity.
     pub viscous: f64,
-    /// Lost to the hourglass control.
+    /// Energy lost to the hourglass control.
     pub hourglass: f64,
-    /// Gone through the open rear end.
+    /// Energy that left through the absorbing rear end.
     pub radiated: f64,
-    /// Lost to the damping.
+    /// Energy lost to the damping.
     pub damped: f64,
-    /// Turned into heat by the equation of state.
+    /// Energy that the equation of state has converted to heat.
     pub relaxed: f64,
 }
 
 impl EnergyBalance {
-    /// Energy that appeared from nowhere, relative to the sum of the sizes of all entries.
+    /// Error of the balance: the sum of all terms minus the energy at the start, divided by the sum of the magnitudes
+    /// of all terms.
     pub fn imbalance(&self) -> f64 {
         let stored = [self.kinetic, self.fluid, self.wall];
         let lost = [self.viscous, self.hourglass, self.radiated, self.damped, self.relaxed];
@@ -62,16 +63,16 @@ impl EnergyBalance {
     }
 }
 
-/// A run: positions at whole steps, velocities at half steps.
+/// State of a run: positions at whole steps, velocities at half steps.
 #[derive(Debug, Clone)]
 pub struct Solver<'a, E> {
     /// The fluid.
     pub fluid: Fluid<E>,
     /// The wall.
     pub shell: Shell,
-    /// Velocities half a step before the present (before the first step: at the start).
+    /// Velocities half a step before the current time; before the first step, velocities at the start.
     pub velocity: Field,
-    /// Completed steps.
+    /// Number of completed steps.
     pub steps: usize,
     /// Decay of all motion in proportion to its mass, 1/s.
     pub damping: f64,
@@ -85,7 +86,7 @@ pub struct Solver<'a, E> {
 }
 
 impl<'a, E: EquationOfState + Clone> Solver<'a, E> {
-    /// A fluid at rest in the vessel, just after the pulse.
+    /// A fluid at rest in the vessel, just after the pulse; `dt` is the time step, s.
     pub fn new(vessel: &'a Vessel, constants: FluidConstants, eos: E, dt: f64) -> Self {
         let Vessel { mesh, shell, held, joints } = vessel;
         let impedance = constants.density * eos.sound_speed();
@@ -118,7 +119,7 @@ impl<'a, E: EquationOfState + Clone> Solver<'a, E> {
         solver
     }
 
-    /// One time step.
+    /// Advances by one time step.
     pub fn step(&mut self) {
         if self.steps == 0 {
             self.first_kick();
@@ -129,7 +130,7 @@ impl<'a, E: EquationOfState + Clone> Solver<'a, E> {
         self.steps += 1;
     }
 
-    /// Positions one step on with the present velocities, and the forces there.
+    /// Advances the positions by one step with the current velocities, and evaluates the forces there.
     pub fn drift(&mut self) {
         self.fluid.advance(&self.vessel.mesh, &self.velocity, self.dt);
         self.shell.advance(&self.velocity, self.dt);
@@ -147,8 +148,8 @@ impl<'a, E: EquationOfState + Clone> Solver<'a, E> {
         self.velocity = velocity;
     }
 
-    /// The velocities a step on; the damping acts on the mean of old and new ones: stable for
-    /// any step. Returns the energy radiated, J.
+    /// Advances the velocities by one step. The damping acts on the mean of the old and the new velocities, which is
+    /// stable for any step. Returns the energy radiated, J.
     fn kick(&self, velocity: &mut Field) -> f64 {
         if self.damping == 0.0 {
             return self.motion.kick(velocity, &self.force, self.dt);
@@ -158,12 +159,12 @@ impl<'a, E: EquationOfState + Clone> Solver<'a, E> {
         self.motion.kick(velocity, &self.force, self.dt / (1.0 + half))
     }
 
-    /// Power that the damping takes from a velocity, tested with another one, W.
+    /// Power that the damping takes from a velocity, projected on another one, W.
     fn damped_power(&self, velocity: &Field, test: &Field) -> f64 {
         2.0 * self.damping * self.motion.kinetic(velocity, test)
     }
 
-    /// From the start to half a step later. The energy that the leapfrog conserves counts the
+    /// Advances the velocities from the start by half a step. The energy that the leapfrog conserves contains the
     /// product of the velocities half a step before and after the start.
     fn first_kick(&mut self) {
         let mut before = self.velocity.clone();
@@ -185,25 +186,25 @@ impl<'a, E: EquationOfState + Clone> Solver<'a, E> {
         self.shell.forces(&mut self.force);
     }
 
-    /// Present forces on every motion, N (N m for rotations).
+    /// Current force on every motion, N (N m for rotations).
     pub fn force(&self) -> &Field {
         &self.force
     }
 
-    /// Masses of every motion, kg (kg m² for rotations).
+    /// Mass of every motion, kg (kg m² for rotations).
     pub fn mass(&self) -> &Field {
         &self.motion.mass
     }
 
-    /// Whether all strains of the fluid and displacements of the wall are finite.
+    /// Returns `true` if all strains of the fluid and displacements of the wall are finite.
     pub fn is_finite(&self) -> bool {
         let total = |x: &[f64]| x.iter().map(|x| x.abs()).sum::<f64>();
         (total(&self.fluid.strain) + total(&self.shell.r) + total(&self.shell.z)).is_finite()
     }
 
-    /// The energy balance now. The kinetic energy is the product of the velocities half a step
-    /// before and after, which the leapfrog conserves exactly together with the stored energy
-    /// as long as the pressure is linear in the strain.
+    /// The current energy balance. The kinetic energy is the product of the velocities half a step before and after,
+    /// which the leapfrog conserves exactly together with the stored energy as long as the pressure is linear in the
+    /// strain.
     pub fn energy(&self) -> EnergyBalance {
         let mut after = self.velocity.clone();
         if self.steps > 0 {
@@ -235,7 +236,7 @@ fn scale(field: &mut Field, factor: f64) {
     }
 }
 
-/// The mean of two fields, in the place of the first.
+/// Replaces the first field by the mean of both.
 fn average(field: &mut Field, other: &Field) {
     for (x, y) in field.parts_mut().into_iter().zip(other.parts()) {
         for (x, y) in x.iter_mut().zip(y) {

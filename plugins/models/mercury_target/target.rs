@@ -1,24 +1,23 @@
-//! The vessel of the settings and a whole run.
+//! The vessel that the settings describe, and complete runs.
 
 use super::coupling::{Contact, Held, Joints};
 use super::eos::{EquationOfState, TensileCutoff};
 use super::fluid::FluidConstants;
 use super::gas::{Bubbly, Gas};
 use super::gauges::{Meridian, Sensor};
-use super::load;
 use super::mesh::Mesh;
 use super::settings::{Rear, Settings};
 use super::shell::{Element, Shell, Steel};
 use super::solver::{Solver, Vessel};
-use super::{Mercury, Outcome, SimulationError};
+use super::{Mercury, Outcome, SimulationError, load};
 
-/// A run of more steps is refused.
+/// Limit on the number of steps of a run; a run that needs more fails.
 const MOST_STEPS: f64 = 5e6;
 
-/// Beyond this size of the volumetric strain the linear kinematics have no meaning.
+/// Magnitude of the volumetric strain from which the linear kinematics are invalid.
 const VALID_STRAIN: f64 = 0.1;
 
-/// The stand-in prepared for any number of runs.
+/// The model prepared for any number of runs: mesh, wall and gauges.
 #[derive(Debug, Clone)]
 pub struct Target {
     settings: Settings,
@@ -27,7 +26,7 @@ pub struct Target {
     sensors: Vec<Sensor>,
 }
 
-/// Mesh, wall and gauges once; then one run.
+/// Builds mesh, wall and gauges, and makes one run.
 pub fn simulate(settings: &Settings, mercury: &Mercury) -> Result<Outcome, SimulationError> {
     Target::new(settings)?.simulate(mercury)
 }
@@ -56,12 +55,12 @@ impl Target {
         &self.vessel
     }
 
-    /// The gauges, in the order of the gauge table.
+    /// The gauges, in the order of the settings.
     pub fn sensors(&self) -> &[Sensor] {
         &self.sensors
     }
 
-    /// The strain traces of one pulse in the given mercury.
+    /// Strain traces after one pulse in the given mercury.
     pub fn simulate(&self, mercury: &Mercury) -> Result<Outcome, SimulationError> {
         mercury.validate()?;
         let initial = self.initial_pressure(mercury);
@@ -69,7 +68,7 @@ impl Target {
         self.run(density, TensileCutoff::new(density, sound_speed, tensile_cutoff, initial))
     }
 
-    /// The strain traces of one pulse in mercury with gas bubbles.
+    /// Strain traces after one pulse in mercury with gas bubbles.
     pub fn simulate_with_gas(
         &self,
         mercury: &Mercury,
@@ -85,13 +84,14 @@ impl Target {
         self.run(density, Bubbly::new(liquid, gas.bubbles(density), share))
     }
 
-    /// Pressure that the pulse leaves in each cell of the given mercury, Pa.
+    /// Pressure in each cell after the pulse in the given mercury, Pa.
     pub fn initial_pressure(&self, mercury: &Mercury) -> Vec<f64> {
         let peak = self.settings.pulse.pressure(mercury);
         self.shapes.iter().map(|shape| peak * shape).collect()
     }
 
-    /// A run with any equation of state.
+    /// A run with any equation of state. `density` is that of the fluid, kg/m³. Fails if the run would need too many
+    /// steps or a strain is not finite.
     pub fn run<E: EquationOfState + Clone>(
         &self,
         density: f64,
@@ -150,7 +150,7 @@ impl Target {
     }
 }
 
-/// Radial lines are parallel to the axis; axial positions run from the cap to the rear.
+/// The mesh: its rows are parallel to the axis, and axial positions run from the cap to the rear.
 fn mesh(settings: &Settings) -> Mesh {
     let [nr, nz] = settings.numerics.mesh.counts();
     let geometry = &settings.geometry;
@@ -186,7 +186,7 @@ fn shell(settings: &Settings, meridian: Meridian<'_>) -> Shell {
     Shell::new(meridian.nodes.windows(2).enumerate().map(element).collect())
 }
 
-/// The axis is held by symmetry; the wall is clamped at the rear.
+/// Held motions: the axis by symmetry, the wall by its clamp at the rear.
 fn held(mesh: &Mesh, wall_nodes: usize, rear: Rear) -> Held {
     let mut held =
         Held { fluid: vec![[false; 2]; mesh.r.len()], shell: vec![[false; 3]; wall_nodes] };

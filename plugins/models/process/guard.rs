@@ -1,7 +1,7 @@
-//! Ends the processes of simulators when this program is killed: a shell that waits for the end of a pipe.
+//! Guard that ends the simulators' processes when this program is killed: a shell that waits for the end of a pipe.
 //!
-//! A group of its own is not reached by the terminal's interrupt, and nothing runs in a killed program. The
-//! shell is told which groups are running; when the pipe closes, for whatever reason, it ends those that are left.
+//! The terminal's interrupt does not reach a separate process group, and a killed program cannot clean up. The shell
+//! receives the ids of the running groups; when the pipe closes, for any reason, it ends those that are left.
 
 use std::io::Write as _;
 use std::process::{ChildStdin, Command, Stdio};
@@ -18,12 +18,12 @@ done
 for group in $groups; do kill -s KILL -- \"-$group\" 2>/dev/null; done
 ";
 
-/// Notes that a group runs.
+/// Registers a running group.
 pub fn watch(group: u32) {
     tell('+', group);
 }
 
-/// Notes that a group has ended.
+/// Removes a group that has ended.
 pub fn release(group: u32) {
     tell('-', group);
 }
@@ -32,11 +32,11 @@ fn tell(change: char, group: u32) {
     static GUARD: OnceLock<Option<Mutex<ChildStdin>>> = OnceLock::new();
     let Some(pipe) = GUARD.get_or_init(start) else { return };
     let mut pipe = pipe.lock().unwrap_or_else(PoisonError::into_inner);
-    // Without its guard a run is made all the same.
+    // A run is possible without the guard.
     let _ = pipe.write_all(format!("{change} {group}\n").as_bytes());
 }
 
-/// The pipe to the guard; `None` where there is no shell.
+/// Starts the guard and returns its pipe; `None` where there is no shell.
 fn start() -> Option<Mutex<ChildStdin>> {
     if !cfg!(unix) {
         return None;

@@ -1,29 +1,32 @@
-//! Processes of simulators: each is one group with all that it starts, and is ended as a whole.
+//! Simulator processes: each is started as a process group with all its descendants, and the group is ended as a
+//! whole.
 //!
-//! A process that puts itself into a session of its own leaves its group and is not ended with it.
+//! A descendant that starts a session of its own leaves the group and is not ended with it.
 
 mod guard;
 mod program;
 mod tail;
 
-use std::io;
 use std::process::{Child, Command, ExitStatus};
-use std::thread;
 use std::time::{Duration, Instant};
+use std::{io, thread};
 
 pub use program::find;
 pub use tail::{tail, tail_of_file};
 
-/// A running process and all that it has started.
+/// The time a process that was asked to end (SIGTERM) leaves to this program, to be asked as well.
+const GRACE: Duration = Duration::from_secs(3);
+
+/// A running process with all its descendants.
 #[derive(Debug)]
 pub struct Process {
     child: Child,
-    /// How the process ended, once it has.
+    /// Exit status of the process, once it has ended.
     status: Option<ExitStatus>,
 }
 
 impl Process {
-    /// Starts a command as a group of its own.
+    /// Starts a command in a process group of its own.
     pub fn start(command: &mut Command) -> io::Result<Self> {
         group::lead(command);
         let child = command.spawn()?;
@@ -31,18 +34,18 @@ impl Process {
         Ok(Self { child, status: None })
     }
 
-    /// The process, for its pipes.
+    /// The process, for access to its pipes.
     pub fn child(&mut self) -> &mut Child {
         &mut self.child
     }
 
-    /// Whether the process has not ended.
+    /// Returns `true` while the process has not ended.
     pub fn is_running(&mut self) -> bool {
         self.status.is_none() && group::leader_has_ended(&mut self.child).is_ok_and(|ended| !ended)
     }
 
-    /// Waits until the process has ended, then ends whatever it left running; `None` when the time is up and
-    /// all of it was ended.
+    /// Waits until the process has ended, then ends all processes of its group that still run. Returns `None` if
+    /// `limit` passes first; the whole group is then ended.
     pub fn wait(&mut self, limit: Option<Duration>) -> io::Result<Option<ExitStatus>> {
         let begun = Instant::now();
         let mut in_time = true;
@@ -55,15 +58,20 @@ impl Process {
             thread::sleep(pause(passed));
         }
         let status = self.end()?;
+        if in_time && group::was_asked_to_end(status) {
+            // A scheduler that ends a job signals its processes one after the other. This one may be the next: it must not
+            // first report that the simulator failed, where the job reached its time limit.
+            thread::sleep(GRACE);
+        }
         Ok(in_time.then_some(status))
     }
 
-    /// Ends the process and all that it has started.
+    /// Ends the process and its whole group.
     pub fn end(&mut self) -> io::Result<ExitStatus> {
         if let Some(status) = self.status {
             return Ok(status);
         }
-        // The leader is not yet waited for, so that its number still stands for this group and no other.
+        // The leader is not yet waited for, so that its process id still identifies this group and no other.
         group::kill(&mut self.child);
         guard::release(self.child.id());
         let status = self.child.wait()?;
@@ -78,7 +86,8 @@ impl Drop for Process {
     }
 }
 
-/// How long to sleep between two looks: a twentieth of the time that has passed, so that little is added to it.
+/// Pause between two checks: a twentieth of the time that has passed, so that waiting adds little to it; between 0.2
+/// and 20 ms.
 fn pause(passed: Duration) -> Duration {
     (passed / 20).clamp(Duration::from_micros(200), Duration::from_millis(20))
 }
@@ -86,8 +95,8 @@ fn pause(passed: Duration) -> Duration {
 #[cfg(unix)]
 mod group {
     use std::io;
-    use std::os::unix::process::CommandExt as _;
-    use std::process::{Child, Command};
+    use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
+    use std::process::{Child, Command, ExitStatus};
 
     use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
 
@@ -100,6 +109,10 @@ mod group {
         Ok(waitid(WaitId::Pid(Pid::from_child(child)), look)?.is_some())
     }
 
+    pub fn was_asked_to_end(status: ExitStatus) -> bool {
+        status.signal() == Some(Signal::TERM.as_raw())
+    }
+
     pub fn kill(child: &mut Child) {
         // An error means that no process of the group is left.
         let _ = kill_process_group(Pid::from_child(child), Signal::KILL);
@@ -109,12 +122,16 @@ mod group {
 #[cfg(not(unix))]
 mod group {
     use std::io;
-    use std::process::{Child, Command};
+    use std::process::{Child, Command, ExitStatus};
 
     pub fn lead(_: &mut Command) {}
 
     pub fn leader_has_ended(child: &mut Child) -> io::Result<bool> {
         Ok(child.try_wait()?.is_some())
+    }
+
+    pub fn was_asked_to_end(_: ExitStatus) -> bool {
+        false
     }
 
     pub fn kill(child: &mut Child) {

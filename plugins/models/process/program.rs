@@ -1,11 +1,11 @@
-//! Where a program is.
+//! Search for programs.
 
 use std::env;
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
-/// The file that a command's first word means: a path from `directory`, or a name that is looked up in the
-/// folders of `path` (the environment's when `None`).
+/// The file of a command's first word: a path relative to `directory`, or a name that is searched for in the
+/// directories of `path` (those of the environment if `None`). Returns `None` if there is no such executable file.
 pub fn find(program: &str, directory: &Path, path: Option<&OsStr>) -> Option<PathBuf> {
     let absolute = std::path::absolute(directory).unwrap_or_else(|_| directory.to_owned());
     if Path::new(program).components().count() > 1 {

@@ -1,15 +1,15 @@
-//! The end of what a program printed, for messages.
+//! The end of a program's output, for messages.
 
 use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
-/// How much of the end is looked at.
+/// Number of bytes at the end of a file that are read.
 const BYTES: u64 = 4096;
 const LINES: usize = 5;
 const CHARACTERS: usize = 200;
 
-/// The last lines that are not blank, long ones cut.
+/// The last lines that are not blank; long lines are cut.
 pub fn tail(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
     let lines: Vec<String> = text
@@ -25,7 +25,7 @@ pub fn tail(bytes: &[u8]) -> String {
     lines[lines.len().saturating_sub(LINES)..].join("\n")
 }
 
-/// The last lines of a file; empty when it cannot be read.
+/// The last lines of a file; empty if it cannot be read.
 pub fn tail_of_file(path: &Path) -> String {
     let end = || -> std::io::Result<Vec<u8>> {
         let mut file = File::open(path)?;

@@ -13,13 +13,13 @@ fn shell(script: &str, folder: &Path) -> Command {
     command
 }
 
-/// Whether a process whose number is in a file ends within two seconds.
+/// Returns `true` if the process whose id is in a file ends within two seconds.
 fn ends(file: &Path) -> bool {
     let begun = Instant::now();
     while begun.elapsed() < Duration::from_secs(2) {
         let pid = fs::read_to_string(file).unwrap_or_default();
         let state = fs::read_to_string(format!("/proc/{}/stat", pid.trim())).unwrap_or_default();
-        // A zombie has ended; who has to wait for it is not ours.
+        // A zombie process has ended; its parent, which must wait for it, is not under the test's control.
         if !pid.is_empty() && (state.is_empty() || state.contains(") Z ")) {
             return true;
         }
@@ -46,6 +46,16 @@ fn what_a_finished_process_left_running_is_ended() {
     let mut process = Process::start(&mut shell(script, folder.path())).unwrap();
     assert_eq!(process.wait(None).unwrap().unwrap().code(), Some(3));
     assert!(ends(&folder.path().join("child")));
+}
+
+#[test]
+fn who_ends_the_simulator_has_time_to_end_this_program_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut process = Process::start(&mut shell("kill -s TERM $$", folder.path())).unwrap();
+    let begun = Instant::now();
+    let status = process.wait(None).unwrap();
+    assert!(status.is_some_and(|status| status.code().is_none()), "{status:?}");
+    assert!(begun.elapsed() >= super::GRACE);
 }
 
 #[test]

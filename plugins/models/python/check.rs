@@ -1,13 +1,13 @@
-//! What can be wrong with a Python file, found without running it: by an interpreter that reads it, and by its text alone
-//! where no program may be started.
+//! Errors in a Python file that can be found without running it: by an interpreter that parses it, or by its text
+//! alone where no program may be started.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
 use lacuna::plugin::Context;
-use lacuna::study::nearest::nearest;
-use lacuna::study::problem::Complaints;
+use lacuna::text::nearest::nearest;
+use lacuna::text::problem::Complaints;
 use serde::Deserialize;
 
 use super::pool::interpreter;
@@ -15,43 +15,43 @@ use super::{Python, written};
 use crate::models::given;
 
 const SCRIPT: &str = include_str!("names.py");
-/// Arguments that a function may have beside the inputs.
+/// Arguments that a function may have in addition to the inputs.
 const EXTRA: [&str; 2] = ["layout", "scenario"];
 
-/// What a file defines.
+/// Definitions in a file.
 #[derive(Deserialize)]
 #[serde(untagged)]
 pub enum Names {
-    /// It cannot be read.
+    /// The file cannot be parsed.
     Wrong {
-        /// What is wrong.
+        /// Description of the error.
         error: String,
-        /// Its line.
+        /// Line of the error.
         line: Option<usize>,
     },
-    /// It can be read.
+    /// The file can be parsed.
     Sound {
-        /// The functions that were asked for, where their arguments can be seen.
+        /// The requested functions, with their arguments where these can be determined.
         functions: BTreeMap<String, Option<Arguments>>,
-        /// The functions that were asked for and are not there.
+        /// The requested functions that the file does not define.
         unknown: Vec<String>,
-        /// All functions.
+        /// All functions of the file.
         defined: Vec<String>,
     },
 }
 
-/// What a function takes by name.
+/// Arguments of a function that can be passed by name.
 #[derive(Deserialize)]
 pub struct Arguments {
-    /// The arguments that can be given by name.
+    /// Names of the arguments.
     pub names: Vec<String>,
-    /// Those that have a default.
+    /// Names of the arguments that have a default.
     pub optional: Vec<String>,
-    /// Whether any other name is taken too.
+    /// The function accepts any other name too (`**kwargs`).
     pub any: bool,
 }
 
-/// The options against the machine.
+/// Checks the options against the files and programs of the machine.
 pub fn files(model: &Python, context: &Context<'_>, complaints: &mut Complaints<'_>) {
     let file = context.directory.join(&model.file);
     if !file.is_file() {
@@ -70,7 +70,7 @@ pub fn files(model: &Python, context: &Context<'_>, complaints: &mut Complaints<
     }
 }
 
-/// What an interpreter reads in the file; `None` when it does not answer.
+/// Definitions that an interpreter finds in the file; `None` if it does not answer.
 fn read(python: &Path, file: &Path, wanted: &[&str]) -> Option<Names> {
     let output = Command::new(python)
         .args(["-c", SCRIPT])
@@ -105,7 +105,7 @@ fn names(
         let name = model.interpreter.display();
         complaints
             .at("interpreter")
-            .say(format!("`{name}` is no working Python interpreter of version 3.8 or later"));
+            .say(format!("`{name}` is not a working Python interpreter of version 3.8 or later"));
         return;
     };
     match found {
@@ -134,7 +134,7 @@ fn names(
 }
 
 impl Arguments {
-    /// Complains of inputs that the function does not take, and of arguments that nothing gives.
+    /// Complains of inputs that the function does not accept and of arguments that have no value.
     fn check(&self, key: &str, name: &str, context: &Context<'_>, complaints: &mut Complaints<'_>) {
         let inputs = || context.given.iter().map(|given| given.name.as_str());
         for input in inputs().filter(|input| !self.any && !self.takes(input)) {
@@ -151,7 +151,7 @@ impl Arguments {
         for argument in wanted {
             complaints
                 .at(key)
-                .say(format!("`{name}` wants `{argument}`, which the study does not give"))
+                .say(format!("`{name}` requires the argument `{argument}`, which is not an input of the study"))
                 .expected(given::listed(inputs()));
         }
     }

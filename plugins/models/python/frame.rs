@@ -1,4 +1,4 @@
-//! What a worker answers: a line of JSON, and doubles after it.
+//! Answers of a worker: a line of JSON, followed by doubles.
 
 use std::io::{self, BufRead, Read as _};
 
@@ -7,9 +7,9 @@ use serde::Deserialize;
 /// One answer.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Answer {
-    /// Numbers.
+    /// Result values.
     Values(Vec<f64>),
-    /// Why there are none.
+    /// Error message.
     Failed(String),
 }
 

@@ -10,11 +10,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use lacuna::data::Unit;
-use lacuna::linalg::Matrix;
 use lacuna::plugin::model::{Call, EvalError, Gradient, Response, Signature};
 use lacuna::plugin::{Component, Context, Model};
-use lacuna::study::problem::Complaints;
-use lacuna::study::values::{Count, Positive};
+use lacuna::text::problem::Complaints;
+use lacuna::text::values::{Count, Positive};
+use lacuna_linalg::Matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -38,47 +38,48 @@ use super::given;
 ///     return [math.exp(-damping * t) * math.cos(2 * math.pi * frequency * t) for t in times]
 /// ```
 ///
-/// The function gets each input that the study gives (parameters, fixed values, values of a scenario) under
-/// its name, in the study's unit or in that of `units`. If it has an argument `layout` it gets the response's `name`,
-/// `unit` and `axes` (each with `name`, and `labels` or `values` and `unit`); if it has an argument `scenario`,
-/// that scenario's `name`, `values` and `functions`. It returns the response: an array or nested lists of the
-/// layout's shape, one flat list in row-major order, or dicts by label. Numbers are passed exactly.
+/// The function receives each input of the study (parameters, fixed values, values of a scenario) as an argument of
+/// that name, in the study's unit or in that of `units`. An argument `layout` receives the response's `name`, `unit`
+/// and `axes` (each with `name`, and `labels` or `values` and `unit`); an argument `scenario` receives the scenario's
+/// `name`, `values` and `functions`. The function returns the response: an array or nested lists of the layout's
+/// shape, one flat list in row-major order, or dicts by label. Numbers are passed without rounding.
 ///
-/// With `vectorised` every input is a sequence with one value a run (an array, if the file imports `numpy`), and the
-/// function returns one response a run; what it does for one run must not depend on the others.
+/// With `vectorised` every input is a sequence with one value per run (a `numpy` array if the file imports `numpy`),
+/// and the function returns one response per run; its result for one run must not depend on the other runs.
 ///
-/// The file is loaded once by a worker process; as many workers run as runs are made at a time. What the
-/// function prints goes nowhere near the results. A run whose function raises an exception, hangs, or takes its worker
-/// down counts as failed with the reason; the next run gets a new worker. Only the Python interpreter is needed (3.8
-/// or later), no package.
+/// Worker processes load the file once each; there are as many workers as concurrent runs. Output that the function
+/// prints does not affect the results. If the function raises an exception, exceeds the time limit or ends its
+/// worker, the run has failed with that reason, and the next run uses a new worker. The interpreter must be Python
+/// 3.8 or later; no package is required.
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Python {
-    /// The Python file, relative to the study file. Runs are made again when it changes, but not when a module changes
-    /// that it imports.
+    /// Path of the Python file, relative to the study file. Existing runs are made again if this file changes, but
+    /// not if a module that it imports changes.
     pub file: PathBuf,
-    /// The function.
+    /// Name of the function.
     #[serde(default = "simulate")]
     pub function: String,
-    /// The interpreter, or the folder of a virtual environment: with a `/` relative to the study file, else looked up
-    /// in `PATH`.
+    /// Python interpreter, or the directory of a virtual environment. A value with a `/` is a path relative to the
+    /// study file; a name is searched for in `PATH`.
     #[serde(default = "python3")]
     pub interpreter: PathBuf,
-    /// Whether the function takes several runs in one call.
+    /// If `true`, the function receives several runs in one call.
     #[serde(default)]
     pub vectorised: bool,
-    /// How many runs a vectorised function gets at most.
+    /// Maximum number of runs per call of a vectorised function.
     #[serde(default = "hundred")]
     pub batch: Count,
-    /// A function in the same file that returns the derivatives of the response by the inputs: a dict with an
-    /// array like the response for each input, or one array with the inputs on an additional last axis.
+    /// Name of a function in the same file that returns the derivatives of the response with respect to the inputs: a
+    /// dict with an array of the response's shape for each input, or one array with the inputs as an additional last
+    /// axis. Without it, methods that use derivatives are not available for this model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gradient: Option<String>,
-    /// Units in which the function takes inputs, where they are not the study's.
+    /// Units in which the function receives inputs; inputs that are not listed use the study's units.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub units: BTreeMap<String, Unit>,
-    /// Seconds after which a call (of all runs in it, if vectorised) is stopped; no limit when left out.
-    /// Loading the file may take a minute, or as long if that is longer.
+    /// Time limit for one call (of all its runs, if vectorised), in seconds; when it passes, the call is stopped and
+    /// its runs have failed. Default: no limit. Loading the file may take 60 seconds, or `timeout` if that is longer.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub timeout: Option<Positive>,
     #[serde(skip)]
@@ -133,7 +134,7 @@ impl Model for Python {
         if !self.vectorised || !all_sound {
             return alone();
         }
-        // One run that goes wrong spoils all of the call: then each is asked for by itself.
+        // If one run of a call fails there is no result for any of them; each run is then made by itself.
         match self.pool.ask(self, "simulate", calls) {
             Ok(values) if values.len() == calls.len() * first.layout.len() => values
                 .chunks(first.layout.len())

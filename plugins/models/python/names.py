@@ -1,4 +1,4 @@
-"""Says what a Python file defines, without running it: one line of JSON on standard output."""
+"""Writes the definitions of a Python file, without running it, as one line of JSON to standard output."""
 import ast
 import json
 import sys
@@ -26,7 +26,7 @@ def main():
     found = {}
     for node in module.body:
         if isinstance(node, ast.FunctionDef) and node.name in names:
-            # A decorator may change what a function takes.
+            # A decorator may change the arguments of a function.
             found[node.name] = None if node.decorator_list else described(node)
     other = {node.id for node in ast.walk(module) if isinstance(node, ast.Name)}
     for node in ast.walk(module):

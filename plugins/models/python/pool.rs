@@ -1,4 +1,4 @@
-//! The workers of a model: one a call at a time, kept for the next.
+//! Workers of a model: each handles one call at a time and is kept for the next.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -12,15 +12,16 @@ use super::frame::Answer;
 use super::worker::{Silent, Worker};
 use crate::models::process;
 
-/// A file may take this long to load, however short the limit of a call: its packages are loaded with it.
+/// Minimum time limit for loading a file, however short the limit of a call: loading includes the packages that it
+/// imports.
 const LOADING: Duration = Duration::from_secs(60);
 
-/// Workers that wait for a call.
+/// Workers that are ready for a call.
 #[derive(Debug, Default)]
 pub struct Pool(Mutex<Vec<Worker>>);
 
 impl Pool {
-    /// What a function of the model's file answers to some calls in one go.
+    /// Answer of a function of the model's file to several calls in one request.
     pub fn ask(
         &self,
         model: &Python,
@@ -52,12 +53,12 @@ impl Pool {
                 let text = told(model, function, Silent::Failed(text));
                 Err(EvalError::Rejected(text))
             }
-            // What is left of the worker is ended as it is dropped.
+            // The rest of the worker is ended when it is dropped.
             Err(silent) => Err(EvalError::Rejected(told(model, function, silent))),
         }
     }
 
-    /// A worker that waits and has not ended since its last call.
+    /// A worker that is ready and still running.
     fn waiting(&self) -> Option<Worker> {
         loop {
             let mut worker = self.0.lock().unwrap_or_else(PoisonError::into_inner).pop()?;
@@ -96,7 +97,7 @@ fn start(model: &Python, study: &Path, limit: Option<Duration>) -> Result<Worker
     })
 }
 
-/// The interpreter that a study means by a path, a name, or the folder of a virtual environment.
+/// The interpreter that the option means: a path, a name, or the directory of a virtual environment.
 pub fn interpreter(path: &Path, study: &Path) -> Option<PathBuf> {
     let folder = study.join(path);
     let inside = if cfg!(windows) { "Scripts/python" } else { "bin/python" };
@@ -108,12 +109,12 @@ fn shown(file: &Path) -> String {
     format!("`{}`", file.display())
 }
 
-/// Why a function gave no answer.
+/// Message for a function that gave no answer.
 fn told(model: &Python, function: &str, why: Silent) -> String {
     match why {
         Silent::Failed(text) => format!("`{function}` in {}: {text}", shown(&model.file)),
         Silent::Late => {
-            let limit = model.timeout.map_or(0.0, lacuna::study::values::Positive::get);
+            let limit = model.timeout.map_or(0.0, lacuna::text::values::Positive::get);
             format!("`{function}` in {} was stopped after {limit} s", shown(&model.file))
         }
         Silent::Ended(text) => {

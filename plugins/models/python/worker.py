@@ -2,7 +2,7 @@
 
 A request is one line of JSON on standard input; an answer is one line of JSON and, after `{"count": n}`, n
 doubles in little-endian order. Both use descriptors of their own, so that whatever the user's code prints
-or reads cannot disturb them: its standard output goes where its errors go.
+or reads cannot disturb them: its standard output is redirected to its standard error.
 """
 import array
 import collections.abc
@@ -16,7 +16,7 @@ import traceback
 
 
 class Wrong(Exception):
-    """A result that is no response."""
+    """A result that is not a valid response."""
 
 
 def streams():
@@ -41,7 +41,7 @@ def load(path):
 
 
 def explain(error, path):
-    """The error, and the last line of the user's file on the way to it."""
+    """Describes the error and the last line of the user's file in its traceback."""
     said = str(error)
     message = type(error).__name__ + (f": {said}" if said else "")
     frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == path]
@@ -52,7 +52,7 @@ def explain(error, path):
 
 
 class Function:
-    """A function of the user's and what it wants to know."""
+    """A function of the user's file and the arguments that it receives."""
 
     def __init__(self, module, name, names):
         self.name = name
@@ -78,7 +78,7 @@ class Function:
                     raise Wrong(f"`{name}` has no argument for the input `{n}`")
         for n, p in by_name.items():
             if p.default is kinds.empty and n not in names and n not in self.extra:
-                raise Wrong(f"`{name}` wants `{n}`, which the study does not give")
+                raise Wrong(f"`{name}` requires the argument `{n}`, which is not an input of the study")
 
 
 def is_one(value):
@@ -135,7 +135,7 @@ def place(value, axes, into):
 
 
 def extended(into, items):
-    """Appends numbers all at once; false when one of them is none."""
+    """Appends all items; returns false if one of them is not a number."""
     try:
         into.extend(array.array("d", items))
     except TypeError:
@@ -144,7 +144,7 @@ def extended(into, items):
 
 
 def flatten(value, axes):
-    """A result as doubles: an array, nested lists, one flat list, or dicts by label."""
+    """Converts a result to doubles: an array, nested lists, one flat list, or dicts by label."""
     shape, count = tuple(axis["length"] for axis in axes), size(axes)
     numpy = sys.modules.get("numpy")
     if numpy is not None and isinstance(value, numpy.ndarray) and value.dtype.kind in "fiub":
@@ -173,7 +173,7 @@ def little_endian(values):
 
 
 def columns(value, axes, names):
-    """Derivatives as one row a value and one column an input."""
+    """Derivatives with one row per value of the response and one column per input."""
     if isinstance(value, collections.abc.Mapping):
         for name in names:
             if name not in value:
@@ -195,7 +195,7 @@ class Worker:
         self.functions = {}
 
     def prepare(self, request):
-        """Takes over what stays the same from call to call."""
+        """Stores the data that do not change from call to call."""
         self.names = request["names"]
         layout = request["layout"]
         self.axes = [
@@ -271,7 +271,7 @@ def main():
             say({"error": explain(error, path)})
         else:
             say({"count": len(data) // 8}, data)
-        # What is printed is for messages only; the user's code may have closed or replaced the stream.
+        # The output is for messages only; the user's code may have closed or replaced the stream.
         with contextlib.suppress(Exception):
             sys.stdout.flush()
 

@@ -17,10 +17,10 @@ use crate::models::given::{layout_document, scenario_document};
 use crate::models::process::{Process, tail};
 
 const SCRIPT: &str = include_str!("worker.py");
-/// How much of what a worker prints is remembered.
+/// Number of bytes at the end of a worker's output that are kept for messages.
 const REMEMBERED: usize = 4096;
 
-/// What stays the same from call to call.
+/// Data that do not change from call to call.
 #[derive(Debug)]
 struct Settings {
     names: Vec<String>,
@@ -42,18 +42,18 @@ impl Settings {
     }
 }
 
-/// Why there is no answer.
+/// Reason for a missing answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Silent {
-    /// The worker says why, and can be asked again.
+    /// Error message of the worker, which is ready for the next request.
     Failed(String),
-    /// The time is up.
+    /// The time limit has passed.
     Late,
-    /// The worker has ended, in words.
+    /// The worker has ended; the text describes how.
     Ended(String),
 }
 
-/// A worker.
+/// A worker process.
 #[derive(Debug)]
 pub struct Worker {
     process: Process,
@@ -64,7 +64,8 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Starts a worker that loads a file.
+    /// Starts a worker and waits until it has loaded the file. `limit` is the time limit for that; no limit if
+    /// `None`.
     pub fn start(
         interpreter: &Path,
         arguments: &[String],
@@ -89,7 +90,7 @@ impl Worker {
         Ok(worker)
     }
 
-    /// Tells the worker what stays the same from call to call, if that is new to it.
+    /// Sends the data that do not change from call to call, unless the worker has them already.
     pub fn prepare(&mut self, call: &Call<'_>, limit: Option<Duration>) -> Result<(), Silent> {
         if self.settings.as_ref().is_some_and(|settings| settings.fit(call)) {
             return Ok(());
@@ -108,14 +109,14 @@ impl Worker {
         }
     }
 
-    /// Whether the worker can be asked.
+    /// Returns `true` if the worker is ready for a request.
     pub fn is_running(&mut self) -> bool {
         self.process.is_running()
     }
 
-    /// The answer to a request.
+    /// Answer to a request.
     pub fn ask(&mut self, request: &Value, limit: Option<Duration>) -> Result<Answer, Silent> {
-        // A worker that does not read any more has ended; the silence tells how.
+        // A worker that does not read any more has ended; the missing answer is then explained by its exit status.
         let _ = self.requests.write_all(format!("{request}\n").as_bytes());
         self.hear_any(limit)
     }
@@ -135,7 +136,7 @@ impl Worker {
         match heard {
             Ok(Ok(answer)) => Ok(answer),
             Err(RecvTimeoutError::Timeout) => {
-                // An error leaves nothing to end.
+                // An error means that the process has already ended.
                 let _ = self.process.end();
                 Err(Silent::Late)
             }
@@ -143,7 +144,7 @@ impl Worker {
         }
     }
 
-    /// How the worker ended.
+    /// Description of how the worker ended.
     fn death(&mut self) -> String {
         let status = self.process.wait(Some(Duration::from_secs(1)));
         let how = match status {
@@ -160,7 +161,7 @@ impl Worker {
     }
 }
 
-/// Reads answers as they come, so that they can be waited for with a limit.
+/// Reads answers in a thread, so that waiting for them can have a limit.
 fn listen(output: impl Read + Send + 'static) -> Receiver<io::Result<Answer>> {
     let (sender, receiver) = mpsc::channel();
     thread::spawn(move || {
@@ -175,7 +176,7 @@ fn listen(output: impl Read + Send + 'static) -> Receiver<io::Result<Answer>> {
     receiver
 }
 
-/// The end of what a worker prints.
+/// The end of a worker's output.
 #[derive(Debug)]
 struct Printed {
     end: Arc<Mutex<Vec<u8>>>,
@@ -188,7 +189,7 @@ impl Printed {
         let (sender, closed) = mpsc::channel::<()>();
         let kept = Arc::clone(&end);
         thread::spawn(move || {
-            // The pipe is closed when this goes.
+            // The channel closes when this is dropped.
             let _open = sender;
             let mut bytes = [0; REMEMBERED];
             while let Ok(count @ 1..) = errors.read(&mut bytes) {
@@ -201,7 +202,7 @@ impl Printed {
         Self { end, closed }
     }
 
-    /// The last lines, once all is read or some time has passed.
+    /// The last lines, once the output is complete or one second has passed.
     fn tail(&self) -> String {
         let _ = self.closed.recv_timeout(Duration::from_secs(1));
         tail(&self.end.lock().unwrap_or_else(PoisonError::into_inner))

@@ -1,13 +1,13 @@
-//! What a Python file defines, as its text shows it: no interpreter is asked.
+//! Definitions in a Python file, determined from its text without an interpreter.
 //!
-//! It sees functions at the left margin with their arguments, and no more: a file that is no valid Python, or that makes
-//! its functions in another way, is left to the interpreter, which `lacuna run` asks.
+//! Only functions at the left margin and their arguments are found. A file that is not valid Python, or that defines
+//! its functions in another way, is left to the interpreter, which `lacuna run` starts.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::check::{Arguments, Names};
 
-/// What is said of the functions `wanted`.
+/// Definitions found for the functions `wanted`.
 pub fn names(text: &str, wanted: &[&str]) -> Names {
     let code = code(text);
     let mut functions = BTreeMap::new();
@@ -20,7 +20,7 @@ pub fn names(text: &str, wanted: &[&str]) -> Names {
         if let Some(name) = line.strip_prefix("def ").map(|after| word(after.trim_start())) {
             defined.push(name.to_owned());
             if wanted.contains(&name) {
-                // A decorator may change what a function takes.
+                // A decorator may change the arguments of a function.
                 let seen = if decorated { None } else { arguments(rest) };
                 functions.insert(name.to_owned(), seen);
             }
@@ -28,7 +28,7 @@ pub fn names(text: &str, wanted: &[&str]) -> Names {
         let at_margin = line.starts_with(|c: char| !c.is_whitespace() && c != ')');
         decorated = if at_margin { line.starts_with('@') } else { decorated };
     }
-    // Whatever else is called so may be a function.
+    // Any other occurrence of the name may define a function.
     let words: BTreeSet<&str> = code.split(|c: char| !(c.is_alphanumeric() || c == '_')).collect();
     let star = code.lines().any(|line| line.contains("import") && line.contains('*'));
     let missing = |name: &&&str| !star && !words.contains(**name);
@@ -36,13 +36,13 @@ pub fn names(text: &str, wanted: &[&str]) -> Names {
     Names::Sound { functions, unknown, defined }
 }
 
-/// The identifier with which a text begins.
+/// The identifier at the start of a text.
 fn word(text: &str) -> &str {
     let end = text.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(text.len());
     &text[..end]
 }
 
-/// The text with blanks in the place of comments and of what stands in strings, line by line the same.
+/// The text with blanks in place of comments and of the contents of strings; its lines are the same.
 fn code(text: &str) -> String {
     let mut code = String::with_capacity(text.len());
     let mut open: Option<&str> = None;
@@ -76,7 +76,7 @@ fn code(text: &str) -> String {
     code
 }
 
-/// The arguments of the function that begins here; `None` where its brackets do not close.
+/// The arguments of the function that begins here; `None` if its brackets do not close.
 fn arguments(code: &str) -> Option<Arguments> {
     let inside = &code[code.find('(')? + 1..];
     let (mut parts, mut depth) = (vec![String::new()], 0_i32);
@@ -105,7 +105,7 @@ fn arguments(code: &str) -> Option<Arguments> {
         if part.starts_with("**") {
             found.any = true;
         } else if part == "/" {
-            // What stands before cannot be given by name.
+            // Arguments before the slash cannot be passed by name.
             found.names.clear();
             found.optional.clear();
         } else if !name.is_empty() {

@@ -1,21 +1,21 @@
-//! Which input of the study stands where in the model's input vectors.
+//! Arrangement of the study's inputs in the model's input vectors.
 
 use lacuna::plugin::Context;
 use lacuna::plugin::model::{Call, EvalError};
-use lacuna::study::nearest::{nearest, one_of};
-use lacuna::study::problem::Complaints;
+use lacuna::text::nearest::{nearest, one_of};
+use lacuna::text::problem::Complaints;
 use lacuna_um_bridge::protocol::Config;
 use serde_json::Value;
 
 use super::{UmBridge, refused};
 
-/// A question to the server.
+/// An evaluation request to the server.
 pub(super) struct Question {
-    /// The input vectors.
+    /// Input vectors.
     pub(super) input: Vec<Vec<f64>>,
-    /// The vector and the position in it of each input of the call; none for one among the settings.
+    /// Vector and position in it of each input of the call; `None` for an input among the settings.
     pub(super) places: Vec<Option<(usize, usize)>>,
-    /// The settings.
+    /// Settings.
     pub(super) config: Config,
 }
 
@@ -24,7 +24,7 @@ fn fatal<T>(message: String) -> Result<T, EvalError> {
 }
 
 impl UmBridge {
-    /// The names of the model's inputs: each once, those of the vectors first.
+    /// The names of the model's inputs without repetition, those of the vectors first.
     pub(super) fn input_names(&self, context: &Context<'_>) -> Vec<String> {
         let given = || context.given.iter().map(|given| &given.name);
         let vectors: Vec<&String> = match &self.inputs {
@@ -32,7 +32,7 @@ impl UmBridge {
             None => given().filter(|name| !self.config_inputs.contains(name)).collect(),
         };
         let mut names: Vec<String> = Vec::new();
-        // What nothing sets is complained about in `check`.
+        // Names without a value are complained about in `check`.
         let config_inputs = self.config_inputs.iter().filter(|name| given().any(|g| g == *name));
         for name in vectors.into_iter().chain(config_inputs) {
             if !names.contains(name) {
@@ -42,7 +42,7 @@ impl UmBridge {
         names
     }
 
-    /// What is asked of the server for a call.
+    /// The request for a call. Fails if an input is missing or not finite, or if the inputs do not fit the vectors.
     pub(super) fn arranged(&self, call: &Call<'_>) -> Result<Question, EvalError> {
         if call.inputs.len() != call.names.len() {
             let (found, expected) = (call.inputs.len(), call.names.len());
@@ -107,13 +107,13 @@ impl UmBridge {
         Ok(config)
     }
 
-    /// Complains of addresses that are none, or of one too many.
+    /// Complains if neither or both of `url` and `urls` are given, and of invalid addresses.
     pub(super) fn check_address(&self, complaints: &mut Complaints<'_>) {
         if self.url.is_empty() == self.urls.is_empty() {
             let found = if self.url.is_empty() { "neither" } else { "both" };
             complaints
                 .at("url")
-                .say("a model is at one address or at several")
+                .say("a model has either one address or several")
                 .expected("`url` or `urls`")
                 .found(found);
             return;
@@ -123,36 +123,36 @@ impl UmBridge {
             if host.is_none_or(|host| host.is_empty() || host.contains(char::is_whitespace)) {
                 complaints
                     .at(self.address_key())
-                    .say("this is no address of an UM-Bridge server")
+                    .say("this is not an address of an UM-Bridge server")
                     .expected("an address such as `http://localhost:4242`")
                     .found(format!("`{url}`"));
             }
         }
     }
 
-    /// The option that holds the addresses.
+    /// Name of the option that holds the addresses.
     pub(super) fn address_key(&self) -> &'static str {
         if self.urls.is_empty() { "url" } else { "urls" }
     }
 
-    /// Complains of inputs that cannot stand where they stand.
+    /// Complains of inputs that are listed twice, have no value or cannot be sent as settings.
     pub(super) fn check_names(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
         let vectors: Vec<&String> = self.inputs.iter().flatten().flatten().collect();
         for (i, name) in vectors.iter().enumerate() {
             if vectors[..i].contains(name) {
-                complaints.at("inputs").say(format!("`{name}` stands in `inputs` twice"));
+                complaints.at("inputs").say(format!("`{name}` is listed twice in `inputs`"));
             }
         }
         for name in &self.config_inputs {
             if vectors.contains(&name) {
-                let text = format!("`{name}` stands both in `inputs` and in `config_inputs`");
+                let text = format!("`{name}` is listed both in `inputs` and in `config_inputs`");
                 complaints.at("config_inputs").say(text).help("take it out of one of the two");
             } else if context.parameters.iter().any(|parameter| &parameter.name == name) {
                 complaints
                     .at("config_inputs")
                     .say(format!("`{name}` is an unknown of the study"))
                     .expected("fixed values or values of scenarios")
-                    .help("an unknown belongs in an input vector: servers differentiate by those");
+                    .help("list it in `inputs`: servers give derivatives only with respect to input vectors");
             } else if !context.given.iter().any(|given| &given.name == name) {
                 let names = || context.given.iter().map(|given| given.name.as_str());
                 let problem = complaints
@@ -167,7 +167,7 @@ impl UmBridge {
         if self.outputs.as_ref().is_some_and(Vec::is_empty) {
             complaints
                 .at("outputs")
-                .say("no output vector makes the response")
+                .say("the response needs at least one output vector")
                 .expected("at least one number, or no `outputs` for all vectors");
         }
     }

@@ -1,10 +1,10 @@
-//! The server, and what it says of the model once and for all.
+//! Connection to the server, and the properties of the model that do not change.
 
 use std::fmt;
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use lacuna::study::values::Count;
+use lacuna::text::values::Count;
 use lacuna_um_bridge::Client;
 use lacuna_um_bridge::client::Error;
 use lacuna_um_bridge::protocol::{About, Config, Support};
@@ -12,7 +12,7 @@ use lacuna_um_bridge::protocol::{About, Config, Support};
 use super::UmBridge;
 use super::pool::Pool;
 
-/// What is known of the server.
+/// Connection to the server and the answers it has given, each requested when first needed.
 #[derive(Default)]
 pub(super) struct Connection {
     pool: OnceLock<Pool>,
@@ -27,7 +27,8 @@ impl fmt::Debug for Connection {
     }
 }
 
-/// What is there, or else what is made and then kept; what fails is made again the next time.
+/// The value of the cell. If it is empty, `make` computes it; an error is not stored, so that the next call tries
+/// again.
 fn once<T>(cell: &OnceLock<T>, make: impl FnOnce() -> Result<T, Error>) -> Result<&T, Error> {
     if let Some(value) = cell.get() {
         return Ok(value);
@@ -37,7 +38,7 @@ fn once<T>(cell: &OnceLock<T>, make: impl FnOnce() -> Result<T, Error>) -> Resul
 }
 
 impl UmBridge {
-    /// The answer of a server that is free.
+    /// Answer of a server that is free.
     pub(super) fn ask<T>(
         &self,
         question: impl Fn(&Client) -> Result<T, Error>,
@@ -56,7 +57,7 @@ impl UmBridge {
         if self.urls.is_empty() { std::slice::from_ref(&self.url) } else { &self.urls }
     }
 
-    /// Where the model is, in words.
+    /// Address of the model for messages.
     pub(super) fn place(&self) -> String {
         match self.addresses() {
             [only] => only.clone(),
@@ -69,13 +70,14 @@ impl UmBridge {
         About { name: self.model.clone(), config }
     }
 
-    /// What the model can be asked for.
+    /// Operations that the model supports.
     pub(super) fn support(&self) -> Result<Support, Error> {
         let ask = || self.ask(|client| client.support(&self.about(self.config.clone())));
         once(&self.connection.support, ask).copied()
     }
 
-    /// The same from a server that answers at once.
+    /// Operations that the model supports, from the first server that answers within a minute, without repeated
+    /// requests; `None` if none does.
     pub(super) fn support_now(&self) -> Option<Support> {
         let ask = || {
             let about = self.about(self.config.clone());
@@ -87,13 +89,13 @@ impl UmBridge {
         once(&self.connection.support, ask).ok().copied()
     }
 
-    /// The length of each input vector, under the settings that the study writes.
+    /// The length of each input vector, under the settings that the study gives.
     pub(super) fn input_sizes(&self) -> Result<&[usize], Error> {
         let ask = || self.ask(|client| client.input_sizes(&self.about(self.config.clone())));
         once(&self.connection.input_sizes, ask).map(Vec::as_slice)
     }
 
-    /// The length of each output vector, under the settings that the study writes.
+    /// The length of each output vector, under the settings that the study gives.
     pub(super) fn output_sizes(&self) -> Result<&[usize], Error> {
         let ask = || self.ask(|client| client.output_sizes(&self.about(self.config.clone())));
         once(&self.connection.output_sizes, ask).map(Vec::as_slice)

@@ -1,20 +1,20 @@
-//! What `lacuna check` asks the server.
+//! Checks of the server for `lacuna check`.
 
 use std::time::Duration;
 
 use lacuna::plugin::Context;
-use lacuna::study::nearest::{nearest, one_of};
-use lacuna::study::problem::Complaints;
+use lacuna::text::nearest::{nearest, one_of};
+use lacuna::text::problem::Complaints;
 use lacuna_um_bridge::Client;
 use lacuna_um_bridge::client::Error;
 use lacuna_um_bridge::protocol::{About, VERSION};
 
 use super::UmBridge;
 
-/// How long the server may take to say who it is.
+/// Time limit for each of these requests, in seconds.
 const PATIENCE: f64 = 10.0;
 
-/// Complains of servers that are not there or do not have the model.
+/// Complains of servers that cannot be reached or do not have the model with the right sizes.
 pub(super) fn check(model: &UmBridge, context: &Context<'_>, complaints: &mut Complaints<'_>) {
     for url in model.addresses() {
         of_address(model, url, context, complaints);

@@ -1,19 +1,19 @@
 //! Derivatives of the response, by columns or by rows.
 
-use lacuna::linalg::Matrix;
 use lacuna::plugin::model::{Call, EvalError, Gradient};
+use lacuna_linalg::Matrix;
 use lacuna_um_bridge::client::Place;
 use lacuna_um_bridge::protocol::About;
 
 use super::arrangement::Question;
 use super::{UmBridge, refused};
 
-/// The derivatives that are asked for at one point.
+/// Request for the derivatives at one point.
 struct Asked<'a> {
     model: &'a UmBridge,
     about: About,
     question: Question,
-    /// The number and the length of each output vector of the response.
+    /// Index and length of each output vector of the response.
     outputs: Vec<(usize, usize)>,
 }
 
@@ -39,7 +39,8 @@ impl Gradient for UmBridge {
 }
 
 impl UmBridge {
-    /// The number and the length of each output vector of the response, whose length is `total`.
+    /// Index and length of each output vector of the response. Fails if the lengths do not add up to `total`, the
+    /// length of the response.
     fn chosen_outputs(&self, total: usize) -> Result<Vec<(usize, usize)>, EvalError> {
         let sizes = self.output_sizes().map_err(refused)?;
         let all: Vec<usize> = (0..sizes.len()).collect();
@@ -59,18 +60,18 @@ impl UmBridge {
 }
 
 impl Asked<'_> {
-    /// The inputs that stand in a vector: column, vector, position.
+    /// The inputs that are part of a vector: column, vector, position.
     fn inputs(&self) -> impl Iterator<Item = (usize, usize, usize)> + '_ {
         let places = self.question.places.iter().enumerate();
         places.filter_map(|(j, place)| place.map(|(v, k)| (j, v, k)))
     }
 
-    /// The numbers of the input vectors that have values.
+    /// The indices of the input vectors that have values.
     fn vectors(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.question.input.len()).filter(|&v| !self.question.input[v].is_empty())
     }
 
-    /// One question an input and output vector.
+    /// The derivatives, with one request per input and output vector; `rows` is the length of the response.
     fn columns(&self, rows: usize) -> Result<Matrix, EvalError> {
         let mut jacobian = Matrix::zeros(rows, self.question.places.len());
         for (j, v, k) in self.inputs() {
@@ -91,7 +92,7 @@ impl Asked<'_> {
         Ok(jacobian)
     }
 
-    /// One question a value of the response and input vector.
+    /// The derivatives, with one request per value of the response and input vector.
     fn rows(&self, rows: usize) -> Result<Matrix, EvalError> {
         let mut jacobian = Matrix::zeros(rows, self.question.places.len());
         let places = self
@@ -125,7 +126,7 @@ impl Asked<'_> {
     }
 }
 
-/// Zero everywhere but for a one at `k`.
+/// A vector with 1 at `k` and 0 elsewhere.
 fn unit(length: usize, k: usize) -> Vec<f64> {
     (0..length).map(|i| if i == k { 1.0 } else { 0.0 }).collect()
 }

@@ -1,4 +1,4 @@
-//! `um_bridge`: a model behind an UM-Bridge server.
+//! `um_bridge`: a model on an UM-Bridge server.
 
 mod arrangement;
 mod connection;
@@ -10,8 +10,8 @@ mod tests;
 
 use lacuna::plugin::model::{Call, EvalError, Gradient, Input, Response, Signature};
 use lacuna::plugin::{Component, Context, Model};
-use lacuna::study::problem::Complaints;
-use lacuna::study::values::{Count, Positive};
+use lacuna::text::problem::Complaints;
+use lacuna::text::values::{Count, Positive};
 use lacuna_um_bridge::client;
 use lacuna_um_bridge::protocol::Config;
 use schemars::JsonSchema;
@@ -19,63 +19,65 @@ use serde::{Deserialize, Serialize};
 
 use connection::Connection;
 
-/// A model behind a server that speaks UM-Bridge 1.0: any language, any machine.
+/// A model on a server that implements UM-Bridge 1.0, in any language, on any machine.
 ///
-/// The server is asked over HTTP for one evaluation at a time; several are under way when the executor runs several
-/// (`threads` of `local`; with `urls` give it as many as there are servers). The study's inputs fill the model's input vectors in the study's order, and the model's
-/// output vectors, one after the other, are the response: values in the order of the response's axes, the last axis
-/// fastest, in the study's units. In a study with scenarios the settings sent to the model also name the
-/// `scenario`.
+/// The server is asked over HTTP for one evaluation at a time. Several are made at the same time if the executor
+/// makes several runs (`threads` of `local`; with `urls`, set it to the number of servers). The study's inputs fill
+/// the model's input vectors in the study's order. The model's output vectors, one after the other, are the response:
+/// values in the order of the response's axes, the last axis fastest, in the study's units. In a study with scenarios
+/// the settings sent to the model also contain the name of the `scenario`.
 ///
-/// Where the server offers `ApplyJacobian` or `Gradient`, the study has derivatives of the model, by whichever
-/// takes fewer questions. `ApplyHessian` is not used: nothing in a study asks a model for second derivatives.
+/// If the server offers `ApplyJacobian` or `Gradient`, the study has derivatives of the model, obtained with the one
+/// that needs fewer requests. `ApplyHessian` is not used, because no method in a study needs second derivatives of a
+/// model.
 ///
-/// `lacuna check STUDY` asks the server whether it is there and whether it has the model, with the right sizes. While a study
-/// runs, an evaluation that fails (an error body, a crash, a value that is not finite, an answer of another size or
-/// none in time) is a failed run with its reason. A server that is gone for good, or that does not know the model,
-/// stops the study; what is done is kept.
+/// `lacuna check STUDY` asks the server whether it has the model with the right sizes. While a study runs, an
+/// evaluation that fails (an error body, a crash, a value that is not finite, an answer of another size, no answer in
+/// time) is a failed run with its reason. If the server remains unreachable or does not know the model, the study
+/// stops; completed runs are kept.
 ///
 /// Source: Seelinger et al., J. Open Source Software 8 (2023) 4748.
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct UmBridge {
-    /// The server's address, such as `http://localhost:4242`, or that of a load balancer in front of many.
+    /// Address of the server, such as `http://localhost:4242`, or of a load balancer for several servers.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub url: String,
-    /// The addresses of several servers of the same model, in place of `url`. Each question goes to a server that is free;
-    /// one that is gone is left out with a warning and its question put to another. An input over which two servers break the
-    /// connection counts as failed.
+    /// Addresses of several servers of the same model, in place of `url`. Each request goes to a server that is free.
+    /// A server that cannot be reached is not used any more, with a warning, and its request goes to another. If two
+    /// servers break the connection for the same input, that run has failed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub urls: Vec<String>,
-    /// How many evaluations are under way at a time at each address; when left out 1 with `urls`, and with `url` as many
-    /// as the executor runs.
+    /// Number of concurrent evaluations at each address, at least 1. Default: 1 with `urls`; with `url` as many as
+    /// the executor makes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub parallel: Option<Count>,
-    /// The model's name on the server; `forward` when left out.
+    /// Name of the model on the server.
     #[serde(default = "UmBridge::forward")]
     pub model: String,
-    /// Settings that the model is sent with every question, as it defines them, such as `{ level = 2 }`.
+    /// Settings that are sent to the model with every request, as the model defines them, such as `{ level = 2 }`.
     #[serde(default)]
     pub config: Config,
-    /// Inputs of the study that are sent among the settings, under their names, and in no input vector: fixed values or
-    /// values of scenarios.
+    /// Names of inputs of the study that are sent with the settings under these names instead of in an input vector:
+    /// fixed values or values of scenarios, no parameters.
     #[serde(default)]
     pub config_inputs: Vec<String>,
-    /// The names of the inputs that fill each input vector, such as `[["density", "sound_speed"], ["load"]]`; when left
-    /// out, all inputs of the study fill the vectors one after the other.
+    /// Names of the inputs that fill each input vector, such as `[["density", "sound_speed"], ["load"]]`. Default:
+    /// all inputs of the study fill the vectors one after the other.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inputs: Option<Vec<Vec<String>>>,
-    /// The numbers of the output vectors that make the response, the first being 0; all when left out.
+    /// Indices of the output vectors that form the response, from 0. Default: all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outputs: Option<Vec<usize>>,
-    /// How long an evaluation may take, in seconds, waiting on the server included; an hour when left out.
+    /// Time limit for an evaluation, in seconds, including the wait for a busy server; when it passes, the run has
+    /// failed.
     #[serde(default = "UmBridge::hour")]
     pub timeout: Positive,
-    /// How many times a question is asked again when the server cannot be reached or breaks the connection, after
-    /// pauses of a quarter of a second, half a second and so on up to half a minute; 5 when left out.
+    /// Number of times that a request is repeated if the server cannot be reached or breaks the connection, with
+    /// pauses of 0.25 s, 0.5 s and so on up to 30 s.
     #[serde(default = "UmBridge::five")]
     pub retries: u32,
-    /// The server, once it was asked.
+    /// Connection to the server, made with the first request.
     #[serde(skip)]
     connection: Connection,
 }
@@ -93,7 +95,7 @@ impl UmBridge {
         5
     }
 
-    /// The answer of the server to a call: the chosen output vectors, one after the other.
+    /// Answer of the server to a call: the chosen output vectors, one after the other.
     fn answer(&self, call: &Call<'_>) -> Result<Vec<f64>, EvalError> {
         let question = self.arranged(call)?;
         let about = self.about(question.config);
@@ -126,7 +128,7 @@ impl UmBridge {
     }
 }
 
-/// What an answer that is none means for the study.
+/// Consequence of a failed request: a final error stops the study, others make the run fail.
 fn refused(error: client::Error) -> EvalError {
     let reason = error.to_string();
     if error.is_final() { EvalError::Fatal(reason) } else { EvalError::Rejected(reason) }
@@ -168,7 +170,7 @@ impl Model for UmBridge {
     fn gradient(&self) -> Option<&dyn Gradient> {
         match self.support_now() {
             Some(support) if !(support.gradient || support.apply_jacobian) => None,
-            // Who is not there now says so when derivatives are asked for.
+            // A server that does not answer now reports this when derivatives are requested.
             _ => Some(self),
         }
     }

@@ -1,4 +1,4 @@
-//! Servers of one model: each question goes to one that is free.
+//! Servers of one model: each request goes to one that is free.
 
 use std::fmt;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -7,13 +7,14 @@ use std::time::Duration;
 use lacuna_um_bridge::Client;
 use lacuna_um_bridge::client::Error;
 
-/// Servers with what is under way at each.
+/// Servers with the requests in progress at each.
 pub struct Pool {
-    /// They ask once where there are several servers: a question that one does not answer goes to another.
+    /// Clients for evaluations. With several servers they do not repeat a request: one that a server does not answer
+    /// goes to another.
     clients: Vec<Client>,
-    /// They ask as often as the study says, whether a server is there at all.
+    /// Clients with the study's number of repetitions, for the decision whether a server can be reached at all.
     callers: Vec<Client>,
-    /// How many questions are under way at a time at each.
+    /// Maximum number of concurrent requests at each server.
     most: usize,
     seats: Mutex<Vec<Seat>>,
     freed: Condvar,
@@ -22,15 +23,15 @@ pub struct Pool {
 #[derive(Default)]
 struct Seat {
     busy: usize,
-    /// Why it is left out.
+    /// Reason why the server is not used any more.
     gone: Option<Error>,
 }
 
-/// An input over which so many servers broke the connection is not sent to another.
+/// Number of servers that may break the connection for one input before its run has failed.
 const MOST_DEATHS: usize = 2;
 
 impl Pool {
-    /// Servers at these addresses, with so many questions at a time at each.
+    /// Servers at these addresses, each with at most `most` concurrent requests.
     pub fn new(urls: &[String], timeout: Duration, retries: u32, most: usize) -> Self {
         let client =
             |retries: u32| move |url: &String| -> Client { Client::new(url, timeout, retries) };
@@ -45,7 +46,8 @@ impl Pool {
         }
     }
 
-    /// The answer of a server that is free. One that is gone is left out, and its question put to another.
+    /// Answer of a server that is free. A server that cannot be reached is not used any more, and its request goes to
+    /// another. Fails if no server is left.
     pub fn ask<T>(&self, question: impl Fn(&Client) -> Result<T, Error>) -> Result<T, Error> {
         let mut deaths = 0;
         loop {
@@ -59,7 +61,7 @@ impl Pool {
                 Err(Error::Unreachable { .. }) => {
                     let gone = self.callers[place].info().err();
                     if let Some(error) = &gone {
-                        eprintln!("warning: {error}; it is left out");
+                        eprintln!("warning: {error}; this server is not used any more");
                     }
                     self.give_back(place, gone);
                 }
@@ -67,9 +69,10 @@ impl Pool {
                     self.give_back(place, None);
                     deaths += 1;
                     if deaths == MOST_DEATHS {
-                        // What ends every server is the input, not the server.
-                        let reason =
-                            format!("{reason}, the second server to do so over this input");
+                        // The cause is then the input and not a server.
+                        let reason = format!(
+                            "{reason}; a second server broke the connection for the same input"
+                        );
                         return Err(Error::Broken { url, reason });
                     }
                 }
@@ -85,7 +88,7 @@ impl Pool {
         self.seats.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for a server that is free: that with the least to do.
+    /// Waits for a free server and returns the one with the fewest requests.
     fn take(&self) -> Result<usize, Error> {
         let mut seats = self.seats();
         loop {
@@ -96,18 +99,18 @@ impl Pool {
                 return Ok(place);
             }
             if here().next().is_none() {
-                let reason = format!("all {} servers are gone", seats.len());
+                let reason = format!("none of the {} servers can be reached any more", seats.len());
                 return Err(Error::Unreachable { url: "any address".to_owned(), reason });
             }
             seats = self.freed.wait(seats).unwrap_or_else(PoisonError::into_inner);
         }
     }
 
-    /// Frees a server, or leaves it out.
+    /// Marks a request as completed; with an error, the server is not used any more.
     fn give_back(&self, place: usize, gone: Option<Error>) {
         let mut seats = self.seats();
         seats[place].busy -= 1;
-        // Another question may have found it gone before.
+        // Another request may have found earlier that the server cannot be reached.
         if gone.is_some() {
             seats[place].gone = gone;
         }

@@ -1,4 +1,5 @@
-//! Against the server of `lacuna_um_bridge`; against the official one in `tests/um_bridge.rs` of the workspace.
+//! Tests with the server of `lacuna_um_bridge`; those with the official server are in `tests/um_bridge.rs` of the
+//! workspace.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::net::Ipv4Addr;
@@ -12,10 +13,10 @@ use lacuna::plugin::{Context, Given, Model};
 use lacuna_um_bridge::protocol::{Config, Fault, Support};
 use lacuna_um_bridge::{Model as Served, Server};
 
-/// From vectors `[a, b]`, `[c]` to `[a b, level c]` and `[a + c]`; `a` below zero has no answer.
+/// A map from the vectors `[a, b]`, `[c]` to `[a b, level c]` and `[a + c]`; it fails for `a` below zero.
 struct Toy {
     support: Support,
-    /// How many questions about derivatives it was asked.
+    /// Number of requests for derivatives.
     derivatives: AtomicUsize,
 }
 
@@ -25,7 +26,7 @@ impl Toy {
         Self { support, derivatives: AtomicUsize::new(0) }
     }
 
-    /// The derivatives of an output by an input.
+    /// The derivatives of an output vector with respect to an input vector.
     fn block(out: usize, by: usize, input: &[Vec<f64>], config: &Config) -> Vec<Vec<f64>> {
         match (out, by) {
             (0, 0) => vec![vec![input[0][1], input[0][0]], vec![0.0, 0.0]],
@@ -88,7 +89,7 @@ impl Served for Toy {
     }
 }
 
-/// A study of inputs `a`, `b`, `c` and of some conditions.
+/// A study with the inputs `a`, `b`, `c` and some conditions.
 struct Case {
     names: Vec<String>,
     layout: Layout,
@@ -111,7 +112,7 @@ impl Case {
     }
 }
 
-/// The plugin with these options on a server of this model.
+/// The plugin with these options and a server of this model.
 fn on(toy: &Toy, options: &str, ask: impl FnOnce(&dyn Model)) {
     let server = Server::bind(Ipv4Addr::LOCALHOST.into(), 0).unwrap();
     let url = format!("http://{}", server.address());
@@ -164,8 +165,8 @@ fn settings_are_sent_along_with_what_is_known_of_the_run() {
 #[test]
 fn derivatives_take_as_few_questions_as_possible() {
     let expected = [[3.0, 2.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0]];
-    // By columns: three inputs times two outputs. By rows: three values times two input vectors; so equal, and columns
-    // are taken; with one output of one value rows win.
+    // By columns: three inputs times two outputs. By rows: three values times two input vectors. The numbers are
+    // equal, and columns are used; with one output of one value rows need fewer requests.
     for (toy, options, rows, questions) in [
         (Toy::new(true, true), "", &expected[..], 6),
         (Toy::new(true, false), "", &expected[..], 6),
@@ -235,7 +236,7 @@ fn the_study_gives_names_and_units() {
     assert_eq!(signature.layout, case.layout);
 }
 
-/// Servers of one toy; those after the first are made to end, or were never there.
+/// Servers of one model; those after the first are stopped during the test or do not exist.
 #[test]
 fn questions_go_to_servers_that_are_there() {
     let toy = Toy::new(false, false);
@@ -247,7 +248,7 @@ fn questions_go_to_servers_that_are_there() {
     let model = from_text::<dyn Model>("um_bridge", &options).unwrap().plugin;
     std::thread::scope(|scope| {
         let stoppers: Vec<_> = servers.iter().map(Server::stopper).collect();
-        // A server that has ended is dropped: nobody listens there any more.
+        // A server that has ended is dropped and does not listen any more.
         let toy = &toy;
         let mut threads: Vec<_> = servers
             .into_iter()
@@ -270,7 +271,7 @@ fn questions_go_to_servers_that_are_there() {
             stoppers[1].stop();
             threads[1].take().unwrap().join().unwrap();
             ask(12);
-            // What has no answer has none, and costs no server.
+            // An input without an answer fails and makes no server unused.
             let outcome = model.predict(&case.call(&[-1.0, 3.0, 5.0]));
             assert!(matches!(outcome, Err(EvalError::Rejected(_))), "{outcome:?}");
             ask(3);

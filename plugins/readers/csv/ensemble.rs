@@ -12,8 +12,8 @@ use crate::readers::sheet::{Record, Sheet};
 
 type Values = Vec<Option<f64>>;
 
-/// The values of each run, in the order of the runs; `None` where the table has none, and where it has no row of a run
-/// at all.
+/// Returns the values of each run, in the order of the runs. A value is `None` if the table has none; a run is `None`
+/// if it has no row.
 pub(super) fn responses(
     (sheet, mut faults): (Sheet, Faults),
     runs: &[Run],

@@ -1,4 +1,4 @@
-//! What a table holds.
+//! Contents of a table.
 
 use std::collections::BTreeSet;
 
@@ -41,7 +41,7 @@ pub(super) fn contents(sheet: &Sheet) -> Contents {
     Contents { format: "comma-separated table".to_owned(), facts, variables }
 }
 
-/// A column as numbers, missing ones as NaN; `None` if it holds anything else.
+/// Returns a column as numbers, missing ones as NaN; `None` if it holds anything else.
 fn numbers(sheet: &Sheet, column: usize) -> Option<Column> {
     let heading = &sheet.headings[column];
     let values: Option<Vec<f64>> = sheet

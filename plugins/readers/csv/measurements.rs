@@ -11,13 +11,13 @@ use crate::readers::faults::Faults;
 use crate::readers::noise::{MASK, REPLICATE, SIGMA, left_out};
 use crate::readers::sheet::{Conversion, Record, Sheet};
 
-/// A replicate while its rows come in, with the line of each value.
+/// A replicate as its rows are read, with the line of each value.
 struct Rows {
     replicate: Replicate,
     lines: Vec<usize>,
 }
 
-/// The columns of a table.
+/// Columns of a table.
 struct Columns<'a> {
     places: LongColumns<'a>,
     replicate: Option<usize>,
@@ -25,7 +25,7 @@ struct Columns<'a> {
     mask: Option<usize>,
 }
 
-/// One row: its replicate, place, value and standard deviation.
+/// One row: replicate, place, value and standard deviation.
 struct Row<'a> {
     replicate: &'a str,
     place: usize,
@@ -33,10 +33,10 @@ struct Row<'a> {
     sd: f64,
 }
 
-/// The name of the curve of a table without a column `replicate`.
+/// Name of the only replicate of a table without a column `replicate`.
 const ONLY: &str = "1";
 
-/// Reads the table: one replicate for each name in the column `replicate`, one in all without that column.
+/// Reads the table: one replicate for each name in the column `replicate`, or a single one without that column.
 pub(super) fn measurements(
     (sheet, mut faults): (Sheet, Faults),
     layout: &Layout,
@@ -84,12 +84,12 @@ impl<'a> Columns<'a> {
         let known = |name: &str| sheet.find(name).filter(|_| !ignore.iter().any(|i| i == name));
         let places = LongColumns::find(sheet, layout);
         let of_places = places.as_ref().ok();
-        // The response itself may be called so.
+        // The response itself may have one of these names.
         let known = |name: &str| known(name).filter(|c| of_places.is_none_or(|p| !p.has(*c)));
         let sigma = known(SIGMA)
             .map(|column| {
                 let own = sheet.conversion(column, &layout.unit)?;
-                // Without a unit of its own it is in that of the values.
+                // A standard deviation without a unit of its own is in the unit of the values.
                 let of_values = of_places.filter(|_| !own.is_stated()).map(LongColumns::conversion);
                 Ok((column, of_values.cloned().unwrap_or(own)))
             })
@@ -151,7 +151,7 @@ impl<'a> Columns<'a> {
     }
 }
 
-/// The numbers of an axis that appear in the table, increasing.
+/// Returns the numbers of an axis that appear in the table, in increasing order and in `unit`.
 pub(super) fn grid(
     (sheet, mut faults): (Sheet, Faults),
     axis: &str,
@@ -191,7 +191,7 @@ fn measured(
     Ok(value)
 }
 
-/// The standard deviation of a value.
+/// Returns the standard deviation of a value; fails if it is not above zero.
 fn stated(
     sheet: &Sheet,
     record: &Record,
@@ -207,8 +207,8 @@ fn stated(
     })
 }
 
-/// A column that nothing reads may hold a condition: replicates of different conditions must not
-/// silently become one.
+/// Rejects columns that nothing reads. Such a column may hold a condition, and replicates of different conditions
+/// must not be merged silently.
 fn reject_unknown(
     sheet: &Sheet,
     ignore: &[String],
@@ -226,7 +226,7 @@ fn reject_unknown(
     ReadError::of_all(unknown.map(error)).map_or(Ok(()), Err)
 }
 
-/// Every sensor and every time of the response has to appear in some row, be it without a value.
+/// Rejects tables in which a sensor or a time of the response has no row at all, not even one without a value.
 fn reject_absent(sheet: &Sheet, layout: &Layout, found: &[Rows], faults: &mut Faults) {
     let mut seen: Vec<Vec<bool>> = layout.axes.iter().map(|a| vec![false; a.len()]).collect();
     for flat in 0..layout.len() {

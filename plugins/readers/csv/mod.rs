@@ -11,44 +11,43 @@ use lacuna::plugin::reader::{
     Contents, EnsembleSource, GridSource, MeasurementSource, ReadError, scenario_path,
 };
 use lacuna::plugin::{Component, Context, Reader};
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::cells::LongColumns;
-use super::noise;
 use super::runs::{self, AllowFailed};
-use super::scenario;
 use super::sheet::Sheet;
 use super::sierra::heartbeat;
+use super::{noise, scenario};
 
 /// Reads comma-separated tables: simulation runs, measurements, and single responses.
 ///
-/// Fields are separated by commas, or by semicolons or tabs if the first line has no comma. The
-/// first line names the columns; a name may carry a unit, as in `time [ms]`, and numbers are then
-/// converted to the study's unit. Lines that start with `#` are comments.
+/// Fields are separated by commas, or by semicolons or tabs if the first line has no comma. The first line names the
+/// columns; a name may carry a unit, as in `time [ms]`, and numbers are then converted to the study's unit. Lines
+/// that start with `#` are comments.
 ///
-/// **Runs** (section `simulations`): the table `parameters` has the columns `run` and one a
-/// parameter; the table `responses` is long, with the columns `run`, one an axis of the response
-/// (`sensor`, `time`) and the response's name, or wide: one row a run, the column `run` and one a
-/// value, headed by its place (`B 1e-5`). A wide table of a response without axes has one column,
-/// named after the response.
+/// **Runs** (section `simulations`): the table `parameters` has the columns `run` and one per parameter. The table
+/// `responses` is either long, with the columns `run`, one per axis of the response (`sensor`, `time`) and the
+/// response's name; or wide, with one row per run, the column `run` and one column per value, whose heading gives its
+/// place (`B 1e-5`). A wide table of a response without axes has one column, named after the response.
 ///
 /// **Measurements** (section `measurements`): one long table `path` with the columns of the axes and the response's
-/// name. A column `replicate` names repeated measurements; a table without it is one curve. A blank cell, `NaN`, or a row
-/// that is not there is a missing value, and so is one with 1 in a column `mask`.
+/// name. A column `replicate` names repeated measurements; a table without it is one curve. A blank cell, `NaN`, or
+/// an absent row is a missing value, and so is a value with 1 in a column `mask`.
 ///
-/// **Noise** of the measurements, where it is known: a column `sigma` with the standard deviation of each value (in the
-/// unit of its heading, else in that of the values), or a file `covariance` for one whole curve. What the likelihood
-/// makes of it, the page of the discrepancy says.
+/// **Noise** of the measurements, if it is known: a column `sigma` with the standard deviation of each value (in the
+/// unit of its heading, else in that of the values), or a file `covariance` for one whole curve. The page of the
+/// discrepancy describes how the likelihood uses it.
 ///
-/// **Cut files**: a last line without a line end is refused when its last field is shorter than those above it, as it is
-/// when a program is killed while it writes: it has fewer decimals, or fewer significant digits, than every other number
-/// of a column in which all have equally many, or at least two fewer than nearly all where they vary; it has a shorter
-/// exponent; it is blank where no other is; or it is the beginning of a text above it.
+/// **Cut files**: a last line without a line end is refused if its last field is shorter than those above it, as
+/// happens when a program is killed while it writes. The field counts as cut if it has fewer decimals, or fewer
+/// significant digits, than every other number of a column in which all have equally many, or at least two fewer than
+/// nearly all if they vary; if it has a shorter exponent; if it is blank and no other is; or if it is the beginning
+/// of a text above it.
 ///
-/// **Scenarios**: in a study with `[[scenario]]` sections the column `scenario` of these tables says to which a row
-/// belongs; or a path holds `{scenario}`, and each scenario has a file of its own.
+/// **Scenarios**: in a study with `[[scenario]]` sections the column `scenario` of these tables assigns the rows; or
+/// a path contains `{scenario}`, and each scenario has its own file.
 ///
 /// **A single response** of an external simulator: a long table with the axes and the response.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -57,30 +56,29 @@ pub struct Csv {
     /// Table of measurements, relative to the study file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub path: Option<PathBuf>,
-    /// Table of runs, relative to the study file. Left out, the runs are those that the study
-    /// simulates.
+    /// Table of runs, relative to the study file. Default: the runs that the study simulates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameters: Option<PathBuf>,
-    /// Table of the runs' responses, long or wide, relative to the study file. Left out, each run
-    /// has a file of its own, named in the column `file` of the table of runs.
+    /// Table of the runs' responses, long or wide, relative to the study file. Default: one file per run, named in
+    /// the column `file` of the table of runs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub responses: Option<PathBuf>,
-    /// Covariance of the noise of one curve, relative to the study file, in the squared unit of the response: a square of
-    /// numbers, as text without headings or in the variable `covariance` of a netCDF file (`.nc`). Rows and columns
-    /// follow the response, its last axis fastest; or the columns of a text have headings as in a wide table, and the
-    /// rows follow them. It has to be symmetric and positive definite.
+    /// Covariance of the noise of one curve, relative to the study file, in the squared unit of the response: a
+    /// square of numbers, as text without headings or in the variable `covariance` of a netCDF file (`.nc`). Rows and
+    /// columns follow the response, its last axis fastest; if the columns of a text have headings as in a wide table,
+    /// the rows follow these. It must be symmetric and positive definite.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub covariance: Option<PathBuf>,
-    /// Table of values that are left out, relative to the study file: the columns of the axes and `mask`, which is 1 for
-    /// a value that is left out and 0 for one that is used (as in a masked array of `NumPy`), and `replicate` where
-    /// it is not the same for all.
+    /// Table of values to be left out, relative to the study file: the columns of the axes and `mask`, which is 1 for
+    /// a value that is left out and 0 for one that is used (as in a masked array of `NumPy`), and `replicate` if it
+    /// differs between replicates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mask: Option<PathBuf>,
-    /// How many runs without a complete response may be left out: below 1 a fraction, from 1 on a
-    /// count.
+    /// Number of runs without a complete response that may be left out: a fraction if below 1, a count from 1 on.
+    /// More of them stop the study.
     pub allow_failed: AllowFailed,
-    /// Columns of a table of measurements that mean nothing to the study. Any other column that
-    /// the reader does not know is an error.
+    /// Columns of a table of measurements to be ignored. Any other column that the reader does not know is an error,
+    /// because it may hold a condition.
     pub ignore: Vec<String>,
 }
 
@@ -152,7 +150,7 @@ impl Reader for Csv {
         runs::ensemble(source, &table, &list, self.allow_failed, |run| {
             let values =
                 list.iter().position(|r| r.name == run.name).and_then(|i| values[i].as_ref());
-            let values = values.ok_or_else(|| ReadError::new(&path, "has no row of it"))?;
+            let values = values.ok_or_else(|| ReadError::new(&path, "has no row for this run"))?;
             complete(&path, source.layout, values)
         })
     }
@@ -217,7 +215,7 @@ impl Reader for Csv {
     }
 }
 
-/// All values of a response, or which one is missing or not finite.
+/// Returns all values of a response; fails if one is missing or not finite.
 fn complete(path: &Path, layout: &Layout, values: &[Option<f64>]) -> Result<Vec<f64>, ReadError> {
     let missing = values.iter().filter(|y| y.is_none()).count();
     let first = values.iter().position(Option::is_none);

@@ -1,4 +1,4 @@
-//! The layouts that the documentation promises, and every complaint.
+//! The layouts that the documentation promises, and every error message.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
@@ -103,7 +103,7 @@ fn incomplete_runs_are_named_and_left_out_only_if_allowed() {
                      b,B,1e-5,1\nb,B,2e-5,nan\nb,C,1e-5,inf\n";
     let folder = Folder::new(&[("runs.csv", RUNS), ("responses.csv", responses)]);
     let text = folder.ensemble(&tables()).unwrap_err();
-    assert!(text.contains("1 of 2 runs cannot be used, 0 may fail"), "{text}");
+    assert!(text.contains("1 of 2 runs cannot be used, and 0 may be left out"), "{text}");
     assert!(
         text.contains("`b`") && text.contains("2 of 4 values are missing, first at sensor `B`")
     );

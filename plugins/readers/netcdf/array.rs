@@ -1,4 +1,4 @@
-//! Variables of a netCDF file, brought onto the axes of the response.
+//! Variables of a netCDF file, mapped onto the axes of the response.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -6,8 +6,8 @@ use std::sync::Arc;
 use hdf5_reader::{FileStorage, Storage};
 use lacuna::data::layouts::SCENARIO;
 use lacuna::data::{Axis, Coordinates, Layout, Unit};
-use lacuna::linalg::Matrix;
 use lacuna::plugin::reader::ReadError;
+use lacuna_linalg::Matrix;
 use netcdf_reader::{NcFile, NcOpenOptions, NcType, NcVariable};
 
 use crate::discrepancies::common::squared;
@@ -23,7 +23,7 @@ pub(super) struct File {
 }
 
 impl File {
-    /// Opens a file; data are read by position, so that a file that shrinks gives an error.
+    /// Opens a file. Data are read by position, so that a file that shrinks gives an error.
     pub(super) fn open(path: &Path) -> Result<Self, ReadError> {
         let storage = FileStorage::open(path)
             .map_err(|e| ReadError::new(path, format!("cannot be opened: {e}")))?;
@@ -36,7 +36,7 @@ impl File {
             ..NcOpenOptions::default()
         };
         let file = NcFile::from_storage_with_options(storage, options)
-            .map_err(|e| ReadError::new(path, format!("is not a whole netCDF file: {e}")))?;
+            .map_err(|e| ReadError::new(path, format!("is not a complete netCDF file: {e}")))?;
         Ok(Self { path: path.to_owned(), file })
     }
 
@@ -60,7 +60,7 @@ impl File {
         })
     }
 
-    /// All numbers of a variable, missing ones as NaN, last dimension fastest.
+    /// Returns all numbers of a variable, missing ones as NaN, last dimension fastest.
     pub(super) fn numbers(&self, name: &str) -> Result<Vec<f64>, ReadError> {
         self.file
             .read_variable_unpacked_masked(name)
@@ -70,7 +70,7 @@ impl File {
             })
     }
 
-    /// The attribute `units` of a variable.
+    /// Returns the attribute `units` of a variable.
     pub(super) fn unit(&self, variable: &NcVariable) -> Result<Option<Unit>, ReadError> {
         let text = variable.attribute("units").and_then(|attribute| attribute.value.as_string());
         text.map(|text| Unit::parse(&text)).transpose().map_err(|e| {
@@ -78,7 +78,7 @@ impl File {
         })
     }
 
-    /// Numbers of a variable in the unit asked for.
+    /// Returns the numbers of a variable in the unit `to`.
     fn converted(&self, name: &str, to: Option<&Unit>) -> Result<Vec<f64>, ReadError> {
         let mut numbers = self.numbers(name)?;
         if let (Some(from), Some(to)) = (self.unit(self.variable(name)?)?, to) {
@@ -92,7 +92,7 @@ impl File {
         Ok(numbers)
     }
 
-    /// A variable over a single dimension.
+    /// Reads a variable over a single dimension of this name and length.
     pub(super) fn along(
         &self,
         name: &str,
@@ -110,7 +110,7 @@ impl File {
         Ok(numbers)
     }
 
-    /// Names along a dimension: its coordinate variable's texts or numbers, else 1, 2, 3, ...
+    /// Returns the names along a dimension: the texts or numbers of its coordinate variable, else 1, 2, 3, ...
     pub(super) fn names(&self, dimension: &str, count: usize) -> Result<Vec<String>, ReadError> {
         let names: Vec<String> = if !self.has(dimension) {
             (1..=count).map(|i| i.to_string()).collect()
@@ -139,7 +139,8 @@ impl File {
         Ok(Some(texts.iter().map(|text| text.trim().to_owned()).collect()))
     }
 
-    /// The responses in a variable, each on the layout; one a place of `outer`, or a single one.
+    /// Returns the responses in a variable, each on the layout: one per index of the dimension `outer`, or a single
+    /// one.
     pub(super) fn responses(
         &self,
         name: &str,
@@ -155,9 +156,9 @@ impl File {
                 format!("expected dimensions {}, found {}", listed(&expected), listed(&found));
             return Err(self.complain(text).at(format!("variable `{name}`")));
         }
-        // Read first: a damaged file must not ask for memory by its dimensions alone.
+        // The data are read first: the dimensions of a damaged file must not cause a large allocation.
         let numbers = self.converted(name, Some(&layout.unit))?;
-        // How far a step along each dimension goes in the result, for each place on it.
+        // Offset in the result for each index along each dimension.
         let mut count = 1;
         let mut offsets: Vec<Vec<usize>> = Vec::new();
         for dimension in dimensions {
@@ -183,8 +184,8 @@ impl File {
         Ok(responses.chunks(layout.len().max(1)).map(<[f64]>::to_vec).collect())
     }
 
-    /// The responses to one scenario, one a place of `outer`: those of the variable, or where it has a dimension
-    /// `scenario` those at its label.
+    /// Returns the responses of one scenario, one per index of `outer`: those of the variable, or, if it has a
+    /// dimension `scenario`, those at its label.
     pub(super) fn of_scenario(
         &self,
         name: &str,
@@ -209,7 +210,8 @@ impl File {
         Ok(responses.into_iter().map(|response| response[own.clone()].to_vec()).collect())
     }
 
-    /// Measured curves, one a place of the dimension `replicate`; a single one where the variable has only the axes.
+    /// Returns measured curves, one per index of the dimension `replicate`; a single one if the variable has only the
+    /// axes.
     pub(super) fn curves(
         &self,
         name: &str,
@@ -223,7 +225,7 @@ impl File {
         self.of_scenario(name, layout, outer.then_some(REPLICATE), scenario)
     }
 
-    /// Standard deviations in the unit of the layout.
+    /// Returns standard deviations in the unit of the layout.
     pub(super) fn widths(
         &self,
         name: &str,
@@ -242,7 +244,7 @@ impl File {
         Ok(curves.into_iter().map(scaled).collect())
     }
 
-    /// A square variable of a covariance in the squared unit of the layout, in its order.
+    /// Reads a square covariance variable in the squared unit of the layout and in its order.
     pub(super) fn square(&self, name: &str, layout: &Layout) -> Result<Matrix, ReadError> {
         let variable = self.variable(name)?;
         let sizes: Vec<usize> = variable.dimensions().iter().map(|d| d.size as usize).collect();
@@ -268,7 +270,7 @@ impl File {
         Ok(Matrix::from_vec(size, size, numbers))
     }
 
-    /// The numbers of a coordinate variable, increasing.
+    /// Returns the numbers of a coordinate variable in `unit`, in increasing order.
     pub(super) fn grid(&self, name: &str, unit: &Unit) -> Result<Vec<f64>, ReadError> {
         let mut numbers = self.converted(name, Some(unit))?;
         if let Some(x) = numbers.iter().find(|x| !x.is_finite()) {
@@ -279,7 +281,8 @@ impl File {
         Ok(numbers)
     }
 
-    /// Where each place of the file's dimension lies on the response's axis; all have to be there.
+    /// Returns the index on the response's axis of each index of the file's dimension; fails unless all values of the
+    /// axis are present.
     fn places(&self, axis: &Axis, length: usize) -> Result<Vec<usize>, ReadError> {
         let complain = |text: String| self.complain(text).at(format!("dimension `{}`", axis.name));
         let places = match &axis.coordinates {

@@ -1,4 +1,4 @@
-//! What a netCDF file holds.
+//! Contents of a netCDF file.
 
 use lacuna::data::Table;
 use lacuna::data::table::Column;
@@ -51,7 +51,7 @@ fn described(file: &File, variable: &NcVariable) -> Result<Variable, ReadError> 
         name: variable.name().to_owned(),
         on: "file".to_owned(),
         axes,
-        // A unit that is not one of the engine's is no reason to show nothing.
+        // A unit unknown to the engine does not prevent the description.
         unit: file.unit(variable).ok().flatten(),
         range,
         not_finite,
@@ -59,7 +59,7 @@ fn described(file: &File, variable: &NcVariable) -> Result<Variable, ReadError> 
     })
 }
 
-/// The coordinate of the last dimension, and one column for each place on the others.
+/// Returns the coordinate of the last dimension, and one column for each combination of the others.
 fn signals(file: &File, variable: &NcVariable, axes: &[(String, usize)], values: &[f64]) -> Table {
     let column = |name: String, values: Vec<f64>| Column { name, unit: None, values };
     let Some(((along, length), outer)) = axes.split_last() else {

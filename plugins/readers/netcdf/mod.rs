@@ -10,53 +10,52 @@ use lacuna::plugin::reader::{
     Contents, EnsembleSource, GridSource, MeasurementSource, ReadError, scenario_path,
 };
 use lacuna::plugin::{Component, Context, Reader};
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use self::array::File;
 use super::noise::{self, MASK, REPLICATE, SIGMA};
 use super::runs::{self, AllowFailed, Run};
-use super::scenario;
-use super::sierra;
+use super::{scenario, sierra};
 
-/// Reads netCDF files (classic, 64-bit offset, 64-bit data, netCDF-4) whose dimensions are named
-/// like the axes of the response, in any order.
+/// Reads netCDF files (classic, 64-bit offset, 64-bit data, netCDF-4) whose dimensions are named like the axes of the
+/// response, in any order.
 ///
-/// Each axis has a coordinate variable of its name, with numbers and their `units` or with texts;
-/// labels may instead stand in the file's attribute `sensor_labels` (for an axis `sensor`),
-/// separated by blanks. Values are converted by the attribute `units`, unpacked by `scale_factor`
-/// and `add_offset`, and missing where they equal `_FillValue` or are NaN.
+/// Each axis has a coordinate variable of its name, with numbers and their `units` or with texts; labels may instead
+/// be given by the file's attribute `sensor_labels` (for an axis `sensor`), separated by blanks. Values are converted
+/// by the attribute `units`, unpacked by `scale_factor` and `add_offset`, and missing if they equal `_FillValue` or
+/// are NaN.
 ///
-/// **Runs** (section `simulations`): either one file `path` with a further dimension `run` and a
-/// variable over it for each parameter, or a table `runs` with a file for each run.
+/// **Runs** (section `simulations`): either one file `path` with a further dimension `run` and a variable over it for
+/// each parameter, or a table `runs` with one file per run.
 ///
-/// **Measurements** (section `measurements`): one file `path` with a further dimension
-/// `replicate`; a variable that has only the axes is one curve.
+/// **Measurements** (section `measurements`): one file `path` with a further dimension `replicate`; a variable that
+/// has only the axes is one curve.
 ///
-/// **Noise** of the measurements, where it is known: a variable `sigma` with the standard deviation of each value, over the
-/// axes and where it differs over `replicate`, or a file `covariance` for one whole curve. A variable `mask` over the
-/// same dimensions is not zero where a value is left out.
+/// **Noise** of the measurements, if it is known: a variable `sigma` with the standard deviation of each value, over
+/// the axes and, if it differs between replicates, over `replicate`; or a file `covariance` for one whole curve. A
+/// variable `mask` over the same dimensions is non-zero for values to be left out.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct NetCdf {
     /// File with all runs or all measurements, relative to the study file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub path: Option<PathBuf>,
-    /// Table of runs (CSV), relative to the study file: the columns `run`, `file` and one a
-    /// parameter. Left out, and without `path`, the runs are those that the study simulates.
+    /// Table of runs (CSV), relative to the study file: the columns `run`, `file` and one per parameter. Default, if
+    /// `path` is not given either: the runs that the study simulates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub runs: Option<PathBuf>,
-    /// Covariance of the noise of one curve, relative to the study file, in the squared unit of the response: a square
-    /// variable `covariance` of a netCDF file (`.nc`), or a square of numbers as text. Rows and columns follow the
-    /// response, its last axis fastest; it has to be symmetric and positive definite.
+    /// Covariance of the noise of one curve, relative to the study file, in the squared unit of the response: a
+    /// square variable `covariance` of a netCDF file (`.nc`), or a square of numbers as text. Rows and columns follow
+    /// the response, its last axis fastest; it must be symmetric and positive definite.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub covariance: Option<PathBuf>,
-    /// Variable that holds the response; its name is that of the response when left out.
+    /// Name of the variable that holds the response. Default: the name of the response.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variable: Option<String>,
-    /// How many runs without a complete response may be left out: below 1 a fraction, from 1 on a
-    /// count.
+    /// Number of runs without a complete response that may be left out: a fraction if below 1, a count from 1 on.
+    /// More of them stop the study.
     pub allow_failed: AllowFailed,
 }
 
@@ -243,7 +242,7 @@ impl Reader for NetCdf {
     }
 }
 
-/// One row a replicate of what a variable holds for each or for all.
+/// Returns one row per replicate of a variable that is given for each replicate or once for all.
 fn repeated(
     mut rows: Vec<Vec<f64>>,
     replicates: usize,
@@ -260,7 +259,7 @@ fn repeated(
     Ok(rows)
 }
 
-/// Refuses a measured value without a standard deviation above zero.
+/// Fails if a measured value has no standard deviation above zero.
 fn stated(path: &Path, layout: &Layout, replicate: &mut Replicate) -> Result<(), ReadError> {
     let Some(sd) = &mut replicate.sd else { return Ok(()) };
     for (i, sd) in sd.iter_mut().enumerate() {
@@ -278,7 +277,7 @@ fn stated(path: &Path, layout: &Layout, replicate: &mut Replicate) -> Result<(),
     Ok(())
 }
 
-/// A square variable of a file; see [`noise::covariance`].
+/// Reads a square variable of a file; see [`noise::covariance`].
 pub(super) fn square(path: &Path, name: &str, layout: &Layout) -> Result<noise::Square, ReadError> {
     let values = File::open(path)?.square(name, layout)?;
     Ok(noise::Square { places: (0..layout.len()).collect(), values })

@@ -55,7 +55,7 @@ fn write(path: &Path, outer: &str, format: NcWriteFormat, times: &[f64]) {
     let v = file.add_variable::<f32>("strain", &[time, records, sensor]).unwrap();
     file.set_variable_fill_value(v, -1.0f32).unwrap();
     file.add_variable_attribute(v, "units", NcAttrValue::Chars("microstrain".into())).unwrap();
-    // Value 100 record + 10 sensor + time, the second record's first one missing.
+    // Values are 100 record + 10 sensor + time; the second record's first one is missing.
     let values =
         [110.0, 100.0, 210.0, -1.0, 111.0, 101.0, 211.0, 201.0, 112.0, 102.0, 212.0, 202.0];
     file.write_variable(v, &values.map(|x| x as f32)).unwrap();
@@ -111,7 +111,7 @@ fn files_of_the_simulate_stage_are_read_back() {
     let layout = layout();
     let values: Vec<f64> = (0..6).map(|i| 1e-6 / (f64::from(i) + 0.3)).collect();
     let response = Response { values: values.clone(), valid: true, facts: vec![] };
-    let name = lacuna::run::write_response(folder.path(), "run-1", &layout, &response).unwrap();
+    let name = lacuna_run::write_response(folder.path(), "run-1", &layout, &response).unwrap();
     let path = folder.path().join(name);
     assert_eq!(NetCdf::default().response(&path, &layout).unwrap(), values);
     let contents = NetCdf::default().inspect(&path).unwrap();
@@ -146,7 +146,7 @@ fn mismatched_axes_are_named() {
     assert!(text.contains("expected dimensions `replicate`, `sensor`, `time`"), "{text}");
     std::fs::write(&path, b"CDF\x01").unwrap();
     let text = NetCdf::default().response(&path, &layout).unwrap_err().to_string();
-    assert!(text.contains("is not a whole netCDF file"), "{text}");
+    assert!(text.contains("is not a complete netCDF file"), "{text}");
 }
 
 #[test]
@@ -174,8 +174,8 @@ fn damaged_files_do_no_harm() {
     }
 }
 
-/// One curve `strain(sensor, time)` with its standard deviations in microstrain, a value that is left out, and a covariance
-/// in squared microstrain.
+/// One curve `strain(sensor, time)` with its standard deviations in microstrain, a masked value, and a covariance in
+/// squared microstrain.
 fn write_stated(folder: &Path, sigma: [f64; 6], covariance: &[f64]) {
     let save = |name: &str, file: NcFileBuilder| {
         let options = NcWriteOptions { format: NcWriteFormat::Cdf5 };

@@ -1,26 +1,25 @@
-//! The files under Exodus II: netCDF classic, 64-bit offset, 64-bit data, and netCDF-4.
+//! The containers of Exodus II: netCDF classic, 64-bit offset, 64-bit data, and netCDF-4.
 //!
-//! The three classic containers go through `netcdf-reader`. A netCDF-4 file is HDF5 and is read by
-//! dataset name: the Exodus library creates it with `NC_NODIMSCALE_ATTACH`, so the
-//! `DIMENSION_LIST` attributes that tie variables to dimensions are missing and a netCDF reader
-//! has to refuse it. Exodus fixes the order of every variable's dimensions, so names suffice.
+//! The three classic containers are read by `netcdf-reader`. A netCDF-4 file is HDF5 and is read by dataset name: the
+//! Exodus library creates it with `NC_NODIMSCALE_ATTACH`, so that the `DIMENSION_LIST` attributes that tie variables
+//! to dimensions are missing and a netCDF reader must refuse it. Exodus fixes the order of every variable's
+//! dimensions, so that names suffice.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use hdf5_reader::{BytesStorage, Dataset, Datatype, FileStorage, Hdf5File, OpenOptions, Storage};
+use lacuna::plugin::reader::ReadError;
 use netcdf_reader::{NcFile, NcFormat, NcSliceInfo, NcSliceInfoElem};
 
-use lacuna::plugin::reader::ReadError;
-
-/// Deflate cannot shrink data more than 1032 times, so no honest chunked variable is longer than
-/// this many times the file: a larger extent is a damaged one and must not be allocated.
+/// Largest ratio of data to file size. Deflate cannot shrink data by more than 1032, so that a larger extent means a
+/// damaged file and must not be allocated.
 const LARGEST_EXPANSION: u64 = 1100;
-/// Room for unwritten (fill value) chunks of small files.
+/// Minimum of the read limit in bytes, which leaves room for unwritten (fill value) chunks of small files.
 const SMALLEST_LIMIT: u64 = 64 << 20;
 
-/// An open container: variables by name, with attributes, whatever the file format.
+/// An open container: variables by name, with attributes, for any file format.
 pub struct Container {
     path: PathBuf,
     bytes: u64,
@@ -33,25 +32,25 @@ enum Source {
     Hdf5 { file: Box<Hdf5File>, datasets: BTreeMap<String, Dataset> },
 }
 
-/// What to take along one dimension of a variable.
+/// Selection along one dimension of a variable.
 #[derive(Debug, Clone, Copy)]
 pub enum Pick {
-    /// Everything.
+    /// All indices.
     All,
-    /// One position, counted from 0.
+    /// One index, counted from 0.
     At(usize),
 }
 
 impl Container {
-    /// Opens a file. Data are read on demand by position, not mapped: a file that another process
-    /// shortens meanwhile gives an error and not a signal.
+    /// Opens a file. Data are read on demand by position and not mapped: a file that another process shortens
+    /// meanwhile gives an error and not a signal.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         let storage = FileStorage::open(path)
             .map_err(|e| ReadError::new(path, format!("cannot be opened: {e}")))?;
         Self::from_storage(path, Arc::new(storage))
     }
 
-    /// Opens the bytes of a file; `path` only names them in messages.
+    /// Opens the bytes of a file; `path` is only used in messages.
     pub fn from_bytes(path: &Path, bytes: Vec<u8>) -> Result<Self, ReadError> {
         Self::from_storage(path, Arc::new(BytesStorage::new(bytes)))
     }
@@ -78,12 +77,12 @@ impl Container {
         Ok(Self { path: path.to_owned(), bytes, shapes, source })
     }
 
-    /// The file as the user named it.
+    /// Returns the path of the file as given by the user.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The container's name, for people.
+    /// Returns the name of the container format.
     pub fn format(&self) -> &'static str {
         match &self.source {
             Source::Hdf5 { .. } => "netCDF-4",
@@ -96,12 +95,12 @@ impl Container {
         }
     }
 
-    /// Length of every dimension of a variable, or `None` if the file has no such variable.
+    /// Returns the lengths of a variable's dimensions; `None` if the file has no such variable.
     pub fn shape(&self, name: &str) -> Option<&[usize]> {
         self.shapes.get(name).map(Vec::as_slice)
     }
 
-    /// Length of a dimension. In netCDF-4 files a dimension is a dataset of that length.
+    /// Returns the length of a dimension. In netCDF-4 files a dimension is a dataset of that length.
     pub fn dimension(&self, name: &str) -> Option<usize> {
         match &self.source {
             Source::Classic(file) => file.dimension(name).ok().map(|d| d.size as usize),
@@ -109,8 +108,7 @@ impl Container {
         }
     }
 
-    /// Refuses a number of entries that a file of this size cannot hold, before memory is asked
-    /// for it.
+    /// Fails for a number of entries that a file of this size cannot hold, before memory is allocated for it.
     pub fn check_count(&self, what: &str, count: usize) -> Result<(), ReadError> {
         let limit = match self.source {
             Source::Classic(_) => self.bytes,
@@ -123,13 +121,13 @@ impl Container {
         Err(ReadError::new(&self.path, text))
     }
 
-    /// All numbers of a variable, last dimension fastest.
+    /// Reads all numbers of a variable, last dimension fastest.
     pub fn reals(&self, name: &str) -> Result<Vec<f64>, ReadError> {
         let all = vec![Pick::All; self.shape(name).map_or(0, <[usize]>::len)];
         self.part(name, &all)
     }
 
-    /// A part of a variable, last dimension fastest.
+    /// Reads a part of a variable, last dimension fastest.
     pub fn part(&self, name: &str, picks: &[Pick]) -> Result<Vec<f64>, ReadError> {
         let numbers = match &self.source {
             Source::Classic(file) => file
@@ -144,12 +142,12 @@ impl Container {
         numbers.map_err(|e| self.damaged(name, &e))
     }
 
-    /// All whole numbers of a variable. They are exact up to 2^53, far above any mesh size.
+    /// Reads all whole numbers of a variable. They are exact up to 2^53, far above any mesh size.
     pub fn integers(&self, name: &str) -> Result<Vec<i64>, ReadError> {
         Ok(self.reals(name)?.into_iter().map(|x| x as i64).collect())
     }
 
-    /// The strings of a character variable; its last dimension is the length of a string.
+    /// Reads the strings of a character variable, whose last dimension is the length of a string.
     pub fn texts(&self, name: &str) -> Result<Vec<String>, ReadError> {
         let strings = match &self.source {
             Source::Classic(file) => file.read_variable_as_strings(name).map_err(|e| e.to_string()),
@@ -162,7 +160,7 @@ impl Container {
         Ok(strings.iter().map(|text| unpadded(text)).collect())
     }
 
-    /// A text attribute of a variable.
+    /// Returns a text attribute of a variable.
     pub fn variable_text(&self, variable: &str, attribute: &str) -> Option<String> {
         match &self.source {
             Source::Classic(file) => {
@@ -175,7 +173,7 @@ impl Container {
         .map(|text| unpadded(&text))
     }
 
-    /// A text attribute of the file.
+    /// Returns a text attribute of the file.
     pub fn text(&self, attribute: &str) -> Option<String> {
         match &self.source {
             Source::Classic(file) => file.global_attribute(attribute).ok()?.value.as_string(),
@@ -186,7 +184,7 @@ impl Container {
         .map(|text| unpadded(&text))
     }
 
-    /// A numerical attribute of the file.
+    /// Returns a numeric attribute of the file.
     pub fn real(&self, attribute: &str) -> Option<f64> {
         match &self.source {
             Source::Classic(file) => file.global_attribute(attribute).ok()?.value.as_f64(),
@@ -230,7 +228,7 @@ fn open_hdf5(storage: Arc<dyn Storage>) -> Result<Opened, String> {
     Ok((shapes, Source::Hdf5 { file: Box::new(file), datasets }))
 }
 
-/// The most bytes that one read of an HDF5 file of this length may ask for.
+/// Returns the maximum number of bytes that one read of a file of this length may allocate.
 pub(crate) fn read_limit(bytes: u64) -> u64 {
     bytes.saturating_mul(LARGEST_EXPANSION).max(SMALLEST_LIMIT)
 }
@@ -305,7 +303,7 @@ fn hdf5_texts(dataset: &Dataset) -> Result<Vec<String>, String> {
         .collect())
 }
 
-/// Exodus strings are padded with NUL or blanks, with anything after the first NUL.
+/// Removes the padding of an Exodus string: NUL or blanks, with arbitrary bytes after the first NUL.
 fn unpadded(text: &str) -> String {
     text.split('\0').next().unwrap_or_default().trim().to_owned()
 }

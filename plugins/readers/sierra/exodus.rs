@@ -1,44 +1,44 @@
 //! One Exodus II file: its time steps, variables, blocks and sets.
 //!
-//! Names and meaning of the netCDF variables are those of the Exodus library's
-//! `exodusII_int.h`. In them, `{v}`, `{b}` and `{k}` are positions counted from 1, never ids.
+//! Names and meaning of the netCDF variables are those of the Exodus library's `exodusII_int.h`. In them `{v}`, `{b}`
+//! and `{k}` are positions counted from 1, never ids.
 
 use std::path::Path;
 
+use lacuna::plugin::reader::ReadError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::container::{Container, Pick};
-use lacuna::plugin::reader::ReadError;
 
-/// What the netCDF library puts where nothing was written: `NC_FILL_DOUBLE`, in single precision
-/// the same number.
+/// Fill value of the netCDF library for data that were never written: `NC_FILL_DOUBLE`, the same number in single
+/// precision.
 const NEVER_WRITTEN: f64 = 9.969_209_968_386_869e36;
 
-/// What an Exodus variable is attached to.
+/// Kind of entity to which an Exodus variable is attached.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
-    /// One value a step: everything in a history file.
+    /// One value per step: every variable of a history file.
     Global,
-    /// One value a node.
+    /// One value per node.
     Nodal,
-    /// One value an element.
+    /// One value per element.
     Element,
-    /// One value a node of a node set.
+    /// One value per node of a node set.
     NodeSet,
-    /// One value a side of a side set.
+    /// One value per side of a side set.
     SideSet,
 }
 
 impl Kind {
-    /// Every kind, in the order of a file.
+    /// All kinds, in the order in which a file lists them.
     pub const ALL: [Self; 5] =
         [Self::Global, Self::Nodal, Self::Element, Self::NodeSet, Self::SideSet];
 
-    /// The kind as a user writes it.
+    /// Returns the kind as written in a study.
     pub fn label(self) -> &'static str {
         match self {
             Self::Global => "global",
@@ -49,7 +49,7 @@ impl Kind {
         }
     }
 
-    /// What carries a value: for messages.
+    /// Returns the name of the entity that carries a value, for messages.
     pub(super) fn carrier(self) -> &'static str {
         match self {
             Self::Global => "file",
@@ -74,32 +74,32 @@ impl Kind {
 pub struct Group {
     /// Position in the file, counted from 0.
     pub position: usize,
-    /// The user's id.
+    /// Id given by the user.
     pub id: i64,
-    /// The user's name, empty if it has none.
+    /// Name given by the user; empty if there is none.
     pub name: String,
-    /// Elements, nodes or sides.
+    /// Number of elements, nodes or sides.
     pub size: usize,
     /// Position of a block's first element in the file's numbering of elements.
     pub start: usize,
-    /// Which variables exist here: the truth table's row.
+    /// Variables that exist here: the row of the truth table.
     pub present: Vec<bool>,
 }
 
 impl Group {
-    /// Name, or id where there is no name.
+    /// Returns the name, or the id if there is no name.
     pub fn label(&self) -> String {
         if self.name.is_empty() { self.id.to_string() } else { self.name.clone() }
     }
 }
 
-/// An open Exodus II file; of the values only those asked for are read.
+/// An open Exodus II file; only the values asked for are read.
 pub struct Exodus {
-    /// The file itself.
+    /// Container of the file.
     pub container: Container,
     /// Times of the complete steps.
     pub times: Vec<f64>,
-    /// Steps after `last_written_time`, which the writer began and did not finish.
+    /// Number of steps after `last_written_time`, which the writer began but did not finish.
     pub incomplete_steps: usize,
     /// Number of nodes.
     pub nodes: usize,
@@ -113,12 +113,12 @@ pub struct Exodus {
 }
 
 impl Exodus {
-    /// Opens a file and reads what describes it.
+    /// Opens a file and reads its description.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         Self::from_container(Container::open(path)?)
     }
 
-    /// Reads the description of a file whose container is open.
+    /// Reads the description from an open container.
     pub fn from_container(container: Container) -> Result<Self, ReadError> {
         if container.real("api_version").is_none()
             && container.real("api version").is_none()
@@ -154,17 +154,17 @@ impl Exodus {
         Ok(file)
     }
 
-    /// The file as the user named it.
+    /// Returns the path of the file as given by the user.
     pub fn path(&self) -> &Path {
         self.container.path()
     }
 
-    /// Names of the variables of a kind.
+    /// Returns the names of the variables of a kind.
     pub fn names(&self, kind: Kind) -> &[String] {
         &self.names[kind as usize]
     }
 
-    /// Blocks or sets of a kind; empty for global and nodal variables.
+    /// Returns the blocks or sets of a kind; empty for global and nodal variables.
     pub fn groups(&self, kind: Kind) -> &[Group] {
         match kind {
             Kind::Global | Kind::Nodal => &[],
@@ -174,12 +174,12 @@ impl Exodus {
         }
     }
 
-    /// Number of elements.
+    /// Returns the number of elements.
     pub fn elements(&self) -> usize {
         self.blocks.iter().map(|b| b.size).sum()
     }
 
-    /// Position of a variable: by its exact name, else by the only one that differs in case.
+    /// Returns the index of a variable: by its exact name, else by the only name that differs in case.
     pub fn variable(&self, kind: Kind, name: &str) -> Option<usize> {
         let names = self.names(kind);
         names.iter().position(|n| n == name).or_else(|| {
@@ -189,9 +189,8 @@ impl Exodus {
         })
     }
 
-    /// Values of one variable at one entity, over the complete steps, NaN where the run never wrote
-    /// one. `group` and `entity` are
-    /// positions counted from 0; both are ignored for globals, `group` for nodal variables.
+    /// Returns the values of one variable at one entity over the complete steps, NaN where the run wrote none.
+    /// `group` and `entity` are positions counted from 0; both are ignored for globals, `group` for nodal variables.
     pub fn values(
         &self,
         kind: Kind,
@@ -200,7 +199,7 @@ impl Exodus {
         entity: usize,
     ) -> Result<Vec<f64>, ReadError> {
         let mut values = self.slab(kind, variable, group, Pick::At(entity))?;
-        // In netCDF-4 a variable can lack the last steps.
+        // In netCDF-4 files a variable may lack the last steps.
         values.resize(self.times.len(), f64::NAN);
         for value in values.iter_mut().filter(|value| **value == NEVER_WRITTEN) {
             *value = f64::NAN;
@@ -208,7 +207,7 @@ impl Exodus {
         Ok(values)
     }
 
-    /// Values of one variable at all entities of a group, over all steps, entities fastest.
+    /// Returns the values of one variable at all entities of a group, over all steps, entities fastest.
     pub fn all_values(
         &self,
         kind: Kind,
@@ -257,7 +256,7 @@ impl Exodus {
         self.container.part(&name, &picks)
     }
 
-    /// Maps as long as the mesh: every look-up by id relies on it.
+    /// Fails unless the id maps are as long as the mesh: every look-up by id relies on it.
     fn check_extents(&self) -> Result<(), ReadError> {
         for name in ["node_num_map", "elem_num_map"] {
             if let Some(&[size]) = self.container.shape(name) {
@@ -275,8 +274,8 @@ impl Exodus {
     }
 }
 
-/// Times of the steps up to `last_written_time`, and how many come after it. Of a file without
-/// that attribute every step that has a time is taken.
+/// Returns the times of the steps up to `last_written_time`, and the number of steps after it. In a file without that
+/// attribute every step that has a time is complete.
 fn complete_steps(container: &Container) -> Result<(Vec<f64>, usize), ReadError> {
     if container.shape("time_whole").is_none() {
         return Ok((Vec::new(), 0));
@@ -284,7 +283,7 @@ fn complete_steps(container: &Container) -> Result<(Vec<f64>, usize), ReadError>
     let mut times = container.reals("time_whole")?;
     let single = container.real("floating_point_word_size") == Some(4.0);
     let last = container.real("last_written_time").unwrap_or(f64::INFINITY);
-    // The attribute is double precision even where times are stored in single.
+    // The attribute is in double precision even if times are stored in single precision.
     let complete =
         |t: f64| t != NEVER_WRITTEN && (t <= last || (single && t as f32 <= last as f32));
     let steps = times.iter().take_while(|&&t| complete(t) || t.is_nan()).count();
@@ -303,7 +302,7 @@ fn finite(container: &Container, times: Vec<f64>) -> Result<Vec<f64>, ReadError>
     }
 }
 
-/// How one sort of group is spelt in the file.
+/// Names in the file for one sort of group.
 struct Spelling {
     ids: &'static str,
     names: &'static str,

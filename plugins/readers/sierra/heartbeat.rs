@@ -1,9 +1,8 @@
 //! Heartbeat output: Sierra's text files, in every format and with every option.
 //!
-//! The formats are those of the IOSS library of SEACAS (`Iohb_DatabaseIO`, `Iohb_Layout`):
-//! ORIGINAL (labelled rows), CSV, TEXT, their time-stamped variants and SPYHIS. None says which it
-//! is, and separator, labels, legend and stamp can be changed one by one, so the reader looks at
-//! the lines instead of asking for the format.
+//! The formats are those of the IOSS library of SEACAS (`Iohb_DatabaseIO`, `Iohb_Layout`): ORIGINAL (labelled rows),
+//! CSV, TEXT, their time-stamped variants and SPYHIS. No file states its format, and separator, labels, legend and
+//! stamp can be changed one by one, so that the reader infers the format from the lines.
 
 mod line;
 mod parser;
@@ -18,17 +17,17 @@ use crate::readers::listed;
 /// A heartbeat file: named columns over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Heartbeat {
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
     /// Names of the columns; vectors and tensors are flattened with `_x`, `_xx`, ... as suffix.
     pub names: Vec<String>,
-    /// Values, one list a column.
+    /// Values, one list per column.
     pub columns: Vec<Vec<f64>>,
-    /// Which column is the time, if one is.
+    /// Index of the time column, if there is one.
     pub time: Option<usize>,
-    /// The layout in words.
+    /// Layout in words.
     pub layout: String,
-    /// What was repaired: a truncated last line, steps repeated by a restart.
+    /// Repairs that were made: a truncated last line, steps repeated by a restart.
     pub notes: Vec<String>,
 }
 
@@ -40,7 +39,7 @@ impl Heartbeat {
         Self::parse(path, &bytes)
     }
 
-    /// Reads the bytes of a file; `path` only names them in messages.
+    /// Parses the bytes of a file; `path` is only used in messages.
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, ReadError> {
         if bytes.is_empty() {
             return Err(ReadError::new(path, "is empty"));
@@ -54,7 +53,7 @@ impl Heartbeat {
         parser.finish()
     }
 
-    /// Times and values of a column, found by its exact name or the only one that differs in case.
+    /// Returns times and values of a column, found by its exact name or the only one that differs in case.
     pub fn series(&self, name: &str) -> Result<(Vec<f64>, Vec<f64>), ReadError> {
         let complain = |text: String| ReadError::new(&self.path, text);
         let with = |alike: &dyn Fn(&str) -> bool| -> Vec<usize> {
@@ -80,8 +79,8 @@ impl Heartbeat {
     }
 }
 
-/// Whether a file that begins so is heartbeat output: by Sierra's own first line, by labels, or by
-/// a padded legend that begins with the time.
+/// Returns true if the beginning of a file shows heartbeat output: Sierra's own first line, labels, or a padded
+/// legend that begins with the time.
 pub fn recognised(head: &[u8]) -> bool {
     let text = String::from_utf8_lossy(head);
     let Some(line) = text.lines().find(|line| !line.trim().is_empty()) else { return false };

@@ -1,4 +1,4 @@
-//! What a Sierra file holds.
+//! Contents of a Sierra file.
 
 use std::path::Path;
 
@@ -13,8 +13,8 @@ use super::signal::Output;
 use crate::readers::contents::{MOST_SIGNAL_VALUES, fact, limits};
 use crate::readers::listed;
 
-/// Whether a netCDF container that begins so holds Exodus II: by the names in its header or, for
-/// netCDF-4, whose names stand anywhere, by its own name.
+/// Returns true if the beginning of a netCDF container shows Exodus II: by the names in its header or, for netCDF-4,
+/// whose names may be anywhere, by the file name.
 pub(super) fn looks_like_exodus(path: &Path, head: &[u8]) -> bool {
     let has = |name: &[u8]| head.windows(name.len()).any(|window| window == name);
     if has(b"api_version") || has(b"api version") || has(b"num_el_blk") || has(b"len_line") {
@@ -33,7 +33,7 @@ pub(super) fn contents(path: &Path) -> Result<Contents, ReadError> {
     match Output::open(path)? {
         Output::Heartbeat(table) => Ok(heartbeat(&table)),
         Output::Exodus(results) => {
-            // Of several parts the one named, or the first.
+            // In several parts, the part with this path; otherwise the first.
             let parts = results.parts();
             let file = parts.iter().find(|part| part.path() == path).unwrap_or(&parts[0]);
             let mut contents = exodus(file)?;
@@ -52,7 +52,7 @@ fn heartbeat(table: &Heartbeat) -> Contents {
     let mut facts = vec![fact("rows", rows), fact("columns", table.names.len())];
     match table.time {
         Some(time) => facts.push(times(&table.columns[time])),
-        None => facts.push(fact("time", "no column is called `time`")),
+        None => facts.push(fact("time", "there is no column `time`")),
     }
     facts.extend(table.notes.iter().map(|note| fact("note", note)));
     let column = |i: usize| Column {
@@ -174,7 +174,7 @@ fn described(
     Ok(described)
 }
 
-/// Time and one column an entity, named by the entity's id.
+/// Returns the time and one column per entity, named by the entity's id.
 fn signals(
     file: &Exodus,
     kind: Kind,

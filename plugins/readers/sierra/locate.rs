@@ -1,37 +1,38 @@
-//! Finding the entity of an Exodus file that a probe means.
+//! Search for the entity of an Exodus file that a probe refers to.
+
+use lacuna::plugin::reader::ReadError;
 
 use super::container::Pick;
 use super::exodus::{Exodus, Group, Kind};
 use super::probe::Probe;
 use crate::readers::listed;
-use lacuna::plugin::reader::ReadError;
 
-/// One entity that carries a value, by positions counted from 0.
+/// One entity that carries a value; positions are counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Entity {
-    /// Block or set; 0 for globals and nodal variables.
+    /// Index of the block or set; 0 for globals and nodal variables.
     pub group: usize,
     /// Position within the group, or within the file for nodal variables.
     pub position: usize,
-    /// Distance to the point asked for, 0 if the entity was chosen otherwise.
+    /// Distance to the requested point; 0 if the entity was chosen otherwise.
     pub distance: f64,
 }
 
-/// What a file holds that fits a probe.
+/// Entities of a file that match a probe.
 #[derive(Debug, Clone, Default)]
 pub struct Found {
-    /// The best entity.
+    /// Entity nearest to the requested point, or the only match.
     pub entity: Option<Entity>,
-    /// How many entities fit: with neither id nor point, there has to be one.
+    /// Number of entities that match; without id and point there must be one.
     pub count: usize,
-    /// Groups that hold the id asked for but, by the truth table, not the variable.
+    /// Groups that contain the requested id but, by the truth table, not the variable.
     pub without_variable: Vec<String>,
 }
 
 impl Found {
     fn offer(&mut self, entity: Entity) {
         self.count += 1;
-        // Strictly nearer: of several at the same distance the first in the file stays.
+        // Strictly nearer: of several entities at the same distance the first in the file is kept.
         if self.entity.is_none_or(|best| entity.distance < best.distance) {
             self.entity = Some(entity);
         }
@@ -39,7 +40,7 @@ impl Found {
 }
 
 impl Exodus {
-    /// Entities at which a variable can be read as the probe asks.
+    /// Returns the entities at which a variable can be read as the probe requests.
     pub fn locate(&self, kind: Kind, variable: usize, probe: &Probe) -> Result<Found, ReadError> {
         let mut found = Found::default();
         match kind {
@@ -62,7 +63,7 @@ impl Exodus {
         Ok(found)
     }
 
-    /// Ids of the nodes or elements, as in the input deck; counted from 1 where the file has none.
+    /// Returns the ids of the nodes or elements, as in the input deck; counted from 1 if the file has none.
     pub fn ids(&self, kind: Kind) -> Result<Vec<i64>, ReadError> {
         let (map, count) = match kind {
             Kind::Global => return Ok(Vec::new()),
@@ -89,7 +90,7 @@ impl Exodus {
         Ok(meant)
     }
 
-    /// The nodes or elements of a group, by position in the file counted from 0.
+    /// Returns the nodes or elements of a group, by position in the file counted from 0.
     pub(super) fn members(&self, kind: Kind, group: &Group) -> Result<Vec<usize>, ReadError> {
         let (name, count) = match kind {
             Kind::NodeSet => (format!("node_ns{}", group.position + 1), self.nodes),
@@ -102,7 +103,7 @@ impl Exodus {
         self.positions(&name, count)
     }
 
-    /// Entries of a list of nodes or elements, which Exodus counts from 1.
+    /// Returns the entries of a list of nodes or elements, which Exodus counts from 1.
     fn positions(&self, name: &str, count: usize) -> Result<Vec<usize>, ReadError> {
         let inside = |&number: &i64| number >= 1 && number <= count as i64;
         let numbers = self.container.integers(name)?;
@@ -173,7 +174,7 @@ impl Exodus {
         Ok(kept)
     }
 
-    /// Coordinates of the nodes; a missing third dimension is 0.
+    /// Returns the coordinates of the nodes; a missing third coordinate is 0.
     pub fn coordinates(&self) -> Result<Vec<[f64; 3]>, ReadError> {
         let mut places = vec![[0.0; 3]; self.nodes];
         for (axis, name) in ["coordx", "coordy", "coordz"].into_iter().enumerate() {
@@ -191,7 +192,7 @@ impl Exodus {
         Ok(places)
     }
 
-    /// Mean of each element's nodes.
+    /// Returns the mean of each element's nodes.
     pub fn centroids(&self) -> Result<Vec<[f64; 3]>, ReadError> {
         let nodes = self.coordinates()?;
         let mut centroids = Vec::with_capacity(self.elements());

@@ -1,7 +1,6 @@
 //! `sierra`: output of Sierra/SM, Exodus II and heartbeat files.
 //!
-//! The folder also holds the formats for whoever reads or writes them: [`exodus`], [`heartbeat`]
-//! and [`write`].
+//! The folder also provides the formats to other readers and writers: [`exodus`], [`heartbeat`] and [`mod@write`].
 
 pub mod container;
 pub mod exodus;
@@ -19,8 +18,8 @@ use std::path::{Path, PathBuf};
 use lacuna::data::{Axis, Coordinates, Ensemble, Layout, Unit};
 use lacuna::plugin::reader::{Contents, EnsembleSource, ReadError, scenario_path};
 use lacuna::plugin::{Component, Context, Reader};
-use lacuna::study::problem::Complaints;
-use lacuna::study::values::Fraction;
+use lacuna::text::problem::Complaints;
+use lacuna::text::values::Fraction;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -29,8 +28,8 @@ use self::signal::Output;
 use super::runs::{self, AllowFailed, Run};
 use super::scenario;
 
-/// Reads what Sierra wrote for each run: Exodus II results or history files, in any netCDF
-/// container and in one file or one a processor, and heartbeat text in any of its formats.
+/// Reads Sierra's output of each run: Exodus II results or history files, in any netCDF container and in one file or
+/// one per processor, and heartbeat text in any of its formats.
 ///
 /// ```toml
 /// [simulations]
@@ -45,39 +44,39 @@ use super::scenario;
 /// direction = [1.0, 1.0, 0.0]
 /// ```
 ///
-/// Each sensor's signal is interpolated linearly to the response's times. A run whose file is
-/// missing, damaged or too short, or holds a value that is not finite, counts as failed.
+/// Each sensor's signal is interpolated linearly to the response's times. A run whose file is missing, damaged or too
+/// short, or holds a value that is not finite, counts as failed.
 ///
-/// Sources: the format descriptions in the SEACAS library's `exodusII_int.h`, `Iohb_DatabaseIO.C`
-/// and `Iohb_Layout.C`.
+/// Sources: the format descriptions in the SEACAS library's `exodusII_int.h`, `Iohb_DatabaseIO.C` and
+/// `Iohb_Layout.C`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Sierra {
-    /// Table of runs (CSV), relative to the study file: the columns `run`, one a parameter, and
-    /// `file` unless the key `file` is given. Left out, the runs are those that the study
-    /// simulates.
+    /// Table of runs (CSV), relative to the study file: the columns `run`, one per parameter, and `file` unless the
+    /// key `file` is given. Default: the runs that the study simulates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub runs: Option<PathBuf>,
-    /// Each run's file, relative to the table of runs; `{run}` stands for the run's name. Of a
-    /// parallel run's files the common name is enough: `strain.e` for `strain.e.96.00` and so on.
+    /// File of each run, relative to the table of runs; `{run}` is replaced by the name of the run. For the files of
+    /// a parallel run the common name suffices: `strain.e` for `strain.e.96.00` and so on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
-    /// Variable of every sensor that has no entry of its own under `sensors`. The name of an axis
-    /// in braces stands for the label on it: `strain_{sensor}`.
+    /// Variable of every sensor that has no entry of its own under `sensors`. The name of an axis in braces is
+    /// replaced by the label on it: `strain_{sensor}`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variable: Option<String>,
-    /// Where single sensors are read, by their label.
+    /// Locations of single sensors in the output, by label.
     pub sensors: BTreeMap<String, Probe>,
-    /// Unit of the values in the files; the response's unit when left out.
+    /// Unit of the values in the files. Default: the response's unit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<Unit>,
-    /// Unit of the times in the files; the unit of the response's time axis when left out.
+    /// Unit of the times in the files. Default: the unit of the response's time axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_unit: Option<Unit>,
-    /// How much of the response's time axis a file may lack at either end, as a fraction of the
-    /// axis' spacing; there the first or last value holds.
+    /// Part of the response's time axis that a file may lack at either end, as a fraction of the axis spacing; there
+    /// the first or last value is used.
     pub tolerance: Fraction,
-    /// How many runs without a usable file may be left out: below 1 a fraction, from 1 on a count.
+    /// Number of runs without a usable file that may be left out: a fraction if below 1, a count from 1 on. More of
+    /// them stop the study.
     pub allow_failed: AllowFailed,
 }
 
@@ -142,7 +141,7 @@ impl Sierra {
         {
             complaints
                 .at("sensors")
-                .say(format!("nothing says where sensor `{name}` is read"))
+                .say(format!("the options do not state where sensor `{name}` is read"))
                 .help("add it under `sensors`, or give a pattern such as `variable = \"strain_{sensor}\"`");
         }
         if let Some(pattern) = &self.variable {
@@ -160,7 +159,7 @@ impl Sierra {
             return Ok(probe.clone());
         }
         let pattern = self.variable.as_ref().ok_or_else(|| {
-            format!("neither `variable` nor `sensors` says where `{}` is read", curve.name)
+            format!("neither `variable` nor `sensors` states where `{}` is read", curve.name)
         })?;
         let name = curve.labels.iter().fold(pattern.clone(), |name, (axis, label)| {
             name.replace(&format!("{{{axis}}}"), label)
@@ -201,7 +200,7 @@ impl Reader for Sierra {
     fn ensemble(&self, source: &EnsembleSource<'_>) -> Result<Ensemble, ReadError> {
         let table = runs::table_path(source, self.runs.as_deref(), "runs")?;
         let list = runs::read_runs(&table, source.parameters)?;
-        // The simulate stage names its files in its own table; the pattern is for the user's.
+        // The simulate stage names its files in its own table; the pattern applies to the user's table.
         let named = source.simulated.is_none() || self.runs.is_some();
         runs::ensemble(source, &table, &list, self.allow_failed, |run| {
             let file = match &run.file {
@@ -253,7 +252,7 @@ impl Reader for Sierra {
     }
 }
 
-/// The response as curves over time, one a sensor.
+/// The response as curves over time, one per sensor.
 struct Curves<'a> {
     times: &'a [f64],
     time_unit: &'a Unit,

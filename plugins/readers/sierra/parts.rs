@@ -1,41 +1,42 @@
-//! A run's results: one Exodus file, or the files its processors wrote (`run.e.96.00`, ...).
+//! Results of a run: one Exodus file, or one file per processor (`run.e.96.00`, ...).
 
 use std::path::{Path, PathBuf};
+
+use lacuna::plugin::reader::ReadError;
 
 use super::exodus::{Exodus, Kind};
 use super::locate::{Entity, Found};
 use super::probe::Probe;
 use crate::readers::listed;
-use lacuna::plugin::reader::ReadError;
 
-/// The files of one run. A node or element lies in one part, or in several with equal values if
-/// it is shared; globals are in all.
+/// The files of one run. A node or element lies in one part, or in several with equal values if it is shared; globals
+/// are in all.
 pub struct Results {
     parts: Vec<Exodus>,
     expected: usize,
 }
 
 impl Results {
-    /// Opens the file, and with it the other parts if its name says that it is one of several.
-    /// The common name of the parts (`run.e` for `run.e.96.00`) will do as well.
+    /// Opens a file, together with the other parts if its name shows that it is one of several. The common name of
+    /// the parts (`run.e` for `run.e.96.00`) is accepted too.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         let (paths, expected) = part_paths(path);
         let parts = paths.iter().map(|p| Exodus::open(p)).collect::<Result<Vec<_>, _>>()?;
         Ok(Self { parts, expected })
     }
 
-    /// One file.
+    /// Wraps a single file.
     pub fn single(file: Exodus) -> Self {
         Self { parts: vec![file], expected: 1 }
     }
 
-    /// The files, in the order of the processors.
+    /// Returns the files, in the order of the processors.
     pub fn parts(&self) -> &[Exodus] {
         &self.parts
     }
 
-    /// Times and values of one component of a variable, where the probe says. `name` stands in
-    /// for the probe's own variable name.
+    /// Returns times and values of one component of a variable at the location of the probe. `name` takes the place
+    /// of the probe's own variable name.
     pub fn series(&self, name: &str, probe: &Probe) -> Result<(Vec<f64>, Vec<f64>), ReadError> {
         let kind = self.kind(name, probe)?;
         let (part, entity) = self.locate(kind, name, probe)?;
@@ -118,7 +119,8 @@ impl Results {
         }
     }
 
-    /// Why what was found in all parts together is not the one entity that the probe means.
+    /// Describes why the entities found in all parts together are not the single one that the probe needs; `None` if
+    /// they are.
     fn objection(&self, kind: Kind, name: &str, probe: &Probe, found: &Found) -> Option<String> {
         let carrier = kind.carrier();
         let missing = self.expected - self.parts.len();
@@ -140,7 +142,7 @@ impl Results {
         }
         if probe.nearest.is_some() && probe.id.is_none() && missing > 0 {
             return Some(format!(
-                "the nearest {carrier} cannot be known{absent}: choose by `id` or join the files \
+                "the nearest {carrier} is unknown{absent}: choose by `id` or join the files \
                  with `epu`"
             ));
         }
@@ -154,7 +156,7 @@ impl Results {
     }
 }
 
-/// The existing parts that belong to `path`, in order, and how many the run wrote.
+/// Returns the existing parts that belong to `path`, in order, and the number of parts that the run wrote.
 pub(super) fn part_paths(path: &Path) -> (Vec<PathBuf>, usize) {
     let alone = (vec![path.to_owned()], 1);
     let Some(name) = path.file_name().and_then(|name| name.to_str()) else { return alone };
@@ -181,7 +183,7 @@ pub(super) fn part_paths(path: &Path) -> (Vec<PathBuf>, usize) {
         .unwrap_or(alone)
 }
 
-/// Splits `run.e.96.07` into the common name, the number of parts and the digits of a part.
+/// Splits `run.e.96.07` into the common name, the number of parts and the number of digits of a part.
 pub(super) fn part_name(name: &str) -> Option<(&str, usize, usize)> {
     let (rest, part) = name.rsplit_once('.')?;
     let (stem, count) = rest.rsplit_once('.')?;
@@ -190,7 +192,7 @@ pub(super) fn part_name(name: &str) -> Option<(&str, usize, usize)> {
         return None;
     }
     let (count, number): (usize, usize) = (count.parse().ok()?, part.parse().ok()?);
-    // No machine has a million processors' files in one folder: a larger number is no part count.
+    // No machine has the files of a million processors in one folder: a larger number is not a part count.
     (number < count && count <= 1_000_000).then_some((stem, count, part.len()))
 }
 

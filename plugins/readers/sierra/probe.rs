@@ -1,25 +1,24 @@
-//! Where a signal is read: the options a user gives for one gauge.
+//! Location of a signal: the options for one gauge.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::exodus::{Group, Kind};
 
-/// Where one gauge is read in a simulation's output.
+/// Location of one gauge in a simulation's output.
 ///
-/// A history or heartbeat file needs only `variable`. In a results file the entity is chosen by
-/// its `id`, or as the one `nearest` to a point; `block` narrows the choice.
+/// A history or heartbeat file needs only `variable`. In a results file the entity is chosen by its `id`, or as the
+/// one `nearest` to a point; `block` narrows the choice.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Probe {
-    /// Name of the variable. If no variable has this exact name, the only one that differs in
-    /// case is taken.
+    /// Name of the variable. If no variable has this exact name, the only one that differs in case is taken.
     ///
-    /// With `direction`, the name of a symmetric tensor without its component: `log_strain` for
-    /// `log_strain_xx`, ... `log_strain_zx`. A component in the middle of the name is written
-    /// `{component}`: `unrotated_stress_{component}_1`.
+    /// With `direction`, the name of a symmetric tensor without its component: `log_strain` for `log_strain_xx`, ...
+    /// `log_strain_zx`. A component in the middle of the name is written `{component}`:
+    /// `unrotated_stress_{component}_1`.
     pub variable: String,
-    /// What the variable is attached to, needed only if several kinds have the same name.
+    /// Kind of entity to which the variable is attached; needed only if several kinds have a variable of this name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kind: Option<Kind>,
     /// Element block, node set or side set, by name or id.
@@ -28,22 +27,22 @@ pub struct Probe {
     /// Id of the node or element, as in the input deck.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub id: Option<i64>,
-    /// Side of the element `id`, counted from 1, where a side set holds several of them.
+    /// Side of the element `id`, counted from 1; needed if a side set contains several of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub side: Option<i64>,
-    /// Takes the node, or the element by its centroid, nearest to this point, in the mesh's unit
-    /// of length. For a side set the centroid is that of the element behind the side.
+    /// Point whose nearest node, or element by its centroid, is read; in the mesh's unit of length. For a side set
+    /// the centroid is that of the element behind the side.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nearest: Option<[f64; 3]>,
-    /// Direction of the gauge: the normal component e = d·E·d of the symmetric tensor E along the
-    /// unit vector d. The length given does not matter. Shear components are those of the tensor,
-    /// not the engineering shear, which is twice as large.
+    /// Direction of the gauge: the signal is the normal component e = d·E·d of the symmetric tensor E along the unit
+    /// vector d; the vector given is normalised. Shear components are those of the tensor, not the engineering shear,
+    /// which is twice as large.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub direction: Option<[f64; 3]>,
 }
 
 impl Probe {
-    /// A variable that needs no place: a global of a history file, a column of a heartbeat file.
+    /// Returns a probe without a location, for a global of a history file or a column of a heartbeat file.
     pub fn named(variable: impl Into<String>) -> Self {
         Self {
             variable: variable.into(),
@@ -56,7 +55,7 @@ impl Probe {
         }
     }
 
-    /// Whether the user said where in the mesh to look.
+    /// Returns true if the user gave a location in the mesh.
     pub(super) fn is_placed(&self) -> bool {
         self.block.is_some() || self.id.is_some() || self.nearest.is_some()
     }
@@ -66,14 +65,14 @@ impl Probe {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum GroupName {
-    /// The id in the input deck.
+    /// Id in the input deck.
     Id(i64),
-    /// The name.
+    /// Name.
     Name(String),
 }
 
 impl GroupName {
-    /// Whether a group is meant.
+    /// Returns true if this is the id or name of a group.
     pub fn means(&self, group: &Group) -> bool {
         match self {
             Self::Id(id) => group.id == *id,

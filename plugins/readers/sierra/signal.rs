@@ -1,5 +1,4 @@
-//! From a file to the study's response: the signals of the gauges, in their direction, on the
-//! response's time axis and in its unit.
+//! Signals of the gauges, in their direction, on the response's time axis and in its unit.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -14,7 +13,7 @@ use super::probe::Probe;
 /// Components of a symmetric tensor, in Sierra's order.
 pub const COMPONENTS: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "zx"];
 
-/// What Sierra wrote for one run.
+/// Sierra's output of one run.
 pub enum Output {
     /// Exodus II: results or history, in one file or several parts.
     Exodus(Results),
@@ -23,14 +22,14 @@ pub enum Output {
 }
 
 impl Output {
-    /// Opens a file of either sort.
+    /// Opens a file of either format.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         if path.is_dir() {
             return Err(ReadError::new(path, "is a folder, expected a file"));
         }
         let mut head = [0; 4];
         let length = match File::open(path) {
-            // The common name of a parallel run's parts is not itself a file.
+            // The common name of a parallel run's parts is not the name of a file.
             Err(_) => return Results::open(path).map(Self::Exodus),
             Ok(mut file) => file
                 .read(&mut head)
@@ -43,7 +42,7 @@ impl Output {
         }
     }
 
-    /// The signal of one gauge.
+    /// Returns the signal of one gauge.
     pub fn signal(&self, probe: &Probe) -> Result<Signal, ReadError> {
         let Some(direction) = probe.direction else {
             return self.variable(&probe.variable, probe);
@@ -51,7 +50,7 @@ impl Output {
         let weights = normal_weights(direction).map_err(|text| self.complain(text))?;
         let mut sum: Option<Signal> = None;
         for (component, weight) in COMPONENTS.into_iter().zip(weights) {
-            // A plane mesh has no components out of its plane, and none is needed.
+            // A plane mesh has no components normal to its plane, and none is required.
             if weight == 0.0 {
                 continue;
             }
@@ -73,7 +72,7 @@ impl Output {
                 }
             }
         }
-        sum.ok_or_else(|| self.complain("`direction` has no length"))
+        sum.ok_or_else(|| self.complain("the vector `direction` is zero"))
     }
 
     fn variable(&self, name: &str, probe: &Probe) -> Result<Signal, ReadError> {
@@ -93,7 +92,7 @@ impl Output {
         ReadError::new(self.path(), text)
     }
 
-    /// The file, or the first of several parts.
+    /// Returns the path of the file, or of the first of several parts.
     pub fn path(&self) -> &Path {
         match self {
             Self::Exodus(results) => results.parts()[0].path(),
@@ -102,16 +101,16 @@ impl Output {
     }
 }
 
-/// Whether a file that begins so is a netCDF container.
+/// Returns true if the beginning of a file shows a netCDF container.
 pub(crate) fn is_exodus(head: &[u8]) -> bool {
     head.starts_with(b"CDF") || head.starts_with(b"\x89HDF")
 }
 
-/// Weights of the tensor's components in e = d·E·d, d of unit length.
+/// Returns the weights of the tensor's components in e = d·E·d, with d of unit length.
 fn normal_weights(direction: [f64; 3]) -> Result<[f64; 6], String> {
     let length = direction.iter().map(|d| d * d).sum::<f64>().sqrt();
     if !(length.is_finite() && length > 0.0) {
-        return Err(format!("`direction` {direction:?} is not the direction of anything"));
+        return Err(format!("the vector `direction` {direction:?} must be finite and not zero"));
     }
     let [x, y, z] = direction.map(|d| d / length);
     Ok([x * x, y * y, z * z, 2.0 * x * y, 2.0 * y * z, 2.0 * z * x])
@@ -120,14 +119,14 @@ fn normal_weights(direction: [f64; 3]) -> Result<[f64; 6], String> {
 /// A quantity over increasing times.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Signal {
-    /// Times, strictly increasing.
+    /// Strictly increasing times.
     pub times: Vec<f64>,
-    /// Values.
+    /// Value at each time.
     pub values: Vec<f64>,
 }
 
 impl Signal {
-    /// Makes times increase: where a restart repeats steps, the later ones hold.
+    /// Makes the times increase: of steps repeated by a restart the later ones are kept.
     fn increasing(times: Vec<f64>, values: Vec<f64>) -> Self {
         if times.is_sorted_by(|a, b| a < b) {
             return Self { times, values };
@@ -144,11 +143,11 @@ impl Signal {
         kept
     }
 
-    /// Linear interpolation to the given increasing times.
+    /// Interpolates linearly to the given increasing times.
     ///
-    /// Files print times with few digits and take the first step after the time asked for, so up
-    /// to `tolerance` times the mean spacing of `times` may lack at either end; there the end
-    /// value is taken. More than that is an error, as is a value that is not finite.
+    /// Files print times with few digits and write the first step after the requested time, so that up to `tolerance`
+    /// times the mean spacing of `times` may be missing at either end; there the end value is used. A larger gap is
+    /// an error, as is a value that is not finite.
     pub fn resampled(&self, times: &[f64], tolerance: f64) -> Result<Vec<f64>, String> {
         let (Some(&first), Some(&last)) = (self.times.first(), self.times.last()) else {
             return Err("has no time steps".to_owned());
@@ -177,7 +176,7 @@ impl Signal {
         } else if after == self.times.len() {
             self.values[after - 1]
         } else if self.times[after] == t {
-            // Exact, and not touched by a neighbour that is not finite.
+            // Exact, and independent of a neighbour that is not finite.
             self.values[after]
         } else {
             let (t0, t1) = (self.times[after - 1], self.times[after]);

@@ -1,8 +1,7 @@
-//! Writing a history file as Sierra does.
+//! Writer of history files in Sierra's layout.
 //!
-//! The layout is that of the IOSS library: a dummy mesh of one node and one `sphere` element, all
-//! signals as global variables in alphabetical order, 64-bit offset container. The Exodus tools
-//! and any netCDF reader open it.
+//! The layout is that of the IOSS library: a dummy mesh of one node and one `sphere` element, all signals as global
+//! variables in alphabetical order, in a 64-bit offset container. The Exodus tools and any netCDF reader can open it.
 
 use std::path::Path;
 
@@ -10,34 +9,33 @@ use lacuna::run::Stop;
 use lacuna::run::files::write_atomic;
 use netcdf_writer::{DimensionId, Error, NcAttrValue, NcFileBuilder, NcWriteOptions};
 
-/// Version of the Exodus library whose files these are.
+/// Version of the Exodus library whose format is written.
 const VERSION: f32 = 9.06;
 /// Length of a name and of a QA field, with the terminating NUL.
 const NAME: usize = 33;
 /// Length of an information line, with the terminating NUL.
 const LINE: usize = 81;
 
-/// What a history file says about its origin. It is all an argument, the date too, so that equal
-/// data give equal bytes.
+/// Information on the origin of a history file. All of it, including the date, is an argument, so that equal data
+/// give equal bytes.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Origin {
     /// Title of the run, at most 80 characters.
     pub title: String,
     /// QA record: code, version, date (`2022/04/15`), time (`12:00:00`), at most 32 characters each.
     pub qa: [String; 4],
-    /// Information records, usually the input deck; longer lines are wrapped at 79 characters with
-    /// a backslash.
+    /// Information records, usually the input deck; longer lines are wrapped at 79 characters with a backslash.
     pub info: Vec<String>,
 }
 
 /// Signals over common times.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct History {
-    /// Times.
+    /// Increasing times.
     pub times: Vec<f64>,
     /// Names of the signals, at most 256 characters each.
     pub names: Vec<String>,
-    /// One list a signal, each as long as `times`.
+    /// Values of the signals, one list per signal and each as long as `times`.
     pub values: Vec<Vec<f64>>,
 }
 
@@ -124,7 +122,7 @@ fn add_records(file: &mut NcFileBuilder, origin: &Origin) -> Result<(), Error> {
     add_texts(file, "info_records", &[count, length], LINE, &lines)
 }
 
-/// The mesh that IOSS gives a history file: its place and its element mean nothing.
+/// Adds the mesh that IOSS gives a history file; its coordinates and element have no meaning.
 fn add_mesh(file: &mut NcFileBuilder, name_length: DimensionId, width: usize) -> Result<(), Error> {
     let axes = file.add_dimension("num_dim", 3)?;
     let nodes = file.add_dimension("num_nodes", 1)?;
@@ -155,7 +153,7 @@ fn add_mesh(file: &mut NcFileBuilder, name_length: DimensionId, width: usize) ->
     file.write_variable(connect, &[1])
 }
 
-/// A character variable, each text cut to its field and padded with NUL.
+/// Adds a character variable; each text is cut to its field and padded with NUL.
 fn add_texts(
     file: &mut NcFileBuilder,
     name: &str,
@@ -173,7 +171,7 @@ fn add_texts(
     file.write_char_variable(variable, &bytes)
 }
 
-/// Wraps a line as Exodus keeps input decks: all but the last piece end in a backslash.
+/// Wraps a line as Exodus stores input decks: all pieces but the last end in a backslash.
 fn wrapped(line: &str) -> Vec<String> {
     let characters: Vec<char> = line.chars().map(|c| if c.is_ascii() { c } else { '?' }).collect();
     let mut pieces = Vec::new();
@@ -187,7 +185,7 @@ fn wrapped(line: &str) -> Vec<String> {
     pieces
 }
 
-/// At most `length` bytes of ASCII: Exodus strings know no other.
+/// Returns at most `length` bytes of ASCII, because Exodus strings are limited to it.
 fn clipped(text: &str, length: usize) -> String {
     text.chars().map(|c| if c.is_ascii() { c } else { '?' }).take(length).collect()
 }

@@ -1,12 +1,12 @@
-//! A calibration in small: best fit, walkers around it, ensemble, diagnosis.
+//! A complete small calibration: best fit, walkers around it, ensemble, diagnosis.
 //!
-//! The problem has the shape of the inversion on which samplers that start from draws of the prior
-//! lose most of their walkers: three parameters of decaying oscillations at several sensors, one unknown
-//! variance a sensor with a wide uniform prior.
+//! The problem is shaped like the inversion on which samplers that start from draws of the prior lose most of their
+//! walkers: three parameters of decaying oscillations at several sensors, and one unknown variance per sensor with a
+//! wide uniform prior.
 
 use lacuna::diagnose::Diagnosis;
-use lacuna::math::optimise::{laplace, maximise, scatter};
 use lacuna::math::random::normal;
+use lacuna_optimise::{laplace, maximise, scatter};
 
 use super::tests::run_from;
 use super::*;
@@ -20,7 +20,7 @@ struct Oscillations {
     data: Vec<f64>,
 }
 
-/// The signal and its derivatives by the three parameters.
+/// Returns the signal and its derivatives with respect to the three parameters.
 fn signal(theta: &[f64], sensor: usize, time: usize) -> (f64, [f64; 3]) {
     let (t, s) = (0.5 * (1 + time) as f64, 1.0 + 0.2 * sensor as f64);
     let decay = (-0.3 * (1.5 + theta[0]) * t).exp();
@@ -107,7 +107,7 @@ fn no_walker_is_lost_when_the_ensemble_starts_around_the_best_fit() {
         let stranded = &diagnosis.stranded;
         assert!(stranded.to_the_end.is_empty() && stranded.late.is_empty(), "{stranded:?}");
         assert!(diagnosis.converged, "seed {seed}: {:?}", diagnosis.advice);
-        // With 48 data the posterior of the parameters is almost normal.
+        // With 48 data the posterior of the parameters is nearly normal.
         for (j, truth) in TRUTH.into_iter().enumerate() {
             let sd = shape.covariance[(j, j)].sqrt();
             assert!((best.point[j] - truth).abs() < 4.0 * sd, "seed {seed}: {:?}", best.point);

@@ -1,66 +1,67 @@
-//! `affine_invariant_ensemble`: walkers that move along lines through each other.
+//! `affine_invariant_ensemble`: walkers that move along lines through other walkers.
 
 mod moves;
 mod start;
 
-use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, permutation, uniform};
 use lacuna::plugin::sampler::{Plan, State};
 use lacuna::plugin::{Component, Context, Fact, Sampler, Target};
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
+use lacuna_linalg::Matrix;
 use rand::Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use moves::Moves;
+use super::chains;
 use moves::{Move, Others, Settings};
 
-use super::chains;
+pub use moves::Moves;
 
-/// Affine-invariant ensemble: many walkers, each of which moves along the line through itself and
-/// another one, by a random stretch.
+/// Affine-invariant ensemble: many walkers, each of which moves along the line through itself and another walker by a
+/// random stretch.
 ///
-/// It has nothing to tune and no gradient to ask for, and it does not mind how parameters are
-/// scaled or correlated: any affine change of the unknowns changes the walkers by the same map and
-/// nothing else. It suits up to some twenty unknowns; the autocorrelation time grows faster than their
-/// number. Walkers depend on each other, so that their number of effective draws is what counts,
-/// and walkers that start far outside the bulk may never find in: start them around the best fit.
+/// It needs neither tuning nor gradients and is insensitive to the scales and correlations of the parameters: an
+/// affine transformation of the unknowns transforms the walkers alike and changes nothing else. It suits up to about
+/// twenty unknowns; the autocorrelation time grows faster than their number. The walkers depend on each other, so
+/// judge the run by the number of effective draws. Walkers that start far outside the bulk of the density may never
+/// reach it: start them around the best fit.
 ///
-/// Other `moves` can be mixed in. Jumps by differences between walkers, `{ differential_evolution = 0.8,
-/// snooker = 0.2 }`, are the better ones for densities of several modes; the snooker move
-/// is the only one that minds how the unknowns are scaled, and takes their spread at the start for a unit.
+/// Other `moves` can be mixed in. Jumps by differences between walkers,
+/// `{ differential_evolution = 0.8, snooker = 0.2 }`, are better for densities with several modes. The snooker move
+/// alone depends on the scales of the unknowns: it takes their spread at the start as units.
 ///
-/// References: Goodman and Weare, Comm. App. Math. Comp. Sci. 5 (2010) 65; Foreman-Mackey, Hogg, Lang
-/// and Goodman, PASP 125 (2013) 306 (the update by halves); Nelson, Ford and Payne, Astrophys. J. Suppl. 210
-/// (2014) 11 (differential evolution within an ensemble).
+/// References: Goodman and Weare, Comm. App. Math. Comp. Sci. 5 (2010) 65; Foreman-Mackey, Hogg, Lang and Goodman,
+/// PASP 125 (2013) 306 (the update by halves); Nelson, Ford and Payne, Astrophys. J. Suppl. 210 (2014) 11
+/// (differential evolution within an ensemble).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct AffineInvariantEnsemble {
-    /// The number of walkers: even, and at least twice the number of unknowns and two more.
+    /// Number of walkers: even, and at least twice the number of unknowns plus two. More walkers cost more
+    /// evaluations per step and make it easier to cover a complicated density.
     pub walkers: usize,
-    /// The number of steps of each walker.
+    /// Number of steps. A step moves every walker once and costs one evaluation per walker.
     pub steps: usize,
-    /// The weights of the moves, such as `{ stretch = 0.8, differential_evolution = 0.18, snooker = 0.02 }`:
-    /// each time a walker moves, one of them is drawn.
+    /// Weights of the moves, such as `{ stretch = 0.8, differential_evolution = 0.18, snooker = 0.02 }`: each time a
+    /// walker moves, one of the moves is drawn with a probability in proportion to its weight.
     pub moves: Moves,
-    /// The scale of the stretch move, called `a` in the literature: a walker's distance from the other one
-    /// is multiplied by a number between `1 / stretch` and `stretch`.
+    /// Scale `a` of the stretch move, above 1: the distance to the other walker is multiplied by a random factor
+    /// between `1 / a` and `a`. A larger value makes longer moves, which are accepted less often.
     pub stretch: f64,
-    /// The number of walkers whose places shape one walk move: at least two.
+    /// Number of other walkers that define one walk move, at least 2.
     pub subset: usize,
-    /// The order in which the walkers of one step move.
+    /// Order in which the walkers of one step move.
     pub update: Update,
 }
 
-/// The order in which walkers move.
+/// Order in which the walkers of one step move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Update {
-    /// In two halves, drawn anew at each step: each half moves at once, by the places of walkers of the
-    /// other half, so that its log densities are computed in parallel.
+    /// In two halves, which are redrawn at each step. All walkers of one half move at once, relative to walkers of the
+    /// other half, so that their log densities are computed in parallel.
     Split,
-    /// One after the other, by the places where all others then are, as in the paper of 2010.
+    /// One after the other, relative to the current positions of all others, as in Goodman and Weare 2010.
     Sequential,
 }
 
@@ -79,7 +80,7 @@ impl Default for AffineInvariantEnsemble {
 
 impl Component for AffineInvariantEnsemble {
     fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        // Unknowns of discrepancies and effects come on top; `start` counts all of them.
+        // Discrepancies and effects add unknowns that are not known here; `start` counts all of them.
         let least = self.least(context.parameters.len());
         if self.walkers < least {
             complaints
@@ -113,7 +114,7 @@ impl Component for AffineInvariantEnsemble {
             let [stretch, walk, jump, snooker] = self.moves.weights().map(|(_, weight)| weight);
             complaints
                 .at("moves")
-                .say("the weights are no shares of the moves")
+                .say("the weights of the moves are not valid")
                 .expected("numbers from 0 up, at least one of them above 0")
                 .found(format!("{stretch}, {walk}, {jump} and {snooker}"));
         }
@@ -132,7 +133,7 @@ impl Sampler for AffineInvariantEnsemble {
     fn start(&self, target: &dyn Target, points: Matrix) -> Result<State, Stop> {
         self.check_start(target.dimension(), &points)?;
         let log_density = chains::log_density(target, &points, "walkers")?;
-        // Only the snooker move needs to remember anything.
+        // Only the snooker move needs a memory.
         let memory = if self.moves.snooker > 0.0 {
             start::lengths(&points).into()
         } else {
@@ -179,14 +180,14 @@ impl Sampler for AffineInvariantEnsemble {
     }
 }
 
-/// Walkers that move at once.
+/// Group of walkers that move simultaneously.
 struct Batch<'a> {
     target: &'a dyn Target,
     settings: &'a Settings<'a>,
     shares: &'a [(Move, f64)],
-    /// Where they want to go.
+    /// Proposed points, one row per walker.
     points: Matrix,
-    /// The logarithms of the factor beside the ratio of the densities, and of the uniform number that
+    /// For each walker the logarithms of the factor on the ratio of the densities, and of the uniform number that
     /// decides.
     chances: Vec<(f64, f64)>,
 }
@@ -197,7 +198,7 @@ impl<'a> Batch<'a> {
         Self { target, settings, shares, points, chances: Vec::new() }
     }
 
-    /// Moves each of `walkers` by the places of others.
+    /// Moves each of `walkers` relative to the walkers that `others` names.
     fn move_walkers<'o>(
         &mut self,
         state: &mut State,
@@ -221,7 +222,7 @@ impl<'a> Batch<'a> {
         for (row, (&walker, (ln_factor, ln_chance))) in
             walkers.iter().zip(&self.chances).enumerate()
         {
-            // A log density that is not a number compares false, and the walker stays.
+            // A NaN log density compares false, and the walker stays.
             if *ln_chance < ln_factor + log_density[row] - state.log_density[walker] {
                 state.points.row_mut(walker).copy_from_slice(self.points.row(row));
                 state.log_density[walker] = log_density[row];

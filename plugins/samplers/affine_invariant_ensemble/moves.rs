@@ -1,39 +1,38 @@
-//! The moves of a walker, given where the others stand.
+//! Moves of a walker, given the positions of the others.
 //!
-//! Each move leaves the density of one walker unchanged as long as the walkers it looks at stand
-//! still, and so does a move drawn by weights that do not depend on the walkers.
+//! Each move leaves the density of one walker invariant as long as the walkers it uses stay fixed, and so does a move
+//! drawn with weights that do not depend on the walkers.
 
-use lacuna::linalg::Matrix;
 use lacuna::math::random::{below, normal, uniform};
+use lacuna_linalg::Matrix;
 use rand::Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::samplers::snooker;
 
-/// How often a jump has the whole length of the difference, which leads from one mode to another.
+/// Probability of a jump by the full difference, which can lead from one mode to another.
 const LEAPS: f64 = 0.1;
-/// The relative spread of the lengths of the other jumps, which keeps them off a lattice.
+/// Relative standard deviation of the lengths of the other jumps; it keeps the walkers off a lattice.
 const JITTER: f64 = 0.1;
 
-/// The weights of the moves. Each move of a walker is drawn anew; those that are not named have
-/// weight zero.
+/// Weights of the moves, 0 or more. The move of each walker is drawn at random at each step; moves that are not named
+/// have weight 0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Moves {
-    /// Along the line through another walker, by a random stretch (Goodman and Weare 2010).
+    /// Move along the line through another walker, by a random stretch (Goodman and Weare 2010).
     #[serde(default)]
     pub stretch: f64,
-    /// By a normal number times the deviation of each of `subset` other walkers from their mean
-    /// (Goodman and Weare 2010, section 2): a random walk that has the shape of the ensemble.
+    /// Move by the sum of the deviations of `subset` other walkers from their mean, each times a normal number
+    /// (Goodman and Weare 2010, section 2): a random walk with the covariance of the ensemble.
     #[serde(default)]
     pub walk: f64,
-    /// By `2.38 / sqrt(2 d)` times the difference between two other walkers, one time in ten by the
-    /// whole difference, which leads from one mode to another (ter Braak, Statistics and Computing 16
-    /// (2006) 239).
+    /// Move by `2.38 / sqrt(2 d)` times the difference between two other walkers; one time in ten by the full
+    /// difference, which can lead from one mode to another (ter Braak, Statistics and Computing 16 (2006) 239).
     #[serde(default)]
     pub differential_evolution: f64,
-    /// Along the line through another walker, by 1.2 to 2.2 times the difference between two more,
+    /// Move along the line through another walker, by 1.2 to 2.2 times the difference between two more walkers
     /// projected on that line (ter Braak and Vrugt, Statistics and Computing 18 (2008) 435).
     #[serde(default)]
     pub snooker: f64,
@@ -46,7 +45,7 @@ impl Default for Moves {
 }
 
 impl Moves {
-    /// The weights with their names.
+    /// Returns the weights with their names.
     pub(super) fn weights(&self) -> [(&'static str, f64); 4] {
         [
             ("stretch", self.stretch),
@@ -56,14 +55,14 @@ impl Moves {
         ]
     }
 
-    /// Whether the weights are shares of something.
+    /// Returns true if the weights are finite and non-negative, with at least one above zero.
     pub(super) fn are_sound(&self) -> bool {
         let weights = self.weights();
         weights.iter().all(|(_, w)| *w >= 0.0 && w.is_finite())
             && weights.iter().any(|(_, w)| *w > 0.0)
     }
 
-    /// The moves that have a weight, with their share.
+    /// Returns the moves of non-zero weight with their probabilities.
     pub(super) fn shares(&self) -> Vec<(Move, f64)> {
         let all = [Move::Stretch, Move::Walk, Move::DifferentialEvolution, Move::Snooker];
         let total: f64 = self.weights().iter().map(|(_, weight)| weight).sum();
@@ -72,7 +71,7 @@ impl Moves {
     }
 }
 
-/// One kind of move.
+/// Kind of move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Move {
     Stretch,
@@ -82,7 +81,7 @@ pub(super) enum Move {
 }
 
 impl Move {
-    /// Draws a move; nothing is drawn where there is no choice.
+    /// Draws a move. With a single move no random number is used.
     pub(super) fn draw(shares: &[(Self, f64)], rng: &mut impl Rng) -> Self {
         let Some(((last, _), rest)) = shares.split_last() else { return Self::Stretch };
         if rest.is_empty() {
@@ -98,12 +97,12 @@ impl Move {
         *last
     }
 
-    /// Its name, as in the weights.
+    /// Returns the name of the move, as in the weights.
     pub(super) fn name(self) -> &'static str {
         Moves::default().weights()[self as usize].0
     }
 
-    /// How many other walkers it needs.
+    /// Returns the number of other walkers that the move needs.
     pub(super) fn needs(self, subset: usize) -> usize {
         match self {
             Self::Stretch => 1,
@@ -114,16 +113,16 @@ impl Move {
     }
 }
 
-/// The walkers that stand still while one moves.
+/// Walkers that stay fixed while one moves.
 #[derive(Clone, Copy)]
 pub(super) enum Others<'a> {
-    /// These.
+    /// The walkers with these indices.
     These(&'a [usize]),
-    /// All of `count` but `walker`.
+    /// All of `count` walkers except `walker`.
     AllBut {
-        /// The one that moves.
+        /// Index of the moving walker.
         walker: usize,
-        /// The number of all.
+        /// Total number of walkers.
         count: usize,
     },
 }
@@ -143,12 +142,12 @@ impl Others<'_> {
         }
     }
 
-    /// One of them.
+    /// Draws one of the walkers.
     fn pick(self, rng: &mut impl Rng) -> usize {
         self.at(below(rng, self.len()))
     }
 
-    /// Some of them, all different.
+    /// Draws `N` distinct walkers.
     fn pick_distinct<const N: usize>(self, rng: &mut impl Rng) -> [usize; N] {
         let mut picked = [usize::MAX; N];
         for k in 0..N {
@@ -161,7 +160,7 @@ impl Others<'_> {
         picked
     }
 
-    /// `count` of them, all different.
+    /// Draws `count` distinct walkers.
     fn subset(self, count: usize, rng: &mut impl Rng) -> Vec<usize> {
         let mut picked = Vec::with_capacity(count);
         while picked.len() < count {
@@ -174,19 +173,19 @@ impl Others<'_> {
     }
 }
 
-/// What the moves depend on besides the walkers.
+/// Settings of the moves.
 pub(super) struct Settings<'a> {
-    /// The scale `a` of the stretch.
+    /// Scale `a` of the stretch move.
     pub stretch: f64,
-    /// The number of walkers that a walk looks at.
+    /// Number of other walkers that define a walk move.
     pub subset: usize,
-    /// The unit of length of each coordinate, in which projections are made.
+    /// Unit of length of each coordinate, used in projections.
     pub lengths: &'a [f64],
 }
 
 impl Settings<'_> {
-    /// Writes the place to which `walker` would go into `new` and gives the logarithm of the factor
-    /// that belongs to the ratio of the densities.
+    /// Writes the proposed position of `walker` into `new` and returns the logarithm of the factor on the ratio of
+    /// the densities. `points` has one row per walker.
     pub(super) fn propose(
         &self,
         kind: Move,
@@ -225,15 +224,15 @@ impl Settings<'_> {
         }
     }
 
-    /// A draw of the density proportional to `1 / sqrt(z)` on `[1 / a, a]` (equation 10 of the paper of
-    /// 2013).
+    /// Draws from the density proportional to `1 / sqrt(z)` on `[1 / a, a]` (Foreman-Mackey et al. 2013, equation
+    /// 10).
     fn draw_stretch(&self, rng: &mut impl Rng) -> f64 {
         let a = self.stretch;
         ((a - 1.0) * uniform(rng) + 1.0).powi(2) / a
     }
 }
 
-/// The factor of a difference by which a walker jumps in `dimension` coordinates.
+/// Returns the factor on the difference by which a walker jumps in `dimension` coordinates.
 fn jump_length(dimension: usize, rng: &mut impl Rng) -> f64 {
     if uniform(rng) < LEAPS {
         return 1.0;
@@ -241,11 +240,12 @@ fn jump_length(dimension: usize, rng: &mut impl Rng) -> f64 {
     2.38 / (2.0 * dimension as f64).sqrt() * (1.0 + JITTER * normal(rng))
 }
 
-/// `x + sum_k z_k (x_k - mean) / sqrt(s)` over the `s` walkers of a subset, which has their covariance.
+/// Writes `x + sum_k z_k (x_k - mean) / sqrt(s)` over the `s` walkers of a subset into `new`; the step has the
+/// covariance of the subset.
 fn walk(points: &Matrix, from: &[f64], subset: &[usize], new: &mut [f64], rng: &mut impl Rng) {
     let size = subset.len() as f64;
     let mut weights: Vec<f64> = subset.iter().map(|_| normal(rng) / size.sqrt()).collect();
-    // The mean's share taken off each weight leaves a combination of the places themselves.
+    // Subtracting the mean from the weights gives a combination of the positions themselves, without their mean.
     let mean = weights.iter().sum::<f64>() / size;
     for weight in &mut weights {
         *weight -= mean;

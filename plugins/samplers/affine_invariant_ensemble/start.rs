@@ -1,25 +1,24 @@
-//! What starting points must satisfy.
+//! Conditions on the starting points.
 
-use lacuna::linalg::{Matrix, thin_svd};
 use lacuna::math::moments::Moments;
 use lacuna::run::Stop;
-
-use crate::samplers::chains;
+use lacuna_linalg::{Matrix, thin_svd};
 
 use super::AffineInvariantEnsemble;
+use crate::samplers::chains;
 
-/// The largest condition number of the starting points, as in emcee.
+/// Largest condition number of the starting points, as in emcee.
 const LARGEST_CONDITION: f64 = 1e8;
 
 impl AffineInvariantEnsemble {
-    /// The least number of walkers: they span the space twice, and each half has as many as a move
-    /// looks at.
+    /// Returns the minimum number of walkers: twice as many as span the space, and in each half as many as the
+    /// largest move needs.
     pub(super) fn least(&self, dimension: usize) -> usize {
         let needed = self.moves.shares().iter().map(|(kind, _)| kind.needs(self.subset)).max();
         2 * (dimension + 1).max(needed.unwrap_or(1))
     }
 
-    /// Checks number and place of the starting points.
+    /// Checks number, dimension, finiteness and spread of the starting points, and the options that depend on them.
     pub(super) fn check_start(&self, dimension: usize, points: &Matrix) -> Result<(), Stop> {
         chains::check_points(points, self.walkers, dimension, "walkers")?;
         let rows = points.rows();
@@ -50,14 +49,18 @@ impl AffineInvariantEnsemble {
     }
 }
 
-/// Walkers that start on a plane never leave it: their steps are combinations of their places.
+/// Fails if the starting points lie in a hyperplane: every move is a combination of positions and would never leave
+/// it.
+///
+/// The condition number is taken after scaling each coordinate to unit norm, so that the units of the unknowns do not
+/// matter.
 fn spanning(points: &Matrix) -> Result<(), Stop> {
     let (count, dimension) = (points.rows(), points.columns());
     let mut centred = points.clone();
     for j in 0..dimension {
         let mean = points.column(j).iter().sum::<f64>() / count as f64;
         let largest = points.column(j).iter().fold(0.0_f64, |m, x| m.max((x - mean).abs()));
-        // What rounding leaves of equal values is no spread.
+        // Rounding errors of equal values do not count as spread.
         if largest <= 8.0 * f64::EPSILON * mean.abs() {
             return Err(Stop::new(format!(
                 "all walkers start with the same value {mean} of coordinate {}, \
@@ -70,7 +73,11 @@ fn spanning(points: &Matrix) -> Result<(), Stop> {
         (0..count).for_each(|i| centred[(i, j)] = (points[(i, j)] - mean) / norm(sum));
     }
     let values = thin_svd(&centred)
-        .map_err(|error| Stop::new(format!("the starting points cannot be judged: {error}")))?
+        .map_err(|error| {
+            Stop::new(format!(
+                "the singular values of the starting points cannot be computed: {error}"
+            ))
+        })?
         .values;
     let extreme = |pick: fn(f64, f64) -> f64, from| values.iter().copied().fold(from, pick);
     let condition = extreme(f64::max, 0.0) / extreme(f64::min, f64::INFINITY);
@@ -84,7 +91,7 @@ fn spanning(points: &Matrix) -> Result<(), Stop> {
     Ok(())
 }
 
-/// The standard deviation of the starting points in each coordinate.
+/// Returns the standard deviation of the starting points in each coordinate.
 pub(super) fn lengths(points: &Matrix) -> Vec<f64> {
     Moments::of_rows(points).sd()
 }

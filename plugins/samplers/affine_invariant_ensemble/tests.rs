@@ -1,6 +1,5 @@
 //! The stretch move against closed forms and against figures measured with emcee 3.1.6.
 
-use lacuna::contract;
 use lacuna::data::Draws;
 use lacuna::diagnose::walkers::Stranded;
 use lacuna::diagnose::{autocorrelation, walkers};
@@ -11,7 +10,7 @@ use rayon::prelude::*;
 
 use super::*;
 
-/// A density made of a function; the prior draws are normal numbers around `centre`.
+/// A density given by a function; its prior draws are normal numbers around `centre`.
 struct Density<F> {
     dimension: usize,
     centre: f64,
@@ -56,13 +55,13 @@ fn ensemble(walkers: usize, steps: usize) -> AffineInvariantEnsemble {
     AffineInvariantEnsemble { walkers, steps, ..AffineInvariantEnsemble::default() }
 }
 
-/// A whole run; the draws after `burn_in` steps.
+/// Runs a sampler to its end; returns the draws after `burn_in` steps.
 fn run(sampler: &AffineInvariantEnsemble, target: &dyn Target, seed: u64, burn_in: usize) -> Draws {
     let points = target.prior_draws(sampler.walkers, &Stream::root(seed).named("start"));
     run_from(sampler, target, points, seed, burn_in)
 }
 
-/// The same from given starting points.
+/// Like [`run`], from given starting points.
 pub(super) fn run_from(
     sampler: &AffineInvariantEnsemble,
     target: &dyn Target,
@@ -97,11 +96,11 @@ fn assert_mean(draws: &Draws, what: &str, expected: f64, f: impl Fn(&[f64]) -> f
 fn it_keeps_the_contract_of_samplers() {
     for update in [Update::Split, Update::Sequential] {
         let sampler = AffineInvariantEnsemble { update, ..ensemble(40, 2000) };
-        assert_eq!(contract::sampler("affine_invariant_ensemble", &sampler), Ok(()));
+        assert_eq!(lacuna_contract::sampler("affine_invariant_ensemble", &sampler), Ok(()));
     }
 }
 
-/// The first two of all coordinates, which are alike, of a run of 100 walkers.
+/// The first two coordinates of a run of 100 walkers; all coordinates are alike.
 fn first_two_coordinates(target: &dyn Target, steps: u64) -> Draws {
     let (sampler, root) = (ensemble(100, 1), Stream::root(1));
     let mut state = sampler.start(target, target.prior_draws(100, &root.named("start"))).unwrap();
@@ -115,7 +114,8 @@ fn first_two_coordinates(target: &dyn Target, steps: u64) -> Draws {
 
 #[test]
 fn acceptance_and_autocorrelation_are_those_of_emcee() {
-    // Source: emcee 3.1.6, standard normal law, 100 walkers, 20000 steps, a = 2: acceptance and tau.
+    // Source: emcee 3.1.6, standard normal distribution, 100 walkers, 20000 steps, a = 2: acceptance rate and
+    // autocorrelation time.
     for (dimension, acceptance, tau) in
         [(2, 0.716, 31.0), (5, 0.552, 56.0), (10, 0.418, 111.0), (20, 0.298, 264.0)]
     {
@@ -178,8 +178,8 @@ fn a_strongly_correlated_normal_law_has_its_mean_and_covariance() {
 
 #[test]
 fn a_curved_ridge_has_its_exact_moments() {
-    // x ~ N(1, 1) and y | x ~ N(x^2, 0.1), a density of Rosenbrock's shape: the moments of the
-    // normal law give E y = 2 and var y = 6.1.
+    // x ~ N(1, 1) and y | x ~ N(x^2, 0.1), a density of Rosenbrock's shape: the moments of the normal distribution
+    // give E y = 2 and var y = 6.1.
     let function = |x: &[f64]| -0.5 * (x[0] - 1.0).powi(2) - 5.0 * (x[1] - x[0] * x[0]).powi(2);
     let target = Density { dimension: 2, centre: 1.0, spread: 0.5, function };
     for update in [Update::Split, Update::Sequential] {
@@ -267,8 +267,8 @@ fn threads_that_share_a_batch_do_not_change_it() {
 
 #[test]
 fn stranded_walkers_are_found_in_a_real_run() {
-    // Two modes 40 standard deviations apart, the second with e^-60 of the density: walkers that start
-    // there are too few to leave it.
+    // Two modes 40 standard deviations apart, the second with e^-60 of the density: the walkers that start there are
+    // too few to leave it.
     let function = |x: &[f64]| {
         let square = |m: f64| x.iter().map(|x| (x - m).powi(2)).sum::<f64>();
         (-0.5 * square(0.0)).max(-60.0 - 0.5 * square(40.0))

@@ -1,12 +1,12 @@
-//! Independent chains that learn a step size each and a common metric.
+//! Independent chains, each with a step size of its own and all with a common metric.
 
-use lacuna::linalg::Matrix;
 use lacuna::math::random::Stream;
 use lacuna::math::transform::Unconstrained;
 use lacuna::plugin::sampler::{Plan, State};
 use lacuna::plugin::{Fact, Target};
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
+use lacuna_linalg::Matrix;
 use rand::rngs::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ use super::pace::Pace;
 use super::told::Last;
 use super::windows::Windows;
 
-/// The options that methods with gradients share.
+/// Options shared by the samplers that use gradients.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Settings {
     pub chains: usize,
@@ -28,10 +28,10 @@ pub(crate) struct Settings {
     pub metric: Option<Shape>,
 }
 
-/// The fewest steps in which a step size can be learnt.
+/// Minimum number of warm-up steps needed to tune a step size.
 const SHORTEST_WARM_UP: usize = 20;
 
-/// Up to this number of unknowns all correlations are learnt.
+/// Largest number of unknowns for which the metric is dense by default.
 const MOST_DENSE: usize = 20;
 
 impl Settings {
@@ -82,30 +82,31 @@ impl Settings {
     }
 }
 
-/// What one step of one chain did.
+/// Outcome of one step of one chain.
 pub(crate) struct Transition {
-    /// Where it ends.
+    /// Point at which the step ends.
     pub point: Point,
-    /// Whether that is another place.
+    /// True if that point differs from the start.
     pub moved: bool,
-    /// The acceptance from which the step size learns.
+    /// Acceptance statistic from which the step size is tuned.
     pub acceptance: f64,
-    /// Gradients that were computed.
+    /// Number of gradients computed.
     pub gradients: u64,
-    /// Whether the trajectory left the true one.
+    /// True if the energy error exceeded [`LARGEST_ERROR`].
     pub divergent: bool,
-    /// Whether the trajectory was cut off.
+    /// True if the trajectory reached the maximum tree depth.
     pub saturated: bool,
-    /// Kinetic energy less log density of the free coordinates, of the point where it ends with its momentum there.
+    /// Hamiltonian at the end of the step: kinetic energy minus log density in the free coordinates, with the
+    /// momentum there.
     pub energy: f64,
-    /// How often the trajectory was doubled, where it grows by doubling.
+    /// Depth of the tree, i.e. number of doublings of the trajectory; `None` for trajectories of fixed length.
     pub depth: Option<u32>,
 }
 
-/// What is kept between steps.
+/// Memory of the sampler between steps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Memory {
-    /// The number of steps done.
+    /// Number of steps done.
     step: usize,
     metric: Metric,
     chains: Vec<Chain>,
@@ -114,15 +115,15 @@ struct Memory {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Chain {
     point: Point,
-    /// The step size; `None` until it has been sought for the present metric.
+    /// Step size; `None` until it has been sought for the present metric.
     pace: Option<Pace>,
-    /// The draws of the present window.
+    /// Moments of the draws of the present window.
     spread: Option<Spread>,
-    /// Divergent trajectories since the warm-up.
+    /// Number of divergent trajectories after the warm-up.
     divergences: u64,
-    /// Trajectories since the warm-up that were cut off.
+    /// Number of trajectories after the warm-up that reached the maximum tree depth.
     saturated: u64,
-    /// The last trajectory.
+    /// Statistics of the last trajectory.
     #[serde(default)]
     last: Option<Last>,
 }
@@ -143,7 +144,7 @@ pub(crate) fn foreign(error: serde_json::Error) -> Stop {
         .help("remove the run's `5-calibrate` folder and start the calibration again")
 }
 
-/// Checks number and place of the starting points, one a chain.
+/// Checks number, dimension and finiteness of the starting points, one row per chain.
 pub(crate) fn check_start(chains: usize, target: &dyn Target, points: &Matrix) -> Result<(), Stop> {
     let (rows, columns, dimension) = (points.rows(), points.columns(), target.dimension());
     if dimension == 0 {
@@ -161,7 +162,7 @@ pub(crate) fn check_start(chains: usize, target: &dyn Target, points: &Matrix) -
     Ok(())
 }
 
-/// Checks that there is a density with a slope at each starting point.
+/// Fails unless the density and its gradient exist at each starting point.
 pub(crate) fn check_support(log_density: &[f64], points: &[Point]) -> Result<(), Stop> {
     let bad = |(_, (density, point)): &(usize, (&f64, &Point))| {
         !density.is_finite() || !point.value.is_finite()
@@ -184,7 +185,7 @@ pub(crate) fn check_support(log_density: &[f64], points: &[Point]) -> Result<(),
     )))
 }
 
-/// The state before the first step, with the metric of the curvature at the starting points.
+/// Returns the state before the first step; the initial metric is that of the curvature at the starting points.
 pub(crate) fn start(
     settings: &Settings,
     target: &dyn Target,
@@ -216,7 +217,7 @@ pub(crate) fn start(
     Ok(state)
 }
 
-/// One step of all chains, each on random numbers of its own.
+/// Advances all chains by one step in parallel, each with a random stream of its own.
 pub(crate) fn advance<T>(
     settings: &Settings,
     target: &dyn Target,
@@ -283,17 +284,19 @@ where
         state.accepted[index] = moved;
         state.evaluations += gradients;
     }
-    // The density of the very points that are kept, which rounding has moved.
+    // The log density is evaluated at the very points that are stored, because the transform back from the free
+    // coordinates rounds them.
     state.log_density = target.log_density(&state.points);
     state.evaluations += state.points.rows() as u64;
     memory.keep(state)
 }
 
-/// So many divergent trajectories, and this share of them, are a warning only: single ones happen in sound runs.
+/// Up to this number of divergent trajectories, or up to this fraction of all, divergences are only noted: single
+/// ones also happen in valid runs.
 const FEW_DIVERGENCES: u64 = 3;
 const SMALL_SHARE: f64 = 1e-3;
 
-/// Trajectories after the warm-up.
+/// Numbers of trajectories after the warm-up.
 struct Tally {
     all: usize,
     divergent: u64,
@@ -324,34 +327,36 @@ impl Tally {
     }
 }
 
-/// Reasons not to trust draws: trajectories that often went astray or were cut off.
+/// Returns the reasons not to trust the draws: too many divergent or truncated trajectories.
 pub(crate) fn doubts(settings: &Settings, state: &State) -> Vec<String> {
     let Some(tally) = Tally::of(settings, state) else { return Vec::new() };
     let mut doubts = Vec::new();
     if tally.diverges() {
         doubts.push(format!(
-            "{}: the density is too curved there for their steps, and draws are missing around; raise \
-             `target_acceptance` above {} or narrow the priors",
+            "{}: the steps are too long for the curvature of the density there, and draws from that region are \
+             missing; raise `target_acceptance` above {} or narrow the priors",
             tally.divergences(),
             settings.target_acceptance
         ));
     }
     if tally.saturated > 0 {
         doubts.push(format!(
-            "{} of {} trajectories after the warm-up were cut off before they turned: draws \
-             follow each other closely; raise `depth`, or learn all correlations with `metric = \"dense\"`",
+            "{} of {} trajectories after the warm-up were cut off at the largest depth before they turned back: \
+             successive draws are strongly correlated; raise `depth`, or learn all correlations with \
+             `metric = \"dense\"`",
             tally.saturated, tally.all
         ));
     }
     doubts
 }
 
-/// Divergences that are too few to distrust the draws.
+/// Returns a note on divergences that are too few to distrust the draws.
 pub(crate) fn notes(settings: &Settings, state: &State) -> Vec<String> {
     let few = |tally: &Tally| tally.divergent > 0 && !tally.diverges();
     let note = |tally: Tally| {
         format!(
-            "{}, too few to distrust the draws; a `target_acceptance` above {} shows whether they matter",
+            "{}, which is few enough to use the draws; to check whether they matter, repeat the run with a \
+             `target_acceptance` above {}",
             tally.divergences(),
             settings.target_acceptance
         )

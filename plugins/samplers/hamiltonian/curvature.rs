@@ -1,29 +1,29 @@
-//! The scale of a density before any draw of it: its curvature where chains start.
+//! Initial covariance of a density before any draw: its curvature at the starting points.
 
-use lacuna::linalg::{Cholesky, Matrix, symmetric_eigen};
 use lacuna::math::moments::{mean, quantile, sorted};
 use lacuna::math::random::Stream;
 use lacuna::math::transform::Unconstrained;
 use lacuna::plugin::Target;
+use lacuna_linalg::{Cholesky, Matrix, symmetric_eigen};
 
-/// A first covariance and what it cost.
+/// Initial covariance (`d x d`, free coordinates) and the number of gradients it took.
 pub(crate) struct Curvature {
     pub covariance: Matrix,
     pub gradients: u64,
 }
 
-/// Starting points whose curvature counts.
+/// Maximum number of starting points at which the curvature is computed.
 const MOST_PLACES: usize = 8;
-/// Prior draws that tell the widest scale.
+/// Number of prior draws from which the prior's width is estimated.
 const PRIOR_DRAWS: usize = 100;
-/// Step of the differences, in standard deviations.
+/// Step of the central differences, in standard deviations.
 const STEP: f64 = 1e-3;
 
-/// The inverse of the mean curvature at `places`, each of its eigenvalues taken as positive, plus one
-/// over the prior variance of each coordinate.
+/// Returns the inverse of the mean curvature at `places`, with the absolute values of its eigenvalues, plus the
+/// inverse prior variance of each coordinate.
 ///
-/// At draws around a maximum this is Laplace's covariance, whatever the units. Far from it the scales
-/// are rough; no scale is wider than the prior's.
+/// At draws around a maximum this is the Laplace approximation, in any units. Far from a maximum the scales are
+/// rough; no scale is wider than the prior's.
 pub(crate) fn covariance(target: &Unconstrained<'_>, places: &[&[f64]]) -> Curvature {
     let d = target.dimension();
     let widths = widths(target, places);
@@ -44,9 +44,9 @@ pub(crate) fn covariance(target: &Unconstrained<'_>, places: &[&[f64]]) -> Curva
     Curvature { covariance, gradients }
 }
 
-/// The half width of the prior in each free coordinate, or of the places where the prior has none.
+/// Returns half the prior's width in each free coordinate; that of the starting points if the prior has none.
 fn widths(target: &Unconstrained<'_>, places: &[&[f64]]) -> Vec<f64> {
-    // Any fixed stream will do: the draws tell the order of magnitude only.
+    // The draws only tell the order of magnitude, so that a fixed stream is sufficient.
     let prior = target.prior_draws(PRIOR_DRAWS, &Stream::root(0).named("width"));
     let half = |values: &[f64]| {
         let finite: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
@@ -64,10 +64,10 @@ fn widths(target: &Unconstrained<'_>, places: &[&[f64]]) -> Vec<f64> {
         .collect()
 }
 
-/// The inverse of a curvature in units of the prior's widths.
+/// Inverts a curvature given in units of the prior's widths.
 fn inverse(curvature: &Matrix) -> Matrix {
     let d = curvature.rows();
-    // In units of each coordinate's own curvature, so that an eigenvalue keeps its digits.
+    // Each coordinate is scaled by its own curvature, so that small eigenvalues keep their digits.
     let own: Vec<f64> = (0..d).map(|j| curvature[(j, j)].abs().max(1.0).sqrt().recip()).collect();
     let scaled = Matrix::from_fn(d, d, |i, j| own[i] * own[j] * curvature[(i, j)]);
     let diagonal = || Matrix::from_fn(d, d, |i, j| if i == j { own[i] * own[i] } else { 0.0 });
@@ -83,14 +83,14 @@ fn inverse(curvature: &Matrix) -> Matrix {
     Matrix::from_fn(d, d, |i, j| own[i] * own[j] * inverse[(i, j)])
 }
 
-/// The negative second derivatives at a place in units of `widths`, and the gradients that they cost;
-/// `None` where some have no value.
+/// Returns the negative second derivatives of the log density at `place` in units of `widths`, and the number of
+/// gradients used; `None` if some of them cannot be computed.
 fn at(target: &Unconstrained<'_>, place: &[f64], widths: &[f64]) -> (Option<Matrix>, u64) {
     let d = place.len();
     let mut curvature = Matrix::zeros(d, d);
     let mut gradients = 0;
     for j in 0..d {
-        // The step must fit the scale that it measures.
+        // The step is adapted to the scale of the curvature that it measures.
         let mut step = STEP;
         let mut column = None;
         for _ in 0..20 {

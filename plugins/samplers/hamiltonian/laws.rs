@@ -1,32 +1,32 @@
-//! Densities with known moments, and whole runs on them, for the tests of methods that use gradients.
+//! Densities with known moments, and complete runs on them, for the tests of samplers that use gradients.
 
 use lacuna::data::{Draws, Layout, Unit};
 use lacuna::diagnose::chains::mcse_mean;
-use lacuna::linalg::{Cholesky, Matrix, multiply_vector};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::moments::Moments;
 use lacuna::math::random::{Stream, normal};
 use lacuna::math::transform::Unconstrained;
 use lacuna::plugin::sampler::State;
 use lacuna::plugin::{Component, Context, Sampler, Target};
-use lacuna::study::{Complaints, Problems, Sources};
+use lacuna::text::{Complaints, Problems, Sources};
+use lacuna_linalg::{Cholesky, Matrix, multiply_vector};
 use rand::rngs::ChaCha8Rng;
 use serde::de::DeserializeOwned;
 
 use super::metric::Metric;
 use super::{Flow, Point, Transition};
 
-/// A density made of a function that gives its logarithm and gradient.
+/// A density given by a function that returns its logarithm and gradient.
 pub(crate) struct Law<F> {
     pub bounds: Vec<(f64, f64)>,
-    /// Mean and standard deviation of the normal law of each coordinate that stands for the prior; its
-    /// draws outside the bounds are drawn again.
+    /// Mean and standard deviation of the normal prior of each coordinate; prior draws outside the bounds are
+    /// repeated.
     pub prior: Vec<[f64; 2]>,
     pub function: F,
 }
 
 impl<F: Fn(&[f64]) -> (f64, Vec<f64>) + Sync> Law<F> {
-    /// A density without bounds.
+    /// Returns a density without bounds.
     pub fn free(prior: Vec<[f64; 2]>, function: F) -> Self {
         Self { bounds: vec![(f64::NEG_INFINITY, f64::INFINITY); prior.len()], prior, function }
     }
@@ -69,8 +69,8 @@ impl<F: Fn(&[f64]) -> (f64, Vec<f64>) + Sync> Target for Law<F> {
     }
 }
 
-/// The self-test of UQLab: prior N(7, variance 2), data 9.1241 and 8.151 with variance 3. The posterior is
-/// normal with mean 7.935743 and variance 0.857143.
+/// The self-test of UQLab: prior N(7, variance 2), data 9.1241 and 8.151 with variance 3. The posterior is normal
+/// with mean 7.935743 and variance 0.857143.
 pub(crate) fn conjugate() -> Law<impl Fn(&[f64]) -> (f64, Vec<f64>) + Sync> {
     Law::free(vec![[7.0, 2.0_f64.sqrt()]], |x: &[f64]| {
         let misfit = (9.1241 - x[0]).powi(2) + (8.151 - x[0]).powi(2);
@@ -79,7 +79,7 @@ pub(crate) fn conjugate() -> Law<impl Fn(&[f64]) -> (f64, Vec<f64>) + Sync> {
     })
 }
 
-/// The divergence of Kullback and Leibler of the normal law with the moments of draws from the
+/// Returns the Kullback-Leibler divergence of the normal distribution with the moments of the draws from the
 /// posterior of [`conjugate`].
 pub(crate) fn conjugate_divergence(draws: &[f64]) -> f64 {
     use lacuna::math::moments::{mean, variance};
@@ -87,13 +87,13 @@ pub(crate) fn conjugate_divergence(draws: &[f64]) -> f64 {
     0.5 * (ratio - 1.0 - ratio.ln() + (mean(draws) - 7.935_743_f64).powi(2) / 0.857_143)
 }
 
-/// The scale of coordinate `j` of [`scaled`]: from 1e-3 to 1e3.
+/// Returns the scale of coordinate `j` of [`scaled`]: from 1e-3 to 1e3.
 pub(crate) fn scale(j: usize) -> f64 {
     10.0_f64.powf(-3.0 + 6.0 * j as f64 / 9.0)
 }
 
-/// A normal law in ten coordinates of scale [`scale`] around ten scales times their number, each
-/// correlated with the next by 0.8 and so on (an autoregressive series). The prior is a thousand times wider.
+/// A normal density in ten coordinates with standard deviations [`scale`] and means `10 j` times these; correlations
+/// are 0.8 to the power of the distance (an autoregressive series). The prior is a thousand times wider.
 pub(crate) fn scaled() -> Law<impl Fn(&[f64]) -> (f64, Vec<f64>) + Sync> {
     let correlation = Matrix::from_fn(10, 10, |i, j| 0.8_f64.powi(i.abs_diff(j) as i32));
     let precision = Cholesky::new(&correlation).unwrap().inverse();
@@ -116,8 +116,8 @@ pub(crate) fn banana() -> Law<impl Fn(&[f64]) -> (f64, Vec<f64>) + Sync> {
     })
 }
 
-/// A gamma law of shape 3 and rate 2e4 beside a beta law of shapes 2 and 5 on (100, 200): means 1.5e-4
-/// and 128.571, standard deviations 8.660e-5 and 15.97.
+/// The product of a gamma density with shape 3 and rate 2e4 and a beta density with shapes 2 and 5 on (100, 200):
+/// means 1.5e-4 and 128.571, standard deviations 8.660e-5 and 15.97.
 pub(crate) fn bounded() -> Law<impl Fn(&[f64]) -> (f64, Vec<f64>) + Sync> {
     let function = |x: &[f64]| {
         let (below, above) = (x[1] - 100.0, 200.0 - x[1]);
@@ -143,7 +143,7 @@ pub(crate) fn funnel() -> Law<impl Fn(&[f64]) -> (f64, Vec<f64>) + Sync> {
     })
 }
 
-/// A whole run from prior draws: the draws after the warm-up, and the last state.
+/// Runs a sampler from prior draws to its end; returns the draws after the warm-up, and the last state.
 pub(crate) fn run(sampler: &dyn Sampler, target: &dyn Target, seed: u64) -> (Draws, State) {
     let root = Stream::root(seed);
     let plan = sampler.plan(target.dimension());
@@ -160,8 +160,8 @@ pub(crate) fn run(sampler: &dyn Sampler, target: &dyn Target, seed: u64) -> (Dra
     (Draws::from_steps(names, &kept), state)
 }
 
-/// Asserts that the mean of `f` over the draws is within four Monte Carlo errors of `expected`, and
-/// that the error is below a share of `scale`.
+/// Asserts that the mean of `f` over the draws is within four Monte Carlo errors of `expected`, and that the error is
+/// below a tenth of `scale`.
 pub(crate) fn assert_mean(
     draws: &Draws,
     what: &str,
@@ -178,7 +178,7 @@ pub(crate) fn assert_mean(
     assert!(error < 0.1 * scale, "{what}: known to {error} only");
 }
 
-/// Asserts that a run on each law that chains can explore has its moments.
+/// Asserts that runs on the scaled and on the bounded density reproduce their moments.
 pub(crate) fn assert_moments(sampler: &dyn Sampler) {
     let (draws, state) = run(sampler, &scaled(), 1);
     for j in 0..10 {
@@ -200,7 +200,7 @@ pub(crate) fn assert_moments(sampler: &dyn Sampler) {
     });
 }
 
-/// Asserts that a run on the curved ridge has its moments.
+/// Asserts that a run on the curved ridge reproduces its moments.
 pub(crate) fn assert_banana(sampler: &dyn Sampler) {
     let (draws, _) = run(sampler, &banana(), 3);
     assert_mean(&draws, "mean of x", 1.0, 1.0, |x| x[0]);
@@ -209,15 +209,15 @@ pub(crate) fn assert_banana(sampler: &dyn Sampler) {
     assert_mean(&draws, "variance of y", 6.1, 10.0, |x| (x[1] - 2.0).powi(2));
 }
 
-/// The median over twenty seeds of [`conjugate_divergence`].
+/// Returns the median of [`conjugate_divergence`] over twenty seeds.
 pub(crate) fn median_divergence(draws_of: impl Fn(u64) -> Vec<f64>) -> f64 {
     let mut all: Vec<f64> = (0..20).map(|seed| conjugate_divergence(&draws_of(seed))).collect();
     all.sort_by(f64::total_cmp);
     0.5 * (all[9] + all[10])
 }
 
-/// Asserts that a transition turns independent draws of the curved ridge into draws of it: the
-/// moments of many chains after a few steps have no error but that of independent draws.
+/// Asserts that a transition leaves the density of the curved ridge invariant: independent draws of it stay
+/// independent draws, so that the moments of many chains after a few steps have only the error of independent draws.
 pub(crate) fn assert_stationary(
     transition: impl Fn(&Flow<'_>, &Point, &mut ChaCha8Rng) -> Transition,
 ) {
@@ -246,13 +246,13 @@ pub(crate) fn assert_stationary(
     }
 }
 
-/// What a component says about options written as TOML.
+/// Returns the problems a component reports for options written as TOML.
 pub(crate) fn complaints_about<C: Component + DeserializeOwned>(text: &str) -> String {
     let mut sources = Sources::default();
     let mut problems = Problems::new();
     let source = sources.add_argument("sampler", text.to_owned());
-    let node = lacuna::study::read::read(source, &sources, &mut problems).unwrap();
-    let component: C = lacuna::study::decode(&node, &mut problems).unwrap();
+    let node = lacuna::text::read::read(source, &sources, &mut problems).unwrap();
+    let component: C = lacuna::text::decode(&node, &mut problems).unwrap();
     let layout = Layout { name: String::new(), unit: Unit::parse("1").unwrap(), axes: Vec::new() };
     let directory = std::path::Path::new(".");
     let context = Context::new(directory, &[], &layout);

@@ -1,28 +1,28 @@
-//! Motion over the landscape of a log density.
+//! Leapfrog integration of the Hamiltonian dynamics of a log density (Neal 2011, section 5.2.3).
 //!
-//! With the covariance `F F'` as the inverse of the mass matrix, a momentum `p` is kept as `z = F' p`, which is
+//! With the covariance `F F'` as the inverse of the mass matrix, a momentum `p` is stored as `z = F' p`, which is
 //! standard normal: the kinetic energy is `z'z / 2` and the velocity `F z`.
 
-use lacuna::linalg::vector::{add_scaled, dot};
 use lacuna::math::random::normal;
 use lacuna::math::transform::Unconstrained;
 use lacuna::plugin::Target;
+use lacuna_linalg::vector::{add_scaled, dot};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 use super::metric::Metric;
 
-/// A trajectory whose energy grows by more than this has left the true one, as in Stan.
+/// Energy error above which a trajectory counts as divergent, as in Stan.
 pub(crate) const LARGEST_ERROR: f64 = 1000.0;
 
-/// A place with what is known there.
+/// A point with log density and gradient.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Point {
-    /// The free coordinates.
+    /// Free (unconstrained) coordinates.
     pub place: Vec<f64>,
-    /// The log density of them; minus infinity where there is none.
+    /// Log density in the free coordinates; minus infinity if it has no value.
     pub value: f64,
-    /// Its gradient.
+    /// Gradient of `value`.
     pub gradient: Vec<f64>,
 }
 
@@ -33,18 +33,18 @@ impl Point {
     }
 }
 
-/// A place and a momentum there.
+/// A point in phase space.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Phase {
     pub point: Point,
-    /// `z`.
+    /// Momentum, as `z`.
     pub momentum: Vec<f64>,
-    /// The force on `z`, `F'` times the gradient.
+    /// Force on `z`: `F'` times the gradient.
     force: Vec<f64>,
 }
 
 impl Phase {
-    /// Kinetic energy less log density.
+    /// Returns the Hamiltonian: kinetic energy minus log density.
     pub fn energy(&self) -> f64 {
         0.5 * dot(&self.momentum, &self.momentum) - self.point.value
     }
@@ -58,14 +58,14 @@ pub(crate) struct Flow<'a> {
 }
 
 impl Flow<'_> {
-    /// A point with a random momentum.
+    /// Gives a point a random momentum.
     pub fn push(&self, point: &Point, rng: &mut impl Rng) -> Phase {
         let momentum = point.place.iter().map(|_| normal(rng)).collect();
         let force = self.metric.pull(&point.gradient);
         Phase { point: point.clone(), momentum, force }
     }
 
-    /// One step of size `step`, backwards when it is negative: half a kick, a drift, half a kick.
+    /// Makes one leapfrog step of size `step`, backwards if it is negative: half a kick, a drift, half a kick.
     pub fn leapfrog(&self, phase: &mut Phase, step: f64) {
         add_scaled(&mut phase.momentum, 0.5 * step, &phase.force);
         let mut place = std::mem::take(&mut phase.point.place);

@@ -1,31 +1,31 @@
-//! The shape of a law as chains learn it.
+//! Metric learnt from the draws of the chains.
 
-use lacuna::linalg::{Cholesky, Matrix, multiply_vector, transposed_multiply_vector};
 use lacuna::math::moments::Moments;
+use lacuna_linalg::{Cholesky, Matrix, multiply_vector, transposed_multiply_vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What is learnt of a covariance.
+/// Form of the learnt covariance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Shape {
-    /// The variances.
+    /// Variances only: cheaper steps, for many or weakly correlated unknowns.
     Diagonal,
-    /// The variances and all correlations.
+    /// Variances and all correlations: longer steps if unknowns are correlated, at a cost of `d^2` per step.
     Dense,
 }
 
-/// A covariance by a factor: `F F'`.
+/// A covariance `F F'`, stored by its factor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Metric {
-    /// The diagonal of `F`.
+    /// Diagonal of `F`, i.e. the standard deviations.
     Diagonal(Vec<f64>),
-    /// `F`, lower triangular.
+    /// Lower triangular factor `F`.
     Dense(Matrix),
 }
 
 impl Metric {
-    /// The metric of a covariance; `None` where that is not positive definite.
+    /// Returns the metric of a covariance (`d x d`); `None` if it is not positive definite.
     pub fn of(shape: Shape, covariance: &Matrix) -> Option<Self> {
         match shape {
             Shape::Diagonal => {
@@ -38,7 +38,7 @@ impl Metric {
         }
     }
 
-    /// `F z`.
+    /// Returns `F z`.
     pub fn push(&self, z: &[f64]) -> Vec<f64> {
         match self {
             Self::Diagonal(sd) => sd.iter().zip(z).map(|(s, z)| s * z).collect(),
@@ -46,7 +46,7 @@ impl Metric {
         }
     }
 
-    /// `F' g`.
+    /// Returns `F' g`.
     pub fn pull(&self, g: &[f64]) -> Vec<f64> {
         match self {
             Self::Diagonal(_) => self.push(g),
@@ -59,16 +59,16 @@ impl Metric {
             Self::Diagonal(sd) => {
                 Matrix::from_fn(sd.len(), sd.len(), |i, j| if i == j { sd[i] * sd[i] } else { 0.0 })
             }
-            Self::Dense(factor) => lacuna::linalg::multiply_transposed(factor, factor),
+            Self::Dense(factor) => lacuna_linalg::multiply_transposed(factor, factor),
         }
     }
 
-    /// What the draws of one window tell, pooled over the chains.
+    /// Replaces the metric by the covariance of the draws of one window, pooled over the chains.
     ///
-    /// Each chain is measured from its own mean, so that chains that have not yet met do not widen the law.
-    /// The estimate is drawn a little towards zero as in Stan, in units of the present metric: `n / (n + 5)`
-    /// of it, and `0.001 * 5 / (n + 5)` of the present one. The present metric stays where the
-    /// draws do not span the space.
+    /// Deviations are taken from the mean of each chain, so that chains that have not yet met do not inflate the
+    /// covariance. The estimate is shrunk slightly as in Stan, but in units of the present metric: `n / (n + 5)` of
+    /// the estimate plus `0.001 * 5 / (n + 5)` of the present covariance. The metric is kept if the result is not
+    /// positive definite.
     pub fn learn(&mut self, shape: Shape, spreads: &[Spread]) {
         let d = spreads.first().map_or(0, Spread::dimension);
         let degrees: f64 = spreads.iter().map(Spread::degrees).sum();
@@ -84,17 +84,17 @@ impl Metric {
     }
 }
 
-/// The spread of one chain's draws.
+/// Moments of the draws of one chain.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Spread {
-    /// The number of draws, their mean, and the sums of squares of deviations from it.
+    /// Number of draws, their mean, and the sums of squared deviations from it.
     Diagonal(u64, Vec<f64>, Vec<f64>),
-    /// The covariance.
+    /// Full covariance.
     Dense(Moments),
 }
 
 impl Spread {
-    /// No draws yet.
+    /// Returns moments without any draw.
     pub fn new(shape: Shape, dimension: usize) -> Self {
         match shape {
             Shape::Diagonal => Self::Diagonal(0, vec![0.0; dimension], vec![0.0; dimension]),
@@ -102,7 +102,7 @@ impl Spread {
         }
     }
 
-    /// Takes in one more draw.
+    /// Adds one draw.
     pub fn add(&mut self, place: &[f64]) {
         match self {
             Self::Dense(moments) => moments.add(place),
@@ -124,7 +124,7 @@ impl Spread {
         }
     }
 
-    /// The number of draws less one.
+    /// Returns the degrees of freedom: the number of draws minus one.
     fn degrees(&self) -> f64 {
         let count = match self {
             Self::Dense(moments) => moments.count(),
@@ -133,7 +133,7 @@ impl Spread {
         count.saturating_sub(1) as f64
     }
 
-    /// Adds the sums of products of deviations, times a factor.
+    /// Adds the sums of products of deviations, multiplied by `factor`, to `sums`.
     fn add_to(&self, sums: &mut Matrix, factor: f64) {
         match self {
             Self::Dense(moments) => {

@@ -1,4 +1,4 @@
-//! `hamiltonian`: chains that coast along trajectories of a fixed length.
+//! `hamiltonian`: chains that follow Hamiltonian trajectories of a fixed length.
 
 pub(crate) mod chains;
 pub(crate) mod curvature;
@@ -9,12 +9,12 @@ pub(crate) mod told;
 mod windows;
 
 use lacuna::data::Statistic;
-use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::sampler::{Plan, State};
 use lacuna::plugin::{Component, Context, Fact, Sampler, Target};
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
+use lacuna_linalg::Matrix;
 use rand::Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -23,55 +23,55 @@ pub(crate) use chains::{Settings, Transition};
 pub(crate) use leapfrog::{Flow, LARGEST_ERROR, Phase, Point};
 pub use metric::Shape;
 
-/// Hamiltonian Monte Carlo: each chain is pushed in a random direction and coasts over the
-/// landscape of the log density for a fixed time, guided by its gradient.
+/// Hamiltonian Monte Carlo: each chain gets a random momentum and follows the Hamiltonian dynamics of the log density
+/// for a fixed time, guided by its gradient.
 ///
-/// One trajectory carries a chain right across the posterior, so that draws are nearly independent
-/// even with many correlated unknowns, at the price of a gradient for each small step on the way. The
-/// length of the step and the shape of the posterior are learnt in the warm-up. `no_u_turn` chooses the
-/// length of each trajectory as well and is the safer choice; this method is the faster one where one
-/// length suits all of the posterior. Unknowns with bounds are moved in logarithms or logits, so that
-/// no trajectory hits a bound. The density must be smooth.
+/// One trajectory carries a chain across the whole posterior, so that draws are nearly independent even with many
+/// correlated unknowns, at the cost of a gradient for each leapfrog step. The step size and the metric (the shape of
+/// the posterior) are learnt in the warm-up. `no_u_turn` also chooses the length of each trajectory and is the safer
+/// choice; `hamiltonian` is faster if one length suits the whole posterior. Unknowns with bounds are sampled as
+/// logarithms or logits, so that no trajectory reaches a bound. The density must be smooth.
 ///
-/// Divergent trajectories after the warm-up, whose energy error exceeds 1000, are counted: more than three that
-/// are more than 0.1 % of all mean that the run has not converged; fewer are told as a note.
+/// Divergent trajectories, whose energy error exceeds 1000, are counted after the warm-up: if there are more than
+/// three and more than 0.1 % of all, the run counts as not converged; fewer are reported as a note.
 ///
-/// References: Neal, in Handbook of Markov Chain Monte Carlo (2011), chapter 5; Hoffman and Gelman,
-/// J. Mach. Learn. Res. 15 (2014) 1593 (the step size); Stan reference manual, chapter 15 (the windows of
-/// the warm-up).
+/// References: Neal, in Handbook of Markov Chain Monte Carlo (2011), chapter 5; Hoffman and Gelman, J. Mach. Learn.
+/// Res. 15 (2014) 1593 (the step size); Stan reference manual, chapter 15 (the windows of the warm-up).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Hamiltonian {
-    /// The number of independent chains.
+    /// Number of independent chains, at least 1; use several, because convergence is judged by comparing them.
     pub chains: usize,
-    /// The number of steps of each chain, the warm-up included. A step is a whole trajectory.
+    /// Number of steps of each chain, including the warm-up. A step is a whole trajectory and costs one gradient per
+    /// leapfrog step.
     pub steps: usize,
-    /// The number of first steps in which step size and metric are learnt; they are no draws.
+    /// Number of initial steps in which step size and metric are learnt, at least 20; they are discarded.
     pub warm_up: usize,
-    /// How far a trajectory goes.
+    /// Length of each trajectory.
     pub trajectory: Trajectory,
-    /// The share by which the length of each trajectory varies at random, up and down, so that no
-    /// trajectory returns to its start time and again.
+    /// Relative half-width of the uniform random variation of the trajectory length, from 0 to below 1. It prevents
+    /// trajectories from returning periodically to their start.
     pub jitter: f64,
-    /// The share of accepted trajectories at which the step size aims: larger means smaller steps.
+    /// Target acceptance rate to which the step size is tuned, from 0.1 to below 1. A larger value gives smaller
+    /// steps: fewer divergences, more gradients.
     pub target_acceptance: f64,
-    /// Which shape of the posterior is learnt: by default all correlations for up to 20 unknowns, and only
-    /// the scales for more.
+    /// Form of the learnt metric. Default: `"dense"` (all correlations) for up to 20 unknowns, `"diagonal"` (scales
+    /// only) for more.
     pub metric: Option<Shape>,
 }
 
-/// How far a trajectory goes.
+/// Length of a trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Trajectory {
-    /// For this time, in units in which a normal posterior has the period `2 pi`: a quarter of it,
-    /// 1.57, makes draws of a normal law independent.
+    /// Integration time, in units in which a normal posterior has the period `2 pi`; a quarter of it, 1.57, makes
+    /// draws from a normal density independent.
     Time(f64),
-    /// For this number of leapfrog steps, whatever their size.
+    /// Number of leapfrog steps, whatever their size.
     LeapfrogSteps(usize),
 }
 
-/// No trajectory has more leapfrog steps, as in trees of depth ten.
+/// Maximum number of leapfrog steps of a trajectory, as in a tree of depth ten.
 const MOST_STEPS: usize = 1023;
 
 impl Default for Hamiltonian {
@@ -99,7 +99,7 @@ impl Hamiltonian {
         }
     }
 
-    /// One trajectory and its acceptance.
+    /// Integrates one trajectory from `from` with leapfrog steps of size `step`, and accepts or rejects its end.
     fn coast(&self, flow: &Flow<'_>, from: &Point, step: f64, rng: &mut impl Rng) -> Transition {
         let stretch = 1.0 + self.jitter * (2.0 * uniform(rng) - 1.0);
         let count = match self.trajectory {
@@ -115,7 +115,7 @@ impl Hamiltonian {
             gradients += 1;
         }
         let error = phase.energy() - energy;
-        // What is not a number would pass for the smaller one.
+        // NaN must not pass through `min`, which would return 1.
         let acceptance = if error.is_nan() { 0.0 } else { (-error).exp().min(1.0) };
         let accepted = uniform(rng) < acceptance;
         Transition {

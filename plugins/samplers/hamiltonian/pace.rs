@@ -1,21 +1,22 @@
-//! The size of the leapfrog steps.
+//! Step size of the leapfrog integrator.
 
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 use super::leapfrog::{Flow, Point};
 
-/// Nesterov's dual averaging of the logarithm of a step size towards a given acceptance (Hoffman and Gelman 2014,
-/// section 3.2, with the constants of their algorithm 6).
+/// Dual averaging (Nesterov) of the logarithm of the step size towards a target acceptance rate (Hoffman and Gelman
+/// 2014, section 3.2, with the constants of their algorithm 6).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Pace {
-    /// The step size to be used now.
+    /// Current step size.
     pub step: f64,
-    /// Where the search begins, ten times the first step size: large steps are cheap to try.
+    /// Logarithm `mu` towards which the iterates are drawn: ten times the first step size, because large steps are
+    /// cheap to try.
     centre: f64,
-    /// The logarithm of the step size averaged over the steps.
+    /// Average of the logarithm of the step size over the steps.
     average: f64,
-    /// The averaged lack of acceptance.
+    /// Averaged difference between target and actual acceptance.
     lack: f64,
     count: u32,
 }
@@ -25,10 +26,10 @@ const T0: f64 = 10.0;
 const KAPPA: f64 = 0.75;
 
 impl Pace {
-    /// A first step size, with which one leapfrog step is accepted with a chance near `target`
-    /// (algorithm 4), and the number of gradients that it took to find.
+    /// Finds an initial step size at which one leapfrog step is accepted with a probability near `target` (algorithm
+    /// 4), and returns the number of gradients it took.
     pub fn find(flow: &Flow<'_>, point: &Point, target: f64, rng: &mut impl Rng) -> (Self, u64) {
-        // Powers of two between 1e-12 and 1e4: a target beyond is no density.
+        // The search is limited to 1e-12 .. 1e4: beyond, the function is not a density.
         const LONGEST: f64 = 16_384.0;
         const SHORTEST: f64 = 1e-12;
         let (mut step, mut gradients) = (1.0, 0);
@@ -38,7 +39,7 @@ impl Pace {
             let energy = phase.energy();
             flow.leapfrog(&mut phase, step);
             gradients += 1;
-            // An energy that is not a number is no acceptance.
+            // A NaN energy compares false and counts as rejected.
             let good = energy - phase.energy() > target.ln();
             if *grow.get_or_insert(good) != good || !(SHORTEST..LONGEST).contains(&step) {
                 break;
@@ -49,7 +50,7 @@ impl Pace {
         (Self { step, centre, average: step.ln(), lack: 0.0, count: 0 }, gradients)
     }
 
-    /// Takes in the acceptance of one step.
+    /// Updates the step size from the acceptance statistic of one step.
     pub fn learn(&mut self, acceptance: f64, target: f64) {
         self.count += 1;
         let t = f64::from(self.count);
@@ -60,7 +61,7 @@ impl Pace {
         self.step = step.exp();
     }
 
-    /// Ends the search with the average.
+    /// Fixes the step size at the average, at the end of the warm-up.
     pub fn settle(&mut self) {
         self.step = self.average.exp();
     }

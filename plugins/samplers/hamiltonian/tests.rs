@@ -1,8 +1,7 @@
-//! Trajectories against closed forms, and whole runs against known moments.
+//! Trajectories against closed forms, and complete runs against known moments.
 
-use lacuna::contract;
-use lacuna::linalg::vector::norm;
 use lacuna::math::transform::Unconstrained;
+use lacuna_linalg::vector::norm;
 
 use super::laws::{
     assert_banana, assert_moments, assert_stationary, banana, complaints_about, conjugate,
@@ -15,14 +14,14 @@ use super::*;
 fn it_keeps_the_contract_of_samplers() {
     for metric in [None, Some(Shape::Diagonal)] {
         let sampler = Hamiltonian { steps: 2000, warm_up: 300, metric, ..Hamiltonian::default() };
-        assert_eq!(contract::sampler("hamiltonian", &sampler), Ok(()));
+        assert_eq!(lacuna_contract::sampler("hamiltonian", &sampler), Ok(()));
     }
 }
 
 #[test]
 fn known_moments_come_out() {
     assert_moments(&Hamiltonian { steps: 4000, ..Hamiltonian::default() });
-    // The ridge is ever narrower away from its bend: larger steps would diverge there.
+    // The ridge narrows away from its bend, where larger steps would diverge.
     assert_banana(&Hamiltonian { steps: 4000, target_acceptance: 0.99, ..Hamiltonian::default() });
 }
 
@@ -86,7 +85,7 @@ fn the_energy_error_falls_with_the_square_of_the_step() {
 fn the_first_metric_is_the_covariance_of_a_normal_law() {
     let law = scaled();
     let target = Unconstrained::new(&law);
-    // Two places far outside the bulk: the curvature of a normal law is the same everywhere.
+    // Two points far outside the bulk: the curvature of a normal density is the same everywhere.
     let places: Vec<Vec<f64>> =
         [-40.0, 300.0].map(|z| (0..10).map(|j| z * laws::scale(j)).collect()).to_vec();
     let places: Vec<&[f64]> = places.iter().map(|p| &p[..]).collect();
@@ -101,7 +100,7 @@ fn the_first_metric_is_the_covariance_of_a_normal_law() {
     }
 }
 
-/// The mean acceptance after the warm-up.
+/// Returns the mean acceptance rate after the warm-up.
 fn acceptance(sampler: &Hamiltonian, target: &dyn Target) -> f64 {
     let (draws, _) = run(sampler, target, 4);
     let shares = lacuna::diagnose::walkers::acceptance(&draws);

@@ -1,4 +1,4 @@
-//! What is told of each trajectory, under the names of ArviZ.
+//! Statistics of each trajectory, under the names of ArviZ.
 
 use lacuna::data::Statistic;
 use lacuna::data::statistics::Kind;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::chains::Transition;
 
-/// What is told of a trajectory.
+/// Statistics of one trajectory.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Last {
     acceptance: f64,
@@ -26,10 +26,10 @@ impl Last {
     }
 }
 
-/// What is told of a trajectory: its name, its kind, its value.
+/// A statistic: its name, its kind, and the function that reads it.
 type Told = (&'static str, Kind, fn(&Last) -> f64);
 
-/// The statistics of the last trajectories; `doubles` where these grow by doubling.
+/// Returns the statistics of the last trajectory of each chain; `doubles` adds those of trees.
 pub(crate) fn statistics(state: &State, doubles: bool) -> Vec<Statistic> {
     const ALL: [Told; 7] = [
         ("acceptance_rate", Kind::Number, |last| last.acceptance),

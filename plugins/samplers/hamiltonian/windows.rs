@@ -1,15 +1,15 @@
-//! The windows of a warm-up, as Stan has them.
+//! Windows of the warm-up, as in Stan.
 
-/// When which part of a chain's memory learns.
+/// Schedule of the warm-up.
 ///
-/// The step size learns throughout. The metric learns between a first stretch, in which chains find
-/// the bulk, and a last one, in which the step size settles; there it is made anew at the end of each
-/// window, and each window is twice as long as the one before.
+/// The step size is tuned throughout. The metric is learnt between an initial phase, in which the chains find the
+/// bulk, and a final one, in which the step size settles; it is replaced at the end of each window, and each window
+/// is twice as long as the one before.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Windows {
-    /// The first step whose draw tells about the metric.
+    /// First step whose draw contributes to the metric.
     first: usize,
-    /// The last step of each window.
+    /// Last step of each window.
     ends: Vec<usize>,
 }
 
@@ -24,7 +24,7 @@ impl Windows {
         let close = warm_up - last;
         let (mut ends, mut begin, mut size) = (Vec::new(), first, base);
         while begin < close {
-            // A window after which no longer one fits takes the rest.
+            // A window that leaves no room for the next one, twice as long, extends to the end.
             let end = if begin + 3 * size > close { close } else { begin + size };
             ends.push(end - 1);
             (begin, size) = (end, 2 * size);
@@ -32,21 +32,20 @@ impl Windows {
         Self { first, ends }
     }
 
-    /// Whether the draw of this step tells about the metric.
+    /// Returns true if the draw of this step contributes to the metric.
     pub fn measure(&self, step: usize) -> bool {
         step >= self.first && self.ends.last().is_some_and(|last| step <= *last)
     }
 
-    /// Whether the metric is made anew after this step.
+    /// Returns true if the metric is replaced after this step.
     pub fn end(&self, step: usize) -> bool {
         self.ends.contains(&step)
     }
 
-    /// Whether the step size is sought anew after this step.
+    /// Returns true if the search for the step size restarts after this step.
     ///
-    /// Not after the last of several windows, unlike Stan: the metric was nearly right before, and a
-    /// search that begins again swings so widely in the few steps that are left that its average comes
-    /// out too small.
+    /// Unlike Stan, it does not restart after the last of several windows: the metric was nearly right before, and a
+    /// new search oscillates so strongly in the few steps left that its average comes out too small.
     pub fn seek(&self, step: usize) -> bool {
         self.end(step) && (self.ends.len() == 1 || self.ends.last() != Some(&step))
     }

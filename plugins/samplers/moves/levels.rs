@@ -1,29 +1,29 @@
-//! Groups of points of similar likelihood, in each of which steps have a length and a shape of their own.
+//! Groups of points of similar likelihood, each with its own length and shape of steps.
 //!
-//! Where an unknown variance goes down with the misfit, a population on its way to a concentrated posterior
-//! spans many orders of magnitude: a funnel, whose neck no step of the mouth's length enters. Points of similar
-//! likelihood are of similar width, so that their differences are steps that suit them.
+//! If an unknown variance decreases with the misfit, a population on its way to a concentrated posterior spans many
+//! orders of magnitude: a funnel, whose neck no step with the length of the mouth enters. Points of similar
+//! likelihood have a similar spread, so that their differences are steps of a suitable length.
 
 use lacuna::math::random::{below, uniform};
 use rand::Rng;
 
 use super::Evaluated;
 
-/// The most groups.
+/// Maximum number of groups.
 const MOST: usize = 8;
-/// The fewest points of a group for each dimension: fewer do not span the space well.
+/// Minimum number of points of a group per dimension; fewer do not span the space reliably.
 const POINTS: usize = 8;
 
-/// Points in groups of equal size, in the order of their likelihood.
+/// Points in groups of equal size, ordered by likelihood.
 pub(super) struct Levels {
-    /// The places of the points, from the lowest likelihood to the highest.
+    /// Indices of the points, from the lowest likelihood to the highest.
     rising: Vec<usize>,
-    /// The lowest likelihood of each group but the first.
+    /// Lowest log-likelihood of each group except the first.
     bounds: Vec<f64>,
 }
 
 impl Levels {
-    /// The groups of these points.
+    /// Groups points by likelihood.
     pub fn of(points: &Evaluated) -> Self {
         let likelihood = points.log_likelihoods();
         let mut rising: Vec<usize> = (0..likelihood.len()).collect();
@@ -34,29 +34,29 @@ impl Levels {
         Self { bounds: (1..count).map(bound).collect(), rising }
     }
 
-    /// The number of groups.
+    /// Returns the number of groups.
     pub fn count(&self) -> usize {
         self.bounds.len() + 1
     }
 
-    /// The places of all points.
+    /// Returns the indices of all points.
     pub fn all(&self) -> &[usize] {
         &self.rising
     }
 
-    /// The places of the points of one group.
+    /// Returns the indices of the points of one group.
     pub fn members(&self, level: usize) -> &[usize] {
         let n = self.rising.len();
         &self.rising[level * n / self.count()..(level + 1) * n / self.count()]
     }
 
-    /// The group to which a likelihood belongs.
+    /// Returns the group to which a log-likelihood belongs.
     fn level(&self, log_likelihood: f64) -> usize {
         self.bounds.partition_point(|bound| *bound <= log_likelihood)
     }
 
-    /// A group for the step of a point with this likelihood: its own, or less often another, the less often the
-    /// farther away.
+    /// Chooses a group for the step of a point with this log-likelihood: with the highest probability its own, and
+    /// half that for each group farther away.
     pub fn choose(&self, log_likelihood: f64, rng: &mut impl Rng) -> usize {
         let mut left = uniform(rng) * self.sum(log_likelihood);
         (0..self.count() - 1)
@@ -67,7 +67,7 @@ impl Levels {
             .unwrap_or(self.count() - 1)
     }
 
-    /// The log of the probability of that choice.
+    /// Returns the log of the probability of choosing `level`.
     pub fn ln_chance(&self, level: usize, log_likelihood: f64) -> f64 {
         (self.weight(level, log_likelihood) / self.sum(log_likelihood)).ln()
     }
@@ -81,7 +81,7 @@ impl Levels {
     }
 }
 
-/// Two different places.
+/// Draws two distinct indices below `places`.
 pub(super) fn pair(places: usize, rng: &mut impl Rng) -> (usize, usize) {
     let first = below(rng, places);
     (first, (first + 1 + below(rng, places - 1)) % places)

@@ -1,12 +1,12 @@
-//! Metropolis moves of a population, repeated until it has forgotten where it was.
+//! Metropolis moves of a population, repeated until it has forgotten its start.
 
 mod levels;
 mod rescaling;
 mod watch;
 
-use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, normal, permutation, uniform};
 use lacuna::plugin::Target;
+use lacuna_linalg::Matrix;
 use rand::Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -15,24 +15,25 @@ use super::evaluated::{Evaluated, Shape};
 use levels::Levels;
 use watch::Watch;
 
-/// How points move.
+/// Kind of the moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Mutation {
-    /// By turns: independent draws, differential evolution, and changes of scale between points of low and
-    /// of high likelihood, which lead into the neck of a funnel; the first and the last as long as they are taken often
-    /// enough.
+    /// In turn: independent draws, differential evolution, and changes of scale between points of low and of high
+    /// likelihood, which lead into the neck of a funnel. The first and the last are dropped if fewer than 10 % of
+    /// them are accepted.
     Automatic,
-    /// Normal steps with the covariance of the population, their size adapted to the acceptance.
+    /// Normal steps with the covariance of the population and a size tuned to the acceptance rate. For densities that
+    /// are nearly normal.
     RandomWalk,
-    /// Draws of Student's t law with the population's mean and covariance.
+    /// Independent draws from Student's t distribution with the population's mean and covariance. For densities that
+    /// are nearly normal, with few unknowns.
     Independent,
-    /// Steps along the difference of two other points of similar likelihood, which follow curved and split
-    /// populations.
+    /// Steps along the difference of two other points of similar likelihood. For curved densities and several modes.
     DifferentialEvolution,
 }
 
-/// One kind of move.
+/// Kind of one move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     RandomWalk,
@@ -42,20 +43,20 @@ enum Kind {
     Rescaling,
 }
 
-/// What is learned about the moves.
+/// Tuning of the moves, and statistics of the last ones.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Learned {
-    /// The size of random walks and differences, relative to what suits a normal law.
+    /// Size of random walks and differences, relative to the optimum of a normal density.
     size: f64,
-    /// The share of moves that were taken last.
+    /// Acceptance rate of the last moves.
     pub acceptance: f64,
-    /// The largest correlation of a coordinate with that before the last moves.
+    /// Largest correlation of a coordinate with its value before the last moves.
     pub of_coordinates: f64,
-    /// The correlation of the likelihood with that before the last moves.
+    /// Rank correlation of the likelihood with that before the last moves.
     pub of_likelihood: f64,
-    /// Moves of each point so far.
+    /// Number of moves of each point so far.
     pub moves: usize,
-    /// Moves after which the next population is expected to have forgotten its past.
+    /// Number of moves after which the next population is expected to have forgotten its start.
     planned: usize,
 }
 
@@ -72,29 +73,30 @@ impl Default for Learned {
     }
 }
 
-/// The law that the moves keep: the log of its density at a point of the second population over
-/// that at a point of the first.
+/// Target distribution of the moves: the log of its density at a point of the second population minus that at a point
+/// of the first.
 pub(super) type Law<'a> = &'a dyn Fn(&Evaluated, usize, &Evaluated, usize) -> f64;
 
-/// From what moving points learn.
+/// Points from which the proposals are built.
 #[derive(Clone, Copy)]
 pub(super) enum Others<'a> {
-    /// Each half of the population from the other half, and from this shape of all.
+    /// Each half of the population from the other half, with the mean and covariance of all.
     OtherHalf(&'a Shape),
-    /// From draws that do not move.
+    /// Fixed draws that do not move.
     Apart(&'a [Side]),
 }
 
-/// Places of points that move, and draws of the law that stay, from which they learn.
+/// Indices of the moving points, and fixed draws of the target distribution from which their proposals are built.
 ///
-/// The points started from other draws: a copy that learns from its own original is drawn towards the rest.
+/// The moving points started from other draws: a copy whose proposals use its own original would be drawn towards the
+/// rest.
 pub(super) struct Side {
     pub movers: Vec<usize>,
     pub others: Evaluated,
     pub shape: Shape,
 }
 
-/// Points that move, and from what they learn.
+/// Moving points, and the points from which their proposals are built.
 #[derive(Clone, Copy)]
 struct Group<'a> {
     movers: &'a [usize],
@@ -102,43 +104,44 @@ struct Group<'a> {
     shape: &'a Shape,
 }
 
-/// What the moves of one population have in common.
+/// Settings common to all moves of one population.
 pub(super) struct Movement<'a> {
-    /// The density.
+    /// The posterior.
     pub target: &'a dyn Target,
-    /// How points move.
+    /// Kind of the moves.
     pub mutation: Mutation,
-    /// The correlation below which the past is forgotten.
+    /// Correlation with the start below which the start counts as forgotten.
     pub correlation: f64,
-    /// The most moves of each point.
+    /// Maximum number of moves of each point.
     pub most: usize,
-    /// The law.
+    /// Target distribution of the moves.
     pub law: Law<'a>,
-    /// From what points learn.
+    /// Points from which the proposals are built.
     pub others: Others<'a>,
-    /// Whether size and number of moves are settled before the population moves, from those before it. Where many
-    /// small errors add up this matters: moves that end when their own outcome looks right select outcomes.
+    /// If true, size and number of moves are fixed before the population moves, from the populations before it. This
+    /// matters if many small errors add up: stopping when the own outcome looks right would select outcomes.
     pub ahead: bool,
 }
 
-/// Degrees of freedom of independent draws: tails heavier than those of any likelihood that matters.
+/// Degrees of freedom of the independent draws; their tails are heavier than those of any relevant likelihood.
 const FREEDOM: usize = 5;
-/// Independent draws that are taken less often than this are not worth their evaluations.
+/// Acceptance rate below which independent draws and rescalings are not worth their evaluations.
 const USEFUL: f64 = 0.1;
-/// Moves of the first population whose number is settled ahead.
+/// Number of moves of the first population if the number is fixed ahead.
 const FIRST_PLAN: usize = 20;
 
-/// Proposed points.
+/// Points that a move proposes.
 struct Proposal {
     points: Matrix,
-    /// The log of the proposal's density at the old point over that at the new, but for the choice of a group.
+    /// Log of the proposal's density at the old point minus that at the new point, without the choice of a group.
     ln_ratio: Vec<f64>,
-    /// The groups of points from which steps come, and the one that was chosen for each.
+    /// Groups of points from which steps are taken, and the group chosen for each point.
     chosen: Option<(Levels, Vec<usize>)>,
 }
 
 impl Proposal {
-    /// The log of the probability of the way back over that of the way there.
+    /// Returns the log of the probability of the reverse proposal minus that of the proposal; `from` and `to` are the
+    /// log-likelihoods of the old and the new point.
     fn ln_back(&self, row: usize, from: f64, to: f64) -> f64 {
         let choice = self.chosen.as_ref().map_or(0.0, |(levels, chosen)| {
             levels.ln_chance(chosen[row], to) - levels.ln_chance(chosen[row], from)
@@ -148,7 +151,7 @@ impl Proposal {
 }
 
 impl Movement<'_> {
-    /// Moves all points until they have forgotten where they were; which have moved.
+    /// Moves all points until they have forgotten their start; returns a flag per point that is true if it has moved.
     pub fn run(
         &self,
         population: &mut Evaluated,
@@ -175,7 +178,7 @@ impl Movement<'_> {
             let share = self.sweep(kind, now, population, &mut moved, &mut rng);
             turns.learn(kind, share);
             if matches!(kind, Kind::DifferentialEvolution | Kind::RandomWalk) {
-                // Robbins and Monro's steps towards the acceptance that suits random walks.
+                // Robbins-Monro recursion towards the optimal acceptance rate of random walks.
                 let gain = if self.ahead { 1.0 / most as f64 } else { 2.0 };
                 size = (size * (gain * (share - 0.25)).exp()).clamp(1e-6, 10.0);
             }
@@ -193,7 +196,7 @@ impl Movement<'_> {
         moved
     }
 
-    /// One move of each point; the share of those taken.
+    /// Proposes one move of each point; returns the acceptance rate.
     fn sweep(
         &self,
         kind: Kind,
@@ -224,7 +227,7 @@ impl Movement<'_> {
         taken as f64 / count as f64
     }
 
-    /// One move of each mover of a group; the number of those taken.
+    /// Proposes one move of each point of a group; returns the number accepted.
     fn learn_and_move(
         &self,
         kind: Kind,
@@ -243,7 +246,7 @@ impl Movement<'_> {
         proposal.map_or(0, |proposal| self.decide(population, group.movers, proposal, moved, rng))
     }
 
-    /// Takes or refuses the proposed points, one for each mover; the number of those taken.
+    /// Accepts or rejects the proposed points, one per mover; returns the number accepted.
     fn decide(
         &self,
         population: &mut Evaluated,
@@ -272,8 +275,8 @@ impl Movement<'_> {
     }
 }
 
-/// How many moves the next population needs, after one that had so many and forgot its past after some of them, or
-/// did not.
+/// Plans the number of moves of the next population from that of the last one and the number after which the last one
+/// had forgotten its start (`None` if it had not).
 fn plan(moves: usize, forgotten: Option<usize>) -> usize {
     match forgotten {
         Some(needed) => moves - (moves - needed) / 10,
@@ -281,7 +284,7 @@ fn plan(moves: usize, forgotten: Option<usize>) -> usize {
     }
 }
 
-/// Which kind of move is next, when they take turns.
+/// Sequence of the kinds of moves that take turns.
 struct Turns {
     last: usize,
     useful: [bool; 3],
@@ -312,7 +315,7 @@ impl Turns {
     }
 }
 
-/// Normal steps with the covariance of the population (Roberts, Gelman and Gilks 1997).
+/// Proposes normal steps with the covariance of the population (Roberts, Gelman and Gilks 1997).
 fn random_walk(
     population: &Evaluated,
     Group { movers, shape, .. }: Group<'_>,
@@ -329,7 +332,7 @@ fn random_walk(
     Proposal { ln_ratio: vec![0.0; points.rows()], points, chosen: None }
 }
 
-/// Draws of Student's t law around the centre of the population.
+/// Proposes draws from Student's t distribution around the mean of the population.
 fn independent(
     population: &Evaluated,
     Group { movers, shape, .. }: Group<'_>,
@@ -352,8 +355,8 @@ fn independent(
     Proposal { points, ln_ratio, chosen: None }
 }
 
-/// Steps along differences of two others of similar likelihood (Ter Braak 2006); one in ten is a whole difference
-/// of any two, which leads from mode to mode.
+/// Proposes steps along the difference of two other points of similar likelihood (ter Braak 2006); one step in ten is
+/// the full difference of any two points, which can lead from mode to mode.
 fn differences(
     population: &Evaluated,
     Group { movers, others, .. }: Group<'_>,

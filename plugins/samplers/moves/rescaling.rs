@@ -1,19 +1,19 @@
-//! Steps that change a point's scale to that of another group of points.
+//! Steps that map a point from the scale of one group of points to that of another.
 //!
-//! The map takes the centre and the widths of one group to those of another, along the principal axes of all
-//! points. It suits funnels, in which a whole posterior shrinks about a centre while an unknown variance
-//! falls: there it leads in one step from mouth to neck and on, whatever the dimension. Its inverse is the map between
-//! the same groups the other way, so that a step is taken with the probability of Green, Biometrika 82 (1995) 711,
-//! for deterministic maps: the ratio of densities times the determinant.
+//! The map takes the mean and the standard deviations of one group to those of another, along the principal axes of
+//! all points. It suits funnels, in which the whole posterior shrinks about a centre as an unknown variance
+//! decreases: one step leads from mouth to neck and back, in any dimension. Its inverse is the map between the same
+//! groups in the opposite direction, so that the acceptance ratio is that of Green, Biometrika 82 (1995) 711, for
+//! deterministic maps: the ratio of the densities times the Jacobian determinant.
 
-use lacuna::linalg::Matrix;
 use lacuna::math::moments::variance;
+use lacuna_linalg::Matrix;
 use rand::Rng;
 
 use super::levels::{Levels, pair};
 use super::{Evaluated, Group, Proposal, Shape};
 
-/// The centre and the widths of each group of others, in the axes of a shape.
+/// Mean and standard deviations of each group, in the whitened coordinates of a shape.
 struct Frames {
     centres: Vec<Vec<f64>>,
     widths: Vec<Vec<f64>>,
@@ -35,7 +35,7 @@ impl Frames {
     }
 }
 
-/// One step of each mover between two groups drawn at random; none with a single group.
+/// Proposes for each mover a map between two groups drawn at random; `None` if there is a single group.
 pub(super) fn rescalings(
     population: &Evaluated,
     Group { movers, others, shape }: Group<'_>,
@@ -60,7 +60,7 @@ pub(super) fn rescalings(
             ln_determinant += ratio.ln();
         }
         points.push_row(&shape.factor.colour(&x));
-        // A group of equal points has no width.
+        // A group of identical points has no width; the step is rejected.
         ln_ratio.push(if ln_determinant.is_finite() { ln_determinant } else { f64::NEG_INFINITY });
     }
     Some(Proposal { points, ln_ratio, chosen: None })

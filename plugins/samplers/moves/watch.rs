@@ -1,12 +1,13 @@
-//! How much a population remembers of where it was.
+//! Correlation of a population with its start.
 
 use super::Evaluated;
 
-/// A correlation that falls by less than this in [`PATIENCE`] sweeps stays: separate modes do not mix.
+/// A correlation that decreases by less than this within [`PATIENCE`] sweeps is taken as final: separate modes do not
+/// mix.
 const STALL: f64 = 0.02;
 const PATIENCE: usize = 8;
 
-/// How much the particles remember of where they were.
+/// Correlations of the points with their start, sweep by sweep.
 pub(super) struct Watch {
     before: Vec<Vec<f64>>,
     history: Vec<Vec<f64>>,
@@ -17,10 +18,10 @@ impl Watch {
         Self { before: quantities(population), history: Vec::new() }
     }
 
-    /// Whether each quantity has forgotten its past, or will not within reach.
+    /// Returns true if the correlation of each quantity has fallen to `threshold`, or no longer decreases.
     pub fn forgotten(&mut self, population: &Evaluated, threshold: f64) -> bool {
         let now = quantities(population);
-        // Less than the error of a correlation cannot be seen.
+        // A correlation below its own standard error cannot be detected.
         let threshold = threshold.max(1.0 / (population.points.rows() as f64).sqrt());
         let present: Vec<f64> =
             self.before.iter().zip(&now).map(|(x, y)| correlation(x, y)).collect();
@@ -33,7 +34,7 @@ impl Watch {
         })
     }
 
-    /// The correlations that are left: the largest of a coordinate, and that of the likelihood.
+    /// Returns the remaining correlations: the largest of the coordinates, and that of the likelihood.
     pub fn left(&self) -> (f64, f64) {
         let last = self.history.last().and_then(|last| last.split_last());
         last.map_or((1.0, 1.0), |(likelihood, coordinates)| {
@@ -42,8 +43,8 @@ impl Watch {
     }
 }
 
-/// The coordinates, and the ranks of the likelihoods, which tell of all their orders of magnitude alike; one list
-/// each.
+/// Returns the coordinates, and the ranks of the likelihoods, one list each. Ranks weigh all orders of magnitude of
+/// the likelihood alike.
 fn quantities(population: &Evaluated) -> Vec<Vec<f64>> {
     let d = population.points.columns();
     let mut all: Vec<Vec<f64>> = (0..d).map(|j| population.points.column(j)).collect();
@@ -51,7 +52,7 @@ fn quantities(population: &Evaluated) -> Vec<Vec<f64>> {
     all
 }
 
-/// The rank of each number.
+/// Returns the rank of each number.
 fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
@@ -62,7 +63,7 @@ fn ranks(values: &[f64]) -> Vec<f64> {
     ranks
 }
 
-/// The correlation of two lists; zero where one of them does not vary.
+/// Returns the correlation of two lists; zero if one of them is constant.
 fn correlation(x: &[f64], y: &[f64]) -> f64 {
     let n = x.len() as f64;
     let (mx, my) = (x.iter().sum::<f64>() / n, y.iter().sum::<f64>() / n);

@@ -1,20 +1,20 @@
-//! What the dead and the living bring home.
+//! Harvest of a nested sampling run: draws, evidence and its error from the removed and the live points.
 
-use lacuna::linalg::Matrix;
 use lacuna::math::moments::kolmogorov_probability;
 use lacuna::math::random::{Stream, permutation, uniform};
 use lacuna::plugin::sampler::{Evidence, Harvest, State};
 use lacuna::plugin::{Fact, Target};
+use lacuna_linalg::Matrix;
 use rand::Rng;
 
 use super::volumes::{Ladder, log_sum};
 use super::{Memory, Nested};
 
-/// Sequences of volumes that are drawn for the error of the evidence.
+/// Number of sequences of prior volumes drawn to estimate the error of the evidence.
 const SEQUENCES: usize = 100;
-/// Draws for each effective one: so many that drawing in proportion to weights adds little noise.
+/// Draws per effective draw; with this many, drawing in proportion to the weights adds little noise.
 const REPEATS: f64 = 4.0;
-/// A probability of the ranks below this speaks against the draws.
+/// P-value of the ranks below which the draws are not trusted.
 const IMPROBABLE: f64 = 1e-3;
 
 impl Nested {
@@ -74,23 +74,23 @@ impl Nested {
         let mut doubts = Vec::new();
         if !memory.finished {
             doubts.push(format!(
-                "the live points still hold evidence after {} halvings of the prior volume: the draws do \
-                 not cover the peak; raise `halvings`",
+                "after {} halvings of the prior volume the live points still contribute to the evidence: the \
+                 draws do not cover the peak; raise `halvings`",
                 self.halvings
             ));
         }
         if ranks < IMPROBABLE {
             doubts.push(format!(
-                "new points do not fall evenly among the survivors (probability {ranks:.1e}): lower \
-                 `correlation` or raise `moves`"
+                "the ranks of new points among the live points are not uniform (probability {ranks:.1e}): \
+                 lower `correlation` or raise `moves`"
             ));
         }
         doubts
     }
 }
 
-/// Draws of equal weight in random order, with their log densities, from the weights of the dead and then of the
-/// living.
+/// Draws with equal weights in random order, and their log densities. `weights` are those of the removed points, then
+/// of the live points in the order of `living`.
 fn equal_weights(
     state: &State,
     memory: &Memory,
@@ -116,13 +116,14 @@ fn equal_weights(
     (points, log_density)
 }
 
-/// The effective number of weighted points, `(sum w)^2 / sum w^2` (Kish 1965).
+/// Returns the effective number of weighted points, `(sum w)^2 / sum w^2` (Kish 1965).
 fn effective_size(weights: &[f64]) -> f64 {
     let sum: f64 = weights.iter().sum();
     sum * sum / weights.iter().map(|w| w * w).sum::<f64>()
 }
 
-/// `count` places in proportion to weights, equally spaced behind one random start.
+/// Returns `count` indices in proportion to the weights, by systematic sampling: equally spaced after one random
+/// start.
 fn systematic(weights: &[f64], count: usize, rng: &mut impl Rng) -> Vec<usize> {
     let sum: f64 = weights.iter().sum();
     let step = sum / count as f64;
@@ -139,8 +140,8 @@ fn systematic(weights: &[f64], count: usize, rng: &mut impl Rng) -> Vec<usize> {
         .collect()
 }
 
-/// The probability that evenly spread ranks leave the even distribution as far as these, by the test of
-/// Kolmogorov and Smirnov; survivors and new points are two samples of about the same size.
+/// Returns the p-value of the Kolmogorov-Smirnov test of uniform ranks. Survivors and new points are two samples of
+/// about the same size, hence half the total as the effective size.
 fn rank_probability(ranks: &[u64]) -> f64 {
     let total = ranks.iter().sum::<u64>() as f64;
     if total == 0.0 {

@@ -1,15 +1,15 @@
-//! `nested`: live points that climb through shells of equal prior volume.
+//! `nested`: live points that rise through shells of equal prior volume.
 
 mod harvest;
 mod volumes;
 
-use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, permutation, uniform};
 use lacuna::math::special::ln_sum_exp;
 use lacuna::plugin::sampler::{Harvest, Plan, State};
 use lacuna::plugin::{Component, Context, Fact, Sampler, Target};
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
+use lacuna_linalg::Matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -18,38 +18,39 @@ use super::moves::{Learned, Movement, Mutation, Others, Side};
 use super::population::{self, Share};
 use volumes::Ladder;
 
-/// Nested sampling: live points, spread over the prior, that climb to ever higher likelihood while the prior
-/// volume in which they live shrinks at a known rate.
+/// Nested sampling: live points, initially draws of the prior, rise to ever higher likelihood while the prior volume
+/// they occupy shrinks at a known rate.
 ///
-/// It needs no starting point, finds several modes, and gives the evidence (the probability of the
-/// data, from which Bayes factors follow) with its standard error, and draws of the posterior as
-/// well. In each step the lower half of the live points dies; as many new ones start from survivors and
-/// move inside the prior, above the highest likelihood that died, until they have forgotten their
-/// start. It follows likelihoods with sudden rises, where tempering fails; for smooth ones
-/// `sequential_monte_carlo` gives the same for less work.
+/// It needs no starting points, finds several modes, and gives the evidence (the marginal likelihood, from which
+/// Bayes factors follow) with its standard error, together with draws of the posterior. In each step the lower half
+/// of the live points is removed; as many new points start as copies of survivors and move within the prior, above
+/// the highest likelihood removed, until they have forgotten their start. It handles likelihoods with phase
+/// transitions (sudden rises), where tempering fails; for smooth likelihoods `sequential_monte_carlo` gives the same
+/// results at lower cost.
 ///
-/// Whether new points are spread as they should be is tested by their ranks among the survivors
-/// (Fowlie, Handley and Su), and the report says when they are not.
+/// The uniform distribution of the new points is tested by their ranks among the survivors (Fowlie, Handley and Su);
+/// the report says if the test fails.
 ///
-/// References: Skilling, Bayesian Analysis 1 (2006) 833; Feroz and Hobson, MNRAS 384 (2008) 449;
-/// Henderson and Goggans, ISBA 2014 (several points at a time); Fowlie, Handley and Su, MNRAS 497
-/// (2020) 5256 (the test).
+/// References: Skilling, Bayesian Analysis 1 (2006) 833; Feroz and Hobson, MNRAS 384 (2008) 449; Henderson and
+/// Goggans, ISBA 2014 (several points at a time); Fowlie, Handley and Su, MNRAS 497 (2020) 5256 (the test).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Nested {
-    /// The number of live points; the error of the log evidence is about `1.2 sqrt(information / live)`,
-    /// with the information gained in nats.
+    /// Number of live points, at least 20 times one more than the number of unknowns. The standard error of the log
+    /// evidence is about `1.2 sqrt(information / live)`, with the information gain in nats; the cost is proportional
+    /// to `live`.
     pub live: usize,
-    /// The run ends when the live points could raise the log evidence by no more than this.
+    /// Tolerance of the log evidence: the run ends when the live points could raise it by no more than this.
     pub remaining: f64,
-    /// How new points move.
+    /// Kind of the moves of new points.
     pub mutation: Mutation,
-    /// New points move until the correlation of each coordinate, and of the likelihood, with that of
-    /// the survivor from which they started has fallen to this.
+    /// Correlation, between 0 and 1, at which a new point counts as independent: new points move until each
+    /// coordinate and the likelihood are correlated with those of their survivor by no more than this. A smaller
+    /// value costs more moves and gives a more reliable evidence.
     pub correlation: f64,
-    /// The most moves of each new point.
+    /// Maximum number of moves of each new point.
     pub moves: usize,
-    /// The most halvings of the prior volume.
+    /// Maximum number of steps; each halves the prior volume.
     pub halvings: usize,
 }
 
@@ -85,35 +86,35 @@ impl Component for Nested {
     }
 }
 
-/// Bins in which ranks of new points are counted.
+/// Number of bins in which the ranks of new points are counted.
 const BINS: usize = 50;
-/// Dead points whose weight is below this power of e, relative to the evidence, are forgotten.
+/// Log weight, relative to the evidence, below which removed points are dropped from memory.
 const NEGLIGIBLE: f64 = -40.0;
 
-/// What is kept from step to step.
+/// Memory of the sampler between steps.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(default)]
 struct Memory {
-    /// How many dead points are forgotten, because they weigh nothing.
+    /// Number of removed points dropped because of their negligible weight.
     forgotten: usize,
-    /// The log-likelihood of each other dead point in the order of their deaths.
+    /// Log-likelihood of each other removed point, in order of removal.
     dead: Vec<f64>,
-    /// The coordinates of those, point by point.
+    /// Coordinates of these points, one point after the other.
     points: Vec<f64>,
-    /// The log density of those.
+    /// Log density of these points.
     log_density: Vec<f64>,
-    /// The log of the prior volume above the last that died.
+    /// Log of the prior volume above the last removed point.
     log_volume: f64,
-    /// The log of the evidence of the dead; none before the first death with any.
+    /// Log evidence of the removed points; `None` before the first removal.
     log_evidence: Option<f64>,
-    /// The log of the share of the prior inside the support, and its variance.
+    /// Log of the fraction of the prior inside the support, and its variance.
     log_share: f64,
     share_variance: f64,
-    /// How often new points took each rank among the survivors.
+    /// Number of new points in each bin of ranks among the survivors.
     ranks: Vec<u64>,
-    /// What is learned about the moves.
+    /// Tuning of the moves.
     moves: Learned,
-    /// Whether the live points can add no more to the evidence.
+    /// True once the live points can no longer raise the evidence by more than the tolerance.
     finished: bool,
 }
 
@@ -163,14 +164,14 @@ impl Sampler for Nested {
 }
 
 impl Memory {
-    /// Before the first death.
+    /// Returns the memory before the first removal.
     fn first(support: Share) -> Self {
         let Share { log, variance } = support;
         let ranks = vec![0; BINS];
         Self { log_share: log, share_variance: variance, ranks, ..Self::default() }
     }
 
-    /// One more dead point, the lowest of `live`.
+    /// Records the removal of the lowest of `live` points.
     fn bury(&mut self, point: &[f64], log_density: f64, log_likelihood: f64, live: usize) {
         let (log_width, next) = volumes::shell(self.log_volume, live);
         let weight = log_likelihood + log_width;
@@ -181,7 +182,7 @@ impl Memory {
         self.log_density.push(log_density);
     }
 
-    /// Forgets the dead points that weigh nothing; they are the earliest.
+    /// Drops the removed points of negligible weight, which are the earliest.
     fn forget(&mut self, live: usize) {
         let Some(evidence) = self.log_evidence else { return };
         let d = self.points.len() / self.dead.len().max(1);
@@ -195,18 +196,18 @@ impl Memory {
     }
 }
 
-/// A number in (0, 1) that depends on a point alone, by which points of equal likelihood are ordered.
+/// Returns a number in (0, 1) that depends on the point alone and orders points of equal likelihood.
 fn label(point: &[f64]) -> f64 {
     let stream = point.iter().fold(Stream::root(0), |stream, x| stream.at(x.to_bits()));
     uniform(&mut stream.generator())
 }
 
-/// Whether a point lies higher than another: by likelihood, by label where that is equal.
+/// Compares two points by likelihood, and by label if the likelihoods are equal.
 fn order(a: (f64, &[f64]), b: (f64, &[f64])) -> std::cmp::Ordering {
     a.0.total_cmp(&b.0).then_with(|| label(a.1).total_cmp(&label(b.1)))
 }
 
-/// The survivors in two halves: the copies of each half learn from the other half.
+/// Splits the survivors into two halves; the proposals of the copies of each half are built from the other half.
 fn sides(survivors: &Evaluated, parents: &[usize]) -> Result<[Side; 2], Stop> {
     let (first, second) = parents.split_at(parents.len() / 2);
     let side = |copies: std::ops::Range<usize>, others: &[usize]| {
@@ -219,7 +220,7 @@ fn sides(survivors: &Evaluated, parents: &[usize]) -> Result<[Side; 2], Stop> {
 }
 
 impl Nested {
-    /// The lower half of the live points dies and is replaced; which points are new.
+    /// Replaces the lower half of the live points; returns a flag per point that is true if it is new.
     fn halve(
         &self,
         target: &dyn Target,

@@ -1,7 +1,5 @@
 //! Evidence and draws against closed forms and published values.
 
-use lacuna::contract;
-
 use super::super::known_evidence::{
     assert_conjugate, assert_effective_size, assert_evidence, assert_shares, assert_support,
     calibration, informative, peak, regression, run, shells, two_data, unit_cube,
@@ -16,7 +14,7 @@ fn with(live: usize) -> Nested {
 fn it_keeps_the_contract_of_samplers() {
     for mutation in [Mutation::DifferentialEvolution, Mutation::Automatic] {
         let sampler = Nested { mutation, ..with(300) };
-        assert_eq!(contract::sampler(&format!("{mutation:?}"), &sampler), Ok(()));
+        assert_eq!(lacuna_contract::sampler(&format!("{mutation:?}"), &sampler), Ok(()));
     }
 }
 
@@ -83,10 +81,10 @@ fn too_little_work_is_doubted() {
     let (harvest, _) = run(&sampler, &peak(4, 30.0), 1);
     assert_eq!(harvest.evidence, None);
     assert!(harvest.doubts[0].contains("after 3 halvings"), "{:?}", harvest.doubts);
-    // A single small move leaves new points beside their parents, where the likelihood falls behind.
+    // A single small move leaves new points next to their parents, where the likelihood is behind.
     let sampler = Nested { mutation: Mutation::RandomWalk, moves: 1, ..with(1000) };
     let (harvest, _) = run(&sampler, &peak(10, 60.0), 1);
-    let uneven = "do not fall evenly among the survivors";
+    let uneven = "among the live points are not uniform";
     assert!(harvest.doubts.iter().any(|d| d.contains(uneven)), "{:?}", harvest.facts);
     let (harvest, _) = run(&with(500), &regression(), 1);
     assert!(harvest.doubts.is_empty(), "{:?}", harvest.doubts);
@@ -94,7 +92,7 @@ fn too_little_work_is_doubted() {
 
 #[test]
 fn equal_likelihoods_are_no_obstacle() {
-    // The likelihood is one on half of the prior and e^-5 on the other: Z = (1 + e^-5) / 2.
+    // The likelihood is one on half of the prior and e^-5 on the other half: Z = (1 + e^-5) / 2.
     let function = |x: &[f64]| if x[0] < 0.5 { 0.0 } else { -5.0 };
     let expected = 0.5 * (1.0 + (-5.0_f64).exp());
     calibration(&with(400), &unit_cube(1, expected.ln(), function), 20).assert("plateaus");

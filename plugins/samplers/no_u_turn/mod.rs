@@ -1,14 +1,14 @@
-//! `no_u_turn`: chains that coast until they would turn back.
+//! `no_u_turn`: chains whose trajectories end at a U-turn.
 
 mod tree;
 
 use lacuna::data::Statistic;
-use lacuna::linalg::Matrix;
 use lacuna::math::random::Stream;
 use lacuna::plugin::sampler::{Plan, State};
 use lacuna::plugin::{Component, Context, Fact, Sampler, Target};
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
+use lacuna_linalg::Matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -16,35 +16,36 @@ use super::hamiltonian::{Settings, Shape, chains, told};
 
 /// No-U-turn sampler: Hamiltonian Monte Carlo whose trajectories end where they would turn back.
 ///
-/// The method of choice when the posterior is smooth and has a gradient: it has no length to choose, copes
-/// with hundreds of correlated unknowns, and says where it failed. Each step costs several gradients
-/// and gives a draw that is nearly independent of the one before. Step size and shape of the posterior are
-/// learnt in the warm-up, the shape from all chains together. Unknowns with bounds are moved in logarithms
-/// or logits. Separate maxima are not visited in turn: a chain stays at the one it finds.
+/// The method of choice if the posterior is smooth and has a gradient: no trajectory length has to be chosen, it
+/// copes with hundreds of correlated unknowns, and it reports where it fails. Each step costs several gradients and
+/// gives a draw that is nearly independent of the one before. Step size and metric are learnt in the warm-up, the
+/// metric from all chains together. Unknowns with bounds are sampled as logarithms or logits. A chain stays at the
+/// mode it finds: separate modes are not visited in turn.
 ///
-/// Divergent trajectories after the warm-up, whose energy error exceeds 1000, are counted: more than three that
-/// are more than 0.1 % of all mean that the run has not converged; fewer are told as a note.
+/// Divergent trajectories, whose energy error exceeds 1000, are counted after the warm-up: if there are more than
+/// three and more than 0.1 % of all, the run counts as not converged; fewer are reported as a note.
 ///
-/// References: Hoffman and Gelman, J. Mach. Learn. Res. 15 (2014) 1593; Betancourt, A conceptual
-/// introduction to Hamiltonian Monte Carlo, arXiv:1701.02434 (2017), appendix A (multinomial draws, the
-/// criterion of the turn); Stan reference manual, chapter 15 (the windows of the warm-up, the
-/// criterion across halves of a trajectory).
+/// References: Hoffman and Gelman, J. Mach. Learn. Res. 15 (2014) 1593; Betancourt, A conceptual introduction to
+/// Hamiltonian Monte Carlo, arXiv:1701.02434 (2017), appendix A (multinomial draws, U-turn criterion); Stan reference
+/// manual, chapter 15 (the windows of the warm-up, the criterion across the halves of a trajectory).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct NoUTurn {
-    /// The number of independent chains.
+    /// Number of independent chains, at least 1; use several, because convergence is judged by comparing them.
     pub chains: usize,
-    /// The number of steps of each chain, the warm-up included. A step is a whole trajectory.
+    /// Number of steps of each chain, including the warm-up. A step is a whole trajectory and costs up to
+    /// `2^depth - 1` gradients.
     pub steps: usize,
-    /// The number of first steps in which step size and metric are learnt; they are no draws.
+    /// Number of initial steps in which step size and metric are learnt, at least 20; they are discarded.
     pub warm_up: usize,
-    /// The largest number of times that a trajectory is doubled: at most `2^depth - 1` gradients a step.
+    /// Maximum tree depth, from 1 to 20: the number of times a trajectory may be doubled. It limits a step to
+    /// `2^depth - 1` gradients; if many trajectories reach it, draws are strongly autocorrelated.
     pub depth: u32,
-    /// The mean acceptance along a trajectory at which the step size aims: larger means smaller steps
-    /// and fewer divergences.
+    /// Target mean acceptance rate along a trajectory to which the step size is tuned, from 0.1 to below 1. A larger
+    /// value gives smaller steps: fewer divergences, more gradients.
     pub target_acceptance: f64,
-    /// Which shape of the posterior is learnt: by default all correlations for up to 20 unknowns, and only
-    /// the scales for more.
+    /// Form of the learnt metric. Default: `"dense"` (all correlations) for up to 20 unknowns, `"diagonal"` (scales
+    /// only) for more.
     pub metric: Option<Shape>,
 }
 

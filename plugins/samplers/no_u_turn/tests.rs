@@ -1,6 +1,5 @@
-//! Whole runs against known moments, and the reports of failure.
+//! Complete runs against known moments, and the reports of failure.
 
-use lacuna::contract;
 use lacuna::diagnose::chains::ess_bulk;
 
 use super::*;
@@ -13,14 +12,14 @@ use crate::samplers::hamiltonian::laws::{
 fn it_keeps_the_contract_of_samplers() {
     for metric in [None, Some(Shape::Diagonal)] {
         let sampler = NoUTurn { steps: 2000, warm_up: 300, metric, ..NoUTurn::default() };
-        assert_eq!(contract::sampler("no_u_turn", &sampler), Ok(()));
+        assert_eq!(lacuna_contract::sampler("no_u_turn", &sampler), Ok(()));
     }
 }
 
 #[test]
 fn known_moments_come_out() {
     assert_moments(&NoUTurn { steps: 4000, ..NoUTurn::default() });
-    // The ridge is ever narrower away from its bend: larger steps would diverge there.
+    // The ridge narrows away from its bend, where larger steps would diverge.
     assert_banana(&NoUTurn { steps: 4000, target_acceptance: 0.99, ..NoUTurn::default() });
 }
 
@@ -45,7 +44,7 @@ fn draws_of_ten_correlated_unknowns_of_any_scale_are_nearly_independent() {
         let size = ess_bulk(&draws.coordinate(j).collect::<Vec<_>>());
         assert!(size > 0.5 * draws.len() as f64, "{j}: {size} of {}", draws.len());
     }
-    // With the metric learnt, a trajectory of a ten-dimensional normal law takes some seven gradients.
+    // With the metric learnt, a trajectory of a ten-dimensional normal density takes about seven gradients.
     assert!(state.evaluations < 4 * 2000 * 14, "{}", state.evaluations);
 }
 

@@ -1,25 +1,25 @@
-//! Trajectories that double until they turn (Betancourt 2017, appendix A.4, in the form of Stan).
+//! Trajectories that are doubled until they turn back (Betancourt 2017, appendix A.4, in the form of Stan).
 
-use lacuna::linalg::vector::dot;
 use lacuna::math::random::uniform;
 use lacuna::math::special::ln_sum_exp;
+use lacuna_linalg::vector::dot;
 use rand::Rng;
 
 use crate::samplers::hamiltonian::{Flow, LARGEST_ERROR, Phase, Point, Transition};
 
-/// A stretch of a trajectory.
+/// A section of a trajectory.
 struct Tree {
-    /// The momentum at its first point.
+    /// Momentum at its first point.
     first: Vec<f64>,
-    /// The momentum at its last point.
+    /// Momentum at its last point.
     last: Vec<f64>,
-    /// The sum of all momenta.
+    /// Sum of all momenta.
     total: Vec<f64>,
-    /// The logarithm of the sum of all densities, relative to the start's.
+    /// Log of the sum of the densities `exp(-energy)` of all points, relative to that of the start.
     log_weight: f64,
-    /// One of its points, drawn by density.
+    /// One of its points, drawn in proportion to the density.
     draw: Point,
-    /// The energy of that point with its momentum.
+    /// Energy of that point with its momentum.
     energy: f64,
 }
 
@@ -40,8 +40,8 @@ impl Tree {
         self
     }
 
-    /// This stretch and the one after it, with the draw of one of them; and whether neither the whole
-    /// nor either half with the nearest point of the other turns back.
+    /// Joins two consecutive sections and keeps the draw of one of them. The flag is true if there is no U-turn:
+    /// neither over the whole, nor over either half extended by the nearest point of the other.
     fn join(self, next: Self, take_next: bool) -> (Self, bool) {
         let total = sum(&self.total, &next.total);
         let ahead = on(&self.first, &next.last, &total)
@@ -63,12 +63,13 @@ fn sum(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a + b).collect()
 }
 
-/// Whether both ends still move along the way that leads from one to the other.
+/// Returns true if both ends still move in the direction that leads from one to the other (Betancourt 2017, appendix
+/// A.4.2).
 fn on(first: &[f64], last: &[f64], total: &[f64]) -> bool {
     dot(first, total) > 0.0 && dot(last, total) > 0.0
 }
 
-/// Builds trees in one direction.
+/// Builder of the trees in one direction.
 struct Builder<'a, 'r, R> {
     flow: &'a Flow<'a>,
     energy: f64,
@@ -79,8 +80,8 @@ struct Builder<'a, 'r, R> {
 }
 
 impl<R: Rng> Builder<'_, '_, R> {
-    /// A tree of `2^depth` points beyond `phase`, which is left at its last one; `None` where
-    /// it turns or diverges.
+    /// Builds a tree of `2^depth` points beyond `phase`, which moves to its last point; `None` if the trajectory
+    /// turns back or diverges.
     fn build(&mut self, phase: &mut Phase, step: f64, depth: u32) -> Option<Tree> {
         if depth == 0 {
             return self.leaf(phase, step);
@@ -105,7 +106,8 @@ impl<R: Rng> Builder<'_, '_, R> {
     }
 }
 
-/// One step of a chain.
+/// Makes one step of a chain: a trajectory of at most `2^depth - 1` leapfrog steps of size `step`, and a draw from
+/// its points.
 pub(super) fn transition(
     flow: &Flow<'_>,
     from: &Point,
@@ -130,7 +132,7 @@ pub(super) fn transition(
         ahead = false;
         doubled = level + 1;
         let Some(new) = grown else { break };
-        // The new half is favoured, which carries the draw away from the start.
+        // Biased progressive sampling: the new half is favoured, which carries the draw away from the start.
         let take_new = uniform(builder.rng) < (new.log_weight - tree.log_weight).exp();
         (tree, ahead) = if goes_forward {
             tree.join(new, take_new)

@@ -1,4 +1,4 @@
-//! What the particles bring home.
+//! Harvest of sequential Monte Carlo: draws, evidence and its error.
 
 use lacuna::math::random::{Stream, permutation};
 use lacuna::plugin::sampler::{Evidence, Harvest, State};
@@ -7,7 +7,7 @@ use lacuna::plugin::{Fact, Target};
 use super::genealogy::{effective_families, effective_size, evidence_variance};
 use super::{Memory, SequentialMonteCarlo};
 
-/// With fewer families than this the error of the evidence has itself an error of half its size.
+/// Number of families below which the error of the evidence is itself uncertain by half its size.
 const FAMILIES: f64 = 8.0;
 
 impl SequentialMonteCarlo {
@@ -61,14 +61,14 @@ impl SequentialMonteCarlo {
         let mut doubts = Vec::new();
         if memory.temperature < 1.0 {
             doubts.push(format!(
-                "the particles stopped at the power {:.3e} of the likelihood, short of 1, after {} \
-                 temperatures: they are no draws of the posterior; raise `temperatures`",
+                "the particles stopped at the power {:.3e} of the likelihood instead of 1, after {} \
+                 temperatures: they are not distributed like the posterior; raise `temperatures`",
                 memory.temperature, memory.generations
             ));
         }
         if families < FAMILIES {
             doubts.push(format!(
-                "the particles descend from {families:.1} draws of the prior only, too few to know the \
+                "the particles descend from only {families:.1} draws of the prior, too few to estimate the \
                  error of the evidence: raise `particles` or lower `correlation`"
             ));
         }
@@ -79,12 +79,12 @@ impl SequentialMonteCarlo {
                 self.particles
             ));
         }
-        // Coordinates may remember in which of several modes they are; the likelihood must not.
+        // Coordinates may still be correlated with the mode they started in; the likelihood must not be.
         let error = 1.0 / (self.particles as f64).sqrt();
         if memory.moves.of_likelihood > self.correlation + 2.0 * error {
             doubts.push(format!(
-                "after the last {} moves of each particle its likelihood still has the correlation {:.2} \
-                 with that before: raise `moves`",
+                "the likelihoods of the particles before and after their last {} moves have the correlation \
+                 {:.2}: raise `moves`",
                 self.moves, memory.moves.of_likelihood
             ));
         }
@@ -92,15 +92,14 @@ impl SequentialMonteCarlo {
     }
 }
 
-/// The standard error of the log evidence, never below that of particles that forget all at each
-/// temperature.
+/// Returns the standard error of the log evidence, at least that of particles independent at each temperature.
 fn evidence_error(memory: &Memory) -> f64 {
     let tree = evidence_variance(&memory.families, memory.generations);
     // The standard deviation of the logarithm of a log-normal number with this relative variance.
     tree.max(memory.independent_variance).ln_1p().sqrt()
 }
 
-/// The number of independent draws that the particles are worth, for the coordinate that suffers most.
+/// Returns the number of independent draws the particles are worth, for the worst coordinate.
 fn worth(state: &State, memory: &Memory) -> f64 {
     let size = |values: &[f64]| effective_size(&memory.families, memory.generations, values);
     let coordinates = (0..state.points.columns()).map(|j| size(&state.points.column(j)));

@@ -1,15 +1,15 @@
-//! `sequential_monte_carlo`: a population of particles that is cooled from the prior to the posterior.
+//! `sequential_monte_carlo`: a population of particles tempered from the prior to the posterior.
 
 mod genealogy;
 mod harvest;
 mod temperature;
 
-use lacuna::linalg::Matrix;
 use lacuna::math::random::Stream;
 use lacuna::plugin::sampler::{Harvest, Plan, State};
 use lacuna::plugin::{Component, Context, Fact, Sampler, Target};
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
+use lacuna_linalg::Matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -17,40 +17,42 @@ use super::evaluated::{Evaluated, Shape};
 use super::moves::{Learned, Movement, Mutation, Others};
 use super::population::{self, Share};
 
-/// Sequential Monte Carlo: a population of particles that is led from the prior to the posterior by
-/// raising the likelihood to a power that grows from 0 to 1.
+/// Sequential Monte Carlo: a population of particles that moves from the prior to the posterior as the likelihood is
+/// raised to a power that grows from 0 to 1.
 ///
-/// It needs no starting point, finds several modes where the prior reaches them, and gives the evidence (the
-/// probability of the data, from which Bayes factors follow) with its standard error. At each
-/// temperature the particles are weighted, drawn anew in proportion to their weights, and moved by
-/// Metropolis steps whose size and shape are learned from points of similar likelihood, and which change the scale of
-/// a point as well: an unknown variance and its misfit fall through a funnel together. Choose it for comparing models and for
-/// posteriors with several modes; for one well-shaped posterior a Markov chain gives more draws for
-/// the same work.
+/// It needs no starting points, finds several modes where the prior reaches them, and gives the evidence (the
+/// marginal likelihood, from which Bayes factors follow) with its standard error. At each temperature the particles
+/// are weighted, resampled in proportion to their weights, and moved by Metropolis steps. The size and shape of the
+/// steps are learnt from points of similar likelihood; some steps change the scale of a point, so that an unknown
+/// variance and its misfit can decrease together through a funnel. Choose it to compare models and for posteriors
+/// with several modes; for a single well-shaped mode a Markov chain gives more draws at the same cost.
 ///
-/// The standard error of the evidence comes from the family tree of the particles: from how unequally the
-/// draws of the prior are represented at the end (Lee and Whiteley). It is too small when
-/// few families are left, and the report says so.
+/// The standard error of the evidence is estimated from the genealogy of the particles, i.e. from how unequally the
+/// initial draws of the prior are represented at the end (Lee and Whiteley). It is too small if few families are
+/// left; the report then says so.
 ///
-/// References: Neal, Statistics and Computing 11 (2001) 125; Del Moral, Doucet and Jasra, J. R. Stat.
-/// Soc. B 68 (2006) 411; Lee and Whiteley, Biometrika 105 (2018) 609 (errors); Ter Braak, Statistics
-/// and Computing 16 (2006) 239 (differential evolution).
+/// References: Neal, Statistics and Computing 11 (2001) 125; Del Moral, Doucet and Jasra, J. R. Stat. Soc. B 68
+/// (2006) 411; Lee and Whiteley, Biometrika 105 (2018) 609 (errors); ter Braak, Statistics and Computing 16 (2006)
+/// 239 (differential evolution).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SequentialMonteCarlo {
-    /// The number of particles; the error of the evidence falls as one over its root.
+    /// Number of particles, at least 10 times one more than the number of unknowns. The standard error of the
+    /// evidence decreases as `1 / sqrt(particles)`; the cost is proportional to it.
     pub particles: usize,
-    /// The share of the particles that a change of temperature leaves effective: the next temperature is the
-    /// highest one at which the weights are still so equal.
+    /// Effective fraction of the particles after a change of temperature, between 0 and 1: the next temperature is
+    /// the one at which the weights have this effective size. A larger value gives more temperatures, a higher cost
+    /// and a smaller error.
     pub effective_share: f64,
-    /// How particles move at one temperature.
+    /// Kind of the moves at one temperature.
     pub mutation: Mutation,
-    /// Particles move until the correlation of each coordinate, and of the likelihood, with its value
-    /// before the moves has fallen to this.
+    /// Correlation, between 0 and 1, at which the moves at one temperature end: particles move until each coordinate
+    /// and the likelihood are correlated with their values before the moves by no more than this. A smaller value
+    /// costs more moves.
     pub correlation: f64,
-    /// The most moves of each particle at one temperature.
+    /// Maximum number of moves of each particle at one temperature.
     pub moves: usize,
-    /// The most temperatures.
+    /// Maximum number of temperatures.
     pub temperatures: usize,
 }
 
@@ -83,21 +85,21 @@ impl Component for SequentialMonteCarlo {
     }
 }
 
-/// What is kept from temperature to temperature.
+/// Memory of the sampler between temperatures.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(default)]
 struct Memory {
-    /// The power of the likelihood.
+    /// Power of the likelihood, from 0 to 1 (an inverse temperature).
     temperature: f64,
-    /// The log of the evidence at that power.
+    /// Log evidence at that power.
     log_evidence: f64,
-    /// The variance that this would have, were the particles independent at each temperature.
+    /// Variance of the log evidence if the particles were independent at each temperature.
     independent_variance: f64,
-    /// How often the particles were drawn anew.
+    /// Number of resamplings.
     generations: usize,
-    /// From which draw of the prior each particle descends.
+    /// Index of the prior draw from which each particle descends.
     families: Vec<usize>,
-    /// What is learned about the moves.
+    /// Tuning of the moves.
     moves: Learned,
 }
 

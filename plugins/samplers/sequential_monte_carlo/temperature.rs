@@ -1,4 +1,4 @@
-//! One change of temperature: weights, evidence, and the particles drawn anew.
+//! One change of temperature: weights, evidence, and resampling.
 
 use lacuna::math::random::{Stream, uniform};
 use lacuna::run::Stop;
@@ -6,18 +6,18 @@ use rand::Rng;
 
 use super::{Evaluated, Memory, SequentialMonteCarlo, Shape};
 
-/// Weights of particles.
+/// Importance weights of particles.
 pub(super) struct Weights {
-    /// They sum to one.
+    /// Weights, normalised to sum to 1.
     pub normalised: Vec<f64>,
-    /// The log of the mean of the weights before that.
+    /// Log of the mean of the weights before normalisation.
     pub log_mean: f64,
-    /// Their effective number, `(sum w)^2 / sum w^2`.
+    /// Effective number of particles, `(sum w)^2 / sum w^2`.
     pub effective: f64,
 }
 
 impl Weights {
-    /// The weights `likelihood^power`.
+    /// Computes the weights `likelihood^power`.
     pub fn new(log_likelihood: &[f64], power: f64) -> Self {
         let largest = log_likelihood.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let raw: Vec<f64> = log_likelihood.iter().map(|l| (power * (l - largest)).exp()).collect();
@@ -31,13 +31,13 @@ impl Weights {
     }
 }
 
-/// The largest increase of the power, at most `rest`, that leaves this many particles effective.
+/// Returns the largest increase of the power, at most `rest`, that leaves `effective` particles effective.
 pub(super) fn increase(log_likelihood: &[f64], effective: f64, rest: f64) -> f64 {
     let enough = |power: f64| Weights::new(log_likelihood, power).effective >= effective;
     if enough(rest) {
         return rest;
     }
-    // The effective number falls from all to few over many orders of magnitude: halve the logarithm.
+    // The effective number decreases over many orders of magnitude of the power: bisection in its logarithm.
     let (mut low, mut high) = (rest.ln() - 80.0, rest.ln());
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
@@ -50,10 +50,9 @@ pub(super) fn increase(log_likelihood: &[f64], effective: f64, rest: f64) -> f64
     low.exp()
 }
 
-/// Places drawn independently in proportion to weights, in ascending order.
+/// Draws indices independently in proportion to the weights (multinomial resampling), in ascending order.
 ///
-/// Systematic draws would vary less, but the family tree that they make does not tell the error of the
-/// evidence.
+/// Systematic resampling would have less variance, but the error estimate from the genealogy is not valid for it.
 pub(super) fn draw(weights: &[f64], rng: &mut impl Rng) -> Vec<usize> {
     let mut levels: Vec<f64> = weights.iter().map(|_| uniform(rng)).collect();
     levels.sort_by(f64::total_cmp);
@@ -70,8 +69,8 @@ pub(super) fn draw(weights: &[f64], rng: &mut impl Rng) -> Vec<usize> {
 }
 
 impl SequentialMonteCarlo {
-    /// Raises the temperature's power as far as the weights allow and draws the particles anew;
-    /// the shape of the weighted particles.
+    /// Raises the power as far as the weights allow and resamples the particles; returns the shape of the weighted
+    /// particles.
     pub(super) fn cool(
         &self,
         population: &mut Evaluated,
@@ -81,7 +80,7 @@ impl SequentialMonteCarlo {
         let log_likelihood = population.log_likelihoods();
         let (count, rest) = (self.particles as f64, 1.0 - memory.temperature);
         let power = increase(&log_likelihood, self.effective_share * count, rest);
-        // The sum of two roundings must not miss the end.
+        // Without the first case rounding could leave the temperature just below 1, and the run would not end.
         memory.temperature = if power == rest { 1.0 } else { memory.temperature + power };
         let weights = Weights::new(&log_likelihood, power);
         memory.log_evidence += weights.log_mean;

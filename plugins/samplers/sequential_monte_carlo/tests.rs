@@ -1,7 +1,5 @@
 //! Evidence and draws against closed forms and published values.
 
-use lacuna::contract;
-
 use super::super::known_evidence::{
     Calibration, assert_conjugate, assert_effective_size, assert_evidence, assert_shares,
     assert_support, calibration, informative, peak, regression, run, shells, two_data,
@@ -23,7 +21,7 @@ const ALL: [Mutation; 4] = [
 fn it_keeps_the_contract_of_samplers() {
     for mutation in ALL {
         let sampler = SequentialMonteCarlo { mutation, ..with(400) };
-        assert_eq!(contract::sampler(&format!("{mutation:?}"), &sampler), Ok(()));
+        assert_eq!(lacuna_contract::sampler(&format!("{mutation:?}"), &sampler), Ok(()));
     }
 }
 
@@ -44,7 +42,7 @@ fn both_shells_are_found_with_the_published_evidence() {
         let (harvest, _) = run(&sampler, &shells(dimension), 3);
         let right = harvest.points.iter_rows().filter(|x| x[0] > 0.0).count() as f64;
         let share = right / particles as f64;
-        // Half of the mass is on either side; the families of particles tell how well it is known.
+        // Half of the mass is on either side; the effective size tells how accurately the particles give it.
         let error = 0.5 / harvest.effective_size.sqrt();
         assert!((share - 0.5).abs() < 4.0 * error, "{dimension}: {share} +- {error}");
     }
@@ -75,7 +73,7 @@ fn stated_errors_of_the_evidence_hold() {
 
 #[test]
 fn the_evidence_of_posteriors_as_concentrated_as_the_founding_one_is_found() {
-    // While the power grows, the unknown variance and the misfit fall together through a funnel.
+    // As the power grows, the unknown variance and the misfit decrease together through a funnel.
     for (name, unknowns, particles, runs) in
         [("two unknowns", 1, 1000, 40), ("four", 3, 1000, 40), ("ten", 9, 1000, 20)]
     {
@@ -90,8 +88,8 @@ fn the_effective_size_is_that_of_the_posterior_mean() {
 
 #[test]
 fn a_posterior_of_thirty_nats_costs_a_tenth_of_nested_sampling() {
-    // dynesty 3.1.0 needs 387,642 evaluations for an error of 0.30 on a posterior of four unknowns that takes up
-    // 30 nats.
+    // dynesty 3.1.0 needs 387,642 evaluations for an error of 0.30 on a posterior of four unknowns with an
+    // information gain of 30 nats.
     let Calibration { error, evaluations, .. } = calibration(&with(1000), &peak(4, 30.0), 10);
     let at_equal_error = evaluations * (error / 0.30).powi(2);
     assert!(at_equal_error < 38_800.0, "{error} with {evaluations} evaluations");
@@ -102,9 +100,13 @@ fn too_little_work_is_doubted() {
     let sampler = SequentialMonteCarlo { temperatures: 3, ..with(200) };
     let (harvest, _) = run(&sampler, &peak(4, 30.0), 1);
     assert_eq!(harvest.evidence, None);
-    assert!(harvest.doubts[0].contains("short of 1, after 3 temperatures"), "{:?}", harvest.doubts);
+    assert!(
+        harvest.doubts[0].contains("instead of 1, after 3 temperatures"),
+        "{:?}",
+        harvest.doubts
+    );
     let (harvest, _) = run(&with(60), &peak(6, 60.0), 1);
-    let few = "draws of the prior only, too few to know the error";
+    let few = "draws of the prior, too few to estimate the error";
     assert!(harvest.doubts.iter().any(|d| d.contains(few)), "{:?}", harvest.doubts);
     let (harvest, _) = run(&with(1000), &regression(), 1);
     assert!(harvest.doubts.is_empty(), "{:?}", harvest.doubts);
@@ -126,13 +128,13 @@ fn the_increase_of_the_power_leaves_the_effective_number() {
 
 #[test]
 fn a_family_tree_gives_the_variance_of_equal_draws() {
-    // Without any drawing anew each particle is its own family: the evidence is exact.
+    // Without any resampling each particle is its own family: the evidence is exact.
     let alone: Vec<usize> = (0..50).collect();
     assert!(genealogy::evidence_variance(&alone, 0).abs() < 1e-14);
     assert!((genealogy::effective_families(&alone) - 50.0).abs() < 1e-12);
     // Two families of equal size: 1 - (2 / 1) (1 - 1/2) = 0 for two particles.
     assert!(genealogy::evidence_variance(&[0, 1], 0).abs() < 1e-14);
-    // One family is left: nothing is known.
+    // With one family left, nothing is known.
     assert!((genealogy::evidence_variance(&[3; 50], 1) - 1.0).abs() < 1e-14);
 }
 

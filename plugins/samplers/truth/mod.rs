@@ -1,15 +1,15 @@
-//! Samplers against densities whose moments are known.
+//! Samplers against densities with known moments.
 
 mod proof;
 
 use lacuna::data::Draws;
 use lacuna::diagnose::{autocorrelation, chains};
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
 use lacuna::plugin::{Sampler, Target};
+use lacuna_linalg::Matrix;
 
-/// A density made of a function, with independent priors; its gradient is taken by differences.
+/// A density given by a function, with independent priors; its gradient is taken by differences.
 pub(super) struct Density<F> {
     pub priors: Vec<Distribution>,
     pub bounds: Vec<(f64, f64)>,
@@ -17,7 +17,7 @@ pub(super) struct Density<F> {
 }
 
 impl<F: Fn(&[f64]) -> f64 + Sync> Density<F> {
-    /// A density without bounds.
+    /// Returns a density without bounds.
     pub fn new(priors: Vec<Distribution>, function: F) -> Self {
         let bounds = vec![(f64::NEG_INFINITY, f64::INFINITY); priors.len()];
         Self { priors, bounds, function }
@@ -63,7 +63,8 @@ impl<F: Fn(&[f64]) -> f64 + Sync> Target for Density<F> {
     }
 }
 
-/// A whole run from draws of the prior; the draws after the warm-up and the first quarter.
+/// Runs a sampler from draws of the prior to its end; returns the draws after the warm-up and after the first
+/// quarter.
 pub(super) fn run(sampler: &dyn Sampler, target: &dyn Target, seed: u64) -> Draws {
     let plan = sampler.plan(target.dimension());
     let root = Stream::root(seed);
@@ -80,14 +81,14 @@ pub(super) fn run(sampler: &dyn Sampler, target: &dyn Target, seed: u64) -> Draw
     Draws::from_steps(names, &kept)
 }
 
-/// The values of a function of the draws, chain by chain.
+/// Returns the values of a function of the draws, chain by chain.
 pub(super) fn values(draws: &Draws, f: impl Fn(&[f64]) -> f64) -> Vec<Vec<f64>> {
     let of = |chain| (0..draws.steps).map(|step| f(draws.point(chain, step))).collect();
     (0..draws.chains).map(of).collect()
 }
 
-/// Asserts that the mean of `f` over the draws is within four Monte Carlo errors of `expected`, and
-/// that this error is less than `largest`.
+/// Asserts that the mean of `f` over the draws is within four Monte Carlo errors of `expected`, and that this error
+/// is below `largest`.
 pub(super) fn assert_mean(
     (what, draws, ensemble): (&str, &Draws, bool),
     expected: f64,

@@ -1,9 +1,8 @@
-//! The random walks, differential evolution and each move of the ensemble on densities of known moments.
+//! The random walks, differential evolution and each move of the ensemble on densities with known moments.
 
-use lacuna::contract;
-use lacuna::linalg::{Cholesky, Matrix};
 use lacuna::math::moments::Moments;
 use lacuna::plugin::sampler::Plan;
+use lacuna_linalg::{Cholesky, Matrix};
 use rayon::prelude::*;
 
 use super::super::adaptation::Adapt;
@@ -17,7 +16,7 @@ use super::*;
 
 type Named = (&'static str, Box<dyn Sampler>);
 
-/// The samplers of independent chains.
+/// The samplers with independent chains.
 fn walks(steps: usize, warm_up: usize) -> Vec<Named> {
     vec![
         ("metropolis", Box::new(Metropolis { steps, ..Default::default() })),
@@ -30,7 +29,7 @@ fn walks(steps: usize, warm_up: usize) -> Vec<Named> {
     ]
 }
 
-/// The ensemble with each move alone, in both orders.
+/// The ensemble with each move alone, in both orders of update.
 fn moves(walkers: usize, steps: usize) -> Vec<Named> {
     let none = Moves { stretch: 0.0, ..Moves::default() };
     let all = [
@@ -51,7 +50,7 @@ fn moves(walkers: usize, steps: usize) -> Vec<Named> {
         .collect()
 }
 
-/// What is judged: the mean of a function of the unknowns, its value and the largest error of it.
+/// A check: the name of a mean, its value, the largest allowed error, and the function of the unknowns.
 type Mean = (&'static str, f64, f64, fn(&[f64]) -> f64);
 
 fn judge(samplers: &[Named], target: &dyn Target, means: &[Mean]) {
@@ -67,7 +66,7 @@ fn judge(samplers: &[Named], target: &dyn Target, means: &[Mean]) {
 
 const SCALE: [f64; 5] = [1e-3, 1.0, 1e3, 5.0, 1e-1];
 
-/// Correlations `0.9^|i - j|`, means equal to the scales.
+/// A normal density with the correlations `0.9^|i - j|` and means equal to the scales.
 fn correlated(dimension: usize) -> Density<impl Fn(&[f64]) -> f64 + Sync> {
     let entry = |i: usize, j: usize| 0.9_f64.powi(i.abs_diff(j) as i32);
     let factor = Cholesky::new(&Matrix::from_fn(dimension, dimension, entry)).unwrap();
@@ -96,7 +95,7 @@ fn contracts_hold() {
     ));
     let breaches: Vec<String> = samplers
         .par_iter()
-        .flat_map_iter(|(name, s)| contract::sampler(name, &**s).err().unwrap_or_default())
+        .flat_map_iter(|(name, s)| lacuna_contract::sampler(name, &**s).err().unwrap_or_default())
         .collect();
     assert!(breaches.is_empty(), "{}", breaches.join("\n"));
 }
@@ -144,9 +143,9 @@ fn a_correlated_normal_law_has_its_moments() {
 
 #[test]
 fn a_twisted_normal_law_has_its_moments() {
-    // Source: Haario, Saksman and Tamminen, Computational Statistics 14 (1999) 375, pi_3: x1 of variance 100, and
-    // x2 + b x1^2 - 100 b standard normal, b = 0.03, beside standard normal coordinates. The moments of
-    // the normal law give E x2 = 0 and var x2 = 1 + 2 b^2 100^2 = 19.
+    // Source: Haario, Saksman and Tamminen, Computational Statistics 14 (1999) 375, pi_3: x1 with variance 100, x2 +
+    // b x1^2 - 100 b standard normal, b = 0.03, and two further standard normal coordinates. The moments of the
+    // normal distribution give E x2 = 0 and var x2 = 1 + 2 b^2 100^2 = 19.
     let target = Density::new(vec![Distribution::Normal([0.0, 10.0]); 4], |x: &[f64]| {
         let bent = x[1] + 0.03 * x[0] * x[0] - 3.0;
         -0.5 * (x[0] * x[0] / 100.0 + bent * bent + x[2] * x[2] + x[3] * x[3])
@@ -161,7 +160,7 @@ fn a_twisted_normal_law_has_its_moments() {
     judge(&walks(50_000, 5000), &target, &means);
 }
 
-/// Exponential of mean 1, uniform, and beta of 2 and 5.
+/// The product of an exponential density with mean 1, a uniform one, and a beta density with shapes 2 and 5.
 fn bounded() -> Density<impl Fn(&[f64]) -> f64 + Sync> {
     let inside =
         |x: &[f64]| x[0] >= 0.0 && (0.0..=1.0).contains(&x[1]) && (0.0..=1.0).contains(&x[2]);
@@ -207,8 +206,8 @@ fn each_move_of_the_ensemble_keeps_a_correlated_normal_law() {
 
 #[test]
 fn walks_and_moves_keep_a_skewed_law() {
-    // x ~ gamma(3), y | x ~ N(x, 1), z | y ~ N(y^2 / 16, 1): the moments of the gamma law about zero are
-    // 3, 12, 60, 360, so that E y^2 = 13, E z = 13/16, and var x = 3, var y = 4; E (x - 3)^3 = 6.
+    // x ~ gamma(3), y | x ~ N(x, 1), z | y ~ N(y^2 / 16, 1): the moments of the gamma distribution about zero are 3,
+    // 12, 60, 360, so that E y^2 = 13, E z = 13/16, var x = 3, var y = 4, and E (x - 3)^3 = 6.
     let target = Density {
         priors: vec![
             Distribution::Gamma([3.0, 1.0]),
@@ -238,7 +237,7 @@ fn walks_and_moves_keep_a_skewed_law() {
 
 #[test]
 fn jumps_find_their_way_between_two_modes() {
-    // Two normal laws of unit variance at (-5, -5) and (5, 5), the second with twice the weight.
+    // Two normal densities of unit variance at (-5, -5) and (5, 5), the second with twice the weight.
     let target = Density::new(vec![Distribution::Normal([0.0, 6.0]); 2], |x: &[f64]| {
         let near = |m: f64| -0.5 * ((x[0] - m).powi(2) + (x[1] - m).powi(2));
         let (a, b) = (near(-5.0), near(5.0) + 2.0_f64.ln());

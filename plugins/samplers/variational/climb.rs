@@ -1,29 +1,29 @@
-//! The path to a maximum and the normal laws along it (Zhang et al. 2022).
+//! Path to a maximum and the normal approximations along it (Zhang et al. 2022).
 //!
-//! Where Pathfinder uses L-BFGS, the whole matrix of BFGS is kept, which costs `d^2` numbers and is the better
-//! covariance; its start is the curvature at the starting point.
+//! Where Pathfinder uses L-BFGS, the full BFGS matrix is kept: it takes `d^2` numbers and is the better covariance.
+//! It starts with the curvature at the starting point.
 
-use lacuna::linalg::vector::{add_scaled, dot};
-use lacuna::linalg::{Matrix, multiply_vector};
 use lacuna::math::random::normal;
 use lacuna::math::transform::Unconstrained;
 use lacuna::plugin::Target;
+use lacuna_linalg::vector::{add_scaled, dot};
+use lacuna_linalg::{Matrix, multiply_vector};
 use rand::Rng;
 
 use super::law::Law;
 use super::{Fit, Path, Point, Progress};
 
-/// A path ends when less than this can be gained in the quadratic model, in units of log density.
+/// Minimum gain of the quadratic model, in units of log density; a path ends below it.
 const LEAST_GAIN: f64 = 1e-6;
-/// Draws that estimate an evidence lower bound.
+/// Number of draws to estimate an evidence lower bound.
 const DRAWS: usize = 20;
-/// Constants of the weak conditions of Wolfe.
+/// Constants of the weak Wolfe conditions: sufficient increase, and decrease of the slope.
 const RISE: f64 = 1e-4;
 const CURVATURE: f64 = 0.9;
-/// The most points of one line search.
+/// Maximum number of points of one line search.
 const TRIALS: usize = 40;
 
-/// One step of the path, and whether it goes on.
+/// Makes one step of the path; the flag is true if the path goes on.
 pub(super) fn iterate(
     target: &Unconstrained<'_>,
     path: &mut Path,
@@ -44,7 +44,8 @@ pub(super) fn iterate(
     (Progress { moved, evaluations }, moved)
 }
 
-/// Compares the law at the present point with the best one so far; gives the evaluations spent.
+/// Keeps the normal approximation at the present point if its evidence lower bound is the largest so far; returns the
+/// number of evaluations.
 fn judge(target: &Unconstrained<'_>, path: &mut Path, rng: &mut impl Rng) -> u64 {
     let mut mean = path.point.place.clone();
     let shift = multiply_vector(&path.inverse, &path.point.gradient);
@@ -60,8 +61,8 @@ fn judge(target: &Unconstrained<'_>, path: &mut Path, rng: &mut impl Rng) -> u64
     DRAWS as u64
 }
 
-/// A higher point along a direction, by bisection (Lewis and Overton, Math. Program. 141 (2013) 135); `None`
-/// where rounding hides the rise.
+/// Searches along a direction for a point that satisfies the weak Wolfe conditions, by bisection (Lewis and Overton,
+/// Math. Program. 141 (2013) 135), and returns the number of evaluations; `None` if rounding hides the increase.
 fn search(
     target: &Unconstrained<'_>,
     from: &Point,
@@ -89,8 +90,8 @@ fn search(
     (best, TRIALS as u64)
 }
 
-/// The update of Broyden, Fletcher, Goldfarb and Shanno; left out where the density does not
-/// curve downwards along the step.
+/// Updates the inverse by the formula of Broyden, Fletcher, Goldfarb and Shanno; skipped if the density is not
+/// concave along the step, because the matrix would no longer be positive definite.
 fn update(inverse: &mut Matrix, from: &Point, to: &Point) {
     let s: Vec<f64> = to.place.iter().zip(&from.place).map(|(b, a)| b - a).collect();
     let y: Vec<f64> = from.gradient.iter().zip(&to.gradient).map(|(a, b)| a - b).collect();

@@ -1,25 +1,25 @@
-//! Draws of the mixture of all paths' laws, weighed by importance.
+//! Draws from the mixture of the approximations of all paths, weighted by importance.
 
 use lacuna::diagnose::pareto::{self, Smoothed};
-use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, normal, permutation, uniform};
 use lacuna::math::special::ln_sum_exp;
 use lacuna::math::transform::Unconstrained;
 use lacuna::plugin::sampler::{Evidence, Harvest};
 use lacuna::plugin::{Fact, Target};
 use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
 use rand::Rng;
 
 use super::law::{self, Law};
 use super::{Fit, Path, Stage, Variational};
 
-/// The share of the mixture that goes to all laws alike, however low their bounds.
+/// Fraction of the mixture that is distributed equally over all paths, however low their bounds.
 const EVEN: f64 = 0.1;
-/// The tails that are tried in turn: those of the normal law, then of Student's with ever fewer degrees of
-/// freedom. The logarithm of a variance falls off like an exponential law on one side, where a normal law
-/// would give weights without a mean.
+/// Tails that are tried in turn: normal, then Student's t with fewer and fewer degrees of freedom. The density of a
+/// log variance decreases only exponentially on one side, where a normal proposal would give weights without a finite
+/// mean.
 const TAILS: [Option<u32>; 4] = [None, Some(8), Some(4), Some(2)];
-/// Bounds that differ by more than this belong to different laws.
+/// Difference of evidence lower bounds above which paths are taken to have found different maxima.
 const DIFFERENT: f64 = 1.0;
 
 pub(super) fn harvest(
@@ -30,11 +30,11 @@ pub(super) fn harvest(
 ) -> Result<Harvest, Stop> {
     let fits: Vec<&Fit> = paths.iter().filter_map(|path| path.best.as_ref()).collect();
     if fits.is_empty() {
-        return Err(Stop::new("no path has a normal law yet").help("raise `iterations`"));
+        return Err(Stop::new("no path has a normal approximation yet").help("raise `iterations`"));
     }
     let free = Unconstrained::new(target);
     let tails = if options.importance { &TAILS[..] } else { &TAILS[..1] };
-    // Twice as many as are wanted, so that few of them are drawn twice.
+    // Twice as many proposals as draws, so that few of them are drawn twice.
     let count = 2 * options.draws;
     let limit = pareto::limit(count);
     let mut weighed = Weighed::of(&free, Mixture::of(&fits, None), count, &stream.named("normal"));
@@ -70,7 +70,7 @@ pub(super) fn harvest(
     })
 }
 
-/// Independent draws of a mixture with the ratios of the posterior to it, as logarithms.
+/// Independent draws of a mixture, with the log ratios of the posterior to it.
 struct Weighed {
     tail: Option<u32>,
     proposals: Matrix,
@@ -89,15 +89,15 @@ impl Weighed {
     }
 }
 
-/// Laws with weights.
+/// A mixture of normal or Student's t distributions.
 struct Mixture<'a> {
     laws: Vec<(f64, &'a Law)>,
-    /// The degrees of freedom of Student's law; `None` for the normal law.
+    /// Degrees of freedom of Student's t distribution; `None` for the normal distribution.
     tail: Option<u32>,
 }
 
 impl<'a> Mixture<'a> {
-    /// Each law by the evidence that its bound promises, and none below a small share.
+    /// Weights each component by the exponential of its evidence lower bound, but no component below a small minimum.
     fn of(fits: &[&'a Fit], tail: Option<u32>) -> Self {
         let largest = fits.iter().map(|fit| fit.bound).fold(f64::NEG_INFINITY, f64::max);
         let shares: Vec<f64> = fits.iter().map(|fit| (fit.bound - largest).exp()).collect();
@@ -136,7 +136,7 @@ impl<'a> Mixture<'a> {
     }
 }
 
-/// Indices drawn by weights that sum to one, evenly spaced along them (systematic resampling).
+/// Draws indices in proportion to weights that sum to 1, by systematic resampling.
 fn resample(log_weights: &[f64], count: usize, rng: &mut impl Rng) -> Vec<usize> {
     let offset = uniform(rng);
     let (mut sum, mut index) = (log_weights[0].exp(), 0);
@@ -152,14 +152,14 @@ fn resample(log_weights: &[f64], count: usize, rng: &mut impl Rng) -> Vec<usize>
         .collect()
 }
 
-/// The number of independent draws: the error of the weights and that of drawing among them.
+/// Returns the effective number of independent draws, from the error of the weights and that of resampling.
 fn worth(smoothed: &Smoothed, draws: usize) -> f64 {
     let (drawn, weighed) = (draws as f64, smoothed.log_weights.len() as f64);
     let error = 1.0 / smoothed.effective_size.max(1.0) + 1.0 / drawn - 1.0 / weighed;
     (1.0 / error).min(drawn)
 }
 
-/// The mean of the raw ratios, whose error follows from their spread.
+/// Estimates the evidence by the mean of the raw ratios, and its standard error from their spread.
 fn evidence(log_ratios: &[f64]) -> Evidence {
     let count = log_ratios.len() as f64;
     let largest = log_ratios.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -183,8 +183,8 @@ fn doubts(
     let limit = pareto::limit(smoothed.log_weights.len());
     if smoothed.k_hat > limit {
         doubts.push(format!(
-            "the Pareto k-hat is {:.2}, above {}: no normal law is near the posterior, and weights \
-             do not make up for it; use `no_u_turn` or `sequential_monte_carlo`",
+            "the Pareto k-hat is {:.2}, above {}: no normal distribution is close enough to the posterior for \
+             importance weights to correct the difference; use `no_u_turn` or `sequential_monte_carlo`",
             smoothed.k_hat,
             (100.0 * limit).round() / 100.0
         ));
@@ -201,7 +201,7 @@ fn doubts(
     let others = fits.iter().filter(|fit| fit.bound < largest - DIFFERENT).count();
     if others > 0 {
         doubts.push(format!(
-            "{others} of {} paths ended at another normal law: the posterior may have several maxima; \
+            "{others} of {} paths ended at another normal distribution: the posterior may have several maxima; \
              compare with `sequential_monte_carlo`",
             paths.len()
         ));

@@ -1,17 +1,17 @@
-//! `variational`: the normal law nearest to the posterior.
+//! `variational`: the normal distribution closest to the posterior.
 
 mod climb;
 mod harvest;
 mod law;
 mod refine;
 
-use lacuna::linalg::Matrix;
 use lacuna::math::random::Stream;
 use lacuna::math::transform::Unconstrained;
 use lacuna::plugin::sampler::{Harvest, Plan, State};
 use lacuna::plugin::{Component, Context, Fact, Sampler, Target};
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
+use lacuna_linalg::Matrix;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -20,37 +20,38 @@ use super::hamiltonian::{Point, chains, curvature};
 use law::Law;
 use refine::Refined;
 
-/// Variational inference: the posterior as the normal law that lies nearest to it, corrected by
+/// Variational inference: the posterior is approximated by the normal distribution closest to it and corrected by
 /// importance sampling.
 ///
-/// Hundreds of times cheaper than sampling, and it tells by itself whether it may be trusted: each
-/// draw is weighed by the ratio of the posterior to the normal law, and the tail of these weights, the
-/// Pareto k-hat, must stay below 0.7. It suits posteriors with one maximum that are not far from normal once
-/// unknowns with bounds are moved to logarithms or logits; elsewhere `no_u_turn` takes over. With a good
-/// k-hat the weights give the evidence as well.
+/// It is hundreds of times cheaper than sampling and tells whether it can be trusted: each draw is weighted by the
+/// ratio of the posterior to the approximation, and the tail index of these weights, the Pareto k-hat, must stay
+/// below 0.7. It suits posteriors with one maximum that are nearly normal once bounded unknowns are transformed to
+/// logarithms or logits; otherwise use `no_u_turn`. With a good k-hat the weights also give the evidence.
 ///
-/// Several paths climb to the maximum (Pathfinder); along each, the normal law of the curvature gathered
-/// so far is the candidate, and the one with the largest evidence lower bound is kept. Natural gradients
-/// on fixed points then raise the bound over mean and full covariance. The draws come from the mixture
-/// of the laws of all paths; where the k-hat of normal laws is too large, Student's laws with ever heavier
-/// tails are tried in their place.
+/// Several paths climb to the maximum (Pathfinder); along each, the normal approximation with the curvature gathered
+/// so far is a candidate, and the one with the largest evidence lower bound (ELBO) is kept. Natural gradients on
+/// fixed nodes then maximise the bound over mean and full covariance. The draws come from the mixture of the
+/// approximations of all paths; if the k-hat of normal distributions is too large, Student's t distributions with
+/// increasingly heavy tails are tried instead.
 ///
-/// References: Zhang, Carpenter, Gelman and Vehtari, J. Mach. Learn. Res. 23 (2022) 306 (Pathfinder);
-/// Kucukelbir et al., J. Mach. Learn. Res. 18 (2017) 14 (normal laws in free coordinates); Khan and Rue,
-/// J. Mach. Learn. Res. 24 (2023) 281 (natural gradients); Giordano, Ingram and Broderick, J. Mach. Learn.
-/// Res. 25 (2024) 18 (fixed points); Vehtari et al., J. Mach. Learn. Res. 25 (2024) 72 (k-hat).
+/// References: Zhang, Carpenter, Gelman and Vehtari, J. Mach. Learn. Res. 23 (2022) 306 (Pathfinder); Kucukelbir et
+/// al., J. Mach. Learn. Res. 18 (2017) 14 (normal approximations in free coordinates); Khan and Rue, J. Mach. Learn.
+/// Res. 24 (2023) 281 (natural gradients); Giordano, Ingram and Broderick, J. Mach. Learn. Res. 25 (2024) 18 (fixed
+/// nodes); Vehtari et al., J. Mach. Learn. Res. 25 (2024) 72 (k-hat).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Variational {
-    /// The number of paths, each from its own starting point.
+    /// Number of paths, at least 1, each from its own starting point. Several paths show whether there are several
+    /// maxima.
     pub paths: usize,
-    /// The largest number of iterations of a path; it ends as soon as nothing is to be gained.
+    /// Maximum number of iterations of each path; a path ends as soon as an iteration gains nothing.
     pub iterations: usize,
-    /// The number of draws.
+    /// Number of draws of the posterior, at least 100.
     pub draws: usize,
-    /// Whether the law of each path is refined: without, it is Pathfinder's, which is cheaper and rougher.
+    /// If true, the approximation of each path is refined by natural gradients; if false, it is Pathfinder's, which
+    /// is cheaper and less accurate.
     pub refine: bool,
-    /// Whether draws are weighed and drawn again by their importance: without, they follow the normal law.
+    /// If true, draws are weighted and resampled by importance; if false, they follow the normal approximation.
     pub importance: bool,
 }
 
@@ -60,7 +61,7 @@ impl Default for Variational {
     }
 }
 
-/// Where a path is.
+/// Stage of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 enum Stage {
     Climbing,
@@ -68,28 +69,28 @@ enum Stage {
     Done,
 }
 
-/// One path and the best normal law along it.
+/// One path and the best normal approximation along it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Path {
     stage: Stage,
     point: Point,
-    /// The estimate of the inverse of the negative second derivatives.
+    /// Estimate of the inverse of the negative Hessian (`d x d`), i.e. of the covariance.
     inverse: Matrix,
     best: Option<Fit>,
 }
 
-/// A normal law and its evidence lower bound.
+/// A normal approximation and its evidence lower bound.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Fit {
     law: Law,
     bound: f64,
 }
 
-/// What one iteration of a path did.
+/// Outcome of one iteration of a path.
 struct Progress {
-    /// Whether the point moved.
+    /// True if the point moved.
     moved: bool,
-    /// Evaluations of density or gradient.
+    /// Number of evaluations of density or gradient.
     evaluations: u64,
 }
 
@@ -140,7 +141,7 @@ fn keep(paths: &[Path], state: &mut State) -> Result<(), Stop> {
 impl Component for Variational {
     fn check(&self, _context: &Context<'_>, complaints: &mut Complaints<'_>) {
         let counts = [("paths", self.paths, 1), ("iterations", self.iterations, 1)];
-        // Below this the tail of the weights has too few draws to be judged.
+        // With fewer draws, k-hat cannot be estimated from the tail of the weights.
         for (key, found, least) in counts.into_iter().chain([("draws", self.draws, 100)]) {
             if found < least {
                 complaints
@@ -197,7 +198,8 @@ impl Sampler for Variational {
             state.accepted[index] = progress.moved;
             state.evaluations += progress.evaluations;
         }
-        // The density of the very points that are kept, which rounding has moved.
+        // The log density is evaluated at the very points that are stored, because the transform back from the free
+        // coordinates rounds them.
         state.log_density = target.log_density(&state.points);
         state.evaluations += state.points.rows() as u64;
         keep(&paths, state)

@@ -1,39 +1,39 @@
-//! The normal law with the largest evidence lower bound, by natural gradients.
+//! Normal approximation with the largest evidence lower bound, by natural gradients.
 //!
 //! The bound is the mean of the log density over fixed points `m + L z_i` plus the entropy (Giordano, Ingram and
-//! Broderick 2024). Mean and precision follow Khan and Rue (2023, equations 10 and 11); the mean
-//! second derivative is that of Stein's lemma, `L' E[H] L = E[z (L' g)']`. The nodes `z_i` have mean zero
-//! and unit covariance exactly, so that one step reaches a normal target.
+//! Broderick 2024). Mean and precision follow Khan and Rue (2023, equations 10 and 11); the mean Hessian is that of
+//! Stein's lemma, `L' E[H] L = E[z (L' g)']`. The nodes `z_i` have exactly zero mean and unit covariance, so that one
+//! step reaches a normal target.
 
-use lacuna::linalg::{
-    Cholesky, Matrix, multiply, multiply_transposed, solve_lower, symmetric_eigen,
-    transposed_multiply, transposed_multiply_vector,
-};
 use lacuna::math::random::{Stream, normal};
 use lacuna::math::special::HALF_LN_TWO_PI;
 use lacuna::math::transform::Unconstrained;
 use lacuna::plugin::Target;
+use lacuna_linalg::{
+    Cholesky, Matrix, multiply, multiply_transposed, solve_lower, symmetric_eigen,
+    transposed_multiply, transposed_multiply_vector,
+};
 use rayon::prelude::*;
 
 use super::Fit;
 use super::law::Law;
 
-/// A refinement ends when a step gains less than this, in units of log density.
+/// Minimum gain of a step, in units of log density; the refinement ends below it.
 const LEAST_GAIN: f64 = 1e-4;
-/// Halvings of a step before it counts as useless.
+/// Maximum number of halvings of a step.
 const HALVINGS: i32 = 12;
-/// No step makes a standard deviation more than this many times larger.
+/// Maximum factor by which one step may increase a standard deviation.
 const LARGEST_GROWTH: f64 = 3.0;
 
-/// What one iteration did.
+/// Outcome of one iteration.
 pub(super) struct Refined {
     pub fit: Fit,
-    /// Whether more can be gained.
+    /// True if further iterations may gain more.
     pub on: bool,
     pub evaluations: u64,
 }
 
-/// The fixed nodes of a path: pairs of opposite normal draws, whitened.
+/// Returns the fixed nodes of a path, one per row: pairs of opposite normal draws, whitened.
 pub(super) fn nodes(dimension: usize, path: usize) -> Matrix {
     let half = (5 * dimension).max(50);
     let mut rng = Stream::root(0).named("nodes").at(path as u64).generator();
@@ -55,13 +55,13 @@ pub(super) fn nodes(dimension: usize, path: usize) -> Matrix {
     nodes
 }
 
-/// The evidence lower bound on the nodes; minus infinity where one has no density.
+/// Returns the evidence lower bound on the nodes; minus infinity if the density is zero at one of them.
 fn bound(law: &Law, values: &[f64]) -> f64 {
     let entropy = law.mean.len() as f64 * (0.5 + HALF_LN_TWO_PI) + law.log_volume();
     values.iter().sum::<f64>() / values.len() as f64 + entropy
 }
 
-/// One step of natural gradient, as long as it may be and still gain.
+/// Makes the longest step along the natural gradient (1, 1/2, 1/4, ...) that increases the bound.
 pub(super) fn iterate(target: &Unconstrained<'_>, fit: Fit, nodes: &Matrix) -> Refined {
     let count = nodes.rows();
     let points = fit.law.points(nodes);
@@ -71,7 +71,7 @@ pub(super) fn iterate(target: &Unconstrained<'_>, fit: Fit, nodes: &Matrix) -> R
     let mut evaluations = count as u64;
     let present = bound(&fit.law, &values);
     if !present.is_finite() {
-        // Some node has no density: a smaller law may have one everywhere.
+        // The density is zero at some node: a narrower distribution may avoid that.
         let law = fit.law.widened(0.5);
         let on = law.log_volume().is_finite();
         return Refined { fit: Fit { law, bound: fit.bound }, on, evaluations };
@@ -93,7 +93,7 @@ pub(super) fn iterate(target: &Unconstrained<'_>, fit: Fit, nodes: &Matrix) -> R
     Refined { fit: Fit { law: fit.law, bound: present }, on: false, evaluations }
 }
 
-/// The law after a step of length `rate`.
+/// Returns the distribution after a step of length `rate`; `None` if it is not a proper one.
 fn moved(law: &Law, nodes: &Matrix, pulled: &Matrix, rate: f64) -> Option<Law> {
     let (count, d) = (nodes.rows() as f64, nodes.columns());
     let products = transposed_multiply(nodes, pulled);
@@ -109,7 +109,7 @@ fn moved(law: &Law, nodes: &Matrix, pulled: &Matrix, rate: f64) -> Option<Law> {
     let slope: Vec<f64> =
         (0..d).map(|j| rate * pulled.column(j).iter().sum::<f64>() / count).collect();
     let shift =
-        lacuna::linalg::multiply_vector(&factor, &transposed_multiply_vector(&spread, &slope));
+        lacuna_linalg::multiply_vector(&factor, &transposed_multiply_vector(&spread, &slope));
     let mean = law.mean.iter().zip(shift).map(|(m, s)| m + s).collect();
     Law::new(mean, &multiply_transposed(&factor, &factor))
 }

@@ -1,6 +1,5 @@
-//! The nearest normal law against closed forms, and its judgement on itself.
+//! The variational approximation against closed forms, and its own diagnostics.
 
-use lacuna::contract;
 use lacuna::math::moments::{Moments, mean, variance};
 
 use super::*;
@@ -8,7 +7,7 @@ use crate::samplers::hamiltonian::laws::{
     Law, banana, bounded, complaints_about, conjugate, funnel, median_divergence, scale, scaled,
 };
 
-/// A whole run from prior draws; the harvest and the evaluations before it.
+/// Runs the sampler from prior draws; returns the harvest and the number of evaluations before it.
 fn reap(sampler: &Variational, target: &dyn Target, seed: u64) -> (Harvest, u64) {
     let root = Stream::root(seed);
     let points = target.prior_draws(sampler.paths, &root.named("start"));
@@ -27,7 +26,7 @@ fn reap(sampler: &Variational, target: &dyn Target, seed: u64) -> (Harvest, u64)
 fn it_keeps_the_contract_of_samplers() {
     for refine in [true, false] {
         let sampler = Variational { refine, ..Variational::default() };
-        assert_eq!(contract::sampler("variational", &sampler), Ok(()));
+        assert_eq!(lacuna_contract::sampler("variational", &sampler), Ok(()));
     }
 }
 
@@ -46,7 +45,7 @@ fn a_conjugate_normal_posterior_is_found() {
 #[test]
 fn a_normal_law_of_any_scale_is_found_exactly() {
     let (harvest, evaluations) = reap(&Variational::default(), &scaled(), 1);
-    // Weights of a normal law under itself are equal up to rounding.
+    // The weights of a normal density under itself are equal up to rounding.
     assert!(harvest.doubts.is_empty(), "{:?}", harvest.doubts);
     assert!(harvest.effective_size > 3999.0, "{}", harvest.effective_size);
     assert!(evaluations < 10_000, "{evaluations}");
@@ -89,7 +88,7 @@ fn unknowns_with_bounds_come_out_by_importance() {
 
 #[test]
 fn a_law_that_is_not_normal_is_told() {
-    // Cauchy's law in three independent coordinates, whose densities integrate to pi each.
+    // Cauchy densities in three independent coordinates, each of which integrates to pi.
     let cauchy = Law::free(vec![[0.0, 1.0]; 3], |x: &[f64]| {
         let value = -x.iter().map(|x| (x * x).ln_1p()).sum::<f64>();
         (value, x.iter().map(|x| -2.0 * x / (1.0 + x * x)).collect())
@@ -98,13 +97,13 @@ fn a_law_that_is_not_normal_is_told() {
     let (harvest, _) = reap(&plain, &cauchy, 3);
     assert!(harvest.doubts.iter().any(|d| d.contains("k-hat")), "{:?}", harvest.facts);
     assert!(harvest.evidence.is_none());
-    // Student's laws have tails for it.
+    // Student's t distributions have tails heavy enough for it.
     let (harvest, _) = reap(&Variational::default(), &cauchy, 3);
     assert!(harvest.facts[1].value.contains("Student"), "{:?}", harvest.facts);
     let evidence = harvest.evidence.unwrap();
     let expected = 3.0 * std::f64::consts::PI.ln();
     assert!((evidence.log - expected).abs() < 4.0 * evidence.error, "{evidence:?}");
-    // What weights cost on a curved ridge and in a funnel is told.
+    // The loss of accuracy on a curved ridge and in a funnel is reported.
     for harvest in [
         reap(&Variational::default(), &banana(), 3).0,
         reap(&Variational::default(), &funnel(), 3).0,
@@ -115,7 +114,7 @@ fn a_law_that_is_not_normal_is_told() {
 
 #[test]
 fn separate_maxima_and_unfinished_paths_are_told() {
-    // Two normal laws of weights 0.9 and 0.1, twenty standard deviations apart.
+    // Two normal densities of weights 0.9 and 0.1, twenty standard deviations apart.
     let law = Law::free(vec![[0.0, 10.0]], |x: &[f64]| {
         let (a, b) = (x[0] + 10.0, x[0] - 10.0);
         let (p, q) = (0.9 * (-0.5 * a * a).exp(), 0.1 * (-0.5 * b * b).exp());
@@ -127,7 +126,7 @@ fn separate_maxima_and_unfinished_paths_are_told() {
     let sampler = Variational { paths: 10, ..Variational::default() };
     let (harvest, _) = reap(&sampler, &law, 4);
     assert!(harvest.doubts.iter().any(|d| d.contains("several maxima")), "{:?}", harvest.doubts);
-    // Both are in the mixture, so that weights give each its share.
+    // Both are in the mixture, so that the weights give each its mass.
     let share = harvest.points.column(0).iter().filter(|x| **x > 0.0).count() as f64 / 4000.0;
     assert!((share - 0.1).abs() < 0.02, "{share}");
     let short = Variational { iterations: 1, ..Variational::default() };

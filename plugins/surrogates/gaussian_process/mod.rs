@@ -1,4 +1,4 @@
-//! `gaussian_process`: the response as a draw from a Gaussian process.
+//! `gaussian_process`: the response as a realisation of a Gaussian process.
 
 #[cfg(test)]
 pub(super) mod tests;
@@ -7,7 +7,7 @@ use lacuna::math::random::Stream;
 use lacuna::plugin::surrogate::{Surrogate, Training};
 use lacuna::plugin::{Component, Context, Emulator};
 use lacuna::run::{Progress, Stop};
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -16,60 +16,61 @@ use super::kriging::{
 };
 use super::principal_components::Components;
 
-/// A Gaussian process: the response between the runs is what a random function of that smoothness would be,
-/// given the runs.
+/// Gaussian process regression (kriging): between the runs the response is interpolated as a Gaussian process
+/// conditioned on the runs.
 ///
-/// Use it for few runs (tens to some hundreds) of a smooth response, and where the emulator's own uncertainty at
-/// each point matters: it is the one surrogate here whose variance grows away from the runs. Time grows
-/// with the cube of the number of runs; for many more of them, or to know Sobol' indices, take
-/// `polynomial_chaos`.
+/// Use it for few runs (tens to some hundreds) of a smooth response, and if the emulator's own uncertainty at each
+/// point matters: among the surrogates only this one and `polynomial_chaos_kriging` have a variance that grows away
+/// from the runs. The fitting time grows with the cube of the number of runs; for many more runs, or for Sobol'
+/// indices, use `polynomial_chaos`.
 ///
-/// The outputs are reduced to a few principal components, each of which is one Gaussian process of the parameters with a
-/// trend, a length scale for each parameter and a nugget (noise). The length scales and the nugget are those of
-/// the largest marginal likelihood, the trend's coefficients integrated out under a flat prior and the process's variance at its
-/// restricted estimate (REML). They are searched for from several starts by L-BFGS-B with the exact gradient.
-/// Leave-one-out errors are exact for the hyperparameters and components found, and so a little optimistic. The variance is
-/// that of a new run about the emulator's mean: it includes the uncertainty of the trend, the nugget and what the
-/// components leave out, but not the uncertainty of the hyperparameters.
+/// The outputs are reduced to a few principal components. Each component is one Gaussian process of the parameters
+/// with a trend, a length scale for each parameter and a nugget (noise). Length scales and nugget maximise the
+/// marginal likelihood, with the trend's coefficients integrated out under a flat prior and the variance of the
+/// process at its restricted estimate (REML); the maximum is sought from several starts by L-BFGS-B with the exact
+/// gradient. Leave-one-out errors are exact for the hyperparameters and components found, and therefore slightly
+/// optimistic. The variance is that of a new run about the emulator's mean: it includes the uncertainty of the trend,
+/// the nugget and the part that the components leave out, but not the uncertainty of the hyperparameters.
 ///
-/// Parameters are measured on the scale of their design, log-uniform and log-normal ones by their logarithms. Far outside
-/// of the design the mean returns to the trend.
+/// Parameters are measured on the scale of their design, log-uniform and log-normal ones by their logarithms. Far
+/// outside the design the mean returns to the trend.
 ///
-/// References: Rasmussen and Williams, *Gaussian Processes for Machine Learning*, MIT Press 2006; Sacks, Welch, Mitchell and
-/// Wynn, *Design and analysis of computer experiments*, Statistical Science 4 (1989) 409; Higdon, Gattiker, Williams and
-/// Rightley, *Computer model calibration using high-dimensional output*, Journal of the American
-/// Statistical Association 103 (2008) 570; Dubrule, *Cross validation of kriging in a unique neighborhood*,
-/// Mathematical Geology 15 (1983) 687; Harville, *Bayesian inference for variance components using
-/// only error contrasts*, Biometrika 61 (1974) 383.
+/// References: Rasmussen and Williams, *Gaussian Processes for Machine Learning*, MIT Press 2006; Sacks, Welch,
+/// Mitchell and Wynn, *Design and analysis of computer experiments*, Statistical Science 4 (1989) 409; Higdon,
+/// Gattiker, Williams and Rightley, *Computer model calibration using high-dimensional output*, Journal of the
+/// American Statistical Association 103 (2008) 570; Dubrule, *Cross validation of kriging in a unique neighborhood*,
+/// Mathematical Geology 15 (1983) 687; Harville, *Bayesian inference for variance components using only error
+/// contrasts*, Biometrika 61 (1974) 383.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GaussianProcess {
-    /// How the correlation of two points falls with their distance.
+    /// Correlation of two points as a function of their distance; it sets the smoothness of the response.
     pub kernel: Kernel,
-    /// What the response is like far from all runs.
+    /// Mean of the process far from all runs.
     pub trend: Trend,
-    /// Whether each component has length scales and a nugget of its own.
+    /// Choice between separate and common length scales and nuggets of the components.
     pub length_scales: LengthScales,
-    /// What runs differ by besides the smooth response, as a share of the variance of the process: a number, or
-    /// `"estimated"`.
+    /// Variance of the noise of the runs (the deviation from a smooth response), as a fraction of the variance of the
+    /// process: a number, or `"estimated"`.
     pub nugget: Nugget,
-    /// The principal components of the outputs: as many as carry a share of the variance, `{ variance = 0.99999 }`, or
+    /// Principal components of the outputs: as many as carry a fraction of the variance, `{ variance = 0.99999 }`, or
     /// `{ count = 20 }`; `"none"` gives every output a process of its own.
     pub components: Components,
-    /// How many starts the search for the hyperparameters has.
+    /// Number of starts of the search for the hyperparameters, at least 1. More starts take longer and are less
+    /// likely to miss the global maximum.
     pub starts: usize,
-    /// Where the hyperparameters are looked for.
+    /// Bounds of the hyperparameters.
     pub bounds: Bounds,
 }
 
-/// What the response is like far from all runs.
+/// Mean of the process far from all runs.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Trend {
-    /// A constant.
+    /// Constant mean.
     #[default]
     Constant,
-    /// A linear function of the parameters.
+    /// Linear function of the parameters.
     Linear,
 }
 
@@ -109,14 +110,14 @@ impl GaussianProcess {
         }
     }
 
-    /// Fits the processes to all outputs.
+    /// Fits the processes to all outputs; fails if the options or the runs do not permit it.
     pub fn krige(
         &self,
         training: &Training<'_>,
         stream: &Stream,
         progress: &Progress<'_>,
     ) -> Result<Kriging, Stop> {
-        let trends = |standards: &[Standard], scores: &lacuna::linalg::Matrix| {
+        let trends = |standards: &[Standard], scores: &lacuna_linalg::Matrix| {
             Ok(Trends::all(self.regressors(standards), scores.columns()))
         };
         self.settings().fit(training, trends, stream, progress)

@@ -1,13 +1,14 @@
-//! Beside a peer: the figures of scikit-learn were made with version 1.9.1 on the same runs.
+//! Comparison with a peer: the figures of scikit-learn were computed with version 1.9.1 on the same runs.
 
-use super::*;
 use lacuna::data::{Axis, Layout, Layouts, Parameter, Unit};
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::Forward;
 use lacuna::run::Silent;
+use lacuna_linalg::Matrix;
 
-/// Points of the unit cube by the additive recurrence of Roberts (2018), which any language repeats.
+use super::*;
+
+/// Points of the unit cube by the additive recurrence of Roberts (2018), which is easily repeated in any language.
 pub(in crate::surrogates) fn recurrence(skip: usize, count: usize, dimension: usize) -> Matrix {
     let mut root = 2.0_f64;
     for _ in 0..200 {
@@ -47,7 +48,7 @@ pub(in crate::surrogates) fn rmse(found: &Matrix, exact: &Matrix) -> Vec<f64> {
     (0..found.columns()).map(error).collect()
 }
 
-/// Branin's function (Dixon and Szego 1978), its domain the unit square.
+/// Branin's function (Dixon and Szego 1978), with its domain scaled to the unit square.
 fn branin(u: &[f64]) -> f64 {
     use std::f64::consts::PI;
     let (x, y) = (15.0 * u[0] - 5.0, 15.0 * u[1]);
@@ -55,7 +56,7 @@ fn branin(u: &[f64]) -> f64 {
     bent * bent + 10.0 * (1.0 - 1.0 / (8.0 * PI)) * x.cos() + 10.0
 }
 
-/// The function of Ishigami and Homma (1990), its domain the unit cube.
+/// The function of Ishigami and Homma (1990), with its domain scaled to the unit cube.
 pub(in crate::surrogates) fn ishigami(u: &[f64]) -> f64 {
     let x: Vec<f64> = u.iter().map(|u| (2.0 * u - 1.0) * std::f64::consts::PI).collect();
     x[0].sin() + 7.0 * x[1].sin().powi(2) + 0.1 * x[2].powi(4) * x[0].sin()
@@ -86,9 +87,10 @@ impl Case {
     }
 }
 
-/// Source: scikit-learn 1.9.1, `GaussianProcessRegressor(ConstantKernel(1, (1e-3, 1e6)) * k, alpha=1e-10,
-/// normalize_y=True, n_restarts_optimizer=8, random_state=0)` with `k` of length scales 0.5 between 1e-2 and 1e2. Its
-/// noise may be 1e-16 of the process's variance, so that the nugget here must be allowed to be small too.
+/// Source: scikit-learn 1.9.1,
+/// `GaussianProcessRegressor(ConstantKernel(1, (1e-3, 1e6)) * k, alpha=1e-10, normalize_y=True, n_restarts_optimizer=8, random_state=0)`
+/// with `k` of length scales 0.5 between 1e-2 and 1e2. Its noise may be 1e-16 of the process's variance, so that the
+/// nugget must be allowed to be as small here.
 #[test]
 fn errors_are_not_above_those_of_a_peer() {
     let cases = [
@@ -108,8 +110,8 @@ fn errors_are_not_above_those_of_a_peer() {
     }
 }
 
-/// Within how many standard errors the truth lies: of 2000 points about 95 % within 1.96 if the variance is
-/// right; a likelihood estimate from 100 runs of one function is not that exact.
+/// If the variance is right, about 95 % of 2000 points lie within 1.96 standard errors of the truth; a likelihood
+/// estimate from 100 runs of one function is not that accurate.
 #[test]
 fn the_variance_covers_the_error() {
     for trend in [Trend::Constant, Trend::Linear] {
@@ -127,7 +129,7 @@ fn the_variance_covers_the_error() {
     }
 }
 
-/// Noise of a known variance that the nugget must find: its share of the process's variance times that variance.
+/// Noise of a known variance must be found by the nugget: nugget times the variance of the process.
 #[test]
 fn noise_is_found() {
     let mut case = Case::new(2, |u| 3.0 * (4.0 * u[0]).sin() + u[1]);
@@ -138,12 +140,12 @@ fn noise_is_found() {
     let emulator = GaussianProcess::default()
         .krige(&case.training(), &Stream::root(1), &Progress::new(&Silent))
         .unwrap();
-    // The variance of a new run is that of the noise where runs are dense; 100 runs tell it to 1/sqrt(50).
+    // Where runs are dense, the variance of a new run is that of the noise; 100 runs determine it to 1/sqrt(50).
     let variance = emulator.variance(&case.fresh).unwrap();
     let typical = variance.as_slice().iter().sum::<f64>() / 2000.0;
     assert!((0.6..1.5).contains(&(typical / 0.04)), "{typical}");
     assert!(rmse(&emulator.mean(&case.fresh), &case.exact)[0] < 0.1);
-    // Left out runs carry their noise.
+    // Left-out runs include their noise.
     let error = emulator.fit_error();
     let left_out: f64 = error.residuals.as_slice().iter().map(|e| e * e).sum::<f64>() / 100.0;
     assert!((0.6..1.6).contains(&(left_out / 0.04)), "{left_out}");

@@ -1,10 +1,10 @@
 //! Gaussian processes over the components of the outputs.
 
-use lacuna::linalg::{Matrix, multiply, transposed_multiply};
 use lacuna::plugin::forward::Linear;
 use lacuna::plugin::surrogate::FitError;
 use lacuna::plugin::{Emulator, Fact, Forward};
 use lacuna::run::Stop;
+use lacuna_linalg::{Matrix, multiply, transposed_multiply};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -14,37 +14,38 @@ use super::regressors::{Regressors, Written};
 use super::standard::{Standard, standardised};
 use crate::surrogates::polynomial_chaos::bytes;
 
-/// So many points are emulated at a time, so that their correlations stay in the cache.
+/// Number of points emulated at a time, so that their correlations stay in the cache.
 const BLOCK: usize = 64;
 
 /// The fitted surrogate: `y(x) = mean + sum_c t_c(x) loadings_c`, each score `t_c` a Gaussian process.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kriging {
-    /// The plugin that fitted it.
+    /// Name of the plugin that fitted it.
     pub plugin: &'static str,
-    /// The correlation function of all fields.
+    /// Correlation function of all fields.
     pub kernel: Kernel,
-    /// The names of the parameters.
+    /// Names of the parameters.
     pub names: Vec<String>,
-    /// Their standard variables.
+    /// Standard variables of the parameters.
     pub standards: Vec<Standard>,
-    /// The functions of which the fields' trends are made.
+    /// Regressors from which the trends of the fields are built.
     pub regressors: Regressors,
-    /// The processes.
+    /// Gaussian processes of the components.
     pub fields: Vec<Field>,
-    /// The runs' parameters in physical units, one run a row.
+    /// Parameters of the runs in physical units (`runs x parameters`).
     pub points: Matrix,
-    /// The scores of the components, one run a row.
+    /// Scores of the components (`runs x components`).
     pub scores: Matrix,
-    /// The mean of each output over the runs, then what one unit of each score adds: `(1 + components) x outputs`.
+    /// Mean of each output over the runs, then the contribution of one unit of each score
+    /// (`(1 + components) x outputs`).
     pub loadings: Matrix,
-    /// The mean square of what the components leave out of each output.
+    /// Mean square of the part of each output that the components leave out.
     pub truncation: Vec<f64>,
-    /// The leave-one-out errors.
+    /// Leave-one-out errors.
     pub fit_error: FitError,
 }
 
-/// All of a surrogate but its large arrays.
+/// All of a surrogate except its large arrays.
 #[derive(Debug, Serialize, Deserialize)]
 struct Header {
     kernel: Kernel,
@@ -57,7 +58,7 @@ struct Header {
     outputs: usize,
 }
 
-/// The processes of these choices given the runs; none where one of them cannot be.
+/// Conditions the processes of these choices on the runs; `None` if one of them cannot be computed.
 pub fn condition(
     kernel: Kernel,
     choices: Vec<Choice>,
@@ -72,7 +73,8 @@ pub fn condition(
 }
 
 impl Kriging {
-    /// Calls `give` for blocks of points with their standard variables (one a column) and regressors.
+    /// Calls `give` for blocks of points, with the index of the first point, their standard variables (one point per
+    /// column) and their regressors.
     fn in_blocks(&self, points: &Matrix, mut give: impl FnMut(usize, &Matrix, &Matrix)) {
         for first in (0..points.rows()).step_by(BLOCK) {
             let rows: Vec<usize> = (first..points.rows().min(first + BLOCK)).collect();
@@ -81,7 +83,7 @@ impl Kriging {
         }
     }
 
-    /// The file that [`Emulator::save`] of the plugin's surrogate wrote.
+    /// Loads the file that [`Emulator::save`] wrote; fails if it is damaged or from another plugin.
     pub fn from_bytes(plugin: &'static str, bytes: &[u8]) -> Result<Self, Stop> {
         let damaged = || bytes::damaged_as(plugin);
         let (header, mut numbers) = bytes::read_as::<Header>(plugin, bytes)?;
@@ -226,7 +228,7 @@ impl Emulator for Kriging {
     }
 }
 
-/// The scores and the constant are the basis functions: few, whatever the number of outputs and runs.
+/// The constant and the scores are the basis functions: few, whatever the number of outputs and runs.
 impl Linear for Kriging {
     fn coefficients(&self) -> &Matrix {
         &self.loadings
@@ -269,7 +271,7 @@ impl Linear for Kriging {
     }
 }
 
-/// The least, the median and the largest of some numbers, in three digits.
+/// Formats the least, the median and the largest of some numbers with three digits.
 fn spread(mut numbers: Vec<f64>) -> String {
     numbers.sort_by(f64::total_cmp);
     let text = |x: f64| {

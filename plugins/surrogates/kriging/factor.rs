@@ -1,6 +1,6 @@
-//! A covariance and a trend, factored: everything that universal kriging asks of them.
+//! Factors of a covariance and a trend, from which all quantities of universal kriging follow.
 
-use lacuna::linalg::{
+use lacuna_linalg::{
     self, Cholesky, Matrix, gram_lower, multiply, solve_upper_matrix, thin_qr, transposed_multiply,
 };
 
@@ -8,11 +8,11 @@ use lacuna::linalg::{
 /// `P = K^-1 - K^-1 F (F' K^-1 F)^-1 F' K^-1 = L^-T (I - Q Q') L^-1`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Factor {
-    /// `L^-1`, `N x N`.
+    /// `L^-1` (`N x N`).
     pub lower_inverse: Matrix,
-    /// `Q`, `N x p`.
+    /// `Q` (`N x p`).
     pub q: Matrix,
-    /// `R^-1`, `p x p`, upper triangular.
+    /// `R^-1` (`p x p`), upper triangular.
     pub r_inverse: Matrix,
     /// `log |K|`.
     pub log_determinant: f64,
@@ -20,22 +20,23 @@ pub struct Factor {
     pub log_information: f64,
 }
 
-/// Scores seen through the factors.
+/// Solutions for a set of scores `Y`.
 pub struct Weights {
-    /// `P Y`, `N x C`.
+    /// `P Y` (`N x C`).
     pub alpha: Matrix,
-    /// The coefficients of the trend by generalised least squares, `p x C`.
+    /// Coefficients of the trend by generalised least squares (`p x C`).
     pub beta: Matrix,
-    /// `Y' P Y`, its diagonal.
+    /// Diagonal of `Y' P Y`.
     pub squares: Vec<f64>,
 }
 
-/// The jitters that are tried one after the other where a covariance has no factor to working precision.
+/// Jitters added to the diagonal in turn if a covariance cannot be factored to working precision.
 const JITTERS: [f64; 8] = [0.0, 1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8];
 
 impl Factor {
-    /// The factors of a covariance (its lower triangle, of unit size) and a trend `F` (`N x p`), with the jitter that had to
-    /// be added to the covariance's diagonal; `None` when no jitter helps or the trend's columns are dependent.
+    /// Factors a covariance (its lower triangle, of unit size) and a trend `F` (`N x p`); returns also the jitter
+    /// that had to be added to the diagonal of the covariance. `None` if no jitter suffices or the columns of the
+    /// trend are dependent.
     pub fn new(mut covariance: Matrix, trend: &Matrix) -> Option<(Self, f64)> {
         let mut added = 0.0;
         for jitter in JITTERS {
@@ -53,7 +54,7 @@ impl Factor {
     fn of(cholesky: &Cholesky, trend: &Matrix) -> Option<Self> {
         let lower_inverse = cholesky.lower_inverse();
         let white = multiply(&lower_inverse, trend);
-        let linalg::Qr { q, r } = thin_qr(&white).ok()?;
+        let lacuna_linalg::Qr { q, r } = thin_qr(&white).ok()?;
         let p = r.rows();
         let size = |i: usize| r[(i, i)].abs();
         let largest = (0..p).map(size).fold(0.0, f64::max);
@@ -71,17 +72,17 @@ impl Factor {
         })
     }
 
-    /// `N`.
+    /// Returns `N`.
     pub fn size(&self) -> usize {
         self.lower_inverse.rows()
     }
 
-    /// `p`.
+    /// Returns `p`.
     pub fn terms(&self) -> usize {
         self.q.columns()
     }
 
-    /// `P Y`, the trend's coefficients and the squares for scores `Y`, `N x C`.
+    /// Returns `P Y`, the trend's coefficients and the squares for scores `Y` (`N x C`).
     pub fn weights(&self, scores: &Matrix) -> Weights {
         let (white, along) = self.split(scores);
         let mut squares = vec![0.0; scores.columns()];
@@ -95,12 +96,12 @@ impl Factor {
         }
     }
 
-    /// `(I - Q Q') L^-1 Y`: inner products of its columns are those of `P`.
+    /// Returns `(I - Q Q') L^-1 Y`; inner products of its columns are those with `P`.
     pub fn whitened(&self, scores: &Matrix) -> Matrix {
         self.split(scores).0
     }
 
-    /// `(I - Q Q') L^-1 Y` and `Q' L^-1 Y`.
+    /// Returns `(I - Q Q') L^-1 Y` and `Q' L^-1 Y`.
     fn split(&self, scores: &Matrix) -> (Matrix, Matrix) {
         let mut white = multiply(&self.lower_inverse, scores);
         let along = transposed_multiply(&self.q, &white);
@@ -109,17 +110,17 @@ impl Factor {
         (white, along)
     }
 
-    /// `B` with `K^-1 F (F' K^-1 F)^-1 F' K^-1 = B B'`, `N x p`.
+    /// Returns `B` with `K^-1 F (F' K^-1 F)^-1 F' K^-1 = B B'` (`N x p`).
     pub fn trend_directions(&self) -> Matrix {
         transposed_multiply(&self.lower_inverse, &self.q)
     }
 
-    /// `K^-1`.
+    /// Returns `K^-1`.
     pub fn inverse(&self) -> Matrix {
         gram_lower(&self.lower_inverse)
     }
 
-    /// The diagonals of `P` and of `K^-1`.
+    /// Returns the diagonals of `P` and of `K^-1`.
     pub fn precisions(&self) -> Vec<(f64, f64)> {
         let n = self.size();
         let mut diagonal = vec![0.0; n];

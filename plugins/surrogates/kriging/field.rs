@@ -1,58 +1,59 @@
 //! Gaussian processes with given hyperparameters, conditioned on their scores: universal kriging.
 
-use lacuna::linalg::vector::dot;
-use lacuna::linalg::{Matrix, multiply, multiply_transposed};
+use lacuna_linalg::vector::dot;
+use lacuna_linalg::{Matrix, multiply, multiply_transposed};
 use serde::{Deserialize, Serialize};
 
 use super::factor::{Factor, Weights};
 use super::kernel::Kernel;
 use super::likelihood::{Hyperparameters, measured, restricted};
 
-/// What of a field is chosen; the rest follows from the runs.
+/// Choices that define a field; the rest follows from the runs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Choice {
-    /// Which components it gives.
+    /// Indices of its components.
     pub components: Vec<usize>,
-    /// Which regressors make its trend.
+    /// Indices of the regressors of its trend.
     pub terms: Vec<usize>,
-    /// One a parameter, in units of the standard variable.
+    /// Length scale of each parameter, in units of the standard variable.
     pub length_scales: Vec<f64>,
-    /// The noise, as a share of the variance of the process.
+    /// Variance of the noise as a fraction of the variance of the process.
     pub nugget: f64,
 }
 
-/// The runs as fields see them.
+/// The runs as used by the fields.
 #[derive(Debug, Clone, Copy)]
 pub struct Runs<'a> {
-    /// The standard variables, one run a column.
+    /// Standard variables, one run per column.
     pub points: &'a Matrix,
-    /// All regressors at the runs, `runs x regressors`.
+    /// All regressors at the runs (`runs x regressors`).
     pub regressors: &'a Matrix,
-    /// The scores of all components, `runs x components`.
+    /// Scores of all components (`runs x components`).
     pub scores: &'a Matrix,
 }
 
-/// Independent Gaussian processes of one covariance and trend, one for each of its components.
+/// Independent Gaussian processes with a common covariance and trend, one for each of its components.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
     pub choice: Choice,
     kernel: Kernel,
-    /// The nugget with the jitter that the factorisation needed.
+    /// Nugget plus the jitter that the factorisation needed.
     pub nugget: f64,
-    /// The runs in length scales, one a column.
+    /// Runs in units of the length scales, one run per column.
     points: Matrix,
     factor: Factor,
-    /// One component a row: `components x runs` and `components x terms`.
+    /// `alpha` (`components x runs`) and `beta` (`components x terms`), one component per row.
     alpha: Matrix,
     beta: Matrix,
-    /// The variance of each process.
+    /// Variance of each process.
     variances: Vec<f64>,
-    /// The restricted log-likelihood of the scores.
+    /// Restricted log-likelihood of the scores.
     pub log_likelihood: f64,
 }
 
 impl Field {
-    /// The processes given the runs; none where the covariance has no factor, or the runs do not determine the trend.
+    /// Conditions the processes on the runs; `None` if the covariance cannot be factored or the runs do not determine
+    /// the trend.
     pub fn new(kernel: Kernel, choice: Choice, runs: Runs<'_>) -> Option<Self> {
         let points = measured(runs.points, &choice.length_scales);
         let trend = runs.regressors.select_columns(&choice.terms);
@@ -79,10 +80,11 @@ impl Field {
         })
     }
 
-    /// The mean of each component at points in standard variables (one a column) where the regressors
-    /// have these values, `points x components`.
+    /// Returns the mean of each component (`points x components`) at points in standard variables (one per column)
+    /// with these values of the regressors.
     ///
-    /// Each point by itself, so that its bits do not depend on its neighbours: the sums cancel.
+    /// Each point is computed separately, so that its bits do not depend on the other points in the batch: the sums
+    /// involve cancellation.
     pub fn mean(&self, points: &Matrix, regressors: &Matrix) -> Matrix {
         let place = measured(points, &self.choice.length_scales);
         let above = self.kernel.above_one(&place, &self.points);
@@ -94,8 +96,8 @@ impl Field {
         })
     }
 
-    /// The variance of a new run's score about the mean, with the share that the trend's estimate has in it, `points x
-    /// components`: `s^2 (1 + nugget - k' K^-1 k + u' (F' K^-1 F)^-1 u)` with `u = f - F' K^-1 k`.
+    /// Returns the variance of a new run's score about the mean (`points x components`), including the uncertainty of
+    /// the trend: `s^2 (1 + nugget - k' K^-1 k + u' (F' K^-1 F)^-1 u)` with `u = f - F' K^-1 k`.
     pub fn variance(&self, points: &Matrix, regressors: &Matrix) -> Matrix {
         let white = multiply_transposed(&self.correlations(points), &self.factor.lower_inverse);
         let trend = regressors.select_columns(&self.choice.terms);
@@ -110,8 +112,8 @@ impl Field {
         Matrix::from_fn(shares.len(), self.variances.len(), |i, c| self.variances[c] * shares[i])
     }
 
-    /// The derivatives of each component (rows) by the standard variables at a point, and by the regressors
-    /// (`terms` of its choice).
+    /// Returns the derivatives of each component (rows) with respect to the standard variables at a point, and with
+    /// respect to the regressors (`terms` of its choice).
     pub fn gradient(&self, point: &[f64]) -> (Matrix, &Matrix) {
         let scales = &self.choice.length_scales;
         let place: Vec<f64> = point.iter().zip(scales).map(|(z, l)| z / l).collect();
@@ -123,11 +125,11 @@ impl Field {
         (gradient, &self.beta)
     }
 
-    /// What each run's score is above the mean that the other runs give it, the hyperparameters kept and the
-    /// trend fitted anew, `runs x components`: `(P y)_i / P_ii` (Dubrule 1983; Rasmussen and Williams 2006,
-    /// equation 5.12).
+    /// Returns the leave-one-out residuals of the scores (`runs x components`), with the hyperparameters kept and the
+    /// trend refitted: `(P y)_i / P_ii` (Dubrule 1983; Rasmussen and Williams 2006, equation 5.12).
     pub fn left_out(&self) -> Matrix {
-        // A run that alone determines a term of the trend has no other runs to predict it.
+        // If a run alone determines a term of the trend, `P_ii` is zero: the other runs cannot predict it. The floor
+        // keeps the residual finite.
         let precisions: Vec<f64> =
             self.factor.precisions().into_iter().map(|(p, k)| p.max(1e-13 * k)).collect();
         Matrix::from_fn(precisions.len(), self.alpha.rows(), |i, c| {
@@ -141,7 +143,7 @@ impl Field {
 }
 
 impl Choice {
-    /// The choice of these hyperparameters.
+    /// Returns the choice with these hyperparameters.
     pub fn new(components: Vec<usize>, terms: Vec<usize>, found: Hyperparameters) -> Self {
         let Hyperparameters { length_scales, nugget } = found;
         Self { components, terms, length_scales, nugget }

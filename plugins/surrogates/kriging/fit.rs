@@ -1,11 +1,11 @@
-//! From runs to Gaussian processes.
+//! Fit of Gaussian processes to runs.
 
-use lacuna::linalg::{Matrix, multiply};
 use lacuna::math::random::Stream;
 use lacuna::plugin::Context;
 use lacuna::plugin::surrogate::{FitError, Training};
 use lacuna::run::{Progress, Stop};
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
+use lacuna_linalg::{Matrix, multiply};
 use rayon::prelude::*;
 
 use super::emulator::{Kriging, condition};
@@ -19,47 +19,47 @@ use super::standard::{Standard, standardised};
 use crate::surrogates::polynomial_chaos::check_numbers;
 use crate::surrogates::principal_components::{Components, PrincipalComponents};
 
-/// What all surrogates of Gaussian processes are told.
+/// Settings common to all surrogates of Gaussian processes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// The plugin's name.
+    /// Name of the plugin.
     pub plugin: &'static str,
-    /// The correlation function.
+    /// Correlation function.
     pub kernel: Kernel,
-    /// Whether all components share one set of hyperparameters.
+    /// Choice between separate and common hyperparameters of the components.
     pub length_scales: LengthScales,
-    /// The noise.
+    /// Noise of the runs.
     pub nugget: Nugget,
-    /// What stands for the outputs.
+    /// Reduction of the outputs to components.
     pub components: Components,
-    /// The number of starts of the search.
+    /// Number of starts of the search.
     pub starts: usize,
-    /// Where it searches.
+    /// Bounds of the search.
     pub bounds: Bounds,
 }
 
-/// The trends from which each component takes the best.
+/// Candidate trends, from which each component takes the best.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trends {
-    /// The functions of which all trends are made.
+    /// Regressors from which all trends are built.
     pub regressors: Regressors,
-    /// For each component sets of regressors, one at least.
+    /// For each component, one or more sets of regressors.
     pub candidates: Vec<Vec<Vec<usize>>>,
 }
 
 impl Trends {
-    /// The same trend for all components: all of these regressors.
+    /// Gives all components the same trend, with all of these regressors.
     pub fn all(regressors: Regressors, components: usize) -> Self {
         let terms: Vec<usize> = (0..regressors.count()).collect();
         Self { regressors, candidates: vec![vec![terms]; components] }
     }
 }
 
-/// Outputs whose standard deviation over the runs is below this share of the largest response do not vary.
+/// Standard deviation over the runs, as a fraction of the largest response, below which an output counts as constant.
 const ROUND_OFF: f64 = 1e-13;
 
 impl Settings {
-    /// Complains about what is wrong with the options, and about designs that have no standard variable.
+    /// Reports invalid options, and designs for which no standard variable exists.
     pub fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
         for (key, message) in self.faults() {
             complaints.at(key).say(message);
@@ -69,7 +69,7 @@ impl Settings {
         }
     }
 
-    /// What is wrong with the settings: the option, and in words.
+    /// Returns what is wrong with the settings: the option, and a description.
     fn faults(&self) -> Vec<(&'static str, String)> {
         let mut faults = self.bounds.faults();
         faults.extend(self.components.fault().map(|words| ("components", words)));
@@ -80,7 +80,7 @@ impl Settings {
         faults
     }
 
-    /// Fits the processes; `trends` makes them from the standard variables and the scores.
+    /// Fits the processes; `trends` builds the candidate trends from the standard variables and the scores.
     pub fn fit(
         &self,
         training: &Training<'_>,
@@ -123,7 +123,7 @@ impl Settings {
         })
     }
 
-    /// The hyperparameters and the trend of each field.
+    /// Returns hyperparameters and trend of each field.
     fn choices(
         &self,
         runs: Runs<'_>,
@@ -150,8 +150,8 @@ impl Settings {
         groups.into_par_iter().enumerate().map(choose).collect()
     }
 
-    /// The best trend of a field with its hyperparameters: that with the least error of the runs left out, corrected for
-    /// the choice of the terms by the same runs with `N / (N - p) (1 + p / N)` (Chapelle, Vapnik and Bengio
+    /// Chooses the best trend of a field, with its hyperparameters: that with the smallest leave-one-out error,
+    /// corrected by `N / (N - p) (1 + p / N)` because the same runs choose the terms (Chapelle, Vapnik and Bengio
     /// 2002, for orthonormal regressors).
     fn choose(
         &self,
@@ -175,7 +175,7 @@ impl Settings {
         found.into_iter().reduce(better).map(|(_, choice)| choice)
     }
 
-    /// The hyperparameters of the largest likelihood for a trend.
+    /// Maximises the likelihood of the hyperparameters for a given trend.
     fn maximise(
         &self,
         runs: Runs<'_>,
@@ -224,7 +224,7 @@ fn standards(training: &Training<'_>) -> Result<Vec<Standard>, Stop> {
     parameters.map(standard).collect()
 }
 
-/// Scores of root mean square 1, and what they were divided by.
+/// Scales the scores to a root mean square of 1; returns also the divisors.
 fn unit_scores(scores: &Matrix) -> (Matrix, Vec<f64>) {
     let size = |c| {
         let column = scores.column(c);
@@ -234,7 +234,8 @@ fn unit_scores(scores: &Matrix) -> (Matrix, Vec<f64>) {
     (Matrix::from_fn(scores.rows(), sizes.len(), |i, c| scores[(i, c)] / sizes[c]), sizes)
 }
 
-/// The error of each run's outputs when the run is left out: that of the scores, and what the components leave out.
+/// Returns the leave-one-out error of each run's outputs: that of the scores plus the part that the components leave
+/// out.
 fn fit_error(
     responses: &Matrix,
     fields: &[Field],

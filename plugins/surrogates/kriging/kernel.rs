@@ -1,30 +1,30 @@
 //! Correlation functions of distance.
 
-use lacuna::linalg::Matrix;
-use lacuna::linalg::radial::{exponentials, polynomials, squared_distances};
+use lacuna_linalg::Matrix;
+use lacuna_linalg::radial::{exponentials, polynomials, squared_distances};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The correlation of two points as a function of `r`, the length of their difference measured in length scales
+/// Correlation of two points as a function of `r`, the length of their difference measured in length scales
 /// (Rasmussen and Williams 2006, section 4.2.1).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Kernel {
-    /// `(1 + sqrt(5) r + 5 r^2 / 3) exp(-sqrt(5) r)`: responses with two derivatives. The usual choice for
+    /// `(1 + sqrt(5) r + 5 r^2 / 3) exp(-sqrt(5) r)`: twice differentiable responses. The usual choice for
     /// simulators.
     #[default]
     #[serde(rename = "matern_5_2")]
     Matern52,
-    /// `(1 + sqrt(3) r) exp(-sqrt(3) r)`: responses with one derivative.
+    /// `(1 + sqrt(3) r) exp(-sqrt(3) r)`: once differentiable responses.
     #[serde(rename = "matern_3_2")]
     Matern32,
-    /// `exp(-r^2 / 2)`: responses that are smooth without end. The most accurate where that holds, and
-    /// overconfident where it does not.
+    /// `exp(-r^2 / 2)`: infinitely differentiable responses. The most accurate choice if the response is that smooth,
+    /// and overconfident if it is not.
     #[serde(rename = "squared_exponential")]
     SquaredExponential,
 }
 
 impl Kernel {
-    /// The name in a study.
+    /// Returns the name of the kernel in a study.
     pub fn name(self) -> &'static str {
         match self {
             Self::Matern52 => "matern_5_2",
@@ -33,8 +33,8 @@ impl Kernel {
         }
     }
 
-    /// Replaces squared distances `r^2` by correlations `c(r)`, and fills `slopes` with `-c'(r) / r`: the
-    /// derivative by the logarithm of a length scale, divided by that coordinate's part of `r^2`.
+    /// Replaces squared distances `r^2` by correlations `c(r)`, and fills `slopes` with `-c'(r) / r`: the derivative
+    /// with respect to the logarithm of a length scale, divided by that coordinate's contribution to `r^2`.
     fn evaluate(self, squares: &mut [f64], slopes: &mut [f64]) {
         let rate = match self {
             Self::Matern52 => 5.0,
@@ -66,8 +66,8 @@ impl Kernel {
         }
     }
 
-    /// The correlations among points (one a column, in length scales) and their slopes, below the diagonal; the
-    /// diagonal is `1 + nugget`.
+    /// Returns the correlations among points (one per column, in length scales) and their slopes, below the diagonal;
+    /// the diagonal of the correlations is `1 + nugget`.
     pub fn among(self, points: &Matrix, nugget: f64) -> (Matrix, Matrix) {
         let n = points.columns();
         let (mut correlations, mut slopes) = (Matrix::zeros(n, n), Matrix::zeros(n, n));
@@ -82,7 +82,7 @@ impl Kernel {
         (correlations, slopes)
     }
 
-    /// The correlations of some points (one a column) with others, `points x others`.
+    /// Returns the correlations of some points (one per column) with others (`points x others`).
     pub fn between(self, points: &Matrix, others: &Matrix) -> Matrix {
         let mut correlations = Matrix::zeros(points.columns(), others.columns());
         let mut slopes = vec![0.0; others.columns()];
@@ -94,10 +94,10 @@ impl Kernel {
         correlations
     }
 
-    /// What the correlations of some points (one a column) with others are above 1, `points x others`.
+    /// Returns the correlations of some points (one per column) with others, minus 1 (`points x others`).
     ///
-    /// Weights of smooth responses are large and of both signs, so that in their sum with the correlations the ones
-    /// cancel and leave round-off. Near points have these numbers to their own last digit.
+    /// The weights of smooth responses are large and of both signs, so that in their sum with the correlations the
+    /// ones cancel and leave rounding errors. For near points these differences are accurate to the last digit.
     pub fn above_one(self, points: &Matrix, others: &Matrix) -> Matrix {
         let mut above = Matrix::zeros(points.columns(), others.columns());
         let mut slopes = vec![0.0; others.columns()];
@@ -121,7 +121,7 @@ impl Kernel {
         above
     }
 
-    /// The variable of the [series](Self::series) at a squared distance.
+    /// Returns the variable of the [series](Self::series) at a squared distance.
     fn argument(self, square: f64) -> f64 {
         match self {
             Self::Matern52 => (5.0 * square).sqrt(),
@@ -130,7 +130,7 @@ impl Kernel {
         }
     }
 
-    /// The Taylor coefficients of the correlation less 1, enough of them for arguments below 1.
+    /// Returns the Taylor coefficients of the correlation minus 1, enough of them for arguments below 1.
     fn series(self) -> [f64; 22] {
         let mut factorial = 1.0;
         std::array::from_fn(|n| {
@@ -146,8 +146,8 @@ impl Kernel {
         })
     }
 
-    /// The derivatives of the correlations of one point with others (one a column) by the point's coordinates,
-    /// `coordinates x others`, all in length scales.
+    /// Returns the derivatives of the correlations of one point with others (one per column) with respect to the
+    /// point's coordinates (`coordinates x others`), all in length scales.
     pub fn gradient(self, point: &[f64], others: &Matrix) -> Matrix {
         let mut squares = vec![0.0; others.columns()];
         let mut slopes = squares.clone();
@@ -187,7 +187,7 @@ mod tests {
                 let r = others[(0, j)];
                 let expected = closed_form(kernel, r);
                 assert!((found[(0, j)] - expected).abs() < 1e-15);
-                // Moving the point up shortens the distance.
+                // A larger coordinate of the point makes the distance smaller.
                 let difference =
                     (closed_form(kernel, r - 1e-6) - closed_form(kernel, r + 1e-6)) / 2e-6;
                 assert!(j == 0 || (gradient[(0, j)] - difference).abs() < 1e-9);
@@ -195,8 +195,8 @@ mod tests {
         }
     }
 
-    /// Beside the closed form; for near points, where its difference from 1 keeps few digits, beside the first term of
-    /// the series.
+    /// Compares with the closed form; for near points, where its difference from 1 keeps few digits, with the first
+    /// terms of the series.
     #[test]
     fn what_is_above_one_keeps_its_digits() {
         for kernel in ALL {

@@ -1,53 +1,53 @@
-//! The restricted likelihood of a kernel's length scales and nugget.
+//! Restricted likelihood of the length scales and the nugget.
 
 use std::f64::consts::TAU;
 
-use lacuna::linalg::{Matrix, multiply_transposed, vector};
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::Target;
+use lacuna_linalg::{Matrix, multiply_transposed, vector};
 
 use super::factor::Factor;
 use super::kernel::Kernel;
 use super::options::{Bounds, Nugget};
 
-/// What a Gaussian process has besides the scale and the trend, which are known once these are.
+/// Hyperparameters of a Gaussian process; its variance and trend follow from them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hyperparameters {
-    /// One a parameter, in units of the standard variable.
+    /// Length scale of each parameter, in units of the standard variable.
     pub length_scales: Vec<f64>,
-    /// The variance of the noise as a share of the variance of the process.
+    /// Variance of the noise as a fraction of the variance of the process.
     pub nugget: f64,
 }
 
-/// Scores with a trend and a covariance that they share: `Y = F B + Z`, the columns of `Z` independent Gaussian processes
-/// with the covariance `s_c^2 (C + nugget I)`.
+/// Scores with a common trend and covariance: `Y = F B + Z`, the columns of `Z` independent Gaussian processes with
+/// the covariance `s_c^2 (C + nugget I)`.
 ///
-/// The trend's coefficients are integrated out under a flat prior and each `s_c^2` is at its restricted
-/// estimate `y' P y / (N - p)`, which leaves the restricted (marginal) log-likelihood of the length scales and the nugget:
-/// `-1/2 sum_c [(N - p) (1 + log 2 pi s_c^2) + log |K| + log |F' K^-1 F|]` (Rasmussen and Williams 2006,
-/// equation 2.45; Harville 1974). Its derivative by a hyperparameter is `-1/2 sum_c [tr(P dK) - a_c' dK a_c / s_c^2]`
+/// The trend's coefficients are integrated out under a flat prior and each `s_c^2` is at its restricted estimate `y'
+/// P y / (N - p)`, which leaves the restricted (marginal) log-likelihood of the length scales and the nugget: `-1/2
+/// sum_c [(N - p) (1 + log 2 pi s_c^2) + log |K| + log |F' K^-1 F|]` (Rasmussen and Williams 2006, equation 2.45;
+/// Harville 1974). Its derivative with respect to a hyperparameter is `-1/2 sum_c [tr(P dK) - a_c' dK a_c / s_c^2]`
 /// with `a_c = P y_c`.
 ///
-/// As a density its coordinates are the logarithms of the length scales, then that of the nugget where it is
+/// As a density its coordinates are the logarithms of the length scales, followed by that of the nugget if it is
 /// estimated.
 #[derive(Debug, Clone, Copy)]
 pub struct Restricted<'a> {
     pub kernel: Kernel,
-    /// The runs in standard variables, one a column.
+    /// Runs in standard variables, one per column.
     pub points: &'a Matrix,
-    /// `F`, `N x p`.
+    /// `F` (`N x p`).
     pub trend: &'a Matrix,
-    /// `Y`, `N x C`.
+    /// `Y` (`N x C`).
     pub scores: &'a Matrix,
     pub bounds: Bounds,
     pub nugget: Nugget,
 }
 
-/// Residuals of scores of size 1 whose mean square is below this are round-off.
+/// Mean square of the residuals of scores of size 1 below which they count as rounding errors.
 const ROUND_OFF: f64 = 1e-28;
 
 impl Restricted<'_> {
-    /// The hyperparameters at a point of the density.
+    /// Returns the hyperparameters at a point of the density.
     pub fn at(&self, point: &[f64]) -> Hyperparameters {
         let d = self.points.rows();
         let length_scales = point[..d].iter().map(|x| x.exp()).collect();
@@ -58,7 +58,7 @@ impl Restricted<'_> {
         Hyperparameters { length_scales, nugget }
     }
 
-    /// The log-likelihood alone.
+    /// Returns the log-likelihood alone; minus infinity if the covariance cannot be factored.
     pub fn value(&self, point: &[f64]) -> f64 {
         let Hyperparameters { length_scales, nugget } = self.at(point);
         let (covariance, _) = self.kernel.among(&measured(self.points, &length_scales), nugget);
@@ -68,7 +68,7 @@ impl Restricted<'_> {
         restricted(&factor, &factor.weights(self.scores).squares).0
     }
 
-    /// The log-likelihood and its derivatives; none where the covariance has no factor.
+    /// Returns the log-likelihood and its derivatives; `None` if the covariance cannot be factored.
     pub fn slopes(&self, point: &[f64]) -> Option<Slopes> {
         let Hyperparameters { length_scales, nugget } = self.at(point);
         let points = measured(self.points, &length_scales);
@@ -76,7 +76,7 @@ impl Restricted<'_> {
         let (factor, _) = Factor::new(covariance, self.trend)?;
         let weights = factor.weights(self.scores);
         let (value, variances) = restricted(&factor, &weights.squares);
-        // Those of the nugget are left out where it is given.
+        // A fixed nugget has no derivative.
         let moved = Moved { points: &points, slopes: &slopes, alpha: weights.alpha.transposed() };
         let (gradient, pulls) =
             moved.by_logarithms(&factor, &variances, nugget, Target::dimension(self));
@@ -85,20 +85,21 @@ impl Restricted<'_> {
     }
 }
 
-/// The restricted likelihood around a point.
+/// Restricted likelihood around a point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slopes {
-    /// The log-likelihood.
+    /// Log-likelihood.
     pub value: f64,
-    /// Its derivative by each coordinate.
+    /// Derivative with respect to each coordinate.
     pub gradient: Vec<f64>,
-    /// The average of the observed and the expected information (Gilmour, Thompson and Cullis 1995), the
-    /// variances profiled out: `1/2 sum_c [q_i' P q_j / s_c^2 - (a_c' q_i) (a_c' q_j) / (s_c^4 (N - p))]` with
-    /// `q_i = dK_i a_c`. Never negative.
+    /// Average of the observed and the expected information (Gilmour, Thompson and Cullis 1995), with the variances
+    /// profiled out: `1/2 sum_c [q_i' P q_j / s_c^2 - (a_c' q_i) (a_c' q_j) / (s_c^4 (N - p))]` with
+    /// `q_i = dK_i a_c`. Positive semidefinite.
     pub information: Matrix,
 }
 
-/// The restricted log-likelihood where `Y' P Y` has this diagonal, and the estimates of the variances `s_c^2`.
+/// Returns the restricted log-likelihood and the estimates of the variances `s_c^2`; `squares` is the diagonal of
+/// `Y' P Y`.
 pub fn restricted(factor: &Factor, squares: &[f64]) -> (f64, Vec<f64>) {
     let free = (factor.size() - factor.terms()) as f64;
     let variances: Vec<f64> = squares.iter().map(|s| (s / free).max(ROUND_OFF)).collect();
@@ -107,19 +108,19 @@ pub fn restricted(factor: &Factor, squares: &[f64]) -> (f64, Vec<f64>) {
     (-0.5 * variances.iter().map(each).sum::<f64>(), variances)
 }
 
-/// How a covariance moves with its hyperparameters.
+/// Derivatives of a covariance with respect to its hyperparameters.
 struct Moved<'a> {
-    /// The runs in length scales, one a column.
+    /// Runs in length scales, one per column.
     points: &'a Matrix,
-    /// `-c'(r) / r` of each pair below the diagonal.
+    /// `-c'(r) / r` of each pair, below the diagonal.
     slopes: &'a Matrix,
-    /// `P Y`, one component a row.
+    /// `P Y`, one component per row.
     alpha: Matrix,
 }
 
 impl Moved<'_> {
-    /// The gradient by the first `count` of the logarithms of length scales and nugget, and `dK_i a_c` of each
-    /// component and logarithm, one a row.
+    /// Returns the gradient with respect to the first `count` of the logarithms of length scales and nugget, and
+    /// `dK_i a_c` of each component and logarithm, one per row.
     fn by_logarithms(
         &self,
         factor: &Factor,
@@ -159,7 +160,7 @@ impl Moved<'_> {
         (gradient, pulls)
     }
 
-    /// `sum_c (P - a_c a_c' / s_c^2) = C K^-1 - S S'`.
+    /// Returns `sum_c (P - a_c a_c' / s_c^2) = C K^-1 - S S'`, with `C` the number of components.
     fn inside(&self, factor: &Factor, variances: &[f64]) -> Matrix {
         let count = self.alpha.rows() as f64;
         let directions = factor.trend_directions();
@@ -193,7 +194,7 @@ fn information(factor: &Factor, alpha: &Matrix, variances: &[f64], pulls: &Matri
     information
 }
 
-/// Standard variables in length scales.
+/// Returns standard variables in units of the length scales.
 pub fn measured(points: &Matrix, length_scales: &[f64]) -> Matrix {
     Matrix::from_fn(points.rows(), points.columns(), |k, i| points[(k, i)] / length_scales[k])
 }

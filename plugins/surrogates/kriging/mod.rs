@@ -1,4 +1,4 @@
-//! Gaussian processes with a trend, conditioned on runs: what `gaussian_process` and `polynomial_chaos_kriging` share.
+//! Gaussian processes with a trend, conditioned on runs; shared by `gaussian_process` and `polynomial_chaos_kriging`.
 
 mod emulator;
 mod factor;

@@ -1,36 +1,36 @@
-//! The options that all Gaussian processes share.
+//! Options common to all Gaussian processes.
 
 use std::fmt;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, de};
 
-/// Which components have hyperparameters of their own.
+/// Choice between separate and common hyperparameters of the components.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LengthScales {
-    /// Each component.
+    /// Each component has its own.
     #[default]
     Each,
-    /// All components share them, which costs little more than one of them and is a little less accurate.
+    /// All components share one set, which costs little more than fitting one of them and is slightly less accurate.
     Shared,
 }
 
-/// What runs differ by besides the smooth response: `"estimated"`, or a number.
+/// Variance of the noise of the runs, as a fraction of the variance of the process: `"estimated"`, or a number.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Nugget {
-    /// Estimated with the length scales.
+    /// Estimate with the length scales.
     Estimated(Estimated),
-    /// This share of the variance of the process; 0 for a response that must be interpolated.
+    /// A fixed value; 0 for a response that must be interpolated exactly.
     Fixed(f64),
 }
 
-/// The word that asks for an estimate.
+/// Keyword for an estimated value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Estimated {
-    /// Estimated with the length scales.
+    /// Estimate with the length scales.
     Estimated,
 }
 
@@ -46,7 +46,7 @@ impl<'de> Deserialize<'de> for Nugget {
     }
 }
 
-/// Reads a [`Nugget`] by the kind of value that stands there.
+/// Deserialises a [`Nugget`] by the type of the value.
 struct NuggetVisitor;
 
 impl de::Visitor<'_> for NuggetVisitor {
@@ -76,15 +76,15 @@ impl de::Visitor<'_> for NuggetVisitor {
     }
 }
 
-/// Where hyperparameters are looked for.
+/// Bounds of the hyperparameters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Bounds {
-    /// The least and the largest length scale; 1 is the range of a parameter with a uniform design (of any other, the
-    /// distance of its 10 % and 90 % quantiles divided by 0.8).
+    /// Smallest and largest length scale, in units of the range of a parameter with a uniform design (for any other
+    /// design, the distance between its 10 % and 90 % quantiles divided by 0.8).
     pub length_scale: [f64; 2],
-    /// The least and the largest nugget where it is estimated. A smaller least value makes the mean of a response without
-    /// noise more accurate, and its derivatives less so: they carry more round-off.
+    /// Smallest and largest nugget if it is estimated. A smaller lower bound makes the mean of a noise-free response
+    /// more accurate and its derivatives less so, because they carry more rounding errors.
     pub nugget: [f64; 2],
 }
 
@@ -95,7 +95,7 @@ impl Default for Bounds {
 }
 
 impl Bounds {
-    /// What is wrong with them: the option, and in words.
+    /// Returns what is wrong with the bounds: the option, and a description.
     pub fn faults(&self) -> Vec<(&'static str, String)> {
         let check = |key, [low, high]: [f64; 2]| {
             let sound = low > 0.0 && low < high && high.is_finite();
@@ -110,7 +110,7 @@ impl Bounds {
 }
 
 impl Nugget {
-    /// What is wrong with it, in words.
+    /// Returns a description of what is wrong with the nugget, if anything.
     pub fn fault(&self) -> Option<String> {
         match *self {
             Self::Fixed(nugget) if !(nugget >= 0.0 && nugget.is_finite()) => {

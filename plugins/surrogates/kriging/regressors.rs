@@ -1,23 +1,23 @@
-//! The functions of which trends are made.
+//! Regressors from which trends are built.
 
-use lacuna::linalg::Matrix;
+use lacuna_linalg::Matrix;
 use serde::{Deserialize, Serialize};
 
 use super::standard::Standard;
 use crate::surrogates::polynomial_chaos::{Basis, Coordinate, Terms};
 
-/// A set of regressors.
+/// Regressors of the trend.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Regressors {
-    /// One.
+    /// The constant 1.
     Constant,
-    /// One and the standard variables.
+    /// The constant 1 and the standard variables.
     Linear(Vec<Standard>),
     /// Products of orthonormal polynomials.
     Polynomials(Basis),
 }
 
-/// Regressors as they are saved beside the standard variables.
+/// Regressors as saved next to the standard variables.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum Written {
     Constant,
@@ -26,7 +26,7 @@ pub enum Written {
 }
 
 impl Regressors {
-    /// How many there are.
+    /// Returns the number of regressors.
     pub fn count(&self) -> usize {
         match self {
             Self::Constant => 1,
@@ -35,7 +35,7 @@ impl Regressors {
         }
     }
 
-    /// Their values at points in physical units (one a row), `points x regressors`.
+    /// Returns their values at points in physical units, one per row (`points x regressors`).
     pub fn values(&self, points: &Matrix) -> Matrix {
         match self {
             Self::Constant => Matrix::from_vec(points.rows(), 1, vec![1.0; points.rows()]),
@@ -49,7 +49,7 @@ impl Regressors {
         }
     }
 
-    /// Their derivatives (rows) by the parameters at a point in physical units.
+    /// Returns their derivatives (rows) with respect to the parameters (columns) at a point in physical units.
     pub fn gradient(&self, point: &[f64]) -> Matrix {
         match self {
             Self::Constant => Matrix::zeros(1, point.len()),
@@ -60,7 +60,7 @@ impl Regressors {
         }
     }
 
-    /// What is needed to make them again.
+    /// Returns the form to save.
     pub fn written(&self) -> Written {
         match self {
             Self::Constant => Written::Constant,
@@ -74,7 +74,7 @@ impl Regressors {
 }
 
 impl Written {
-    /// The regressors; none where the parts do not fit together.
+    /// Restores the regressors; `None` if the parts are inconsistent.
     pub fn read(self, standards: &[Standard]) -> Option<Regressors> {
         Some(match self {
             Self::Constant => Regressors::Constant,

@@ -1,27 +1,27 @@
-//! Scoring: the search that uses the information of the likelihood.
+//! Scoring: maximisation by the information of the likelihood.
 
-use lacuna::linalg::vector::dot;
-use lacuna::linalg::{Cholesky, Matrix, multiply_vector};
 use lacuna::plugin::Target;
+use lacuna_linalg::vector::dot;
+use lacuna_linalg::{Cholesky, Matrix, multiply_vector};
 
 use super::likelihood::{Restricted, Slopes};
 
-/// A step that promises less than this in log-likelihood is not made.
+/// Minimum gain in log-likelihood that the quadratic model must predict for a step.
 const GAIN: f64 = 1e-4;
-/// The longest steps in the logarithms of a length scale and of the nugget, which often has far to go.
+/// Longest steps in the logarithms of a length scale and of the nugget; the nugget often has far to go.
 const LONGEST: [f64; 2] = [1.0, 10.0];
-/// A likelihood is the dear part: so many of them are enough.
+/// Maximum number of likelihood evaluations, which dominate the cost.
 const MOST: usize = 40;
-/// How many of the last steps correct the information.
+/// Number of last steps that correct the information.
 const MEMORY: usize = 4;
 
-/// The maximum of the likelihood that a point leads to, and whether it was reached; none where the point has no
+/// Returns the local maximum reached from a point, and whether the search converged; `None` if the point has no
 /// likelihood.
 ///
-/// Steps are those of Newton's method with the average information in place of the curvature (Gilmour, Thompson
-/// and Cullis 1995), which costs little more than the gradient. The response of a simulator is no draw of the
-/// process, so that the information is wrong by factors: what the gradient did along the last steps corrects it
-/// (BFGS). Steps are damped (Levenberg and Marquardt) until the likelihood rises; coordinates that are pressed
+/// The steps are those of Newton's method with the average information in place of the Hessian (Gilmour, Thompson and
+/// Cullis 1995), which costs little more than the gradient. The response of a simulator is not a realisation of the
+/// process, so that the information is wrong by factors; the changes of the gradient along the last steps correct it
+/// (BFGS). Steps are damped (Levenberg-Marquardt) until the likelihood increases; coordinates that are pressed
 /// against a bound stay there.
 pub fn score(problem: &Restricted<'_>, start: &[f64]) -> Option<(Vec<f64>, bool)> {
     let bounds = Target::bounds(problem);
@@ -37,7 +37,7 @@ pub fn score(problem: &Restricted<'_>, start: &[f64]) -> Option<(Vec<f64>, bool)
         let Some(next) = place.step(&bounds, damping, longest) else { break };
         let promise = place.promise(&next);
         if promise < GAIN {
-            // A step that a bound cuts short promises nothing of what the other coordinates could gain.
+            // A step limited by a bound says nothing about what the other coordinates could gain.
             let cut = (next.iter().zip(&point).zip(&bounds))
                 .any(|((x, y), (low, high))| x != y && (x <= low || x >= high));
             return Some((point, !cut));
@@ -62,7 +62,7 @@ pub fn score(problem: &Restricted<'_>, start: &[f64]) -> Option<(Vec<f64>, bool)
     Some((point, false))
 }
 
-/// The coordinates that no bound holds.
+/// Returns the coordinates that no bound holds.
 fn free(point: &[f64], gradient: &[f64], bounds: &[(f64, f64)]) -> Vec<usize> {
     let held = |j: usize| {
         let (low, high) = bounds[j];
@@ -71,7 +71,7 @@ fn free(point: &[f64], gradient: &[f64], bounds: &[(f64, f64)]) -> Vec<usize> {
     (0..point.len()).filter(|&j| !held(j)).collect()
 }
 
-/// The information with the curvature that the last steps have met, where that is positive.
+/// Corrects the information by the curvature along the last steps, where that is positive.
 fn corrected(information: &Matrix, steps: &[(Vec<f64>, Vec<f64>)]) -> Matrix {
     let mut curvature = information.clone();
     for (moved, slowed) in &steps[steps.len().saturating_sub(MEMORY)..] {
@@ -90,7 +90,7 @@ fn corrected(information: &Matrix, steps: &[(Vec<f64>, Vec<f64>)]) -> Matrix {
     curvature
 }
 
-/// The likelihood's quadratic model around a point.
+/// Quadratic model of the likelihood around a point.
 struct Place<'a> {
     point: &'a [f64],
     here: &'a Slopes,
@@ -103,7 +103,7 @@ impl Place<'_> {
         self.curvature[(self.free[i], self.free[j])]
     }
 
-    /// Where the damped step leads within the bounds.
+    /// Returns the end of the damped step, within the bounds.
     fn step(
         &self,
         bounds: &[(f64, f64)],
@@ -111,7 +111,7 @@ impl Place<'_> {
         longest: impl Fn(usize) -> f64,
     ) -> Option<Vec<f64>> {
         let count = self.free.len();
-        // Where there is nearly no curvature the floor keeps the step finite.
+        // The floor keeps the step finite if there is hardly any curvature.
         let floor = 1e-10 + 1e-6 * (0..count).map(|i| self.entry(i, i)).fold(0.0, f64::max);
         let damped = Matrix::from_fn(count, count, |i, j| {
             let more = if i == j { damping * self.entry(i, i) + floor } else { 0.0 };
@@ -127,7 +127,7 @@ impl Place<'_> {
         Some(next)
     }
 
-    /// The gain that the quadratic promises at another point.
+    /// Returns the gain that the quadratic model predicts at another point.
     fn promise(&self, next: &[f64]) -> f64 {
         let moved: Vec<f64> = next.iter().zip(self.point).map(|(a, b)| a - b).collect();
         let bent = multiply_vector(self.curvature, &moved);

@@ -1,32 +1,32 @@
-//! The search for the hyperparameters of the largest likelihood.
+//! Search for the hyperparameters with the largest likelihood.
 
-use lacuna::linalg::Matrix;
-use lacuna::math::optimise::{Precision, ascend};
 use lacuna::math::random::{Stream, permutation, uniform};
 use lacuna::plugin::Target;
+use lacuna_linalg::Matrix;
+use lacuna_optimise::{Precision, ascend};
 use rayon::prelude::*;
 
 use super::likelihood::{Hyperparameters, Restricted};
 use super::options::Nugget;
 use super::scoring::score;
 
-/// Several starts are followed on so many runs, where there are at least twice as many.
+/// Number of runs on which several starts are followed, if there are at least twice as many.
 const FEW: usize = 120;
-/// Enough to tell one maximum from another.
+/// Precision sufficient to distinguish two maxima.
 const ROUGH: Precision = Precision { gradient: 0.05, gain: Some(1e-5), steps: 30 };
-/// The rest moves no length scale by a tenth of its standard error.
+/// Precision at which the remaining error of a length scale is below a tenth of its standard error.
 const FINE: Precision = Precision { gradient: 1e-2, gain: Some(1e-6), steps: 100 };
-/// Where starts are drawn: length scales and nuggets.
+/// Region from which starts are drawn: length scales and nuggets.
 const REGION: [[f64; 2]; 2] = [[0.1, 3.0], [1e-8, 1e-2]];
-/// The usual standard error of a logarithm.
+/// Typical standard error of the logarithm of a hyperparameter.
 const SCALE: f64 = 0.3;
 
-/// The hyperparameters of the largest restricted likelihood that `starts` searches find; none where no start has a
-/// likelihood.
+/// Returns the hyperparameters with the largest restricted likelihood that `starts` searches find; `None` if no start
+/// has a likelihood.
 ///
-/// The starts are followed by L-BFGS-B; with many runs on some of them, drawn at random, because a likelihood costs the cube
-/// of the number of runs. All runs then choose among the ends (and the usual start), and one search from there, by
-/// scoring, gives the result, which is a maximum of the whole likelihood.
+/// The starts are followed by L-BFGS-B. With many runs a random subset of them is used, because a likelihood costs
+/// the cube of the number of runs; all runs then select among the end points (and the first start), and one search
+/// from there, by scoring, gives the result, which is a maximum of the full likelihood.
 pub fn search(problem: &Restricted<'_>, starts: usize, stream: &Stream) -> Option<Hyperparameters> {
     let starts = starting_points(problem, starts, &stream.named("starts"));
     let runs = problem.points.columns();
@@ -52,7 +52,7 @@ pub fn search(problem: &Restricted<'_>, starts: usize, stream: &Stream) -> Optio
     Some(problem.at(&point))
 }
 
-/// Where the searches on some of the runs end, the best first.
+/// Returns the end points of the searches on some of the runs, the best first.
 fn climbs_on(problem: &Restricted<'_>, runs: &[usize], starts: &Matrix) -> Vec<Vec<f64>> {
     let part = Restricted {
         points: &problem.points.select_columns(runs),
@@ -63,7 +63,7 @@ fn climbs_on(problem: &Restricted<'_>, runs: &[usize], starts: &Matrix) -> Vec<V
     climbs(&part, starts, ROUGH).into_iter().map(|(point, _)| point).collect()
 }
 
-/// Where the searches from all starts end, the best first.
+/// Returns the end points of the searches from all starts, the best first.
 fn climbs(problem: &Restricted<'_>, starts: &Matrix, precision: Precision) -> Vec<(Vec<f64>, f64)> {
     let scales = vec![SCALE; Target::dimension(problem)];
     let mut ends: Vec<(Vec<f64>, f64)> = (0..starts.rows())
@@ -75,12 +75,12 @@ fn climbs(problem: &Restricted<'_>, starts: &Matrix, precision: Precision) -> Ve
     ends
 }
 
-/// Ends of rough searches so near to each other belong to one maximum.
+/// Returns true if two end points of rough searches belong to the same maximum.
 fn near(a: &[f64], b: &[f64]) -> bool {
     a.iter().zip(b).all(|(x, y)| (x - y).abs() < SCALE)
 }
 
-/// The usual start, half of the design's diagonal, and draws around it.
+/// Returns the default start, half of the design's diagonal, and random starts.
 fn starting_points(problem: &Restricted<'_>, count: usize, stream: &Stream) -> Matrix {
     let d = problem.points.rows();
     let mut rng = stream.generator();

@@ -1,13 +1,12 @@
-//! Parameters of all units and sizes on one scale.
+//! Parameters of any unit and size on a common scale.
 
 use lacuna::data::Parameter;
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
+use lacuna_linalg::Matrix;
 use serde::{Deserialize, Serialize};
 
-/// The standard variable `z = (x - centre) / width` of a parameter: 0 at the median of its design, and 1 is the range
-/// of a uniform design. Laws whose logarithm is the simple thing, log-uniform and log-normal, are measured by
-/// logarithms.
+/// Standard variable `z = (x - centre) / width` of a parameter: 0 at the median of its design, and 1 the range of a
+/// uniform design. For log-uniform and log-normal designs `x` is the logarithm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Standard {
     centre: f64,
@@ -16,7 +15,7 @@ pub struct Standard {
 }
 
 impl Standard {
-    /// That of a parameter, or what stands against it in words.
+    /// Returns the standard variable of a parameter, or a description of why there is none.
     pub fn of(parameter: &Parameter) -> Result<Self, String> {
         let design = &parameter.design;
         let logarithm = matches!(design, Distribution::LogUniform(_) | Distribution::LogNormal(_));
@@ -24,7 +23,7 @@ impl Standard {
             let x = design.quantile(p);
             if logarithm { x.ln() } else { x }
         };
-        // Between these quantiles lie 0.8 of the range of a uniform law.
+        // Between these quantiles lie 0.8 of the range of a uniform distribution.
         let width = (measured(0.9) - measured(0.1)) / 0.8;
         let standard = Self { centre: measured(0.5), width, logarithm };
         if width > 0.0 && width.is_finite() && standard.centre.is_finite() {
@@ -33,14 +32,14 @@ impl Standard {
         Err(format!("the design of parameter `{}`, {design}, has no width", parameter.name))
     }
 
-    /// The standard variable at a value of the parameter.
+    /// Returns the standard variable at a value of the parameter.
     pub fn at(&self, x: f64) -> f64 {
-        // Outside the support of a positive law the least positive number stands for the value.
+        // Values outside the support of a positive distribution are replaced by the smallest positive number.
         let measured = if self.logarithm { x.max(f64::MIN_POSITIVE).ln() } else { x };
         (measured - self.centre) / self.width
     }
 
-    /// Its derivative by the parameter.
+    /// Returns the derivative of the standard variable with respect to the parameter.
     pub fn slope(&self, x: f64) -> f64 {
         match self.logarithm {
             true if x > f64::MIN_POSITIVE => 1.0 / (x * self.width),
@@ -49,13 +48,14 @@ impl Standard {
         }
     }
 
-    /// Whether it tells values of the parameter apart there.
+    /// Returns true if `x` lies in the range of the standard variable: a logarithmic one needs `x > 0`.
     pub fn covers(&self, x: f64) -> bool {
         !self.logarithm || x > 0.0
     }
 }
 
-/// The standard variables of points (one a row), one point a column: `parameters x points`.
+/// Returns the standard variables of points (one per row) as a matrix with one point per column
+/// (`parameters x points`).
 pub fn standardised(standards: &[Standard], points: &Matrix) -> Matrix {
     Matrix::from_fn(standards.len(), points.rows(), |k, i| standards[k].at(points[(i, k)]))
 }

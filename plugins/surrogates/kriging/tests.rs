@@ -1,7 +1,8 @@
-//! Beside the textbook's formulas with dense inverses, and figures of a peer.
+//! Comparison with textbook formulas that use dense inverses, and with figures of a peer.
 
-use lacuna::linalg::{Matrix, multiply, multiply_transposed, multiply_vector, vector::dot};
 use lacuna::plugin::Target;
+use lacuna_linalg::vector::dot;
+use lacuna_linalg::{Matrix, multiply, multiply_transposed, multiply_vector};
 
 use super::factor::Factor;
 use super::field::{Choice, Field, Runs};
@@ -12,7 +13,7 @@ use crate::surrogates::gaussian_process::tests::recurrence;
 
 const KERNELS: [Kernel; 3] = [Kernel::Matern52, Kernel::Matern32, Kernel::SquaredExponential];
 
-/// The inverse by Gauss and Jordan's elimination with pivots, and the logarithm of the determinant's size.
+/// Returns the inverse by Gauss-Jordan elimination with pivoting, and the logarithm of the absolute determinant.
 fn inverse(a: &Matrix) -> (Matrix, f64) {
     let n = a.rows();
     let (mut a, mut inverse) =
@@ -46,7 +47,7 @@ fn inverse(a: &Matrix) -> (Matrix, f64) {
 
 /// Runs of two parameters with a linear trend and three components.
 struct Sample {
-    /// One run a column.
+    /// One run per column.
     points: Matrix,
     regressors: Matrix,
     scores: Matrix,
@@ -89,7 +90,7 @@ fn choice() -> Choice {
     }
 }
 
-/// The whole covariance at some hyperparameters, both triangles.
+/// Returns the full covariance at some hyperparameters, both triangles.
 fn covariance(kernel: Kernel, points: &Matrix, choice: &Choice) -> Matrix {
     let points = measured(points, &choice.length_scales);
     let mut k = kernel.between(&points, &points);
@@ -97,7 +98,7 @@ fn covariance(kernel: Kernel, points: &Matrix, choice: &Choice) -> Matrix {
     k
 }
 
-/// `P` and what it is made of, by the textbook.
+/// `P` and its parts by textbook formulas.
 struct Textbook {
     inverse: Matrix,
     information: Matrix,
@@ -272,9 +273,9 @@ fn gradients_of_the_mean_are_those_of_differences() {
     }
 }
 
-/// Source: scikit-learn 1.9.1, `GaussianProcessRegressor(ConstantKernel(s2) * kernel([0.4, 0.7]), alpha=1e-4 * s2,
-/// optimizer=None)` with `s2 = y' K^-1 y / N`, no trend: log marginal likelihood, and mean and variance (without
-/// noise) at three points.
+/// Source: scikit-learn 1.9.1,
+/// `GaussianProcessRegressor(ConstantKernel(s2) * kernel([0.4, 0.7]), alpha=1e-4 * s2, optimizer=None)` with
+/// `s2 = y' K^-1 y / N`, no trend: log marginal likelihood, and mean and variance (without noise) at three points.
 #[test]
 fn figures_are_those_of_a_peer() {
     let peers = [

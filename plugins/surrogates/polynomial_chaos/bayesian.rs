@@ -1,34 +1,34 @@
-//! Bayesian compressive sensing: each weight has a normal prior of its own unknown variance, most of which become
-//! zero where the marginal likelihood is largest.
+//! Bayesian compressive sensing: each weight has a normal prior with its own unknown variance, most of which are zero
+//! where the marginal likelihood is largest.
 //!
-//! The ascent is that of Tipping and Faul (2003): at each step the one term whose variance changes the
-//! marginal likelihood most enters, changes or leaves. The variance of the noise is not known; it is tried
-//! from large to small, and taken where runs that were left out are predicted best by the posterior mean.
+//! The ascent is that of Tipping and Faul (2003): at each step the one term whose variance changes the marginal
+//! likelihood most enters, is updated or leaves. The variance of the noise is unknown; it is tried from large to
+//! small values, and that with the smallest cross-validation error of the posterior mean is taken.
 
 use std::sync::OnceLock;
 
-use lacuna::linalg::{Matrix, gram, vector};
 use lacuna::math::random::{Stream, permutation};
+use lacuna_linalg::{Matrix, gram, vector};
 
 use super::dictionary::{ActiveSet, Dictionary};
 use super::judge::{Choice, Criterion, judged};
 
-/// The ascent ends when no step gains more than this in twice the log marginal likelihood.
+/// Gain in twice the log marginal likelihood below which the ascent ends.
 const GAIN: f64 = 1e-4;
-/// Variances of the noise that were worse in a row before the search among them ends.
+/// Number of consecutive noise variances that were worse than the best before the search among them ends.
 const WORSE: usize = 2;
-/// The least share of the output's variance that noise is taken to have, as a power of ten.
+/// Smallest fraction of the output's variance that is tried for the noise, as a negative power of ten.
 const LEAST_NOISE: i32 = 14;
-/// The parts of the runs that are left out to find the noise.
+/// Number of folds of the cross-validation that finds the noise.
 const PARTS: usize = 5;
 
-/// What all outputs share: the parts of the runs that are left out and the Gram matrices of the others.
+/// The folds of runs shared by all outputs, with the Gram matrices of the other runs.
 #[derive(Default)]
 pub(super) struct Parts(OnceLock<Vec<Part>>);
 
 struct Part {
     runs: Vec<usize>,
-    /// The dictionary's columns at these runs, `runs x terms`.
+    /// The dictionary's columns at these runs (`runs x terms`).
     columns: Matrix,
     gram: Matrix,
 }
@@ -53,7 +53,7 @@ impl Parts {
 }
 
 impl Part {
-    /// The sum of squares of what the fit to the other runs leaves of these.
+    /// Returns the sum of squared residuals of these runs for a fit to the other runs.
     fn error(&self, open: &[bool], centred: &[f64], all: &[f64], noise: f64, most: usize) -> f64 {
         let own: Vec<f64> = self.runs.iter().map(|&i| centred[i]).collect();
         let mut correlations = all.to_vec();
@@ -70,8 +70,8 @@ impl Part {
     }
 }
 
-/// The set of terms for an output, given as its values less their mean and their products with the
-/// dictionary's columns.
+/// Chooses the terms of an output, given as its values minus their mean (`centred`) and their products with the
+/// dictionary's columns (`correlations`).
 pub(super) fn bayesian(
     dictionary: &Dictionary,
     parts: &Parts,
@@ -102,7 +102,7 @@ pub(super) fn bayesian(
         set.enter(term);
     }
     if set.terms().is_empty() {
-        // Nothing rises above the noise; the strongest term must do.
+        // No term rises above the noise; the strongest one is taken, because an output that varies needs a term.
         let size = |t: &usize| correlations[*t].abs();
         let strongest =
             (0..open.len()).filter(|&t| open[t]).max_by(|a, b| size(a).total_cmp(&size(b)))?;
@@ -111,17 +111,17 @@ pub(super) fn bayesian(
     Some(judged(&set, centred, criterion))
 }
 
-/// The posterior of the active weights and the two statistics of every term, in the notation of Tipping and
-/// Faul: `S = phi' C^-1 phi` and `Q = phi' C^-1 y` with `C` the covariance of the output.
+/// Posterior of the active weights and the two statistics of every term, in the notation of Tipping and Faul:
+/// `S = phi' C^-1 phi` and `Q = phi' C^-1 y` with `C` the covariance of the output.
 pub(super) struct Ascent<'a> {
     gram: &'a Matrix,
     open: &'a [bool],
-    /// The noise's precision.
+    /// Precision of the noise.
     beta: f64,
     pub active: Vec<usize>,
-    /// The precision of each active weight's prior.
+    /// Precision of each active weight's prior.
     pub alpha: Vec<f64>,
-    /// The posterior mean of each active weight.
+    /// Posterior mean of each active weight.
     pub mean: Vec<f64>,
     covariance: Matrix,
     s: Vec<f64>,
@@ -129,7 +129,7 @@ pub(super) struct Ascent<'a> {
     scratch: Vec<f64>,
 }
 
-/// A change of one term.
+/// Change of one term of the model.
 enum Change {
     Enter { term: usize, alpha: f64 },
     Set { place: usize, alpha: f64 },
@@ -137,7 +137,8 @@ enum Change {
 }
 
 impl<'a> Ascent<'a> {
-    /// From the inner products of the columns, which of them are open, and their products with the output.
+    /// Starts the ascent without active terms, from the Gram matrix of the columns, flags of those that may enter,
+    /// and their products with the output.
     pub fn new(gram: &'a Matrix, open: &'a [bool], correlations: &[f64], noise: f64) -> Self {
         let beta = noise.recip();
         Self {
@@ -154,7 +155,7 @@ impl<'a> Ascent<'a> {
         }
     }
 
-    /// Ascends to the maximum, or until so many weights are active.
+    /// Ascends to the maximum, or until `most` weights are active.
     pub fn run(mut self, most: usize) -> Self {
         for _ in 0..20 * most.max(1) {
             let Some((gain, change)) = self.best() else { break };
@@ -179,7 +180,7 @@ impl<'a> Ascent<'a> {
         self
     }
 
-    /// The change that gains most.
+    /// Returns the change with the largest gain.
     fn best(&self) -> Option<(f64, Change)> {
         let mut best: Option<(f64, Change)> = None;
         let mut offer = |gain: f64, change| {
@@ -241,7 +242,7 @@ impl<'a> Ascent<'a> {
         self.alpha.push(alpha);
     }
 
-    /// Takes `size` times the outer product of column `place` off the covariance.
+    /// Subtracts `size` times the outer product of column `place` from the covariance.
     fn shrink(&mut self, place: usize, size: f64) {
         let column = self.covariance.column(place);
         let mean = self.mean[place];

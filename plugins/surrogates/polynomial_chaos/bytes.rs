@@ -1,4 +1,4 @@
-//! A file of one JSON header and raw numbers, which keeps every bit.
+//! File format of a JSON header and raw numbers, which preserves every bit.
 
 use lacuna::run::Stop;
 use serde::Serialize;
@@ -6,27 +6,27 @@ use serde::de::DeserializeOwned;
 
 const NAME: &str = "polynomial_chaos";
 
-/// [`write_as`] for this plugin.
+/// Like [`write_as`], for this plugin.
 pub(super) fn write(header: &impl Serialize, numbers: &[&[f64]]) -> Result<Vec<u8>, Stop> {
     write_as(NAME, header, numbers)
 }
 
-/// [`read_as`] for this plugin.
+/// Like [`read_as`], for this plugin.
 pub(super) fn read<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Vec<f64>), Stop> {
     read_as(NAME, bytes)
 }
 
-/// [`damaged_as`] for this plugin.
+/// Like [`damaged_as`], for this plugin.
 pub(super) fn damaged() -> Stop {
     damaged_as(NAME)
 }
 
-/// The first bytes of a plugin's file; the last one is the version of its layout.
+/// Returns the first bytes of a plugin's file; the digit is the version of its layout.
 fn magic(plugin: &str) -> Vec<u8> {
     format!("lacuna {plugin} 2\n").into_bytes()
 }
 
-/// The magic, the header's length (8 bytes, little-endian), the header, the numbers (little-endian).
+/// Writes the magic, the length of the header (8 bytes, little-endian), the header, and the numbers (little-endian).
 pub(in crate::surrogates) fn write_as(
     plugin: &str,
     header: &impl Serialize,
@@ -41,15 +41,18 @@ pub(in crate::surrogates) fn write_as(
     Ok(bytes)
 }
 
-/// The header and the numbers of what [`write_as`] wrote.
+/// Reads the header and the numbers of a file that [`write_as`] wrote; fails if it is damaged or from another
+/// version.
 pub(in crate::surrogates) fn read_as<H: DeserializeOwned>(
     plugin: &str,
     bytes: &[u8],
 ) -> Result<(H, Vec<f64>), Stop> {
     let damaged = || damaged_as(plugin);
     let rest = bytes.strip_prefix(&magic(plugin)[..]).ok_or_else(|| {
-        Stop::new(format!("the saved surrogate is no `{plugin}` surrogate of this version"))
-            .help("remove it, so that it is fitted again")
+        Stop::new(format!(
+            "the saved surrogate is not a `{plugin}` surrogate of this program version"
+        ))
+        .help("remove it, so that it is fitted again")
     })?;
     let (length, rest) = rest.split_first_chunk::<8>().ok_or_else(damaged)?;
     let length = usize::try_from(u64::from_le_bytes(*length)).map_err(|_| damaged())?;
@@ -62,7 +65,7 @@ pub(in crate::surrogates) fn read_as<H: DeserializeOwned>(
     Ok((header, numbers.iter().map(|x| f64::from_le_bytes(*x)).collect()))
 }
 
-/// A plugin's file is not whole.
+/// Returns the error for a damaged file.
 pub(in crate::surrogates) fn damaged_as(plugin: &str) -> Stop {
     Stop::new(format!("the saved `{plugin}` surrogate is damaged"))
         .help("remove it, so that it is fitted again")

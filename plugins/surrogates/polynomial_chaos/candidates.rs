@@ -1,76 +1,76 @@
-//! Which term enters the path next.
+//! Choice of the next term of the path.
 //!
-//! All candidates matter, but most are far from entering. Between two looks at all of them their
-//! correlations would fall at known rates if the direction stayed; each term that enters turns it by a
-//! known length `t` along one new orthonormal vector, and because columns have length one no
-//! correlation can leave its straight line by more than `drift = sqrt(sum_i (t_i d_i)^2)`, where `d_i` is
-//! the distance since term `i` entered. So only candidates near the level are followed at each
-//! step; the others are looked at again before the drift could have brought one of them there. This is
-//! a bound, not a guess: the path is the same.
+//! The path depends on all candidates, but most of them are far from entering. After an evaluation of all of them,
+//! their correlations would decrease at known rates if the direction stayed. Each term that enters turns the
+//! direction by a known length `t` along one new orthonormal vector, and because columns have length one no
+//! correlation can deviate from its straight line by more than `drift = sqrt(sum_i (t_i d_i)^2)`, where `d_i` is the
+//! distance since term `i` entered. So only candidates near the level are followed at each step; the others are
+//! evaluated again before the drift could have brought one of them there. This is a bound, not an approximation: the
+//! path is the same.
 
-use lacuna::linalg::level::{Lines, first_meeting, least_gaps};
-use lacuna::linalg::{Matrix, vector};
+use lacuna_linalg::level::{Lines, first_meeting, least_gaps};
+use lacuna_linalg::{Matrix, vector};
 
-/// The near candidates are those that could arrive within about so many steps.
+/// Number of steps within which a candidate could enter, to count as near.
 const HORIZON: f64 = 8.0;
-/// Round-off that the bound must allow for, relative to the level.
+/// Allowance of the bound for rounding errors, relative to the level.
 const SLACK: f64 = 1e-9;
 
-/// Where the path goes: along `sum_i weights[i] * column(active[i])`.
+/// Direction of the path: `sum_i weights[i] * column(active[i])`.
 pub(super) struct Direction<'a> {
     pub active: &'a [usize],
     pub weights: &'a [f64],
-    /// The common size of the active correlations, which falls at the rate 1.
+    /// Common size of the active correlations, which decreases at the rate 1.
     pub level: f64,
 }
 
-/// A candidate that reaches the level.
+/// Candidate whose correlation reaches that of the active terms.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Arrival {
     pub term: usize,
-    /// How far along the direction.
+    /// Distance along the direction.
     pub distance: f64,
-    /// Its correlation there.
+    /// Correlation there.
     pub correlation: f64,
 }
 
-/// The candidates and their correlations with the residual.
+/// Candidates and their correlations with the residual.
 pub(super) struct Candidates<'a> {
     gram: &'a Matrix,
-    /// Zero for candidates, infinity for the active and the dependent.
+    /// Zero for candidates; infinity for active and dependent columns.
     closed: Vec<f64>,
-    /// All correlations where they were last looked at together, and how fast they fell there.
+    /// All correlations at the last evaluation of all candidates, and their rates of decrease there.
     correlations: Vec<f64>,
     rates: Vec<f64>,
-    /// Scratch of their size.
+    /// Scratch memory of the same length.
     scratch: Vec<f64>,
     since: Since,
     pace: Pace,
     near: Near,
 }
 
-/// What happened since all candidates were last looked at.
+/// Changes since the last evaluation of all candidates.
 #[derive(Default)]
 struct Since {
-    /// How the fit has changed, by active term.
+    /// Change of the fit, by active term.
     shifts: Vec<f64>,
-    /// How far the level has fallen.
+    /// Decrease of the level.
     fallen: f64,
-    /// The turns: their lengths and where the level was, as `fallen`.
+    /// Turns of the direction: their lengths, and the decrease of the level at each.
     turns: Vec<(f64, f64)>,
-    /// The least distance of a far candidate from the level, on its straight line up to `horizon`.
+    /// Smallest distance of a far candidate from the level, along its straight line up to `horizon`.
     clearance: f64,
     horizon: f64,
 }
 
-/// What a step was like lately: running means.
+/// Running means of the last steps.
 #[derive(Default)]
 struct Pace {
     distance: f64,
     turn: f64,
 }
 
-/// The candidates near the level, densely packed.
+/// Candidates near the level, densely packed.
 #[derive(Default)]
 struct Near {
     terms: Vec<usize>,
@@ -78,14 +78,14 @@ struct Near {
     correlations: Vec<f64>,
     rates: Vec<f64>,
     scratch: Vec<f64>,
-    /// The entries of the Gram matrix, `active x near`.
+    /// Entries of the Gram matrix (`active x near`).
     gram: Matrix,
     /// `0, 1, 2, ...`: all rows of `gram`.
     rows: Vec<usize>,
 }
 
 impl<'a> Candidates<'a> {
-    /// All candidates at the start of the path; `open` says which columns may enter at all.
+    /// Returns all candidates at the start of the path; `open` tells which columns may enter at all.
     pub fn new(gram: &'a Matrix, correlations: &[f64], open: impl Iterator<Item = bool>) -> Self {
         let n = correlations.len();
         Self {
@@ -100,7 +100,7 @@ impl<'a> Candidates<'a> {
         }
     }
 
-    /// The candidate of largest correlation at the start of the path.
+    /// Returns the candidate with the largest correlation at the start of the path.
     pub fn strongest(&self) -> Option<Arrival> {
         let mut best: Option<Arrival> = None;
         for (term, (&correlation, closed)) in self.correlations.iter().zip(&self.closed).enumerate()
@@ -113,7 +113,7 @@ impl<'a> Candidates<'a> {
         best
     }
 
-    /// Moves until the level meets a candidate; none when the level falls to zero before.
+    /// Moves along the direction until the level meets a candidate; `None` if the level decreases to zero before.
     pub fn advance(&mut self, direction: &Direction<'_>) -> Option<Arrival> {
         if !self.near.terms.is_empty() {
             let (first, distance) = self.near.first(direction.level);
@@ -133,7 +133,7 @@ impl<'a> Candidates<'a> {
         self.advance_all(direction)
     }
 
-    /// Moves all candidates.
+    /// Moves with all candidates.
     fn advance_all(&mut self, direction: &Direction<'_>) -> Option<Arrival> {
         let level = direction.level;
         let lines = Lines { values: &self.correlations, rates: &self.rates, closed: &self.closed };
@@ -162,7 +162,7 @@ impl<'a> Candidates<'a> {
         Some(Arrival { term: near.terms[i], distance, correlation: near.correlations[i] })
     }
 
-    /// Brings all correlations and rates to where the path is.
+    /// Updates all correlations and rates to the present point of the path.
     fn look_at_all(&mut self, direction: &Direction<'_>) {
         let Direction { active, weights, .. } = *direction;
         let Self { gram, rates, scratch, since, .. } = self;
@@ -176,11 +176,11 @@ impl<'a> Candidates<'a> {
         self.since = Since::default();
     }
 
-    /// Packs the candidates that could arrive soon; none at all where most of them could.
+    /// Packs the candidates that could enter soon; none if these are the majority, because packing would not pay.
     fn choose_near(&mut self, direction: &Direction<'_>) {
         let level = direction.level;
         let horizon = (HORIZON * self.pace.distance).min(level);
-        // The drift after so many steps of the usual length with turns of the usual length.
+        // Estimated deviation of the correlations from their straight lines over the horizon.
         let margin = self.pace.turn * self.pace.distance * (HORIZON.powi(3) / 3.0).sqrt();
         self.near.clear();
         let lines = Lines { values: &self.correlations, rates: &self.rates, closed: &self.closed };
@@ -194,7 +194,7 @@ impl<'a> Candidates<'a> {
         self.near.pack(direction.active, self.gram, &self.correlations, &self.rates);
     }
 
-    /// Takes a term out of the candidates.
+    /// Removes a term from the candidates.
     pub fn close(&mut self, term: usize) {
         self.closed[term] = f64::INFINITY;
         if let Ok(i) = self.near.terms.binary_search(&term) {
@@ -202,7 +202,8 @@ impl<'a> Candidates<'a> {
         }
     }
 
-    /// A term became active: the direction has new weights and turned by this length.
+    /// Updates the near candidates after a term has become active: the direction has new weights and has turned by
+    /// `length`.
     pub fn turn(&mut self, entered: usize, weights: &[f64], length: f64) {
         self.pace.turned(length.abs());
         if self.near.terms.is_empty() {
@@ -216,7 +217,7 @@ impl<'a> Candidates<'a> {
 }
 
 impl Since {
-    /// Whether no far candidate can arrive before the level has fallen by `distance` more.
+    /// Returns true if no far candidate can enter before the level has decreased by a further `distance`.
     fn is_safe(&self, distance: f64, level: f64) -> bool {
         let end = self.fallen + distance;
         let squares: f64 =
@@ -245,11 +246,11 @@ impl Near {
         self.rows.clear();
     }
 
-    /// Chooses the terms whose gaps are below the margin; the least gap of the others.
+    /// Selects the terms whose gaps are below the margin; returns the smallest gap of the others.
     fn choose(&mut self, gaps: &[f64], margin: f64) -> f64 {
         let mut clearance = f64::INFINITY;
         let mut count = 0;
-        // Without a branch, which nobody could foresee.
+        // Written without a branch, which would be unpredictable and slow.
         self.terms.resize(gaps.len(), 0);
         for (term, &gap) in gaps.iter().enumerate() {
             self.terms[count] = term;
@@ -260,7 +261,7 @@ impl Near {
         clearance
     }
 
-    /// Copies what belongs to the chosen terms.
+    /// Copies the data of the selected terms.
     fn pack(&mut self, active: &[usize], gram: &Matrix, correlations: &[f64], rates: &[f64]) {
         self.correlations.extend(self.terms.iter().map(|&t| correlations[t]));
         self.rates.extend(self.terms.iter().map(|&t| rates[t]));
@@ -272,7 +273,7 @@ impl Near {
         }
     }
 
-    /// The first to arrive and its distance; the level itself when none does.
+    /// Returns the first candidate to arrive and its distance; the level itself if none does.
     fn first(&mut self, level: f64) -> (Option<usize>, f64) {
         let Self { correlations, rates, closed, scratch, .. } = self;
         let lines = Lines { values: correlations, rates, closed };
@@ -280,7 +281,7 @@ impl Near {
         (first.map(|(i, _)| i), first.map_or(level, |(_, distance)| distance.min(level)))
     }
 
-    /// Adds the row of one active term, of which the near columns are kept.
+    /// Adds the row of one active term, restricted to the near columns.
     fn push(&mut self, gram: &[f64]) {
         self.rows.push(self.rows.len());
         self.gram.extend_row(self.terms.iter().map(|&t| gram[t]));

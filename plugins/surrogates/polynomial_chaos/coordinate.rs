@@ -1,43 +1,42 @@
-//! Where a parameter sits in its family of polynomials.
+//! Standard variable and polynomials of one parameter.
 
 use lacuna::data::Parameter;
-use lacuna::linalg::lanes::{LANES, Lanes};
 use lacuna::math::distribution::Distribution;
+use lacuna_linalg::lanes::{LANES, Lanes};
 use serde::{Deserialize, Serialize};
 
 use super::family::{Family, legendre, legendre_derivatives, legendre_lanes};
 use super::measure;
 use super::recurrence::Recurrence;
 
-/// The standard variable `z` of one parameter and the polynomials in it.
+/// Standard variable `z` of one parameter and the polynomials in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Coordinate {
     family: Family,
     map: Map,
-    /// Empty for Legendre polynomials, which have their own.
+    /// Recurrence of the polynomials; empty for Legendre polynomials, which have code of their own.
     recurrence: Recurrence,
 }
 
-/// From the parameter `x` to its standard variable.
+/// Map from the parameter `x` to its standard variable.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Map {
     /// `z = (x - centre) / scale`.
     Affine { centre: f64, scale: f64 },
-    /// `z = (ln x - centre) / scale`, kept within `bound` of zero.
+    /// `z = (ln x - centre) / scale`, limited to `bound` in size.
     Logarithm { centre: f64, scale: f64, bound: f64 },
     /// `z = F_standard^-1(F_design(x))`.
     Probability { design: Distribution, standard: Distribution },
 }
 
-/// Probabilities of a transformed parameter are kept this far from 0 and 1.
+/// Smallest distance of the probabilities of a transformed parameter from 0 and 1.
 const EXTREME: f64 = 1e-15;
-/// What a normal variable exceeds with about that probability.
+/// Value that a standard normal variable exceeds with about that probability.
 const EXTREME_NORMAL: f64 = 8.0;
 
 impl Coordinate {
-    /// The coordinate of a parameter for polynomials up to some degree, or what stands against it in
-    /// words.
+    /// Returns the coordinate of a parameter for polynomials up to `degree`, or a description of why there is none.
     pub fn new(family: Family, parameter: &Parameter, degree: usize) -> Result<Self, String> {
         let (name, design) = (&parameter.name, &parameter.design);
         design.check().map_err(|fault| format!("the design of parameter `{name}`: {fault}"))?;
@@ -60,7 +59,7 @@ impl Coordinate {
         Ok(coordinate)
     }
 
-    /// Legendre polynomials in `(x - centre) / scale`.
+    /// Returns the coordinate of Legendre polynomials in `(x - centre) / scale`.
     pub fn legendre(centre: f64, scale: f64) -> Self {
         let map = Map::Affine { centre, scale };
         Self { family: Family::Legendre, map, recurrence: Recurrence::default() }
@@ -155,12 +154,12 @@ impl Coordinate {
         (self.map, self.recurrence)
     }
 
-    /// The family of the polynomials.
+    /// Returns the family of the polynomials.
     pub fn family(&self) -> Family {
         self.family
     }
 
-    /// The recurrence of the polynomials, at least up to some degree.
+    /// Returns the recurrence of the polynomials, at least up to `degree`.
     pub fn recurrence(&self, degree: usize) -> Recurrence {
         if self.family == Family::Legendre {
             Recurrence::legendre(degree)
@@ -169,12 +168,12 @@ impl Coordinate {
         }
     }
 
-    /// Whether it has the polynomials up to this degree.
+    /// Returns true if the polynomials are available up to this degree.
     pub fn reaches(&self, degree: usize) -> bool {
         self.family == Family::Legendre || degree <= self.recurrence.degree()
     }
 
-    /// The standard variable at a value of the parameter.
+    /// Returns the standard variable at a value of the parameter.
     pub fn standard(&self, x: f64) -> f64 {
         match &self.map {
             Map::Affine { centre, scale } => (x - centre) / scale,
@@ -187,7 +186,7 @@ impl Coordinate {
         }
     }
 
-    /// The value of the parameter at a standard variable.
+    /// Returns the value of the parameter at a standard variable.
     pub fn parameter(&self, z: f64) -> f64 {
         match &self.map {
             Map::Affine { centre, scale } => centre + z * scale,
@@ -196,7 +195,7 @@ impl Coordinate {
         }
     }
 
-    /// `dx/dz` at a value of the parameter; infinite where the standard variable no longer changes.
+    /// Returns `dx/dz` at a value of the parameter; infinite where the standard variable is constant.
     pub fn stretch(&self, x: f64) -> f64 {
         match &self.map {
             Map::Affine { scale, .. } => *scale,
@@ -219,12 +218,12 @@ impl Coordinate {
         }
     }
 
-    /// Whether sums of products hold at a value of the parameter.
+    /// Returns true if sums of products are accurate at a value of the parameter.
     pub fn covers(&self, x: f64) -> bool {
         self.standard(x).abs() <= self.family.reach()
     }
 
-    /// The polynomials of degree `0..table.len()` at some values of the parameter, side by side.
+    /// Computes the polynomials of degree `0..table.len()` at several values of the parameter side by side.
     pub fn values(&self, parameter: impl Iterator<Item = f64>, table: &mut [Lanes]) {
         if self.family == Family::Legendre {
             let mut z = [0.0; LANES];
@@ -243,7 +242,7 @@ impl Coordinate {
         }
     }
 
-    /// The polynomials of degree `0..values.len()` at a standard variable.
+    /// Computes the polynomials of degree `0..values.len()` at a standard variable.
     pub fn polynomials(&self, z: f64, values: &mut [f64]) {
         if self.family == Family::Legendre {
             legendre(z, values);
@@ -252,7 +251,7 @@ impl Coordinate {
         }
     }
 
-    /// With their derivatives by the standard variable.
+    /// Computes the polynomials and their derivatives with respect to the standard variable.
     pub fn derivatives(&self, z: f64, values: &mut [f64], derivatives: &mut [f64]) {
         if self.family == Family::Legendre {
             legendre_derivatives(z, values, derivatives);
@@ -263,13 +262,13 @@ impl Coordinate {
 }
 
 impl Map {
-    /// The interval onto (-1, 1).
+    /// Maps the interval onto (-1, 1).
     fn between(low: f64, high: f64) -> Self {
         Self::Affine { centre: 0.5 * (low + high), scale: 0.5 * (high - low) }
     }
 
     fn to(design: &Distribution, standard: Distribution) -> Self {
-        // Files hold no infinite numbers.
+        // The file format cannot hold infinite numbers.
         let design = match *design {
             Distribution::TruncatedNormal([mean, sd, low, high]) => {
                 Distribution::TruncatedNormal([mean, sd, low.max(f64::MIN), high.min(f64::MAX)])
@@ -280,7 +279,8 @@ impl Map {
     }
 }
 
-/// The shapes of the beta law with the mean and variance of a bounded law between its bounds.
+/// Returns the shapes of the beta distribution with the mean and variance of a bounded distribution, on the same
+/// interval.
 fn matched_beta(design: &Distribution) -> Option<[f64; 2]> {
     let (low, high) = design.support();
     let (mean, spread) = ((design.mean() - low) / (high - low), design.variance());

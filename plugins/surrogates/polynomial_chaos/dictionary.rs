@@ -1,22 +1,22 @@
-//! The basis functions at the runs, and sets of them that grow one by one.
+//! Basis functions at the runs, and sets of them that grow one by one.
 
-use lacuna::linalg::{Matrix, PackedUpper, gram, multiply, vector};
+use lacuna_linalg::{Matrix, PackedUpper, gram, multiply, vector};
 
-/// A new column whose share outside the span of the active ones is below this is dependent on them.
+/// Squared fraction of a new column outside the span of the active ones below which it counts as dependent.
 const DEPENDENT: f64 = 1e-8;
 
-/// The basis functions of one set at the runs, standardised, with all that outputs share.
+/// Basis functions of one set at the runs, standardised, with everything that the outputs share.
 pub(super) struct Dictionary {
-    /// Standardised basis functions, `terms x runs`; zero for those that are constant over the runs.
+    /// Standardised basis functions (`terms x runs`); zero for those that are constant over the runs.
     columns: Matrix,
     gram: Matrix,
     means: Vec<f64>,
-    /// The length of each centred basis function; zero marks a constant.
+    /// Length of each centred basis function; zero for a constant.
     lengths: Vec<f64>,
 }
 
 impl Dictionary {
-    /// From the basis functions at the runs, `runs x terms`.
+    /// Standardises the basis functions at the runs (`runs x terms`).
     pub fn new(basis: &Matrix) -> Self {
         let mut columns = basis.transposed();
         let runs = columns.columns();
@@ -40,48 +40,48 @@ impl Dictionary {
         Self { columns, gram, means, lengths }
     }
 
-    /// The standardised basis functions, `terms x runs`.
+    /// Returns the standardised basis functions (`terms x runs`).
     pub fn columns(&self) -> &Matrix {
         &self.columns
     }
 
-    /// Their inner products.
+    /// Returns their inner products (`terms x terms`).
     pub fn gram(&self) -> &Matrix {
         &self.gram
     }
 
-    /// Whether each basis function varies over the runs.
+    /// Tells for each basis function if it varies over the runs.
     pub fn varies(&self) -> impl Iterator<Item = bool> {
         self.lengths.iter().map(|length| *length > 0.0)
     }
 
-    /// The most terms that a fit may have besides the constant, with a run to spare.
+    /// Returns the maximum number of terms of a fit besides the constant, with one run to spare.
     pub fn most_terms(&self) -> usize {
         let runs = self.columns.columns();
         runs.saturating_sub(2).min(self.varies().filter(|varies| *varies).count())
     }
 
-    /// The most terms of a greedy choice: half of the others. Each greedy term fits the noise that the
-    /// ones before have left, so that near as many terms as runs the leave-one-out error deceives.
+    /// Returns the maximum number of terms of a greedy choice: half the number of runs. Each greedy term also fits
+    /// the noise that the previous ones have left, so that the leave-one-out error is misleading if there are nearly
+    /// as many terms as runs.
     pub fn most_greedy_terms(&self) -> usize {
         let runs = self.columns.columns();
         self.most_terms().min((runs / 2).max(1))
     }
 }
 
-/// Some columns of a dictionary and the factors of their Gram matrix, kept up to date while columns
-/// are added.
+/// Selected columns of a dictionary and the inverse factor of their Gram matrix, updated as columns are added.
 #[derive(Clone)]
 pub(super) struct ActiveSet<'a> {
     dictionary: &'a Dictionary,
     terms: Vec<usize>,
-    /// The active columns, `active x runs`.
+    /// The active columns (`active x runs`).
     columns: Matrix,
-    /// The inverse `R^-1` of the Cholesky factor of the active Gram matrix `G = R' R`.
+    /// Inverse `R^-1` of the Cholesky factor of the active Gram matrix `G = R' R`.
     inverse: PackedUpper,
-    /// `tr (Psi' Psi)^-1` after each step, for the basis functions as they are and the constant.
+    /// `tr (Psi' Psi)^-1` after each step, for the basis functions without standardisation and the constant.
     traces: Vec<f64>,
-    /// Memory for the products of the entering column with the active ones and for its column of `R^-1`.
+    /// Scratch memory for the products of the entering column with the active ones and for its column of `R^-1`.
     products: Vec<f64>,
     next: Vec<f64>,
 }
@@ -99,12 +99,12 @@ impl<'a> ActiveSet<'a> {
         }
     }
 
-    /// The active terms in the order in which they entered.
+    /// Returns the active terms in the order in which they entered.
     pub fn terms(&self) -> &[usize] {
         &self.terms
     }
 
-    /// Adds a term; false when it depends linearly on those there.
+    /// Adds a term; returns false if it depends linearly on the active ones.
     pub fn enter(&mut self, term: usize) -> bool {
         let gram = self.dictionary.gram.row(term);
         let Self { products, next, inverse, .. } = self;
@@ -127,18 +127,20 @@ impl<'a> ActiveSet<'a> {
         true
     }
 
-    /// The column of `R^-1` that the last term added.
+    /// Returns the column of `R^-1` that the last term added.
     ///
     /// # Panics
-    /// When there is no term.
+    ///
+    /// If there is no term.
     pub fn last_column(&self) -> &[f64] {
         self.inverse.column(self.terms.len() - 1)
     }
 
-    /// What one column of `R^-1` adds to `tr (Psi' Psi)^-1` of the basis functions as they are.
+    /// Returns the contribution of one column of `R^-1` to `tr (Psi' Psi)^-1` of the basis functions without
+    /// standardisation.
     ///
-    /// With `D` the lengths and `m` the means of the centred functions, the inverse Gram matrix with
-    /// the constant has the trace `1/N + |D^-1 R^-1|^2 + |m' D^-1 R^-1|^2`.
+    /// With `D` the lengths and `m` the means of the centred functions, the inverse Gram matrix with the constant has
+    /// the trace `1/N + |D^-1 R^-1|^2 + |m' D^-1 R^-1|^2`.
     fn trace_of(&self, column: &[f64]) -> f64 {
         let (mut squares, mut shift) = (0.0, 0.0);
         for (x, &t) in column.iter().zip(&self.terms) {
@@ -149,12 +151,12 @@ impl<'a> ActiveSet<'a> {
         squares + shift * shift
     }
 
-    /// `tr (Psi' Psi)^-1` of the first `k` active terms and the constant.
+    /// Returns `tr (Psi' Psi)^-1` of the first `k` active terms and the constant.
     pub fn trace(&self, k: usize) -> f64 {
         1.0 / self.columns.columns() as f64 + if k == 0 { 0.0 } else { self.traces[k - 1] }
     }
 
-    /// The orthonormal columns that the steps from `first` on added, one a row.
+    /// Returns the orthonormal columns that the steps from `first` on added, one per row.
     pub fn orthonormal(&self, first: usize) -> Matrix {
         let k = self.terms.len();
         let mut block = Matrix::zeros(k - first, k);
@@ -164,8 +166,8 @@ impl<'a> ActiveSet<'a> {
         multiply(&block, &self.columns)
     }
 
-    /// The least-squares weights of the active columns for an output with these products with all
-    /// columns, and the sum of squares that they explain.
+    /// Returns the least-squares weights of the active columns for an output with these products with all columns,
+    /// and the sum of squares that they explain.
     pub fn solve(&self, correlations: &[f64]) -> (Vec<f64>, f64) {
         let mut own: Vec<f64> = self.terms.iter().map(|&t| correlations[t]).collect();
         let mut weights = Vec::new();

@@ -1,10 +1,10 @@
 //! The fitted expansion.
 
-use lacuna::linalg::{Matrix, multiply, transposed_multiply};
 use lacuna::plugin::forward::{Linear, SumOfSquares};
 use lacuna::plugin::surrogate::{FitError, Sensitivity};
 use lacuna::plugin::{Emulator, Fact, Forward};
 use lacuna::run::Stop;
+use lacuna_linalg::{Matrix, multiply, transposed_multiply};
 use serde::{Deserialize, Serialize};
 
 use super::coordinate::Coordinate;
@@ -18,51 +18,51 @@ use super::{bytes, sensitivity};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expansion {
     basis: Basis,
-    /// `terms x outputs`.
+    /// Coefficients (`terms x outputs`).
     coefficients: Matrix,
-    /// The same without zeros, where these are most of them.
+    /// Sparse form of the coefficients, if most of them are zero.
     sparse: Option<Sparse>,
     fit_error: FitError,
     summary: Summary,
 }
 
-/// How the expansion came about.
+/// Properties of the fit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
-    /// The solver that chose the terms.
+    /// Solver that chose the terms.
     pub solver: Solver,
-    /// The error by which they were chosen.
+    /// Error by which the terms were chosen.
     pub selection: Selection,
-    /// The quadrature rule that the runs are, in words.
+    /// Quadrature rule that the runs form, in words.
     pub rule: Option<String>,
-    /// The degree chosen for each output (or component); zero for those that do not vary.
+    /// Degree chosen for each output (or component); zero for those that do not vary.
     pub degrees: Vec<usize>,
-    /// The norm chosen for each output (or component) that varies.
+    /// Norm chosen for each output (or component) that varies.
     pub q_norms: Vec<f64>,
-    /// The number of terms of each output (or component), the constant included.
+    /// Number of terms of each output (or component), including the constant.
     pub terms: Vec<usize>,
-    /// The number of terms among which they were chosen.
+    /// Number of terms to choose from.
     pub candidates: usize,
-    /// The number of outputs that do not vary over the runs.
+    /// Number of outputs that do not vary over the runs.
     pub constant: usize,
-    /// The number of outputs whose error is not below that of their mean.
+    /// Number of outputs whose error is not below that of their mean.
     pub poor: usize,
-    /// The number of outputs (or components) with fewer than three runs a term.
+    /// Number of outputs (or components) with fewer than three runs per term.
     pub optimistic: usize,
-    /// The principal components, where they were fitted instead of the outputs.
+    /// Principal components, if they were fitted in place of the outputs.
     pub reduction: Option<Reduction>,
 }
 
-/// What was fitted instead of the outputs.
+/// Reduction of the outputs to principal components.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reduction {
-    /// The number of principal components.
+    /// Number of principal components.
     pub components: usize,
-    /// The share of the outputs' variance over the runs that they leave out.
+    /// Fraction of the outputs' variance over the runs that they leave out.
     pub left_out: f64,
 }
 
-/// All of an expansion but its large arrays.
+/// All of an expansion except its large arrays.
 #[derive(Debug, Serialize, Deserialize)]
 struct Header {
     coordinates: Vec<Coordinate>,
@@ -83,28 +83,28 @@ impl Expansion {
         Self { basis, coefficients, sparse, fit_error, summary }
     }
 
-    /// The same with other terms and coefficients.
+    /// Replaces terms and coefficients; errors and summary are kept.
     pub(super) fn with(self, basis: Basis, coefficients: Matrix) -> Self {
         Self::new(basis, coefficients, self.fit_error, self.summary)
     }
 
-    /// The mean and the variance of each output under the design's distribution.
+    /// Returns mean and variance of each output under the design's distribution.
     pub fn mean_and_variance(&self) -> (Vec<f64>, Vec<f64>) {
         let Sensitivity { mean, variance, .. } = self.moments();
         (mean, variance)
     }
 
-    /// How the expansion came about.
+    /// Returns the properties of the fit.
     pub fn summary(&self) -> &Summary {
         &self.summary
     }
 
-    /// The terms over which all outputs are expanded.
+    /// Returns the terms over which all outputs are expanded.
     pub fn terms(&self) -> &Terms {
         self.basis.terms()
     }
 
-    /// Where the parameters sit in their families.
+    /// Returns the standard variables and polynomials of the parameters.
     pub fn basis_coordinates(&self) -> Vec<Coordinate> {
         self.basis.coordinates().to_vec()
     }
@@ -217,7 +217,7 @@ impl Linear for Expansion {
 }
 
 impl Summary {
-    /// What is worth telling; `union` is the number of terms of all outputs together.
+    /// Returns the facts for the report; `union` is the number of terms of all outputs together.
     fn facts(&self, union: usize) -> Vec<Fact> {
         let one = if self.reduction.is_some() { "a component" } else { "an output" };
         let mut facts = vec![
@@ -254,14 +254,14 @@ impl Summary {
         if self.optimistic > 0 {
             let name = if self.reduction.is_some() { "components" } else { "outputs" };
             let name =
-                format!("{name} with fewer than 3 runs a term, whose error is likely too small");
+                format!("{name} with fewer than 3 runs per term, whose error is likely too small");
             tell(&name, self.optimistic.to_string());
         }
         facts
     }
 }
 
-/// The least, the median and the largest of some numbers.
+/// Formats the least, the median and the largest of some numbers.
 fn spread(numbers: &[usize]) -> String {
     let mut sorted = numbers.to_vec();
     sorted.sort_unstable();

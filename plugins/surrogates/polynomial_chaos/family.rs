@@ -1,40 +1,40 @@
 //! Families of orthonormal polynomials in one variable.
 
-use lacuna::linalg::lanes::{LANES, Lanes};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::special::ln_gamma;
+use lacuna_linalg::lanes::{LANES, Lanes};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A family of polynomials, orthonormal under the law of its standard variable.
+/// Family of polynomials, orthonormal under the distribution of its standard variable.
 ///
-/// Where the parameter's design is not of the family's law, the polynomials are those of
-/// `z = F_family^-1(F_design(x))`, which has that law; beyond the design's support they keep the values of its bounds.
+/// If the parameter's design has another distribution, the polynomials are those of `z = F_family^-1(F_design(x))`,
+/// which has the family's distribution; beyond the design's support they keep the values at its bounds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Family {
-    /// For each parameter the family of its design: `legendre` for `uniform`, `hermite` for `normal`, `laguerre`
-    /// for `exponential` and `gamma`, `jacobi` for `beta`, and `arbitrary` for all others.
+    /// For each parameter the family of its design: `legendre` for `uniform`, `hermite` for `normal`, `laguerre` for
+    /// `exponential` and `gamma`, `jacobi` for `beta`, and `arbitrary` for all others.
     #[default]
     Auto,
-    /// Legendre polynomials: the uniform law. With a `log_uniform` design, polynomials in the logarithm.
+    /// Legendre polynomials, for the uniform distribution. With a `log_uniform` design, polynomials in the logarithm.
     Legendre,
-    /// Hermite polynomials: the normal law. With a `log_normal` design, polynomials in the logarithm: often
-    /// better than `arbitrary`, for polynomials in a log-normal parameter do not reach every response.
+    /// Hermite polynomials, for the normal distribution. With a `log_normal` design, polynomials in the logarithm:
+    /// often better than `arbitrary`, because polynomials in a log-normal parameter cannot represent every response.
     Hermite,
-    /// Laguerre polynomials: the gamma law. For other designs with a lower bound the gamma law of the same mean
-    /// and variance above it, for those without the exponential law.
+    /// Laguerre polynomials, for the gamma distribution. For other designs with a lower bound, the gamma distribution
+    /// with the same mean and variance above it; for designs without a lower bound, the exponential distribution.
     Laguerre,
-    /// Jacobi polynomials: the beta law. For other bounded designs the beta law of the same mean and
-    /// variance between the bounds, for unbounded ones the uniform law.
+    /// Jacobi polynomials, for the beta distribution. For other bounded designs, the beta distribution with the same
+    /// mean and variance between the bounds; for unbounded ones, the uniform distribution.
     Jacobi,
-    /// The polynomials that are orthonormal under the design itself, by the procedure of Stieltjes where
-    /// they have no closed form. A law with few moments (`student_t`, `inverse_gamma`) has few of them.
+    /// Polynomials that are orthonormal under the design itself, by the Stieltjes procedure if they have no closed
+    /// form. A distribution with few moments (`student_t`, `inverse_gamma`) has few of them.
     Arbitrary,
 }
 
 impl Family {
-    /// The name in a study.
+    /// Returns the name of the family in a study.
     pub fn name(self) -> &'static str {
         match self {
             Self::Auto => "auto",
@@ -46,7 +46,7 @@ impl Family {
         }
     }
 
-    /// The family itself, or that of a design for [`Family::Auto`].
+    /// Returns the family itself, or that of a design for [`Family::Auto`].
     pub fn of(self, design: &Distribution) -> Self {
         match (self, design) {
             (Self::Auto, Distribution::Uniform(_)) => Self::Legendre,
@@ -58,8 +58,9 @@ impl Family {
         }
     }
 
-    /// The weights of the product of two polynomials in the family: `psi_m psi_n = sum_r weights[r]
-    /// psi_{m + n - 2 r}`, `r` from 0 to the lesser of the degrees; none where there is no such short form.
+    /// Returns the weights of the product of two polynomials in the family,
+    /// `psi_m psi_n = sum_r weights[r] psi_{m + n - 2 r}` with `r` from 0 to the smaller degree; `None` if there is no
+    /// such short form.
     pub fn product(self, m: usize, n: usize) -> Option<Vec<f64>> {
         match self {
             Self::Legendre => Some(legendre_product(m, n)),
@@ -68,11 +69,11 @@ impl Family {
         }
     }
 
-    /// How far from zero the standard variable may lie for sums of products to be formed: beyond, the largest
-    /// polynomials are so large that their round-off would cover the sum.
+    /// Returns the largest size of the standard variable for which sums of products are formed: beyond it the largest
+    /// polynomials are so large that their rounding errors would exceed the sum.
     pub fn reach(self) -> f64 {
         match self {
-            // Values on the bounds come back from physical units with round-off.
+            // Values at the bounds return from physical units with rounding errors.
             Self::Legendre => 1.0 + 1e-9,
             Self::Hermite => 3.0,
             _ => 0.0,
@@ -80,13 +81,13 @@ impl Family {
     }
 }
 
-/// `sqrt(2 n + 1) P_n(z)` by the three-term recurrence (Abramowitz and Stegun 22.7.10).
+/// Computes `sqrt(2 n + 1) P_n(z)` by the three-term recurrence (Abramowitz and Stegun 22.7.10).
 pub(super) fn legendre(z: f64, values: &mut [f64]) {
     legendre_raw(z, values);
     normalise(values);
 }
 
-/// The same at several values side by side, with the same bits.
+/// Like [`legendre`], at several values side by side and with the same bits.
 pub(super) fn legendre_lanes(z: &Lanes, table: &mut [Lanes]) {
     for n in 0..table.len() {
         table[n] = match n {
@@ -109,7 +110,7 @@ pub(super) fn legendre_lanes(z: &Lanes, table: &mut [Lanes]) {
     }
 }
 
-/// With the derivatives by `P'_{n+1} = P'_{n-1} + (2 n + 1) P_n`, which holds at the ends too.
+/// Computes also the derivatives, by `P'_{n+1} = P'_{n-1} + (2 n + 1) P_n`, which is valid at the ends too.
 pub(super) fn legendre_derivatives(z: f64, values: &mut [f64], derivatives: &mut [f64]) {
     legendre_raw(z, values);
     for n in 0..derivatives.len() {
@@ -152,7 +153,7 @@ fn legendre_product(m: usize, n: usize) -> Vec<f64> {
     (0..=m.min(n)).map(weight).collect()
 }
 
-/// Feldheim (1940): `He_m He_n = sum_r r! C(m, r) C(n, r) He_{m+n-2r}`, here of length one.
+/// Feldheim (1940): `He_m He_n = sum_r r! C(m, r) C(n, r) He_{m+n-2r}`, here normalised to length one.
 fn hermite_product(m: usize, n: usize) -> Vec<f64> {
     let ln_factorial = |k: usize| ln_gamma(k as f64 + 1.0);
     let weight = |r: usize| {

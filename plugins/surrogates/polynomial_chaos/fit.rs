@@ -1,10 +1,10 @@
-//! From runs to an expansion: one problem for all outputs.
+//! Fit of an expansion to runs, as one problem for all outputs.
 
-use lacuna::linalg::{Matrix, multiply_transposed};
 use lacuna::math::random::Stream;
 use lacuna::plugin::Emulator;
 use lacuna::plugin::surrogate::{FitError, Training};
 use lacuna::run::{Progress, Stop};
+use lacuna_linalg::{Matrix, multiply_transposed};
 
 use super::PolynomialChaos;
 use super::coordinate::Coordinate;
@@ -17,17 +17,17 @@ use super::search::{Best, Output, Search};
 use super::terms::{Basis, Sets};
 use crate::surrogates::principal_components::PrincipalComponents;
 
-/// Outputs whose standard deviation over the runs is below this share of the largest response do not
-/// vary: what is left is round-off (the strain of a sensor before the wave arrives).
+/// Standard deviation over the runs, as a fraction of the largest response, below which an output counts as constant:
+/// what is left are rounding errors (such as the strain of a sensor before the wave arrives).
 const ROUND_OFF: f64 = 1e-13;
 
-/// The fits of all outputs, or of all components, side by side.
+/// Fits of all outputs, or of all components, side by side.
 struct Fits {
     terms: Basis,
-    /// `terms x outputs`.
+    /// Coefficients (`terms x outputs`).
     coefficients: Matrix,
     relative: Vec<f64>,
-    /// `runs x outputs`.
+    /// Leave-one-out residuals (`runs x outputs`).
     residuals: Matrix,
     summary: Summary,
 }
@@ -72,7 +72,7 @@ pub(super) fn fit(
     Ok(expansion)
 }
 
-/// Refuses numbers that no regression can take, naming where they are.
+/// Fails if there are fewer than 3 runs or a number is not finite; the message names the run and the place.
 pub(in crate::surrogates) fn check_numbers(training: &Training<'_>) -> Result<(), Stop> {
     let Training { parameters, layouts, points, responses } = training;
     if points.rows() != responses.rows() || points.rows() < 3 {
@@ -123,7 +123,7 @@ fn outputs(responses: &Matrix) -> Vec<Output> {
     columns.iter_rows().map(output).collect()
 }
 
-/// Warns of what the user should know about the fit.
+/// Warns of outputs and errors that deserve caution.
 fn warn(expansion: &Expansion, runs: usize, dimension: usize, progress: &Progress<'_>) {
     let Summary { constant, poor, optimistic, .. } = expansion.summary();
     let outputs = expansion.fit_error().relative.len();
@@ -139,15 +139,16 @@ fn warn(expansion: &Expansion, runs: usize, dimension: usize, progress: &Progres
     }
     let few = runs < 10 * dimension;
     if few || 2 * optimistic > outputs {
-        let why = if few { "ten runs a parameter" } else { "three runs a term in most outputs" };
+        let why =
+            if few { "ten runs per parameter" } else { "three runs per term in most outputs" };
         progress.warn(&format!(
             "{runs} runs are fewer than {why}: the surrogate's leave-one-out errors are likely too small; \
-             judge it by runs kept aside"
+             use the errors at `validation` runs instead"
         ));
     }
 }
 
-/// What the fits of all outputs share.
+/// Data shared by the fits of all outputs.
 struct Problem<'a> {
     options: &'a PolynomialChaos,
     points: &'a Matrix,
@@ -158,12 +159,12 @@ struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// Refuses degrees of which the quadrature rule finds none.
+    /// Fails if the quadrature rule determines none of the requested degrees.
     fn check_level(&self) -> Result<(), Stop> {
         let least = self.options.degree.range().min;
         match &self.projection {
             Some(projection) if projection.level < least => Err(Stop::new(format!(
-                "`surrogate.degree`: the runs are a {} rule of level {}, which finds no expansion of degree \
+                "`surrogate.degree`: the runs are a {} rule of level {}, which cannot determine an expansion of degree \
                  {least}",
                 projection.rule.name(),
                 projection.level
@@ -173,7 +174,7 @@ impl Problem<'_> {
         }
     }
 
-    /// The best fit of each output.
+    /// Returns the best fit of each output.
     fn fits(&self, outputs: &[Output], progress: &Progress<'_>) -> Result<Fits, Stop> {
         let search = Search {
             options: self.options,
@@ -194,14 +195,14 @@ impl Problem<'_> {
         Ok(self.assembled(outputs, &found, &fits))
     }
 
-    /// Puts the outputs' terms into their union.
+    /// Assembles the fits over the union of the outputs' terms.
     fn assembled(&self, outputs: &[Output], found: &[Option<Best>], fits: &[Fit]) -> Fits {
         let all = &self.sets.terms;
         let terms_of = |best: &Option<Best>| best.as_ref().map_or(vec![0], |b| b.terms.clone());
         let own: Vec<Vec<usize>> = found.iter().map(terms_of).collect();
         let mut used = vec![false; all.len()];
         own.iter().flatten().for_each(|&t| used[t] = true);
-        // The constant is there even without outputs.
+        // The constant is included even without outputs.
         used[0] = true;
         let union: Vec<usize> = (0..used.len()).filter(|&t| used[t]).collect();
         let mut position = vec![0; used.len()];
@@ -244,8 +245,8 @@ impl Fits {
         Expansion::new(self.terms, self.coefficients, fit_error, summary)
     }
 
-    /// The outputs' expansion from that of their components. What the components leave out of the outputs is
-    /// part of the residuals, and so of all that is said about the emulator's error.
+    /// Converts an expansion of components to one of the outputs. The part of the outputs that the components leave
+    /// out is included in the residuals, and hence in all statements about the emulator's error.
     fn multiplied_back(self, outputs: &[Output], components: &PrincipalComponents) -> Expansion {
         let PrincipalComponents { mean, directions, scores, remainder } = components;
         let runs = self.residuals.rows();
@@ -253,7 +254,7 @@ impl Fits {
         // The constant is the first term of every set.
         coefficients.row_mut(0).iter_mut().zip(mean).for_each(|(c, m)| *c += m);
         let square = |column: Vec<f64>| column.iter().map(|x| x * x).sum::<f64>();
-        // The correction for the number of terms differs from component to component.
+        // The correction for the number of terms differs between components.
         let corrections: Vec<f64> = (0..scores.columns())
             .map(|k| {
                 let plain = square(self.residuals.column(k));
@@ -288,7 +289,7 @@ impl Fits {
     }
 }
 
-/// The fit of an output that does not vary.
+/// Returns the fit of an output that does not vary.
 fn constant(output: &Output) -> Fit {
     let n = output.centred.len() as f64;
     let residuals = output.centred.iter().map(|y| y / (1.0 - 1.0 / n)).collect();

@@ -1,26 +1,26 @@
-//! How good a set of terms is for an output.
+//! Assessment of a set of terms for an output.
 
-use lacuna::linalg::{Cholesky, Matrix, vector};
 use lacuna::math::random::{Stream, permutation};
+use lacuna_linalg::{Cholesky, Matrix, vector};
 
 use super::dictionary::ActiveSet;
 use super::options::Selection;
 
-/// Residuals below this share of the output are round-off: the fit is exact.
+/// Size of the residuals relative to the output below which they are rounding errors and the fit is exact.
 const EXACT: f64 = 1e-14;
-/// The most steps whose errors are computed together.
+/// Maximum number of steps whose errors are computed together.
 const BLOCK: usize = 32;
 
-/// The error by which sets of terms are compared.
+/// Error by which sets of terms are compared.
 pub(super) enum Criterion {
-    /// Each run is left out once; the error is corrected for the number of terms.
+    /// Leave-one-out error, corrected for the number of terms.
     LeaveOneOut,
-    /// Each of these groups of runs is left out once.
+    /// Cross-validation error with these groups of runs left out in turn.
     Folds(Vec<Vec<usize>>),
 }
 
 impl Criterion {
-    /// The criterion that the options ask for, for so many runs.
+    /// Returns the criterion that the options request, for `runs` runs.
     pub fn new(selection: Selection, runs: usize, stream: &Stream) -> Self {
         match selection {
             Selection::LeaveOneOut => Self::LeaveOneOut,
@@ -33,8 +33,8 @@ impl Criterion {
     }
 }
 
-/// `N / (N - P) (1 + tr (Psi' Psi)^-1)`: corrects the leave-one-out error for the number of terms
-/// (Chapelle, Vapnik and Bengio 2002; Blatman and Sudret 2011). Infinite when `P >= N`.
+/// Returns `N / (N - P) (1 + tr (Psi' Psi)^-1)`, the correction of the leave-one-out error for the number of terms
+/// (Chapelle, Vapnik and Bengio 2002; Blatman and Sudret 2011). Infinite if `P >= N`.
 pub(super) fn correction(runs: usize, terms: usize, trace: f64) -> f64 {
     if terms >= runs {
         return f64::INFINITY;
@@ -42,17 +42,17 @@ pub(super) fn correction(runs: usize, terms: usize, trace: f64) -> f64 {
     runs as f64 / (runs - terms) as f64 * (1.0 + trace)
 }
 
-/// The terms chosen for one output, in the order in which they entered.
+/// Terms chosen for one output, in the order in which they entered.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Choice {
-    /// Their positions in the dictionary, without the constant.
+    /// Indices in the dictionary, without the constant.
     pub terms: Vec<usize>,
-    /// Their error relative to the output's variance.
+    /// Error relative to the output's variance.
     pub error: f64,
 }
 
 impl Choice {
-    /// Keeps the better one.
+    /// Keeps the better of two choices; returns true if it is `other`.
     pub fn improve(best: &mut Option<Self>, other: Self) -> bool {
         let better = best.as_ref().is_none_or(|b| other.error < b.error);
         if better {
@@ -64,17 +64,17 @@ impl Choice {
 
 /// A method that proposes one term after the other.
 pub(super) trait Path<'a> {
-    /// Lets the next term in; false when there is none.
+    /// Adds the next term; returns false if there is none.
     fn step(&mut self) -> bool;
 
-    /// The terms so far.
+    /// Returns the terms so far.
     fn active(&self) -> &ActiveSet<'a>;
 }
 
-/// The best least-squares fit along a path for one output, given as its values less their mean.
+/// Returns the best least-squares fit along a path for one output, given as its values minus their mean.
 ///
-/// The path ends `window` steps after the best step so far, after `most` steps, or when terms or residuals
-/// are exhausted.
+/// The path ends `window` steps after the best step so far, after `most` steps, or when terms or residuals are
+/// exhausted.
 pub(super) fn best_along<'a>(
     path: &mut impl Path<'a>,
     centred: &[f64],
@@ -86,7 +86,7 @@ pub(super) fn best_along<'a>(
     let mut best: Option<(f64, usize)> = None;
     'path: while path.active().terms().len() < most {
         let first = path.active().terms().len();
-        // No step is taken of which it is not known that the path reaches it.
+        // A block ends no later than the path is known to continue, so that no step is wasted.
         let known = best.map_or(usize::MAX, |(_, at)| at.saturating_add(window));
         let end = most.min(first + BLOCK).min(known);
         while path.active().terms().len() < end && path.step() {}
@@ -110,7 +110,7 @@ pub(super) fn best_along<'a>(
     best.map(|(error, k)| Choice { terms: path.active().terms()[..k].to_vec(), error })
 }
 
-/// The least-squares fit on a whole set of terms.
+/// Assesses the least-squares fit on a whole set of terms.
 pub(super) fn judged(active: &ActiveSet<'_>, centred: &[f64], criterion: &Criterion) -> Choice {
     let mut judge = Judge::new(centred, criterion);
     active.orthonormal(0).iter_rows().for_each(|column| judge.add(column));
@@ -118,16 +118,16 @@ pub(super) fn judged(active: &ActiveSet<'_>, centred: &[f64], criterion: &Criter
     Choice { error: judge.error(active.trace(terms.len())), terms }
 }
 
-/// Keeps leverages and residuals of the least-squares fit while terms are added.
+/// Leverages and residuals of the least-squares fit, updated as terms are added.
 struct Judge<'a> {
     residual: Vec<f64>,
-    /// One less the leverage of each run.
+    /// One minus the leverage of each run.
     freedom: Vec<f64>,
-    /// The runs of each fold and their part of `1 - H`, `H` the hat matrix.
+    /// Runs of each fold and their block of `1 - H`, with `H` the hat matrix.
     folds: Vec<(&'a [usize], Matrix)>,
-    /// The sum of squares of the centred output.
+    /// Sum of squares of the centred output.
     total: f64,
-    /// Those of the residuals, and of these divided by `freedom`: the leave-one-out residuals.
+    /// Sums of squares of the residuals, and of the leave-one-out residuals (the residuals divided by `freedom`).
     squares: [f64; 2],
     terms: usize,
 }
@@ -159,8 +159,8 @@ impl<'a> Judge<'a> {
     /// Adds one orthonormal column.
     fn add(&mut self, column: &[f64]) {
         self.terms += 1;
-        // The projection of the residual, not of the output: what round-off left in the columns
-        // already there is not projected twice.
+        // The residual is projected and not the output: rounding errors of earlier columns are then not projected
+        // twice.
         let projection = vector::dot(column, &self.residual);
         self.squares = vector::take_out(column, projection, &mut self.residual, &mut self.freedom);
         for (runs, block) in &mut self.folds {
@@ -171,7 +171,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// The error relative to the variance; `trace` is `tr (Psi' Psi)^-1`.
+    /// Returns the error relative to the variance; `trace` is `tr (Psi' Psi)^-1`.
     fn error(&self, trace: f64) -> f64 {
         let error = if self.folds.is_empty() {
             self.squares[1] / self.total * correction(self.residual.len(), self.terms, trace)
@@ -182,14 +182,14 @@ impl<'a> Judge<'a> {
         if error.is_nan() { f64::INFINITY } else { error }
     }
 
-    /// Whether nothing is left but round-off.
+    /// Returns true if only rounding errors are left.
     fn exact(&self) -> bool {
         self.squares[0] <= EXACT * EXACT * self.total
     }
 }
 
-/// The sum of squares of the residuals that some runs have in the fit without them: `(1 - H)^-1 r` of their
-/// rows and columns of the hat matrix. Infinite when the rest does not determine the fit.
+/// Returns the sum of squared residuals of some runs for the fit without them: `(1 - H)^-1 r` with their rows and
+/// columns of the hat matrix. Infinite if the other runs do not determine the fit.
 pub(super) fn left_out(runs: &[usize], block: &Matrix, residual: &[f64]) -> f64 {
     let mut own: Vec<f64> = runs.iter().map(|&i| residual[i]).collect();
     let Ok(factor) = Cholesky::new(block) else { return f64::INFINITY };

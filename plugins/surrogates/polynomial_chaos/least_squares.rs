@@ -1,6 +1,6 @@
-//! Ordinary least squares with its leave-one-out error.
+//! Ordinary least squares with leave-one-out errors.
 
-use lacuna::linalg::{
+use lacuna_linalg::{
     Matrix, multiply_transposed, multiply_vector, solve_upper, solve_upper_matrix, thin_qr,
     transposed_multiply_vector,
 };
@@ -11,27 +11,27 @@ use super::judge::{Criterion, correction, left_out};
 pub(super) struct Regression {
     q: Matrix,
     r: Matrix,
-    /// The diagonal of the hat matrix.
+    /// Diagonal of the hat matrix.
     leverage: Vec<f64>,
-    /// The correction for the number of terms.
+    /// Correction for the number of terms.
     correction: f64,
-    /// The runs of each fold and their part of `1 - H`, `H` the hat matrix.
+    /// Runs of each fold and their block of `1 - H`, with `H` the hat matrix.
     folds: Vec<(Vec<usize>, Matrix)>,
 }
 
-/// One output's regression.
+/// Regression of one output.
 pub(super) struct Fit {
-    /// One coefficient a basis function.
+    /// Coefficient of each basis function.
     pub coefficients: Vec<f64>,
-    /// The error by the criterion, relative to the output's variance.
+    /// Error by the criterion, relative to the output's variance.
     pub relative: f64,
-    /// The leave-one-out residuals `r_i / (1 - h_i)`.
+    /// Leave-one-out residuals `r_i / (1 - h_i)`.
     pub residuals: Vec<f64>,
 }
 
 impl Regression {
-    /// Factors the basis functions at the runs (`runs x terms`); none when they are linearly dependent
-    /// to working precision.
+    /// Factors the basis functions at the runs (`runs x terms`); `None` if they are linearly dependent to working
+    /// precision.
     pub fn new(basis: &Matrix, criterion: &Criterion) -> Option<Self> {
         let (n, p) = (basis.rows(), basis.columns());
         let qr = thin_qr(basis).ok()?;
@@ -52,8 +52,8 @@ impl Regression {
         Some(Self { q: qr.q, r: qr.r, leverage, correction, folds })
     }
 
-    /// Fits one output, given as its mean and what is left; `variance` is that of its values, divided
-    /// by `N`. The first basis function must be the constant 1: it takes the mean, so that a large one
+    /// Fits one output, given as its mean and the deviations from it (`centred`); `variance` is that of its values,
+    /// with divisor `N`. The first basis function must be the constant 1: it takes the mean, so that a large mean
     /// costs no digits.
     pub fn fit(&self, mean: f64, centred: &[f64], variance: f64) -> Fit {
         let mut coefficients = transposed_multiply_vector(&self.q, centred);
@@ -79,7 +79,7 @@ impl Regression {
     }
 }
 
-/// The runs of a fold and their part of `1 - H`.
+/// Returns the runs of a fold and their block of `1 - H`.
 fn block(q: &Matrix, fold: &[usize]) -> (Vec<usize>, Matrix) {
     let own = q.select_rows(fold);
     let hat = multiply_transposed(&own, &own);

@@ -1,24 +1,24 @@
 //! Orthogonal matching pursuit: the term most correlated with the residual of the least-squares fit enters next
 //! (Pati, Rezaiifar and Krishnaprasad 1993).
 //!
-//! Like the path of least-angle regression it never touches the runs: the residual's correlations
-//! fall by the Gram matrix's products with each new orthonormal column (Rubinstein, Zibulevsky and Elad 2008).
+//! Like the path of least-angle regression it does not depend on the number of runs: the correlations of the residual
+//! are updated by the Gram matrix's products with each new orthonormal column (Rubinstein, Zibulevsky and Elad 2008).
 
-use lacuna::linalg::vector;
+use lacuna_linalg::vector;
 
 use super::dictionary::{ActiveSet, Dictionary};
 use super::judge::Path;
 
-/// Correlations below this share of the largest at the start are round-off.
+/// Size of a correlation relative to the largest at the start below which it is a rounding error.
 const NOTHING: f64 = 1e-15;
 
-/// The state of the pursuit.
+/// State of the pursuit.
 pub(super) struct MatchingPursuit<'a> {
     dictionary: &'a Dictionary,
     active: ActiveSet<'a>,
-    /// The output's products with the columns.
+    /// Products of the output with the columns.
     start: Vec<f64>,
-    /// The residual's.
+    /// Products of the residual with the columns.
     correlations: Vec<f64>,
     scratch: Vec<f64>,
     open: Vec<bool>,
@@ -26,7 +26,7 @@ pub(super) struct MatchingPursuit<'a> {
 }
 
 impl<'a> MatchingPursuit<'a> {
-    /// `correlations` are the output's products with the dictionary's columns.
+    /// Starts the pursuit; `correlations` are the output's products with the dictionary's columns.
     pub fn new(dictionary: &'a Dictionary, correlations: &[f64]) -> Self {
         let largest = correlations.iter().fold(0.0_f64, |most, c| most.max(c.abs()));
         Self {

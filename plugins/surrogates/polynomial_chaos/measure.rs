@@ -1,11 +1,10 @@
-//! Laws as sums over many nodes, fine enough for the moments that orthogonal polynomials need.
+//! Distributions as sums over many nodes, fine enough for the moments that orthogonal polynomials need.
 
 use lacuna::math::distribution::Distribution;
 
 use super::recurrence::Recurrence;
 
-/// A change of variable `x(s)` after which the law's density is smooth and falls at least like an
-/// exponential.
+/// A change of variable `x(s)` after which the density is smooth and decays at least exponentially.
 #[derive(Debug, Clone, Copy)]
 enum Change {
     /// `x = origin + unit s`.
@@ -16,22 +15,23 @@ enum Change {
     Sine { origin: f64, unit: f64 },
 }
 
-/// A piece of a law: where it starts, how far it may reach and how fine it is cut.
+/// A piece of a distribution: start, largest extent, and width of the panels.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
     change: Change,
     start: f64,
     low: f64,
     high: f64,
-    /// The width of a panel.
+    /// Width of a panel.
     width: f64,
 }
 
-/// Nodes of each panel.
+/// Number of nodes of each panel.
 const NODES: usize = 32;
-/// A piece ends where what the highest moment has there is below `exp(-NEGLIGIBLE)` of its largest part.
+/// Log ratio at which a piece is cut off: the integrand of the highest moment is there `exp(-NEGLIGIBLE)` of its
+/// maximum.
 const NEGLIGIBLE: f64 = 80.0;
-/// Moments closer than this to the first infinite one are not computed: their tail is too long.
+/// Distance from the first infinite moment below which moments are not computed, because their tails are too long.
 const NEAR_INFINITE: f64 = 0.1;
 
 impl Change {
@@ -43,7 +43,7 @@ impl Change {
         }
     }
 
-    /// `ln dx/ds`.
+    /// Returns `ln dx/ds`.
     fn ln_slope(self, s: f64) -> f64 {
         match self {
             Self::Affine { unit, .. } => unit.ln(),
@@ -53,7 +53,8 @@ impl Change {
     }
 }
 
-/// The largest degree of which the law has orthogonal polynomials: twice the degree must be a moment.
+/// Returns the largest degree for which the distribution has orthogonal polynomials: the moment of twice the degree
+/// must be finite. `None` without limit.
 pub fn largest_degree(law: &Distribution) -> Option<usize> {
     let below = |moments: f64| Some((0.5 * (moments - NEAR_INFINITE)).max(0.0).floor() as usize);
     match *law {
@@ -65,11 +66,11 @@ pub fn largest_degree(law: &Distribution) -> Option<usize> {
     }
 }
 
-/// The recurrence of the polynomials that are orthonormal under a law, in the variable
+/// Returns the recurrence of the polynomials that are orthonormal under a distribution, in the variable
 /// `(x - centre) / scale`, by quadrature.
 pub fn recurrence(law: &Distribution, degree: usize, centre: f64, scale: f64) -> Recurrence {
     let (mut nodes, mut weights) = (Vec::new(), Vec::new());
-    // A rule of so few nodes exists for any degree.
+    // A rule with so few nodes always exists.
     let rule = Recurrence::legendre(NODES).gauss(NODES).unwrap_or_default();
     for piece in pieces(law, degree) {
         let (low, high) = piece.reach(law, degree, centre, scale);
@@ -123,7 +124,7 @@ fn pieces(law: &Distribution, degree: usize) -> Vec<Piece> {
         }
         Distribution::TruncatedNormal([mean, sd, low, high]) => {
             let mode = mean.clamp(low, high);
-            // Far from the mean the law falls like an exponential one of this scale.
+            // Far from the mean the density decays like an exponential with this scale.
             let unit = sd / (1.0 + ((mode - mean) / sd).abs());
             let bounds = ((low - mode) / unit, (high - mode) / unit);
             vec![piece(Change::Affine { origin: mode, unit }, 0.0, bounds, 0.5)]
@@ -143,7 +144,7 @@ impl Piece {
         law.log_density(self.change.at(s)) + self.change.ln_slope(s)
     }
 
-    /// Where the piece begins and ends for moments up to `2 degree`.
+    /// Returns the ends of the piece for moments up to `2 degree`.
     fn reach(&self, law: &Distribution, degree: usize, centre: f64, scale: f64) -> (f64, f64) {
         let size = |s: f64| {
             let z = ((self.change.at(s) - centre) / scale).abs().max(1.0);

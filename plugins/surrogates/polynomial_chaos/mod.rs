@@ -33,7 +33,7 @@ use lacuna::math::random::Stream;
 use lacuna::plugin::surrogate::{Summand, Surrogate, Training};
 use lacuna::plugin::{Component, Context, Emulator};
 use lacuna::run::{Progress, Stop};
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -47,59 +47,58 @@ pub use options::{Degree, DegreeRange, EarlyStop, QNorm, QNormRange, Selection, 
 pub use recurrence::Recurrence;
 pub use terms::{Basis, Nested, Sets, TermSet, Terms, Truncation};
 
-/// A polynomial chaos expansion: each output is a sum of products of orthonormal polynomials in the
-/// parameters.
+/// A polynomial chaos expansion: each output is a sum of products of orthonormal polynomials in the parameters.
 ///
-/// The polynomials are orthonormal under the *design's* distribution, so that the coefficients give mean,
-/// variance and Sobol' indices without sampling. All outputs are fitted as one problem: they share the
-/// basis and its Gram matrix. For each output, degree and norm the solver proposes sets of terms;
-/// every proposed set is fitted by least squares and judged by its leave-one-out error,
-/// corrected for the number of terms by `N / (N - P) (1 + tr (Psi' Psi)^-1)`, or by cross-validation. The output keeps
-/// the set, the degree and the norm with the least error, and never only its mean where it varies. Outputs that
-/// do not vary over the runs, but for round-off, are emulated by their mean and have the error 0.
+/// The polynomials are orthonormal under the *design's* distribution, so that the coefficients give mean, variance
+/// and Sobol' indices without sampling. All outputs are fitted as one problem: they share the basis and its Gram
+/// matrix. For each output, degree and norm the solver proposes sets of terms; every proposed set is fitted by least
+/// squares and assessed by its leave-one-out error, corrected for the number of terms by
+/// `N / (N - P) (1 + tr (Psi' Psi)^-1)`, or by cross-validation. The output keeps the set, degree and norm with the
+/// smallest error; an output that varies is never represented by its mean alone. Outputs that are constant over the
+/// runs up to rounding errors are emulated by their mean and have the error 0.
 ///
-/// The error was used to choose, so that it is too small where runs are few: with fewer than three runs a term
-/// or ten a parameter believe the `validation` runs instead. The result tells when this is so.
+/// Because this error was used for the choice, it is too small if there are few runs: with fewer than three runs per
+/// term or ten per parameter rely on the `validation` runs instead. The result reports when this is the case.
 ///
-/// Outside the design's range the polynomials are extrapolated, and grow quickly there; where a parameter is
-/// transformed they keep their values on the design's bounds.
+/// Outside the range of the design the polynomials are extrapolated, and grow quickly; if a parameter is transformed
+/// they keep their values at the bounds of the design.
 ///
-/// References: Blatman and Sudret, *Adaptive sparse polynomial chaos expansion based on least angle
-/// regression*, Journal of Computational Physics 230 (2011) 2345; Efron, Hastie, Johnstone and
-/// Tibshirani, *Least angle regression*, Annals of Statistics 32 (2004) 407; Chapelle, Vapnik and
-/// Bengio, *Model selection for small sample regression*, Machine Learning 48 (2002) 9; Sudret,
-/// *Global sensitivity analysis using polynomial chaos expansions*, Reliability Engineering and System
-/// Safety 93 (2008) 964. Families: Xiu and Karniadakis, SIAM Journal on Scientific Computing 24 (2002) 619; Gautschi,
-/// *Orthogonal Polynomials*, Oxford (2004); Ernst, Mugler, Starkloff and Ullmann, ESAIM: Mathematical Modelling and
-/// Numerical Analysis 46 (2012) 317 (what log-normal parameters cannot reach). Solvers: Pati, Rezaiifar and
-/// Krishnaprasad, 27th Asilomar Conference (1993) 40; Dai and Milenkovic, IEEE Transactions on Information Theory 55
-/// (2009) 2230; Tipping and Faul, 9th Workshop on Artificial Intelligence and Statistics (2003); Lüthen, Marelli and
-/// Sudret, SIAM/ASA Journal on Uncertainty Quantification 9 (2021) 593 (a comparison).
+/// References: Blatman and Sudret, *Adaptive sparse polynomial chaos expansion based on least angle regression*,
+/// Journal of Computational Physics 230 (2011) 2345; Efron, Hastie, Johnstone and Tibshirani, *Least angle
+/// regression*, Annals of Statistics 32 (2004) 407; Chapelle, Vapnik and Bengio, *Model selection for small sample
+/// regression*, Machine Learning 48 (2002) 9; Sudret, *Global sensitivity analysis using polynomial chaos
+/// expansions*, Reliability Engineering and System Safety 93 (2008) 964. Families: Xiu and Karniadakis, SIAM Journal
+/// on Scientific Computing 24 (2002) 619; Gautschi, *Orthogonal Polynomials*, Oxford (2004); Ernst, Mugler, Starkloff
+/// and Ullmann, ESAIM: Mathematical Modelling and Numerical Analysis 46 (2012) 317 (responses that polynomials of
+/// log-normal parameters cannot represent). Solvers: Pati, Rezaiifar and Krishnaprasad, 27th Asilomar Conference
+/// (1993) 40; Dai and Milenkovic, IEEE Transactions on Information Theory 55 (2009) 2230; Tipping and Faul, 9th
+/// Workshop on Artificial Intelligence and Statistics (2003); Lüthen, Marelli and Sudret, SIAM/ASA Journal on
+/// Uncertainty Quantification 9 (2021) 593 (a comparison).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PolynomialChaos {
-    /// The families of polynomials.
+    /// Family of polynomials of each parameter.
     pub basis: Family,
-    /// How the coefficients are found.
+    /// Method that chooses the terms and their coefficients.
     pub solver: Solver,
-    /// The degree, or the range of degrees from which each output takes its best.
+    /// Degree, or the range of degrees from which each output takes the best.
     pub degree: Degree,
-    /// Which products belong to a degree `p`: those whose exponents have
-    /// `(sum of exponent^q_norm)^(1 / q_norm) <= p`. With 1 this is the total degree; smaller values
-    /// leave out products of many parameters. Of a list, or of a range such as `{ min = 0.5, max = 1.0, step =
-    /// 0.1 }`, each output takes the one with the least error.
+    /// Norm `q` that truncates the basis: degree `p` includes the products whose exponents satisfy
+    /// `(sum of exponent^q)^(1 / q) <= p`. Above 0, at most 1. With 1 this is the total degree; smaller values leave
+    /// out products of many parameters. From a list, or a range such as `{ min = 0.5, max = 1.0, step = 0.1 }`, each
+    /// output takes the norm with the smallest error.
     pub q_norm: QNorm,
-    /// The most parameters that may appear together in a product; all when not given.
+    /// Maximum number of parameters in one product. Default: no limit.
     pub max_interaction: Option<usize>,
-    /// Degrees with more terms than this are not tried.
+    /// Maximum number of terms of a degree; degrees with more terms are not tried.
     pub max_terms: usize,
-    /// When to stop looking for something better.
+    /// Conditions that end the search for a better expansion.
     pub early_stop: EarlyStop,
-    /// The error by which terms, degrees and norms are chosen.
+    /// Error by which terms, degrees and norms are chosen.
     pub selection: Selection,
-    /// Principal components of the outputs that are fitted instead of the outputs: `{ variance = 0.9999 }` for as
-    /// many as carry this share, or `{ count = 20 }`. Saves time with thousands of outputs; what they
-    /// leave out becomes part of the emulator's error. All outputs themselves when not given.
+    /// Principal components of the outputs, fitted in place of the outputs: `{ variance = 0.9999 }` for as many as
+    /// carry this fraction of the variance, or `{ count = 20 }`. This saves time with thousands of outputs; the part
+    /// that the components leave out is added to the emulator's error. Default: the outputs themselves.
     pub components: Option<Components>,
 }
 
@@ -119,27 +118,27 @@ impl Default for PolynomialChaos {
     }
 }
 
-/// The highest degree that may be asked for.
+/// Highest degree that may be requested.
 const MOST_DEGREES: usize = 1000;
 
-/// What is wrong with the options in view of the rest of the study.
+/// An error of the options in the context of the study.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Fault {
-    /// The option.
+    /// Name of the option.
     key: &'static str,
     message: String,
     help: String,
 }
 
 impl PolynomialChaos {
-    /// The nested sets of terms of one norm for so many parameters.
+    /// Returns the nested sets of terms of one norm in `dimension` parameters.
     fn nested(&self, dimension: usize, q_norm: f64) -> Nested {
         let max_interaction = self.max_interaction.unwrap_or(dimension);
         let truncation = Truncation { q_norm, max_interaction };
         Nested::new(dimension, self.degree.range().max, truncation, self.max_terms)
     }
 
-    /// The sets of terms that are to be tried.
+    /// Returns the sets of terms to be tried.
     fn sets(&self, dimension: usize) -> Sets {
         let norms = self.q_norm.values().unwrap_or_default();
         let families: Vec<(f64, Nested)> =
@@ -148,16 +147,16 @@ impl PolynomialChaos {
     }
 
     fn coordinate(&self, parameter: &Parameter) -> Result<Coordinate, String> {
-        // Among so many degrees there is always one that is too high.
+        // The cap bounds the work for a degree out of range, which is reported separately.
         Coordinate::new(self.basis, parameter, self.degree.range().max.min(MOST_DEGREES))
     }
 
-    /// Where the parameters sit in their families.
+    /// Returns the standard variables of the parameters with their polynomials.
     fn coordinates(&self, parameters: &[Parameter]) -> Result<Vec<Coordinate>, String> {
         parameters.iter().map(|p| self.coordinate(p)).collect()
     }
 
-    /// All that is wrong with the options for these parameters and runs.
+    /// Returns all errors of the options for these parameters and runs.
     fn faults(&self, parameters: &[Parameter], runs: Option<usize>) -> Vec<Fault> {
         let mut faults = self.faults_alone();
         if parameters.is_empty() {
@@ -183,7 +182,9 @@ impl PolynomialChaos {
         };
         let DegreeRange { min, max } = self.degree.range();
         if min == 0 || min > max || max > MOST_DEGREES {
-            let message = format!("the degrees {min} to {max} are no range between 1 and 1000");
+            let message = format!(
+                "the degrees must be an increasing range from 1 to 1000, not {min} to {max}"
+            );
             add("degree", message, "write `degree = { min = 1, max = 20 }` or a whole number");
         }
         if let Err(message) = self.q_norm.values() {
@@ -199,21 +200,22 @@ impl PolynomialChaos {
         }
         if let Selection::KFold(folds) = self.selection {
             if folds < 2 {
-                let message =
-                    format!("`selection` by {folds} parts of the runs leaves none to fit");
+                let message = format!(
+                    "`selection` by cross-validation needs at least 2 parts of the runs, not {folds}"
+                );
                 add("selection", message, "5 or 10 parts are usual");
             } else if self.solver == Solver::Quadrature {
-                let message = "no part of a quadrature rule's nodes can be left out".to_owned();
+                let message = "cross-validation is not possible with a quadrature rule, which needs all of its nodes".to_owned();
                 add("selection", message, "use `selection = \"leave_one_out\"`");
             }
         }
         faults
     }
 
-    /// Whether the basis is too large: for the option's limit, or for the runs.
+    /// Returns an error if the basis is too large for `max_terms` or for the number of runs.
     fn fault_of_size(&self, dimension: usize, runs: Option<usize>) -> Option<Fault> {
         let DegreeRange { min, max } = self.degree.range();
-        // The smallest norm has the fewest terms.
+        // The smallest norm has the smallest number of terms.
         let norm = self.q_norm.values().ok()?.into_iter().next()?;
         let counts = self.nested(dimension, norm).counts;
         if counts.len() <= min {
@@ -232,7 +234,7 @@ impl PolynomialChaos {
         {
             return Some(Fault {
                 key: "selection",
-                message: format!("{runs} runs cannot be cut into {folds} parts"),
+                message: format!("{runs} runs cannot be divided into {folds} parts"),
                 help: "5 or 10 parts are usual".to_owned(),
             });
         }

@@ -1,4 +1,4 @@
-//! The options of a study's section.
+//! Options of the study's section.
 
 use std::fmt;
 
@@ -6,32 +6,32 @@ use schemars::JsonSchema;
 use serde::de::value::MapAccessDeserializer;
 use serde::{Deserialize, Deserializer, Serialize, de};
 
-/// How the terms are chosen; those chosen are then fitted by least squares.
+/// Method that chooses the terms; the chosen terms are then fitted by least squares.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Solver {
-    /// A few terms among many: least-angle regression proposes them one after the other, and the set
-    /// with the least error is taken. There may be more terms to choose from than runs. The usual choice.
+    /// Sparse expansion by least-angle regression: terms are proposed one after the other, and the set with the
+    /// smallest error is taken. There may be more terms to choose from than runs. The usual choice.
     #[default]
     LeastAngleRegression,
-    /// The term most correlated with what is not yet explained comes next, up to half as many as runs: greedier,
-    /// good where few terms carry nearly everything. Its leave-one-out error is too small where they do not.
+    /// Greedy sparse expansion: the term most correlated with the residual enters next, up to half as many terms as
+    /// runs. Good if few terms carry nearly all of the variance; otherwise its leave-one-out error is too small.
     OrthogonalMatchingPursuit,
-    /// Sets of so many terms at once, improved by exchange; the number of terms with the least error is
-    /// taken. Often the best where runs are few and dimensions many, and slower.
+    /// Sparse expansion by exchange: sets of a given size are improved term by term, and the size with the smallest
+    /// error is taken. Often the best if there are few runs and many parameters, but slower.
     SubspacePursuit,
-    /// Sparse Bayesian learning: terms stay whose weights the data need; the noise is found by five-fold
-    /// cross-validation. Few terms, and slower.
+    /// Sparse Bayesian learning: only terms that the data require keep a weight; the noise is found by five-fold
+    /// cross-validation. It gives few terms and is slower.
     BayesianCompressiveSensing,
-    /// All terms of a degree. There must be more runs than terms; twice as many is a usual rule.
+    /// All terms of a degree. There must be more runs than terms; twice as many is a common rule.
     LeastSquares,
-    /// Projection by the weights of a quadrature rule. The runs must be the nodes, made by `[design] use =
-    /// "quadrature"` with the same `basis`; a rule of level `l` finds expansions up to degree `l`.
+    /// Projection with the weights of a quadrature rule. The runs must be its nodes, made by
+    /// `[design] use = "quadrature"` with the same `basis`; a rule of level `l` determines expansions up to degree `l`.
     Quadrature,
 }
 
 impl Solver {
-    /// The name in a study.
+    /// Returns the name of the solver in a study.
     pub fn name(self) -> &'static str {
         match self {
             Self::LeastAngleRegression => "least_angle_regression",
@@ -44,35 +44,35 @@ impl Solver {
     }
 }
 
-/// The error by which terms, degrees and norms are chosen.
+/// Error by which terms, degrees and norms are chosen.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Selection {
-    /// Each run is left out once, corrected for the number of terms.
+    /// Leave-one-out error, corrected for the number of terms.
     #[default]
     LeaveOneOut,
-    /// The runs are cut into so many groups at random, and each group is left out once:
-    /// `{ k_fold = 10 }`. Less optimistic where runs are few, and slower.
+    /// Cross-validation error of that many random groups of runs, at least 2: `{ k_fold = 10 }`. Less optimistic if
+    /// there are few runs, but slower.
     KFold(usize),
 }
 
-/// The degrees to be tried: a whole number, or `{ min = 1, max = 20 }`.
+/// Degrees to be tried: a whole number, or `{ min = 1, max = 20 }`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Degree {
-    /// This one.
+    /// A single degree.
     Fixed(usize),
-    /// Each output takes the one with the least error.
+    /// A range, from which each output takes the degree with the smallest error.
     Range(DegreeRange),
 }
 
-/// A range of degrees.
+/// A range of degrees, within 1 to 1000.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DegreeRange {
-    /// The first degree to be tried.
+    /// Lowest degree to be tried.
     pub min: usize,
-    /// The last one.
+    /// Highest degree to be tried.
     pub max: usize,
 }
 
@@ -89,7 +89,7 @@ impl Default for Degree {
 }
 
 impl Degree {
-    /// The first and the last degree.
+    /// Returns the lowest and the highest degree.
     pub fn range(self) -> DegreeRange {
         match self {
             Self::Fixed(degree) => DegreeRange { min: degree, max: degree },
@@ -104,8 +104,8 @@ impl<'de> Deserialize<'de> for Degree {
     }
 }
 
-/// Reads a [`Degree`] by the kind of value that stands there, so that errors inside the range keep
-/// their own place and words.
+/// Deserialises a [`Degree`] by the type of the value, so that errors inside the range keep their own position and
+/// message.
 struct DegreeVisitor;
 
 impl<'de> de::Visitor<'de> for DegreeVisitor {
@@ -132,15 +132,15 @@ impl<'de> de::Visitor<'de> for DegreeVisitor {
     }
 }
 
-/// When to stop looking for something better.
+/// Conditions that end the search for a better expansion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EarlyStop {
-    /// An output is done when so many degrees in a row were worse than its best one; 0 tries all. A
-    /// search that has not yet explained half of the output's variance goes on regardless.
+    /// Number of consecutive degrees that are worse than the best before the search for an output ends; 0 tries all
+    /// degrees. A search that has not yet explained half of the output's variance continues regardless.
     pub degrees: usize,
-    /// The path of least-angle regression ends when so many terms (or a tenth of the runs, where
-    /// that is more) brought no improvement; 0 follows it to its end.
+    /// Number of consecutive terms (or a tenth of the runs, if larger) without improvement after which the path of
+    /// least-angle regression or matching pursuit ends; 0 follows it to its end.
     pub terms: usize,
 }
 
@@ -151,33 +151,33 @@ impl Default for EarlyStop {
 }
 
 impl EarlyStop {
-    /// After how many steps without improvement a path ends.
+    /// Returns the number of steps without improvement after which a path ends.
     pub fn window(&self, runs: usize) -> usize {
         if self.terms == 0 { usize::MAX } else { self.terms.max(runs / 10) }
     }
 }
 
-/// The norms to be tried: a number, a list of numbers, or `{ min = 0.5, max = 1.0, step = 0.1 }`.
+/// Norms to be tried: a number, a list of numbers, or `{ min = 0.5, max = 1.0, step = 0.1 }`; above 0, at most 1.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum QNorm {
-    /// This one.
+    /// A single norm.
     Fixed(f64),
-    /// Each output takes the one with the least error.
+    /// A list, from which each output takes the norm with the smallest error.
     List(Vec<f64>),
-    /// The same from equal steps.
+    /// Equally spaced norms, from which each output takes the one with the smallest error.
     Range(QNormRange),
 }
 
-/// Norms in equal steps.
+/// Equally spaced norms.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct QNormRange {
-    /// The smallest.
+    /// Smallest norm, above 0.
     pub min: f64,
-    /// The largest.
+    /// Largest norm, at most 1.
     pub max: f64,
-    /// From one to the next.
+    /// Step between norms, above 0.
     pub step: f64,
 }
 
@@ -188,7 +188,7 @@ impl Default for QNormRange {
 }
 
 impl QNorm {
-    /// All norms from the smallest, or what is wrong with them in words.
+    /// Returns all norms in increasing order, or a description of what is wrong with them.
     pub fn values(&self) -> Result<Vec<f64>, String> {
         let mut values = match self {
             Self::Fixed(q) => vec![*q],
@@ -196,7 +196,7 @@ impl QNorm {
             Self::Range(QNormRange { min, max, step }) => {
                 if !(min <= max && *step > 0.0 && (max - min) / step < 100.0) {
                     return Err(format!(
-                        "`q_norm` from {min} to {max} in steps of {step} is no range"
+                        "`q_norm` from {min} to {max} in steps of {step} is not an increasing range of up to 100 values"
                     ));
                 }
                 let count = ((max - min) / step + 1e-9).floor() as usize;
@@ -221,7 +221,7 @@ impl<'de> Deserialize<'de> for QNorm {
     }
 }
 
-/// Reads a [`QNorm`] by the kind of value that stands there.
+/// Deserialises a [`QNorm`] by the type of the value.
 struct QNormVisitor;
 
 impl<'de> de::Visitor<'de> for QNormVisitor {

@@ -1,8 +1,8 @@
-//! Projection by the weights of a quadrature rule whose nodes are the runs.
+//! Projection with the weights of a quadrature rule whose nodes are the runs.
 
 use lacuna::data::Parameter;
-use lacuna::linalg::{Matrix, multiply_vector, thin_qr, transposed_multiply_vector};
 use lacuna::run::Stop;
+use lacuna_linalg::{Matrix, multiply_vector, thin_qr, transposed_multiply_vector};
 
 use super::coordinate::Coordinate;
 use super::family::Family;
@@ -12,23 +12,23 @@ use super::recurrence::Recurrence;
 use super::search::Output;
 use crate::designs::quadrature::{Nodes, Rule};
 
-/// How far a run may lie from its node, in standard variables: nodes come back from probabilities and physical
-/// units with round-off, which is largest far out.
+/// Largest distance of a run from its node in standard variables, relative to `1 + |z|`: nodes return from
+/// probabilities and physical units with rounding errors, which are largest far out.
 const NEAR: f64 = 1e-6;
 
-/// The rule that the runs are.
+/// Quadrature rule formed by the runs.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Projection {
-    /// Which rule.
+    /// Type of the rule.
     pub rule: Rule,
-    /// Its level, the highest degree that it finds.
+    /// Level of the rule, which is the highest degree it determines.
     pub level: usize,
-    /// The weight of each run.
+    /// Weight of each run.
     pub weights: Vec<f64>,
 }
 
 impl Projection {
-    /// The rule whose nodes these points are, one a row in physical units.
+    /// Finds the rule whose nodes these points are (one per row, in physical units); fails if there is none.
     pub fn of(family: Family, parameters: &[Parameter], points: &Matrix) -> Result<Self, Stop> {
         let runs = points.rows();
         let mut nearest = 0;
@@ -50,7 +50,7 @@ impl Projection {
         let others = runs - nearest;
         Err(Stop::new(format!(
             "`surrogate.solver`: the {runs} training runs are not the nodes of a quadrature rule: {others} of \
-             them are no nodes of the rule that fits best"
+             them are not nodes of the most similar rule"
         ))
         .help(
             "make the runs with `[design] use = \"quadrature\"` and the same `basis`, and give `training` the \
@@ -58,11 +58,11 @@ impl Projection {
         ))
     }
 
-    /// The projection on basis functions at the runs, `runs x terms`.
+    /// Returns the projection on basis functions at the runs (`runs x terms`).
     pub fn on<'a>(&'a self, basis: &'a Matrix) -> Projected<'a> {
         let squares = |row: &[f64]| row.iter().map(|x| x * x).sum::<f64>();
-        // Where all weights are positive the projection is the weighted least-squares fit, and this its
-        // hat matrix; otherwise that of the plain fit says how far a run can draw the expansion to itself.
+        // With positive weights the projection is the weighted least-squares fit, and this is its hat matrix;
+        // otherwise the leverage of the unweighted fit tells how strongly a run attracts the expansion.
         let weighted = basis.iter_rows().zip(&self.weights).map(|(row, w)| w * squares(row));
         let leverage = if self.weights.iter().all(|w| *w > 0.0) {
             weighted.collect()
@@ -76,7 +76,7 @@ impl Projection {
     }
 }
 
-/// A projection on a fixed set of basis functions, for any number of outputs.
+/// Projection on a fixed set of basis functions, for any number of outputs.
 pub(super) struct Projected<'a> {
     projection: &'a Projection,
     basis: &'a Matrix,
@@ -84,8 +84,7 @@ pub(super) struct Projected<'a> {
 }
 
 impl Projected<'_> {
-    /// The coefficients `c_t = sum_i w_i y_i psi_t(x_i)` of one output, of which the first belongs to the
-    /// constant.
+    /// Computes the coefficients `c_t = sum_i w_i y_i psi_t(x_i)` of one output; the first belongs to the constant.
     pub fn fit(&self, output: &Output) -> Fit {
         let (runs, terms) = (self.basis.rows(), self.basis.columns());
         let Output { mean, centred, variance } = output;
@@ -98,7 +97,7 @@ impl Projected<'_> {
             .map(|((y, m), h)| (y - m) / (1.0 - h).max(f64::EPSILON))
             .collect();
         let squares = residuals.iter().map(|r| r * r).sum::<f64>() / runs as f64;
-        // Under the rule's weights the Gram matrix is the unit matrix.
+        // Under the rule's weights the Gram matrix is the identity.
         let trace = terms as f64 / runs as f64;
         let relative = squares / variance * correction(runs, terms, trace);
         let relative = if relative.is_nan() { f64::INFINITY } else { relative };
@@ -106,7 +105,7 @@ impl Projected<'_> {
     }
 }
 
-/// The weight of each run, where each is one node and each node one run; and how many runs are nodes.
+/// Returns the weight of each run if runs and nodes match one to one, and the number of runs that are nodes.
 fn matched(
     nodes: &Nodes,
     coordinates: &[Coordinate],

@@ -1,10 +1,10 @@
 //! Orthonormal polynomials by their three-term recurrence.
 
-use lacuna::linalg::{Matrix, symmetric_eigen};
+use lacuna_linalg::{Matrix, symmetric_eigen};
 use serde::{Deserialize, Serialize};
 
-/// The recurrence `sizes[n] psi_{n+1} = (z - centres[n]) psi_n - sizes[n-1] psi_{n-1}`, `psi_0 = 1`: the entries
-/// on and beside the diagonal of the law's Jacobi matrix (Gautschi, *Orthogonal Polynomials*, 2004, 1.3).
+/// The recurrence `sizes[n] psi_{n+1} = (z - centres[n]) psi_n - sizes[n-1] psi_{n-1}`, `psi_0 = 1`: the entries on
+/// and next to the diagonal of the distribution's Jacobi matrix (Gautschi, *Orthogonal Polynomials*, 2004, 1.3).
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Recurrence {
     /// `a_n`.
@@ -21,22 +21,22 @@ impl Recurrence {
         }
     }
 
-    /// Legendre: the uniform law on (-1, 1).
+    /// Legendre: the uniform distribution on (-1, 1).
     pub fn legendre(degree: usize) -> Self {
         Self::from_fns(degree, |_| 0.0, |n| n * n / (4.0 * n * n - 1.0))
     }
 
-    /// Hermite: the standard normal law.
+    /// Hermite: the standard normal distribution.
     pub fn hermite(degree: usize) -> Self {
         Self::from_fns(degree, |_| 0.0, |n| n)
     }
 
-    /// Laguerre: the gamma law of this shape and the scale 1.
+    /// Laguerre: the gamma distribution with this shape and scale 1.
     pub fn laguerre(degree: usize, shape: f64) -> Self {
         Self::from_fns(degree, |n| 2.0 * n + shape, |n| n * (n + shape - 1.0))
     }
 
-    /// Jacobi: the beta law on (-1, 1) of density `(1 + z)^(a - 1) (1 - z)^(b - 1)`.
+    /// Jacobi: the beta distribution on (-1, 1) with the density `(1 + z)^(a - 1) (1 - z)^(b - 1)`.
     pub fn jacobi(degree: usize, a: f64, b: f64) -> Self {
         let sum = a + b - 2.0;
         let centre = |n: f64| {
@@ -55,18 +55,18 @@ impl Recurrence {
         Self::from_fns(degree, centre, square)
     }
 
-    /// Stieltjes and Wigert: the log-normal law of median 1 (Szegő, *Orthogonal Polynomials*, 2.7).
+    /// Stieltjes-Wigert: the log-normal distribution with median 1 (Szegő, *Orthogonal Polynomials*, 2.7).
     pub fn stieltjes_wigert(degree: usize, sigma: f64) -> Self {
-        // In logarithms of q = exp(-sigma^2) the large powers keep their digits.
+        // Written with logarithms of q = exp(-sigma^2), the large powers keep their digits.
         let power = |n: f64| (-sigma * sigma * n).exp();
         let centre = |n: f64| power(-2.0 * n - 0.5) * (1.0 + power(1.0) - power(n + 1.0));
         let square = |n: f64| power(2.0 - 4.0 * n) * -(-sigma * sigma * n).exp_m1();
         Self::from_fns(degree, centre, square)
     }
 
-    /// The polynomials of a discrete law with these nodes and weights, by the procedure of Stieltjes in
-    /// the form of Lanczos: vectors `sqrt(weight) psi_n` of length one, each made orthogonal to all
-    /// before it (Gautschi 2004, 2.2.3).
+    /// Returns the polynomials of a discrete distribution with these nodes and weights, by the Stieltjes procedure in
+    /// the form of Lanczos: vectors `sqrt(weight) psi_n` of length one, each orthogonalised twice against all
+    /// previous ones (Gautschi 2004, 2.2.3).
     pub fn stieltjes(degree: usize, nodes: &[f64], weights: &[f64]) -> Self {
         let total: f64 = weights.iter().sum();
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
@@ -91,12 +91,12 @@ impl Recurrence {
         recurrence
     }
 
-    /// The largest degree it reaches.
+    /// Returns the largest degree available.
     pub fn degree(&self) -> usize {
         self.sizes.len()
     }
 
-    /// The polynomials of degree `0..values.len()` at `z`.
+    /// Computes the polynomials of degree `0..values.len()` at `z`.
     pub fn values(&self, z: f64, values: &mut [f64]) {
         for n in 0..values.len() {
             values[n] = match n {
@@ -110,7 +110,7 @@ impl Recurrence {
         }
     }
 
-    /// With the derivatives by `z`.
+    /// Computes the polynomials and their derivatives with respect to `z`.
     pub fn derivatives(&self, z: f64, values: &mut [f64], derivatives: &mut [f64]) {
         self.values(z, values);
         for n in 0..derivatives.len() {
@@ -125,9 +125,9 @@ impl Recurrence {
         }
     }
 
-    /// The nodes, increasing, and the weights of Gauss' rule of `count` nodes: the eigenvalues of the Jacobi
-    /// matrix (Golub and Welsch 1969), improved by Newton's steps, and `1 / sum_k psi_k(node)^2`. None
-    /// where the recurrence is too short or the eigenvalues are not found.
+    /// Returns the nodes, in increasing order, and the weights of the Gauss rule with `count` nodes: the eigenvalues
+    /// of the Jacobi matrix (Golub and Welsch 1969), improved by Newton steps, and `1 / sum_k psi_k(node)^2`. `None`
+    /// if the recurrence is too short or the eigenvalues are not found.
     pub fn gauss(&self, count: usize) -> Option<Vec<(f64, f64)>> {
         if count > self.degree() {
             return None;

@@ -1,9 +1,9 @@
-//! The search for each output's best terms over degrees and norms.
+//! Search for each output's best terms over degrees and norms.
 
 use std::collections::BTreeMap;
 
-use lacuna::linalg::{Matrix, multiply_transposed};
 use lacuna::run::{Progress, Stop};
+use lacuna_linalg::{Matrix, multiply_transposed};
 use rayon::prelude::*;
 
 use super::PolynomialChaos;
@@ -19,58 +19,58 @@ use super::quadrature::Projection;
 use super::subspace_pursuit::subspace_pursuit;
 use super::terms::{Basis, Sets, TermSet};
 
-/// A fit whose relative error is below this is exact; no higher degree is tried.
+/// Relative error below which a fit is exact and no higher degree is tried.
 const EXACT: f64 = 1e-26;
-/// A search whose best relative error is above this has found nothing yet and must not be ended.
+/// Relative error above which a search has not found anything useful yet and must continue.
 const USELESS: f64 = 0.5;
-/// Norms of one degree that were worse in a row before the next degree is tried.
+/// Number of consecutive norms of one degree that were worse before the next degree is tried.
 const WORSE_NORMS: usize = 2;
 
-/// One output over the runs.
+/// Values of one output over the runs.
 pub(super) struct Output {
     pub mean: f64,
-    /// The values less their mean.
+    /// Values minus their mean.
     pub centred: Vec<f64>,
-    /// Divided by the number of runs; zero for outputs that do not vary.
+    /// Variance with the number of runs as divisor; zero for outputs that do not vary.
     pub variance: f64,
 }
 
-/// The terms of one output.
+/// Terms of one output, and how they were found.
 #[derive(Debug, Clone)]
 pub(super) struct Best {
     pub error: f64,
     pub degree: usize,
     pub q_norm: f64,
-    /// Positions in the terms of all sets, the constant first.
+    /// Indices among the terms of all sets, the constant first.
     pub terms: Vec<usize>,
 }
 
-/// The best fit of one output so far.
+/// Best fit of one output so far.
 #[derive(Debug, Clone, Default)]
 struct State {
     best: Option<Best>,
-    /// Degrees in a row that were worse than the best.
+    /// Number of consecutive degrees that were worse than the best.
     worse: usize,
     done: bool,
-    /// The same for the norms of the present degree.
+    /// Best fit among the norms of the present degree.
     of_degree: Option<Best>,
     worse_norms: usize,
 }
 
-/// The search and all that outputs share in it.
+/// The search and the data shared by all outputs.
 pub(super) struct Search<'a> {
     pub options: &'a PolynomialChaos,
     pub points: &'a Matrix,
     pub coordinates: &'a [Coordinate],
     pub sets: &'a Sets,
     pub criterion: &'a Criterion,
-    /// The weights of the runs, for projections.
+    /// Weights of the runs, for projections.
     pub projection: Option<&'a Projection>,
 }
 
 impl Search<'_> {
-    /// Tries one set after the other for all outputs that still improve. None for outputs that do not
-    /// vary, or with which no basis function varies.
+    /// Tries one set after the other for all outputs that still improve. `None` for outputs that do not vary, or with
+    /// which no basis function varies.
     pub fn run(
         &self,
         outputs: &[Output],
@@ -108,7 +108,7 @@ impl Search<'_> {
         Ok(states.into_iter().map(|s| s.best).collect())
     }
 
-    /// Whether the runs determine all terms, where all are fitted.
+    /// Returns true if the runs determine the fit of this set; sparse solvers accept any set.
     fn is_possible(&self, set: &TermSet) -> bool {
         match (self.options.solver, self.projection) {
             (Solver::LeastSquares, _) => set.members.len() < self.points.rows(),
@@ -117,12 +117,12 @@ impl Search<'_> {
         }
     }
 
-    /// The basis functions of some terms at the runs, `runs x terms`.
+    /// Returns the basis functions of some terms at the runs (`runs x terms`).
     fn basis(&self, terms: &[usize]) -> Matrix {
         Basis::new(self.coordinates.to_vec(), self.sets.terms.select(terms)).values(self.points)
     }
 
-    /// The best fit of each active output on one set.
+    /// Returns the best fit of each active output on one set.
     fn on_set(
         &self,
         set: &TermSet,
@@ -163,7 +163,7 @@ impl Search<'_> {
         (0..active.len()).into_par_iter().map(best).collect()
     }
 
-    /// The solver's choice for one output.
+    /// Returns the solver's choice for one output.
     fn choose(
         &self,
         dictionary: &Dictionary,
@@ -192,8 +192,8 @@ impl Search<'_> {
         }
     }
 
-    /// The fits of all outputs on their chosen terms; outputs with the same terms share the work. None
-    /// for outputs without any.
+    /// Fits all outputs on their chosen terms; outputs with the same terms share the work. `None` for outputs without
+    /// terms.
     pub fn refit(
         &self,
         outputs: &[Output],
@@ -215,7 +215,7 @@ impl Search<'_> {
         Ok(fits)
     }
 
-    /// The fits of some outputs on the same terms.
+    /// Fits some outputs on the same terms.
     fn fits(&self, terms: &[usize], outputs: &[Output], which: &[usize]) -> Result<Vec<Fit>, Stop> {
         let basis = self.basis(terms);
         if let Some(projection) = self.projection {
@@ -237,7 +237,7 @@ fn dependent() -> Stop {
 }
 
 impl State {
-    /// Compares the fit with one more norm with the best of this degree.
+    /// Compares the fit with a further norm with the best of this degree.
     fn take_norm(&mut self, found: Option<Best>) {
         let least = self.of_degree.as_ref().map_or(f64::INFINITY, |b| b.error);
         match found {
@@ -249,7 +249,7 @@ impl State {
         }
     }
 
-    /// Compares the best of one more degree with the best so far.
+    /// Compares the best fit of a further degree with the best so far.
     fn take_degree(&mut self, patience: usize) {
         self.worse_norms = 0;
         let least = self.best.as_ref().map_or(f64::INFINITY, |b| b.error);

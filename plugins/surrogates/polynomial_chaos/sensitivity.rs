@@ -1,14 +1,14 @@
 //! Moments and Sobol' indices from the coefficients (Sudret 2008).
 
-use lacuna::linalg::Matrix;
 use lacuna::plugin::surrogate::{Indices, Sensitivity};
+use lacuna_linalg::Matrix;
 
 use super::terms::Terms;
 
-/// The moments and indices of an expansion with these coefficients (`terms x outputs`).
+/// Returns moments and Sobol' indices of an expansion with these coefficients (`terms x outputs`).
 ///
-/// The basis is orthonormal, so that the variance is the sum of the squared coefficients of all terms but
-/// the constant, and each share is the sum over the terms in which just these parameters appear.
+/// Since the basis is orthonormal, the variance is the sum of the squared coefficients of all terms except the
+/// constant, and each partial variance is the sum over the terms in which exactly these parameters appear.
 pub(super) fn sensitivity(terms: &Terms, coefficients: &Matrix, dimension: usize) -> Sensitivity {
     let pairs: Vec<[usize; 2]> =
         (0..dimension).flat_map(|i| (i + 1..dimension).map(move |j| [i, j])).collect();

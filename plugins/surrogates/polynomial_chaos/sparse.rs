@@ -1,24 +1,25 @@
-//! Coefficients without their zeros: outputs choose their terms, so that few of the union belong to one of them.
+//! Sparse form of the coefficients: outputs choose their terms, so that each has few terms of the union.
 
-use lacuna::linalg::Matrix;
-use lacuna::linalg::lanes::{LANES, Lanes, sparse_multiply};
+use lacuna_linalg::Matrix;
+use lacuna_linalg::lanes::{LANES, Lanes, sparse_multiply};
 
 use super::terms::Basis;
 
-/// A sparse product is faster than a dense one where no more than one number in so many is not zero (measured: 3.5).
+/// Ratio of all to non-zero coefficients above which a sparse product is faster than a dense one (measured: 3.5).
 const SHARE: usize = 4;
 
-/// The coefficients that are not zero, output by output.
+/// Non-zero coefficients, output by output.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Sparse {
-    /// Where each output's coefficients begin, and where the last one's end.
+    /// Start of each output's coefficients, and the end of the last.
     starts: Vec<usize>,
     terms: Vec<u16>,
     weights: Vec<f64>,
 }
 
 impl Sparse {
-    /// From `terms x outputs`; none where a dense product is faster, or the terms cannot be numbered.
+    /// Converts coefficients (`terms x outputs`); `None` if a dense product is faster, or there are too many terms
+    /// for the indices.
     pub fn of(coefficients: &Matrix) -> Option<Self> {
         let all = coefficients.as_slice();
         let used = all.iter().filter(|c| **c != 0.0).count();
@@ -45,7 +46,8 @@ impl Sparse {
         sparse_multiply(&self.starts, &self.terms, &self.weights, table, sums);
     }
 
-    /// The outputs at each point. Each point has a lane of its own: its bits do not depend on the others.
+    /// Returns the outputs at each point (`points x outputs`). Each point has its own lane, so that its bits do not
+    /// depend on the others.
     pub fn mean(&self, basis: &Basis, points: &Matrix) -> Matrix {
         let mut mean = Matrix::zeros(points.rows(), self.outputs());
         let mut table = vec![[0.0; LANES]; basis.terms().len()];
@@ -64,7 +66,7 @@ impl Sparse {
         mean
     }
 
-    /// The transposed coefficients times a matrix of one row a term.
+    /// Returns the transposed coefficients times a matrix with one row per term.
     pub fn transposed_multiply(&self, matrix: &Matrix) -> Matrix {
         let mut product = Matrix::zeros(self.outputs(), matrix.columns());
         let mut table = vec![[0.0; LANES]; matrix.rows()];
@@ -87,14 +89,14 @@ impl Sparse {
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use lacuna::linalg::{multiply, transposed_multiply};
     use lacuna::math::random::{Stream, normal, uniform};
+    use lacuna_linalg::{multiply, transposed_multiply};
 
     use super::super::coordinate::Coordinate;
     use super::super::terms::{Nested, Truncation};
     use super::*;
 
-    /// A basis, and coefficients of which a tenth are not zero.
+    /// A basis, and coefficients of which a tenth are non-zero.
     fn problem() -> (Basis, Matrix) {
         let truncation = Truncation { q_norm: 1.0, max_interaction: 3 };
         let terms = Nested::new(3, 9, truncation, 1000).terms;

@@ -1,49 +1,50 @@
-//! Sums of squares of expansions as polynomials of their own.
+//! Sums of squares of expansions as expansions.
 //!
 //! A product of two basis functions is a short sum of basis functions of up to twice the degree, so that
-//! `|R (psi(x), 1)|^2 = sum_ij (R'R)_ij psi_i(x) psi_j(x)` is one expansion again. It has as many terms as there
-//! are sums of two exponents: 12,341 for degree 20 in three variables, where the 1771 basis functions make
-//! 1.6 million products. The terms are summed variable by variable, one multiplication each:
+//! `|R (psi(x), 1)|^2 = sum_ij (R'R)_ij psi_i(x) psi_j(x)` is again one expansion. It has as many terms as there are
+//! sums of two exponents: 12,341 for degree 20 in three variables, compared with 1.6 million products of the 1771 basis
+//! functions. The terms are summed variable by variable, with one multiplication each:
 //! `sum_a psi_a(x_1) sum_b psi_b(x_2) sum_c q_abc psi_c(x_3)`.
 
-use lacuna::linalg::lanes::{LANES, Lanes, sparse_multiply};
-use lacuna::linalg::vector::dot;
-use lacuna::linalg::{Matrix, gram, multiply_vector};
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::forward::SumOfSquares;
+use lacuna_linalg::lanes::{LANES, Lanes, sparse_multiply};
+use lacuna_linalg::vector::dot;
+use lacuna_linalg::{Matrix, gram, multiply_vector};
 
 use super::coordinate::Coordinate;
 use super::terms::{Basis, Terms};
 
-/// See the module.
+/// The sum of squares as an expansion (see the module).
 pub struct Squares {
     coordinates: Vec<Coordinate>,
     /// One more than the largest exponent of each variable.
     sizes: Vec<usize>,
-    /// The sums by each variable.
+    /// Sums over each variable.
     levels: Vec<Level>,
-    /// The weights of the last level's terms.
+    /// Weights of the terms of the last level.
     weights: Vec<f64>,
     error: f64,
 }
 
-/// Sums by one variable, each within one choice of exponents of the variables before.
+/// Sums over one variable, each for one choice of the exponents of the variables before.
 #[derive(Default)]
 struct Level {
-    /// Where the terms of each sum begin, and where the last one's end.
+    /// Start of the terms of each sum, and the end of the last.
     starts: Vec<usize>,
-    /// The exponent of each term.
+    /// Exponent of each term.
     exponents: Vec<u16>,
 }
 
-/// The most exponents, zero weights included, that are listed while the products are added up.
+/// Maximum number of exponents, including those with zero weight, that are listed while the products are added up.
 const MOST_EXPONENTS: usize = 1 << 22;
 
-/// The most basis functions whose pairs are multiplied out.
+/// Maximum number of basis functions whose pairs are multiplied out.
 const MOST_TERMS: usize = 4000;
 
 impl Squares {
-    /// `None` where products have no short form, where it would take more operations than the product, or too many to be found.
+    /// Expands the sum of squares; `None` if products have no short form, or the expansion would cost more than the
+    /// product or take too long to compute.
     pub fn new(basis: &Basis, factor: &Matrix) -> Option<Self> {
         let terms = basis.terms();
         let dimension = basis.coordinates().len();
@@ -64,8 +65,8 @@ impl Squares {
         Some(squares)
     }
 
-    /// The largest difference from the product at random points of the design and, where polynomials are
-    /// largest, at its corners.
+    /// Returns the largest difference from the product at random points of the design and at its corners, where
+    /// polynomials are largest.
     fn largest_difference(&self, basis: &Basis, factor: &Matrix) -> f64 {
         let dimension = self.coordinates.len();
         let corners = 1_usize << dimension.min(6);
@@ -118,7 +119,7 @@ impl SumOfSquares for Squares {
                 coordinate.derivatives(z, &mut values, &mut slopes);
                 for ((entry, value), slope) in table.iter_mut().zip(values).zip(slopes) {
                     *entry = [value; LANES];
-                    // Side by side stand derivatives by one variable each.
+                    // The lanes hold the derivatives with respect to different variables.
                     if (first..end).contains(&i) {
                         entry[i - first] = slope / stretch;
                     }
@@ -141,7 +142,7 @@ impl SumOfSquares for Squares {
 }
 
 impl Squares {
-    /// Room for the polynomials of each variable and for the sums of each level.
+    /// Allocates the tables of polynomials of each variable and the sums of each level.
     fn memory(&self) -> (Vec<Vec<Lanes>>, Vec<Vec<Lanes>>) {
         let room = |length: usize| vec![[0.0; LANES]; length];
         let tables = self.sizes.iter().map(|&size| room(size)).collect();
@@ -149,7 +150,7 @@ impl Squares {
         (tables, sums)
     }
 
-    /// The sums of all levels, the last variable's first.
+    /// Computes the sums of all levels, starting with the last variable.
     fn sum(&self, tables: &[Vec<Lanes>], sums: &mut [Vec<Lanes>]) {
         let last = self.levels.len() - 1;
         let Level { starts, exponents } = &self.levels[last];
@@ -170,7 +171,7 @@ impl Squares {
     }
 }
 
-/// The weights of all exponents up to the largest ones, the last variable's running fastest.
+/// Weights of all exponents up to the largest; the exponent of the last variable varies fastest.
 struct Expanded {
     sizes: Vec<usize>,
     /// [`Family::product`](super::Family::product) of each variable and pair of exponents.
@@ -179,8 +180,8 @@ struct Expanded {
 }
 
 impl Expanded {
-    /// `sum_ij form_ij psi_i psi_j`, the last row and column of `form` belonging to the function 1.
-    /// None where a family has no short products.
+    /// Expands `sum_ij form_ij psi_i psi_j`; the last row and column of `form` belong to the function 1. `None` if a
+    /// family has no short products.
     fn of(basis: &Basis, sizes: Vec<usize>, size: usize, form: &Matrix) -> Option<Self> {
         let products = basis.coordinates().iter().zip(&sizes);
         let products = products.map(|(coordinate, &size)| {
@@ -202,8 +203,8 @@ impl Expanded {
         Some(expanded)
     }
 
-    /// Adds `weight` times the product of two terms in the variables from `i` on, to exponents of
-    /// which the variables before have chosen the block number `block`.
+    /// Adds `weight` times the product of two terms in the variables from `i` on; `block` is the index chosen by the
+    /// exponents of the variables before.
     fn add(&mut self, i: usize, block: usize, weight: f64, a: &[u16], b: &[u16]) {
         if i == a.len() {
             self.weights[block] += weight;
@@ -219,13 +220,13 @@ impl Expanded {
     }
 }
 
-/// The terms and, after them, the constant.
+/// Appends the constant to the terms.
 fn with_constant(terms: &Terms, dimension: usize) -> Terms {
     let exponents = [terms.exponents(), &vec![0; dimension]].concat();
     Terms::from_exponents(dimension, exponents)
 }
 
-/// The levels of sums and the weights of the last one's terms, without those that are zero.
+/// Returns the levels of sums and the weights of the last level's terms, without zero weights.
 fn nested(dense: &[f64], sizes: &[usize]) -> (Vec<Level>, Vec<f64>) {
     let mut present: Vec<usize> = (0..dense.len()).filter(|&k| dense[k] != 0.0).collect();
     let weights = present.iter().map(|&k| dense[k]).collect();
@@ -256,8 +257,8 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::surrogates::polynomial_chaos::terms::{Nested, Truncation};
-    use lacuna::linalg::transposed_multiply_vector;
     use lacuna::math::random::normal;
+    use lacuna_linalg::transposed_multiply_vector;
 
     fn basis(dimension: usize, degree: usize, skip: usize) -> Basis {
         let truncation = Truncation { q_norm: 0.9, max_interaction: dimension };
@@ -292,7 +293,7 @@ mod tests {
         }
     }
 
-    /// The derivative of `r'r` is `2 r' R J`, `J` the derivatives of the basis functions.
+    /// The derivative of `r'r` is `2 r' R J`, with `J` the derivatives of the basis functions.
     #[test]
     fn gradients_are_those_of_the_product() {
         for (dimension, degree, skip) in [(1, 12, 2), (3, 8, 5), (4, 5, 2)] {

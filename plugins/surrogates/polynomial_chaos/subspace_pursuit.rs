@@ -1,23 +1,23 @@
-//! Subspace pursuit: of a given number of terms, which ones? (Dai and Milenkovic 2009.)
+//! Subspace pursuit: the best set of a given number of terms (Dai and Milenkovic 2009).
 //!
-//! Starting with the most correlated terms, as many again are joined that are most correlated with the
-//! residual, and of all those the largest in the least-squares fit are kept, until the residual no longer
-//! falls. The number of terms is the one of least error.
+//! Starting from the most correlated terms, as many terms most correlated with the residual are added, and the
+//! largest of all of them in the least-squares fit are kept, until the residual no longer decreases. The number of
+//! terms is that with the smallest error.
 
 use std::collections::BTreeMap;
 
-use lacuna::linalg::vector;
+use lacuna_linalg::vector;
 
 use super::dictionary::{ActiveSet, Dictionary};
 use super::judge::{Choice, Criterion, judged};
 
-/// Rounds of joining and leaving.
+/// Maximum number of rounds of adding and removing terms.
 const ROUNDS: usize = 30;
-/// Numbers of terms that were worse in a row before the search among them ends.
+/// Number of consecutive set sizes that were worse than the best before the search among them ends.
 const WORSE: usize = 4;
 
-/// The best set of terms for an output, given as its values less their mean and their products with the
-/// dictionary's columns.
+/// Chooses the terms of an output, given as its values minus their mean (`centred`) and their products with the
+/// dictionary's columns (`correlations`).
 pub(super) fn subspace_pursuit(
     dictionary: &Dictionary,
     centred: &[f64],
@@ -40,8 +40,7 @@ pub(super) fn subspace_pursuit(
             error
         })
     };
-    // First so many that each is about a fifth more than the one before, then between the best and its
-    // neighbours.
+    // First set sizes that increase by about a fifth, then sizes between the best one and its neighbours.
     let (mut count, mut least, mut at, mut worse) = (1, f64::INFINITY, 1, 0);
     while count <= most && worse < WORSE {
         let error = attempt(count, &mut best);
@@ -67,7 +66,7 @@ pub(super) fn subspace_pursuit(
     best
 }
 
-/// The set of `count` terms where the pursuit ends.
+/// Returns the set of `count` terms at which the pursuit ends.
 fn pursue<'a>(
     dictionary: &'a Dictionary,
     correlations: &[f64],
@@ -94,7 +93,7 @@ fn pursue<'a>(
             next.enter(wide.terms()[i]);
         }
         let (found, more) = next.solve(correlations);
-        // Differences below this share of the output are round-off.
+        // Differences below this fraction of the output are rounding errors.
         if more <= explained + 1e-15 * total {
             break;
         }
@@ -103,7 +102,7 @@ fn pursue<'a>(
     set
 }
 
-/// Lets terms in, those of the largest `sizes` first, until there are `count`.
+/// Adds terms in decreasing order of `sizes` until the set has `count` terms.
 fn join(set: &mut ActiveSet<'_>, terms: &[usize], sizes: &[f64], count: usize) {
     for i in by_size(terms.len(), |i| sizes[terms[i]]) {
         if set.terms().len() >= count {
@@ -113,7 +112,7 @@ fn join(set: &mut ActiveSet<'_>, terms: &[usize], sizes: &[f64], count: usize) {
     }
 }
 
-/// Positions by falling absolute size; equal ones in their order.
+/// Returns indices by decreasing absolute size; equal ones keep their order.
 fn by_size(count: usize, size: impl Fn(usize) -> f64) -> Vec<usize> {
     let mut order: Vec<usize> = (0..count).collect();
     order.sort_by(|&a, &b| size(b).abs().total_cmp(&size(a).abs()));

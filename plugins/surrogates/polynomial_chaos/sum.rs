@@ -2,17 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use lacuna::linalg::Matrix;
-use lacuna::linalg::vector::add_scaled;
 use lacuna::plugin::Forward as _;
 use lacuna::plugin::forward::Linear as _;
 use lacuna::plugin::surrogate::Summand;
 use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
+use lacuna_linalg::vector::add_scaled;
 
 use super::emulator::Expansion;
 use super::terms::{Basis, Terms};
 
-/// The sum, where the parameters of all parts sit in the same families; what it says of errors is the first part's.
+/// Returns the sum if the parameters of all parts have the same standard variables and families, otherwise `None`.
+/// Errors and summary are those of the first part.
 pub(super) fn sum(parts: &[Summand<'_>], offset: &[f64]) -> Result<Option<Expansion>, Stop> {
     let loaded: Vec<Expansion> =
         parts.iter().map(|part| Expansion::from_bytes(part.bytes)).collect::<Result<_, Stop>>()?;
@@ -35,7 +36,7 @@ pub(super) fn sum(parts: &[Summand<'_>], offset: &[f64]) -> Result<Option<Expans
         }
         found
     };
-    // The polynomial of degree zero is one.
+    // The polynomial of degree zero is 1.
     let constant = place(&vec![0; dimension]);
     let rows: Vec<Vec<usize>> = loaded
         .iter()

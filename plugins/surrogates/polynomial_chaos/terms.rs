@@ -1,48 +1,47 @@
-//! The multi-indices of an expansion, ordered so that each degree's set is a prefix of the next.
+//! Multi-indices of an expansion, ordered so that the set of each degree is a prefix of the next.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use lacuna::linalg::Matrix;
-use lacuna::linalg::lanes::{LANES, Lanes};
+use lacuna_linalg::Matrix;
+use lacuna_linalg::lanes::{LANES, Lanes};
 
 use super::coordinate::Coordinate;
 
-/// One multi-index after the other: the degree of each parameter's polynomial.
+/// Multi-indices one after the other: the degree of each parameter's polynomial.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Terms {
     dimension: usize,
     exponents: Vec<u16>,
 }
 
-/// Which multi-indices belong to degree `p`.
+/// Condition on the multi-indices of degree `p`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truncation {
-    /// `q` of the hyperbolic norm `(sum_i alpha_i^q)^(1/q) <= p` (Blatman and Sudret 2011); 1 is the
-    /// total degree.
+    /// `q` of the hyperbolic norm `(sum_i alpha_i^q)^(1/q) <= p` (Blatman and Sudret 2011); 1 is the total degree.
     pub q_norm: f64,
-    /// The most parameters that may appear together.
+    /// Maximum number of parameters in one product.
     pub max_interaction: usize,
 }
 
 /// A nested family of multi-index sets.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Nested {
-    /// All of them, lower degrees first.
+    /// All multi-indices, lower degrees first.
     pub terms: Terms,
-    /// How many belong to each degree `0..=largest`.
+    /// Number of multi-indices of each degree `0..=largest` and below.
     pub counts: Vec<usize>,
 }
 
 impl Nested {
-    /// The sets of degree `0..=degree`; ends before the first set of more than `limit` members.
+    /// Returns the sets of degree `0..=degree`; ends before the first set with more than `limit` members.
     pub fn new(dimension: usize, degree: usize, truncation: Truncation, limit: usize) -> Self {
         let mut terms = Terms { dimension, exponents: vec![0; dimension] };
         let mut counts = vec![1];
         for p in 1..=degree {
             let mut shell =
                 Shell { truncation, p, exponents: vec![0; dimension], found: Vec::new() };
-            // A shell above the limit is abandoned half-way: large sets must not even be listed.
+            // A shell above the limit is abandoned while it is filled: large sets must not even be listed.
             let room = limit.saturating_sub(terms.len());
             if !shell.fill(0, 0.0, 0, room * dimension) {
                 break;
@@ -54,28 +53,28 @@ impl Nested {
     }
 }
 
-/// The sets of all degrees and norms that are to be tried.
+/// Sets of all degrees and norms to be tried.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sets {
-    /// The members of all sets.
+    /// Members of all sets.
     pub terms: Terms,
-    /// By degree, and of one degree by norm, without those that repeat the one before.
+    /// Sets ordered by degree and then by norm, without repetitions of the previous one.
     pub sets: Vec<TermSet>,
 }
 
-/// The terms of one degree and norm.
+/// Terms of one degree and norm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TermSet {
-    /// The degree.
+    /// Degree.
     pub degree: usize,
-    /// The norm.
+    /// Norm.
     pub q_norm: f64,
-    /// Positions in the terms of all sets.
+    /// Indices among the terms of all sets.
     pub members: Vec<usize>,
 }
 
 impl Sets {
-    /// The sets of degree `min` and more of nested families, one a norm, the smallest norm first.
+    /// Returns the sets of degree `min` and above of nested families, one per norm with the smallest norm first.
     pub fn new(dimension: usize, min: usize, families: &[(f64, Nested)]) -> Self {
         let mut known: BTreeMap<&[u16], usize> = BTreeMap::new();
         let (mut exponents, mut sets) = (Vec::new(), Vec::<TermSet>::new());
@@ -104,7 +103,7 @@ impl Sets {
     }
 }
 
-/// The members of degree `p` that are not of degree `p - 1`.
+/// Members of degree `p` that are not of degree `p - 1`.
 struct Shell {
     truncation: Truncation,
     p: usize,
@@ -113,10 +112,10 @@ struct Shell {
 }
 
 impl Shell {
-    /// Chooses exponents from parameter `i` on; false when more than `room` numbers were found.
+    /// Chooses exponents from parameter `i` on; returns false if more than `room` numbers were found.
     fn fill(&mut self, i: usize, norm: f64, active: usize, room: usize) -> bool {
         let q = self.truncation.q_norm;
-        // Sums of q-th powers carry round-off; a member on the boundary belongs to the set.
+        // Sums of q-th powers carry rounding errors; a member on the boundary belongs to the set.
         let bound = |p: usize| (p as f64).powf(q) * (1.0 + 1e-12);
         if i == self.exponents.len() {
             if norm > bound(self.p - 1) {
@@ -142,62 +141,62 @@ impl Shell {
 }
 
 impl Terms {
-    /// The terms with these exponents, `dimension` numbers each.
+    /// Returns the terms with these exponents, `dimension` numbers per term.
     pub fn from_exponents(dimension: usize, exponents: Vec<u16>) -> Self {
         Self { dimension, exponents }
     }
 
-    /// The exponents of all terms, one after the other.
+    /// Returns the exponents of all terms, one after the other.
     pub fn exponents(&self) -> &[u16] {
         &self.exponents
     }
 
-    /// The number of terms.
+    /// Returns the number of terms.
     pub fn len(&self) -> usize {
         self.exponents.len() / self.dimension
     }
 
-    /// Whether there are none.
+    /// Returns true if there are no terms.
     pub fn is_empty(&self) -> bool {
         self.exponents.is_empty()
     }
 
-    /// The exponents of term `t`.
+    /// Returns the exponents of term `t`.
     pub fn term(&self, t: usize) -> &[u16] {
         &self.exponents[t * self.dimension..(t + 1) * self.dimension]
     }
 
-    /// The first `count` terms.
+    /// Returns the first `count` terms.
     pub fn prefix(&self, count: usize) -> Self {
         let exponents = self.exponents[..count * self.dimension].to_vec();
         Self { dimension: self.dimension, exponents }
     }
 
-    /// The terms named by `indices`.
+    /// Returns the terms with these indices.
     pub fn select(&self, indices: &[usize]) -> Self {
         let exponents = indices.iter().flat_map(|&t| self.term(t)).copied().collect();
         Self { dimension: self.dimension, exponents }
     }
 }
 
-/// The product polynomials of a set of terms, ready to be evaluated.
+/// Product polynomials of a set of terms, prepared for evaluation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Basis {
     coordinates: Vec<Coordinate>,
     terms: Terms,
     /// One more than the largest exponent: the length of each parameter's table of values.
     stride: usize,
-    /// The entries of the tables that each term multiplies, and where each term's entries end.
+    /// Table entries that each term multiplies, and the end of each term's entries.
     factors: Vec<u32>,
     ends: Vec<usize>,
-    /// The products that make up the terms, after 1: an earlier one times an entry of the tables.
+    /// Products from which the terms are built, after 1: an earlier product times a table entry.
     products: Vec<(u32, u32)>,
-    /// The product that each term is.
+    /// Index of the product that equals each term.
     places: Vec<u32>,
 }
 
 impl Basis {
-    /// The product polynomials of `terms` in these coordinates.
+    /// Prepares the product polynomials of `terms` in these coordinates.
     pub fn new(coordinates: Vec<Coordinate>, terms: Terms) -> Self {
         let stride = terms.exponents.iter().max().map_or(1, |&e| usize::from(e) + 1);
         let (mut factors, mut ends) = (Vec::new(), Vec::new());
@@ -219,12 +218,12 @@ impl Basis {
         Self { coordinates, terms, stride, factors, ends, products, places }
     }
 
-    /// The terms.
+    /// Returns the terms.
     pub fn terms(&self) -> &Terms {
         &self.terms
     }
 
-    /// The standard coordinates.
+    /// Returns the standard coordinates.
     pub fn coordinates(&self) -> &[Coordinate] {
         &self.coordinates
     }
@@ -234,7 +233,7 @@ impl Basis {
         &self.factors[start..self.ends[t]]
     }
 
-    /// The basis functions at each point (one a row, in physical units), `points x terms`.
+    /// Returns the basis functions at points in physical units, one per row (`points x terms`).
     pub fn values(&self, points: &Matrix) -> Matrix {
         let count = self.terms.len();
         let mut values = Matrix::zeros(points.rows(), count);
@@ -249,12 +248,12 @@ impl Basis {
         values
     }
 
-    /// Where each basis function stands in the table that [`Self::in_lanes`] makes.
+    /// Returns the index of each basis function in the table that [`Self::in_lanes`] makes.
     pub(super) fn places(&self) -> &[u32] {
         &self.places
     }
 
-    /// Calls `take` with some points at a time, by their rows, and a table of their products side by side.
+    /// Calls `take` with blocks of points: the range of their rows, and a table of their products side by side.
     pub(super) fn in_lanes(&self, points: &Matrix, mut take: impl FnMut(Range<usize>, &[Lanes])) {
         let mut table = vec![[0.0; LANES]; self.coordinates.len() * self.stride];
         let mut products = vec![[1.0; LANES]; self.products.len() + 1];
@@ -274,7 +273,8 @@ impl Basis {
         }
     }
 
-    /// The derivative of each basis function (rows) by each parameter (columns), in physical units.
+    /// Returns the derivative of each basis function (rows) with respect to each parameter (columns), in physical
+    /// units.
     pub fn gradient(&self, point: &[f64]) -> Matrix {
         let mut table = vec![0.0; self.coordinates.len() * self.stride];
         let mut slopes = table.clone();

@@ -4,14 +4,14 @@ use lacuna::math::random::Stream;
 use lacuna::plugin::Context;
 use lacuna::plugin::surrogate::Training;
 use lacuna::run::{Progress, Stop};
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
 
 use super::PolynomialChaos;
 use super::emulator::Expansion;
 use super::fit::fit;
 
 impl PolynomialChaos {
-    /// The expansion of all outputs.
+    /// Fits the expansion of all outputs.
     pub fn expand(
         &self,
         training: &Training<'_>,
@@ -21,7 +21,7 @@ impl PolynomialChaos {
         fit(self, training, stream, progress)
     }
 
-    /// All that is wrong with the options where they stand in a table of another plugin's options.
+    /// Reports errors of the options in a table of another plugin's options.
     pub(in crate::surrogates) fn check_within(
         &self,
         table: &str,

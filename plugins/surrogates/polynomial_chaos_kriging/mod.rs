@@ -3,13 +3,13 @@
 #[cfg(test)]
 mod tests;
 
-use lacuna::linalg::Matrix;
 use lacuna::math::random::Stream;
 use lacuna::plugin::forward::Linear;
 use lacuna::plugin::surrogate::{Surrogate, Training};
 use lacuna::plugin::{Component, Context, Emulator};
 use lacuna::run::{Progress, Silent, Stop};
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
+use lacuna_linalg::Matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -19,51 +19,53 @@ use super::kriging::{
 use super::polynomial_chaos::{Basis, Expansion, PolynomialChaos};
 use super::principal_components::Components;
 
-/// Kriging with a trend of sparse polynomials: the polynomials give the response's global shape, a Gaussian process what is
-/// left between the runs.
+/// Kriging with a trend of sparse polynomials: the polynomials give the global shape of the response, a Gaussian
+/// process the remainder between the runs.
 ///
-/// Use it where `polynomial_chaos` and `gaussian_process` are each good at a part of the response: smooth over the
-/// whole design, with local features. It is seldom worse than either, and dearer than both. Far outside of the
+/// Use it if `polynomial_chaos` and `gaussian_process` are each good at a part of the response: smooth over the whole
+/// design, with local features. It is seldom less accurate than either, and costs more than both. Far outside the
 /// design the polynomials are extrapolated, and grow quickly.
 ///
-/// The outputs are reduced to principal components. For each of them a sparse polynomial chaos expansion chooses
-/// the polynomials; their coefficients are then found anew by generalised least squares under the covariance of the
-/// process (universal kriging), whose length scales and nugget are those of the largest restricted likelihood, as in
-/// `gaussian_process`. With `selection = "optimal"` the largest half of the polynomials, the largest quarter, and so on down
-/// to the constant alone are tried too, and the least leave-one-out error (corrected for the number of
-/// terms) decides; the last of them is ordinary kriging.
+/// The outputs are reduced to principal components. For each of them a sparse polynomial chaos expansion chooses the
+/// polynomials; their coefficients are then re-estimated by generalised least squares under the covariance of the
+/// process (universal kriging), whose length scales and nugget maximise the restricted likelihood, as in
+/// `gaussian_process`. With `selection = "optimal"` the largest half of the polynomials, the largest quarter, and so
+/// on down to the constant alone are tried too, and the smallest leave-one-out error (corrected for the number of
+/// terms) decides; the constant alone is ordinary kriging.
 ///
 /// References: Schöbi, Sudret and Wiart, *Polynomial-chaos-based Kriging*, International Journal for Uncertainty
 /// Quantification 5 (2015) 171; those of `polynomial_chaos` and `gaussian_process`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PolynomialChaosKriging {
-    /// How the polynomials are chosen: the options of `polynomial_chaos`.
+    /// Expansion that chooses the polynomials: the options of `polynomial_chaos`.
     pub trend: PolynomialChaos,
-    /// How many of the chosen polynomials are kept.
+    /// Selection among the chosen polynomials.
     pub selection: Selection,
-    /// How the correlation of two points falls with their distance.
+    /// Correlation of two points as a function of their distance; it sets the smoothness of the remainder.
     pub kernel: Kernel,
-    /// What runs differ by besides the smooth response, as a share of the variance of the process: a number, or
-    /// `"estimated"`.
+    /// Variance of the noise of the runs (the deviation from a smooth response), as a fraction of the variance of the
+    /// process: a number, or `"estimated"`.
     pub nugget: Nugget,
-    /// The principal components of the outputs: as many as carry a share of the variance, `{ variance = 0.99999 }`, or
+    /// Principal components of the outputs: as many as carry a fraction of the variance, `{ variance = 0.99999 }`, or
     /// `{ count = 20 }`; `"none"` gives every output a process of its own.
     pub components: Components,
-    /// How many starts the search for the hyperparameters has.
+    /// Number of starts of the search for the hyperparameters, at least 1. More starts take longer and are less
+    /// likely to miss the global maximum.
     pub starts: usize,
-    /// Where the hyperparameters are looked for.
+    /// Bounds of the hyperparameters.
     pub bounds: Bounds,
 }
 
-/// How many of the chosen polynomials are kept.
+/// Selection among the chosen polynomials.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Selection {
-    /// All of them, the largest half, the largest quarter, ..., or none but the constant, by the leave-one-out error.
+    /// The best, by the leave-one-out error, of all polynomials, the largest half, the largest quarter, ..., and the
+    /// constant alone.
     #[default]
     Optimal,
-    /// All of them.
+    /// All polynomials.
     Sequential,
 }
 
@@ -96,7 +98,7 @@ impl PolynomialChaosKriging {
         }
     }
 
-    /// Fits trends and processes to all outputs.
+    /// Fits trends and processes to all outputs; fails if the options or the runs do not permit it.
     pub fn krige(
         &self,
         training: &Training<'_>,
@@ -107,7 +109,7 @@ impl PolynomialChaosKriging {
         self.settings().fit(training, trends, stream, progress)
     }
 
-    /// The polynomials that each component's expansion has chosen.
+    /// Returns the polynomials that each component's expansion has chosen.
     fn trends(
         &self,
         training: &Training<'_>,
@@ -127,7 +129,7 @@ impl PolynomialChaosKriging {
         Ok(Trends { regressors: Regressors::Polynomials(basis), candidates })
     }
 
-    /// The sets of terms that one component may have.
+    /// Returns the sets of terms to be tried for one component.
     fn candidates(&self, expansion: &Expansion, component: usize, runs: usize) -> Vec<Vec<usize>> {
         let (coefficients, terms) = (expansion.coefficients(), expansion.terms());
         let size = |t: usize| coefficients[(t, component)].abs();
@@ -136,7 +138,7 @@ impl PolynomialChaosKriging {
         let mut chosen: Vec<usize> =
             (0..terms.len()).filter(|&t| Some(t) != constant && size(t) > 0.0).collect();
         chosen.sort_by(|&a, &b| size(b).total_cmp(&size(a)).then(a.cmp(&b)));
-        // With fewer runs than twice the terms little is left to estimate the process from.
+        // With fewer runs than twice the terms, little is left to estimate the process from.
         chosen.truncate((runs / 2).saturating_sub(1));
         let set = |count: usize| {
             let mut set: Vec<usize> =

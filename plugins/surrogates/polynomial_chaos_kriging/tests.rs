@@ -1,10 +1,10 @@
-//! Beside the two surrogates of which it is made.
+//! Comparison with the two surrogates that it combines.
 
 use super::*;
 use crate::surrogates::gaussian_process::GaussianProcess;
 use crate::surrogates::gaussian_process::tests::{Case, ishigami, rmse};
 
-/// Errors of the Gaussian process, the expansion and both together.
+/// Returns the errors of the Gaussian process, the expansion, and both combined.
 fn errors(case: &Case) -> [f64; 3] {
     let (stream, progress) = (Stream::root(1), Progress::new(&Silent));
     let training = case.training();
@@ -15,7 +15,7 @@ fn errors(case: &Case) -> [f64; 3] {
     [error(&plain), error(&chaos), error(&both)]
 }
 
-/// Not worse than the better of the two but for a tenth: the choice is made on 100 runs.
+/// At most a tenth worse than the better of the two: the choice is made on 100 runs.
 #[test]
 fn it_is_as_good_as_the_better_of_the_two() {
     // A polynomial with a bump that polynomials resolve badly; a product of waves; a cubic.

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::fmt;
 
 use lacuna::expression::Data;
-use lacuna::linalg::Matrix;
+use lacuna_linalg::Matrix;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
 use serde::ser::{Serialize, Serializer};
@@ -54,13 +54,13 @@ impl JsonSchema for Known {
     }
 }
 
-/// What stands in the study.
+/// A value as written in the study.
 enum Item {
     One(f64),
     Many(Vec<Item>),
 }
 
-/// Numbers, or rows of equal length, of a list.
+/// Converts a list to a vector of numbers, or to a matrix of rows of equal length.
 fn listed(items: Vec<Item>) -> Result<Data, String> {
     let row = |items: &[Item]| -> Option<Vec<f64>> {
         let number = |item: &Item| if let Item::One(x) = item { Some(*x) } else { None };

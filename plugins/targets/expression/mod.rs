@@ -8,11 +8,11 @@ use std::collections::BTreeMap;
 
 use lacuna::data::Parameter;
 use lacuna::expression::{Fault, Program, Scope};
-use lacuna::linalg::Matrix;
 use lacuna::plugin::density::{BoundDensity, Density};
 use lacuna::plugin::{Component, Context, Fact};
 use lacuna::run::Stop;
-use lacuna::study::problem::Complaints;
+use lacuna::text::problem::Complaints;
+use lacuna_linalg::Matrix;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -47,39 +47,39 @@ pub use data::Known;
 /// use = "no_u_turn"
 /// ```
 ///
-/// An expression has the usual operators and functions (`+ - * / ^`, comparisons, `and`, `or`, `not`, `if(condition,
-/// yes, no)`, `exp`, `log`, `sqrt`, trigonometry, `erf`, `log_gamma`, …) and log densities (`normal_log_density(x,
-/// mean, sd)`, and likewise `log_normal`, `student_t`, `cauchy`, `exponential`, `gamma`, `inverse_gamma`, `beta`,
-/// `uniform`, `poisson`, `binomial`, with the numbers that priors have). Vectors go element by element; `sum`, `mean`,
-/// `min`, `max`, `dot` and `log_sum_exp` make one number of them; `recurrence(start, factor, input)` is the vector of
-/// `z[i] = factor * z[i - 1] + input[i]`, for time series. Elements count from 1: `y[3]`, `y[2:10]`,
-/// `theta[school]` for a vector of whole numbers; `[a, b, c]` makes a vector.
+/// An expression may use the usual operators and functions (`+ - * / ^`, comparisons, `and`, `or`, `not`,
+/// `if(condition, yes, no)`, `exp`, `log`, `sqrt`, trigonometry, `erf`, `log_gamma`, …) and log densities
+/// (`normal_log_density(x, mean, sd)`, and likewise `log_normal`, `student_t`, `cauchy`, `exponential`, `gamma`,
+/// `inverse_gamma`, `beta`, `uniform`, `poisson`, `binomial`, with the arguments of the priors of that name). Vectors
+/// are combined element by element; `sum`, `mean`, `min`, `max`, `dot` and `log_sum_exp` reduce them to one number;
+/// `recurrence(start, factor, input)` is the vector of `z[i] = factor * z[i - 1] + input[i]`, for time series.
+/// Indices start at 1: `y[3]`, `y[2:10]`, `theta[school]` for a vector of whole numbers; `[a, b, c]` makes a vector.
 ///
-/// The posterior is the prior times the density. Where the expression is undefined, the density is zero.
-/// The gradient is exact; the module `lacuna::expression` says which slope is taken at a kink.
+/// The posterior is the prior times the density, which is zero where the expression is undefined. The gradient is
+/// exact; the module `lacuna::expression` says which slope is taken at a kink.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Expression {
-    /// The logarithm of the density, up to a constant: an expression of the parameters, the definitions and the data.
+    /// Logarithm of the density, up to a constant: an expression of the parameters, the definitions and the data.
     pub log_density: String,
-    /// Definitions: names for expressions, numbers or vectors, that other expressions use. Their order does not
+    /// Definitions: names for expressions (numbers or vectors) that other expressions use. Their order does not
     /// matter.
     #[serde(default, rename = "where", skip_serializing_if = "BTreeMap::is_empty")]
     pub definitions: BTreeMap<String, String>,
-    /// Numbers, lists of numbers (vectors) and lists of rows (matrices, for `matrix_product(matrix, vector)`).
+    /// Data: numbers, lists of numbers (vectors), or lists of rows (matrices, for `matrix_product(matrix, vector)`).
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub data: BTreeMap<String, Known>,
-    /// Whether the expression is the whole posterior density already. The prior then serves for starting points
-    /// and bounds only, and every parameter must occur.
+    /// If true, the expression is the whole posterior density; the prior then only provides starting points and
+    /// bounds, and every parameter must occur in the expression. If false, the expression is multiplied by the prior.
     #[serde(default)]
     pub includes_prior: bool,
 }
 
-/// The name under which the scope holds the expression itself.
+/// Name of the expression itself in the scope.
 const WHOLE: &str = "log_density";
 
 impl Expression {
-    /// The compiled expression, or all its faults, each with the option it is in.
+    /// Compiles the expression; on failure returns all faults, each with the option that contains it.
     fn compile(&self, parameters: &[Parameter]) -> Result<Program, Vec<(String, Fault)>> {
         let mut scope = Scope::new();
         let mut faults = Vec::new();
@@ -113,7 +113,7 @@ impl Expression {
         Ok(program)
     }
 
-    /// Demands one number that, without a prior, depends on every parameter.
+    /// Checks that the result is one number and, without a prior, depends on every parameter.
     fn suits(&self, program: &Program, parameters: &[Parameter]) -> Result<(), Fault> {
         let whole = 0..self.log_density.len();
         if program.outputs() != 1 {
@@ -150,7 +150,7 @@ impl Density for Expression {
     fn bind(&self, parameters: &[Parameter]) -> Result<Box<dyn BoundDensity>, Stop> {
         let program = self.compile(parameters).map_err(|faults| {
             let lines = faults.iter().map(|(option, fault)| {
-                // The fault of a definition names it already.
+                // The option already names the definition.
                 let fault = Fault { definition: String::new(), ..fault.clone() };
                 format!("`target.{option}`: {fault}")
             });
@@ -168,10 +168,10 @@ struct Bound {
     program: Program,
 }
 
-/// The number of operations below which a batch is not worth sharing between threads.
+/// Number of operations below which a batch is evaluated on one thread.
 const SHARED: usize = 200_000;
 
-/// Points that one thread takes at a time.
+/// Number of points that one thread takes at a time.
 const CHUNK: usize = 64;
 
 impl Bound {
@@ -202,7 +202,7 @@ impl BoundDensity for Bound {
     }
 }
 
-/// A density that is undefined, or infinite, is none.
+/// Replaces an undefined or infinite log density by minus infinity, i.e. zero density.
 fn defined(log_density: f64) -> f64 {
     if log_density < f64::INFINITY { log_density } else { f64::NEG_INFINITY }
 }

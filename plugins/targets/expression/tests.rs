@@ -7,8 +7,8 @@ use lacuna::data::{Layout, Unit};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::registry::from_text;
-use lacuna::study::read::read;
-use lacuna::study::{Node, Problems, Sources};
+use lacuna::text::read::read;
+use lacuna::text::{Node, Problems, Sources};
 
 use super::*;
 
@@ -24,7 +24,7 @@ fn parameters(names: &[&str]) -> Vec<Parameter> {
     names.iter().map(parameter).collect()
 }
 
-/// A target with these definitions and data.
+/// Returns a target with these definitions and data.
 fn target(log_density: &str, definitions: &[(&str, &str)], data: &[(&str, Data)]) -> Expression {
     let definition = |(name, text): &(&str, &str)| ((*name).to_owned(), (*text).to_owned());
     let known = |(name, data): &(&str, Data)| ((*name).to_owned(), Known(data.clone()));
@@ -38,14 +38,14 @@ fn target(log_density: &str, definitions: &[(&str, &str)], data: &[(&str, Data)]
 
 use lacuna::expression::Data;
 
-/// What `check` says of a section, as a user sees it.
+/// Returns the problems that `check` reports for a section, as a user sees them.
 fn complaints(section: &str) -> String {
     let mut sources = Sources::default();
     let mut problems = Problems::new();
     let id = sources.add_file(Path::new("study.toml"), section.to_owned());
     let root = read(id, &sources, &mut problems).unwrap();
     let node: &Node = root.get("target").unwrap();
-    let options: Option<Expression> = lacuna::study::decode(node, &mut problems);
+    let options: Option<Expression> = lacuna::text::decode(node, &mut problems);
     let layout = Layout { name: "none".into(), unit: Unit::dimensionless(), axes: Vec::new() };
     let parameters = parameters(&["a", "sigma"]);
     let context = Context::new(Path::new("."), &parameters, &layout);
@@ -108,7 +108,7 @@ fn options_are_written_as_they_are_read() {
                 [data]\nX = [[1.0, 2.0], [3.0, 4.0]]\nk = 2.0\ny = [1.0, 2.0]\n\
                 [where]\nb = \"[a, sigma]\"\n";
     let built = from_text::<dyn Density>("expression", text).unwrap();
-    let again = lacuna::study::emit::to_toml(&built.options).unwrap();
+    let again = lacuna::text::emit::to_toml(&built.options).unwrap();
     assert_eq!(from_text::<dyn Density>("expression", &again).unwrap().options, built.options);
     let bound = built.plugin.bind(&parameters(&["a", "sigma"])).unwrap();
     let (value, gradient) = bound.gradient(&[1.0, 10.0]);
@@ -138,7 +138,7 @@ fn large_batches_have_the_bits_of_single_points() {
     }
 }
 
-/// Demands the value and, by differences, the gradient of a formula.
+/// Asserts the values of a formula and, by differences, its gradient.
 fn is(bound: &dyn BoundDensity, formula: impl Fn(&[f64]) -> f64, points: &[Vec<f64>]) {
     for point in points {
         let (value, gradient) = bound.gradient(point);
@@ -173,7 +173,7 @@ fn cauchy(x: f64, scale: f64) -> f64 {
     -(std::f64::consts::PI * scale * (1.0 + (x / scale).powi(2))).ln()
 }
 
-/// The data of a posterior of posteriordb, where its file is at hand.
+/// Returns the data of a posteriordb posterior if its file is available.
 fn posteriordb(name: &str) -> Option<serde_json::Value> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/reference/posteriordb");
     let Ok(text) = std::fs::read_to_string(Path::new(folder).join(format!("{name}.json"))) else {
@@ -294,7 +294,7 @@ fn mixture_of_two_normal_laws() {
     is(&*bound, formula, &[vec![-2.73, 2.87, 1.03, 1.02, 0.62], vec![-2.0, 2.0, 1.5, 0.7, 0.4]]);
 }
 
-/// posteriordb, `garch-garch11`: the variance of each value follows from the value and the variance before.
+/// posteriordb, `garch-garch11`: the variance of each value follows from the previous value and variance.
 #[test]
 fn recurrence_of_variances() {
     let Some(data) = posteriordb("garch-garch11") else { return };

@@ -1,16 +1,17 @@
-//! The study of the vessel: polynomial chaos in place of the model and of what it holds fixed, and their errors.
+//! The study of the vessel: a polynomial chaos expansion in place of the model, including quantities that the model
+//! fixes, with their errors.
 
 use std::sync::OnceLock;
 
 use lacuna::data::{Axis, Layout, Layouts, Parameter, Unit};
-use lacuna::gap::wide::{Freed, Wide};
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
 use lacuna::plugin::discrepancy::CommonError;
 use lacuna::plugin::surrogate::Training;
 use lacuna::plugin::{Design, Emulator, Forward, Surrogate, registry};
 use lacuna::run::{Progress, Silent};
+use lacuna_engine::gap::experiment::wider::{ExtendedMap, FreeInput};
+use lacuna_linalg::Matrix;
 use lacuna_plugins::models::mercury_target::{Gas, Mercury, Target};
 use rayon::prelude::*;
 
@@ -24,7 +25,7 @@ const FINER_RUNS: usize = 30;
 /// Order of convergence of the mesh, as in `configs/sns`.
 const ORDER: f64 = 1.8;
 
-/// Three parameters and then what the model holds fixed: name, absent value, prior.
+/// Three parameters, followed by the quantities that the model fixes: name, value at which the effect is absent, prior.
 fn unknowns() -> Vec<(&'static str, f64, Distribution)> {
     use Distribution::{TruncatedNormal, Uniform};
     vec![
@@ -58,7 +59,7 @@ pub fn layouts() -> Layouts {
     Layout { name: "strain".into(), unit: Unit::dimensionless(), axes }.into()
 }
 
-/// The model at its parameters, and after them what else is free.
+/// The model as a function of its parameters, followed by the other free quantities.
 fn model(fineness: usize, x: &[f64]) -> Vec<f64> {
     let mut settings = settings(fineness);
     let mercury = Mercury { tensile_cutoff: x[0], density: x[1], sound_speed: x[2] };
@@ -97,7 +98,7 @@ fn fitted(parameters: &[Parameter], points: &Matrix, responses: &Matrix) -> Box<
     surrogate.plugin.fit(&training, &Stream::root(2), &Progress::new(&Silent)).unwrap()
 }
 
-/// Samples of an error, one a row.
+/// Samples of an error, one per row, as a common error of the given size.
 fn error(origin: &str, samples: &Matrix, size: f64) -> CommonError {
     let scale = size / (samples.rows() as f64).sqrt();
     let factor = Matrix::from_fn(OUTPUTS, samples.rows(), |i, r| scale * samples[(r, i)]);
@@ -108,7 +109,7 @@ fn difference(a: &Matrix, b: &Matrix) -> Matrix {
     Matrix::from_fn(a.rows(), a.columns(), |i, j| a[(i, j)] - b[(i, j)])
 }
 
-/// The study's emulator, and its differences when more is free: `base(x) + change(x, s) - change(x, absent)`.
+/// The study's emulator, plus its change if further quantities are free: `base(x) + change(x, s) - change(x, absent)`.
 struct Widened {
     base: &'static dyn Emulator,
     change: Box<dyn Emulator>,
@@ -173,8 +174,8 @@ pub fn lab() -> &'static Lab {
     })
 }
 
-pub fn wide() -> &'static Wide<'static> {
-    static MADE: OnceLock<Wide<'static>> = OnceLock::new();
+pub fn wide() -> &'static ExtendedMap<'static> {
+    static MADE: OnceLock<ExtendedMap<'static>> = OnceLock::new();
     MADE.get_or_init(|| {
         let (lab, all, unknowns) = (lab(), parameters(), unknowns());
         let points = design(&all, WIDE_RUNS, 3);
@@ -182,10 +183,10 @@ pub fn wide() -> &'static Wide<'static> {
         let change = fitted(&all, &points, &difference(&simulated(1, &points), &base));
         let common = vec![error("emulator of what is free", &change.fit_error().residuals, 1.0)];
         let freed = |(name, absent, prior): &(&str, f64, Distribution)| {
-            Freed::new(name, Unit::dimensionless(), *absent, prior.clone())
+            FreeInput::new(name, Unit::dimensionless(), *absent, prior.clone())
         };
         let absent = unknowns[3..].iter().map(|(_, absent, _)| *absent).collect();
         let forward = Box::new(Widened { base: &*lab.base, change, absent });
-        Wide { forward, inputs: unknowns[3..].iter().map(freed).collect(), common }
+        ExtendedMap { forward, inputs: unknowns[3..].iter().map(freed).collect(), common }
     })
 }

@@ -1,7 +1,7 @@
-//! The vessel on meshes of different fineness, and what can be hidden in it.
+//! The vessel on meshes of different fineness, and physics that can be hidden in it.
 //!
-//! Truths are simulated on a mesh three times as fine as the model's, with physics that the model does not have. Nothing
-//! here says what a search should call them.
+//! Truths are simulated on a mesh three times as fine as the model's, with physics that the model lacks. The names that
+//! a search should give are not stated here.
 
 use lacuna_plugins::models::mercury_target::{
     Cells, EquationOfState, Gas, Mercury, Outcome, Rear, Sampling, Settings, Target, TensileCutoff,
@@ -26,11 +26,11 @@ pub const SENSORS: [(&str, f64); 10] = [
 pub const HOOP: [(&str, f64); 6] =
     [("T", 0.055), ("G", 0.100), ("C", 0.150), ("U", 0.200), ("V", 0.280), ("R", 0.330)];
 
-/// The mercury of all truths.
+/// Properties of the mercury in all truths.
 pub const MERCURY: Mercury =
     Mercury { density: 13_350.0, sound_speed: 1440.0, tensile_cutoff: 1.5e5 };
 
-/// A mesh `fineness` times as fine as the model's in each direction.
+/// Settings with a mesh `fineness` times as fine as the model's in each direction.
 pub fn settings(fineness: usize) -> Settings {
     let mut settings = Settings::default();
     settings.numerics.mesh = Cells::Explicit([10 * fineness, 45 * fineness]);
@@ -38,28 +38,28 @@ pub fn settings(fineness: usize) -> Settings {
     settings
 }
 
-/// The strain of the gauges in microstrain, one gauge after another.
+/// Strain of the gauges in microstrain, all gauges concatenated.
 pub fn strain(settings: &Settings, outcome: &Outcome) -> Vec<f64> {
     let row = |name: &str| settings.gauges.0.iter().position(|g| g.name == name).unwrap();
     let curve = |(name, _): &(&str, f64)| outcome.strain[row(name)].iter().map(|y| 1e6 * y);
     SENSORS.iter().flat_map(curve).collect()
 }
 
-/// What a truth has that the model does not have.
+/// Physics of a truth that the model lacks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Truth {
-    /// Nothing but the finer mesh.
+    /// Only the finer mesh.
     Mesh,
-    /// Over-damped bubbles, more towards the wall and fewer at the window.
+    /// Over-damped bubbles, with more towards the wall and fewer at the window.
     Bubbles,
-    /// Gauge G stands 12 mm behind its place.
+    /// Gauge G is 12 mm behind its declared position.
     MovedGauge,
     /// The mercury ends at a rigid wall.
     RigidRear,
-    /// The pressure of mercury that closes again comes late.
+    /// The pressure of mercury recovers with a delay after a cavity has closed.
     LateClosing,
-    /// The beam hits 22 mm beside the axis.
+    /// The beam hits 22 mm off the axis.
     BesideTheAxis,
 }
 
@@ -73,7 +73,7 @@ impl Truth {
         Self::BesideTheAxis,
     ];
 
-    /// What the gauges would show without noise, in microstrain.
+    /// Noise-free signals of the gauges, in microstrain.
     pub fn simulated(self) -> Vec<f64> {
         let mut settings = settings(3);
         match self {
@@ -116,8 +116,8 @@ fn liquid(mercury: &Mercury, initial: Vec<f64>) -> TensileCutoff {
     TensileCutoff::new(density, sound_speed, tensile_cutoff, initial)
 }
 
-/// The mean around the axis of the pressure that a Gaussian beam leaves whose middle is `distance` beside it: at the radius `r` it
-/// is `exp(-d²/2s²) I₀(r d/s²)` times that of the beam on the axis. The heat of the cap stays as it is.
+/// Azimuthal mean of the pressure of a Gaussian beam whose centre is at `distance` from the axis: at radius `r` it is
+/// `exp(-d²/2s²) I₀(r d/s²)` times that of the beam on the axis. The heating of the cap is unchanged.
 fn beside_the_axis(vessel: &Target, settings: &Settings, distance: f64) -> Vec<f64> {
     let square = settings.pulse.width.powi(2);
     let share = |r: f64| (-0.5 * distance.powi(2) / square).exp() * bessel(r * distance / square);
@@ -135,14 +135,14 @@ fn bessel(x: f64) -> f64 {
     sum
 }
 
-/// Mercury whose cavities do not vanish at once: where one closes, the pressure above the cutoff comes back as
+/// Mercury whose cavities do not vanish at once: where one closes, the pressure above the cutoff recovers as
 /// `1 - exp(-t / delay)`.
 #[derive(Debug, Clone)]
 struct LateClosing {
     liquid: TensileCutoff,
     cutoff: f64,
     delay: f64,
-    /// The time since each cell was last cavitated, s.
+    /// Time since each cell was last cavitated, s.
     closed: Vec<f64>,
 }
 
@@ -179,7 +179,7 @@ impl EquationOfState for LateClosing {
     }
 }
 
-/// Radial mean of a shifted Gaussian beam by the midpoint rule around the axis.
+/// The radial mean of a shifted Gaussian beam, compared with the midpoint rule around the axis.
 #[test]
 fn the_beam_beside_the_axis_is_the_mean_around_it() {
     let (width, distance, radius) = (0.032_f64, 0.015_f64, 0.04_f64);

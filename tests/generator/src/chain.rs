@@ -1,31 +1,31 @@
-//! Two masses in a chain, driven by a force: the model, and physics that it lacks.
+//! Two masses in a chain, driven by a force: the model, and physics that the model lacks.
 
 use crate::{FINE, Fine, SAMPLES, STEP};
 
-/// The names of the model's parameters.
+/// Names of the model's parameters.
 pub const PARAMETERS: [&str; 4] = ["k1", "k2", "c", "force"];
 
-/// Their values in the middle of the priors.
+/// Values of the parameters at the middle of the priors.
 pub const REFERENCE: [f64; 4] = [4.0, 2.0, 0.4, 1.0];
 
-/// Inputs: a knock and a slow sweep.
+/// Number of input signals: an impact and a slow sweep.
 pub const CONDITIONS: usize = 2;
 
-/// The chain with what the model may lack.
+/// The chain, including physics that the model may lack.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Chain {
     /// `k1`, `k2`, `c` and the gain of the force.
     pub parameters: [f64; 4],
-    /// A cubic stiffness beside `k1`.
+    /// Cubic stiffness parallel to `k1`.
     pub cubic: f64,
-    /// Drag with the square of the first mass's speed.
+    /// Drag coefficient of the first mass, quadratic in its speed.
     pub drag: f64,
-    /// A stiffness that `k2` gains under tension only.
+    /// Additional stiffness of `k2` under tension only.
     pub switching: f64,
 }
 
 impl Chain {
-    /// The model.
+    /// The chain without additional physics: the model.
     pub fn plain(parameters: [f64; 4]) -> Self {
         Self { parameters, cubic: 0.0, drag: 0.0, switching: 0.0 }
     }
@@ -50,7 +50,7 @@ impl Chain {
         [v1, v2, a1, a2]
     }
 
-    /// The curves of the sensors at fine sampling, by the classical method of Runge and Kutta.
+    /// Curves of the sensors at fine sampling, by the classical Runge-Kutta method.
     pub fn curves(&self, condition: usize) -> Fine {
         let h = STEP / FINE as f64;
         let mut state = [0.0; 4];

@@ -1,10 +1,10 @@
-//! What is hidden in data: effects on sensors, made at fine sampling, and physics of the chain.
+//! Effects hidden in data: on sensors, applied at fine sampling, and in the physics of the chain.
 
 use crate::chain::{CONDITIONS, Chain};
 use crate::noise::Source;
 use crate::{FINE, Fine, STEP, sampled};
 
-/// A kind of hidden effect.
+/// Kind of a hidden effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// The gauge factor.
@@ -13,55 +13,55 @@ pub enum Kind {
     Offset,
     /// A trend.
     Drift,
-    /// A shift in time.
+    /// Shift in time.
     Delay,
-    /// A filter of first order.
+    /// First-order low-pass filter.
     LowPass,
-    /// A weaker copy that comes later.
+    /// Weaker, delayed copy.
     Echo,
     /// An exponential loss.
     Damping,
-    /// A limit.
+    /// Saturation at a limit.
     Saturation,
-    /// A bump.
+    /// Bump of limited duration.
     SecondaryPulse,
-    /// A decaying exponential from the beginning.
+    /// Decaying exponential from the beginning.
     Flash,
-    /// A rising exponential from the beginning.
+    /// Rising exponential from the beginning.
     PulseHeating,
     /// A step.
     LevelJump,
     /// A decaying oscillation.
     Resonance,
-    /// A share of the next sensor.
+    /// Fraction of the next sensor's signal.
     Crosstalk,
-    /// Drag with the square of a speed: not of a sensor.
+    /// Drag quadratic in a speed, not on a sensor.
     Drag,
-    /// A cubic stiffness.
+    /// Cubic stiffness.
     Cubic,
-    /// A stiffness under tension only.
+    /// Additional stiffness under tension only.
     Switching,
-    /// A half sine of some width at some time, on one condition: local, and of no library.
+    /// Half sine of random width and time, under one condition: local, and not in the library.
     Burst,
-    /// Every second half of the curve is mirrored a little: of no library.
+    /// Every second half of the curve is slightly mirrored; not in the library.
     Rectified,
 }
 
-/// A hidden effect with its numbers.
+/// A hidden effect with its parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hidden {
-    /// What it is.
+    /// Kind of the effect.
     pub kind: Kind,
-    /// The sensors that it acts on.
+    /// Indices of the sensors that it acts on.
     pub sensors: Vec<usize>,
-    /// Its size.
+    /// Size of the effect.
     pub size: f64,
-    /// Times or frequencies that it has.
+    /// Times or frequencies of the effect.
     pub shape: [f64; 3],
 }
 
 impl Hidden {
-    /// An effect of random shape and sign whose size changes its sensors by `ratio` times their noise.
+    /// An effect of random shape and sign whose size changes its sensors' signals by `ratio` times their noise.
     pub fn sized(
         kind: Kind,
         sensors: &[usize],
@@ -118,7 +118,7 @@ impl Hidden {
         hidden
     }
 
-    /// The root mean square change of its sensors' samples over their noise.
+    /// Root mean square change of the affected samples, in units of the noise.
     fn change(&self, truth: [f64; 4], sd: &[f64; 4]) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
         for condition in 0..CONDITIONS {
@@ -195,7 +195,7 @@ impl Hidden {
     }
 }
 
-/// The fine curves of a condition with everything that is hidden.
+/// Fine curves of a condition with all hidden effects.
 pub fn curves(hidden: &[Hidden], truth: [f64; 4], condition: usize) -> Fine {
     let mut chain = Chain::plain(truth);
     for effect in hidden {

@@ -1,8 +1,8 @@
-//! Measured data in which an effect is hidden.
+//! Generator of measured data in which an effect is hidden.
 //!
-//! Nothing here uses the engine or its plugins, and nothing of theirs uses this: truths are integrated by another
-//! scheme, filtered and shifted at ten times the sampling, and made noisy with other random numbers. The answer stands in
-//! [`Case::hidden`], which only the last assertion of a test should look at.
+//! It shares no code with the engine or its plugins: truths are integrated by another scheme, filtered and shifted at
+//! ten times the sampling rate, and noise is made with other random numbers. The answer is in [`Case::hidden`], which
+//! only the last assertion of a test should use.
 
 pub mod chain;
 pub mod hidden;
@@ -16,13 +16,13 @@ pub use hidden::{Hidden, Kind};
 /// Sensors of the chain.
 pub const SENSORS: [&str; 4] = ["x1", "x2", "v1", "a2"];
 
-/// Samples of a curve.
+/// Number of samples of a curve.
 pub const SAMPLES: usize = 100;
 
-/// Fine steps between samples.
+/// Number of fine steps between samples.
 pub const FINE: usize = 10;
 
-/// The time between samples, s.
+/// Time between samples, s.
 pub const STEP: f64 = 0.1;
 
 /// Curves at fine sampling by sensor: `FINE * (SAMPLES - 1) + 1` values each.
@@ -31,20 +31,20 @@ pub type Fine = Vec<Vec<f64>>;
 /// Measured data with the answer.
 #[derive(Debug, Clone)]
 pub struct Case {
-    /// The parameters of the truth.
+    /// True parameters.
     pub truth: [f64; 4],
-    /// What was hidden.
+    /// Hidden effects.
     pub hidden: Vec<Hidden>,
-    /// By condition and replicate: the curves of all sensors one after another.
+    /// Replicates by condition; each holds the curves of all sensors, concatenated.
     pub replicates: Vec<Vec<Vec<f64>>>,
 }
 
-/// The times of the samples.
+/// Times of the samples, s.
 pub fn times() -> Vec<f64> {
     (0..SAMPLES).map(|i| STEP * i as f64).collect()
 }
 
-/// The standard deviation of one replicate's noise on each sensor: a twentieth of the root mean square of its curve.
+/// Standard deviation of one replicate's noise on each sensor: 5 % of the root mean square of its curve.
 pub fn noise_sd() -> [f64; 4] {
     let mut square = [0.0; 4];
     for condition in 0..chain::CONDITIONS {
@@ -56,13 +56,13 @@ pub fn noise_sd() -> [f64; 4] {
     square.map(|sum| 0.05 * (sum / (SAMPLES * chain::CONDITIONS) as f64).sqrt())
 }
 
-/// The samples of fine curves.
+/// Samples of fine curves.
 pub fn sampled(fine: &Fine) -> Vec<Vec<f64>> {
     fine.iter().map(|curve| curve.iter().step_by(FINE).copied().collect()).collect()
 }
 
-/// Data of some replicates in which effects are hidden, each of a size that changes its sensors' curves by `ratio`
-/// times the noise of one replicate (root mean square, before any calibration).
+/// Data of some replicates with hidden effects, each of a size that changes its sensors' curves by `ratio` times the
+/// noise of one replicate (root mean square, before any calibration).
 pub fn case(seed: u64, kinds: &[(Kind, Vec<usize>)], ratio: f64, replicates: usize) -> Case {
     let mut random = noise::Source::new(seed);
     let mut truth = REFERENCE;

@@ -2,19 +2,19 @@
 
 use crate::noise::Source;
 
-/// The times of the measured values, s.
+/// Times of the measured values, s.
 pub const TIMES: [f64; 6] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
 
-/// The standard deviations of the priors of level and rise, about zero.
+/// Standard deviations of the priors of level and slope, with mean zero.
 pub const PRIOR: [f64; 2] = [1.0, 0.5];
 
-/// Replicates of a line: one list of values each.
+/// Replicates of a line, one vector of values each.
 pub fn replicates(truth: [f64; 2], sd: f64, count: usize, random: &mut Source) -> Vec<Vec<f64>> {
     let mut one = || TIMES.iter().map(|t| truth[0] + truth[1] * t + sd * random.normal()).collect();
     (0..count).map(|_| one()).collect()
 }
 
-/// The same as a table in long form.
+/// The replicates as a table in long form.
 pub fn table(replicates: &[Vec<f64>]) -> String {
     let mut text = String::from("replicate,t [s],level [m]\n");
     for (r, values) in replicates.iter().enumerate() {
@@ -25,7 +25,7 @@ pub fn table(replicates: &[Vec<f64>]) -> String {
     text
 }
 
-/// Runs of the line at points of the priors: the tables of their parameters and of their responses.
+/// Runs of the line at points drawn from the priors: tables of their parameters and of their responses.
 pub fn runs(count: usize, random: &mut Source) -> [String; 2] {
     let mut points = String::from("run,level0 [m],rise [m/s]\n");
     let mut responses = String::from("run,t [s],level [m]\n");
@@ -39,18 +39,18 @@ pub fn runs(count: usize, random: &mut Source) -> [String; 2] {
     [points, responses]
 }
 
-/// The posterior: its means, and its covariance, row by row.
+/// The posterior in closed form.
 #[derive(Debug, Clone, Copy)]
 pub struct Posterior {
-    /// Of level and rise.
+    /// Means of level and slope.
     pub mean: [f64; 2],
-    /// The variances and the covariance.
+    /// Covariance matrix of level and slope.
     pub covariance: [[f64; 2]; 2],
-    /// The logarithm of the probability of the data.
+    /// Logarithm of the evidence.
     pub log_evidence: f64,
 }
 
-/// The posterior of replicates whose noise has the standard deviation `sd`: conjugate normal laws.
+/// Posterior for replicates with noise of standard deviation `sd`: conjugate normal distributions.
 pub fn posterior(replicates: &[Vec<f64>], sd: f64) -> Posterior {
     let precision = 1.0 / (sd * sd);
     let mut a = [[1.0 / (PRIOR[0] * PRIOR[0]), 0.0], [0.0, 1.0 / (PRIOR[1] * PRIOR[1])]];
@@ -73,7 +73,7 @@ pub fn posterior(replicates: &[Vec<f64>], sd: f64) -> Posterior {
         [-a[1][0] / determinant, a[0][0] / determinant],
     ];
     let mean = [0, 1].map(|i: usize| covariance[i][0] * b[0] + covariance[i][1] * b[1]);
-    // The normal density of the data, with the determinant of its covariance by that of the posterior's precision.
+    // Normal density of the data, with the determinant of its covariance expressed by that of the posterior precision.
     let log_determinant =
         count * (sd * sd).ln() + determinant.ln() + 2.0 * PRIOR.iter().map(|s| s.ln()).sum::<f64>();
     let square = squares - mean[0] * b[0] - mean[1] * b[1];

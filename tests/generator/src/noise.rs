@@ -1,12 +1,12 @@
-//! Noise of replicates: an autoregression of first order and an offset of the whole replicate.
+//! Noise of replicates: a first-order autoregression plus an offset of the whole replicate.
 
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
-/// The coefficient of the autoregression.
+/// Coefficient of the autoregression.
 const MEMORY: f64 = 0.5;
 
-/// The standard deviation of a replicate's offset relative to that of its noise.
+/// Standard deviation of a replicate's offset relative to that of its noise.
 const OFFSET: f64 = 0.3;
 
 /// Random numbers.
@@ -14,7 +14,7 @@ const OFFSET: f64 = 0.3;
 pub struct Source(ChaCha8Rng);
 
 impl Source {
-    /// From a seed.
+    /// A source with this seed.
     pub fn new(seed: u64) -> Self {
         Self(ChaCha8Rng::seed_from_u64(seed))
     }
@@ -36,7 +36,7 @@ impl Source {
     }
 }
 
-/// One replicate of some curves: all sensors one after another.
+/// One replicate of some curves: all sensors concatenated.
 pub fn replicate(curves: &[Vec<f64>], sd: &[f64; 4], random: &mut Source) -> Vec<f64> {
     let mut all = Vec::new();
     for (curve, sd) in curves.iter().zip(sd) {

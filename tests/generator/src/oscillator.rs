@@ -1,22 +1,22 @@
-//! A mass on a spring with more than Hooke and Stokes: the classical method of Runge and Kutta of order four at steps of a
-//! millisecond.
+//! An oscillator with nonlinear stiffness and damping, integrated by the classical fourth-order Runge-Kutta method with
+//! steps of one millisecond.
 
-/// The rate of the speed is `-stiffness x - damping v - cubic x³ - quadratic v |v|`.
+/// The acceleration is `-stiffness x - damping v - cubic x³ - quadratic v |v|`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Oscillator {
-    /// 1/s².
+    /// Linear stiffness per mass, 1/s².
     pub stiffness: f64,
-    /// 1/s.
+    /// Linear damping per mass, 1/s.
     pub damping: f64,
-    /// 1/(m² s²).
+    /// Cubic stiffness per mass, 1/(m² s²).
     pub cubic: f64,
-    /// 1/m.
+    /// Quadratic damping per mass, 1/m.
     pub quadratic: f64,
-    /// Where it is let go, m.
+    /// Initial deflection, m; released from rest.
     pub start: f64,
 }
 
-/// The step, s.
+/// Time step, s.
 const STEP: f64 = 1e-3;
 
 impl Oscillator {
@@ -25,7 +25,7 @@ impl Oscillator {
         [v, -spring - self.damping * v - self.quadratic * v * v.abs()]
     }
 
-    /// The deflection `each` milliseconds apart, `count` times; the first not at the start but one interval behind.
+    /// The deflection at `count` times that are `each` milliseconds apart, the first one interval after the start.
     pub fn deflection(&self, each: usize, count: usize) -> Vec<f64> {
         let along = |y: [f64; 2], k: [f64; 2], h: f64| [y[0] + h * k[0], y[1] + h * k[1]];
         let mut state = [self.start, 0.0];

@@ -9,12 +9,12 @@ use super::{File, Model, Posterior, Real, file, half_cauchy, normal_prior, posit
 struct Regression {
     y: Vec<f64>,
     rows: Vec<Vec<f64>>,
-    /// Mean and standard deviation of each coefficient's normal prior; none where it is flat.
+    /// Mean and standard deviation of each coefficient's normal prior; empty for flat priors.
     coefficients: Vec<(f64, f64)>,
     sigma: Sigma,
 }
 
-/// The prior of the standard deviation, on positive numbers.
+/// Prior of the standard deviation, on positive numbers.
 enum Sigma {
     Flat,
     Normal(f64),
@@ -45,7 +45,7 @@ impl Model for Regression {
     }
 }
 
-/// Rows of a one and the elements of the columns.
+/// Rows with a leading one and the elements of the columns.
 fn with_intercept(columns: &[&[f64]]) -> Vec<Vec<f64>> {
     let row = |i: usize| std::iter::once(1.0).chain(columns.iter().map(|c| c[i])).collect();
     (0..columns[0].len()).map(row).collect()
@@ -54,7 +54,7 @@ fn with_intercept(columns: &[&[f64]]) -> Vec<Vec<f64>> {
 const BETA: [&str; 9] =
     ["beta_1", "beta_2", "beta_3", "beta_4", "beta_5", "beta_6", "beta_7", "beta_8", "beta_9"];
 
-/// Starting points: coefficients around zero with these widths, and sigma.
+/// Distributions of starting points: coefficients around zero with these widths, and sigma.
 fn starts(widths: &[f64], sigma: f64) -> Vec<(&'static str, Distribution)> {
     let coefficients = BETA.iter().zip(widths).map(|(name, width)| (*name, Normal([0.0, *width])));
     coefficients.chain([("sigma", HalfNormal(sigma))]).collect()

@@ -1,10 +1,10 @@
-//! `low_dim_gauss_mix`: a mixture of two normal laws, the lower mean first.
+//! `low_dim_gauss_mix`: a mixture of two normal distributions, the lower mean first.
 
 use lacuna::math::distribution::Distribution::{Beta, HalfNormal, Normal};
 
 use super::{Model, Posterior, Real, file, normal, normal_prior, positive};
 
-/// Point: both means, both standard deviations, the share of the first.
+/// Point: both means, both standard deviations, the weight of the first component.
 struct Mixture(Vec<f64>);
 
 impl Model for Mixture {

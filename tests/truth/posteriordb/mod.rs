@@ -1,8 +1,8 @@
 //! Posteriors of posteriordb (Magnusson et al., github.com/stan-dev/posteriordb, commit 28f8d3d) as targets.
 //!
-//! The log densities are those that posteriordb's Stan programs define, in natural units and so without the
-//! Jacobians of Stan's transformations, priors included; each is written once over [`Real`] numbers, of
-//! which dual numbers give the gradient. Solutions of differential equations are differentiated step by step.
+//! The log densities are those that posteriordb's Stan programs define, including priors, in natural units and so
+//! without the Jacobians of Stan's transformations; each is written once over [`Real`] numbers, and dual numbers give
+//! the gradient. Solutions of differential equations are differentiated step by step.
 
 mod linear;
 mod mixture;
@@ -16,40 +16,40 @@ mod series;
 use std::sync::Arc;
 
 use lacuna::data::Parameter;
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::Component;
 use lacuna::plugin::density::{BoundDensity, Density};
 use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
 use serde_json::Value;
 
 pub use real::{Dual, Real};
 
-/// A posterior with published figures.
+/// A posterior with published reference values.
 pub struct Posterior {
-    /// Its name in posteriordb, such as `sblrc-blr`.
+    /// Name in posteriordb, such as `sblrc-blr`.
     pub name: &'static str,
-    /// The unknowns that are sampled. Their priors are for starting points and bounds: the density includes the
-    /// priors of the Stan program.
+    /// Sampled unknowns. Their priors serve for starting points and bounds: the density includes the priors of the Stan
+    /// program.
     pub parameters: Vec<Parameter>,
     /// The posterior density.
     pub density: Box<dyn Density>,
-    /// From a sampled point to the quantities that have published figures, in the order of `reference`.
+    /// Maps a sampled point to the quantities with published values, in the order of `reference`.
     pub reported: fn(&[f64]) -> Vec<f64>,
-    /// The published figures.
+    /// Published reference values.
     pub reference: Vec<Reference>,
 }
 
-/// The published figures of one quantity.
+/// Published values of one quantity.
 pub struct Reference {
     pub name: String,
     pub mean: f64,
     pub sd: f64,
-    /// The Monte Carlo error of the mean.
+    /// Monte Carlo error of the mean.
     pub mean_error: f64,
 }
 
-/// All of them, in the order of their names.
+/// All posteriors, in the order of their names.
 pub fn posteriors() -> Vec<Posterior> {
     let mut all = linear::posteriors();
     all.extend(series::posteriors());
@@ -64,7 +64,7 @@ pub fn posteriors() -> Vec<Posterior> {
     all
 }
 
-/// A log density over any kind of number; anything but a finite number outside the support.
+/// A log density over any type of number; outside the support it is not finite.
 trait Model: Send + Sync + 'static {
     fn log_density<R: Real>(&self, point: &[R]) -> R;
 }
@@ -102,7 +102,7 @@ impl<M: Model> BoundDensity for Natural<M> {
     }
 }
 
-/// The file of a posterior.
+/// File of a posterior.
 struct File {
     name: &'static str,
     content: Value,
@@ -151,7 +151,7 @@ fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
 }
 
-/// The file of this name.
+/// The file with this name.
 macro_rules! file {
     ($name:literal) => {
         super::File::new($name, include_str!(concat!("data/", $name, ".json")))
@@ -159,18 +159,18 @@ macro_rules! file {
 }
 use file;
 
-/// The logarithm of a normal density, its constant left out.
+/// Logarithm of a normal density, without its constant.
 fn normal<R: Real>(x: R, mean: R, sd: R) -> R {
     let z = (x - mean) / sd;
     z * z * R::from(-0.5) - sd.ln()
 }
 
-/// The same where mean and standard deviation are numbers.
+/// Like [`normal`], with constant mean and standard deviation.
 fn normal_prior<R: Real>(x: R, mean: f64, sd: f64) -> R {
     normal(x, R::from(mean), R::from(sd))
 }
 
-/// The logarithm of a Cauchy density around zero on positive numbers, its constant left out.
+/// Logarithm of a Cauchy density around zero on positive numbers, without its constant.
 fn half_cauchy<R: Real>(x: R, scale: f64) -> R {
     let z = x / R::from(scale);
     positive(x) - (z * z + R::from(1.0)).ln()
@@ -181,14 +181,14 @@ fn positive<R: Real>(x: R) -> R {
     R::from(if x.number() > 0.0 { 0.0 } else { f64::NEG_INFINITY })
 }
 
-/// Every target obeys the contract, and knows its published quantities.
+/// Every target fulfils the contract and has its published quantities.
 #[test]
 fn the_posteriors_are_sound() {
     let all = posteriors();
     assert_eq!(all.len(), 15);
     for posterior in &all {
         let breaches =
-            lacuna::contract::density(posterior.name, &*posterior.density, &posterior.parameters);
+            lacuna_contract::density(posterior.name, &*posterior.density, &posterior.parameters);
         assert_eq!(breaches, Ok(()));
         let middle: Vec<f64> = posterior.parameters.iter().map(|p| p.prior.quantile(0.5)).collect();
         assert!(posterior.reference.iter().all(|r| r.mean_error > 0.0 && r.mean_error < r.sd));

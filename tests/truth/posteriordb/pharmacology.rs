@@ -1,4 +1,4 @@
-//! `one_comp_mm_elim_abs`: one compartment, first-order absorption, elimination of Michaelis and Menten.
+//! `one_comp_mm_elim_abs`: one compartment, first-order absorption, Michaelis-Menten elimination.
 
 use lacuna::math::distribution::Distribution::HalfNormal;
 
@@ -12,7 +12,7 @@ struct Compartment {
     concentrations: Vec<f64>,
 }
 
-/// The largest step of Runge and Kutta's fourth-order method, in days.
+/// Largest step of the fourth-order Runge-Kutta method, in days.
 const STEP: f64 = 1.0 / 128.0;
 
 impl Model for Compartment {

@@ -4,14 +4,14 @@ use lacuna::math::distribution::Distribution::{LogNormal, TruncatedNormal};
 
 use super::{Model, Posterior, Real, file, normal, normal_prior, positive};
 
-/// Point: alpha, beta, gamma, delta, both initial populations, both logarithmic errors.
+/// Point: alpha, beta, gamma, delta, both initial populations, both errors of the logarithms.
 struct Populations {
     initial: Vec<f64>,
-    /// One row a year from the first.
+    /// One row per year from the first.
     counts: Vec<Vec<f64>>,
 }
 
-/// Steps of Runge and Kutta's fourth-order method a year: the error is far below that of the reference's own tolerances.
+/// Steps of the fourth-order Runge-Kutta method per year: the error is far below the tolerances of the reference.
 const STEPS: usize = 32;
 
 impl Model for Populations {
@@ -42,7 +42,7 @@ impl Model for Populations {
     }
 }
 
-/// The logarithm of a log-normal density, its constant left out.
+/// Logarithm of a log-normal density, without its constant.
 fn log_normal<R: Real>(x: R, mu: f64, sigma: f64) -> R {
     normal_prior(x.ln(), mu, sigma) - x.ln()
 }

@@ -4,7 +4,7 @@ use lacuna::math::distribution::Distribution::{Gamma, HalfNormal};
 
 use super::{Model, Posterior, Real, file, normal_prior, positive};
 
-/// Point: length scale rho, amplitude alpha, and sigma, which is added to the diagonal as it is.
+/// Point: length scale rho, amplitude alpha, and sigma, which is added to the diagonal without squaring.
 struct Process {
     x: Vec<f64>,
     y: Vec<f64>,
@@ -25,7 +25,7 @@ impl Model for Process {
             let kernel = alpha * alpha * (distance * distance * R::from(-0.5)).exp();
             if i == j { kernel + sigma } else { kernel }
         };
-        // Cholesky's factor row by row, and the whitened data beside it.
+        // Cholesky factor row by row, and the whitened data along the way.
         let mut factor: Vec<Vec<R>> = Vec::new();
         let mut white: Vec<R> = Vec::new();
         for i in 0..self.x.len() {

@@ -1,11 +1,11 @@
-//! Numbers that log densities are written over: plain ones, and dual numbers that carry their derivatives.
+//! Number types for log densities: plain numbers, and dual numbers that carry their derivatives.
 
 #![allow(clippy::suspicious_arithmetic_impl, reason = "rules of products and quotients")]
 
 use std::array::from_fn;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// What a log density needs of a number.
+/// Operations on numbers that log densities need.
 pub trait Real:
     Copy
     + From<f64>
@@ -15,7 +15,7 @@ pub trait Real:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
-    /// The number without its derivatives.
+    /// The value without its derivatives.
     fn number(self) -> f64;
     fn exp(self) -> Self;
     fn ln(self) -> Self;
@@ -37,7 +37,7 @@ impl Real for f64 {
     }
 }
 
-/// As many derivatives as the largest posterior has parameters.
+/// Number of derivatives: that of the parameters of the largest posterior.
 const SLOPES: usize = 10;
 
 /// A number with its derivatives by all unknowns.
@@ -48,7 +48,7 @@ pub struct Dual {
 }
 
 impl Dual {
-    /// The unknown of this index.
+    /// The unknown with this index.
     pub fn unknown(value: f64, index: usize) -> Self {
         Self { value, slopes: from_fn(|j| if j == index { 1.0 } else { 0.0 }) }
     }

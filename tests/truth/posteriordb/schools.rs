@@ -32,7 +32,7 @@ pub(super) fn posterior() -> Posterior {
     let model = Schools { y: file.vector("y"), sigma: file.vector("sigma") };
     let mut starts = EFFECTS.map(|name| (name, Normal([0.0, 1.0]))).to_vec();
     starts.extend([("mu", Normal([0.0, 5.0])), ("tau", HalfNormal(5.0))]);
-    // Published are the effects themselves.
+    // The published quantities are the effects themselves.
     let reported = |point: &[f64]| {
         let (mu, tau) = (point[8], point[9]);
         point[..8].iter().map(|effect| effect * tau + mu).chain([mu, tau]).collect()

@@ -38,7 +38,7 @@ fn autoregression() -> Posterior {
     file.posterior(model, starts)
 }
 
-/// Point: mu, phi, theta, sigma. The error before the first time is zero, the value mu.
+/// Point: mu, phi, theta, sigma. Before the first time the error is zero and the value mu.
 struct MovingAverage(Vec<f64>);
 
 impl Model for MovingAverage {

@@ -1,5 +1,5 @@
-//! Built-in plugins once more, under other names, in a library that is loaded: they must give the same bits. Beside them
-//! plugins that panic, and one that leaves out what it may.
+//! Built-in plugins under other names, in a library that is loaded: they must give the same bits. In addition, plugins
+//! that panic, and one that implements no optional functions.
 
 mod panicking;
 mod rigid;
@@ -21,6 +21,7 @@ use lacuna_plugins::samplers::nested::Nested;
 use lacuna_plugins::samplers::no_u_turn::NoUTurn;
 use lacuna_plugins::surrogates::gaussian_process::GaussianProcess as Kriging;
 use lacuna_plugins::surrogates::polynomial_chaos::PolynomialChaos;
+
 use panicking::Panicking;
 use rigid::Rigid;
 

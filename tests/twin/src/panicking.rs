@@ -5,11 +5,10 @@ use lacuna_plugin::linalg::Matrix;
 use lacuna_plugin::math::distribution::Distribution;
 use lacuna_plugin::math::random::Stream;
 use lacuna_plugin::plugin::discrepancy::{Discrepancy, Known, Likelihood, VariancePart};
-use lacuna_plugin::plugin::sampler::{Plan, Sampler, State, Target};
+use lacuna_plugin::plugin::sampler::{Plan, Sampler, Start, State, Target};
 use lacuna_plugin::plugin::{Component, Context, Hyperparameter};
 use lacuna_plugin::run::Stop;
-use lacuna_plugin::study::Complaints;
-use lacuna_plugin::study::file::Start;
+use lacuna_plugin::text::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +16,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Panicking {
-    /// The call.
+    /// Name of the call.
     pub call: String,
 }
 
@@ -85,7 +84,7 @@ impl Likelihood for Panics {
 
     fn predictive(&self, response: &[f64], _: &[f64]) -> Vec<VariancePart> {
         self.own.at("predictive");
-        vec![VariancePart { origin: "discrepancy".to_owned(), variance: vec![1.0; response.len()] }]
+        vec![VariancePart { origin: "discrepancy".into(), variance: vec![1.0; response.len()] }]
     }
 
     fn simulate(&self, _: &[f64], _: &[f64], _: &Stream) -> Vec<Measurements> {

@@ -1,4 +1,4 @@
-//! A design that leaves out all that a design may leave out.
+//! A design without any optional functions.
 
 use lacuna_plugin::linalg::Matrix;
 use lacuna_plugin::math::random::{Stream, uniform};
@@ -7,7 +7,7 @@ use lacuna_plugin::run::Stop;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Random points, beside which there are no others.
+/// Random points that cannot be extended.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Rigid {}

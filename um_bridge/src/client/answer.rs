@@ -1,14 +1,14 @@
-//! From the bytes of an answer to what it says.
+//! Decoding of responses.
 
 use serde::de::DeserializeOwned;
 
 use super::Error;
 use crate::protocol::Failed;
 
-/// The most characters of an answer that are shown.
+/// Largest number of characters of a response that are shown.
 const SHOWN: usize = 120;
 
-/// Reads an answer.
+/// Decodes a response.
 pub(super) fn read<T: DeserializeOwned>(url: &str, status: u16, body: &[u8]) -> Result<T, Error> {
     let url = url.to_owned();
     let text = with_nulls(&String::from_utf8_lossy(body));
@@ -32,7 +32,7 @@ pub(super) fn read<T: DeserializeOwned>(url: &str, status: u16, body: &[u8]) -> 
     }
 }
 
-/// The first line, after a colon; nothing where there is none.
+/// The first line, after a colon; empty if there is none.
 fn beginning(text: &str) -> String {
     let line = text.trim_start().lines().next().unwrap_or_default().trim_end();
     let shown: String = line.chars().take(SHOWN).collect();
@@ -40,8 +40,8 @@ fn beginning(text: &str) -> String {
     if shown.is_empty() { String::new() } else { format!(": `{shown}{dots}`") }
 }
 
-/// JSON has no `NaN` and no `Infinity`, but servers write them (Python as `nan`, `inf`, `NaN`, `Infinity`; other
-/// libraries as `null`): all of them become `null`.
+/// Replaces NaN and infinities by `null`: JSON has neither, but servers write them (Python as `nan`, `inf`, `NaN`,
+/// `Infinity`; other libraries as `null`).
 fn with_nulls(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut rest = text;
@@ -61,7 +61,7 @@ fn with_nulls(text: &str) -> String {
     out + rest
 }
 
-/// The length of the string at the beginning, quotes included.
+/// Length of the string at the beginning, including its quotes.
 fn string(text: &str) -> usize {
     let mut escaped = false;
     for (i, c) in text.char_indices().skip(1) {
@@ -75,7 +75,7 @@ fn string(text: &str) -> usize {
     text.len()
 }
 
-/// The length of the word at the beginning.
+/// Length of the word at the beginning.
 fn word(text: &str) -> usize {
     text.find(|c: char| !c.is_ascii_alphabetic()).unwrap_or(text.len())
 }

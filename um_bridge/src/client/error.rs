@@ -1,69 +1,69 @@
-//! No answer from a server.
+//! Errors of the client.
 
 use std::io::ErrorKind;
 use std::time::Duration;
 
 use crate::protocol::{Fault, MODEL_NOT_FOUND, UNSUPPORTED_FEATURE};
 
-/// Why a question has no answer.
+/// Reason why a request failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
-    /// Nobody is there.
+    /// No server responds at the address.
     #[error("no server at {url}: {reason}")]
     Unreachable {
-        /// The server's address.
+        /// Address of the server.
         url: String,
-        /// Why.
+        /// Reason.
         reason: String,
     },
-    /// The connection broke before the answer was whole.
+    /// The connection broke before the response was complete.
     #[error("the server at {url} broke the connection: {reason}")]
     Broken {
-        /// The server's address.
+        /// Address of the server.
         url: String,
-        /// How.
+        /// Description of the failure.
         reason: String,
     },
-    /// The answer takes too long.
+    /// The response took too long.
     #[error("the server at {url} has not answered within {seconds} s")]
     Slow {
-        /// The server's address.
+        /// Address of the server.
         url: String,
-        /// How long it was given.
+        /// Time limit, in seconds.
         seconds: f64,
     },
-    /// Somebody is there who does not speak UM-Bridge.
+    /// The server does not speak UM-Bridge.
     #[error("the server at {url} does not speak UM-Bridge: it answered {status}{text}")]
     Foreign {
-        /// The server's address.
+        /// Address of the server.
         url: String,
-        /// The HTTP status.
+        /// HTTP status.
         status: u16,
-        /// The first line of the answer, after a colon.
+        /// First line of the response, after a colon.
         text: String,
     },
-    /// The server says what is wrong.
+    /// The server reported an error.
     #[error("the server at {url} reports {fault}")]
     Fault {
-        /// The server's address.
+        /// Address of the server.
         url: String,
-        /// What it says.
+        /// The error that the server reported.
         fault: Fault,
     },
-    /// The answer is none.
+    /// The response has no usable content.
     #[error("the answer of the server at {url} cannot be used: {reason}")]
     Useless {
-        /// The server's address.
+        /// Address of the server.
         url: String,
-        /// Why.
+        /// Reason.
         reason: String,
     },
 }
 
 impl Error {
-    /// Whether no other input would be answered either: nobody is there, or nobody who has the model.
+    /// Returns true if requests with other inputs would fail too, because there is no server or none with the model.
     ///
-    /// Everything else may be due to the input: a model that crashes, hangs or diverges.
+    /// Any other failure may be due to the input: a model that crashes, hangs or diverges.
     pub fn is_final(&self) -> bool {
         match self {
             Self::Unreachable { .. } | Self::Foreign { .. } => true,
@@ -74,7 +74,7 @@ impl Error {
         }
     }
 
-    /// Whether the same question may be answered in a moment.
+    /// Returns true if the same request may succeed a moment later.
     pub(super) fn may_pass(&self) -> bool {
         matches!(self, Self::Unreachable { .. } | Self::Broken { .. })
     }
@@ -106,7 +106,7 @@ impl Error {
                 | ErrorKind::BrokenPipe => {
                     Self::Broken { url, reason: "it closed it without an answer".to_owned() }
                 }
-                // The kind of a name that nobody knows has no name of its own.
+                // The error for an unknown host name has no kind of its own.
                 _ if io.to_string().contains("lookup address") => {
                     unreachable(url, "there is no such host")
                 }

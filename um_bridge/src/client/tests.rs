@@ -1,4 +1,4 @@
-//! Servers that misbehave: each answers every connection with the same bytes.
+//! Misbehaving servers: each responds to every connection with the same bytes.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::io::{Read, Write};
@@ -9,12 +9,12 @@ use std::time::{Duration, Instant};
 
 use super::*;
 
-/// An answer with this status line and body.
+/// A response with this status line and body.
 fn answer(status: &str, body: &str) -> String {
     format!("HTTP/1.1 {status}\r\nContent-Length: {}\r\n\r\n{body}", body.len())
 }
 
-/// Answers connections with the given bytes, one after the other; the last one again and again.
+/// A server that responds to connections with the given bytes, one entry after the other; the last one repeatedly.
 struct Script {
     url: String,
     asked: Arc<AtomicUsize>,
@@ -26,7 +26,7 @@ fn script(answers: Vec<String>) -> Script {
     let url = format!("http://{}", listener.local_addr().unwrap());
     let (asked, heard) = (Arc::new(AtomicUsize::new(0)), Arc::<Mutex<Vec<u8>>>::default());
     let (counted, noted) = (asked.clone(), heard.clone());
-    // Ends with the test's process.
+    // The thread ends with the process of the test.
     std::thread::spawn(move || {
         for stream in listener.incoming() {
             let mut stream = stream.unwrap();
@@ -57,7 +57,7 @@ fn evaluate(script: &Script, retries: u32) -> Result<Vec<Vec<f64>>, Error> {
     client.evaluate(&about(), &[vec![1.0]])
 }
 
-/// The message without the address, and whether other inputs would fail too.
+/// The error message without the address, and whether it is final.
 fn failure(answer: &str) -> (String, bool) {
     let script = script(vec![answer.to_owned()]);
     let error = evaluate(&script, 0).unwrap_err();

@@ -1,4 +1,4 @@
-//! From a request to its answer.
+//! From a request to its response.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -15,7 +15,7 @@ use crate::protocol::{
     OutputSizes, VERSION,
 };
 
-/// What a client posts to.
+/// Paths that accept `POST`.
 const POSTED: [&str; 7] = [
     "/ModelInfo",
     "/InputSizes",
@@ -26,7 +26,7 @@ const POSTED: [&str; 7] = [
     "/ApplyHessian",
 ];
 
-/// The HTTP status and the body.
+/// HTTP status and body of the response.
 pub(super) fn answer(request: &Request, shared: &Shared<'_>) -> (u16, String) {
     let (method, path) = (request.method.as_str(), request.path.as_str());
     match method {
@@ -43,7 +43,7 @@ pub(super) fn answer(request: &Request, shared: &Shared<'_>) -> (u16, String) {
         }
     }
     let work = || posted(path, &request.body, shared);
-    // A model that panics must cost its own question and no other.
+    // A panic of the model must fail only its own request.
     let outcome = catch_unwind(AssertUnwindSafe(work))
         .unwrap_or_else(|_| Err(Fault::new(INTERNAL_ERROR, "the model panicked")));
     match outcome {
@@ -146,7 +146,7 @@ fn supported(model: &dyn Model, what: &str, supported: bool) -> Result<(), Fault
     if supported { Ok(()) } else { Err(unsupported(what, model.name())) }
 }
 
-/// The sizes of a model under some settings.
+/// Sizes of a model's vectors under given settings.
 struct Sizes {
     inputs: Vec<usize>,
     outputs: Vec<usize>,

@@ -1,4 +1,4 @@
-//! One client: its questions, one after the other.
+//! One client connection: its requests, one after the other.
 
 use std::net::TcpStream;
 use std::sync::atomic::Ordering;
@@ -8,12 +8,12 @@ use super::http::{Nothing, Reader};
 use super::{Shared, answer};
 use crate::protocol::{Failed, Fault, INTERNAL_ERROR, INVALID_INPUT};
 
-/// How often a connection without questions looks whether the server stops.
+/// Interval at which an idle connection checks whether the server is stopping.
 const GLANCE: Duration = Duration::from_millis(200);
-/// The longest a client may take to receive some of its answer.
+/// Longest time a client may take to receive a part of its response.
 const RECEIVING: Duration = Duration::from_secs(30);
 
-/// Answers until the client leaves or the server stops.
+/// Serves requests until the client disconnects or the server stops.
 pub(super) fn attend(stream: TcpStream, shared: &Shared<'_>) {
     let prepared = stream
         .set_nodelay(true)
@@ -34,7 +34,7 @@ pub(super) fn attend(stream: TcpStream, shared: &Shared<'_>) {
                 }
             }
             Err(Nothing::Refused(status, reason)) => {
-                // A client that is gone needs no reason.
+                // The client may have disconnected already; then the reason reaches nobody.
                 let _ = reader.answer(status, &fault(INVALID_INPUT, reason), false);
                 return;
             }
@@ -43,7 +43,7 @@ pub(super) fn attend(stream: TcpStream, shared: &Shared<'_>) {
     }
 }
 
-/// Turns a client away because there are too many.
+/// Rejects a client because there are too many.
 pub(super) fn refuse(stream: TcpStream) {
     let _ = stream.set_write_timeout(Some(GLANCE));
     let mut reader = Reader::new(stream);
@@ -51,7 +51,7 @@ pub(super) fn refuse(stream: TcpStream) {
     let _ = reader.answer(503, &fault(INTERNAL_ERROR, text), false);
 }
 
-/// The body of an error.
+/// Body of an error response.
 pub(super) fn fault(kind: &str, message: String) -> String {
     let failed = Failed { error: Fault::new(kind, message) };
     serde_json::to_string(&failed).unwrap_or_default()

@@ -1,55 +1,55 @@
-//! As much of HTTP/1.1 (RFC 9112) as the protocol needs: a method, a path, a body of known length.
+//! The subset of HTTP/1.1 (RFC 9112) that the protocol needs: a method, a path, a body of known length.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::time::{Duration, Instant};
 
-/// The most bytes before the body.
+/// Largest size of the head of a request, in bytes.
 const LONGEST_HEAD: usize = 16 * 1024;
-/// The most bytes of a body.
+/// Largest size of a body, in bytes.
 const LONGEST_BODY: usize = 256 * 1024 * 1024;
-/// The longest pause of a client in the middle of a request.
+/// Longest pause of a client in the middle of a request.
 const PATIENCE: Duration = Duration::from_secs(30);
-/// How long a connection stays open without a request.
+/// Time for which a connection stays open without a request.
 const IDLE: Duration = Duration::from_secs(120);
 
-/// A question.
+/// A request.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Request {
-    /// `GET`, `POST`.
+    /// Method: `GET` or `POST`.
     pub(super) method: String,
-    /// The path without what follows a question mark.
+    /// Path without the query.
     pub(super) path: String,
-    /// The body.
+    /// Body of the request.
     pub(super) body: Vec<u8>,
-    /// Whether the client wants to ask more.
+    /// True if the client keeps the connection open.
     pub(super) stays: bool,
 }
 
-/// What came instead of a question.
+/// Outcome of waiting for a request, other than a request.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Nothing {
-    /// The client is gone, or the server stops.
+    /// The client disconnected, or the server is stopping.
     End,
-    /// No such request is answered: the HTTP status, and why.
+    /// The request is rejected, with this HTTP status and reason.
     Refused(u16, String),
 }
 
-/// The part of a head that matters.
+/// The relevant part of a head.
 struct Head {
     method: String,
     path: String,
     length: usize,
     stays: bool,
-    /// Whether the client waits for a word before it sends the body.
+    /// True if the client waits for `100 Continue` before it sends the body.
     waits: bool,
-    /// The length of the head itself.
+    /// Length of the head itself, in bytes.
     end: usize,
 }
 
-/// Reads requests from a connection whose reads return now and then without data.
+/// Reads requests from a connection whose reads time out regularly.
 pub(super) struct Reader<S> {
     stream: S,
-    /// What was read beyond the last request.
+    /// Bytes read beyond the last request.
     buffer: Vec<u8>,
 }
 
@@ -58,7 +58,7 @@ impl<S: Read + Write> Reader<S> {
         Self { stream, buffer: Vec::new() }
     }
 
-    /// The next request; `stop` says whether to wait no longer for one.
+    /// Waits for the next request; `stop` returns true if waiting should end.
     pub(super) fn next(&mut self, stop: impl Fn() -> bool) -> Result<Request, Nothing> {
         let head = loop {
             if let Some(head) = head(&self.buffer)? {
@@ -84,7 +84,7 @@ impl<S: Read + Write> Reader<S> {
         Ok(Request { method: head.method, path: head.path, body, stays: head.stays })
     }
 
-    /// Reads some more, for at most so long.
+    /// Reads more bytes, waiting at most for `patience`.
     fn more(&mut self, patience: Duration, stop: impl Fn() -> bool) -> Result<(), Nothing> {
         let begun = Instant::now();
         let mut chunk = [0; 16 * 1024];
@@ -102,7 +102,7 @@ impl<S: Read + Write> Reader<S> {
         Err(Nothing::End)
     }
 
-    /// Writes an answer.
+    /// Writes a response.
     pub(super) fn answer(&mut self, status: u16, body: &str, stays: bool) -> io::Result<()> {
         let reason = reason(status);
         let length = body.len();
@@ -120,7 +120,7 @@ fn is_pause(error: &io::Error) -> bool {
     [ErrorKind::WouldBlock, ErrorKind::TimedOut, ErrorKind::Interrupted].contains(&error.kind())
 }
 
-/// The head at the beginning of these bytes, once it is whole.
+/// Parses the head at the beginning of these bytes; `None` if it is not complete yet.
 fn head(bytes: &[u8]) -> Result<Option<Head>, Nothing> {
     let mut headers = [httparse::EMPTY_HEADER; 100];
     let mut request = httparse::Request::new(&mut headers);

@@ -1,28 +1,27 @@
-//! What a server serves.
+//! Models that a server offers.
 
 use crate::protocol::{Config, Fault, Support, UNSUPPORTED_FEATURE};
 
-/// A function from some vectors to some vectors.
+/// A function from vectors to vectors.
 ///
-/// The server checks the sizes of what comes in and of what goes out; a derivative is asked for only where
-/// [`Model::support`] says so.
+/// The server checks the sizes of inputs and outputs; a derivative is requested only if [`Model::support`] includes it.
 pub trait Model: Sync {
-    /// The name by which clients ask for it.
+    /// Name by which clients request the model.
     fn name(&self) -> &str;
 
-    /// What it can be asked for.
+    /// Operations that the model supports.
     fn support(&self) -> Support;
 
-    /// The length of each input vector.
+    /// Length of each input vector.
     fn input_sizes(&self, config: &Config) -> Result<Vec<usize>, Fault>;
 
-    /// The length of each output vector.
+    /// Length of each output vector.
     fn output_sizes(&self, config: &Config) -> Result<Vec<usize>, Fault>;
 
-    /// The output vectors.
+    /// Evaluates the output vectors.
     fn evaluate(&self, input: &[Vec<f64>], config: &Config) -> Result<Vec<Vec<f64>>, Fault>;
 
-    /// The derivatives of `sens · output` by the input `in_wrt`.
+    /// Gradient of `sens · output` by the input `in_wrt`.
     fn gradient(
         &self,
         _out_wrt: usize,
@@ -34,7 +33,7 @@ pub trait Model: Sync {
         Err(unsupported("Gradient", self.name()))
     }
 
-    /// The derivative of the output `out_wrt` along the direction `vec` of the input `in_wrt`.
+    /// Derivative of the output `out_wrt` along the direction `vec` of the input `in_wrt`.
     fn apply_jacobian(
         &self,
         _out_wrt: usize,
@@ -46,7 +45,7 @@ pub trait Model: Sync {
         Err(unsupported("ApplyJacobian", self.name()))
     }
 
-    /// The derivatives of `sens · output` by the first input and, along the direction `vec`, the second.
+    /// Second derivative of `sens · output` by the first input and along the direction `vec` of the second input.
     fn apply_hessian(
         &self,
         _out_wrt: usize,
@@ -60,7 +59,7 @@ pub trait Model: Sync {
     }
 }
 
-/// The fault of a model that cannot be asked for this.
+/// Fault of a model that does not support an operation.
 pub(super) fn unsupported(what: &str, name: &str) -> Fault {
     Fault::new(UNSUPPORTED_FEATURE, format!("the model `{name}` does not support {what}"))
 }

@@ -10,7 +10,7 @@ use crate::Client;
 use crate::client::Place;
 use crate::protocol::{About, Config, Support};
 
-/// From vectors `a` (of `size` values) and `[b]` to `b a²` by value and `[b³]`.
+/// Maps vectors `a` (of `size` values) and `[b]` to `b a²` elementwise and `[b³]`.
 struct Powers {
     running: AtomicUsize,
     most: AtomicUsize,
@@ -93,7 +93,7 @@ impl Model for Powers {
     }
 }
 
-/// A model that can only be evaluated, and whose every value is not a number.
+/// A model that supports only evaluation and always returns NaN.
 struct Bare;
 
 impl Model for Bare {
@@ -114,7 +114,7 @@ impl Model for Bare {
     }
 }
 
-/// Serves while `ask` asks; the number of questions that were answered.
+/// Runs a server while `ask` runs; returns the number of requests served.
 fn serving(models: &[&dyn Model], at_a_time: usize, ask: impl FnOnce(SocketAddr)) -> u64 {
     let server = Server::bind(Ipv4Addr::LOCALHOST.into(), 0).unwrap();
     std::thread::scope(|scope| {
@@ -152,7 +152,7 @@ fn the_client_gets_what_the_model_gives() {
         assert_eq!(client.input_sizes(&two).unwrap(), [2, 1]);
         assert_eq!(client.output_sizes(&three).unwrap(), [3, 1]);
         assert!(client.support(&two).unwrap().apply_hessian);
-        // Every bit of a number crosses.
+        // Numbers are transmitted bit for bit.
         let x = [0.1 + 0.2, 1e-300];
         let input = [x.to_vec(), vec![3.0]];
         let expected = [vec![3.0 * x[0] * x[0], 3.0 * x[1] * x[1]], vec![27.0]];
@@ -211,12 +211,12 @@ fn wrong_questions_get_error_bodies() {
             says(client.apply_jacobian(&bare, at, &[vec![1.0]], &[1.0]).unwrap_err()),
             "UnsupportedFeature: the model `bare` does not support ApplyJacobian"
         );
-        // The turn of the model that panicked is free again.
+        // The place of the model that panicked is free again.
         assert!(client.evaluate(&powers, &with(1.0)).is_ok());
     });
 }
 
-/// What comes back for some bytes, until the server closes or says nothing for a while.
+/// The response to raw bytes, until the server closes the connection or stays silent.
 fn raw(address: SocketAddr, bytes: &[u8]) -> String {
     let mut stream = TcpStream::connect(address).unwrap();
     stream.set_read_timeout(Some(Duration::from_millis(400))).unwrap();
@@ -278,7 +278,7 @@ fn what_is_no_question_is_refused_without_harm() {
             assert!(answer.contains("\"error\":{\"type\":\"InvalidInput\""), "{answer}");
             assert!(answer.contains(word), "{answer}");
         }
-        // Half a request, and nothing more: no answer, no harm.
+        // An incomplete request gets no response and does no harm.
         assert_eq!(raw(address, b"POST /Evaluate HTTP/1.1\r\nContent-Length: 9\r\n\r\nhalf"), "");
         assert!(raw(address, b"GET /Info HTTP/1.1\r\n\r\n").contains("\"models\":[\"bare\"]"));
     });

@@ -1,20 +1,20 @@
-//! Who may work: so many at a time.
+//! Limit on the number of evaluations in parallel.
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-/// Free places.
+/// Counter of free places.
 pub(super) struct Turns {
     free: Mutex<usize>,
     freed: Condvar,
 }
 
 impl Turns {
-    /// So many places.
+    /// A limit of `places` evaluations.
     pub(super) fn of(places: usize) -> Self {
         Self { free: Mutex::new(places), freed: Condvar::new() }
     }
 
-    /// Waits for a place and works there.
+    /// Waits for a free place and runs `work` there.
     pub(super) fn take<R>(&self, work: impl FnOnce() -> R) -> R {
         let mut free = self.free();
         while *free == 0 {
@@ -31,7 +31,7 @@ impl Turns {
     }
 }
 
-/// A place that is taken; free again when the work is done or has panicked.
+/// An occupied place; freed when the work is done or has panicked.
 struct Place<'a>(&'a Turns);
 
 impl Drop for Place<'_> {

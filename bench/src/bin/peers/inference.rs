@@ -1,20 +1,19 @@
-//! Drawing from the posterior, and its evidence.
+//! Sampling from the posterior, and estimation of its evidence.
 
 use std::path::Path;
 
 use lacuna::data::{Draws, Measurements, Parameter};
 use lacuna::diagnose::Diagnosis;
-use lacuna::diagnose::bridge::bridge;
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::moments::{mean, variance};
-use lacuna::math::optimise;
 use lacuna::math::random::Stream;
 use lacuna::plugin::discrepancy::{Discrepancy, Known};
 use lacuna::plugin::sampler::{Evidence, Sampler};
 use lacuna::plugin::{Emulator, Target};
-use lacuna::posterior::{OfData, Posterior};
 use lacuna_bench::clock::{per_call, timed};
+use lacuna_engine::posterior::bridge::bridge;
+use lacuna_engine::posterior::{OfData, Posterior};
+use lacuna_linalg::Matrix;
 use lacuna_plugins::discrepancies::common::By;
 use lacuna_plugins::discrepancies::gaussian::Gaussian;
 use lacuna_plugins::samplers::affine_invariant_ensemble::AffineInvariantEnsemble;
@@ -25,10 +24,10 @@ use crate::Fallible;
 use crate::problem::{self, VARIANCE_SCALE};
 use crate::surrogates::{ADAPTIVE, SMALL, emulator};
 
-/// How often the evidence is found anew, to see by how much it varies.
+/// Number of repeated estimates of the evidence, which show its scatter.
 const SEEDS: u64 = 8;
 
-/// What a posterior consists of.
+/// Parts of a posterior.
 struct Parts {
     parameters: Vec<Parameter>,
     data: Measurements,
@@ -60,12 +59,12 @@ impl Parts {
     }
 }
 
-/// The ensemble sampler through both emulators.
+/// The ensemble sampler with both emulators.
 pub fn ensemble(folder: &Path) -> Fallible<Value> {
     Ok(json!({ ADAPTIVE: ensemble_of(folder, ADAPTIVE)?, SMALL: ensemble_of(folder, SMALL)? }))
 }
 
-/// The ensemble sampler for its usual number of steps, from around the best fit.
+/// The ensemble sampler for its usual number of steps, starting around the best fit.
 fn ensemble_of(folder: &Path, name: &str) -> Fallible<Value> {
     Parts::read(folder, name)?.with_posterior(|posterior, preparation| {
         let sampler = AffineInvariantEnsemble::default();
@@ -96,7 +95,7 @@ fn ensemble_of(folder: &Path, name: &str) -> Fallible<Value> {
     })
 }
 
-/// All steps of a run.
+/// Runs all steps.
 fn walk(
     sampler: &dyn Sampler,
     target: &dyn Target,
@@ -119,14 +118,14 @@ fn starts(posterior: &Posterior<'_>, count: usize) -> Fallible<Matrix> {
     let density = posterior.log_density(&candidates);
     let mut order: Vec<usize> = (0..candidates.rows()).collect();
     order.sort_by(|&a, &b| density[b].total_cmp(&density[a]));
-    let maxima = optimise::maximise(posterior, &candidates.select_rows(&order[..12]));
+    let maxima = lacuna_optimise::maximise(posterior, &candidates.select_rows(&order[..12]));
     let best = maxima.first().ok_or("no maximum of the posterior was found")?;
-    let laplace = optimise::laplace(posterior, &best.point)?;
-    Ok(optimise::scatter(posterior, &best.point, &laplace, count, &random.named("scatter"))?)
+    let laplace = lacuna_optimise::laplace(posterior, &best.point)?;
+    Ok(lacuna_optimise::scatter(posterior, &best.point, &laplace, count, &random.named("scatter"))?)
 }
 
-/// The evidence by sequential Monte Carlo, several times, beside that of bridge sampling; through the smaller
-/// emulator, which spares the other side most of its time.
+/// The evidence by sequential Monte Carlo, several times, and by bridge sampling; with the smaller emulator, which
+/// saves the other program most of its time.
 pub fn evidence(folder: &Path) -> Fallible<Value> {
     Parts::read(folder, SMALL)?.with_posterior(|posterior, preparation| {
         let sampler = SequentialMonteCarlo::default();
@@ -158,7 +157,7 @@ pub fn evidence(folder: &Path) -> Fallible<Value> {
     })
 }
 
-/// The evidence of one population, and the number of evaluations.
+/// Evidence from one population, and the number of evaluations.
 fn cool(
     sampler: &SequentialMonteCarlo,
     target: &dyn Target,
@@ -178,7 +177,7 @@ fn cool(
     Ok((evidence, state.evaluations))
 }
 
-/// The evidence from draws of the ensemble.
+/// Evidence from draws of the ensemble.
 fn bridged(posterior: &Posterior<'_>) -> Fallible<Evidence> {
     let sampler = AffineInvariantEnsemble::default();
     let steps = walk(&sampler, posterior, starts(posterior, sampler.walkers)?)?;

@@ -1,7 +1,7 @@
-//! Lacuna's side of the comparison with its peers: `bench/peers.sh` runs it, job after job.
+//! Lacuna's part of the comparison with other programs: `bench/peers.sh` runs it, job after job.
 //!
-//! `peers JOB FOLDER` with the jobs `problem`, `polynomial_chaos`, `ensemble`, `evaluation`, `gaussian_process`
-//! and `evidence`. The first writes the data of all others into the folder; each other one writes its figures to
+//! `peers JOB FOLDER` with the jobs `problem`, `polynomial_chaos`, `ensemble`, `evaluation`, `gaussian_process` and
+//! `evidence`. The first writes the data of all others into the folder; each of the others writes its results to
 //! `FOLDER/lacuna_JOB.json`. Seconds are processor time.
 
 mod inference;

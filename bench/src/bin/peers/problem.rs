@@ -1,15 +1,15 @@
 //! A problem of the founding study's size, made here and read by both sides.
 //!
-//! Arrays are raw little-endian numbers; `problem.json` tells their shapes, the ranges of the parameters and the
-//! prior of the variance.
+//! Arrays are raw little-endian numbers; `problem.json` states their shapes, the ranges of the parameters and the prior
+//! of the variance.
 
 use std::fs;
 use std::path::Path;
 
 use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Unit};
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal, uniform};
+use lacuna_linalg::Matrix;
 use serde_json::json;
 
 use crate::Fallible;
@@ -20,12 +20,12 @@ pub const OUTPUTS: usize = SENSORS * TIMES;
 pub const TRAINING: usize = 480;
 pub const VALIDATION: usize = 123;
 pub const REPLICATES: usize = 20;
-/// The cutoff in pascal, the density in kg/m3, the speed of sound in m/s.
+/// Ranges of the cutoff in pascal, the density in kg/m3, the speed of sound in m/s.
 pub const RANGES: [[f64; 2]; 3] = [[0.0, 5e5], [1e4, 1.36e4], [1200.0, 2200.0]];
 const TRUTH: [f64; 3] = [1.7e5, 1.21e4, 1850.0];
-/// The standard deviation of a replicate, microstrain.
+/// Standard deviation of a replicate, microstrain.
 const NOISE: f64 = 32.0;
-/// The scale of the half-normal prior of the variance, microstrain squared.
+/// Scale of the half-normal prior of the variance, microstrain squared.
 pub const VARIANCE_SCALE: f64 = 1e6;
 
 /// Makes all arrays of the problem.
@@ -63,7 +63,7 @@ pub fn save(folder: &Path, name: &str, array: &Matrix) -> Fallible<()> {
     Ok(fs::write(folder.join(format!("{name}.f64")), bytes)?)
 }
 
-/// Reads an array with so many columns.
+/// Reads an array with this number of columns.
 pub fn load(folder: &Path, name: &str, columns: usize) -> Fallible<Matrix> {
     let path = folder.join(format!("{name}.f64"));
     let bytes = fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))?;
@@ -72,10 +72,10 @@ pub fn load(folder: &Path, name: &str, columns: usize) -> Fallible<Matrix> {
     Ok(Matrix::from_vec(numbers.len() / columns, columns, numbers))
 }
 
-/// The strain of a damped wave in microstrain.
+/// Strain of a damped wave, in microstrain.
 ///
-/// It arrives at each sensor at a time that depends on the speed of sound, and where the wall would pull the liquid
-/// below the cutoff it stays there: a smooth function with a kink that is not quite sharp.
+/// It arrives at each sensor at a time that depends on the speed of sound, and stays at the cutoff where the wall would
+/// pull the liquid below it: a smooth function with a slightly rounded kink.
 fn response(point: &[f64]) -> Vec<f64> {
     const ROUNDING: f64 = 15.0;
     let unit = |i: usize| (point[i] - RANGES[i][0]) / (RANGES[i][1] - RANGES[i][0]);
@@ -99,7 +99,7 @@ fn design(count: usize) -> Matrix {
     })
 }
 
-/// The replicates and, as in the founding study, their mean as one more.
+/// The replicates and, as in the founding study, their mean as a further curve.
 fn curves() -> Matrix {
     let truth = response(&TRUTH);
     let mut rng = Stream::root(2).generator();
@@ -126,7 +126,7 @@ pub fn parameters() -> Fallible<Vec<Parameter>> {
     RANGES.iter().zip(names).map(named).collect()
 }
 
-/// The shape of a response with the first so many outputs.
+/// Layout of a response with the first `outputs` outputs.
 pub fn layout(outputs: usize) -> Fallible<Layout> {
     let grid = (0..outputs).map(|k| k as f64).collect();
     let axes = vec![Axis::grid("output", grid, Unit::parse("1")?)];

@@ -4,12 +4,12 @@ use std::fs;
 use std::hint::black_box;
 use std::path::Path;
 
-use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::surrogate::Training;
 use lacuna::plugin::{Emulator, Surrogate};
 use lacuna::run::{Progress, Silent};
 use lacuna_bench::clock::timed;
+use lacuna_linalg::Matrix;
 use lacuna_plugins::surrogates::gaussian_process::GaussianProcess;
 use lacuna_plugins::surrogates::polynomial_chaos::{Degree, PolynomialChaos};
 use lacuna_plugins::surrogates::principal_components::Components;
@@ -18,15 +18,15 @@ use serde_json::{Value, json};
 use crate::Fallible;
 use crate::problem::{self, OUTPUTS, RANGES};
 
-/// The name of the expansion whose outputs each have a degree of their own.
+/// Name of the expansion with a separate degree for each output.
 pub const ADAPTIVE: &str = "adaptive";
-/// The name of the one of degree 10.
+/// Name of the expansion of degree 10.
 pub const SMALL: &str = "degree_10";
-/// The number of points at which the expansion is evaluated.
+/// Number of points at which the expansion is evaluated.
 const EVALUATIONS: usize = 100_000;
-/// Of how many of them the values are written for the other side to compare.
+/// Number of points whose values are written for comparison by the other side.
 const COMPARED: usize = 1000;
-/// How many outputs are emulated by Gaussian processes: every hundredth, from the middle of the first sensor.
+/// Number of outputs emulated by Gaussian processes: every hundredth, from the middle of the first sensor.
 const PROCESSES: usize = 10;
 
 /// Sparse expansions of all outputs, of adaptive degree and of degree 10; keeps the emulators for the other jobs.
@@ -60,7 +60,7 @@ fn expansion(options: &PolynomialChaos, folder: &Path, name: &str) -> Fallible<V
     }))
 }
 
-/// Gaussian processes of a few outputs, each with hyperparameters of its own.
+/// Gaussian processes of a few outputs, each with its own hyperparameters.
 pub fn gaussian_process(folder: &Path) -> Fallible<Value> {
     let options = GaussianProcess { components: Components::None, ..GaussianProcess::default() };
     let outputs: Vec<usize> =
@@ -70,7 +70,7 @@ pub fn gaussian_process(folder: &Path) -> Fallible<Value> {
     Ok(json!({ "cpu_seconds": seconds, "outputs": outputs, "rmse": rmse }))
 }
 
-/// The expansion of all outputs at many points, in pieces.
+/// The expansion of all outputs at many points, evaluated in pieces.
 pub fn evaluation(folder: &Path) -> Fallible<Value> {
     let emulator = emulator(folder, ADAPTIVE)?;
     let mut rng = Stream::root(4).generator();
@@ -103,7 +103,7 @@ pub fn emulator(folder: &Path, name: &str) -> Fallible<Box<dyn Emulator>> {
     Ok(PolynomialChaos::default().load(&bytes)?)
 }
 
-/// An emulator of some outputs and the time it took.
+/// Fits an emulator of some outputs; returns it with the time it took.
 fn fit(
     options: &dyn Surrogate,
     folder: &Path,
@@ -123,7 +123,7 @@ fn fit(
     Ok((emulator?, seconds))
 }
 
-/// The root mean squared error of each output over the runs that were kept back.
+/// Root mean square error of each output over the held-out runs.
 fn validation(emulator: &dyn Emulator, folder: &Path, outputs: &[usize]) -> Fallible<Vec<f64>> {
     let points = problem::load(folder, "validation_points", RANGES.len())?;
     let truth = problem::load(folder, "validation_responses", OUTPUTS)?.select_columns(outputs);
@@ -135,7 +135,7 @@ fn validation(emulator: &dyn Emulator, folder: &Path, outputs: &[usize]) -> Fall
     Ok((0..outputs.len()).map(error).collect())
 }
 
-/// The degrees of the polynomials of each term, from the header of a saved expansion.
+/// Degrees of the polynomials of each term, from the header of a saved expansion.
 fn exponents(bytes: &[u8]) -> Fallible<Matrix> {
     let begin = bytes.iter().position(|&b| b == b'\n').ok_or("no first line")? + 1;
     let (length, rest) = bytes[begin..].split_first_chunk::<8>().ok_or("no header")?;

@@ -1,24 +1,24 @@
 //! `skeleton`: a Kronecker sequence.
 
-use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, uniform};
+use lacuna::matrix::Matrix;
 use lacuna::plugin::{Component, Context, Design};
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Kronecker sequence of the generalised golden ratio: every point is a fixed step from the one before, folded
-/// back into the unit cube.
+/// Kronecker sequence of the generalised golden ratio: every point is a fixed step from the previous one, modulo the
+/// unit cube.
 ///
 /// The points fill the space evenly for any number of runs, and a longer design begins with the shorter one. For more
-/// than a few parameters the steps become alike and `sobol` or `latin_hypercube` is the better one.
+/// than a few parameters the steps become similar and `sobol` or `latin_hypercube` is better.
 ///
 /// Reference: Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018).
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Skeleton {
-    /// Whether the sequence starts at a random point of the cube; if not, at its centre.
+    /// Set to true to start the sequence at a random point of the cube instead of its centre.
     pub random_start: bool,
 }
 
@@ -28,7 +28,7 @@ impl Default for Skeleton {
     }
 }
 
-/// Above this number of parameters neighbouring steps differ by less than 5 %.
+/// Number of parameters above which neighbouring steps differ by less than 5 %.
 const MOST_PARAMETERS: usize = 12;
 
 impl Component for Skeleton {
@@ -53,7 +53,7 @@ impl Design for Skeleton {
         let steps = steps(dimension);
         Ok(Matrix::from_fn(count, dimension, |i, j| {
             let place = (start[j] + (i + 1) as f64 * steps[j]).fract();
-            // The cube is open: zero is no place in it.
+            // The unit cube is open: zero is excluded.
             place.max(f64::EPSILON)
         }))
     }
@@ -62,7 +62,7 @@ impl Design for Skeleton {
 /// The steps `1/g, 1/g², …`, where `g` is the root above one of `g^(d + 1) = g + 1`: the golden ratio for `d = 1`.
 fn steps(dimension: usize) -> Vec<f64> {
     let mut g = 2.0_f64;
-    // The iteration shrinks the error at least threefold.
+    // The iteration reduces the error at least by a factor of three.
     for _ in 0..60 {
         g = (1.0 + g).powf(1.0 / (dimension as f64 + 1.0));
     }
@@ -77,7 +77,7 @@ mod tests {
 
     #[test]
     fn it_keeps_the_contract() {
-        assert_eq!(lacuna::contract::design("skeleton", &Skeleton::default()), Ok(()));
+        assert_eq!(lacuna_contract::design("skeleton", &Skeleton::default()), Ok(()));
     }
 
     /// Sources: the golden ratio is `(1 + sqrt(5)) / 2`; the plastic number is OEIS A060006.

@@ -1,28 +1,28 @@
-//! `skeleton`: normal noise of one unknown standard deviation.
+//! `skeleton`: normal noise with one unknown standard deviation.
 
 use std::f64::consts::TAU;
 
 use lacuna::data::Measurements;
-use lacuna::linalg::vector::dot;
-use lacuna::linalg::{self, Cholesky, Matrix};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal};
-use lacuna::plugin::discrepancy::{CommonError, Known, VariancePart};
+use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin, Known, VariancePart};
 use lacuna::plugin::{Component, Context, Discrepancy, Hyperparameter, Likelihood};
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
+use lacuna_linalg::vector::dot;
+use lacuna_linalg::{Cholesky, Matrix};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Independent normal differences of one standard deviation, the same for all outputs.
+/// Independent normal noise with one standard deviation for all outputs.
 ///
-/// Every measured value is the model's response, plus the errors that all replicates share, plus a normal number. Where
-/// the noise differs between sensors, or neighbouring times are alike, use `gaussian` or `autoregressive`.
+/// Every measured value is the model's response, plus the errors common to all replicates, plus a normal number. If the
+/// noise differs between sensors, or values at neighbouring times are correlated, use `gaussian` or `autoregressive`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Skeleton {
-    /// Prior of the standard deviation, in the unit of the response, such as `{ half_normal = 1e-5 }`. When left out, half-normal
-    /// and as wide as the root mean square of all measured values.
+    /// Prior of the standard deviation, in the unit of the response, such as `{ half_normal = 1e-5 }`. Default:
+    /// half-normal with the root mean square of all measured values.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub deviation: Option<Distribution>,
 }
@@ -59,7 +59,7 @@ impl Discrepancy for Skeleton {
     }
 }
 
-/// Refuses what no likelihood can be made of.
+/// Rejects data for which no likelihood can be computed.
 fn check_data(data: &Measurements) -> Result<(), Stop> {
     let outputs = data.layout.len();
     for replicate in &data.replicates {
@@ -76,7 +76,8 @@ fn check_data(data: &Measurements) -> Result<(), Stop> {
     if data.count() == 0 { Err(Stop::new("the measurements hold no value")) } else { Ok(()) }
 }
 
-/// The likelihood in counts, means and scatters of each output: replicates cost nothing.
+/// The likelihood as a function of count, mean and scatter of each output, so that its cost does not depend on the
+/// number of replicates.
 ///
 /// With the common errors `F z`, `z` standard normal, `N` the counts and `e = mean - response - F z`,
 ///
@@ -92,13 +93,13 @@ struct Noise {
     count: Vec<f64>,
     mean: Vec<f64>,
     scatter: f64,
-    /// `F`: the factors of all common errors side by side.
+    /// `F`: the factors of all common errors side by side, `outputs x rank`.
     factor: Matrix,
     /// `F' N F`.
     gram: Matrix,
 }
 
-/// The best common error at one response.
+/// The most probable common error at one response.
 struct Solved {
     capacitance: Cholesky,
     /// `z`.
@@ -132,13 +133,13 @@ impl Noise {
             unknown: [unknown],
             mean: summaries.iter().map(|s| s.mean).collect(),
             scatter: summaries.iter().map(|s| s.scatter).sum(),
-            gram: linalg::gram(&weighted),
+            gram: lacuna_linalg::gram(&weighted),
             count,
             factor,
         })
     }
 
-    /// `None` where the standard deviation is none.
+    /// The most probable common error; `None` for an invalid standard deviation.
     fn solve(&self, response: &[f64], deviation: f64) -> Option<Solved> {
         let variance = deviation * deviation;
         if !(deviation > 0.0 && variance > 0.0 && variance.is_finite()) {
@@ -154,7 +155,7 @@ impl Noise {
         };
         let mut error: Vec<f64> = (0..response.len()).map(residual).collect();
         let pull: Vec<f64> = error.iter().zip(&self.count).map(|(e, n)| n * e).collect();
-        let mut weights = linalg::transposed_multiply_vector(&self.factor, &pull);
+        let mut weights = lacuna_linalg::transposed_multiply_vector(&self.factor, &pull);
         capacitance.solve(&mut weights);
         let mut squares = self.scatter;
         for (i, e) in error.iter_mut().enumerate().filter(|(i, _)| self.count[*i] > 0.0) {
@@ -164,7 +165,7 @@ impl Noise {
         Some(Solved { capacitance, weights, error, squares })
     }
 
-    /// The number of measured values less the rank of the common errors.
+    /// Number of measured values less the rank of the common errors.
     fn freedom(&self) -> f64 {
         self.data.count() as f64 - self.gram.rows() as f64
     }
@@ -234,10 +235,10 @@ mod tests {
 
     #[test]
     fn it_keeps_the_contract() {
-        assert_eq!(lacuna::contract::discrepancy("skeleton", &Skeleton::default()), Ok(()));
+        assert_eq!(lacuna_contract::discrepancy("skeleton", &Skeleton::default()), Ok(()));
     }
 
-    /// Two outputs, each measured twice, with a common error: the density of four normal numbers of covariance
+    /// Two outputs, each measured twice, with a common error: the density of four normal numbers with covariance
     /// `s² I + f f'`, whose inverse and determinant have closed forms (Sherman and Morrison).
     #[test]
     fn with_one_common_error_it_is_the_density_written_out() {
@@ -247,7 +248,7 @@ mod tests {
         let replicates = vec![replicate([1.0, 2.5]), replicate([1.4, 2.0])];
         let data = Measurements::new(layout, replicates);
         let factor = Matrix::from_vec(2, 1, vec![0.3, -0.2]);
-        let common = [CommonError { origin: "emulator".into(), factor, predictive: true }];
+        let common = [CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }];
         let built = Skeleton::default().likelihood(&Known::without_slopes(&data, &common)).unwrap();
         let (e, f, s) = ([0.1, 0.6, 0.5, 0.1], [0.3, -0.2, 0.3, -0.2], 0.4);
         let [ee, ef, ff] = [dot(&e, &e), dot(&e, &f), dot(&f, &f)];

@@ -4,19 +4,19 @@ use lacuna::plugin::executor::{Batch, Finished, Job};
 use lacuna::plugin::model::EvalError;
 use lacuna::plugin::{Component, Context, Executor};
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
-use lacuna::work::{Ended, evaluate};
+use lacuna::text::Complaints;
+use lacuna_run::work::{Ended, evaluate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Runs the model on this machine, one run after the other.
 ///
-/// For models that use all cores themselves, or of which a licence allows one at a time; `local` runs several at once. A run
-/// that the model rejects can be tried again, where chance or a network decides.
+/// For models that use all cores themselves, or whose licence allows one run at a time; `local` makes several runs in
+/// parallel. A run that the model rejects can be repeated, if it fails by chance or because of a network.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Skeleton {
-    /// How often a run is tried at most.
+    /// Largest number of attempts per run.
     pub attempts: usize,
 }
 
@@ -59,7 +59,7 @@ impl Executor for Skeleton {
     }
 }
 
-/// Runs a job in this process and writes its response down; a model that panics costs its own run and no other.
+/// Runs a job in this process and writes its response to a file; a panic of the model fails only that run.
 fn run(batch: &Batch<'_>, job: &Job) -> Result<Ended, Stop> {
     let ended = evaluate(batch, &[job]).pop();
     ended.ok_or_else(|| Stop::new(format!("the run `{}` has no end", job.name)))
@@ -78,9 +78,10 @@ mod tests {
     use lacuna::plugin::executor::Recipe;
     use lacuna::plugin::model::{Call, Response, Signature};
 
-    /// A folder of this test alone.
+    /// A folder for one test.
     fn folder(name: &str) -> PathBuf {
-        let folder = std::env::temp_dir().join(format!("skeleton-{name}-{}", std::process::id()));
+        let folder =
+            std::env::temp_dir().join(format!("skeleton-executor-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         folder
     }
@@ -88,12 +89,12 @@ mod tests {
     #[test]
     fn it_keeps_the_contract() {
         let folder = folder("contract");
-        let judged = lacuna::contract::executor("skeleton", &Skeleton::default(), &folder);
+        let judged = lacuna_contract::executor("skeleton", &Skeleton::default(), &folder);
         assert_eq!(judged, Ok(()));
         std::fs::remove_dir_all(folder).unwrap();
     }
 
-    /// A model that answers at every third call.
+    /// A model that succeeds at every third call.
     #[derive(Default)]
     struct Moody(AtomicUsize);
 

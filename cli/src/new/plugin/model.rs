@@ -1,21 +1,21 @@
 //! `skeleton`: exponential decay.
 
 use lacuna::data::{Axis, Coordinates, Layout, Unit};
-use lacuna::linalg::Matrix;
+use lacuna::matrix::Matrix;
 use lacuna::plugin::model::{Call, EvalError, Gradient, Input, Response, Signature};
 use lacuna::plugin::{Component, Context, Model};
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Exponential decay: `amplitude exp(-rate t) + background` at any times.
 ///
 /// Charge of a capacitor, activity of one isotope, a first-order reaction. The response has one axis, a grid in
-/// seconds; amplitude and rate are the inputs. A sum of several decays is written faster with `equations`.
+/// seconds; amplitude and rate are the inputs. For a sum of several decays use `equations`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Skeleton {
-    /// What is left when all has decayed, in the unit of the response.
+    /// Value after complete decay, in the unit of the response.
     pub background: f64,
 }
 
@@ -31,7 +31,7 @@ impl Component for Skeleton {
     }
 }
 
-/// A second, as the model counts the time.
+/// The second, the unit of the model's time.
 fn second() -> Unit {
     Unit::parse("s").unwrap_or_default()
 }
@@ -126,7 +126,7 @@ mod tests {
         let folder = std::env::temp_dir();
         let layout = Layout::number("y");
         let context = Context::new(&folder, &[], &layout);
-        let judged = lacuna::contract::model("skeleton", &Skeleton::default(), &context, &folder);
+        let judged = lacuna_contract::model("skeleton", &Skeleton::default(), &context, &folder);
         assert_eq!(judged, Ok(()));
     }
 

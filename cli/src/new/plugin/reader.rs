@@ -6,23 +6,23 @@ use lacuna::data::table::Column;
 use lacuna::data::{Coordinates, Layout, Measurements, Replicate, Table};
 use lacuna::plugin::reader::{Contents, MeasurementSource, ReadError, Variable, scenario_path};
 use lacuna::plugin::{Component, Context, Reader};
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Columns of text between blanks or commas, as instruments write them: one value a line.
+/// Columns of text separated by blanks or commas, as instruments write them: one value per line.
 ///
-/// The first line that is no comment has the names of the columns: one for each axis of the response, one called as the
-/// response, and for measurements one called `replicate`. Numbers are in the units of the study; `nan` stands where nothing
-/// was measured. Other columns and other places are passed over. For names with blanks, units in headings and
+/// The first line that is not a comment holds the names of the columns: one for each axis of the response, one with the
+/// name of the response, and for measurements one called `replicate`. Numbers are in the units of the study; `nan`
+/// marks a missing value. Other columns and other positions are ignored. For names with blanks, units in headings and
 /// simulation runs use `csv`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Skeleton {
-    /// The file with the measurements, relative to the study; `{scenario}` stands for a scenario's name.
+    /// File with the measurements, relative to the study; `{scenario}` is replaced by a scenario's name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub path: Option<PathBuf>,
-    /// How a line begins that is a comment.
+    /// Prefix of comment lines.
     pub comment: String,
 }
 
@@ -57,7 +57,7 @@ impl Component for Skeleton {
 struct Sheet {
     path: PathBuf,
     names: Vec<String>,
-    /// The number of each line, and its cells.
+    /// Number of each line, and its cells.
     lines: Vec<(usize, Vec<String>)>,
 }
 
@@ -107,7 +107,7 @@ impl Sheet {
         })
     }
 
-    /// The place in the response and the value of each line that belongs to it; `nan` is no value.
+    /// Line number, index in the response and value of each line that belongs to the response; `nan` gives no value.
     fn values(&self, layout: &Layout) -> Result<Vec<(usize, usize, Option<f64>)>, ReadError> {
         let axes = layout.axes.iter().map(|axis| self.column(&axis.name));
         let axes: Vec<usize> = axes.collect::<Result<_, _>>()?;
@@ -139,7 +139,7 @@ impl Sheet {
     }
 }
 
-/// The place of a number on a grid, to nine digits.
+/// Index of a number on a grid, to nine digits.
 fn nearest(grid: &[f64], x: f64) -> Option<usize> {
     let span = grid.last()? - grid.first()?;
     grid.iter().position(|g| (g - x).abs() <= 1e-9 * span.max(g.abs()))
@@ -231,12 +231,13 @@ lacuna::register!(Reader, "skeleton", Skeleton);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lacuna::contract::Sample;
     use lacuna::data::{Axis, Unit};
+    use lacuna_contract::Sample;
 
-    /// A folder of this test alone, with a file.
+    /// A folder for one test, with one file.
     fn folder(name: &str, file: &str, text: &str) -> PathBuf {
-        let folder = std::env::temp_dir().join(format!("skeleton-{name}-{}", std::process::id()));
+        let folder =
+            std::env::temp_dir().join(format!("skeleton-reader-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         std::fs::write(folder.join(file), text).unwrap();
         folder
@@ -257,7 +258,7 @@ mod tests {
         let values = vec![1.25, 2.5, -3e-4, 1234.5];
         let file = folder.join("sound.columns");
         let sample = Sample { file, layout: layout(), values, tolerance: 0.0 };
-        let judged = lacuna::contract::reader("skeleton", &Skeleton::default(), &sample, &folder);
+        let judged = lacuna_contract::reader("skeleton", &Skeleton::default(), &sample, &folder);
         assert_eq!(judged, Ok(()));
         std::fs::remove_dir_all(folder).unwrap();
     }

@@ -1,31 +1,30 @@
-//! `skeleton`: random walks as wide as the prior says.
+//! `skeleton`: random-walk Metropolis with step sizes from the prior.
 
-use lacuna::linalg::Matrix;
 use lacuna::math::moments::{quantile, sorted};
 use lacuna::math::random::{Stream, normal, uniform};
+use lacuna::matrix::Matrix;
 use lacuna::plugin::sampler::{Plan, State};
 use lacuna::plugin::{Component, Context, Fact, Sampler, Target};
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Random-walk Metropolis: each chain tries a normal step of fixed width around its place and takes it with the ratio of the
+/// Random-walk Metropolis: each chain proposes a normal step of fixed width and accepts it with the ratio of the
 /// densities, or stays.
 ///
-/// Exact from the first step, with nothing to adapt and nothing to go wrong. Where the data say much more than the prior, or
-/// unknowns are correlated, most steps are refused: then `adaptive_metropolis` or `affine_invariant_ensemble` is the better
-/// one.
+/// Exact from the first step, without adaptation. If the data are much more informative than the prior, or unknowns are
+/// correlated, most proposals are rejected: then `adaptive_metropolis` or `affine_invariant_ensemble` is better.
 ///
 /// Reference: Metropolis, Rosenbluth, Rosenbluth, Teller and Teller, J. Chem. Phys. 21 (1953) 1087.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Skeleton {
-    /// The number of independent chains: at least two.
+    /// Number of independent chains, at least two.
     pub chains: usize,
-    /// The number of steps of each chain.
+    /// Number of steps of each chain.
     pub steps: usize,
-    /// The standard deviation of a step in each unknown, as a fraction of that of its prior.
+    /// Standard deviation of a proposal in each unknown, as a fraction of that of its prior.
     pub width: f64,
 }
 
@@ -57,9 +56,9 @@ impl Component for Skeleton {
     }
 }
 
-/// Half of what lies between the 16 % and the 84 % quantile of the prior of each unknown.
+/// Half the distance between the 16 % and 84 % quantiles of the prior of each unknown.
 fn widths(target: &dyn Target) -> Vec<f64> {
-    // Any fixed stream will do: the draws tell a width only.
+    // Any fixed stream serves: the draws only give a width.
     let draws = target.prior_draws(1000, &Stream::root(0).named("widths"));
     let width = |j: usize| {
         let column = sorted(&draws.column(j));
@@ -98,7 +97,7 @@ impl Sampler for Skeleton {
     fn step(&self, target: &dyn Target, state: &mut State, stream: &Stream) -> Result<(), Stop> {
         let list = state.memory.as_array().map_or(&[][..], Vec::as_slice);
         let widths: Vec<f64> = list.iter().filter_map(serde_json::Value::as_f64).collect();
-        // A stream a chain: none depends on how many there are.
+        // One stream per chain, so that a chain does not depend on the number of chains.
         let mut generators: Vec<_> =
             (0..self.chains).map(|chain| stream.at(chain as u64).generator()).collect();
         let mut tried = state.points.clone();
@@ -131,13 +130,13 @@ lacuna::register!(Sampler, "skeleton", Skeleton);
 mod tests {
     use super::*;
 
-    /// Among it: the mean and the standard deviation of a normal law, within four Monte Carlo errors.
+    /// Includes mean and standard deviation of a normal distribution, within four Monte Carlo errors.
     #[test]
     fn it_keeps_the_contract() {
-        assert_eq!(lacuna::contract::sampler("skeleton", &Skeleton::default()), Ok(()));
+        assert_eq!(lacuna_contract::sampler("skeleton", &Skeleton::default()), Ok(()));
     }
 
-    /// The standard normal law in one coordinate, which is also the prior.
+    /// The standard normal distribution in one coordinate, which is also the prior.
     struct Normal;
 
     impl Target for Normal {
@@ -162,7 +161,7 @@ mod tests {
         }
     }
 
-    /// A step of width `w` on a standard normal density is taken with the probability `2 atan(2 / w) / pi` (Sherlock and
+    /// A step of width `w` on a standard normal density is accepted with probability `2 atan(2 / w) / pi` (Sherlock and
     /// Roberts, Bernoulli 15 (2009) 774, in one dimension).
     #[test]
     fn steps_are_taken_as_often_as_theory_says() {
@@ -177,7 +176,8 @@ mod tests {
         }
         let (share, right) =
             (taken as f64 / 2e4, (2.0 / width).atan() / std::f64::consts::FRAC_PI_2);
-        // Chains start in the law; neighbouring steps are correlated, by a factor of at most three in the variance.
+        // Chains start in the stationary distribution; the correlation of neighbouring steps increases the variance by
+        // a factor of at most three.
         let error = (3.0 * right * (1.0 - right) / 2e4).sqrt();
         assert!((share - right).abs() < 4.0 * error, "{share} and {right}");
     }

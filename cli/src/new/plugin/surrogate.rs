@@ -1,28 +1,28 @@
 //! `skeleton`: a polynomial by least squares.
 
 use lacuna::data::Parameter;
-use lacuna::linalg::{self, Matrix};
 use lacuna::math::moments::{mean, variance};
 use lacuna::math::random::Stream;
 use lacuna::plugin::forward::Linear;
 use lacuna::plugin::surrogate::{FitError, Training};
 use lacuna::plugin::{Component, Context, Emulator, Fact, Forward, Surrogate};
 use lacuna::run::{Progress, Stop};
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
+use lacuna_linalg::Matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A full polynomial in all parameters, fitted by least squares (a response surface).
 ///
-/// Good for smooth responses of few parameters. It needs more runs than it has terms, which are many: `polynomial_chaos`
-/// chooses among them.
+/// Suitable for smooth responses of few parameters. It needs more runs than it has terms, which are many:
+/// `polynomial_chaos` selects among them.
 ///
-/// Reference: Box and Draper, Empirical Model-Building and Response Surfaces (1987); leave-one-out errors from the
-/// hat matrix: Allen, Technometrics 16 (1974) 125.
+/// Reference: Box and Draper, Empirical Model-Building and Response Surfaces (1987); leave-one-out errors from the hat
+/// matrix: Allen, Technometrics 16 (1974) 125.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Skeleton {
-    /// The total degree of the polynomial: 2 has squares and products of two parameters.
+    /// Total degree of the polynomial: 2 includes squares and products of two parameters.
     pub degree: usize,
 }
 
@@ -32,7 +32,8 @@ impl Default for Skeleton {
     }
 }
 
-/// The number of monomials up to a total degree, `(dimension + degree)! / (dimension! degree!)`, as it may be large.
+/// Number of monomials up to a total degree, `(dimension + degree)! / (dimension! degree!)`, as a float because it may
+/// be large.
 fn count(dimension: usize, degree: usize) -> f64 {
     (1..=degree).fold(1.0, |terms, k| terms * (dimension + k) as f64 / k as f64)
 }
@@ -88,18 +89,18 @@ impl Surrogate for Skeleton {
     }
 }
 
-/// A fitted polynomial in coordinates that go from -1 to 1 over the runs.
+/// A fitted polynomial in coordinates scaled to -1..1 over the runs.
 #[derive(Debug, Serialize, Deserialize)]
 struct Polynomial {
     centre: Vec<f64>,
     half: Vec<f64>,
-    /// The exponents of each term.
+    /// Exponents of each term.
     exponents: Vec<Vec<i32>>,
     coefficients: Matrix,
     error: FitError,
 }
 
-/// All exponents of a total degree up to `degree`.
+/// Exponents of all monomials up to total degree `degree`.
 fn exponents(dimension: usize, degree: usize) -> Vec<Vec<i32>> {
     if dimension == 0 {
         return vec![Vec::new()];
@@ -137,7 +138,7 @@ impl Polynomial {
         };
         let fault = |error| Stop::new(format!("the polynomial cannot be fitted: {error}"));
         let basis = made.basis(points);
-        let qr = linalg::thin_qr(&basis).map_err(fault)?;
+        let qr = lacuna_linalg::thin_qr(&basis).map_err(fault)?;
         let pivots = (0..qr.r.columns()).map(|k| qr.r[(k, k)].abs());
         let [least, most] = [f64::min, f64::max]
             .map(|choose: fn(f64, f64) -> f64| pivots.clone().reduce(choose).unwrap_or(0.0));
@@ -145,14 +146,14 @@ impl Polynomial {
             let text = "the runs do not tell all terms of the polynomial apart";
             return Err(Stop::new(text).help("choose a lower `degree`, or another design"));
         }
-        let mut coefficients = linalg::transposed_multiply(&qr.q, responses);
-        linalg::solve_upper_matrix(&qr.r, &mut coefficients);
-        made.error = left_out(&qr.q, responses, &linalg::multiply(&basis, &coefficients))?;
+        let mut coefficients = lacuna_linalg::transposed_multiply(&qr.q, responses);
+        lacuna_linalg::solve_upper_matrix(&qr.r, &mut coefficients);
+        made.error = left_out(&qr.q, responses, &lacuna_linalg::multiply(&basis, &coefficients))?;
         made.coefficients = coefficients;
         Ok(made)
     }
 
-    /// Whether bytes that were read can be what was saved.
+    /// Returns true if bytes that were read are a valid polynomial.
     fn is_sound(&self) -> bool {
         let whole = |m: &Matrix| m.rows().checked_mul(m.columns()) == Some(m.as_slice().len());
         let dimension = self.centre.len();
@@ -170,7 +171,8 @@ impl Polynomial {
     }
 }
 
-/// What each run's residual would be in a fit without it: `residual / (1 - h)`, `h` the diagonal of the hat matrix `Q Q'`.
+/// Residual that each run would have in a fit without it: `residual / (1 - h)`, with `h` the diagonal of the hat matrix
+/// `Q Q'`.
 fn left_out(q: &Matrix, responses: &Matrix, fitted: &Matrix) -> Result<FitError, Stop> {
     let leverage: Vec<f64> =
         q.iter_rows().map(|row| row.iter().map(|x| x * x).sum::<f64>()).collect();
@@ -199,11 +201,11 @@ impl Forward for Polynomial {
     }
 
     fn mean(&self, points: &Matrix) -> Matrix {
-        linalg::multiply(&self.basis(points), &self.coefficients)
+        lacuna_linalg::multiply(&self.basis(points), &self.coefficients)
     }
 
     fn jacobian(&self, point: &[f64]) -> Matrix {
-        linalg::transposed_multiply(&self.coefficients, &self.basis_gradient(point))
+        lacuna_linalg::transposed_multiply(&self.coefficients, &self.basis_gradient(point))
     }
 
     fn linear(&self) -> Option<&dyn Linear> {
@@ -265,7 +267,7 @@ mod tests {
 
     #[test]
     fn it_keeps_the_contract() {
-        assert_eq!(lacuna::contract::surrogate("skeleton", &Skeleton::default()), Ok(()));
+        assert_eq!(lacuna_contract::surrogate("skeleton", &Skeleton::default()), Ok(()));
     }
 
     fn fitted(points: &Matrix, responses: &Matrix) -> Box<dyn Emulator> {

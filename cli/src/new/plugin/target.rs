@@ -3,25 +3,25 @@
 use std::collections::BTreeMap;
 
 use lacuna::data::Parameter;
-use lacuna::linalg::Matrix;
+use lacuna::matrix::Matrix;
 use lacuna::plugin::density::BoundDensity;
 use lacuna::plugin::{Component, Context, Density};
 use lacuna::run::Stop;
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Independent normal densities of the parameters.
 ///
-/// For trying samplers: with wide priors the posterior is known, its maximum lies at `mean`, and the log evidence is the sum of
-/// the logarithms of `sd` times the prior's density and the root of 2 pi. Any other density is written faster with
+/// For testing samplers: with wide priors the posterior is known, its maximum lies at `mean`, and the log evidence is
+/// the sum of the logarithms of `sd` times the prior's density and the square root of 2 pi. For any other density use
 /// `expression`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Skeleton {
-    /// The mean of each parameter, by name and in its unit; zero when left out.
+    /// Mean of each parameter, by name and in its unit; zero by default.
     pub mean: BTreeMap<String, f64>,
-    /// The standard deviation of each parameter, by name and in its unit; one when left out.
+    /// Standard deviation of each parameter, by name and in its unit; one by default.
     pub sd: BTreeMap<String, f64>,
 }
 
@@ -55,7 +55,7 @@ impl Density for Skeleton {
     }
 }
 
-/// Mean and standard deviation of each parameter.
+/// Mean and standard deviation of each parameter, in the order of the study.
 struct Laws(Vec<(f64, f64)>);
 
 impl BoundDensity for Laws {
@@ -67,7 +67,7 @@ impl BoundDensity for Laws {
         let scaled: Vec<f64> =
             point.iter().zip(&self.0).map(|(x, (mean, sd))| (x - mean) / sd).collect();
         let value = -0.5 * scaled.iter().map(|z| z * z).sum::<f64>();
-        // Infinitely far off, or at no number, there is no density.
+        // At infinite or NaN coordinates the density is zero.
         if !value.is_finite() {
             return (f64::NEG_INFINITY, vec![0.0; point.len()]);
         }
@@ -88,7 +88,7 @@ mod tests {
 
     #[test]
     fn it_keeps_the_contract() {
-        let judged = lacuna::contract::density("skeleton", &Skeleton::default(), &parameters());
+        let judged = lacuna_contract::density("skeleton", &Skeleton::default(), &parameters());
         assert_eq!(judged, Ok(()));
     }
 

@@ -1,26 +1,26 @@
-//! `skeleton`: a loss in proportion to what is there.
+//! `skeleton`: a loss proportional to the state.
 
 use lacuna::expression;
 use lacuna::plugin::effect::Description;
 use lacuna::plugin::term::{Place, Sign, Site, Summand};
 use lacuna::plugin::{Component, Context, Term};
-use lacuna::study::Complaints;
+use lacuna::text::Complaints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-/// A linear loss: a state falls in proportion to itself, or to an expression of states.
+/// A linear loss: a state decreases in proportion to itself, or to an expression of states.
 ///
 /// ```text
 /// rate = … - coefficient u,   coefficient ≥ 0
 /// ```
 ///
-/// A leak, a decay, a first-order reaction. `linear_friction` has the same form for speeds, and `relaxation` for what goes
-/// to a level that is not zero.
+/// A leak, a decay, a first-order reaction. `linear_friction` has the same form for velocities, and `relaxation` is for
+/// a decay to a nonzero level.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Skeleton {
-    /// What is lost, `u`, as an expression of states; the state itself when left out.
+    /// Quantity that is lost, `u`, as an expression of states; the state itself by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
 }
@@ -67,7 +67,7 @@ mod tests {
 
     #[test]
     fn it_keeps_the_contract() {
-        assert_eq!(lacuna::contract::term("skeleton", &Skeleton::default()), Ok(()));
+        assert_eq!(lacuna_contract::term("skeleton", &Skeleton::default()), Ok(()));
     }
 
     #[test]

@@ -1,16 +1,16 @@
-//! Several variances, multipliers of measured ones, and variances integrated out.
+//! Several variances, multipliers of measured variances, and variances integrated out.
 
 use std::path::Path;
 
 use lacuna::data::Measurements;
 use lacuna::data::measurements::Summary;
-use lacuna::linalg::{self, Matrix};
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::component::{Component, Context};
 use lacuna::plugin::discrepancy::{CommonError, Known, Likelihood};
-use lacuna::study::problem::Complaints;
-use lacuna::study::read::read;
-use lacuna::study::{Problems, Sources};
+use lacuna::text::problem::Complaints;
+use lacuna::text::read::read;
+use lacuna::text::{Problems, Sources};
+use lacuna_linalg::Matrix;
 
 use super::{Emulated, build};
 use crate::discrepancies::common::testing::{
@@ -37,7 +37,7 @@ fn names(likelihood: &GaussianLikelihood) -> Vec<String> {
     likelihood.hyperparameters().iter().map(|h| h.name.clone()).collect()
 }
 
-/// The group of an output under `WINDOWS`; the last window of sensor G has no data.
+/// Returns the group of an output under `WINDOWS`; the last window of sensor G has no data.
 fn window(i: usize) -> usize {
     (3 * (i / TIMES) + (i % TIMES) / 2).min(7)
 }
@@ -176,12 +176,13 @@ fn the_compressed_forms_of_groups_equal_the_full_ones() {
                 let count = full.hyperparameters().len();
                 let hyper = Matrix::from_fn(3, count, |i, j| 0.2 + (i + j) as f64);
                 let found = compressed.log_likelihood(&basis, &hyper);
-                let responses = linalg::multiply(&basis, &emulated.coefficients);
+                let responses = lacuna_linalg::multiply(&basis, &emulated.coefficients);
                 for (i, &found) in found.iter().enumerate() {
                     close(found, full.log_likelihood(responses.row(i), hyper.row(i)), 1e-10);
                     let (by_basis, by_hyper) = compressed.gradient(basis.row(i), hyper.row(i));
                     let (by_response, expected) = full.gradient(responses.row(i), hyper.row(i));
-                    let chained = linalg::multiply_vector(&emulated.coefficients, &by_response);
+                    let chained =
+                        lacuna_linalg::multiply_vector(&emulated.coefficients, &by_response);
                     by_basis.iter().zip(chained).for_each(|(f, e)| close(*f, e, 1e-8));
                     by_hyper.iter().zip(expected).for_each(|(f, e)| close(*f, e, 1e-8));
                 }
@@ -208,8 +209,8 @@ fn gradients_of_all_forms_are_the_derivatives() {
     }
 }
 
-/// Simpson's rule in the logarithm of the variance, whose error is of the fourth order in the step;
-/// a prior with a corner is given as two ranges.
+/// Integrates by Simpson's rule in the logarithm of the variance, whose error is of the fourth order in the step; a
+/// prior with a corner is given as two ranges.
 fn by_simpson(prior: &Distribution, ranges: &[f64], density: impl Fn(f64) -> f64) -> f64 {
     const COUNT: usize = 6000;
     let mut values = Vec::new();
@@ -297,7 +298,7 @@ fn several_variances_are_not_integrated_out_with_common_errors() {
     assert!(stop.unwrap().to_string().contains("cannot be integrated out together"));
 }
 
-/// The check knows it before anything is run.
+/// The check reports it before anything is run.
 #[test]
 fn several_variances_with_marginal_are_refused_by_the_check() {
     let text = "[discrepancy]\nvariance = { half_normal = 1.0 }\nmarginal = true\nby = ";
@@ -306,7 +307,7 @@ fn several_variances_with_marginal_are_refused_by_the_check() {
         let id = sources.add_file(Path::new("study.toml"), format!("{text}\"{by}\""));
         let root = read(id, &sources, &mut problems).unwrap();
         let node = root.get("discrepancy").unwrap();
-        let chosen: Gaussian = lacuna::study::decode(node, &mut problems).unwrap();
+        let chosen: Gaussian = lacuna::text::decode(node, &mut problems).unwrap();
         let (directory, layout) = (Path::new("."), layout());
         let context = Context { common_errors, ..Context::new(directory, &[], &layout) };
         chosen.check(&context, &mut Complaints::new(node, &mut problems));
@@ -333,7 +334,7 @@ fn the_variance_is_told_in_parts() {
     close(parts[0].variance[c], pooled.0 / pooled.1, 1e-12);
     let single = super::super::super::common::testing::data(1, 1);
     let likelihood = build(&single, &[], "variance = { half_normal = 1 }");
-    assert_eq!(likelihood.predictive(&[0.0; OUTPUTS], &[0.2])[0].origin, "discrepancy");
+    assert_eq!(likelihood.predictive(&[0.0; OUTPUTS], &[0.2])[0].origin.as_str(), "discrepancy");
 }
 
 #[test]

@@ -1,14 +1,13 @@
-//! The fast forms on a smooth problem of the founding study's size, against the sum over all data.
+//! The compressed forms on a smooth problem of the founding study's size, against the sum over all data.
 
 use lacuna::data::{Axis, Layout, Measurements, Parameter, Replicate, Unit};
-use lacuna::linalg::{self, Matrix};
 use lacuna::math::distribution::Distribution;
-
 use lacuna::math::random::{Stream, normal, uniform};
 use lacuna::plugin::Emulator;
-use lacuna::plugin::discrepancy::{CommonError, Compressed, Likelihood};
+use lacuna::plugin::discrepancy::{CommonError, Compressed, ErrorOrigin, Likelihood};
 use lacuna::plugin::surrogate::{Surrogate, Training};
 use lacuna::run::{Progress, Silent};
+use lacuna_linalg::Matrix;
 
 use super::{GaussianLikelihood, build, random_matrix};
 use crate::discrepancies::gaussian::compressed::CompressedGaussian;
@@ -18,7 +17,7 @@ const SENSORS: usize = 10;
 const TIMES: usize = 100;
 const BOX: [[f64; 2]; 3] = [[0.0, 1e6], [1e4, 1.36e4], [1200.0, 2200.0]];
 
-/// The strain of a damped wave that arrives at each sensor at its own time.
+/// Strain of a damped wave that arrives at each sensor at its own time.
 fn response(theta: &[f64]) -> Vec<f64> {
     let [cutoff, density, speed] = [theta[0] / 1e6, theta[1] / 1e4, theta[2] / 1e3];
     let strain = |k: usize| {
@@ -138,7 +137,7 @@ fn common_errors_do_not_change_that() {
     for value in factor.as_mut_slice() {
         *value *= 1e-6;
     }
-    let common = [CommonError { origin: "emulator".to_owned(), factor, predictive: true }];
+    let common = [CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }];
     let full = likelihood(&data, &common);
     let compressed = CompressedGaussian::new(&full, linear).unwrap();
     assert!(compressed.groups[0].squares.is_some());
@@ -150,9 +149,9 @@ fn common_errors_do_not_change_that() {
         let (by_point, by_variance) = compressed.gradient_at(linear, theta.row(i), hyper.row(i));
         let (by_response, by_hyper) = full.gradient(response, hyper.row(i));
         let jacobian = emulator.jacobian(theta.row(i));
-        let chained = linalg::transposed_multiply_vector(&jacobian, &by_response);
+        let chained = lacuna_linalg::transposed_multiply_vector(&jacobian, &by_response);
         for (k, (found, expected)) in by_point.iter().zip(&chained).enumerate() {
-            // What a thousandth of the box changes is known to the digits of the log density.
+            // The change over a thousandth of the box is accurate to the digits of the log density.
             let step = 1e-3 * (BOX[k][1] - BOX[k][0]);
             let scale = fast[i].abs() + (expected * step).abs();
             assert!(((found - expected) * step).abs() < 1e-9 * scale, "{found} {expected}");
@@ -161,8 +160,8 @@ fn common_errors_do_not_change_that() {
     }
 }
 
-/// One replicate with noise a million times smaller than the signal: the expanded square would drown
-/// the smallest residuals in round-off.
+/// One replicate with noise a million times smaller than the signal: in the expanded square, rounding errors would
+/// exceed the smallest residuals.
 #[test]
 fn exact_data_are_compared_without_expanding_the_square() {
     let emulator = emulator();

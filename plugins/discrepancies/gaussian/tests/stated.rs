@@ -1,11 +1,11 @@
-//! Data that state their noise: against the normal density of all data written out, and against generalised least squares
+//! Data that state their noise: against the dense normal density of all data, and against generalised least squares
 //! in closed form (Aitken 1936).
 
 use lacuna::data::Measurements;
-use lacuna::linalg::{self, Cholesky, Matrix};
 use lacuna::math::random::{Stream, normal, uniform};
 use lacuna::plugin::Discrepancy;
 use lacuna::plugin::discrepancy::{CommonError, Known, Likelihood};
+use lacuna_linalg::{Cholesky, Matrix};
 
 use super::{OUTPUTS, common, data, random_matrix};
 use crate::discrepancies::common::testing::{close, has_its_derivatives, options};
@@ -16,7 +16,7 @@ fn build(data: &Measurements, error: &[CommonError], text: &str) -> Box<dyn Like
     chosen.likelihood(&Known::without_slopes(data, error)).unwrap()
 }
 
-/// Standard deviations of each value, alike for all replicates or not.
+/// Standard deviations of each value, the same for all replicates or not.
 fn with_sigma(seed: u64, alike: bool) -> Measurements {
     let mut data = data(seed);
     for (r, replicate) in data.replicates.iter_mut().enumerate() {
@@ -27,16 +27,16 @@ fn with_sigma(seed: u64, alike: bool) -> Measurements {
     data
 }
 
-/// A covariance of one curve.
+/// Data with the covariance of one curve.
 fn with_covariance(seed: u64) -> Measurements {
     let root = random_matrix(OUTPUTS, OUTPUTS, seed + 60);
-    let mut covariance = linalg::gram(&root);
+    let mut covariance = lacuna_linalg::gram(&root);
     (0..OUTPUTS).for_each(|i| covariance[(i, i)] += 0.3);
     Measurements { covariance: Some(covariance), ..data(seed) }
 }
 
-/// All data as one normal vector: the stated noise of each replicate times `scale`, plus `added` on the diagonal, and the
-/// errors that all replicates share.
+/// All data as one normal vector: the stated noise of each replicate times `scale`, plus `added` on the diagonal, and
+/// the errors common to all replicates.
 fn written_out(
     data: &Measurements,
     error: &[CommonError],
@@ -58,7 +58,8 @@ fn written_out(
     let n = residual.len();
     let covariance = Matrix::from_fn(n, n, |a, b| {
         let ((r, i), (s, j)) = (places[a], places[b]);
-        let shared = error.iter().map(|e| linalg::vector::dot(e.factor.row(i), e.factor.row(j)));
+        let shared =
+            error.iter().map(|e| lacuna_linalg::vector::dot(e.factor.row(i), e.factor.row(j)));
         let own = if r == s { scale * noise(r, i, j) } else { 0.0 };
         shared.sum::<f64>() + own + if a == b { added } else { 0.0 }
     });
@@ -98,7 +99,7 @@ fn equals_the_normal_density_written_out() {
     }
 }
 
-/// The data without a replicate keep the law of all data.
+/// The data without one replicate keep the distribution of all data.
 #[test]
 fn a_part_has_the_density_written_out() {
     let error = [common(5)];
@@ -114,7 +115,7 @@ fn a_part_has_the_density_written_out() {
     }
 }
 
-/// Each value given all others, by leaving it out of the data.
+/// Checks each value given all others by removing it from the data.
 #[test]
 fn values_left_out_have_their_conditional_densities() {
     let error = [common(7)];
@@ -137,8 +138,8 @@ fn values_left_out_have_their_conditional_densities() {
     assert!(next.next().is_none());
 }
 
-/// The straight line `a + b t`: the likelihood is `exp(-(b - b0)' H (b - b0) / 2)` about the estimate `b0 = H^-1 X'S^-1 y`
-/// with `H = X'S^-1 X`.
+/// For the straight line `a + b t` the likelihood is `exp(-(b - b0)' H (b - b0) / 2)` about the estimate
+/// `b0 = H^-1 X'S^-1 y` with `H = X'S^-1 X`.
 #[test]
 fn a_straight_line_is_generalised_least_squares() {
     for (seed, of_curve) in [(1, false), (2, true)] {
@@ -157,13 +158,13 @@ fn a_straight_line_is_generalised_least_squares() {
         let x = white.whiten_matrix(&Matrix::from_fn(n, 2, |k, j| line(used[k])[j]));
         let mut y: Vec<f64> = used.iter().map(|&i| data.replicates[0].values[i].unwrap()).collect();
         white.whiten(&mut y);
-        let h = linalg::gram(&x);
-        let mut estimate = linalg::transposed_multiply_vector(&x, &y);
+        let h = lacuna_linalg::gram(&x);
+        let mut estimate = lacuna_linalg::transposed_multiply_vector(&x, &y);
         Cholesky::new(&h).unwrap().solve(&mut estimate);
         let built = build(&data, &[], ALONE);
         let at = |b: &[f64]| -> f64 {
             let response: Vec<f64> =
-                (0..OUTPUTS).map(|i| linalg::vector::dot(&line(i), b)).collect();
+                (0..OUTPUTS).map(|i| lacuna_linalg::vector::dot(&line(i), b)).collect();
             built.log_likelihood(&response, &[])
         };
         let best = at(&estimate);
@@ -171,14 +172,15 @@ fn a_straight_line_is_generalised_least_squares() {
         for _ in 0..20 {
             let step = [normal(&mut rng), normal(&mut rng)];
             let b = [estimate[0] + step[0], estimate[1] + step[1]];
-            let expected = -0.5 * linalg::vector::dot(&step, &linalg::multiply_vector(&h, &step));
+            let expected = -0.5
+                * lacuna_linalg::vector::dot(&step, &lacuna_linalg::multiply_vector(&h, &step));
             close(at(&b) - best, expected, 1e-7);
         }
     }
 }
 
-/// New data have the noise that is stated: the mean square of each value over its variance is one, to four standard
-/// errors of that of 4000 draws.
+/// New data have the stated noise: the mean square of each value over its variance is one, within four standard
+/// errors of 4000 draws.
 #[test]
 fn simulated_data_have_the_stated_noise() {
     let response = vec![0.0; OUTPUTS];
@@ -198,7 +200,7 @@ fn simulated_data_have_the_stated_noise() {
             close(ratio, 1.0, 4.0 * (2.0 / draws as f64).sqrt());
         }
         let parts = built.predictive(&response, &[0.3]);
-        assert_eq!(parts[0].origin, "measurement");
+        assert_eq!(parts[0].origin.as_str(), "measurement");
         close(parts[1].variance[0], 0.3, 1e-12);
     }
 }
@@ -212,10 +214,7 @@ fn what_cannot_be_told_apart_is_refused() {
         built.err().map(|stop| stop.message).unwrap_or_default()
     };
     let by = refused("variance = { half_normal = 1 }\nby = \"time\"");
-    assert_eq!(
-        by,
-        "several variances cannot be told apart beside a covariance of the measurements"
-    );
+    assert_eq!(by, "several variances cannot be estimated if the measurements state a covariance");
     let marginal = refused("variance = { half_normal = 1 }\nmarginal = true");
     assert!(marginal.starts_with("a variance cannot be integrated out"), "{marginal}");
 }

@@ -1,23 +1,23 @@
-//! What an earlier process left behind.
+//! Continuation of what an earlier process left behind.
 
 use std::time::Instant;
 
 use lacuna::run::{Stop, files};
-use lacuna::work::{self, Order};
+use lacuna_run::work::{self, Order};
 
 use super::Campaign;
 use crate::executors::cluster::ledger::{Submission, Whereabouts};
 use crate::executors::cluster::{Cause, TaskState, look};
 
-/// A submission older than this is not on its way to the scheduler any more, in seconds.
+/// Age in seconds above which a submission is no longer on its way to the scheduler.
 const OLD: u64 = 600;
 
 impl Campaign<'_> {
-    /// Takes up what an earlier process left: finds the numbers that it could not write down, and closes what was
-    /// cancelled since, which is to be submitted anew.
+    /// Takes over from an earlier process: finds the job numbers that it could not record, and closes what has been
+    /// cancelled since, which is then submitted again.
     pub(super) fn adopt(&mut self) -> Result<(), Stop> {
         for submission in self.submissions.iter_mut().filter(|s| !s.is_over()) {
-            // What is not asked for has been handed over.
+            // Runs that this batch does not ask for have been reported already.
             submission.close(|run| !self.numbers.contains_key(run));
             if submission.is_withdrawn(self.batch.directory) {
                 self.withdrawn.insert(submission.number);
@@ -35,8 +35,8 @@ impl Campaign<'_> {
         self.close_cancelled()
     }
 
-    /// Asks for the numbers of submissions that have none. What the scheduler never heard of is closed, once it can be
-    /// on its way no more.
+    /// Queries the numbers of submissions that have none. A submission unknown to the scheduler is closed once it can
+    /// no longer be on its way.
     pub(super) fn find_numbers(&mut self) -> Result<(), Stop> {
         let (runs, patience) = (self.runs(), self.patience());
         for submission in self.submissions.iter_mut().filter(|s| !s.is_over() && s.job.is_none()) {
@@ -56,8 +56,8 @@ impl Campaign<'_> {
         Ok(())
     }
 
-    /// Ends the jobs of a run directory that was moved, since they look for it in the old place, and leaves alone those
-    /// of one that this was copied from.
+    /// Cancels the jobs of a run directory that was moved, since they use the old path, and leaves alone those of a
+    /// directory from which this one was copied.
     fn leave_what_is_elsewhere(&mut self) -> Result<(), Stop> {
         let runs = self.runs();
         let (scheduler, warn) = (self.scheduler, self.batch.warn);
@@ -67,12 +67,12 @@ impl Campaign<'_> {
                 Whereabouts::Same => continue,
                 Whereabouts::Moved => {
                     warn(&format!(
-                        "the run directory was moved: jobs that look for it in {place} are ended, and submitted anew"
+                        "the run directory was moved: the jobs that use {place} are cancelled and submitted again"
                     ));
                     look::end(scheduler, &[&*submission], runs)?;
                 }
                 Whereabouts::Copied => warn(&format!(
-                    "this run directory is a copy: jobs of {place} go on there, and are submitted here once more"
+                    "this run directory is a copy: the jobs of {place} continue, and their runs are submitted again from here"
                 )),
             }
             submission.close(|_| true);
@@ -91,7 +91,7 @@ impl Campaign<'_> {
             let is_withdrawn = self.withdrawn.contains(&submission.number);
             let is_cancelled = |task: usize| match states.get(&(submission.number, task)) {
                 Some(TaskState::Failed(Cause::Cancelled, _)) => true,
-                // Its jobs may need a moment to end.
+                // Cancelled jobs may need a moment to end.
                 state => is_withdrawn && !state.is_some_and(TaskState::is_open),
             };
             let gone: Vec<String> = submission
@@ -106,7 +106,7 @@ impl Campaign<'_> {
     }
 }
 
-/// Whether a task of a submission was ever run.
+/// Returns true if a task of a submission has ever run.
 fn left_traces(submission: &Submission, runs: &std::path::Path) -> bool {
     let folder = submission.folder(runs);
     (0..submission.tasks.len()).any(|task| folder.join(format!("task{task}.txt")).exists())

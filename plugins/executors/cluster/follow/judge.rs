@@ -1,4 +1,4 @@
-//! Why jobs wait, and why they have ended without a word of their runs.
+//! Reasons for which jobs wait, and causes of jobs that ended without results of their runs.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -6,30 +6,30 @@ use std::time::Instant;
 
 use lacuna::plugin::executor::Finished;
 use lacuna::run::Stop;
-use lacuna::work::Begun;
+use lacuna_run::work::Begun;
 
 use super::{Campaign, Hand};
 use crate::executors::cluster::ledger::{self, Settled, Submission};
 use crate::executors::cluster::{Cause, States, TaskState, script};
 use crate::models::process::tail_of_file;
 
-/// How many answers in a row a scheduler may owe.
+/// Number of consecutive queries that a scheduler may leave unanswered.
 const SILENCE: usize = 100;
 
-/// A task that has ended and left no word of some of its runs.
+/// A task that ended without a result of some of its runs.
 struct Ended {
     runs: Vec<String>,
-    /// Whether the task made other runs.
+    /// True if the task made other runs.
     made_others: bool,
     cause: Cause,
-    /// The job and its task.
+    /// Number of the job and index of the task.
     job: String,
-    /// The scheduler's words, and what was printed last.
+    /// Words of the scheduler, and the end of the printed output.
     words: String,
 }
 
 impl Campaign<'_> {
-    /// Asks the scheduler and judges the tasks that have ended without a word of their runs.
+    /// Queries the scheduler and settles the tasks that ended without results of their runs.
     pub(super) fn judge(&mut self, finished: Hand<'_>) -> Result<(), Stop> {
         let Some(states) = self.states()? else { return Ok(()) };
         self.tell_reasons(&states);
@@ -49,19 +49,19 @@ impl Campaign<'_> {
         if due.is_empty() {
             return Ok(());
         }
-        // Markers that arrived while the scheduler was asked.
+        // Markers may have arrived during the query.
         self.collect(finished)?;
         due.into_iter().try_for_each(|key| self.sentence(key, states.get(&key), finished))
     }
 
-    /// What the scheduler says of all that is open; `None` when it does not answer, or nothing is.
+    /// Returns the states of all open tasks; `None` if the scheduler does not answer or no task is open.
     fn states(&mut self) -> Result<Option<States>, Stop> {
         let asked = self.find_numbers().and_then(|()| {
             let open: Vec<&Submission> = self.submissions.iter().filter(|s| !s.is_over()).collect();
             if open.is_empty() { Ok(None) } else { self.scheduler.states(&open).map(Some) }
         });
         match asked {
-            // A scheduler that is being restarted is no reason to give up; nor is it one to submit anything again.
+            // A scheduler being restarted is neither a reason to give up nor one to submit anything again.
             Err(_) if self.silent < SILENCE => {
                 self.silent += 1;
                 Ok(None)
@@ -73,7 +73,7 @@ impl Campaign<'_> {
         }
     }
 
-    /// Tells each new reason for which jobs wait for more than their turn.
+    /// Reports each new reason for which jobs wait beyond their turn in the queue.
     fn tell_reasons(&mut self, states: &States) {
         let mut waiting: BTreeMap<&String, usize> = BTreeMap::new();
         for state in states.values() {
@@ -83,11 +83,11 @@ impl Campaign<'_> {
         }
         for (why, count) in waiting {
             let jobs = if count == 1 { "1 job waits" } else { &format!("{count} jobs wait") };
-            self.tell(why, || format!("{jobs} for more than a turn: {why}"));
+            self.tell(why, || format!("{jobs} for a reason other than the queue: {why}"));
         }
     }
 
-    /// Settles the runs of a task that has ended and left no word of them.
+    /// Settles the runs of a task that ended without a result of them.
     fn sentence(
         &mut self,
         (number, task): (usize, usize),
@@ -106,7 +106,7 @@ impl Campaign<'_> {
         let charged: Vec<String> = if self.withdrawn.contains(&number)
             || ended.cause == Cause::Timeout && ended.made_others
         {
-            // The runs are not at fault: somebody ended the jobs, or the time went to other runs of the pack.
+            // The runs are not at fault: the jobs were cancelled, or the time was spent on other runs of the pack.
             Vec::new()
         } else if begun.is_empty() || ended.cause.concerns_all() {
             ended.runs.clone()
@@ -123,14 +123,14 @@ impl Campaign<'_> {
         Ok(())
     }
 
-    /// Has a run submitted again, or hands it over as failed.
+    /// Submits a run again, or reports it as failed.
     fn charge(&mut self, run: &str, ended: &Ended, finished: Hand<'_>) -> Result<(), Stop> {
         let repeats = ledger::repeats(&self.submissions, run);
         let allowed = self.scheduler.rules().retry.after(ended.cause);
         let again = repeats.get(&ended.cause).copied().unwrap_or(0) < allowed;
         if ended.cause == Cause::Start && !(again && self.has_begun_any()) {
             let stop = Stop::new(ended.reason()).help(
-                "`modules`, `setup` and `program` in `[executor]` come before the first run: mend them and run the same \
+                "`modules`, `setup` and `program` in `[executor]` are used before the first run: correct them and run the same \
                  command again; no run is counted as failed",
             );
             return Err(self.give_up(stop));
@@ -151,12 +151,12 @@ impl Campaign<'_> {
         self.begun(run).is_some_and(|begun| begun.order == number.to_string())
     }
 
-    /// Whether any run was ever begun: then the jobs are sound, and it is a node that is not.
+    /// Returns true if any run has ever begun: then the jobs are set up correctly, and the fault lies with a node.
     fn has_begun_any(&self) -> bool {
         self.numbers.keys().any(|run| self.begun(run).is_some())
     }
 
-    /// What is noted of a run for which the same was asked.
+    /// Returns the start record of a run, if it belongs to the same inputs.
     fn begun(&self, run: &str) -> Option<Begun> {
         let index = *self.numbers.get(run)?;
         Begun::read(self.runs(), run).filter(|begun| begun.asked == self.asked[index])
@@ -189,8 +189,8 @@ impl Ended {
     }
 }
 
-/// Whether the end of what a job printed is Slurm's own word that it killed it for its memory: where that is watched and not
-/// limited, the state of the job is that of any failure.
+/// Returns true if the end of a job's output is Slurm's own message that it killed the job for its memory. If memory
+/// is monitored but not limited, the state of such a job is that of any failure.
 fn speaks_of_memory(said: &str) -> bool {
     said.lines().any(|line| {
         line.starts_with("slurmstepd")
@@ -198,7 +198,8 @@ fn speaks_of_memory(said: &str) -> bool {
     })
 }
 
-/// Why a task left no word of a run: the scheduler's word, or the exit code that its script wrote.
+/// Returns the cause for which a task left no result of a run, from the scheduler's state or the exit code that its
+/// script wrote.
 fn verdict(state: Option<&TaskState>, folder: &Path, task: usize) -> (Cause, String) {
     let code = script::exit_code(folder, task);
     match (state, code) {
@@ -209,12 +210,12 @@ fn verdict(state: Option<&TaskState>, folder: &Path, task: usize) -> (Cause, Str
         }
         (Some(TaskState::Failed(cause, words)), _) => (*cause, words.clone()),
         (None, Some(code @ (137 | 143))) => {
-            // A limit, somebody who cancelled it, a node that was shut down: only the scheduler knew.
+            // A limit, a cancellation or a node shut down: only the scheduler knew which.
             (Cause::Lost, format!("and it was ended by signal {}", code - 128))
         }
         (_, Some(code)) => (Cause::Failure, format!("exit code {code}")),
         (Some(TaskState::Ended), None) => {
-            (Cause::Failure, "it ended without a word of the run".to_owned())
+            (Cause::Failure, "it ended without a result or an exit code".to_owned())
         }
         _ => (Cause::Lost, "and it left no exit code".to_owned()),
     }

@@ -1,4 +1,4 @@
-//! From a batch to its results, through a scheduler.
+//! From a batch of runs to their results, through a scheduler.
 
 mod adopt;
 mod judge;
@@ -9,14 +9,14 @@ use std::time::{Duration, Instant};
 
 use lacuna::plugin::executor::{Batch, Finished};
 use lacuna::run::Stop;
-use lacuna::work::{Marker, Order, Outcome};
+use lacuna_run::work::{Marker, Order, Outcome};
 
 use super::ledger::{self, Settled, Submission};
 use super::{Cause, Scheduler, look, pack};
 
 type Hand<'h> = &'h mut dyn FnMut(Finished) -> Result<(), Stop>;
 
-/// Has the jobs of a batch run and hands each over as it ends. What was submitted before is not submitted again.
+/// Runs the jobs of a batch and reports each as it ends. Runs submitted earlier are not submitted again.
 pub fn follow(
     scheduler: &dyn Scheduler,
     batch: &Batch<'_>,
@@ -45,22 +45,22 @@ pub fn follow(
 struct Campaign<'a> {
     scheduler: &'a dyn Scheduler,
     batch: &'a Batch<'a>,
-    /// The hash of what is asked of each job.
+    /// Fingerprint of each job's inputs.
     asked: Vec<String>,
     numbers: BTreeMap<String, usize>,
     handed: Vec<bool>,
     submissions: Vec<Submission>,
-    /// The number of the next submission.
+    /// Number of the next submission.
     next: usize,
-    /// The submissions whose jobs were being ended when this process began.
+    /// Submissions whose jobs were being cancelled when this process began.
     withdrawn: BTreeSet<usize>,
-    /// When the scheduler was first asked in vain for the number of a submission.
+    /// Time of the first unsuccessful query for the number of a submission.
     unheard: BTreeMap<usize, Instant>,
-    /// When tasks were first seen to have ended, by submission and task.
+    /// Time at which tasks were first seen to have ended, by submission and task.
     ended: BTreeMap<(usize, usize), Instant>,
-    /// How many times in a row the scheduler did not answer.
+    /// Number of consecutive queries that the scheduler did not answer.
     silent: usize,
-    /// The reasons for waiting that were told.
+    /// Reasons for waiting that have been reported.
     told: BTreeSet<String>,
 }
 
@@ -93,7 +93,7 @@ impl<'a> Campaign<'a> {
         Duration::from_secs_f64(self.scheduler.rules().patience)
     }
 
-    /// Hands over the runs that have left a marker.
+    /// Reports the runs that have left a marker.
     fn collect(&mut self, finished: Hand<'_>) -> Result<(), Stop> {
         let marked = Marker::names(self.runs());
         for index in 0..self.handed.len() {
@@ -126,7 +126,8 @@ impl<'a> Campaign<'a> {
         Ok(())
     }
 
-    /// Whether a run whose model was killed for want of memory is submitted again. Its job goes on with others.
+    /// Submits a run again whose model was killed for lack of memory, if `retry` permits; returns true if it does.
+    /// The job continues with its other runs.
     fn gets_more_memory(&mut self, run: &str) -> Result<bool, Stop> {
         let cause = Cause::OutOfMemory;
         let is_open = self.submissions.iter().any(|s| s.open().any(|(_, open)| open == run));
@@ -140,7 +141,7 @@ impl<'a> Campaign<'a> {
         Ok(true)
     }
 
-    /// Takes back what is submitted when no run can have a result; the next attempt submits it anew.
+    /// Cancels what is submitted if no run can have a result; the next attempt submits it again.
     fn give_up(&self, why: Stop) -> Stop {
         let open: Vec<&Submission> =
             self.submissions.iter().filter(|s| !s.is_over() && s.job.is_some()).collect();
@@ -148,7 +149,7 @@ impl<'a> Campaign<'a> {
         let cleared = self.clear_hopeless(|_| true);
         match ended.and(cleared) {
             Ok(()) => why,
-            // What went wrong first explains more.
+            // The first error explains more.
             Err(also) => Stop {
                 message: format!("{}\nand its jobs could not be ended: {also}", why.message),
                 ..why
@@ -156,13 +157,14 @@ impl<'a> Campaign<'a> {
         }
     }
 
-    /// Sets aside the word of some runs that all runs are in vain: it has been told, or nobody waited for it.
+    /// Sets aside the markers of some runs that declare all runs hopeless: they have been reported, or no process
+    /// waited for them.
     fn clear_hopeless(&self, which: impl Fn(&str) -> bool) -> Result<(), Stop> {
         let mut of_ours = self.batch.jobs.iter().map(|job| &job.name).filter(|name| which(name));
         of_ours.try_for_each(|name| Marker::clear_hopeless(self.runs(), name))
     }
 
-    /// Notes how a run ended in the submission in which it is open.
+    /// Records how a run ended in the submission in which it is open.
     fn settle(&mut self, run: &str, how: Settled) -> Result<(), Stop> {
         let holds = |s: &&mut Submission| s.open().any(|(_, open)| open == run);
         if let Some(submission) = self.submissions.iter_mut().find(holds) {
@@ -184,17 +186,20 @@ impl<'a> Campaign<'a> {
         let (batch, next) = (self.batch, &mut self.next);
         let submitted = pack::submit(self.scheduler, batch, &free, &mut self.submissions, next);
         let Err(stop) = submitted else { return Ok(()) };
-        // A user may have no more than so many jobs: there is room when some have ended.
+        // The number of jobs per user may be limited: there is room again when some have ended.
         if self.submissions.iter().any(|s| !s.is_over() && s.job.is_some()) {
             self.tell("refused", || {
-                format!("not all runs are submitted yet, that is tried again: {}", stop.message)
+                format!(
+                    "not all runs are submitted yet; Lacuna tries again when jobs have ended: {}",
+                    stop.message
+                )
             });
             return Ok(());
         }
         Err(stop)
     }
 
-    /// Tells the user something, once.
+    /// Reports something to the user, once.
     fn tell(&mut self, what: &str, words: impl FnOnce() -> String) {
         if self.told.insert(what.to_owned()) {
             (self.batch.warn)(&words());

@@ -1,14 +1,14 @@
 #![allow(clippy::unwrap_used)]
-//! Campaigns with a scheduler whose answers are written here; real ones are asked in the tests of the whole.
+//! Campaigns with a scheduler whose answers are defined here; real schedulers are used in the tests of the workspace.
 
 use std::cell::{Cell, RefCell};
 use std::path::PathBuf;
 use std::sync::Mutex;
 
-use lacuna::contract::{LINE, Line};
 use lacuna::data::{Layout, Scenario};
 use lacuna::plugin::executor::{Job, Recipe};
-use lacuna::work::evaluate;
+use lacuna_contract::{LINE, Line};
+use lacuna_run::work::evaluate;
 
 use super::*;
 use crate::executors::cluster::scheduler::Rules;
@@ -16,15 +16,15 @@ use crate::executors::cluster::{Cause, Frame, Growth, Plan, Retry, States, TaskS
 
 type Answer<T> = Box<dyn Fn() -> Result<T, Stop>>;
 
-/// A scheduler of jobs that end as soon as they are handed over.
+/// A scheduler whose jobs end as soon as they are submitted.
 struct Stub {
-    /// What it answers to a submission.
+    /// Answer to a submission.
     submits: Answer<String>,
-    /// Whether jobs make their runs.
+    /// True if jobs make their runs.
     works: bool,
-    /// What it answers to a question for a name.
+    /// Answer to a query for a name.
     finds: Answer<Option<String>>,
-    /// The state of every task.
+    /// State of every task.
     state: Option<TaskState>,
     submitted: Cell<usize>,
     asked: Cell<usize>,
@@ -96,7 +96,7 @@ impl Scheduler for Stub {
     }
 }
 
-/// Makes the runs of an order as its jobs would.
+/// Makes the runs of an order in the same way as its jobs.
 fn make_all(folder: &Path, model: &dyn lacuna::plugin::Model) {
     let order = Order::read(folder).unwrap();
     let runs = folder.join(&order.runs).canonicalize().unwrap();
@@ -108,10 +108,10 @@ fn make_all(folder: &Path, model: &dyn lacuna::plugin::Model) {
     }
 }
 
-/// What became of three runs, the first of which begins so.
+/// Outcome of three runs, the first of which has this input.
 struct Ran {
     outcome: Result<(), Stop>,
-    /// Whether each run that was handed over has a result.
+    /// True for each reported run that has a result.
     handed: BTreeMap<usize, bool>,
     told: Vec<String>,
 }
@@ -193,7 +193,7 @@ fn a_scheduler_that_is_slower_than_its_command_is_given_time() {
 fn jobs_that_are_refused_are_forgotten() {
     let folder = tempfile::tempdir().unwrap();
     let mut stub = Stub::new(false);
-    // The words of the command itself are no sign that the answer was lost.
+    // Words of the command itself do not show that the answer was lost.
     let refusal = "`sbatch socket.sh` failed (exit code 1): invalid partition specified";
     stub.submits = Box::new(move || Err(Stop::new(refusal)));
     stub.finds = Box::new(|| Ok(None));
@@ -210,9 +210,9 @@ fn while_a_scheduler_does_not_answer_its_jobs_are_remembered() {
     (stub.submits, stub.finds) = (Box::new(timed_out), Box::new(timed_out));
     let first = ran(&stub, folder.path());
     let stop = first.outcome.unwrap_err();
-    assert!(stop.message.contains("may have the jobs or not"), "{stop}");
+    assert!(stop.message.contains("unknown whether the scheduler has the jobs"), "{stop}");
     assert!(submission(folder.path(), 1).exists());
-    // It answers again.
+    // The scheduler answers again.
     let again = Stub::new(true);
     let second = ran(&again, folder.path());
     assert_eq!((second.outcome, second.handed), (Ok(()), all_done()));
@@ -243,7 +243,7 @@ fn jobs_that_end_before_their_first_run_cost_no_run() {
     assert!(stop.help.unwrap().contains("`program`"));
     assert_eq!((first.handed.len(), stub.submitted.get()), (0, 1));
     assert_eq!(stub.cancelled.take(), ["7"]);
-    // What was mended is submitted anew.
+    // After the correction the runs are submitted again.
     let again = Stub::new(true);
     let second = ran(&again, folder.path());
     assert_eq!((second.outcome, second.handed), (Ok(()), all_done()));
@@ -255,7 +255,7 @@ fn a_reason_to_wait_for_ever_is_told_once() {
     let folder = tempfile::tempdir().unwrap();
     let mut stub = Stub::new(false);
     stub.state = Some(TaskState::Held("PENDING BadConstraints".to_owned()));
-    // Somebody makes the runs while they wait.
+    // Another process makes the runs while they wait.
     let place = folder.path().to_owned();
     let maker = std::thread::spawn(move || {
         std::thread::sleep(Duration::from_millis(300));
@@ -264,17 +264,17 @@ fn a_reason_to_wait_for_ever_is_told_once() {
     let ran = ran(&stub, folder.path());
     maker.join().unwrap();
     assert_eq!((ran.outcome, ran.handed), (Ok(()), all_done()));
-    assert_eq!(ran.told, ["3 jobs wait for more than a turn: PENDING BadConstraints"]);
+    assert_eq!(ran.told, ["3 jobs wait for a reason other than the queue: PENDING BadConstraints"]);
 }
 
 #[test]
 fn a_word_that_all_is_in_vain_is_not_kept() {
     let folder = tempfile::tempdir().unwrap();
-    // The input by which the model says so.
+    // The input for which the model declares all runs hopeless.
     let hopeless = -4.0;
     let first = ran_from(hopeless, &Stub::new(true), folder.path());
     assert!(first.outcome.unwrap_err().message.contains("no answer anywhere"));
-    // Another word of the same kind, from a job that ended later.
+    // Another marker of the same kind, from a job that ended later.
     make_all(&folder.path().join("campaign/1"), &Line {});
     let again = Stub::new(true);
     let second = ran_from(hopeless, &again, folder.path());
@@ -299,7 +299,7 @@ fn jobs_that_look_for_their_run_directory_in_the_old_place_are_submitted_anew() 
     assert_eq!((moved.outcome, moved.handed), (Ok(()), all_done()));
     assert!(moved.told[0].contains("was moved"), "{:?}", moved.told);
     assert_eq!((again.submitted.get(), again.cancelled.take()), (1, vec!["7".to_owned()]));
-    // A copy does not touch the jobs of what it was copied from.
+    // A copy does not touch the jobs of the original.
     std::fs::rename(&new, &old).unwrap();
     let of_copy = Stub::new(true);
     let copied = ran(&of_copy, &copy);

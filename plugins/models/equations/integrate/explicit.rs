@@ -1,19 +1,19 @@
-//! The explicit method: the pair of orders 5 and 4 of Tsitouras with its interpolation, states and sensitivities side by
-//! side.
+//! Explicit method: the pair of orders 5 and 4 of Tsitouras with its interpolation; states and sensitivities are
+//! integrated together.
 //!
-//! C. Tsitouras, Comput. Math. Appl. 62 (2011) 770, and the coefficients of the interpolation given there; the control of
-//! the steps is that of E. Hairer, S. Nørsett and G. Wanner, Solving Ordinary Differential Equations I, 2nd edition,
-//! Springer 1993, section II.4.
+//! C. Tsitouras, Comput. Math. Appl. 62 (2011) 770, with the coefficients of the interpolation given there; the step
+//! size control is that of E. Hairer, S. Nørsett and G. Wanner, Solving Ordinary Differential Equations I, 2nd
+//! edition, Springer 1993, section II.4.
 
 use super::stepper::Stepper;
 use crate::models::equations::flow::{Flow, Start};
 
 const STAGES: usize = 7;
 
-/// Where in a step the stages lie.
+/// Nodes `c` of the stages.
 const PLACES: [f64; STAGES] = [0.0, 0.161, 0.327, 0.9, 0.980_025_540_904_509_7, 1.0, 1.0];
 
-/// The shares of the earlier stages in each; those of the last one are the solution.
+/// Coefficients `a` of the earlier stages in each stage; those of the last one are the weights of the solution.
 #[rustfmt::skip]
 const SHARES: [[f64; STAGES - 1]; STAGES] = [
     [0.0; 6],
@@ -25,7 +25,7 @@ const SHARES: [[f64; STAGES - 1]; STAGES] = [
     [0.096_460_766_818_065_23, 0.01, 0.479_889_650_414_499_6, 1.379_008_574_103_742, -3.290_069_515_436_081, 2.324_710_524_099_774],
 ];
 
-/// The solution of order 5 less that of order 4.
+/// Weights of the solution of order 5 minus those of the solution of order 4.
 const ERRORS: [f64; STAGES] = [
     -0.001_780_011_052_225_777,
     -0.000_816_434_459_656_746_9,
@@ -36,7 +36,8 @@ const ERRORS: [f64; STAGES] = [
     0.015_151_515_151_515_152,
 ];
 
-/// The polynomial of each stage's share in the step up to a place, from the first power.
+/// Polynomials of the interpolation: the weight of each stage as a function of the position in the step, from the
+/// first power.
 const BETWEEN: [[f64; 4]; STAGES] = [
     [1.0, -2.763_706_197_274_826, 2.913_255_461_821_912_6, -1.053_088_497_729_021_6],
     [0.0, 0.131_7, -0.223_4, 0.101_7],
@@ -47,42 +48,42 @@ const BETWEEN: [[f64; 4]; STAGES] = [
     [0.0, 1.5, -4.0, 2.5],
 ];
 
-/// How much shorter or longer than the last a step may be.
+/// Smallest and largest ratio of the lengths of successive steps.
 const CHANGE: (f64, f64) = (0.2, 5.0);
 
-/// A step is this much shorter than the error allows.
+/// Safety factor on the step length that the error allows.
 const SAFETY: f64 = 0.9;
 
-/// The first step as a share of the way to the first stop, at most.
+/// Upper limit of the first step, relative to the distance to the first stop.
 const FIRST: f64 = 1e-3;
 
-/// A run by the explicit method.
+/// A run with the explicit method.
 pub struct Explicit<'r, 'f> {
     flow: &'r Flow<'f>,
     relative: f64,
-    /// The absolute tolerance of each state; those of its sensitivities are divided by the size of the input.
+    /// Absolute tolerance of each state; those of its sensitivities are divided by the size of the input.
     absolute: Vec<f64>,
-    /// The absolute tolerance as a share of the largest magnitude of a state up to now, where it follows it.
+    /// Absolute tolerance relative to the largest magnitude of a state so far; `None` if the tolerance is fixed.
     following: Option<f64>,
     sizes: Vec<f64>,
     time: f64,
     stop: f64,
-    /// The length of the next step, if no stop is nearer; zero before the first.
+    /// Length of the next step, unless a stop is nearer; zero before the first.
     length: f64,
-    /// Where the last step began, and its length.
+    /// Start and length of the last step.
     last: (f64, f64),
-    /// The states and behind them the sensitivities, channel by channel: now and at the begin of the last step.
+    /// States followed by the sensitivities, channel by channel: now, and at the start of the last step.
     now: Vec<f64>,
     before: Vec<f64>,
     trial: Vec<f64>,
     scratch: Vec<f64>,
-    /// The rates at the stages of the last step; the last is that at the present moment.
+    /// Rates at the stages of the last step; the last are those at the present time.
     rates: [Vec<f64>; STAGES],
 }
 
 impl<'r, 'f> Explicit<'r, 'f> {
-    /// At the start. Without absolute tolerances they are the share `following` of the magnitudes of the states, and
-    /// `floors` at least.
+    /// Starts a run. Without an absolute tolerance, the tolerances are the fraction `following` of the magnitudes of
+    /// the states, but at least `floors`.
     pub fn new(
         flow: &'r Flow<'f>,
         start: &Start,
@@ -118,7 +119,8 @@ impl<'r, 'f> Explicit<'r, 'f> {
         self.absolute.len()
     }
 
-    /// A step that is short against the way to the first stop and against the time in which a state changes.
+    /// Returns a first step that is short relative to the distance to the first stop and to the time in which a state
+    /// changes.
     fn first_length(&self) -> f64 {
         let count = self.count();
         let both = self.now[..count].iter().zip(&self.rates[STAGES - 1][..count]);
@@ -127,7 +129,7 @@ impl<'r, 'f> Explicit<'r, 'f> {
         times.fold(FIRST * (self.stop - self.time), f64::min)
     }
 
-    /// Fills the stages of a step of this length, and the values at its end into `trial`.
+    /// Computes the stages of a step of this length, and the values at its end in `trial`.
     fn stages(&mut self, length: f64) {
         for stage in 1..STAGES {
             let (done, rest) = self.rates.split_at_mut(stage);
@@ -139,7 +141,8 @@ impl<'r, 'f> Explicit<'r, 'f> {
         }
     }
 
-    /// The error of the trial in tolerances: the largest root mean square of the states and of those of each channel.
+    /// Returns the error of the trial step in units of the tolerance: the larger of the root mean squares over the
+    /// states and over the sensitivities of each channel.
     fn error(&mut self, length: f64) -> f64 {
         let count = self.count();
         self.scratch.fill(0.0);
@@ -172,15 +175,16 @@ impl<'r, 'f> Explicit<'r, 'f> {
     }
 }
 
-/// Adds a multiple of some numbers to others.
+/// Adds `factor * numbers` to `to`, element by element.
 fn add(factor: f64, numbers: &[f64], to: &mut [f64]) {
     to.iter_mut().zip(numbers).for_each(|(to, number)| *to += factor * number);
 }
 
-/// How much longer the next step may be after this error, in tolerances.
+/// Returns the ratio of the next step to the last for this error, in units of the tolerance.
 fn change(error: f64) -> f64 {
     let (least, most) = CHANGE;
-    // The fifth power of what allows the longest step: nearly all errors are below it where stops are dense.
+    // Below the fifth power of the bound the limit applies anyway; this saves the power, because nearly all errors
+    // are so small if stops are dense.
     if error < (SAFETY / most).powi(5) {
         return most;
     }
@@ -195,7 +199,7 @@ impl Stepper for Explicit<'_, '_> {
         self.rates.swap(0, STAGES - 1);
         loop {
             let rest = self.stop - self.time;
-            // A little further rather than a crumb that is left over.
+            // Rather a slightly longer step than a tiny one to the stop.
             let stops = 1.01 * self.length >= rest;
             let length = if stops { rest } else { self.length };
             let end = if stops { self.stop } else { self.time + length };
@@ -213,7 +217,7 @@ impl Stepper for Explicit<'_, '_> {
                 std::mem::swap(&mut self.now, &mut self.trial);
                 self.last = (self.time, length);
                 self.time = end;
-                // That a stop was near says nothing against the length that was planned.
+                // A step shortened by a stop does not shorten the next one.
                 self.length = (change * length).max(if stops { self.length } else { 0.0 });
                 return Ok(stops);
             }

@@ -1,20 +1,20 @@
-//! Sensitivities where rates jump.
+//! Sensitivities at jumps of the rates.
 //!
-//! At a moment `t*(p)` at which the rates change from `f⁻` to `f⁺` the states are continuous and their
-//! derivatives by an input `p` are not: `s⁺ = s⁻ + (f⁻ - f⁺) dt*/dp`. With `q(t, y, p)` the quantity that reaches its
-//! value there, `dt*/dp = -(q_y s⁻ + q_p) / (q_t + q_y f⁻)`. E. Rozenwasser and R. Yusupov, Sensitivity of Automatic
-//! Control Systems, CRC 2000, chapter 2.
+//! At a time `t*(p)` at which the rates change from `f⁻` to `f⁺` the states are continuous, but their derivatives
+//! with respect to an input `p` are not: `s⁺ = s⁻ + (f⁻ - f⁺) dt*/dp`. With `q(t, y, p)` the quantity that reaches
+//! its value there, `dt*/dp = -(q_y s⁻ + q_p) / (q_t + q_y f⁻)`. E. Rozenwasser and R. Yusupov, Sensitivity of
+//! Automatic Control Systems, CRC 2000, chapter 2.
 
 use super::stepper::Stepper;
 use crate::models::equations::flow::{Flow, Quantity, Start};
 use crate::models::equations::stops::depends_on_states;
 
-/// The jumps of a system.
+/// Jumps of a system.
 pub struct Jumps<'r, 'f> {
     flow: &'r Flow<'f>,
-    /// Those that happen at certain states, with the side on which the run is.
+    /// Jumps at certain states, with the side on which the run is.
     by_states: Vec<Watched<'f>>,
-    /// The moment and the states before the last step.
+    /// Time and states before the last step.
     before: (f64, Vec<f64>),
 }
 
@@ -28,7 +28,7 @@ struct Watched<'f> {
 impl<'r, 'f> Jumps<'r, 'f> {
     pub fn new(flow: &'r Flow<'f>, start: &Start) -> Self {
         let mut by_states = Vec::new();
-        // Values alone need no correction: the steps get short at the jump.
+        // Without sensitivities no correction is needed: the step size control resolves the jump.
         let breaks = flow.system.breaks.iter().enumerate().filter(|_| flow.channels() > 0);
         for (index, broken) in breaks.filter(|(_, b)| b.jumps && depends_on_states(b, flow)) {
             let (mut quantity, value) = (Quantity::new(&broken.quantity), broken.at[0]);
@@ -38,7 +38,7 @@ impl<'r, 'f> Jumps<'r, 'f> {
         Self { flow, by_states, before: (start.time, start.states.clone()) }
     }
 
-    /// Corrects the sensitivities where the last step has crossed a jump.
+    /// Corrects the sensitivities if the last step has crossed a jump.
     pub fn look(&mut self, stepper: &mut dyn Stepper) {
         if self.by_states.is_empty() {
             return;
@@ -62,14 +62,14 @@ impl<'r, 'f> Jumps<'r, 'f> {
         }
     }
 
-    /// Goes on behind a jump that the run has reached.
+    /// Continues after a jump that the run has reached.
     pub fn cross(&mut self, stepper: &mut dyn Stepper, after: f64, index: usize) {
         let mut rates = vec![0.0; stepper.states().len()];
         self.flow.rates(stepper.time(), stepper.states(), &mut rates);
         self.correct(stepper, after, index, &rates);
     }
 
-    /// Corrects the sensitivities for a jump from these rates, and goes on at `after`.
+    /// Corrects the sensitivities for a jump from `old_rates`, and continues at `after`.
     fn correct(&self, stepper: &mut dyn Stepper, after: f64, index: usize, old_rates: &[f64]) {
         let (flow, now) = (self.flow, stepper.time());
         let states = stepper.states().to_vec();

@@ -1,4 +1,4 @@
-//! From stop to stop to the last time.
+//! Integration from stop to stop up to the last time.
 
 use nalgebra::{DMatrix, Schur};
 
@@ -9,34 +9,34 @@ use crate::models::equations::flow::{Flow, Start, describe};
 use crate::models::equations::options::Solver;
 use crate::models::equations::stops::Stop;
 
-/// Accepted steps between two looks at the stiffness.
+/// Number of accepted steps between two tests for stiffness.
 const LOOK: usize = 25;
 
-/// The product of a step and the fastest decay above which stability and not accuracy limits an explicit step; the
-/// limit of the method itself is near 3.5.
+/// Product of the step and the fastest decay rate above which stability, and not accuracy, limits an explicit step;
+/// the stability limit of the method itself is near 3.5.
 const STIFF: f64 = 2.0;
 
-/// How many looks in a row must find a system stiff.
+/// Number of consecutive tests that must find a system stiff.
 const LOOKS: usize = 3;
 
-/// Sweeps after which the search for eigenvalues is given up.
+/// Maximum number of sweeps of the search for eigenvalues.
 const SWEEPS: usize = 1000;
 
-/// A run on its way.
+/// A run in progress.
 pub struct March<'r, 'f> {
     flow: &'r Flow<'f>,
     solver: &'r Solver,
     times: &'r [f64],
-    /// Whether to give up where the system is stiff.
+    /// True if the run ends when the system is stiff.
     watched: bool,
     jumps: Jumps<'r, 'f>,
     states: Vec<f64>,
     sensitivities: Vec<f64>,
-    /// The first of the times that has not been reached.
+    /// Index of the first time that has not been reached.
     next: usize,
     steps: usize,
     stiff: usize,
-    /// The largest magnitude of each state.
+    /// Largest magnitude of each state.
     pub peaks: Vec<f64>,
 }
 
@@ -63,7 +63,7 @@ impl<'r, 'f> March<'r, 'f> {
         }
     }
 
-    /// Runs to the last time; the number of steps.
+    /// Integrates to the last time; returns the number of steps.
     pub fn run(
         &mut self,
         stepper: &mut dyn Stepper,
@@ -92,7 +92,7 @@ impl<'r, 'f> March<'r, 'f> {
         Ok(self.steps)
     }
 
-    /// Gives away all times up to this one; what lies a rounding behind the present is given as the present.
+    /// Passes on all times up to `until`; a time beyond the present by rounding is given the present values.
     fn emit(
         &mut self,
         until: f64,
@@ -109,7 +109,7 @@ impl<'r, 'f> March<'r, 'f> {
         Ok(())
     }
 
-    /// One step; whether it ends at the stop.
+    /// Makes one step; returns true if it ends at the stop.
     fn step(&mut self, stepper: &mut dyn Stepper) -> Result<bool, String> {
         let before = stepper.time();
         let stopped = stepper.step().map_err(|reason| self.failed(stepper, &reason))?;
@@ -118,7 +118,7 @@ impl<'r, 'f> March<'r, 'f> {
             *peak = peak.max(y.abs());
         }
         if stepper.states().iter().any(|y| !y.is_finite()) {
-            return Err(self.failed(stepper, "a state has left the range of numbers"));
+            return Err(self.failed(stepper, "a state is not finite"));
         }
         if !stopped && stepper.time() <= before {
             return Err(self.failed(stepper, "no step is short enough for the tolerance"));
@@ -146,7 +146,7 @@ impl<'r, 'f> March<'r, 'f> {
         }
     }
 
-    /// Whether the last looks have all found that decay limits the steps.
+    /// Returns true if the last tests have all found that decay limits the steps.
     fn is_stiff(&mut self, stepper: &dyn Stepper) -> bool {
         let n = stepper.states().len();
         let mut jacobian = DMatrix::zeros(n, n);

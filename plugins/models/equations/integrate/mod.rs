@@ -1,16 +1,16 @@
-//! Integration of the states: explicit steps of our own, implicit ones by diffsol.
+//! Integration of the states: explicit steps implemented here, implicit ones by diffsol.
 //!
 //! C. Tsitouras, Comput. Math. Appl. 62 (2011) 770; G. Byrne and A. Hindmarsh, ACM Trans. Math. Softw. 1 (1975) 71;
-//! L. Shampine and M. Reichelt, SIAM J. Sci. Comput. 18 (1997) 1; J. Jørgensen, M. Kristensen and P. Thomsen,
-//! arXiv 1803.01613 (2018). Of stiffness: E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, 2nd
-//! edition, Springer 1996, section IV.2.
+//! L. Shampine and M. Reichelt, SIAM J. Sci. Comput. 18 (1997) 1; J. Jørgensen, M. Kristensen and P. Thomsen, arXiv
+//! 1803.01613 (2018). On stiffness: E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, 2nd edition,
+//! Springer 1996, section IV.2.
 
 mod explicit;
 mod jumps;
 mod march;
 mod stepper;
 
-use lacuna::study::values::Positive;
+use lacuna::text::values::Positive;
 
 use super::flow::{Flow, Start};
 use super::options::{Method, Solver};
@@ -19,32 +19,32 @@ use explicit::Explicit;
 use march::March;
 use stepper::with_stepper;
 
-/// How many breaks of the rates make a method dear that starts anew at each.
+/// Number of discontinuities above which a method that restarts at each of them is too expensive.
 const MANY_BREAKS: usize = 50;
 
-/// The absolute tolerance as a share of the relative one times the largest magnitude of the state.
+/// Absolute tolerance divided by the relative one and the largest magnitude of the state.
 const SHARE: f64 = 0.01;
 
-/// The magnitude that a state at rest is first thought to reach.
+/// Assumed magnitude of a state that starts at zero.
 const SMALL: f64 = 1e-6;
 
-/// An absolute tolerance may be this many times too large for its state before the run is repeated.
+/// Factor by which an absolute tolerance may be too large for its state before the run is repeated.
 const TOO_LARGE: f64 = 3.0;
 
-/// Takes the states and sensitivities (channel by channel) at each of the times asked for, by the time's index; after
-/// a run that is repeated once more.
+/// Receiver of the states and sensitivities (channel by channel) at each requested time, by the index of the time;
+/// after a repeated run it is called again for all times.
 pub type Sink<'k> = dyn FnMut(usize, &[f64], &[f64]) + 'k;
 
-/// What a run cost.
+/// Cost of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Effort {
-    /// The method that came to the end.
+    /// Method that completed the run.
     pub method: Method,
-    /// Its steps.
+    /// Number of steps.
     pub steps: usize,
 }
 
-/// Integrates over the times, which ascend.
+/// Integrates over ascending times. Fails with a description if the integration cannot reach the last one.
 pub fn integrate(
     flow: &Flow<'_>,
     solver: &Solver,
@@ -68,7 +68,7 @@ pub fn integrate(
     }
 }
 
-/// A run by one or more attempts.
+/// A run of one or more attempts.
 struct Run<'r, 'f, 'k> {
     flow: &'r Flow<'f>,
     solver: &'r Solver,
@@ -79,7 +79,8 @@ struct Run<'r, 'f, 'k> {
 }
 
 impl Run<'_, '_, '_> {
-    /// Runs, by an implicit method again where an absolute tolerance has proved too large for its state.
+    /// Integrates with one method; an implicit one repeats the run if an absolute tolerance has proved too large for
+    /// its state.
     fn with_tolerances(&mut self, method: Method) -> Result<Effort, String> {
         let relative = self.solver.relative_tolerance.get();
         let share = SHARE * relative;
@@ -101,10 +102,11 @@ impl Run<'_, '_, '_> {
         if repeat { Ok(self.once(method, &tolerances)?.0) } else { Ok(effort) }
     }
 
-    /// A run by the explicit method, whose absolute tolerances follow the states on their way.
+    /// Integrates with the explicit method, whose absolute tolerances follow the states during the run.
     ///
-    /// A state at rest has no magnitude: however short the step, the error of what first grows from zero is as large
-    /// as that itself. Such states begin with a tolerance for a small magnitude, and again where that proved too large.
+    /// A state at zero has no magnitude: however short the step, the error of a state that starts to grow from zero
+    /// is as large as the state. Such states start with a tolerance for a small magnitude; the run is repeated if
+    /// that proved too large.
     fn explicit(&mut self, relative: f64, share: f64) -> Result<Effort, String> {
         let at_rest = |y: &f64| if *y == 0.0 { share * SMALL } else { 0.0 };
         let mut floors: Vec<f64> = self.start.states.iter().map(at_rest).collect();
@@ -117,7 +119,7 @@ impl Run<'_, '_, '_> {
         if repeat { Ok(self.following(relative, share, &floors)?.0) } else { Ok(effort) }
     }
 
-    /// One run by the explicit method; also the largest magnitude of each state.
+    /// Makes one run with the explicit method; returns also the largest magnitude of each state.
     fn following(
         &mut self,
         relative: f64,
@@ -133,7 +135,7 @@ impl Run<'_, '_, '_> {
         Ok((Effort { method: Method::RungeKutta, steps }, march.peaks))
     }
 
-    /// One run by an implicit method; also the largest magnitude of each state.
+    /// Makes one run with an implicit method; returns also the largest magnitude of each state.
     fn once(&mut self, method: Method, absolute: &[f64]) -> Result<(Effort, Vec<f64>), String> {
         let (flow, start, sink) = (self.flow, &self.start, &mut *self.sink);
         with_stepper(flow, start, self.solver, method, absolute, |stepper| {

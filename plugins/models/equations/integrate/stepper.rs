@@ -1,4 +1,4 @@
-//! Implicit steps by diffsol: the one module that calls it.
+//! Implicit steps by diffsol, which only this module calls.
 
 use std::marker::PhantomData;
 
@@ -13,31 +13,31 @@ use crate::models::equations::options::{Method, Solver};
 
 type Linear = NalgebraLU<f64>;
 
-/// How far the sensitivities of an implicit step are solved, as a share of their tolerance.
+/// Accuracy to which the sensitivities of an implicit step are solved, relative to their tolerance.
 const SENSITIVITY_SOLVE: f64 = 0.02;
 
-/// A method of integration on its way.
+/// An integration method in progress.
 pub trait Stepper {
-    /// One step; whether it ends at the stop.
+    /// Makes one step; returns true if it ends at the stop.
     fn step(&mut self) -> Result<bool, String>;
-    /// Sets the next stop; false where that is the present moment.
+    /// Sets the next stop; returns false if it is the present time.
     fn stop_at(&mut self, time: f64) -> bool;
-    /// The present moment.
+    /// Returns the present time.
     fn time(&self) -> f64;
-    /// The length of the next step.
+    /// Returns the length of the next step.
     fn length(&self) -> f64;
-    /// The states now.
+    /// Returns the present states.
     fn states(&self) -> &[f64];
-    /// The sensitivities now, channel by channel.
+    /// Writes the present sensitivities, channel by channel.
     fn sensitivities(&self, out: &mut [f64]);
-    /// The states and sensitivities at a time in the last step.
+    /// Writes the states and sensitivities at a time within the last step.
     fn interpolate(
         &mut self,
         time: f64,
         states: &mut [f64],
         sensitivities: &mut [f64],
     ) -> Result<(), String>;
-    /// Goes on from a moment with the present states, these rates, sensitivities and rates of sensitivities.
+    /// Continues from a time with the present states and these rates, sensitivities and rates of sensitivities.
     fn go_on(&mut self, time: f64, rates: &[f64], sensitivities: &[f64], their_rates: &[f64]);
 }
 
@@ -57,7 +57,7 @@ impl<E> Equations for E where
 {
 }
 
-/// Hands a stepper at the start to what makes use of it.
+/// Builds a stepper at the start and passes it to `make_use`.
 pub fn with_stepper<R>(
     flow: &Flow<'_>,
     start: &Start,
@@ -112,7 +112,7 @@ fn choose<E: Equations, R>(
     }
 }
 
-/// A solver of diffsol as a stepper.
+/// A diffsol solver as a stepper.
 struct Steps<'p, E: Equations + 'p, S: OdeSolverMethod<'p, E>> {
     solver: S,
     states: NalgebraVec<f64>,
@@ -189,7 +189,7 @@ fn spread(vector: &NalgebraVec<f64>, length: usize, out: &mut [f64]) {
     }
 }
 
-/// What went wrong, in the words of the field.
+/// Describes an error of diffsol.
 fn words(error: DiffsolError) -> String {
     match error {
         DiffsolError::OdeSolverError(
@@ -198,7 +198,7 @@ fn words(error: DiffsolError) -> String {
         ) => "no step is short enough for the tolerance".to_owned(),
         DiffsolError::OdeSolverError(OdeSolverError::TooManyNonlinearSolverFailures { .. })
         | DiffsolError::NonLinearSolverError(_) => {
-            "the equations of an implicit step have not been solved".to_owned()
+            "the equations of an implicit step could not be solved".to_owned()
         }
         other => other.to_string(),
     }

@@ -1,8 +1,8 @@
-//! Rates that break: tables, conditions of time, conditions of states.
+//! Discontinuous rates: tables, conditions of time, conditions of states.
 
 use super::*;
 
-/// `x'' + ω² x = F(t)` with straight pieces: on each, `x = p + q τ + A cos ωτ + B sin ωτ`.
+/// `x'' + ω² x = F(t)` with piecewise linear force: on each piece, `x = p + q τ + A cos ωτ + B sin ωτ`.
 fn forced(omega: f64, at: &[f64], force: &[f64], times: &[f64]) -> Vec<f64> {
     let (mut x, mut v) = (0.0, 0.0);
     let w2 = omega * omega;
@@ -33,7 +33,7 @@ observe = "x"
 
 #[test]
 fn a_table_of_few_points() {
-    // A blow of 2 ms in ten seconds of rest is not to be missed.
+    // A pulse of 2 ms in ten seconds of rest must not be missed.
     let (at, force) = ([0.0, 6.0, 6.001, 6.002, 10.0], [0.0, 0.0, 500.0, 0.0, 0.0]);
     let times = times(10.0, 25);
     for method in ["auto", "bdf", "esdirk"] {
@@ -47,7 +47,7 @@ fn a_table_of_few_points() {
 #[test]
 fn a_table_and_a_record_of_a_hundred_thousand_points() {
     let at: Vec<f64> = (0..=100_000).map(|i| 1e-3 * f64::from(i)).collect();
-    // A chirp with noise of a fixed pattern.
+    // A chirp with noise in a fixed pattern.
     let noise = |i: usize| ((i * 7919) % 1000) as f64 / 1000.0 - 0.5;
     let chirp = |(i, t): (usize, &f64)| (0.05 * t * t).sin() + 0.3 * noise(i);
     let force: Vec<f64> = at.iter().enumerate().map(chirp).collect();
@@ -58,7 +58,7 @@ fn a_table_and_a_record_of_a_hundred_thousand_points() {
     close(&case.jacobian(&[2.0]).column(0), &exact, 1e-5, "the derivative");
 }
 
-/// A push of unknown size, begin and length on a body with friction `v' = a - v`.
+/// A push of unknown size, start and duration on a body with friction, `v' = a - v`.
 #[test]
 fn a_push_of_unknown_length() {
     let options = r#"
@@ -75,7 +75,7 @@ fn a_push_of_unknown_length() {
         };
         times.iter().map(at).collect()
     };
-    // The second push is much shorter than the distance of the points, the third begins at one of them.
+    // The second push is much shorter than the spacing of the points; the third starts at one of them.
     for inputs in [[3.0, 1.3, 4.0], [3.0, 7.123, 0.005], [3.0, 1.52, 2.0]] {
         case.is(&inputs, form, 1e-7, 1e-6);
     }
@@ -83,7 +83,8 @@ fn a_push_of_unknown_length() {
     close(&case.values(&[3.0, 1.5, 2.0]), &at_a_point, 1e-7, "the values");
 }
 
-/// `y' = 1` up to `y = c`, `y' = 3` beyond: the derivative by `c` comes from the moment of the change alone.
+/// `y' = 1` up to `y = c`, `y' = 3` beyond: the derivative with respect to `c` comes only from the time of the
+/// change.
 #[test]
 fn rates_that_jump_at_a_state() {
     for method in ["auto", "bdf", "esdirk"] {

@@ -89,7 +89,7 @@ fn predators_and_prey_keep_their_invariant() {
     case.is(&[a, x0], |p| vec![invariant(p); 500], 1e-6, 3e-5);
 }
 
-/// A start that is given by an input: a decay is the same later, its rates those of the time that has passed.
+/// With the start time as an input: a decay is the same later, and its rates are those of the elapsed time.
 #[test]
 fn the_start_may_be_unknown() {
     let options = r#"
@@ -109,7 +109,7 @@ fn the_start_may_be_unknown() {
     assert_eq!(late, "the first t, 0.5, is before the start t, 0.8");
 }
 
-/// Formulas without states, on two axes of numbers, the labels between them.
+/// Formulas without states, on two numeric axes with the labels between them.
 #[test]
 fn formulas() {
     let built = from_text::<dyn Model>(

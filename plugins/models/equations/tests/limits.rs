@@ -1,4 +1,4 @@
-//! Where equations have no answer, scales, and what is the same each time.
+//! Cases without an answer, scales, and reproducibility.
 
 use super::*;
 
@@ -51,7 +51,7 @@ fn steps_that_are_not_enough() {
     assert!(reason.ends_with(": 500 steps are not enough"), "{reason}");
 }
 
-/// The rate changes its sign at `y = 0` and holds the state there: no function of time solves this.
+/// The rate changes sign at `y = 0` and holds the state there: no function of time solves this.
 #[test]
 fn a_rate_that_switches_without_end() {
     let options = r#"
@@ -65,7 +65,7 @@ fn a_rate_that_switches_without_end() {
     assert!(reason.starts_with("the integration stopped at t = 1"), "{reason}");
 }
 
-/// A decay in times and states of any size: tolerances follow the states.
+/// A decay with times and states of any size: tolerances follow the states.
 #[test]
 fn any_scale() {
     let options = "state = { y = 0.0 }\nrate = { y = \"source - y / tau\" }\nobserve = \"y\"";
@@ -84,8 +84,8 @@ fn any_scale() {
     }
 }
 
-/// From rest, the last of a chain of integrators grows with the fifth power of the time, `t^5 / 120`: at first no step is
-/// short enough for an error that is small against it. Its scale is known to nobody.
+/// From rest, the last of a chain of integrators grows with the fifth power of the time, `t^5 / 120`: at first no
+/// step is short enough for an error that is small relative to it, and its scale is unknown.
 #[test]
 fn what_begins_at_rest() {
     for scale in [1e-12, 1.0, 1e12] {

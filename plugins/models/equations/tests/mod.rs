@@ -9,10 +9,10 @@ mod stiff;
 use std::sync::Arc;
 
 use lacuna::data::{Axis, Function, Layout, Scenario, Unit};
-use lacuna::linalg::Matrix;
 use lacuna::plugin::Model;
 use lacuna::plugin::model::{Call, EvalError};
 use lacuna::plugin::registry::from_text;
+use lacuna_linalg::Matrix;
 
 /// A model with the layout and the conditions of its runs.
 struct Case {
@@ -26,7 +26,7 @@ fn unit(text: &str) -> Unit {
     Unit::parse(text).unwrap()
 }
 
-/// Equations in these inputs, observed at these times `t`, at the labels where there are any.
+/// Equations in these inputs, observed at these times `t` and at the labels, if any.
 fn case(options: &str, inputs: &[&str], labels: &[&str], times: &[f64]) -> Case {
     let built = from_text::<dyn Model>("equations", options).unwrap_or_else(|e| panic!("{e}"));
     let mut axes = vec![Axis::grid("t", times.to_vec(), unit("s"))];
@@ -42,7 +42,7 @@ fn case(options: &str, inputs: &[&str], labels: &[&str], times: &[f64]) -> Case 
 }
 
 impl Case {
-    /// The same with a table over time.
+    /// Returns the case with a table over time.
     fn with_table(mut self, name: &str, at: Vec<f64>, values: Vec<f64>) -> Self {
         let (at_unit, unit) = (unit("s"), unit("N"));
         let function = Function { name: name.into(), at, at_unit, values, unit };
@@ -70,8 +70,8 @@ impl Case {
         gradient.jacobian(&self.call(inputs)).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    /// Demands the values and derivatives of a closed form at every place, of which `form(inputs)` gives all; errors
-    /// as shares of the largest value or slope of a column.
+    /// Asserts values and derivatives against a closed form, `form(inputs)`, that gives all of them; errors are
+    /// relative to the largest value or slope of a column.
     fn is(&self, inputs: &[f64], form: impl Fn(&[f64]) -> Vec<f64>, values: f64, slopes: f64) {
         close(&self.values(inputs), &form(inputs), values, "the values");
         let jacobian = self.jacobian(inputs);

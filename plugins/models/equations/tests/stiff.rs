@@ -19,7 +19,7 @@ fn robertson() {
         let options = format!("{ROBERTSON}solver = {solver}");
         let case = case(&options, &["k1", "k3", "k2"], &LABELS, &[40.0, 1e11]);
         let values = case.values(&rates);
-        // At 40 by Radau IIA of order 5 at a tolerance of 1e-12.
+        // At 40 by Radau IIA of order 5 with a tolerance of 1e-12.
         let expected = [
             0.715_827_068_719_4,
             2.083_340_149_701_255e-8,
@@ -34,7 +34,7 @@ fn robertson() {
     }
 }
 
-/// In `r = k1 t` nothing else changes when all constants and the time are scaled: `Σ k ∂y/∂k = t y'`.
+/// With `r = k1 t` the solution is unchanged if all constants and the inverse time are scaled: `Σ k ∂y/∂k = t y'`.
 #[test]
 fn robertson_scales() {
     let case = case(ROBERTSON, &["k1", "k3", "k2"], &LABELS, &[0.4, 40.0, 4e3]);
@@ -44,7 +44,7 @@ fn robertson_scales() {
         let (a, b, c) = (values[i], values[3 + i], values[6 + i]);
         let slow = -rates[0] * a + rates[1] * b * c;
         let formed = rates[2] * b * b;
-        // The rate of `b` is a difference of two that are nearly equal: no measure.
+        // The rate of `b` is a difference of two nearly equal numbers, and not a suitable reference.
         for (k, expected) in [(0, t * slow), (2, t * formed)] {
             let row = jacobian.row(3 * k + i);
             let found: f64 = row.iter().zip(rates).map(|(slope, rate)| slope * rate).sum();
@@ -76,8 +76,8 @@ fn van_der_pol() {
     assert_eq!(facts[0].value, "bdf", "{facts:?}");
 }
 
-/// `y' = -λ (y - cos t) - sin t`, `y(0) = 1`, is `cos t` for every λ: A. Prothero and A. Robinson, Math. Comp. 28 (1974)
-/// 145. The derivative by λ is zero, that by the start `exp(-λ t)`.
+/// `y' = -λ (y - cos t) - sin t`, `y(0) = 1`, is `cos t` for every λ: A. Prothero and A. Robinson, Math. Comp. 28
+/// (1974) 145. The derivative with respect to λ is zero, that with respect to the start `exp(-λ t)`.
 #[test]
 fn prothero_and_robinson() {
     let options = r#"

@@ -1,10 +1,9 @@
-//! Runs that go wrong: the exact reason, and nothing that runs on.
+//! Failing runs: the exact reason, and no process left running.
 
 use std::time::{Duration, Instant};
 
-use crate::readers::sierra::write::{History, Origin, write_history};
-
 use super::{Case, LINE};
+use crate::readers::sierra::write::{History, Origin, write_history};
 
 #[test]
 fn a_command_that_hangs_is_stopped_with_all_it_started() {
@@ -22,7 +21,7 @@ fn a_command_that_hangs_is_stopped_with_all_it_started() {
         };
         processes.filter(ours).count()
     };
-    // A busy machine takes a moment to end a process that was killed.
+    // A busy machine needs a moment to end a killed process.
     while running() > 0 && begun.elapsed() < Duration::from_secs(10) {
         std::thread::sleep(Duration::from_millis(20));
     }

@@ -28,7 +28,7 @@ impl Case {
         Self { model: built.plugin, study: tempfile::tempdir().unwrap(), layout }
     }
 
-    /// A model that runs a script of the shell and reads `y.csv`.
+    /// A model that runs a shell script and reads `y.csv`.
     fn shell(script: &str, more: &str) -> Self {
         let output = "{ use = \"csv\", path = \"y.csv\" }";
         Self::new(&format!("command = [\"sh\", \"-c\", '''{script}''']\noutput = {output}\n{more}"))
@@ -58,12 +58,12 @@ impl Case {
         self.model.predict(&call).map(|response| response.values)
     }
 
-    /// A run `run7` of which the folder may stay.
+    /// Makes a run `run7` whose folder may stay.
     fn run(&self) -> Result<Vec<f64>, EvalError> {
         self.ask(&[2.0, 0.5], Some(&self.study.path().join("runs/run7")))
     }
 
-    /// Why the run fails.
+    /// Returns the reason for which the run fails.
     fn reason(&self) -> String {
         match self.run() {
             Err(EvalError::Rejected(reason)) => reason,
@@ -72,7 +72,7 @@ impl Case {
     }
 }
 
-/// Lines of the shell that write `y.csv` with `a t + b`.
+/// Shell lines that write `y.csv` with `a t + b`.
 const LINE: &str = "\
 printf 'time,y\\n' > y.csv
 for t in 1 2 3; do

@@ -1,4 +1,4 @@
-//! Runs that go well.
+//! Successful runs.
 
 use lacuna::plugin::model::EvalError;
 
@@ -15,7 +15,7 @@ fn a_command_is_run_through_templates_and_a_reader() {
     assert_eq!(case.read("runs/run7/stdout.txt"), "done run7\n");
     assert_eq!(case.read("runs/run7/stderr.txt"), "");
     assert!(case.read("runs/run7/deck.sh").contains("2.0 * $t + 0.5"));
-    // Nothing of an evaluation without a folder is kept.
+    // An evaluation without a folder leaves no files.
     let before = std::fs::read_dir(case.study.path()).unwrap().count();
     assert_eq!(case.ask(&[1.0, 0.0], None).unwrap(), [1.0, 2.0, 3.0]);
     assert_eq!(std::fs::read_dir(case.study.path()).unwrap().count(), before);
@@ -24,7 +24,7 @@ fn a_command_is_run_through_templates_and_a_reader() {
 #[test]
 fn inputs_reach_a_command_as_json() {
     let case = Case::new("command = [\"cat\"]\ninput = \"json\"\noutput = \"json\"");
-    // `cat` gives back what it was asked, which is no response.
+    // `cat` returns its input, which is not a response.
     let reason = case.reason();
     assert!(reason.starts_with("the response has no") || reason.contains("found an object"));
     let asked: serde_json::Value =

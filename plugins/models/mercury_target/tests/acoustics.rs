@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use super::*;
 
-/// A mesh like the target's but skewed everywhere.
+/// A mesh like that of the vessel but skewed everywhere.
 fn skewed() -> Mesh {
     Mesh::new(6, 9, |i, j| {
         let (x, y) = (i as f64 / 9.0, j as f64 / 6.0);
@@ -14,8 +14,8 @@ fn skewed() -> Mesh {
 
 #[test]
 fn volumes_and_node_volumes_fill_the_body() {
-    // Volume of a spherical cap π h²(3R - h)/3 taken off a cylinder; the meridian polygon of the
-    // cap converges with second order.
+    // The volume of a spherical cap, π h²(3R - h)/3, is missing from the cylinder; the meridian polygon of the cap
+    // converges with second order.
     let geometry = Geometry::default();
     let depth = geometry.nose(geometry.radius);
     let cap = PI * depth * depth * (3.0 * geometry.cap_radius - depth) / 3.0;
@@ -68,7 +68,7 @@ fn a_uniform_pressure_pushes_on_the_wall_only_and_with_no_net_force() {
             total += force.fluid_z[n];
             if i > 0 && i < mesh.nz && j < mesh.nr {
                 assert!(force.fluid_z[n].abs() < 1e-12 * scale);
-                // In r the pressure of a ring balances at the nodes; on the axis it is held.
+                // Radially the pressure of a ring balances at the nodes; on the axis the motion is held.
                 assert!(j == 0 || force.fluid_r[n].abs() < 1e-12 * scale);
             }
         }
@@ -78,8 +78,8 @@ fn a_uniform_pressure_pushes_on_the_wall_only_and_with_no_net_force() {
 
 #[test]
 fn a_linear_pressure_accelerates_every_node_alike() {
-    // Masses by ∫ N 2πr dA make -grad p / ρ exact for a linear pressure on straight cells,
-    // the axis included (derivation in the mesh module).
+    // Masses from ∫ N 2πr dA make -grad p / ρ exact for a linear pressure on straight cells, on the axis also
+    // (derivation in the mesh module).
     let mesh = straight(5, 8, 0.1, 0.2);
     let slope = 2e6;
     let pressure = mesh.centres().map(|[_, z]| slope * z).collect();
@@ -95,9 +95,9 @@ fn a_linear_pressure_accelerates_every_node_alike() {
     }
 }
 
-/// Largest error of the pressure after one period of the mode
-/// `p = J₀(j₁₁ r/a) cos(πz/L) cos ωt`, `ω = c √((j₁₁/a)² + (π/L)²)` of a rigid closed cylinder
-/// (Kinsler et al., Fundamentals of Acoustics, ch. 9), relative to its amplitude.
+/// Largest error of the pressure after one period of the mode `p = J₀(j₁₁ r/a) cos(πz/L) cos ωt`,
+/// `ω = c √((j₁₁/a)² + (π/L)²)` of a rigid closed cylinder (Kinsler et al., Fundamentals of Acoustics, ch. 9), relative
+/// to its amplitude.
 fn mode_error(nr: usize) -> f64 {
     const J11: f64 = 3.831_705_970_207_512;
     let (a, l, c) = (0.1, 0.15, RIEMER.sound_speed);
@@ -129,8 +129,7 @@ fn rigid_acoustics_converge_with_second_order() {
 
 #[test]
 fn plane_waves_leave_through_the_open_end() {
-    // A half space has no reflection: after the pulse has had time to leave, what remains is
-    // the discretisation's share.
+    // A half space has no reflection: after the pulse has left, only the error of the discretisation remains.
     let mesh = straight(1, 200, 0.1, 1.0);
     let initial: Vec<f64> =
         mesh.centres().map(|[_, z]| 1e6 * (-((z - 0.5) / 0.08).powi(2)).exp()).collect();

@@ -1,4 +1,4 @@
-//! What the equations keep: energy, momentum, time reversal, scaling; and grid convergence.
+//! Conserved quantities (energy, momentum), time reversal, scaling, and grid convergence.
 
 use super::*;
 
@@ -30,7 +30,7 @@ fn linear_runs_conserve_energy_to_rounding() {
 
 #[test]
 fn cavitating_runs_conserve_energy_up_to_the_kink() {
-    // A cell that crosses the cutoff within a step errs by the square of the step.
+    // A cell that crosses the cutoff within a step has an error proportional to the square of the step.
     let error = |cfl| {
         let energy = simulate(&undamped(cfl), &RIEMER).unwrap().energy;
         energy.imbalance().abs()
@@ -52,7 +52,7 @@ fn every_loss_of_a_default_run_is_accounted_for() {
     assert!(energy.imbalance().abs() < 1e-10, "{energy:?}");
 }
 
-/// A run of the coarse target by hand.
+/// A run on the coarse mesh, step by step.
 fn by_hand(target: &Target, constants: FluidConstants, cutoff: f64) -> Solver<'_, TensileCutoff> {
     let vessel = target.vessel();
     let (geometry, pulse) = (Geometry::default(), Pulse::default());
@@ -103,7 +103,7 @@ fn undamped_uncavitated_motion_runs_backwards() {
         solver.step();
     }
     let moved = solver.fluid.strain.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-    // After a step the velocity is half a step old: turning it leads one step back at once.
+    // After a step the velocity is half a step old: its reversal leads one step back at once.
     for part in solver.velocity.parts_mut() {
         for v in part {
             *v = -*v;
@@ -176,7 +176,7 @@ fn strains_do_not_change_with_the_unit_of_length_and_time() {
     assert!(rms_difference(&a, &b) < 1e-9 * rms(&a));
 }
 
-/// Observed order from 10 x 45, 20 x 90 and 40 x 180 cells and the last difference, microstrain.
+/// Observed order from 10 x 45, 20 x 90 and 40 x 180 cells, and the last difference, microstrain.
 fn convergence(cutoff: f64) -> (f64, f64) {
     let run = |n: usize| {
         let mut settings = Settings::default();
@@ -190,9 +190,9 @@ fn convergence(cutoff: f64) -> (f64, f64) {
 
 #[test]
 fn traces_converge_with_the_mesh() {
-    // Bounds around what an independent prototype of the same equations showed: order about 1 to
-    // 1.35 without and 0.5 to 0.8 with cavitation, whose closures are chaotic. The linear
-    // viscosity, proportional to the cell, is of first order.
+    // Bounds around the results of an independent prototype of the same equations: order about 1 to 1.35 without and
+    // 0.5 to 0.8 with cavitation, where the closure of cavities is chaotic. The linear viscosity, proportional to the
+    // cell size, is of first order.
     let (order, last) = convergence(1e12);
     assert!(order > 0.7 && last < 9.0, "{order} {last}");
     let (order, last) = convergence(RIEMER.tensile_cutoff);
@@ -211,7 +211,7 @@ fn nothing_happens_without_a_pulse() {
 
 #[test]
 fn tiny_changes_of_the_mercury_change_the_traces_little() {
-    // The closures are chaotic: scatter of about 1 microstrain on rms traces of about 100.
+    // The closure of cavities is chaotic: scatter of about 1 microstrain on rms traces of about 100.
     let target = Target::new(&Settings::default()).unwrap();
     let base = target.simulate(&RIEMER).unwrap();
     for factor in [0.999, 1.001] {
@@ -221,7 +221,7 @@ fn tiny_changes_of_the_mercury_change_the_traces_little() {
     }
 }
 
-/// The production law behind another type.
+/// The production law as another type.
 #[derive(Clone)]
 struct Wrapped(TensileCutoff);
 

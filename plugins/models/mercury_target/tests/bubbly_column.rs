@@ -9,11 +9,11 @@ use super::*;
 const LENGTH: f64 = 0.2;
 const CELLS: usize = 100;
 
-/// Amplitude of the waves, Pa: small beside any ambient pressure.
+/// Amplitude of the waves, Pa: small compared with any ambient pressure.
 const SMALL: f64 = 1e-3;
 
-/// Pressure at the closed end of a column that starts at rest in the shape of its longest wave,
-/// and the time between the values.
+/// Pressure at the closed end of a column that starts at rest in the shape of its longest wave, and the time between
+/// the values.
 fn standing_wave(bubbles: Bubbles, share: f64, cfl: f64, end: f64) -> (Vec<f64>, f64) {
     let vessel = rigid(straight(1, CELLS, 0.01, LENGTH));
     let shape = |[_, z]: [f64; 2]| SMALL * (PI * z / LENGTH).cos();
@@ -70,7 +70,7 @@ fn oscillation(signal: &[f64], stride: usize, dt: f64) -> Complex<f64> {
     z.ln() / (stride as f64 * dt)
 }
 
-/// A root of a function near a place, by the secant method.
+/// A root of a function near `near`, by the secant method.
 fn complex_root(f: impl Fn(Complex<f64>) -> Complex<f64>, near: Complex<f64>) -> Complex<f64> {
     let (mut a, mut b) = (near, near * 1.001);
     for _ in 0..50 {
@@ -85,8 +85,8 @@ fn complex_root(f: impl Fn(Complex<f64>) -> Complex<f64>, near: Complex<f64>) ->
 
 #[test]
 fn bubbles_disperse_and_damp_waves_as_their_linear_relaxation_does() {
-    // Motion e^{st} of the wave number k: s² ρ (1/K + a₀/κP/(1 + sτ)) + k² = 0, the linearised
-    // law. The step is implicit in the gas, of first order: hence the short steps.
+    // Motion e^{st} of the wave number k: s² ρ (1/K + a₀/κP/(1 + sτ)) + k² = 0, the linearised law. The step is
+    // implicit in the gas and of first order, which requires short steps.
     let Mercury { density, sound_speed, .. } = RIEMER;
     let (wave_number, modulus) = (PI / LENGTH, density * sound_speed.powi(2));
     for (share, relaxation) in [(1e-4, 2e-6), (1e-4, 1e-5), (3e-4, 5e-6), (1e-5, 5e-5)] {
@@ -108,9 +108,9 @@ fn bubbles_disperse_and_damp_waves_as_their_linear_relaxation_does() {
 
 #[test]
 fn slow_waves_are_those_of_commander_and_prosperetti() {
-    // J. Acoust. Soc. Am. 85 (1989) 732: k² = ω²/c² + 4πω²nR/(ω₀² - ω² + 2ibω), ω = is, n bubbles
-    // a volume, ω₀ Minnaert's. Far below ω₀ only 2b/ω₀² of the bubbles' own motion is left: it is
-    // the relaxation time 1/ω₀ for b = ω₀/2, up to (ω/ω₀)².
+    // J. Acoust. Soc. Am. 85 (1989) 732: k² = ω²/c² + 4πω²nR/(ω₀² - ω² + 2ibω), ω = is, n bubbles per volume, ω₀
+    // Minnaert's frequency. Far below ω₀ only 2b/ω₀² of the bubbles' own motion remains: it is the relaxation time
+    // 1/ω₀ for b = ω₀/2, up to (ω/ω₀)².
     let Mercury { density, sound_speed, .. } = RIEMER;
     let wave_number = PI / LENGTH;
     for (share, radius) in [(1e-4, 2e-5), (1e-4, 1e-4), (4e-4, 2e-4)] {
@@ -136,8 +136,8 @@ fn slow_waves_are_those_of_commander_and_prosperetti() {
 
 #[test]
 fn bubbles_relax_within_minnaerts_period() {
-    // Minnaert (1933), f₀ = √(3κp/ρ)/2πR in mercury at 3 bar: 154 kHz for 10 µm, 31 for 50 µm,
-    // 3.1 for 500 µm.
+    // Minnaert (1933), f₀ = √(3κp/ρ)/2πR in mercury at 3 bar: 154 kHz for 10 µm, 31 kHz for 50 µm, 3.1 kHz for 500
+    // µm.
     for (radius, frequency, digit) in [(1e-5, 154e3, 1e3), (5e-5, 31e3, 1e3), (5e-4, 3.1e3, 1e2)] {
         let gas = Gas { bubble_radius: radius, ..Gas::default() };
         let found = 1.0 / (TAU * gas.bubbles(RIEMER.density).relaxation);

@@ -1,5 +1,5 @@
-//! A plate on a half space of fluid that cannot bear tension: Taylor's plate, and cavitation with
-//! reclosure after Bleich and Sandler.
+//! A plate on a half space of fluid that cannot bear tension: Taylor's plate, and cavitation with reclosure after
+//! Bleich and Sandler.
 
 use super::*;
 
@@ -28,9 +28,8 @@ impl Plate {
         vessel
     }
 
-    /// Runs until `end`; the fluid starts with pressure `p(depth)` and, if it comes with a wave
-    /// towards the plate, moves at `p/ρc`. `watch` gets time, plate velocity (away from the
-    /// fluid) and the solver.
+    /// Runs until `end`. The fluid starts with pressure `p(depth)`; if that is a wave towards the plate, it moves at
+    /// `p/ρc`. `watch` gets time, plate velocity (away from the fluid) and the solver.
     fn run(
         &self,
         viscosity: (f64, f64),
@@ -56,7 +55,7 @@ impl Plate {
             for n in 0..mesh.r.len() {
                 solver.velocity.fluid_z[n] = -pressure(mesh.z[n]) / impedance;
             }
-            // The half cell that the plate carries brings its momentum.
+            // The half cell that the plate carries contributes its momentum.
             let half = 0.5 * self.density * self.depth / self.cells as f64;
             let share = half / (half + self.mass);
             for n in [mesh.node(0, 0), mesh.node(0, 1)] {
@@ -65,7 +64,7 @@ impl Plate {
         }
         while (solver.steps as f64) * dt < end {
             solver.step();
-            // Velocities live half a step before the present.
+            // Velocities belong to the time half a step before the current one.
             let time = (solver.steps as f64 - 0.5) * dt;
             watch(time, -solver.velocity.fluid_z[0], &solver);
         }
@@ -74,8 +73,8 @@ impl Plate {
 
 #[test]
 fn a_plate_takes_up_an_exponential_wave_and_leaves_the_fluid() {
-    // Taylor (1941): v = (2P/ρc) b/(b-1) (e^{-t/τ} - e^{-bt/τ}), b = ρcτ/m, and the pressure at
-    // the plate vanishes at τ ln b/(b-1).
+    // Taylor (1941): v = (2P/ρc) b/(b-1) (e^{-t/τ} - e^{-bt/τ}), b = ρcτ/m, and the pressure at the plate vanishes at
+    // τ ln b/(b-1).
     let plate = Plate {
         density: 13_500.0,
         sound_speed: 1456.0,
@@ -106,8 +105,8 @@ fn a_plate_takes_up_an_exponential_wave_and_leaves_the_fluid() {
 
 #[test]
 fn a_plate_is_pushed_off_by_a_uniform_pressure() {
-    // Half space at p₀ against a plate: v = (p₀/ρc)(1 - e^{-ρct/m}) (characteristics: p + ρcv =
-    // p₀ at the plate). 25 MPa gives 1.27 m/s.
+    // Half space at p₀ against a plate: v = (p₀/ρc)(1 - e^{-ρct/m}) (characteristics: p + ρcv = p₀ at the plate). 25
+    // MPa gives 1.27 m/s.
     let plate = Plate {
         density: 13_500.0,
         sound_speed: 1456.0,
@@ -132,22 +131,20 @@ fn a_plate_is_pushed_off_by_a_uniform_pressure() {
     assert!(worst < 0.01 * limit, "{worst}");
 }
 
-/// The exact solution of Bleich and Sandler's problem (Int. J. Solids Structures 6, 1970, 617)
-/// without gravity: a plate of mass `m` per area floats on a fluid with cutoff `p_c` (gauge, so
-/// `p_c` is the atmosphere) and is hit by `P e^{-t/τ}`; then the fluid cavitates below a thin
-/// layer that stays with the plate, the layer picks up the fluid that it meets, and the
-/// atmosphere slows it down.
+/// The exact solution of Bleich and Sandler's problem (Int. J. Solids Structures 6, 1970, 617) without gravity. A
+/// plate of mass `m` per area floats on a fluid with cutoff `p_c` (gauge pressure, so that `p_c` is the atmosphere)
+/// and is hit by `P e^{-t/τ}`. The fluid then cavitates below a thin layer that stays with the plate; the layer
+/// collects the fluid that it meets, and the atmosphere decelerates it.
 ///
-/// With depth `d`, `s = t - d/c` and `σ = t + d/c`, the whole fluid has `p = F(σ) + G(s)` and
-/// upward velocity `w = (F - G)/ρc`; at the plate `G = F - ρcw`, `m w' = 2F - ρcw`.
-/// - Inception: `F(σ) + G(s) = -p_c`, a curve in (s, σ) that is faster than sound where
-///   `dσ/ds < 0`, so Taylor's solution holds up to it. Its lower branch runs to any depth, its
-///   upper branch ends where `G' = 0`.
-/// - In the cavitated fluid `p = -p_c`, so `w` keeps its value `w₀(d)` of the inception at
-///   `t₀(d)`, and the strain beyond the cutoff is `δ = -(t - t₀) w₀'(d)`.
-/// - Closure at `D(t)`: momentum `[p] = ρV[u]` and volume `V([p]/K + δ) = [u]`, `u = -w`, with the
-///   characteristic that comes from the plate, `[p] + ρc[u] = R = 2G + p_c + ρc w₀`, give
-///   `V = Rc/(ρc²δ + R)`, `[p] = RV/(V + c)`; the front sends `F = [p] - p_c - G` up.
+/// With depth `d`, `s = t - d/c` and `σ = t + d/c`, the liquid fluid has `p = F(σ) + G(s)` and upward velocity
+/// `w = (F - G)/ρc`; at the plate `G = F - ρcw`, `m w' = 2F - ρcw`.
+/// - Inception: `F(σ) + G(s) = -p_c`, a curve in (s, σ) that is faster than sound where `dσ/ds < 0`, so that Taylor's
+///   solution is valid up to it. Its lower branch extends to any depth, its upper branch ends where `G' = 0`.
+/// - In the cavitated fluid `p = -p_c`, so that `w` keeps its value `w₀(d)` of the inception at `t₀(d)`, and the
+///   strain beyond the cutoff is `δ = -(t - t₀) w₀'(d)`.
+/// - Closure at `D(t)`: momentum `[p] = ρV[u]` and volume `V([p]/K + δ) = [u]`, `u = -w`, with the characteristic
+///   that comes from the plate, `[p] + ρc[u] = R = 2G + p_c + ρc w₀`, give `V = Rc/(ρc²δ + R)`, `[p] = RV/(V + c)`;
+///   the front emits `F = [p] - p_c - G` upwards.
 struct Characteristics {
     /// Time step of the tables.
     dt: f64,
@@ -159,7 +156,7 @@ struct Characteristics {
     opening: Vec<(f64, f64)>,
 }
 
-/// Peak, decay time.
+/// Peak (Pa) and decay time (s) of the wave.
 const WAVE: (f64, f64) = (0.7e6, 1e-3);
 
 fn floating() -> Plate {
@@ -192,7 +189,7 @@ impl Characteristics {
         let s0 = root(|s| reflected(s) + pc, 1e-9, s2);
         let sigma = |s: f64| -tau * ((-pc - reflected(s)) / peak).ln();
         let depth = |s: f64| 0.5 * c * (sigma(s) - s);
-        // Inception at a depth: time and frozen velocity.
+        // Inception at a depth: time, and velocity from then on.
         let inception = |d: f64| {
             let s = root(|s| depth(s) - d, s0 * (1.0 + 1e-12), s2);
             (0.5 * (s + sigma(s)), (-pc - 2.0 * reflected(s)) / z)
@@ -263,13 +260,14 @@ fn cavitation_under_a_floating_plate_opens_and_closes_as_computed_by_characteris
     let exact = Characteristics::new(&plate, end);
     let wave = |z: f64| WAVE.0 * (-z / plate.sound_speed / WAVE.1).exp();
     let cell = plate.depth / plate.cells as f64;
-    // Taylor's plate peaks at (2P/ρc) b^{1/(1-b)}, b = 10, while still in touch.
+    // The velocity of Taylor's plate has its maximum (2P/ρc) b^{1/(1-b)}, b = 10, while the plate is still in
+    // contact.
     let peak = exact.velocity.iter().copied().fold(0.0, f64::max);
     let taylor = 2.0 * WAVE.0 / (plate.density * plate.sound_speed) * 10.0_f64.powf(-1.0 / 9.0);
     assert!((peak / taylor - 1.0).abs() < 1e-3, "{peak} {taylor}");
     assert!(exact.velocity(end) < 0.0, "the atmosphere turns the plate back");
-    // Without linear viscosity the layer at the plate rings from the jump at the start and tears
-    // anew; with it, the weak wave that opens the depths is smoothed and so delayed in proportion.
+    // Without linear viscosity the layer at the plate oscillates after the jump at the start and cavitates again.
+    // With it, the weak wave that opens the depths is smoothed and thus delayed in proportion.
     let any = f64::INFINITY;
     for (linear, limits) in
         [(0.0, [any, any, 10.0]), (0.06, [0.02, any, 40.0]), (0.25, [0.02, 8.0, 90.0])]
@@ -292,8 +290,8 @@ fn cavitation_under_a_floating_plate_opens_and_closes_as_computed_by_characteris
 
 #[test]
 fn a_cavitated_column_closes_against_a_wall() {
-    // Water hammer in a fluid with excess strain δ that comes at speed v: over the front
-    // [p] = ρVv and V([p]/K + δ) = v, so V solves v(1 - V²/c²) = Vδ.
+    // Water hammer in a fluid with excess strain δ that arrives at speed v: over the front [p] = ρVv and V([p]/K + δ)
+    // = v, so that V solves v(1 - V²/c²) = Vδ.
     let (density, c, cutoff) = (13_500.0, 1456.0, 1.5e5);
     let k: f64 = density * c * c;
     for (v, excess) in [(0.5, 1e-3_f64), (2.0, 1e-3), (2.0, 1e-2)] {

@@ -1,4 +1,4 @@
-//! A pulse in mercury with gas: what the gas does to the strains, and what it may not do.
+//! A pulse in mercury with gas: effects of the gas on the strains, and their limits.
 
 use super::*;
 
@@ -32,7 +32,7 @@ fn swing(outcome: &Outcome) -> f64 {
 
 #[test]
 fn little_gas_changes_little() {
-    // Less than the mesh does, and no more than the scatter of the closures.
+    // The effect is smaller than that of the mesh and within the scatter of the closures.
     let target = coarse();
     let base = target.simulate(&RIEMER).unwrap();
     for radius in [0.0, 5e-5] {
@@ -63,8 +63,8 @@ fn more_gas_leaves_less_strain() {
 
 #[test]
 fn strains_fall_by_as_much_as_was_measured_at_the_facility() {
-    // McClintock et al., Materials & Design (2022) 110937: gas injection reduced the strain of the
-    // vessel by 25 to 75 %. The default gas between 1e-4 and 4e-4 covers the middle of that range.
+    // McClintock et al., Materials & Design (2022) 110937: gas injection reduced the strain of the vessel by 25 to 75
+    // %. The default gas between 1e-4 and 4e-4 covers the middle of that range.
     let target = Target::new(&Settings::default()).unwrap();
     let base = swing(&target.simulate(&RIEMER).unwrap());
     let Gas { bubble_radius, .. } = Gas::default();
@@ -104,7 +104,7 @@ fn energy_never_rises_and_the_relaxation_only_takes() {
             }
             let now = solver.energy();
             assert!(stored(&now) <= stored(&before), "{now:?}");
-            // In equilibrium what is lost after the pulse is the error of the step.
+            // In equilibrium the loss after the pulse is the error of the step.
             let error = if radius == 0.0 { 5e-4 * now.start } else { 0.0 };
             assert!(now.relaxed >= before.relaxed - error, "{now:?}");
             assert!(now.viscous < now.start && now.relaxed < now.start, "{now:?}");
@@ -175,7 +175,7 @@ fn stratified_gas_is_where_it_should_be() {
         })
         .sum();
     assert!((mean - 1.0).abs() < 1e-5, "{mean}");
-    // Gas missing at the window saves the near gauges less.
+    // Gas that is missing at the window reduces the effect on the gauges near it.
     let target = coarse();
     let depleted = Gas { depletion: 1.0, depletion_length: 0.1, ..with(2e-4, 5e-5) };
     let even = run(&target, 2e-4, 5e-5);

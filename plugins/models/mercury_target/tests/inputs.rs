@@ -1,11 +1,10 @@
-//! One study, three models: which inputs they list, take, and heed.
+//! One study, three models: inputs that they list, accept and use.
 
 use std::path::Path;
 
 use lacuna::data::{Axis, Layout, Scenario, Unit};
 use lacuna::plugin::model::{Call, EvalError, Response};
-use lacuna::plugin::registry;
-use lacuna::plugin::{Context, Given, Model};
+use lacuna::plugin::{Context, Given, Model, registry};
 
 const NAMES: [&str; 3] =
     ["mercury_target", "mercury_target_equilibrium_gas", "mercury_target_bubbles"];

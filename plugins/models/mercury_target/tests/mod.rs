@@ -17,7 +17,7 @@ use super::*;
 /// Riemer's reference values.
 const RIEMER: Mercury = Mercury { density: 13_500.0, sound_speed: 1456.0, tensile_cutoff: 1.5e5 };
 
-/// No artificial damping.
+/// Fluid constants without artificial damping.
 const INVISCID: FluidConstants = FluidConstants {
     density: RIEMER.density,
     linear_viscosity: 0.0,
@@ -50,8 +50,8 @@ fn rigid(mesh: Mesh) -> Vessel {
     Vessel { mesh, shell: Shell::default(), held, joints: Joints::default() }
 }
 
-/// A tube with rigid ends and an elastic wall of 316L steel; the wall's ends keep their axial
-/// position and slope, or all its nodes their axial position.
+/// A tube with rigid ends and an elastic wall of 316L steel. The wall's ends keep their axial position and slope;
+/// with `axial_held` all its nodes keep their axial position.
 fn elastic(mesh: Mesh, thickness: f64, axial_held: bool) -> Vessel {
     let mut vessel = rigid(mesh);
     let mesh = &vessel.mesh;
@@ -70,8 +70,8 @@ fn elastic(mesh: Mesh, thickness: f64, axial_held: bool) -> Vessel {
     vessel
 }
 
-/// Frequency near `guess` (within `width`, both Hz) at which a signal sampled every `dt` has its
-/// largest windowed Fourier amplitude.
+/// Frequency near `guess` (within `width`, both Hz) at which a signal sampled every `dt`, s, has its largest windowed
+/// Fourier amplitude.
 fn frequency(signal: &[f64], dt: f64, guess: f64, width: f64) -> f64 {
     let n = signal.len() as f64;
     let mean = signal.iter().sum::<f64>() / n;
@@ -108,7 +108,7 @@ fn rms(a: &Outcome) -> f64 {
     (a.strain.iter().flatten().map(|x| x * x).sum::<f64>() / n).sqrt()
 }
 
-/// `J₀` by its integral, exact to rounding for the trapezoidal rule (Abramowitz & Stegun 9.1.18).
+/// `J₀` by its integral, which the trapezoidal rule evaluates exactly to rounding (Abramowitz & Stegun 9.1.18).
 fn bessel_j0(x: f64) -> f64 {
     let n = 64;
     (0..n)
@@ -129,7 +129,7 @@ fn bessel_j1(x: f64) -> f64 {
         / f64::from(n)
 }
 
-/// A root of `f` in a bracket.
+/// A root of `f` between `low` and `high`.
 fn root(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let sign = f(low).signum();
     for _ in 0..200 {

@@ -1,21 +1,21 @@
-//! The model without gas gives what it gave before there was a gas, to the last bit.
+//! The model without gas reproduces its results from before gas was added, to the last bit.
 
 use super::*;
 
-/// Fowler, Noll and Vo's hash (FNV-1a) of all strains' bits.
+/// Hash of Fowler, Noll and Vo (FNV-1a) of all strains' bits.
 fn hash(outcome: &Outcome) -> u64 {
     let fold = |hash: u64, x: &f64| (hash ^ x.to_bits()).wrapping_mul(0x0100_0000_01b3);
     outcome.strain.iter().flatten().fold(0xcbf2_9ce4_8422_2325, fold)
 }
 
-/// The bits depend on `exp` of the platform's library, so on one platform only.
+/// The bits depend on the platform's `exp`, hence the test runs on one platform only.
 #[cfg(all(target_arch = "x86_64", target_os = "linux", target_env = "gnu"))]
 #[test]
 fn pure_mercury_is_what_it_was() {
     let target = Target::new(&Settings::default()).unwrap();
     let mercury =
         |density, sound_speed, tensile_cutoff| Mercury { density, sound_speed, tensile_cutoff };
-    // Recorded from the version before the gas.
+    // Recorded from the version before gas was added.
     for (mercury, strains, saturation, viscous) in [
         (RIEMER, 0xc0e2_159b_2712_bc7c, 0x3f4f_e19f_4455_f408, 0x4018_f5a7_3307_ac7e),
         (

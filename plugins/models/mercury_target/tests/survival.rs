@@ -1,8 +1,8 @@
-//! Whatever the calibration asks for gives finite traces or a stated error.
+//! All values in the calibration's ranges give finite traces or a stated error.
 
 use super::*;
 
-/// Halton's sequence (1960) in base `b`: well spread points without a random stream.
+/// Halton's sequence (1960) in base `b`: evenly distributed points without random numbers.
 fn halton(mut index: u32, base: u32) -> f64 {
     let (mut value, mut share) = (0.0, 1.0);
     while index > 0 {
@@ -74,7 +74,7 @@ fn riemers_values_give_strains_like_the_published_ones() {
         let peak = trace.iter().copied().fold(0.0, f64::max);
         assert!((100e-6..360e-6).contains(&peak), "{peak}");
     }
-    // Near gauges peak early, far gauges late: T before V and R.
+    // Near gauges have early peaks, far gauges late ones: T before V and R.
     let time = |gauge: usize| {
         let trace = &outcome.strain[gauge];
         (0..100).max_by(|&a, &b| trace[a].total_cmp(&trace[b])).unwrap()

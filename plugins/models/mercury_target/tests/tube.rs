@@ -8,9 +8,8 @@ const RADIUS: f64 = 0.1;
 const THICKNESS: f64 = 5e-3;
 const PLANE: f64 = 193e9 / (1.0 - 0.3 * 0.3);
 
-/// Breathing modes of an infinitely long filled tube:
-/// `(K/a) x J₀(x) + (Eh/((1-ν²)a²) - ρ_s h (xc/a)²) J₁(x) = 0`, `f = xc/(2πa)`.
-/// It states that the fluid's pressure `p = P J₀(xr/a)` drives the wall's ring equation.
+/// Breathing modes of an infinitely long filled tube: `(K/a) x J₀(x) + (Eh/((1-ν²)a²) - ρ_s h (xc/a)²) J₁(x) = 0`,
+/// `f = xc/(2πa)`. In this equation the fluid's pressure `p = P J₀(xr/a)` drives the wall's ring equation.
 fn breathing(low: f64, high: f64) -> f64 {
     let (a, h, c) = (RADIUS, THICKNESS, RIEMER.sound_speed);
     let k = RIEMER.density * c * c;
@@ -27,7 +26,7 @@ fn breathing_modes_of_the_filled_tube() {
     for (f, published) in exact.iter().zip([5745.9, 12_576.0, 19_577.0]) {
         assert!((f / published - 1.0).abs() < 1e-4, "{f} {published}");
     }
-    // A pressure peaked on the axis excites the modes; nothing depends on z.
+    // A pressure with its peak on the axis excites the modes; nothing depends on z.
     let mesh = straight(24, 2, RADIUS, 0.01);
     let shape = |r: f64| 1e6 * (-(r / 0.04).powi(2)).exp();
     let initial = mesh.centres().map(|[r, _]| shape(r)).collect();
@@ -67,7 +66,7 @@ fn empty_ring_frequency() {
     assert!((found / exact - 1.0).abs() < 1e-3, "{found}");
 }
 
-/// Phase speed of the gravest mode `cos(πz/L)` of a tube with `L` = 40 radii.
+/// Phase speed of the lowest mode `cos(πz/L)` of a tube with `L` = 40 radii.
 fn long_wave_speed(axial_held: bool) -> f64 {
     let length = 40.0 * RADIUS;
     let mesh = straight(3, 80, RADIUS, length);
@@ -86,8 +85,8 @@ fn long_wave_speed(axial_held: bool) -> f64 {
 
 #[test]
 fn long_waves_run_at_kortewegs_speed() {
-    // Korteweg (1878): c/√(1 + 2K/(k a)) with k = Eh/((1-ν²)a²) for a wall held axially; with
-    // axial motion free the wall is in plane stress, k = Eh/a² (Skalak 1956).
+    // Korteweg (1878): c/√(1 + 2K/(k a)) with k = Eh/((1-ν²)a²) for a wall held axially; with free axial motion the
+    // wall is in plane stress, k = Eh/a² (Skalak 1956).
     let k = RIEMER.density * RIEMER.sound_speed.powi(2);
     let exact = |stiffness: f64| RIEMER.sound_speed / (1.0 + 2.0 * k / stiffness).sqrt();
     let held = exact(PLANE * THICKNESS / RADIUS);

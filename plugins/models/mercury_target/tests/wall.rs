@@ -50,8 +50,8 @@ fn chain(nodes: &[[f64; 2]], thickness: f64, eigenstrain: f64) -> Shell {
 
 #[test]
 fn clamped_circular_plate_under_uniform_pressure() {
-    // w(0) = p a⁴/(64 D) + p a²/(4 · 5/6 G h): Timoshenko & Woinowsky-Krieger, Theory of Plates
-    // and Shells, § 17 and § 20 (with the shear factor of Reissner).
+    // w(0) = p a⁴/(64 D) + p a²/(4 · 5/6 G h): Timoshenko & Woinowsky-Krieger, Theory of Plates and Shells, § 17 and
+    // § 20 (with the shear factor of Reissner).
     let (a, h, p) = (0.1, 8e-3, 1e5);
     let bending = STEEL.young_modulus * h * h * h / (12.0 * (1.0 - 0.09));
     let shear = 5.0 / 6.0 * STEEL.young_modulus / 2.6 * h;
@@ -74,9 +74,9 @@ fn clamped_circular_plate_under_uniform_pressure() {
 
 #[test]
 fn clamped_end_of_a_cylinder_under_pressure() {
-    // Timoshenko & Woinowsky-Krieger § 114: a beam on the elastic foundation k = Eh/a² (free
-    // axially), here with the shear stiffness S of the Mindlin theory:
-    // D β'' = S (β + w'), S (β' + w'') = k w - p, so D m⁴ - (Dk/S) m² + k = 0 for w ~ e^{mx}.
+    // Timoshenko & Woinowsky-Krieger § 114: a beam on the elastic foundation k = Eh/a² (axially free), here with the
+    // shear stiffness S of the Mindlin theory: D β'' = S (β + w'), S (β' + w'') = k w - p, so that D m⁴ - (Dk/S) m² +
+    // k = 0 for w ~ e^{mx}.
     let (a, h, p, length) = (0.1, 3e-3, 1e6, 0.2);
     let (k, d): (f64, f64) = (193e9 * h / (a * a), 193e9 * h * h * h / (12.0 * 0.91));
     let s = 5.0 / 6.0 * 193e9 / 2.6 * h;

@@ -1,4 +1,4 @@
-//! Calls that are answered.
+//! Calls with an answer.
 
 use lacuna::plugin::model::EvalError;
 
@@ -119,7 +119,7 @@ def simulate(a, b):
     let expected = |x, y, call, runs| Ok(vec![x, y, call, runs, 0.0, 0.0]);
     assert_eq!(found[1], expected(3.0, 4.0, 1.0, 3.0));
     assert_eq!(case.run(), expected(2.0, 0.5, 2.0, 1.0));
-    // One that goes wrong costs itself only.
+    // A run that fails does not affect the others.
     let found = case.batch(&[[1.0, 2.0], [99.0, 4.0], [f64::NAN, 1.0]]);
     assert_eq!(found[0], expected(1.0, 2.0, 3.0, 1.0));
     assert!(found[1].as_ref().is_err_and(|why| why.to_string().contains("too much")));
@@ -149,7 +149,7 @@ def slopes(a, b):
     assert!(case.model.gradient().is_none());
 }
 
-/// Arrays are answered as lists are. Runs where the interpreter has `numpy`.
+/// Arrays have the same results as lists. Runs where the interpreter has `numpy`.
 #[test]
 fn arrays_are_answered_exactly() {
     let text = "

@@ -1,13 +1,13 @@
-//! What is said about a Python file before anything runs.
+//! Complaints about a Python file before anything runs.
 
 use lacuna::data::{Layout, Unit};
 use lacuna::plugin::{Context, Given};
-use lacuna::study::problem::Complaints;
-use lacuna::study::{Node, Place, Problems, Sources};
+use lacuna::text::problem::Complaints;
+use lacuna::text::{Node, Place, Problems, Sources};
 
 use super::{Case, LINES};
 
-/// The complaints of a model whose study gives `a` and `b`.
+/// The complaints of a model whose study has the inputs `a` and `b`.
 fn complaints(text: &str, options: &str) -> Option<String> {
     let case = Case::new(text, options)?;
     let given = ["a", "b"].map(|name| Given { name: name.to_owned(), unit: None });
@@ -51,8 +51,8 @@ fn a_file_is_looked_at_without_being_run() {
             "def simulate(a, bb, *, c): pass",
             "",
             "function: `simulate` has no argument for the input `b` | did you mean `bb`?\n\
-             function: `simulate` wants `bb`, which the study does not give | expected one of `a`, `b`\n\
-             function: `simulate` wants `c`, which the study does not give | expected one of `a`, `b`\n",
+             function: `simulate` requires the argument `bb`, which is not an input of the study | expected one of `a`, `b`\n\
+             function: `simulate` requires the argument `c`, which is not an input of the study | expected one of `a`, `b`\n",
         ),
         (
             LINES,

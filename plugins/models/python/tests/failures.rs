@@ -1,10 +1,10 @@
-//! Calls that go wrong: the exact reason, and the next call is answered.
+//! Calls that fail: the exact reason, and an answer to the next call.
 
 use std::time::{Duration, Instant};
 
 use super::{Case, LINES};
 
-/// A function that goes wrong at `a` = 2 and answers elsewhere.
+/// A function that fails at `a` = 2 and answers elsewhere.
 fn wrong(line: &str) -> Option<Case> {
     let text = format!(
         "import os, sys, time\ndef simulate(a, b):\n    if a == 2:\n        {line}\n    return [b] * 6\n"
@@ -66,7 +66,7 @@ fn what_no_run_can_mend_stops_the_study() {
         (
             "def simulate(a, b, c): pass",
             "",
-            "`model.py`: `simulate` wants `c`, which the study does not give",
+            "`model.py`: `simulate` requires the argument `c`, which is not an input of the study",
         ),
         (LINES, "gradient = 'slopes'", "`model.py`: there is no function `slopes`"),
         (

@@ -1,5 +1,5 @@
-//! `LACUNA_PYTHON` names the interpreter; else `python3` is taken where it is there. Without either the tests say that
-//! they are skipped, unless `LACUNA_REQUIRE_PYTHON=1` makes that a failure.
+//! `LACUNA_PYTHON` names the interpreter; otherwise `python3` is used if it exists. Without either the tests report
+//! that they are skipped, unless `LACUNA_REQUIRE_PYTHON=1` makes that a failure.
 #![allow(clippy::unwrap_used)]
 
 mod calls;
@@ -9,14 +9,14 @@ mod failures;
 use std::path::{Path, PathBuf};
 
 use lacuna::data::{Axis, Condition, Layout, Scenario, Unit};
-use lacuna::linalg::Matrix;
 use lacuna::plugin::Model;
 use lacuna::plugin::model::{Call, EvalError, Response};
 use lacuna::plugin::registry::from_text;
+use lacuna_linalg::Matrix;
 
 use crate::models::process;
 
-/// The interpreter; `None` when there is none and none is required.
+/// The interpreter; `None` if there is none and none is required.
 fn interpreter() -> Option<PathBuf> {
     let named = std::env::var_os("LACUNA_PYTHON").map(PathBuf::from);
     let found = named.or_else(|| process::find("python3", Path::new("."), None));

@@ -1,31 +1,31 @@
 //! One line of heartbeat text.
 
-/// What stands between two fields of a line.
+/// Separator between two fields of a line.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Separator {
-    /// A text with something to see in it, such as a comma, or a tab.
+    /// A visible text, such as a comma, or a tab.
     Text(String),
-    /// Blanks alone.
+    /// Line of blanks only.
     Blank,
 }
 
-/// A line taken apart. An empty list means that nothing of the kind was found.
+/// A parsed line. An empty list means that nothing of the kind was found.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Line {
     /// Labels, each with its numbers: `time=1.0e-05, stress=1.0, 2.0, 3.0`.
     Labelled(Vec<(String, Vec<f64>)>),
-    /// Numbers alone.
+    /// Numbers without labels.
     Numbers(Vec<f64>),
-    /// Names alone: a legend.
+    /// Names without numbers: a legend.
     Names(Vec<String>),
     /// A message of one line, or a comment.
     Message,
-    /// None of these.
+    /// A line of no known form.
     Broken,
 }
 
-/// Finds the separator from the end of a line, where no time stamp can be: what stands before the
-/// last field. `None` for a line of a single field.
+/// Infers the separator from the text before the last field of a line, where there can be no time stamp. `None` for a
+/// line with a single field.
 pub(super) fn sniff(line: &str) -> Option<Separator> {
     let inside = |c: char| {
         c.is_alphanumeric() || matches!(c, '_' | '.' | '+' | '-' | '(' | ')' | '[' | ']' | '=')
@@ -43,7 +43,7 @@ pub(super) fn sniff(line: &str) -> Option<Separator> {
     Some(if seen.is_empty() { Separator::Blank } else { Separator::Text(seen.to_owned()) })
 }
 
-/// Takes a line apart. `columns` is the number of fields where it is known already.
+/// Parses a line. `columns` is the number of fields, if it is known already.
 pub(super) fn parse(line: &str, separator: Option<&Separator>, columns: Option<usize>) -> Line {
     let line = line.trim();
     if line.starts_with('%') {
@@ -71,7 +71,7 @@ pub(super) fn parse(line: &str, separator: Option<&Separator>, columns: Option<u
     if parsed == Line::Broken && line.starts_with('-') { Line::Message } else { parsed }
 }
 
-/// A number as C, C++ or Fortran print it, infinities and not-a-number included.
+/// Parses a number as printed by C, C++ or Fortran, including infinities and not-a-number.
 pub(super) fn number(text: &str) -> Option<f64> {
     let text = text.trim();
     let bare = text.trim_start_matches(['+', '-']).to_ascii_lowercase();
@@ -84,7 +84,7 @@ pub(super) fn number(text: &str) -> Option<f64> {
     text.parse().ok().or_else(|| text.replace(['d', 'D'], "e").parse().ok())
 }
 
-/// Splits `name=number`. The name is what follows the last blank: a time stamp may stand before it.
+/// Splits `name=number`. The name is the text after the last blank, because a time stamp may precede it.
 fn label(field: &str) -> Option<(&str, f64)> {
     let (name, value) = field.rsplit_once('=')?;
     let name = name.split_whitespace().next_back()?;
@@ -105,8 +105,8 @@ fn labelled(fields: &[&str], stamped: bool) -> Line {
     Line::Labelled(labels)
 }
 
-/// Removes a time stamp, which may itself contain blanks and the separator: it reaches up to the
-/// last blank of the last field that has one.
+/// Removes a time stamp, which may itself contain blanks and the separator: it extends to the last blank of the last
+/// field that has one.
 fn stamp_removed<'a>(fields: &[&'a str]) -> Vec<&'a str> {
     let first = fields.iter().rposition(|field| field.contains(char::is_whitespace));
     let Some(first) = first else { return fields.to_vec() };
@@ -115,8 +115,8 @@ fn stamp_removed<'a>(fields: &[&'a str]) -> Vec<&'a str> {
     kept
 }
 
-/// The same where blanks also separate the fields: the known number of columns is kept, or, as
-/// long as it is not known, all fields at the end that are alike.
+/// Removes a time stamp if blanks also separate the fields: the known number of columns is kept or, as long as it is
+/// unknown, all similar fields at the end.
 fn blank_stamp_removed<'a>(fields: &[&'a str], columns: Option<usize>) -> Vec<&'a str> {
     let numeric = fields.last().is_some_and(|field| number(field).is_some());
     let like_last = |field: &&&str| if numeric { number(field).is_some() } else { is_name(field) };

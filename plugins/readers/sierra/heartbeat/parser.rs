@@ -1,4 +1,4 @@
-//! A heartbeat file, line after line.
+//! Parser of a heartbeat file, line by line.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use super::line::{self, Line, Separator};
 use crate::readers::listed;
 use crate::readers::sierra::signal::COMPONENTS;
 
-/// What the lines so far have told about the file.
+/// State of the parser: what the lines so far have shown of the file.
 pub(super) struct Parser<'a> {
     path: &'a Path,
     separator: Option<Separator>,
@@ -70,7 +70,7 @@ impl<'a> Parser<'a> {
         Ok(())
     }
 
-    /// Takes a line in; `false` if it is none that fits here.
+    /// Parses a line; returns false if it does not fit here.
     fn take(&mut self, number: usize, line: &str) -> Result<bool, ReadError> {
         let separator = self.separator.clone().or_else(|| line::sniff(line));
         let parsed = line::parse(line, separator.as_ref(), self.known_columns());
@@ -127,7 +127,7 @@ impl<'a> Parser<'a> {
             let shape: Vec<(String, usize)> =
                 labels.iter().map(|(name, values)| (name.clone(), values.len())).collect();
             let flat = flattened(&shape);
-            // A legend has the components' true names; the labels only allow a guess.
+            // A legend has the true names of the components; from labels they can only be guessed.
             if self.header.is_none() || self.names.len() != flat.len() {
                 self.set_names(flat);
             }
@@ -136,7 +136,7 @@ impl<'a> Parser<'a> {
         if self.fits(&labels) {
             return self.row(number, labels.into_iter().flat_map(|(_, values)| values).collect());
         }
-        // Behind a row cut by a kill, a restart goes on in the same line.
+        // After a row cut by a kill, a restart continues in the same line.
         let first = format!("{}=", self.labels[0].0);
         let tails = line.match_indices(&first).map(|(start, _)| &line[start..]);
         let whole =
@@ -160,7 +160,7 @@ impl<'a> Parser<'a> {
             self.set_names((1..=row.len()).map(|i| format!("column_{i}")).collect());
         }
         if self.rows.is_empty() && self.stamped && self.separator == Some(Separator::Blank) {
-            // With blanks as separator, words and numbers of the stamp look like columns.
+            // With blanks as the separator, the words and numbers of the time stamp look like columns.
             let columns = row.len().min(self.names.len());
             row.drain(..row.len() - columns);
             let names = self.names.split_off(self.names.len() - columns);
@@ -174,8 +174,8 @@ impl<'a> Parser<'a> {
                 let text = format!("the time is {}", row[time]);
                 return Err(ReadError::new(self.path, text).at(format!("line {number}")));
             }
-            // A restart repeats steps, and rounding can give two steps the same time: the later
-            // row replaces every earlier one that is not before it.
+            // A restart repeats steps, and rounding can give two steps the same time: the later row replaces all
+            // earlier ones that are not before it.
             while self.rows.last().is_some_and(|last| last[time] >= row[time]) {
                 self.rows.pop();
                 self.replaced += 1;
@@ -185,8 +185,8 @@ impl<'a> Parser<'a> {
         Ok(true)
     }
 
-    /// Lets a line pass that fits nowhere if it is a row cut by the end of the run: at the end of
-    /// the file, before the header of a restart, or with that header behind it in the same line.
+    /// Accepts a line that does not fit if it is a row cut by the end of the run: at the end of the file, before the
+    /// header of a restart, or followed by that header in the same line. Otherwise fails.
     fn excuse(&mut self, number: usize, line: &str, next: Option<&str>) -> Result<(), ReadError> {
         let glued = line.contains("% Sierra")
             || self.header.as_ref().is_some_and(|header| line.ends_with(&header.text));
@@ -216,7 +216,7 @@ impl<'a> Parser<'a> {
             self.notes.push(format!("the header is repeated {} times", self.restarts));
         }
         if self.replaced > 0 {
-            self.notes.push(format!("{} repeated steps: the later ones hold", self.replaced));
+            self.notes.push(format!("{} repeated steps: the last values are used", self.replaced));
         }
         let columns =
             (0..self.names.len()).map(|c| self.rows.iter().map(|row| row[c]).collect()).collect();
@@ -249,8 +249,8 @@ impl<'a> Parser<'a> {
     }
 }
 
-/// Whether a last line without a line end is whole. Fixed formats print all numbers equally long,
-/// so its last number lacks no digit if it is as long as the one above it.
+/// Returns true if a last line without a line end is complete. Fixed formats print all numbers with equal length, so
+/// that its last number is complete if it is as long as the one above it.
 fn as_long(line: &str, above: &str) -> bool {
     let last = |text: &str| {
         let digit = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '+' | '-');
@@ -260,7 +260,7 @@ fn as_long(line: &str, above: &str) -> bool {
     last(line).is_some_and(|length| last(above) == Some(length))
 }
 
-/// Column names of labelled rows, whose vectors and tensors have one label for all components.
+/// Returns the column names of labelled rows, whose vectors and tensors have one label for all components.
 fn flattened(labels: &[(String, usize)]) -> Vec<String> {
     let mut names = Vec::new();
     for (label, count) in labels {

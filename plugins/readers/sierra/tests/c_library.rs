@@ -57,7 +57,7 @@ fn every_container_of_the_c_library_is_read() {
         let status = Command::new(&python).args(["-c", WRITE]).arg(&path).arg(model).status();
         assert!(status.unwrap().success(), "{model}");
         let file = Exodus::open(&path).unwrap();
-        // The time 0.3 is single precision, a little above the double precision 0.3.
+        // The time 0.3 is in single precision, slightly above the 0.3 of double precision.
         assert_eq!((file.times.len(), file.incomplete_steps), (4, 1), "{model}");
         let first = file.ids(Kind::Element).unwrap()[0];
         assert!([50, 5_000_000_000].contains(&first), "{model}");

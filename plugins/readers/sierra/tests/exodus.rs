@@ -1,5 +1,5 @@
-//! Exodus files of the real libraries. Numbers were read from the same files with the Python
-//! package netCDF4 1.7, which uses the C library.
+//! Exodus files of the real libraries. Numbers were read from the same files with the Python package netCDF4 1.7,
+//! which uses the C library.
 
 use super::super::exodus::{Exodus, Kind};
 use super::super::parts::Results;
@@ -110,7 +110,7 @@ fn parts_of_a_parallel_run_are_searched_for_the_entity() {
         assert!(message.contains("2 of the run's 4 files are missing"), "{message}");
         let probe = Probe { nearest: Some([0.0; 3]), ..Probe::named("disp_x") };
         let message = results.series("disp_x", &probe).unwrap_err().message;
-        assert!(message.contains("nearest node cannot be known"), "{message}");
+        assert!(message.contains("nearest node is unknown"), "{message}");
     }
 }
 

@@ -1,5 +1,5 @@
-//! Heartbeat text: samples of the real library and of Sierra, and every further option in text
-//! made after the library's printed layout (`Iohb_Layout.C`).
+//! Heartbeat text: samples of the real library and of Sierra, and all further options in text in the library's
+//! printed layout (`Iohb_Layout.C`).
 
 use std::path::Path;
 
@@ -27,7 +27,7 @@ fn the_formats_of_the_library_agree_with_the_signals() {
         for (name, expected) in names.iter().zip(&values) {
             let (t, y) = table.series(&format!("strain_{name}")).unwrap();
             assert!(largest_difference(&t, &times) < 1e-12);
-            // Five digits behind the first: half a unit of the last is 5e-6 of the value.
+            // Five digits after the first: half a unit of the last is 5e-6 of the value.
             assert!(largest_difference(&y, expected) < 5e-6 * 1e-3, "{}", path.display());
         }
     }
@@ -95,8 +95,8 @@ fn a_restart_repeats_the_header_and_its_steps_hold() {
     let table = parse(&format!("{header}{first}{header}{second}"));
     assert_eq!(table.columns[0], [1e-5, 2e-5, 3e-5, 4e-5]);
     assert_eq!(table.columns[1], [1.0, 2.5, 3.5, 4.5]);
-    assert!(table.notes.contains(&"2 repeated steps: the later ones hold".to_owned()));
-    // The killed run left half a row, alone in its line or with the restart's header behind it.
+    assert!(table.notes.contains(&"2 repeated steps: the last values are used".to_owned()));
+    // The killed run left half a row, alone in its line or followed by the restart's header.
     for cut in [" 4.0e-05,  3\n", " 4.0e-05, ", " 4.0e-0", " 4.0e-05,\n"] {
         let table = parse(&format!("{header}{first}{cut}{header}{second}"));
         assert_eq!(table.columns[1], [1.0, 2.5, 3.5, 4.5], "cut `{cut}`");
@@ -129,7 +129,7 @@ fn rounded_times_and_messages_do_no_harm() {
     // A second header line with units, as CTH's hscth files have it.
     let table = parse("time, pressure\n(s), (dyn/cm2)\n 0.0, 1.0D+6\n 1.0, -2.0D+6\n");
     assert_eq!((table.names[1].as_str(), &table.columns[1][..]), ("pressure", &[1e6, -2e6][..]));
-    // Negative numbers first in the line are no messages.
+    // Negative numbers at the start of a line are not messages.
     assert_eq!(parse("a, time\n-1.0, 0.1\n-2.0, 0.2\n").columns[0], [-1.0, -2.0]);
 }
 

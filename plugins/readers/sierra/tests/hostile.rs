@@ -1,4 +1,4 @@
-//! Damaged files: any answer will do but a panic, endless work or unbounded memory.
+//! Damaged files: any answer is acceptable except a panic, endless work or unbounded memory.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use super::super::parts::Results;
 use super::super::probe::Probe;
 use super::{reference, sample};
 
-/// Reads all that the readers would: every variable at one entity, by id and by place.
+/// Reads everything that the readers would: every variable at one entity, by id and by point.
 fn use_up(bytes: Vec<u8>) -> bool {
     let path = Path::new("damaged");
     if !bytes.starts_with(b"CDF") && !bytes.starts_with(b"\x89HDF") {
@@ -60,7 +60,7 @@ fn flipped_bytes_do_no_harm() {
         let mut random = Stream::root(20_220_415).at(number as u64).generator();
         for round in 0..100 {
             let mut damaged = bytes.clone();
-            // Headers are where a wrong byte does most.
+            // A wrong byte does most harm in a header.
             let range = if round % 2 == 0 { bytes.len().min(4096) } else { bytes.len() };
             for _ in 0..=round % 4 {
                 let at = below(&mut random, range);

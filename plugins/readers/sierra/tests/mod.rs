@@ -1,5 +1,4 @@
-//! Tests of the formats, against files of the real libraries and against text made after their
-//! printed layout.
+//! Tests of the formats, with files of the real libraries and with text in their printed layout.
 #![allow(clippy::unwrap_used)]
 
 mod c_library;
@@ -12,13 +11,13 @@ mod write;
 
 use std::path::PathBuf;
 
-/// A sample shipped with the project. All but `base.csv` were written by the SEACAS IOSS library
-/// (Exodus 9.06, netCDF-C 4.9.0) from the signals of `base.csv`, ten gauges in microstrain.
+/// Path of a sample shipped with the project. All but `base.csv` were written by the SEACAS IOSS library (Exodus
+/// 9.06, netCDF-C 4.9.0) from the signals of `base.csv`, ten gauges in microstrain.
 pub(super) fn sample(name: &str) -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/samples")).join(name)
 }
 
-/// A file of the reference collection, which is not part of the project.
+/// Path of a file of the reference collection, which is not part of the project.
 pub(super) fn reference(name: &str) -> Option<PathBuf> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/reference/exodus_samples");
     let path = PathBuf::from(folder).join(name);
@@ -42,7 +41,7 @@ pub(super) fn base() -> (Vec<String>, Vec<f64>, Vec<Vec<f64>>) {
     (names, times, values)
 }
 
-/// Greatest difference of two lists of equal length.
+/// Returns the largest difference between two lists of equal length.
 pub(super) fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)

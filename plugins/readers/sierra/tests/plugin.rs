@@ -7,8 +7,8 @@ use lacuna::math::distribution::Distribution;
 use lacuna::plugin::Reader;
 use lacuna::plugin::reader::EnsembleSource;
 use lacuna::plugin::registry::{self, NoKeys};
-use lacuna::study::read::read;
-use lacuna::study::{Problems, Sources};
+use lacuna::text::read::read;
+use lacuna::text::{Problems, Sources};
 
 use super::super::Sierra;
 use super::super::probe::Probe;
@@ -97,7 +97,7 @@ fn a_gauge_may_have_its_own_probe() {
     assert!((response[100] - values[1][0]).abs() < 1e-15);
     reader.variable = None;
     let text = reader.response(&sample("hist_nc4.h"), &layout).unwrap_err().message;
-    assert!(text.contains("neither `variable` nor `sensors` says where `C` is read"), "{text}");
+    assert!(text.contains("neither `variable` nor `sensors` states where `C` is read"), "{text}");
 }
 
 #[test]
@@ -117,7 +117,7 @@ fn unfinished_and_damaged_runs_are_named() {
     let reader = Sierra { file: Some("{run}.h".into()), ..reader() };
     let complaint = ensemble(folder.path(), &reader, &layout).unwrap_err();
     for expected in [
-        "4 of 5 runs cannot be used, 0 may fail",
+        "4 of 5 runs cannot be used, and 0 may be left out",
         "`cut`: ",
         "declares 100 records",
         "do not cover the response's 1e-5 to 1e-3: an unfinished run?",
@@ -165,7 +165,7 @@ fn times_printed_with_few_digits_still_cover_the_axis() {
     assert_eq!(signal.resampled(&[1.0, 2.0, 3.0], 0.01).unwrap(), [1.0, 2.0, 3.0]);
     let text = signal.resampled(&[1.0, 2.0, 3.0], 1e-6).unwrap_err();
     assert!(text.starts_with("times go from 1.0001e0 to 2.9999e0 and do not cover"), "{text}");
-    // A value that is not finite harms only what is read from it.
+    // A value that is not finite affects only what is read from it.
     let signal = Signal { times: vec![1.0, 2.0, 3.0], values: vec![1.0, 2.0, f64::NAN] };
     assert_eq!(signal.resampled(&[1.5, 2.0], 0.0).unwrap(), [1.5, 2.0]);
     assert!(signal.resampled(&[2.5], 0.0).is_err());

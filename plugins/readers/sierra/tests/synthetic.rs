@@ -1,4 +1,4 @@
-//! Features that no sample file has, in Exodus files made here after `exodusII_int.h`.
+//! Features that no sample file has, in Exodus files made here according to `exodusII_int.h`.
 
 use std::path::{Path, PathBuf};
 
@@ -8,8 +8,7 @@ use super::super::exodus::{Exodus, Kind};
 use super::super::parts::Results;
 use super::super::probe::{GroupName, Probe};
 
-/// Two square elements side by side in the plane, each a block, over three steps of which the
-/// last was not finished.
+/// Two square elements side by side in the plane, each a block, over three steps, the last of which was not finished.
 struct Mesh {
     old_coordinates: bool,
     element_ids: [i32; 2],
@@ -39,7 +38,7 @@ impl Mesh {
             let v = file.add_variable::<i32>(format!("connect{b}"), &[one, corners]).unwrap();
             file.write_variable(v, &connect).unwrap();
         }
-        // One nodal variable, all of them in one variable as files of the nineties have it.
+        // One nodal variable, with all of them in one netCDF variable as in files of the 1990s.
         names(&mut file, "nod", length, &["velocity"]);
         let count = file.add_dimension("nodal", 1).unwrap();
         let v = file.add_variable::<f32>("vals_nod_var", &[step, count, nodes]).unwrap();

@@ -12,7 +12,7 @@ fn history() -> (Origin, History) {
     let (names, times, values) = base();
     let qa = ["lacuna", "0.1", "2022/04/15", "12:00:00"].map(str::to_owned);
     let info = vec!["short".to_owned(), "x".repeat(200)];
-    // Not in alphabetical order, which the file has to be in.
+    // Deliberately not in alphabetical order, which the file must have.
     let names = names.into_iter().rev().map(|n| format!("strain_{n}")).collect();
     let values = values.into_iter().rev().collect();
     (Origin { title: "ten gauges".into(), qa, info }, History { times, names, values })
@@ -60,7 +60,7 @@ fn impossible_histories_are_refused() {
     assert!(write(&[&long], vec![vec![0.0; 2]]).contains("1 to 256"));
 }
 
-/// Names, times and values through the C library; it also checks what the Exodus tools need.
+/// Reads names, times and values through the C library, and checks what the Exodus tools need.
 const CHECK: &str = r#"
 import sys, netCDF4
 d = netCDF4.Dataset(sys.argv[1]); d.set_auto_mask(False)

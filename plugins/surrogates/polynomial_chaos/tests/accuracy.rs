@@ -1,17 +1,18 @@
-//! Accuracy on published functions, beside figures measured with another implementation.
+//! Accuracy on published functions, compared with figures of another implementation.
 //!
-//! The bounds are the relative validation errors of a Python implementation of the same method
-//! (scikit-learn's path, UQLab's selection), one design each: unscrambled Sobol' points without the
-//! first, and one Latin hypercube. The Sobol' designs are the same points here. The Latin hypercubes
-//! are not, so that there the median of five stands against the one.
+//! The bounds are the relative validation errors of a Python implementation of the same method (scikit-learn's path,
+//! UQLab's selection) with one design each: unscrambled Sobol' points without the first, and one Latin hypercube. The
+//! Sobol' designs have the same points here. The Latin hypercubes do not, so that the median of five is compared with
+//! the single one.
+
+use lacuna::plugin::Emulator;
 
 use super::bench::{
     BOREHOLE, CIRCUIT, Function, ISHIGAMI, SOBOL_G, SOBOL_G_WEIGHTS, latin_hypercube, sobol, up_to,
 };
 use crate::surrogates::polynomial_chaos::{PolynomialChaos, QNorm, QNormRange};
-use lacuna::plugin::Emulator;
 
-/// Validation error with the Sobol' design, and the median with five Latin hypercubes.
+/// Returns the validation error with the Sobol' design, and the median with five Latin hypercubes.
 fn errors(function: &Function, options: &PolynomialChaos, n: usize) -> (f64, f64) {
     let d = function.dimension();
     let error = |unit| function.validation(&function.fit(options, &unit), 10_000);
@@ -40,7 +41,7 @@ fn ishigami_is_as_accurate_as_elsewhere() {
 #[test]
 fn the_circuit_is_as_accurate_as_elsewhere() {
     let options = PolynomialChaos { max_terms: 1300, ..up_to(1, 8) };
-    // The last: 1.3e-6 with the one design there; here five lie between 0.95e-6 and 7.6e-6.
+    // The last bound: the published error is 1.3e-6 with one design; the five designs here give 0.95e-6 to 7.6e-6.
     check(&CIRCUIT, &options, &[(100, 3.4e-5, 2.5e-5), (200, 2.5e-6, 2.0e-6)]);
 }
 
@@ -50,7 +51,7 @@ fn the_borehole_is_as_accurate_as_elsewhere() {
     check(&BOREHOLE, &options, &[(100, 3.4e-5, 1.2e-3), (200, 2.8e-5, 1.4e-4)]);
 }
 
-/// With norms adapted too, as the table's figures were found; bounds of the Sobol' designs.
+/// With adaptive norms too, as the table's figures were found; bounds of the Sobol' designs.
 #[test]
 fn every_row_of_the_table_is_reached_with_adapted_norms() {
     let q_norm = QNorm::Range(QNormRange::default());
@@ -114,8 +115,8 @@ fn moments_and_indices_of_ishigami_have_their_closed_forms() {
 
 #[test]
 fn the_leave_one_out_error_is_near_the_validation_error() {
-    // Source of the factor: the measured table above has both within a factor of 2 for 100 runs and
-    // more; its single designs are widened to 4 for five hypercubes.
+    // Source of the factor: the measured table above has both within a factor of 2 for 100 runs and more; its single
+    // designs are widened to 4 for five hypercubes.
     for seed in 0..5 {
         let fit = CIRCUIT.fit(&up_to(1, 4), &latin_hypercube(200, 6, seed));
         let ratio = fit.fit_error().relative[0] / CIRCUIT.validation(&fit, 10_000);

@@ -1,11 +1,10 @@
-//! What must hold for every fit.
+//! Properties that every fit must have.
 
-use lacuna::linalg::Matrix;
 use lacuna::math::random::{Stream, normal};
-use lacuna::plugin::Emulator;
-use lacuna::plugin::Forward;
 use lacuna::plugin::forward::Linear;
 use lacuna::plugin::surrogate::Surrogate;
+use lacuna::plugin::{Emulator, Forward};
+use lacuna_linalg::Matrix;
 
 use super::bench::{
     ISHIGAMI, fitted, latin_hypercube, monte_carlo, of_degree, scaled, sobol, up_to,
@@ -158,7 +157,7 @@ fn constant_outputs_have_their_mean_and_no_error() {
     assert!(fit.facts().iter().any(|f| f.name.contains("do not vary") && f.value == "3"));
 }
 
-/// Round-off of 1e-15 of the response's scale before the pulse is no signal, whatever the solver.
+/// Rounding errors of 1e-15 of the response's scale before the pulse are not a signal, for any solver.
 #[test]
 fn a_channel_of_round_off_has_no_error() {
     let (points, mut responses) = waves(60, 4);
@@ -190,9 +189,9 @@ fn fits_that_are_not_to_be_trusted_say_so() {
     assert_eq!(fit.summary().poor > 0, told(&fit, "no better than by their mean"));
     assert!(fit.fit_error().relative.iter().any(|e| *e >= 1.0) && fit.summary().poor > 0);
     let few = ISHIGAMI.fit(&up_to(1, 10), &sobol(50, 3));
-    assert!(told(&few, "fewer than 3 runs a term"), "{:?}", few.facts());
+    assert!(told(&few, "fewer than 3 runs per term"), "{:?}", few.facts());
     let many = ISHIGAMI.fit(&up_to(1, 10), &sobol(300, 3));
-    assert!(!told(&many, "fewer than 3 runs a term"));
+    assert!(!told(&many, "fewer than 3 runs per term"));
 }
 
 #[test]
@@ -200,7 +199,7 @@ fn the_emulator_is_its_linear_form_and_its_gradient_the_limit_of_differences() {
     let (points, responses) = waves(90, 6);
     let fit = fitted(&up_to(1, 8), &BOX, &points, &responses).unwrap();
     let linear = fit.linear().unwrap();
-    let product = lacuna::linalg::multiply(&linear.basis(&points), linear.coefficients());
+    let product = lacuna_linalg::multiply(&linear.basis(&points), linear.coefficients());
     assert_eq!(product, fit.mean(&points));
     let point = [0.4e7, 1.21e4, 1503.0];
     let jacobian = fit.jacobian(&point);

@@ -1,12 +1,12 @@
-//! Test functions, designs and short ways to fit.
+//! Test functions, designs and shortcuts to fits.
 
 use lacuna::data::{Axis, Layout, Parameter, Unit};
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, permutation, uniform};
 use lacuna::plugin::Forward;
 use lacuna::plugin::surrogate::Training;
 use lacuna::run::{Progress, Silent, Stop};
+use lacuna_linalg::Matrix;
 
 use crate::surrogates::polynomial_chaos::{Degree, DegreeRange, Expansion, PolynomialChaos, fit};
 
@@ -127,7 +127,7 @@ pub fn monte_carlo(n: usize, dimension: usize, seed: u64) -> Matrix {
     Matrix::from_fn(n, dimension, |_, _| uniform(&mut rng))
 }
 
-/// Points of the unit cube in the ranges' units.
+/// Scales points of the unit cube to physical ranges.
 pub fn scaled(unit: &Matrix, ranges: &[[f64; 2]]) -> Matrix {
     Matrix::from_fn(unit.rows(), unit.columns(), |i, j| {
         let [low, high] = ranges[j];
@@ -194,13 +194,13 @@ impl Function {
         Matrix::from_fn(points.rows(), 1, |i, _| (self.value)(points.row(i)))
     }
 
-    /// The expansion from runs at these points of the unit cube.
+    /// Fits the expansion to runs at these points of the unit cube.
     pub fn fit(&self, options: &PolynomialChaos, unit: &Matrix) -> Expansion {
         let points = scaled(unit, self.ranges);
         fitted(options, self.ranges, &points, &self.values(&points)).unwrap()
     }
 
-    /// The mean squared error on `n` random points relative to the variance there.
+    /// Returns the mean squared error on `n` random points relative to the variance there.
     pub fn validation(&self, expansion: &Expansion, n: usize) -> f64 {
         let points = scaled(&monte_carlo(n, self.dimension(), 99), self.ranges);
         let (truth, emulated) = (self.values(&points), expansion.mean(&points));

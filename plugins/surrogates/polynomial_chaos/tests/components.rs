@@ -1,9 +1,8 @@
 //! Principal components of the outputs.
 
-use lacuna::linalg::{Matrix, multiply};
-use lacuna::plugin::Emulator;
-use lacuna::plugin::Forward;
 use lacuna::plugin::forward::Linear;
+use lacuna::plugin::{Emulator, Forward};
+use lacuna_linalg::{Matrix, multiply};
 
 use super::bench::{fitted, latin_hypercube, of_degree, scaled, up_to};
 use crate::surrogates::polynomial_chaos::{Expansion, PolynomialChaos, Solver};
@@ -21,7 +20,8 @@ fn runs(n: usize, seed: u64) -> (Matrix, Matrix) {
     (scaled(&unit, &BOX), Matrix::from_fn(n, 40, |i, o| response(unit.row(i), o)))
 }
 
-/// With the same terms for all outputs a fit of all components is the fit of the outputs: least squares is linear.
+/// With the same terms for all outputs a fit of all components equals the fit of the outputs, because least squares
+/// is linear.
 #[test]
 fn all_components_are_all_outputs() {
     let (points, responses) = runs(80, 1);

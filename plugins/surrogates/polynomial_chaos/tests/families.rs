@@ -1,9 +1,9 @@
 //! Families of polynomials against their closed forms.
 
-use lacuna::linalg::Matrix;
-use lacuna::linalg::lanes::LANES;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::special::ln_gamma;
+use lacuna_linalg::Matrix;
+use lacuna_linalg::lanes::LANES;
 
 use super::bench::parameter;
 use crate::surrogates::polynomial_chaos::{Coordinate, Family, Recurrence, measure};
@@ -20,7 +20,7 @@ fn close(found: f64, expected: f64, tolerance: f64) {
     assert!((found - expected).abs() <= tolerance * expected.abs().max(1.0), "{found} {expected}");
 }
 
-/// Values and slopes of degree 2, 3, 4, 6 (as many as given), each up to its sign.
+/// Asserts values and slopes of degree 2, 3, 4, 6 (as many as given), each up to its sign.
 fn agrees(coordinate: &Coordinate, z: f64, expected: &[(usize, f64, f64)]) {
     let (mut p, mut d, mut alone) = ([0.0; 7], [0.0; 7], [0.0; 7]);
     coordinate.derivatives(z, &mut p, &mut d);
@@ -117,7 +117,8 @@ fn jacobi_polynomials_have_their_closed_form() {
 
 #[test]
 fn the_procedure_of_stieltjes_finds_the_classical_recurrences() {
-    // Source: the closed forms of the recurrences (Abramowitz and Stegun 22.7; Szegő 2.7 for the log-normal law).
+    // Source: the closed forms of the recurrences (Abramowitz and Stegun 22.7; Szegő 2.7 for the log-normal
+    // distribution).
     let degree = 12;
     for (design, centre, scale, closed) in [
         (Distribution::Uniform([2.0, 6.0]), 4.0, 2.0, Recurrence::legendre(degree)),

@@ -1,10 +1,9 @@
 //! Fits under designs that are not uniform, against closed forms.
 
-use lacuna::linalg::{Matrix, multiply_vector, vector};
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::Emulator;
-use lacuna::plugin::Forward;
 use lacuna::plugin::forward::Linear;
+use lacuna::plugin::{Emulator, Forward};
+use lacuna_linalg::{Matrix, multiply_vector, vector};
 
 use super::bench::{fitted_to, latin_hypercube, of_degree, parameters_of, sobol};
 use crate::surrogates::polynomial_chaos::{Expansion, Family, PolynomialChaos, Solver};
@@ -41,7 +40,7 @@ fn all_laws() -> Vec<Distribution> {
     ]
 }
 
-/// `y = sum a_i x_i + b x_0 x_1` of independent parameters has the mean and variance of its parts.
+/// For `y = sum a_i x_i + b x_0 x_1` with independent parameters, mean and variance follow from those of the parts.
 #[test]
 fn moments_and_indices_of_sums_have_their_closed_forms_under_every_law() {
     let laws = all_laws();

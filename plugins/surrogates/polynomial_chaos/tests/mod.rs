@@ -1,4 +1,4 @@
-//! Proof of the expansion against closed forms, slow textbook code and figures measured elsewhere.
+//! Tests of the expansion against closed forms, slow textbook code, and figures measured elsewhere.
 #![allow(clippy::unwrap_used)]
 
 mod accuracy;

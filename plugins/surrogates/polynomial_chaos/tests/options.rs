@@ -1,4 +1,4 @@
-//! The options as a study writes them.
+//! The options as written in a study.
 
 use lacuna::math::distribution::Distribution;
 

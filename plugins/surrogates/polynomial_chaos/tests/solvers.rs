@@ -1,12 +1,11 @@
 //! The solvers against planted expansions, closed forms and published figures.
 
 use lacuna::data::Parameter;
-use lacuna::linalg::Matrix;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
-use lacuna::plugin::Forward;
 use lacuna::plugin::forward::Linear;
-use lacuna::plugin::{Design, Emulator};
+use lacuna::plugin::{Design, Emulator, Forward};
+use lacuna_linalg::Matrix;
 
 use super::bench::{
     BOREHOLE, ISHIGAMI, fitted_to, latin_hypercube, of_degree, parameters, parameters_of, scaled,
@@ -26,7 +25,7 @@ const SPARSE: [Solver; 4] = [
 
 const PLANTED: [(usize, f64); 5] = [(0, 3.0), (4, -1.25), (17, 0.5), (60, 2.0), (200, -0.75)];
 
-/// The planted expansion on some points and its terms' exponents.
+/// Returns the planted expansion at some points and the exponents of its terms.
 fn planted(parameters: &[Parameter], degree: usize, points: &Matrix) -> (Matrix, Vec<Vec<u16>>) {
     let coordinate = |p| Coordinate::new(Family::Auto, p, degree).unwrap();
     let terms = of_degree(degree).nested(parameters.len(), 1.0).terms;
@@ -76,7 +75,7 @@ fn every_solver_recovers_a_planted_sparse_expansion() {
 #[test]
 fn few_terms_describe_ishigami() {
     // Source: UQLab's self-test with 150 Sobol' points and degree 10 keeps 23 terms by subspace pursuit and 20 by
-    // Bayesian compressive sensing; 17 of the 286 terms are not zero but for round-off of the truncation.
+    // Bayesian compressive sensing; 17 of the 286 terms are non-zero apart from rounding errors of the truncation.
     for (solver, least, most) in [
         (Solver::LeastAngleRegression, 12, 60),
         (Solver::OrthogonalMatchingPursuit, 12, 60),
@@ -112,7 +111,7 @@ fn norms_are_chosen_for_each_output() {
     }
 }
 
-/// The sets that are tried, against their definition.
+/// Compares the sets that are tried with their definition.
 #[test]
 fn sets_of_several_norms_are_those_of_each() {
     let options = PolynomialChaos { q_norm: QNorm::List(vec![1.0, 0.5, 0.75]), ..up_to(2, 6) };
@@ -149,7 +148,7 @@ fn quadrature_finds_polynomials_of_its_level() {
     {
         let parameters = parameters_of(&laws[..d]);
         let design = Quadrature { rule, level: Some(level), basis: Family::Auto };
-        // The message names how many nodes there are.
+        // The message contains the number of nodes.
         let count = if count > 0 {
             count
         } else {
@@ -171,7 +170,7 @@ fn quadrature_finds_polynomials_of_its_level() {
         for (x, y) in fresh.iter_rows().zip(fit.mean(&fresh).as_slice()) {
             assert!((y - response(x)).abs() < 1e-7 * (1.0 + response(x).abs()));
         }
-        // As good in another order, and refused without one node.
+        // The fit is as good with the runs in another order, and an error if a node is missing.
         let order: Vec<usize> = (0..count).map(|i| (i * 7 + 3) % count).collect();
         if count % 7 != 0 {
             let (points, responses) = (points.select_rows(&order), responses.select_rows(&order));
@@ -198,7 +197,7 @@ fn quadrature_judges_itself_like_weighted_least_squares_and_chooses_the_degree()
     let options = PolynomialChaos { solver: Solver::Quadrature, ..up_to(1, 20) };
     let fit = fitted_to(&options, &parameters, &points, &responses).unwrap();
     assert!(fit.fit_error().relative[0] < 1e-5);
-    // Tensor weights are positive: the residual without a run is the weighted fit's, really made.
+    // Tensor weights are positive: the leave-one-out residual is that of the weighted fit, here actually refitted.
     let own = Basis::new(fit.basis_coordinates(), fit.terms().clone());
     let psi = own.values(&points);
     let axes: Vec<_> = fit.basis_coordinates().iter().map(|c| c.recurrence(5)).collect();
@@ -208,7 +207,7 @@ fn quadrature_judges_itself_like_weighted_least_squares_and_chooses_the_degree()
     let root = |i: usize| rule.weights[i].sqrt();
     let a = Matrix::from_fn(124, psi.columns(), |i, t| root(keep[i]) * psi[(keep[i], t)]);
     let b = Matrix::from_fn(124, 1, |i, _| root(keep[i]) * responses[(keep[i], 0)]);
-    let solution = lacuna::linalg::least_squares(&a, &b).unwrap().solution;
+    let solution = lacuna_linalg::least_squares(&a, &b).unwrap().solution;
     let predicted: f64 =
         psi.row(left_out).iter().zip(solution.as_slice()).map(|(p, c)| p * c).sum();
     let expected = responses[(left_out, 0)] - predicted;
@@ -233,7 +232,7 @@ fn k_fold_errors_are_those_of_parts_really_left_out() {
         for fold in &folds {
             let rest: Vec<usize> = (0..90).filter(|i| !fold.contains(i)).collect();
             let (a, b) = (psi.select_rows(&rest), responses.select_rows(&rest));
-            let c = lacuna::linalg::least_squares(&a, &b).unwrap().solution;
+            let c = lacuna_linalg::least_squares(&a, &b).unwrap().solution;
             for &i in fold {
                 let model: f64 = psi.row(i).iter().zip(c.as_slice()).map(|(p, c)| p * c).sum();
                 squares += (responses[(i, 0)] - model).powi(2);

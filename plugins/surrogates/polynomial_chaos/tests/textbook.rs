@@ -1,10 +1,10 @@
-//! The same figures by slow, independent textbook code: explicit inverses, the explicit hat matrix,
-//! runs really left out, and the equiangular vector of Efron et al. (2004), section 2, literally.
+//! Figures computed by slow, independent textbook code: explicit inverses, the explicit hat matrix, runs actually
+//! left out, and the equiangular vector of Efron et al. (2004), section 2, literally.
 
-use lacuna::linalg::{Cholesky, Matrix, multiply_vector};
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::Emulator;
 use lacuna::plugin::forward::Linear;
+use lacuna_linalg::{Cholesky, Matrix, multiply_vector};
 
 use super::bench::{fitted, latin_hypercube, of_degree, scaled};
 use crate::surrogates::polynomial_chaos::bayesian::Ascent;
@@ -16,7 +16,7 @@ use crate::surrogates::polynomial_chaos::{EarlyStop, Expansion, PolynomialChaos,
 
 type Rows = Vec<Vec<f64>>;
 
-/// `A^-1` by Gauss and Jordan with row pivoting.
+/// Returns `A^-1` by Gauss-Jordan elimination with row pivoting.
 fn inverse(a: &Rows) -> Rows {
     let n = a.len();
     let mut w: Rows = (0..n)
@@ -113,7 +113,7 @@ fn fit(options: &PolynomialChaos, unit: &Matrix, responses: &Matrix) -> Expansio
     fitted(options, &BOX, &scaled(unit, &BOX), responses).unwrap()
 }
 
-/// The exponents of an output's own terms and their coefficients.
+/// Returns the exponents of an output's own terms and their coefficients.
 fn own_terms(expansion: &Expansion, output: usize) -> (Vec<Vec<u16>>, Vec<f64>) {
     let terms = expansion.terms();
     (0..terms.len())
@@ -172,8 +172,8 @@ fn leave_one_out_residuals_are_those_of_runs_really_left_out() {
     }
 }
 
-/// The order in which terms enter, from the definition: at each step the equiangular vector of the
-/// active columns through an explicit inverse, and the residual itself.
+/// Returns the order in which terms enter, from the definition: at each step the equiangular vector of the active
+/// columns through an explicit inverse, and the residual itself.
 fn slow_path(psi: &Rows, y: &[f64], steps: usize) -> Vec<usize> {
     let n = y.len();
     let standardised: Rows = transpose(psi)
@@ -277,7 +277,7 @@ fn terms_enter_in_the_order_of_the_explicit_path_when_there_are_more_terms_than_
     }
 }
 
-/// The order in which terms enter by matching pursuit, from the definition: the residual of an explicit
+/// Returns the order in which terms enter by matching pursuit, from the definition: the residual of an explicit
 /// least-squares fit at each step.
 fn slow_pursuit(psi: &Rows, y: &[f64], steps: usize) -> Vec<usize> {
     let n = y.len() as f64;
@@ -326,8 +326,8 @@ fn matching_pursuit_follows_the_explicit_one() {
     }
 }
 
-/// At its maximum the marginal likelihood `-(ln |C| + y' C^-1 y) / 2` of the weights' variances, written
-/// out, falls when any variance is changed, a term left out, or one let in.
+/// At its maximum the marginal likelihood `-(ln |C| + y' C^-1 y) / 2` of the weights' variances, computed densely,
+/// decreases if any variance is changed, a term removed, or one added.
 #[test]
 fn bayesian_sensing_ends_at_a_maximum_of_the_marginal_likelihood() {
     let (unit, responses) = runs(40);

@@ -1,0 +1,93 @@
+//! Models to whose equations a study can add terms.
+
+use lacuna_base::data::Unit;
+use lacuna_base::expression::Fault;
+use toml::{Table, Value};
+
+use super::Context;
+use super::model::{Call, EvalError};
+
+/// A model whose equations can be extended by terms.
+pub trait Amend: Send + Sync {
+    /// States to whose rates terms can be added.
+    fn states(&self, context: &Context<'_>) -> Vec<State>;
+
+    /// Unit of an expression of states, inputs, definitions and the time, with further states; `None` for zero, which
+    /// is compatible with every unit.
+    fn unit(
+        &self,
+        context: &Context<'_>,
+        expression: &str,
+        further: &[State],
+    ) -> Result<Option<Unit>, Fault>;
+
+    /// Root mean square of each expression along a run.
+    fn sizes(&self, call: &Call<'_>, expressions: &[String]) -> Result<Vec<f64>, EvalError>;
+
+    /// Inputs that are coefficients of summands of rates and nothing else: at zero the summand is absent.
+    fn factors(&self, context: &Context<'_>) -> Vec<String>;
+
+    /// Options that change when these terms are added: paths of keys and their new values.
+    fn amended(&self, additions: &[Addition]) -> Vec<Change>;
+}
+
+/// A state variable of a model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct State {
+    /// Name of the state in expressions.
+    pub name: String,
+    /// Unit of the state.
+    pub unit: Unit,
+    /// Unit of its rate; `None` if that is not expressible as a unit.
+    pub rate_unit: Option<Unit>,
+    /// Rate of the state, as an expression.
+    pub rate: String,
+    /// States on which the rate depends.
+    pub uses: Vec<String>,
+    /// Initial value, as an expression of the model's inputs.
+    pub start: String,
+}
+
+/// Terms that are added to equations.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Addition {
+    /// States with the expression that is added to their rates.
+    pub summands: Vec<(String, String)>,
+    /// Further states.
+    pub states: Vec<State>,
+}
+
+/// A changed option of a model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Change {
+    /// Keys that lead to the option from the model's section.
+    pub path: Vec<String>,
+    /// New value.
+    pub value: Value,
+}
+
+/// Options with the changes applied.
+pub fn changed(options: &Table, changes: &[Change]) -> Table {
+    let mut whole = options.clone();
+    for change in changes {
+        set(&mut whole, &change.path, &change.value);
+    }
+    whole
+}
+
+fn set(table: &mut Table, path: &[String], value: &Value) {
+    match path {
+        [] => {}
+        [key] => {
+            table.insert(key.clone(), value.clone());
+        }
+        [key, rest @ ..] => {
+            let mut inner = match table.get(key) {
+                Some(Value::Table(inner)) => inner.clone(),
+                _ => Table::new(),
+            };
+            set(&mut inner, rest, value);
+            table.insert(key.clone(), inner.into());
+        }
+    }
+}

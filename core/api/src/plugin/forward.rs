@@ -1,0 +1,88 @@
+//! Forward map of a calibration: from a study's parameters to the responses that are compared with data.
+
+use lacuna_base::matrix::Matrix;
+
+/// Map from parameters to responses: a fitted surrogate, or the model itself. Points are in physical units, one per
+/// row.
+pub trait Forward: Send + Sync {
+    /// Number of parameters.
+    fn dimension(&self) -> usize;
+
+    /// Number of outputs.
+    fn outputs(&self) -> usize;
+
+    /// Responses, `points x outputs`; a row of NaN where the map has no answer. A surrogate returns its mean.
+    fn mean(&self, points: &Matrix) -> Matrix;
+
+    /// Variance of the map itself at each point and output (`points x outputs`), if known.
+    fn variance(&self, _points: &Matrix) -> Option<Matrix> {
+        None
+    }
+
+    /// Derivative of each output by each parameter at a point, `outputs x parameters`.
+    fn jacobian(&self, point: &[f64]) -> Matrix;
+
+    /// The response at a point as [`Forward::mean`] returns it, and its [`Forward::jacobian`], to the map's own
+    /// accuracy.
+    fn mean_and_jacobian(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
+        let mean = self.mean(&Matrix::from_vec(1, point.len(), point.to_vec()));
+        (mean.into_vec(), self.jacobian(point))
+    }
+
+    /// Like [`Forward::mean_and_jacobian`], but with the derivatives by these parameters only, in this order.
+    fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
+        let (mean, jacobian) = self.mean_and_jacobian(point);
+        (mean, jacobian.select_columns(parameters))
+    }
+
+    /// The map as a linear combination of basis functions, if it has that form.
+    fn linear(&self) -> Option<&dyn Linear> {
+        None
+    }
+
+    /// Reason why the map can no longer answer; `None` while it works.
+    fn failure(&self) -> Option<String> {
+        None
+    }
+}
+
+/// A forward map `y(x) = C' psi(x)` with coefficients `C` (`terms x outputs`).
+pub trait Linear: Send + Sync {
+    /// Coefficients, `terms x outputs`.
+    fn coefficients(&self) -> &Matrix;
+
+    /// Basis functions at each point, `points x terms`.
+    fn basis(&self, points: &Matrix) -> Matrix;
+
+    /// Derivative of each basis function by each parameter at a point, `terms x parameters`.
+    fn basis_gradient(&self, point: &[f64]) -> Matrix;
+
+    /// The sum of squares `|R (psi(x), 1)|^2` as a function of the point, for a factor `R` (`any x (terms + 1)`), if
+    /// the basis has a form of it that is cheaper than the product.
+    fn sum_of_squares(&self, _factor: &Matrix) -> Option<Box<dyn SumOfSquares>> {
+        None
+    }
+}
+
+/// A sum of squares of linear combinations of basis functions.
+pub trait SumOfSquares: Send + Sync {
+    /// The sum of squares at each point, in physical units and one per row; the points must be [covered](Self::covers).
+    fn values(&self, points: &Matrix) -> Vec<f64>;
+
+    /// Derivative by each parameter at a point that is covered.
+    fn gradient(&self, point: &[f64]) -> Vec<f64>;
+
+    /// Returns true if the form is valid at a point to within its [error](Self::error).
+    fn covers(&self, point: &[f64]) -> bool;
+
+    /// Returns true if the form is valid at all of these points.
+    fn covers_all(&self, points: &Matrix) -> bool {
+        points.iter_rows().all(|point| self.covers(point))
+    }
+
+    /// Largest difference from the direct product that round-off can cause.
+    ///
+    /// An expanded sum of squares carries the round-off of its largest terms into its smallest values; the caller
+    /// compares this number with the accuracy it needs.
+    fn error(&self) -> f64;
+}

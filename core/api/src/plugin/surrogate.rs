@@ -1,0 +1,112 @@
+//! Surrogates: from simulation runs to an emulator with an estimate of its own error.
+
+use lacuna_base::data::{Layouts, Parameter};
+use lacuna_base::math::random::Stream;
+use lacuna_base::matrix::Matrix;
+use lacuna_base::run::{Progress, Stop};
+use serde::{Deserialize, Serialize};
+
+use super::{Component, Fact, Forward};
+
+/// Fits an emulator to simulation runs.
+pub trait Surrogate: Component {
+    /// Fits an emulator to all outputs.
+    fn fit(
+        &self,
+        training: &Training<'_>,
+        stream: &Stream,
+        progress: &Progress<'_>,
+    ) -> Result<Box<dyn Emulator>, Stop>;
+
+    /// Restores an emulator from the bytes that [`Emulator::save`] wrote.
+    fn load(&self, bytes: &[u8]) -> Result<Box<dyn Emulator>, Stop>;
+
+    /// The weighted sum of emulators that this surrogate fitted, with one weight per emulator and output and one offset
+    /// per output, as one emulator of the same form. `None` if the method has no such form, or these emulators cannot
+    /// be combined.
+    ///
+    /// Only the response and the sensitivity of the sum are used; its error estimates are meaningless.
+    fn sum(
+        &self,
+        _parts: &[Summand<'_>],
+        _offset: &[f64],
+    ) -> Result<Option<Box<dyn Emulator>>, Stop> {
+        Ok(None)
+    }
+}
+
+/// One term of a sum of emulators.
+#[derive(Debug, Clone, Copy)]
+pub struct Summand<'a> {
+    /// The bytes that [`Emulator::save`] wrote.
+    pub bytes: &'a [u8],
+    /// Weight of each output.
+    pub weights: &'a [f64],
+}
+
+/// Runs to which a surrogate is fitted.
+#[derive(Debug, Clone, Copy)]
+pub struct Training<'a> {
+    /// Parameters with their design distributions.
+    pub parameters: &'a [Parameter],
+    /// Layouts of the response of one run.
+    pub layouts: &'a Layouts,
+    /// Parameters of each run in physical units, `runs x parameters`.
+    pub points: &'a Matrix,
+    /// Responses, `runs x outputs`.
+    pub responses: &'a Matrix,
+}
+
+/// A fitted surrogate. Points are in physical units, one per row.
+pub trait Emulator: Forward {
+    /// Sensitivity to each parameter under the design distribution, if the method computes it exactly.
+    fn sensitivity(&self) -> Option<Sensitivity> {
+        None
+    }
+
+    /// Goodness of fit, estimated from the training runs.
+    fn fit_error(&self) -> &FitError;
+
+    /// Facts about the fit, for the report.
+    fn facts(&self) -> Vec<Fact>;
+
+    /// Serialises the emulator, for [`Surrogate::load`].
+    fn save(&self) -> Result<Vec<u8>, Stop>;
+}
+
+/// Error of a fit, estimated from its own training runs.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct FitError {
+    /// Leave-one-out mean squared error of each output divided by the output's variance over the runs (corrected for
+    /// the selection of terms if the method does so).
+    pub relative: Vec<f64>,
+    /// Leave-one-out residual of each run and output, `runs x outputs`, in the response's unit.
+    pub residuals: Matrix,
+}
+
+/// Moments of each output under the design distribution, and Sobol' indices, which are fractions of its variance. An
+/// output without variance has zero indices.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Sensitivity {
+    /// Mean of each output.
+    pub mean: Vec<f64>,
+    /// Variance of each output.
+    pub variance: Vec<f64>,
+    /// Pairs of parameters for the columns of [`Indices::pairs`].
+    pub pairs: Vec<[usize; 2]>,
+    /// Indices of each output, one per row.
+    pub outputs: Indices,
+    /// Indices of all outputs together, weighted by their variances: one row (Gamboa, Janon, Klein and Lagnoux 2014).
+    pub aggregated: Indices,
+}
+
+/// Sobol' indices, one row per output.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Indices {
+    /// First-order indices, `outputs x parameters`.
+    pub first: Matrix,
+    /// Total indices, `outputs x parameters`.
+    pub total: Matrix,
+    /// Second-order indices: the interaction of each pair beyond the first-order indices, `outputs x pairs`.
+    pub pairs: Matrix,
+}

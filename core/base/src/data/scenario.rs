@@ -1,0 +1,63 @@
+//! Known conditions of a run.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::Unit;
+
+/// Known conditions under which a response is simulated or measured, such as a beam power.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Scenario {
+    /// Name of the scenario; empty in a study with one set of conditions.
+    pub name: String,
+    /// Named constants.
+    pub values: Vec<Condition>,
+    /// Named functions of one variable, such as a measured force over time.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub functions: Vec<Arc<Function>>,
+}
+
+/// A known constant.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Condition {
+    /// Name, such as `beam_power`.
+    pub name: String,
+    /// The value, in `unit`.
+    pub value: f64,
+    /// Unit of the value; `None` for a number in the unit of the input that it sets.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<Unit>,
+}
+
+/// A function of one variable given by a table, linearly interpolated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Function {
+    /// Name, such as `force`.
+    pub name: String,
+    /// Nodes: values of the variable, strictly increasing.
+    pub at: Vec<f64>,
+    /// Unit of the variable.
+    pub at_unit: Unit,
+    /// Value of the function at each node.
+    pub values: Vec<f64>,
+    /// Unit of the function's values.
+    pub unit: Unit,
+}
+
+impl Scenario {
+    /// Name of the scenario; `None` if it is empty.
+    pub fn label(&self) -> Option<&str> {
+        (!self.name.is_empty()).then_some(&self.name)
+    }
+
+    /// The constant with this name.
+    pub fn value(&self, name: &str) -> Option<&Condition> {
+        self.values.iter().find(|condition| condition.name == name)
+    }
+
+    /// The function with this name.
+    pub fn function(&self, name: &str) -> Option<&Function> {
+        self.functions.iter().map(AsRef::as_ref).find(|function| function.name == name)
+    }
+}

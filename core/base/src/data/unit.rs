@@ -1,0 +1,291 @@
+//! Units as people write them: `kg/m3`, `m/s^2`, `microstrain`, `1/s`.
+//!
+//! Names, symbols and prefixes follow the SI brochure (BIPM, 9th edition, 2019, tables 1 to 8). Powers of ten are
+//! stored separately from other factors, so that `g/cm3` is exactly 1000 `kg/m3`.
+
+use std::borrow::Cow;
+use std::fmt::{self, Display};
+use std::ops::Range;
+use std::str::FromStr;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::de::{self, Deserializer};
+use serde::{Deserialize, Serialize, Serializer};
+
+mod parse;
+mod symbols;
+
+/// Number of base quantities: length, mass, time, current, temperature, amount, intensity.
+const BASES: usize = 7;
+
+/// A unit of measurement: the text as written and its meaning.
+#[derive(Clone, Debug)]
+pub struct Unit {
+    text: String,
+    meaning: Meaning,
+}
+
+/// A unit as a multiple of the coherent SI unit of its dimension.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Meaning {
+    /// Conversion factor without its powers of ten.
+    factor: f64,
+    /// Power of ten of the conversion factor.
+    decimals: i32,
+    /// Offset added after multiplication, in the SI unit; nonzero for `degC` only.
+    offset: f64,
+    /// Exponents of the base quantities, in sixths, so that square and cube roots are exact.
+    sixths: [i16; BASES],
+}
+
+impl Meaning {
+    const ONE: Self = Self { factor: 1.0, decimals: 0, offset: 0.0, sixths: [0; BASES] };
+
+    fn times(self, other: Self) -> Self {
+        let mut sixths = self.sixths;
+        for (sum, term) in sixths.iter_mut().zip(other.sixths) {
+            *sum += term;
+        }
+        Self {
+            factor: self.factor * other.factor,
+            decimals: self.decimals + other.decimals,
+            offset: 0.0,
+            sixths,
+        }
+    }
+
+    /// The unit raised to the power `sixths / 6`; `None` if an exponent of the result is not a multiple of 1/6.
+    fn power(self, sixths: i16) -> Option<Self> {
+        let scale = |exponent: i32| {
+            let product = exponent.checked_mul(i32::from(sixths))?;
+            (product % 6 == 0).then_some(product / 6)
+        };
+        let mut exponents = [0; BASES];
+        for (result, exponent) in exponents.iter_mut().zip(self.sixths) {
+            *result = i16::try_from(scale(i32::from(exponent))?).ok()?;
+        }
+        let power = f64::from(sixths) / 6.0;
+        let (decimals, rest) = match scale(self.decimals) {
+            Some(decimals) => (decimals, 1.0),
+            None => (0, 10f64.powf(f64::from(self.decimals) * power)),
+        };
+        let factor = if sixths % 6 == 0 {
+            self.factor.powi(i32::from(sixths / 6))
+        } else {
+            self.factor.powf(power)
+        };
+        Some(Self { factor: factor * rest, decimals, offset: 0.0, sixths: exponents })
+    }
+}
+
+/// Error: the text is not a unit.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}", self.sentence())]
+pub struct UnitError {
+    /// The whole text.
+    pub text: String,
+    /// Byte range of the text that is wrong.
+    pub range: Range<usize>,
+    /// Description of the fault.
+    pub message: String,
+    /// The known symbol closest to the wrong one, if any.
+    pub nearest: Option<String>,
+}
+
+impl UnitError {
+    /// The error in the form in which decoding errors state what was expected and what was found.
+    fn sentence(&self) -> String {
+        let help = match &self.nearest {
+            Some(near) => format!("{}; did you mean `{near}`?", self.message),
+            None => self.message.clone(),
+        };
+        format!("expected a unit such as `m/s2`, found {:?}; help: {help}", self.text)
+    }
+}
+
+impl Unit {
+    /// Parses a unit.
+    ///
+    /// Products are written with a space, `*`, `·` or `.`; quotients with `/`; powers as `s2`, `s^2`, `s²`, `s^-2`,
+    /// `Hz^0.5` or `Hz^(1/2)`. More than one factor after `/` needs parentheses: `J/(kg K)`. The empty text and `1` are
+    /// the dimensionless unit.
+    ///
+    /// # Errors
+    /// If the text is not a unit: the byte range at fault, and the closest known symbol.
+    pub fn parse(text: &str) -> Result<Self, UnitError> {
+        Ok(Self { text: text.trim().to_owned(), meaning: parse::parse(text)? })
+    }
+
+    /// The dimensionless unit.
+    pub fn dimensionless() -> Self {
+        Self { text: "1".to_owned(), meaning: Meaning::ONE }
+    }
+
+    /// The unit as written.
+    pub fn as_str(&self) -> &str {
+        &self.text
+    }
+
+    /// Returns true if both units measure the same quantity.
+    pub fn same_dimension(&self, other: &Self) -> bool {
+        self.meaning.sixths == other.meaning.sixths
+    }
+
+    /// Returns true if the unit has no dimension, such as `%`, `rad` or `microstrain`.
+    pub fn is_dimensionless(&self) -> bool {
+        self.meaning.sixths == [0; BASES]
+    }
+
+    /// Product of two units; `None` if one of them has an offset (`degC`).
+    pub fn times(&self, other: &Self) -> Option<Self> {
+        if [self, other].iter().any(|unit| unit.meaning.offset != 0.0) {
+            return None;
+        }
+        let text = match [self, other].map(|unit| unit.text.as_str()) {
+            ["" | "1", text] | [text, "" | "1"] => text.to_owned(),
+            both => both.map(in_parentheses).join(" "),
+        };
+        Some(Self { text, meaning: self.meaning.times(other.meaning) })
+    }
+
+    /// Power of the unit; `None` if an exponent of the result is not a multiple of 1/6, or if the unit has an offset
+    /// (`degC`).
+    pub fn power(&self, exponent: f64) -> Option<Self> {
+        let sixths = 6.0 * exponent;
+        let fits = sixths.fract() == 0.0 && sixths.abs() <= 120.0 && self.meaning.offset == 0.0;
+        let meaning = self.meaning.power(fits.then_some(sixths as i16)?)?;
+        let text = if exponent == 1.0 || matches!(self.text.as_str(), "" | "1") {
+            self.text.clone()
+        } else {
+            format!("{}^{}", in_parentheses(&self.text), exponent_text(sixths as i16))
+        };
+        Some(Self { text, meaning })
+    }
+
+    /// The shortest form of a coherent unit, such as `m/s2` for `(m/s) (s^-1)`; other units are returned unchanged.
+    #[must_use]
+    pub fn plain(self) -> Self {
+        const SYMBOLS: [&str; BASES] = ["m", "kg", "s", "A", "K", "mol", "cd"];
+        let power = |(symbol, sixths): (&&str, i16)| match (sixths / 6, sixths % 6) {
+            (1, 0) => (*symbol).to_owned(),
+            (whole, 0) => format!("{symbol}{whole}"),
+            _ => format!("{symbol}^{}", exponent_text(sixths)),
+        };
+        let factors = |sign: i16| -> Vec<String> {
+            let all = SYMBOLS.iter().zip(self.meaning.sixths.map(|sixths| sign * sixths));
+            // Mass comes first, as in kg/m3.
+            let (mass, rest): (Vec<_>, Vec<_>) =
+                all.filter(|(_, sixths)| *sixths > 0).partition(|(symbol, _)| **symbol == "kg");
+            mass.into_iter().chain(rest).map(power).collect()
+        };
+        let (above, below) = (factors(1), factors(-1));
+        let above = if above.is_empty() { "1".to_owned() } else { above.join(" ") };
+        let text = match &below[..] {
+            [] => above,
+            [one] => format!("{above}/{one}"),
+            several => format!("{above}/({})", several.join(" ")),
+        };
+        Self::parse(&text).ok().filter(|plain| *plain == self).unwrap_or(self)
+    }
+
+    /// Factor that converts a number in this unit to the other unit.
+    ///
+    /// `None` if the dimensions differ, or if the zero points do (`degC` and `K`).
+    pub fn factor_to(&self, other: &Self) -> Option<f64> {
+        let (from, to) = (&self.meaning, &other.meaning);
+        if !self.same_dimension(other) || from.offset != to.offset {
+            return None;
+        }
+        // Powers of ten up to 10^22 are exact in f64, so a negative power is applied as a division: 10^-3 itself is
+        // rounded.
+        let factor = from.factor / to.factor;
+        Some(match from.decimals - to.decimals {
+            up @ 0.. => factor * 10f64.powi(up),
+            down => factor / 10f64.powi(-down),
+        })
+    }
+
+    /// Converts a number from this unit to the other, including the offset of `degC`; `None` if the dimensions differ.
+    pub fn convert(&self, x: f64, other: &Self) -> Option<f64> {
+        if let Some(factor) = self.factor_to(other) {
+            return Some(x * factor);
+        }
+        let si = |unit: &Self| unit.meaning.factor * 10f64.powi(unit.meaning.decimals);
+        self.same_dimension(other)
+            .then(|| (x * si(self) + self.meaning.offset - other.meaning.offset) / si(other))
+    }
+}
+
+/// Text of an exponent given in sixths, in lowest terms: `2`, `(1/2)`, `(-2/3)`.
+fn exponent_text(sixths: i16) -> String {
+    let common = [6, 3, 2, 1].into_iter().find(|divisor| sixths % divisor == 0).unwrap_or(1);
+    match (sixths / common, 6 / common) {
+        (whole, 1) => whole.to_string(),
+        (above, below) => format!("({above}/{below})"),
+    }
+}
+
+/// Text of a unit as a factor of a product or the base of a power: in parentheses unless it is a single symbol.
+fn in_parentheses(text: &str) -> String {
+    if text.chars().all(|c| c.is_alphabetic() || c == '%') {
+        text.to_owned()
+    } else {
+        format!("({text})")
+    }
+}
+
+impl PartialEq for Unit {
+    /// Units are equal if they mean the same, however they are written.
+    fn eq(&self, other: &Self) -> bool {
+        self.factor_to(other) == Some(1.0)
+    }
+}
+
+impl Default for Unit {
+    fn default() -> Self {
+        Self::dimensionless()
+    }
+}
+
+impl Display for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&self.text)
+    }
+}
+
+impl FromStr for Unit {
+    type Err = UnitError;
+
+    fn from_str(text: &str) -> Result<Self, UnitError> {
+        Self::parse(text)
+    }
+}
+
+impl Serialize for Unit {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&self.text)
+    }
+}
+
+impl<'de> Deserialize<'de> for Unit {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Self::parse(&String::deserialize(deserializer)?).map_err(de::Error::custom)
+    }
+}
+
+impl JsonSchema for Unit {
+    fn schema_name() -> Cow<'static, str> {
+        "Unit".into()
+    }
+
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "string", "examples": ["kg/m3", "m/s2", "microstrain", "1"] })
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,181 @@
+//! Probability distributions that a study can name.
+//!
+//! A distribution is written as a table with one key, such as `{ uniform = [0, 1.5e6] }`. A distribution read from a
+//! study has been checked; [`Distribution::check`] does the same for one made in code.
+
+mod density;
+mod probability;
+mod summary;
+mod written;
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// A distribution of one number, in the unit of that number.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Distribution {
+    /// Uniform on an interval: `[lower bound, upper bound]`.
+    Uniform([f64; 2]),
+    /// Normal: `[mean, standard deviation]`.
+    Normal([f64; 2]),
+    /// The absolute value of a normal variable with mean zero. The number is the standard deviation of that normal
+    /// distribution; the mean of the half-normal one is 0.798 times and its own standard deviation 0.603 times as
+    /// large.
+    HalfNormal(f64),
+    /// Log-normal: `[mu, sigma]`, the mean and the standard deviation of the logarithm.
+    LogNormal([f64; 2]),
+    /// The logarithm is uniform: `[lower bound, upper bound]`, both above zero.
+    LogUniform([f64; 2]),
+    /// Gamma: `[shape, scale]`, with mean shape times scale.
+    Gamma([f64; 2]),
+    /// Inverse gamma: `[shape, scale]`, with mean scale / (shape - 1) if the shape exceeds one.
+    InverseGamma([f64; 2]),
+    /// Beta on an interval: `[a, b, lower bound, upper bound]`, or `[a, b]` on (0, 1).
+    Beta(#[schemars(schema_with = "written::beta_schema")] [f64; 4]),
+    /// Exponential: the mean.
+    Exponential(f64),
+    /// Student's t: `[degrees of freedom, location, scale]`.
+    StudentT([f64; 3]),
+    /// Normal truncated to bounds, which may be infinite: `[mean, standard deviation, lower bound, upper bound]`, the
+    /// first two before truncation.
+    TruncatedNormal([f64; 4]),
+    /// Triangular: `[lower bound, mode, upper bound]`.
+    Triangular([f64; 3]),
+}
+
+impl Distribution {
+    /// Name that a study uses, such as `half_normal`.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Uniform(_) => "uniform",
+            Self::Normal(_) => "normal",
+            Self::HalfNormal(_) => "half_normal",
+            Self::LogNormal(_) => "log_normal",
+            Self::LogUniform(_) => "log_uniform",
+            Self::Gamma(_) => "gamma",
+            Self::InverseGamma(_) => "inverse_gamma",
+            Self::Beta(_) => "beta",
+            Self::Exponential(_) => "exponential",
+            Self::StudentT(_) => "student_t",
+            Self::TruncatedNormal(_) => "truncated_normal",
+            Self::Triangular(_) => "triangular",
+        }
+    }
+
+    /// Parameters in the order in which a study writes them.
+    pub fn numbers(&self) -> &[f64] {
+        match self {
+            Self::Uniform(n)
+            | Self::Normal(n)
+            | Self::LogNormal(n)
+            | Self::LogUniform(n)
+            | Self::Gamma(n)
+            | Self::InverseGamma(n) => n,
+            Self::HalfNormal(n) | Self::Exponential(n) => std::slice::from_ref(n),
+            Self::Beta(n) | Self::TruncatedNormal(n) => n,
+            Self::StudentT(n) | Self::Triangular(n) => n,
+        }
+    }
+
+    /// Checks that the parameters are valid.
+    ///
+    /// # Errors
+    /// What was expected and what was found.
+    pub fn check(&self) -> Result<(), String> {
+        let numbers = self.numbers();
+        let complain = |expected: &str| {
+            let found = match numbers {
+                [x] => written::number(*x),
+                _ => written::in_brackets(numbers),
+            };
+            Err(format!("expected {expected}, found {found}"))
+        };
+        let bounds = if let Self::TruncatedNormal(n) = self { &n[2..] } else { &[][..] };
+        let rest = &numbers[..numbers.len() - bounds.len()];
+        if rest.iter().any(|x| !x.is_finite()) || bounds.iter().any(|x| x.is_nan()) {
+            return complain("finite numbers");
+        }
+        match *self {
+            Self::Uniform([lo, hi]) if lo >= hi => complain("the lower bound below the upper"),
+            Self::Uniform([lo, hi]) if !(hi - lo).is_finite() => complain("a narrower interval"),
+            Self::Normal([_, sd]) if sd <= 0.0 => complain("a standard deviation above zero"),
+            Self::HalfNormal(scale) if scale <= 0.0 => complain("a scale above zero"),
+            Self::LogNormal([_, sigma]) if sigma <= 0.0 => complain("a sigma above zero"),
+            Self::LogUniform([lo, _]) if lo <= 0.0 => complain("bounds above zero"),
+            Self::LogUniform([lo, hi]) if lo >= hi => complain("the lower bound below the upper"),
+            Self::Gamma([shape, scale]) | Self::InverseGamma([shape, scale])
+                if shape <= 0.0 || scale <= 0.0 =>
+            {
+                complain("a shape and a scale above zero")
+            }
+            Self::Beta([a, b, _, _]) if a <= 0.0 || b <= 0.0 => complain("a and b above zero"),
+            Self::Beta([_, _, lo, hi]) if lo >= hi => complain("the lower bound below the upper"),
+            Self::Exponential(mean) if mean <= 0.0 => complain("a mean above zero"),
+            Self::StudentT([dof, _, scale]) if dof <= 0.0 || scale <= 0.0 => {
+                complain("degrees of freedom and a scale above zero")
+            }
+            Self::TruncatedNormal([_, sd, _, _]) if sd <= 0.0 => {
+                complain("a standard deviation above zero")
+            }
+            Self::TruncatedNormal([_, _, lo, hi])
+                if lo >= hi || lo == f64::INFINITY || hi == f64::NEG_INFINITY =>
+            {
+                complain("the lower bound below the upper")
+            }
+            // Beyond that distance the law is exponential at its bound, and its parameters are lost to rounding.
+            Self::TruncatedNormal([mean, sd, lo, hi])
+                if lo - mean > 1000.0 * sd || mean - hi > 1000.0 * sd =>
+            {
+                complain("bounds at most 1000 standard deviations from the mean")
+            }
+            Self::Triangular([lo, mode, hi]) if !(lo <= mode && mode <= hi && lo < hi) => {
+                complain("the mode between a lower and a higher bound")
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for Distribution {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let n = |x: f64| written::number(x);
+        match *self {
+            Self::Uniform([lo, hi]) => write!(f, "uniform on [{}, {}]", n(lo), n(hi)),
+            Self::Normal([mean, sd]) => write!(f, "normal, mean {}, sd {}", n(mean), n(sd)),
+            Self::HalfNormal(scale) => write!(f, "half-normal of scale {}", n(scale)),
+            Self::LogNormal([mu, sigma]) => {
+                write!(f, "log-normal, logarithm of mean {}, sd {}", n(mu), n(sigma))
+            }
+            Self::LogUniform([lo, hi]) => write!(f, "log-uniform on [{}, {}]", n(lo), n(hi)),
+            Self::Gamma([shape, scale]) => {
+                write!(f, "gamma of shape {}, scale {}", n(shape), n(scale))
+            }
+            Self::InverseGamma([shape, scale]) => {
+                write!(f, "inverse gamma of shape {}, scale {}", n(shape), n(scale))
+            }
+            Self::Beta([a, b, lo, hi]) => {
+                write!(f, "beta ({}, {}) on [{}, {}]", n(a), n(b), n(lo), n(hi))
+            }
+            Self::Exponential(mean) => write!(f, "exponential of mean {}", n(mean)),
+            Self::StudentT([dof, location, scale]) => write!(
+                f,
+                "Student t with {} degrees of freedom, location {}, scale {}",
+                n(dof),
+                n(location),
+                n(scale)
+            ),
+            Self::TruncatedNormal([mean, sd, lo, hi]) => {
+                write!(f, "normal, mean {}, sd {}, kept in [{}, {}]", n(mean), n(sd), n(lo), n(hi))
+            }
+            Self::Triangular([lo, mode, hi]) => {
+                write!(f, "triangular on [{}, {}], mode {}", n(lo), n(hi), n(mode))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,165 @@
+//! Distribution functions, quantiles and draws.
+
+use rand::Rng;
+
+use super::Distribution;
+use crate::math::random::uniform;
+use crate::math::special::{
+    HALF_LN_TWO_PI, beta_tails, gamma_tails, inverse_beta, inverse_erf, inverse_gamma_tails,
+    ln_normal_between, ln_normal_cdf, ln_normal_from, ln_sum_exp, normal_cdf, normal_quantile,
+    normal_quantile_of_ln,
+};
+
+impl Distribution {
+    /// Probability of a value at or below `x`.
+    pub fn cdf(&self, x: f64) -> f64 {
+        let (lo, hi) = self.support();
+        if x.is_nan() {
+            return f64::NAN;
+        }
+        if x <= lo {
+            return 0.0;
+        }
+        if x >= hi {
+            return 1.0;
+        }
+        match *self {
+            Self::Uniform([lo, hi]) => (x - lo) / (hi - lo),
+            Self::Normal([mean, sd]) => normal_cdf((x - mean) / sd),
+            Self::HalfNormal(scale) => libm::erf(x / scale * std::f64::consts::FRAC_1_SQRT_2),
+            Self::LogNormal([mu, sigma]) => normal_cdf((x.ln() - mu) / sigma),
+            Self::LogUniform([lo, hi]) => ln_ratio(lo, x) / ln_ratio(lo, hi),
+            Self::Gamma([shape, scale]) => gamma_tails(shape, x / scale).0.exp(),
+            Self::InverseGamma([shape, scale]) => gamma_tails(shape, scale / x).1.exp(),
+            Self::Beta([a, b, lo, hi]) => {
+                beta_tails(a, b, (x - lo) / (hi - lo), (hi - x) / (hi - lo)).0.exp()
+            }
+            Self::Exponential(mean) => -(-x / mean).exp_m1(),
+            Self::StudentT([dof, location, scale]) => student_cdf(dof, (x - location) / scale),
+            Self::TruncatedNormal([mean, sd, lo, hi]) => {
+                // Near the lower bound the distance from it is known to more digits than `x` itself.
+                let (a, z, width) = ((lo - mean) / sd, (x - mean) / sd, (x - lo) / sd);
+                let below =
+                    if width < 1.0 { ln_normal_from(a, width) } else { ln_normal_between(a, z) };
+                (below - ln_normal_between((lo - mean) / sd, (hi - mean) / sd)).exp().min(1.0)
+            }
+            Self::Triangular([lo, mode, hi]) if x <= mode => {
+                (x - lo) * (x - lo) / ((hi - lo) * (mode - lo))
+            }
+            Self::Triangular([lo, mode, hi]) => {
+                1.0 - (hi - x) * (hi - x) / ((hi - lo) * (hi - mode))
+            }
+        }
+    }
+
+    /// Quantile: the value at or below which a draw lies with probability `p`; NaN unless `0 <= p <= 1`.
+    pub fn quantile(&self, p: f64) -> f64 {
+        if !(0.0..=1.0).contains(&p) {
+            return f64::NAN;
+        }
+        let (lo, hi) = self.support();
+        if p == 0.0 {
+            return lo;
+        }
+        if p == 1.0 {
+            return hi;
+        }
+        let q = 1.0 - p;
+        let x = match *self {
+            // A convex combination instead of `lo + p (hi - lo)`: it is monotone, and exact at both ends.
+            Self::Uniform([lo, hi]) => lo * q + hi * p,
+            Self::Normal([mean, sd]) => mean + sd * normal_quantile(p),
+            Self::HalfNormal(scale) => scale * std::f64::consts::SQRT_2 * inverse_erf(p),
+            Self::LogNormal([mu, sigma]) => (mu + sigma * normal_quantile(p)).exp(),
+            Self::LogUniform([lo, hi]) => log_uniform_quantile(lo, hi, p),
+            Self::Gamma([shape, scale]) => scale * inverse_gamma_tails(shape, p, q),
+            Self::InverseGamma([shape, scale]) => scale / inverse_gamma_tails(shape, q, p),
+            Self::Beta([a, b, lo, hi]) => {
+                let (x, y) = inverse_beta(a, b, p, q);
+                if x <= 0.5 { lo + (hi - lo) * x } else { hi - (hi - lo) * y }
+            }
+            Self::Exponential(mean) => -mean * (-p).ln_1p(),
+            Self::StudentT([dof, location, scale]) => location + scale * student_quantile(dof, p),
+            Self::TruncatedNormal([mean, sd, lo, hi]) => {
+                let (a, b) = ((lo - mean) / sd, (hi - mean) / sd);
+                let z = truncated_quantile(a, b, p, q);
+                if p <= q && z - a < 1.0 {
+                    lo + sd * offset_from_bound(a, b, z - a, p)
+                } else if p > q && b - z < 1.0 {
+                    hi - sd * offset_from_bound(-b, -a, b - z, q)
+                } else {
+                    mean + sd * z
+                }
+            }
+            Self::Triangular([lo, mode, hi]) if p * (hi - lo) <= mode - lo => {
+                lo + (p * (hi - lo) * (mode - lo)).sqrt()
+            }
+            Self::Triangular([lo, mode, hi]) => hi - (q * (hi - lo) * (hi - mode)).sqrt(),
+        };
+        x.clamp(lo, hi)
+    }
+
+    /// One draw: the quantile of one uniform number, so that each draw consumes the same amount of the stream.
+    pub fn sample(&self, rng: &mut impl Rng) -> f64 {
+        self.quantile(uniform(rng))
+    }
+}
+
+/// `ln(x / lo)`: near the lower bound the difference keeps the digits that the ratio loses.
+pub(super) fn ln_ratio(lo: f64, x: f64) -> f64 {
+    let excess = (x - lo) / lo;
+    if excess.is_finite() { excess.ln_1p() } else { x.ln() - lo.ln() }
+}
+
+fn log_uniform_quantile(lo: f64, hi: f64, p: f64) -> f64 {
+    let factor = (p * ln_ratio(lo, hi)).exp();
+    if factor.is_finite() { lo * factor } else { ((1.0 - p) * lo.ln() + p * hi.ln()).exp() }
+}
+
+fn student_cdf(dof: f64, t: f64) -> f64 {
+    // For large t, dividing keeps the degrees of freedom from being lost beside t^2.
+    let r = t / dof.sqrt();
+    let (x, y) = if r.abs() > 1.0 {
+        let s = 1.0 / (r * r);
+        (s / (1.0 + s), 1.0 / (1.0 + s))
+    } else {
+        (1.0 / (1.0 + r * r), r * r / (1.0 + r * r))
+    };
+    let (outside, _) = beta_tails(0.5 * dof, 0.5, x, y);
+    let tail = 0.5 * outside.exp();
+    if t < 0.0 { tail } else { 1.0 - tail }
+}
+
+fn student_quantile(dof: f64, p: f64) -> f64 {
+    let tail = p.min(1.0 - p);
+    let (x, y) = inverse_beta(0.5 * dof, 0.5, 2.0 * tail, (1.0 - 2.0 * p).abs());
+    let t = dof.sqrt() * (y / x).sqrt();
+    if p < 0.5 { -t } else { t }
+}
+
+/// Quantile of a standard normal variable truncated to `a` and `b`, computed with logarithms in the tail that contains
+/// the interval.
+fn truncated_quantile(a: f64, b: f64, p: f64, q: f64) -> f64 {
+    if a > 0.0 {
+        return -truncated_quantile(-b, -a, q, p);
+    }
+    let inside = ln_normal_between(a, b);
+    let below = ln_sum_exp(ln_normal_cdf(a), inside + p.ln());
+    let above = ln_sum_exp(ln_normal_cdf(-b), inside + q.ln());
+    if below <= above { normal_quantile_of_ln(below) } else { -normal_quantile_of_ln(above) }
+}
+
+/// Distance from the lower bound `a`, refined by Newton steps in its logarithm: near a bound the distance is known to
+/// more digits than the quantile.
+fn offset_from_bound(a: f64, b: f64, start: f64, p: f64) -> f64 {
+    let target = ln_normal_between(a, b) + p.ln();
+    let ln_density = |z: f64| -0.5 * z * z - HALF_LN_TWO_PI;
+    let linear = (target - ln_density(a)).exp();
+    let mut offset = if start > 1e-6 { start } else { linear };
+    for _ in 0..3 {
+        let value = ln_normal_from(a, offset);
+        let slope = (ln_density(a + offset) - value).exp() * offset;
+        offset *= ((target - value) / slope).exp();
+    }
+    if offset.is_finite() { offset } else { start }
+}

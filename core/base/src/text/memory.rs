@@ -1,0 +1,59 @@
+//! Memory that sizes in a study would need.
+
+/// Largest amount of memory, in bytes, that a study may ask for on any machine: one tebibyte.
+pub const MOST: f64 = 1_099_511_627_776.0;
+/// Size of a number in bytes.
+pub const NUMBER: f64 = 8.0;
+
+/// An amount of memory as text.
+pub fn amount(bytes: f64) -> String {
+    const UNITS: [&str; 9] = ["bytes", "kB", "MB", "GB", "TB", "PB", "EB", "ZB", "YB"];
+    let thousands = (bytes.max(1.0).log10() / 3.0).floor().clamp(0.0, UNITS.len() as f64 - 1.0);
+    let value = bytes / 1000.0_f64.powf(thousands);
+    let digits = usize::from(value < 10.0);
+    format!("{value:.digits$} {}", UNITS[thousands as usize])
+}
+
+/// Checks the number of positions along an axis.
+///
+/// # Errors
+/// Reason why the axis cannot have this many positions.
+pub fn axis(count: usize) -> Result<(), String> {
+    let bytes = NUMBER * count as f64;
+    if bytes <= MOST {
+        return Ok(());
+    }
+    let (needed, most) = (amount(bytes), MOST / NUMBER);
+    Err(format!(
+        "expected a `count` of at most {most}, found {count}, which needs {needed} of memory"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn amounts_are_written_for_people() {
+        for (bytes, text) in [
+            (1.0, "1.0 bytes"),
+            (8e3, "8.0 kB"),
+            (2.5e10, "25 GB"),
+            (1.1e12, "1.1 TB"),
+            (4e27, "4000 YB"),
+        ] {
+            assert_eq!(amount(bytes), text);
+        }
+    }
+
+    #[test]
+    fn axes_have_an_end() {
+        assert_eq!(axis(1_000_000_000), Ok(()));
+        assert_eq!(
+            axis(1_000_000_000_000),
+            Err("expected a `count` of at most 137438953472, found 1000000000000, \
+                 which needs 8.0 TB of memory"
+                .to_owned())
+        );
+    }
+}

@@ -1,0 +1,211 @@
+//! Section `[response]` as written: name, unit and axes.
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::de::{self, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Serialize, Serializer};
+
+use super::memory;
+use super::values::{Count, Name};
+use crate::data::{Axis, Unit};
+
+/// Quantity that the model returns and the experiment measures.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ResponseSection {
+    /// Name of the response, such as `strain`.
+    pub name: Name,
+    /// Unit of its values.
+    #[serde(default = "Unit::dimensionless")]
+    pub unit: Unit,
+    /// Axes, slowest-varying first; omit for a single number.
+    #[serde(default)]
+    pub axes: Axes,
+}
+
+/// Named axes in the order in which they are written.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Axes(pub Vec<(Name, AxisSection)>);
+
+/// One axis: a list of labels, or a grid of numbers with a unit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum AxisSection {
+    /// Labels, such as the names of sensors.
+    Labels(Vec<String>),
+    /// Numbers with a unit, such as times.
+    Grid(GridSection),
+}
+
+/// An axis of increasing numbers: `first`, `last` and `count`, or `values`, or those of the measurements.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GridSection {
+    /// First number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first: Option<f64>,
+    /// Last number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub last: Option<f64>,
+    /// Number of equally spaced numbers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub count: Option<Count>,
+    /// The numbers themselves, increasing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub values: Option<Vec<f64>>,
+    /// Set to true to take the numbers at which the scenario was measured, from its file.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub measured: bool,
+    /// Unit of the numbers.
+    #[serde(default = "Unit::dimensionless")]
+    pub unit: Unit,
+}
+
+impl GridSection {
+    /// The numbers of the axis; `measured` gives those of the measurements.
+    ///
+    /// # Errors
+    /// A description of what is wrong with them.
+    pub fn numbers(
+        &self,
+        measured: impl FnOnce(&Unit) -> Result<Vec<f64>, String>,
+    ) -> Result<Vec<f64>, String> {
+        let numbers = match (self.first, self.last, self.count, &self.values, self.measured) {
+            (None, None, None, None, true) => measured(&self.unit)?,
+            (None, None, None, Some(values), false) => values.clone(),
+            (Some(first), Some(last), Some(count), None, false) => {
+                memory::axis(count.get())?;
+                evenly(first, last, count.get())
+            }
+            _ => {
+                let ways =
+                    "expected `first`, `last` and `count`, or `values`, or `measured = true`";
+                return Err(ways.to_owned());
+            }
+        };
+        match numbers
+            .windows(2)
+            .find(|pair| pair[0].partial_cmp(&pair[1]) != Some(std::cmp::Ordering::Less))
+        {
+            Some(pair) => {
+                Err(format!("expected increasing numbers, found {} before {}", pair[0], pair[1]))
+            }
+            None if numbers.is_empty() => {
+                Err("expected at least one number, found none".to_owned())
+            }
+            None => Ok(numbers),
+        }
+    }
+}
+
+/// Equally spaced numbers, each computed from the ends, so that rounding errors do not accumulate.
+fn evenly(first: f64, last: f64, count: usize) -> Vec<f64> {
+    let place = |i: usize| {
+        let share = if count > 1 { i as f64 / (count as f64 - 1.0) } else { 0.0 };
+        // Rounding to 12 decimals makes grids such as 1e-5, 2e-5, … come out as written.
+        let plain = first + (last - first) * share;
+        format!("{plain:.12e}").parse().unwrap_or(plain)
+    };
+    (0..count).map(place).collect()
+}
+
+impl AxisSection {
+    /// The axis; `measured` gives the numbers of the measurements in a unit.
+    ///
+    /// # Errors
+    /// A description of what is wrong with it.
+    pub fn axis(
+        &self,
+        name: &str,
+        measured: impl FnOnce(&Unit) -> Result<Vec<f64>, String>,
+    ) -> Result<Axis, String> {
+        match self {
+            Self::Labels(labels) => {
+                if labels.is_empty() {
+                    return Err("expected at least one label, found none".to_owned());
+                }
+                match labels.iter().enumerate().find(|(i, label)| labels[..*i].contains(label)) {
+                    Some((_, twice)) => {
+                        Err(format!("expected different labels, found `{twice}` twice"))
+                    }
+                    None => Ok(Axis::labels(name, labels.iter().cloned())),
+                }
+            }
+            Self::Grid(grid) => Ok(Axis::grid(name, grid.numbers(measured)?, grid.unit.clone())),
+        }
+    }
+}
+
+impl Serialize for Axes {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(name, axis)| (name.as_str(), axis)))
+    }
+}
+
+impl<'de> Deserialize<'de> for Axes {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Entries;
+        impl<'de> Visitor<'de> for Entries {
+            type Value = Axes;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a table of axes")
+            }
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Axes, A::Error> {
+                let mut axes = Vec::new();
+                while let Some(entry) = map.next_entry::<Name, AxisSection>()? {
+                    axes.push(entry);
+                }
+                Ok(Axes(axes))
+            }
+        }
+        deserializer.deserialize_map(Entries)
+    }
+}
+
+impl<'de> Deserialize<'de> for AxisSection {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> Visitor<'de> for Either {
+            type Value = AxisSection;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a list of labels or a table with `first`, `last`, `count` and `unit`")
+            }
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<AxisSection, A::Error> {
+                let labels = Vec::deserialize(de::value::SeqAccessDeserializer::new(seq))?;
+                Ok(AxisSection::Labels(labels))
+            }
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<AxisSection, A::Error> {
+                let grid = GridSection::deserialize(de::value::MapAccessDeserializer::new(map))?;
+                Ok(AxisSection::Grid(grid))
+            }
+        }
+        deserializer.deserialize_any(Either)
+    }
+}
+
+impl JsonSchema for Axes {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Axes".into()
+    }
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let grid = generator.subschema_for::<GridSection>();
+        schemars::json_schema!({
+            "type": "object",
+            "additionalProperties": {
+                "anyOf": [{ "type": "array", "items": { "type": "string" } }, grid]
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_decimal_grid_comes_out_as_written() {
+        let grid = evenly(1e-5, 1e-3, 100);
+        assert_eq!((grid[0], grid[2], grid[6], grid[99]), (1e-5, 3e-5, 7e-5, 1e-3));
+    }
+}

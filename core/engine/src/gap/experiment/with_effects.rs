@@ -1,0 +1,93 @@
+//! The forward map with the effects that a study already has, from which a search begins.
+
+use lacuna::data::Parameter;
+use lacuna::plugin::Forward;
+use lacuna::plugin::effect::{Placed, with_tangents};
+use lacuna_linalg::Matrix;
+
+/// A forward map whose parameters are those of another one, followed by the unknowns of effects on its response.
+pub struct WithEffects<'a> {
+    forward: &'a dyn Forward,
+    effects: Vec<Placed<'a>>,
+}
+
+impl<'a> WithEffects<'a> {
+    /// A forward map with effects.
+    pub fn new(forward: &'a dyn Forward, effects: Vec<Placed<'a>>) -> Self {
+        Self { forward, effects }
+    }
+
+    /// The unknowns: the parameters of the forward map, then the unknowns of the effects.
+    pub fn parameters(&self, own: &[Parameter]) -> Vec<Parameter> {
+        let unknowns = self.effects.iter().flat_map(Placed::hyperparameters);
+        let parameter = |unknown: lacuna::plugin::Hyperparameter| Parameter {
+            symbol: unknown.symbol,
+            unit: unknown.unit,
+            ..Parameter::plain(&unknown.name, unknown.prior)
+        };
+        own.iter().cloned().chain(unknowns.map(parameter)).collect()
+    }
+
+    /// Each effect with its values, taken from those of all unknowns.
+    fn placed<'b>(&'b self, point: &'b [f64]) -> impl Iterator<Item = (&'b Placed<'b>, &'b [f64])> {
+        let mut begin = self.forward.dimension();
+        self.effects.iter().map(move |effect| {
+            let own = begin..begin + effect.absent().len();
+            begin = own.end;
+            (effect, &point[own])
+        })
+    }
+}
+
+impl Forward for WithEffects<'_> {
+    fn dimension(&self) -> usize {
+        self.forward.dimension() + self.effects.iter().map(|e| e.absent().len()).sum::<usize>()
+    }
+
+    fn outputs(&self) -> usize {
+        self.forward.outputs()
+    }
+
+    fn mean(&self, points: &Matrix) -> Matrix {
+        let own: Vec<usize> = (0..self.forward.dimension()).collect();
+        let mut means = self.forward.mean(&points.select_columns(&own));
+        for i in 0..means.rows() {
+            let response = self
+                .placed(points.row(i))
+                .fold(means.row(i).to_vec(), |response, (effect, values)| {
+                    effect.apply(&response, values)
+                });
+            means.row_mut(i).copy_from_slice(&response);
+        }
+        means
+    }
+
+    fn jacobian(&self, point: &[f64]) -> Matrix {
+        self.mean_and_jacobian(point).1
+    }
+
+    fn mean_and_jacobian(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
+        let (mean, jacobian) = self.forward.mean_and_jacobian(&point[..self.forward.dimension()]);
+        let (response, tangents) = with_tangents(self.placed(point), mean, &jacobian);
+        (response, tangents.transposed())
+    }
+
+    fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
+        let d = self.forward.dimension();
+        let own: Vec<usize> = parameters.iter().copied().filter(|&i| i < d).collect();
+        let (mean, jacobian) = self.forward.mean_and_jacobian_by(&point[..d], &own);
+        let (response, tangents) = with_tangents(self.placed(point), mean, &jacobian);
+        // The derivatives by all unknowns of the effects come after those that were asked for.
+        let mut seen = 0;
+        let column = |&i: &usize| {
+            seen += usize::from(i < d);
+            if i < d { seen - 1 } else { own.len() + i - d }
+        };
+        let columns: Vec<usize> = parameters.iter().map(column).collect();
+        (response, tangents.transposed().select_columns(&columns))
+    }
+
+    fn failure(&self) -> Option<String> {
+        self.forward.failure()
+    }
+}

@@ -1,0 +1,41 @@
+//! Candidates inside the model: inputs set free, terms added to equations, and other models.
+//!
+//! All inputs and terms are inputs of one extended model. If the model is its own forward map, it is evaluated with the
+//! inputs that are present; if a surrogate replaces it, the surrogate is trained on further runs.
+
+mod emulated;
+mod narrow;
+mod pieces;
+mod swap;
+mod terms;
+mod unasked;
+
+use lacuna::run::{Observer, Stop};
+use lacuna_run::RunDirectory;
+use narrow::RestrictedMap;
+
+use crate::gap::candidates::Candidate;
+use crate::gap::experiment::wider::ExtendedMap;
+use crate::stage::inverse_problem::InverseProblem;
+use crate::study::Study;
+
+pub use pieces::{Piece, Pieces};
+pub use swap::{AlternativeModel, BayesFactor, ModelFits, alternatives, swapped};
+
+/// The candidates inside the model, and the extended forward map of which they are inputs. With a surrogate, further
+/// runs are made.
+pub fn candidates<'a>(
+    pieces: &'a Pieces,
+    study: &'a Study,
+    problem: &InverseProblem<'a>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<(Vec<Candidate>, ExtendedMap<'a>), Stop> {
+    let wide = if problem.emulator().is_some() {
+        emulated::wide(pieces, study, problem, run, observer)?
+    } else {
+        let forward = Box::new(RestrictedMap::new(study, pieces, pieces.narrower())?);
+        ExtendedMap { forward, inputs: pieces.inputs.clone(), common: Vec::new() }
+    };
+    Ok((pieces.candidates(), wide))
+}

@@ -1,0 +1,180 @@
+//! The extended forward map of a model without a surrogate: each evaluation runs the model with the present inputs
+//! only, so that its cost does not grow with the number of candidates.
+
+use std::sync::OnceLock;
+
+use lacuna::plugin::Forward;
+use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
+
+use super::pieces::{ExtendedModel, Pieces};
+use crate::gap::experiment::wider::FreeInput;
+use crate::stage::direct::ModelMap;
+use crate::study::Study;
+
+/// The models with no piece, with one, and with two, each made at its first use.
+pub struct RestrictedModels {
+    slots: Vec<OnceLock<Option<ExtendedModel>>>,
+}
+
+impl RestrictedModels {
+    /// The models of `n` pieces, none of them made yet.
+    pub fn new(n: usize) -> Self {
+        let count = 1 + n + n * n.saturating_sub(1) / 2;
+        Self { slots: (0..count).map(|_| OnceLock::new()).collect() }
+    }
+
+    /// The index of the model with these pieces; `None` for more than two pieces.
+    fn slot(pieces: &[usize], of: usize) -> Option<usize> {
+        match *pieces {
+            [] => Some(0),
+            [a] => Some(1 + a),
+            // Pairs are ordered by their first piece, then by their second.
+            [a, b] => Some(1 + of + a * (2 * of - a - 1) / 2 + b - a - 1),
+            _ => None,
+        }
+    }
+}
+
+/// The forward map.
+pub struct RestrictedMap<'a> {
+    study: &'a Study,
+    pieces: &'a Pieces,
+    narrower: &'a RestrictedModels,
+    whole: ModelMap<'a>,
+    parts: Vec<OnceLock<Option<ModelMap<'a>>>>,
+}
+
+/// A model with the inputs that are free in it.
+type Part<'n, 'a> = (&'n ModelMap<'a>, &'n [usize]);
+
+impl<'a> RestrictedMap<'a> {
+    /// The forward map of the study's parameters and then of all inputs of the pieces.
+    pub fn new(
+        study: &'a Study,
+        pieces: &'a Pieces,
+        narrower: &'a RestrictedModels,
+    ) -> Result<Self, Stop> {
+        let whole = direct(study, pieces, pieces.whole())?;
+        let parts = narrower.slots.iter().map(|_| OnceLock::new()).collect();
+        Ok(Self { study, pieces, narrower, whole, parts })
+    }
+
+    fn part(&self, present: &[usize]) -> Part<'_, 'a> {
+        let whole = (&self.whole, &self.pieces.whole().inputs[..]);
+        let Some(slot) = RestrictedModels::slot(present, self.pieces.all.len()) else {
+            return whole;
+        };
+        // If the model with a part of the pieces cannot be made, the model with all of them is used.
+        let made = || self.pieces.wider(self.study, present).ok().flatten();
+        let Some(wider) = self.narrower.slots[slot].get_or_init(made) else { return whole };
+        let made = || direct(self.study, self.pieces, wider).ok();
+        match self.parts[slot].get_or_init(made) {
+            Some(part) => (part, &wider.inputs),
+            None => whole,
+        }
+    }
+
+    /// The pieces that are present at a point, and those by whose columns derivatives are wanted.
+    fn present(&self, point: &[f64], columns: &[usize]) -> Vec<usize> {
+        let d = self.study.parameters.len();
+        let is_there = |p: &usize| {
+            let piece = &self.pieces.all[*p];
+            let size = piece.places[0];
+            point[d + size] != self.pieces.inputs[size].absent
+                || piece.places.iter().any(|&i| columns.contains(&(d + i)))
+        };
+        (0..self.pieces.all.len()).filter(is_there).collect()
+    }
+
+    /// The point of the part, with its own inputs only.
+    fn narrowed(&self, point: &[f64], inputs: &[usize]) -> Vec<f64> {
+        let d = self.study.parameters.len();
+        point[..d].iter().copied().chain(inputs.iter().map(|i| point[d + i])).collect()
+    }
+}
+
+fn direct<'a>(
+    study: &'a Study,
+    pieces: &'a Pieces,
+    wider: &'a ExtendedModel,
+) -> Result<ModelMap<'a>, Stop> {
+    let free = wider.inputs.iter().map(|&i| &pieces.inputs[i]);
+    let priors = study.parameters.iter().map(|p| p.prior.clone());
+    let priors = priors.chain(free.map(|freed: &FreeInput| freed.prior.clone())).collect();
+    Ok(ModelMap::with(pieces.simulator(study, wider)?, priors, study.layouts.len()))
+}
+
+impl Forward for RestrictedMap<'_> {
+    fn dimension(&self) -> usize {
+        self.study.parameters.len() + self.pieces.inputs.len()
+    }
+
+    fn outputs(&self) -> usize {
+        self.whole.outputs()
+    }
+
+    fn mean(&self, points: &Matrix) -> Matrix {
+        let mut all = Matrix::zeros(points.rows(), self.outputs());
+        let mut groups: Vec<(Vec<usize>, Vec<usize>)> = Vec::new();
+        for (i, point) in points.iter_rows().enumerate() {
+            let present = self.present(point, &[]);
+            match groups.iter_mut().find(|(pieces, _)| *pieces == present) {
+                Some((_, rows)) => rows.push(i),
+                None => groups.push((present, vec![i])),
+            }
+        }
+        for (present, rows) in groups {
+            let (part, inputs) = self.part(&present);
+            let own = rows.iter().map(|&i| self.narrowed(points.row(i), inputs));
+            let means = part.mean(&Matrix::from_rows(part.dimension(), own));
+            for (&i, mean) in rows.iter().zip(means.iter_rows()) {
+                all.row_mut(i).copy_from_slice(mean);
+            }
+        }
+        all
+    }
+
+    fn jacobian(&self, point: &[f64]) -> Matrix {
+        self.mean_and_jacobian(point).1
+    }
+
+    fn mean_and_jacobian(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
+        let all: Vec<usize> = (0..point.len()).collect();
+        self.mean_and_jacobian_by(point, &all)
+    }
+
+    fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
+        let d = self.study.parameters.len();
+        let (part, inputs) = self.part(&self.present(point, parameters));
+        let column = |&i: &usize| match i.checked_sub(d) {
+            Some(input) => inputs.iter().position(|own| *own == input).map_or(0, |k| d + k),
+            None => i,
+        };
+        let columns: Vec<usize> = parameters.iter().map(column).collect();
+        part.mean_and_jacobian_by(&self.narrowed(point, inputs), &columns)
+    }
+
+    fn failure(&self) -> Option<String> {
+        let parts = self.parts.iter().filter_map(|part| part.get()?.as_ref());
+        std::iter::once(&self.whole).chain(parts).find_map(ModelMap::failure)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pair_has_a_slot_of_its_own() {
+        let of = 5;
+        let mut slots: Vec<Option<usize>> = vec![RestrictedModels::slot(&[], of)];
+        slots.extend((0..of).map(|a| RestrictedModels::slot(&[a], of)));
+        for a in 0..of {
+            slots.extend((a + 1..of).map(|b| RestrictedModels::slot(&[a, b], of)));
+        }
+        let expected: Vec<Option<usize>> = (0..1 + of + of * (of - 1) / 2).map(Some).collect();
+        assert_eq!(slots, expected);
+        assert_eq!(RestrictedModels::slot(&[0, 1, 2], of), None);
+    }
+}

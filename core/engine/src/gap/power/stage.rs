@@ -1,0 +1,134 @@
+//! The stage of `lacuna power`: many cases simulated from the data of a study, stored one by one.
+
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions};
+use std::io::Write as _;
+use std::path::Path;
+use std::sync::Mutex;
+
+use lacuna::run::{Observer, Progress, Stop, files};
+use lacuna_run::{Artifact, Kept, RunDirectory, Stage};
+use rayon::prelude::*;
+use serde_json::json;
+
+use crate::gap::inside::Pieces;
+use crate::gap::power::{CaseOutcome, PowerDesign, PowerSetting, Rates, plan, rates, run};
+use crate::gap::stage as gap;
+use crate::gap::stage::prepared::{InsideCandidates, PreparedSearch, SearchModel, prepared};
+use crate::stage::inverse_problem::InverseProblem;
+use crate::stage::stream;
+use crate::study::Study;
+
+const CASES: &str = "cases.jsonl";
+const FILE: &str = "power.json";
+
+impl Artifact for Rates {
+    fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
+        files::write_json(&folder.join(FILE), self)?;
+        Ok(vec![FILE.to_owned()])
+    }
+
+    fn load(folder: &Path) -> Result<Self, Stop> {
+        files::read_json(&folder.join(FILE))
+    }
+}
+
+/// The search on many cases simulated from the data of a study. Finished cases are stored one by one, so that an
+/// interrupted run can be resumed.
+pub fn stage(
+    study: &Study,
+    design: &PowerDesign,
+    simulations: Option<usize>,
+    problem: &InverseProblem<'_>,
+    directory: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Kept<Rates>, Stop> {
+    let inputs = json!([gap::inputs(study, problem), design, simulations]);
+    let pieces = Pieces::of(study)?;
+    let inside = InsideCandidates::of(pieces.as_ref(), study, problem, directory, observer)?;
+    directory.keep(&Stage::Power.folder(), &inputs, observer, |folder| {
+        let beginning = SearchModel::own(study, problem, &inside);
+        prepared(study, problem, &beginning, &stream(study, "gap"), |prepared| {
+            outcomes(prepared, design, simulations, folder, observer)
+        })
+        .map(|outcomes| rates(&outcomes))
+    })
+}
+
+/// The outcomes of all cases, those of an interrupted run taken from its file.
+fn outcomes(
+    prepared: &PreparedSearch<'_>,
+    design: &PowerDesign,
+    simulations: Option<usize>,
+    folder: &Path,
+    observer: &dyn Observer,
+) -> Result<Vec<CaseOutcome>, Stop> {
+    let found = prepared.search()?;
+    // What the data themselves hide is part of no case.
+    let first = found.path.first().map_or(&found.last, |step| &step.before);
+    let mut options = prepared.options;
+    options.simulations = simulations.unwrap_or(options.simulations);
+    let setting = PowerSetting {
+        experiment: prepared.experiment,
+        candidates: prepared.candidates,
+        options,
+        fit: &first.fit,
+        noise: &found.noise,
+    };
+    let plan = plan(design, prepared.candidates);
+    let path = folder.join(CASES);
+    let done = Mutex::new(read(&path)?);
+    let file = Mutex::new(append(&path)?);
+    observer.begin(Stage::Power.label(), "case", plan.len() as u64);
+    let progress = Progress::new(observer);
+    let stream = prepared.random.named("power");
+    plan.par_iter().enumerate().try_for_each(|(case, wanted)| -> Result<(), Stop> {
+        let is_done = done.lock().is_ok_and(|done| done.contains_key(&case));
+        if !is_done {
+            let outcome = run(&setting, case, wanted, &stream.at(case as u64));
+            write(&file, &path, case, outcome.as_ref())?;
+            if let Ok(mut done) = done.lock() {
+                done.insert(case, outcome);
+            }
+        }
+        progress.add(1);
+        Ok(())
+    })?;
+    let done = done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    observer.end(Stage::Power.label(), &format!("{} cases", done.len()));
+    Ok(done.into_values().flatten().collect())
+}
+
+/// The finished cases; an incomplete last line is ignored.
+fn read(path: &Path) -> Result<BTreeMap<usize, Option<CaseOutcome>>, Stop> {
+    if !path.exists() {
+        return Ok(BTreeMap::new());
+    }
+    let text = String::from_utf8_lossy(&files::read(path)?).into_owned();
+    Ok(text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect())
+}
+
+/// The file to which cases are appended; an incomplete last line is ended first.
+fn append(path: &Path) -> Result<File, Stop> {
+    let is_cut = path.exists() && !files::read(path)?.ends_with(b"\n");
+    let mut file = OpenOptions::new()
+        .create(true)
+        .append(true)
+        .open(path)
+        .map_err(|error| files::cannot_write(path, &error))?;
+    if is_cut {
+        file.write_all(b"\n").map_err(|error| files::cannot_write(path, &error))?;
+    }
+    Ok(file)
+}
+
+fn write(
+    file: &Mutex<File>,
+    path: &Path,
+    case: usize,
+    outcome: Option<&CaseOutcome>,
+) -> Result<(), Stop> {
+    let line = json!([case, outcome]).to_string() + "\n";
+    let mut file = file.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    file.write_all(line.as_bytes()).map_err(|error| files::cannot_write(path, &error))
+}

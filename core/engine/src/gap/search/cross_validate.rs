@@ -1,0 +1,325 @@
+//! Cross-validation: which of two explanations predicts left-out data better?
+//!
+//! Conditions, replicates, sensors and blocks of the last axis are left out in turn. The score is the joint log
+//! predictive density of all values that are left out given all others, never that of single values, which are
+//! correlated (Bürkner, Gabry and Vehtari, Computational Statistics 36 (2021) 1243). Both explanations are refitted to
+//! the remaining data and integrated over the linearised posterior from these data. Correlated noise between the
+//! left-out part and the rest, and the covariance of the emulator's error, are included.
+
+use lacuna::math::special::{normal_quantile, student_t_cdf};
+use lacuna_linalg::vector::dot;
+use lacuna_linalg::{Cholesky, Matrix, multiply_transposed, multiply_vector};
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::folds::{Fold, folds};
+use crate::gap::experiment::Experiment;
+use crate::gap::noise::Noise;
+use crate::gap::noise::part::part;
+use crate::gap::system::System;
+use crate::gap::system::fit::{Fit, fit, precision};
+use crate::gap::system::whitener::Whitener;
+
+/// A log score that is strong evidence: 20 to 1 (Kass and Raftery, Journal of the American Statistical Association 90
+/// (1995) 773).
+const STRONG: f64 = 3.0;
+
+/// A kind of part that is left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LeftOut {
+    /// One condition.
+    Condition,
+    /// One replicate of one condition.
+    Replicate,
+    /// One sensor under all conditions.
+    Sensor,
+    /// A block of the last axis under one condition, and nothing of its neighbourhood in the rest.
+    Block,
+}
+
+impl LeftOut {
+    /// One such part, in words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Condition => "condition",
+            Self::Replicate => "replicate",
+            Self::Sensor => "sensor",
+            Self::Block => "block of the last axis",
+        }
+    }
+}
+
+/// An explanation with its fit to all data.
+#[derive(Clone, Copy)]
+pub struct Explanation<'a, 'b> {
+    /// The system.
+    pub system: &'b System<'a>,
+    /// The best fit.
+    pub fit: &'b Fit,
+}
+
+/// The cross-validation of two explanations.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CrossValidation {
+    /// The kind of part that was left out.
+    pub left_out: LeftOut,
+    /// The number of parts, each left out once.
+    pub parts: usize,
+    /// The log predictive density of the first explanation minus that of the second, summed over the parts; positive
+    /// values favour the first.
+    pub difference: f64,
+    /// The difference minus the expected advantage of the best of `tried` equal explanations.
+    pub corrected: f64,
+    /// The standard error of the difference; `None` if there are too few pairs.
+    pub error: Option<f64>,
+    /// True if the standard error is from paired replicates, false if it is from paired parts.
+    pub by_replicates: bool,
+    /// The standard error from the variance between the parts; `None` below three.
+    pub scatter: Option<f64>,
+    /// The number of parts that favour the second by more than 20 to 1.
+    pub against: usize,
+    /// The p-value of the advantage if all explanations that were tried were equal; `None` without a standard error.
+    pub p: Option<f64>,
+}
+
+/// Compares two explanations by cross-validation; the first is the best of `tried`.
+///
+/// Returns one entry per kind of part that the data allow to be left out. Each part costs two refits.
+pub fn cross_validate(
+    first: Explanation<'_, '_>,
+    second: Explanation<'_, '_>,
+    noise: &Noise,
+    tried: usize,
+) -> Vec<CrossValidation> {
+    let experiment = first.system.experiment;
+    let kinds = [LeftOut::Condition, LeftOut::Replicate, LeftOut::Sensor, LeftOut::Block];
+    let compared = kinds.into_iter().filter_map(|left_out| {
+        let folds = folds(experiment, noise, left_out);
+        if folds.len() < 2 {
+            return None;
+        }
+        let all: Vec<Option<FoldScore>> =
+            folds.par_iter().map(|fold| score_of(&[first, second], noise, fold)).collect();
+        let all: Vec<FoldScore> = all.into_iter().flatten().collect();
+        (all.len() >= 2).then(|| summary(experiment, left_out, &all, tried))
+    });
+    compared.collect()
+}
+
+/// The difference in log score between two explanations in one part.
+struct FoldScore {
+    difference: f64,
+    /// The condition, if a single replicate was left out.
+    replicate: Option<usize>,
+    /// The difference without each replicate, by condition; empty if the part has no value of a condition.
+    without: Vec<Vec<f64>>,
+}
+
+/// The difference between the log scores of two explanations in a part that is left out.
+fn score_of(
+    explanations: &[Explanation<'_, '_>; 2],
+    noise: &Noise,
+    fold: &Fold,
+) -> Option<FoldScore> {
+    let experiment = explanations[0].system.experiment;
+    let response = &explanations[0].fit.at.response;
+    // The score of the left-out part given the rest is the log density of both together minus that of the rest.
+    let (both, noise_both) = part(experiment, noise, |c, r, i| !(fold.hidden)(c, r, i));
+    let (rest, noise_rest) =
+        part(experiment, noise, |c, r, i| !(fold.hidden)(c, r, i) && !(fold.left_out)(c, r, i));
+    let whiteners =
+        [Whitener::new(&both, &noise_both, response), Whitener::new(&rest, &noise_rest, response)];
+    let means = [both.means().1, rest.means().1];
+    let scores: Vec<Score> = explanations
+        .iter()
+        .map(|explanation| Score::new(explanation, &whiteners, &means))
+        .collect::<Option<Vec<Score>>>()?;
+    let difference = |shift: &[f64]| scores[0].value(shift) - scores[1].value(shift);
+    let nothing = vec![0.0; experiment.outputs()];
+    let without = if fold.replicate.is_some() {
+        Vec::new()
+    } else {
+        shifts(experiment, fold)
+            .into_iter()
+            .map(|own| own.iter().map(|shift| difference(&whiteners[0].whiten(shift))).collect())
+            .collect()
+    };
+    Some(FoldScore { difference: difference(&nothing), replicate: fold.replicate, without })
+}
+
+/// The change of the means of the left-out part without each replicate, by condition, one value an output.
+fn shifts(experiment: &Experiment<'_>, fold: &Fold) -> Vec<Vec<Vec<f64>>> {
+    let (counts, means) = experiment.means();
+    let of = |(c, condition): (usize, &crate::gap::experiment::Condition)| {
+        let touched = condition.outputs.clone().any(|i| (fold.left_out)(c, 0, i));
+        let count = if touched { condition.replicates.len() } else { 0 };
+        let without = |r: usize| {
+            let mut shift = vec![0.0; means.len()];
+            for (i, y) in condition.outputs.clone().zip(&condition.replicates[r]) {
+                if let Some(y) = y.filter(|_| counts[i] > 1.0 && (fold.left_out)(c, r, i)) {
+                    shift[i] = (means[i] - y) / (counts[i] - 1.0);
+                }
+            }
+            shift
+        };
+        (0..count).map(without).collect()
+    };
+    experiment.conditions.iter().enumerate().map(of).collect()
+}
+
+/// The log density of the left-out part as a function of its whitened means.
+struct Score {
+    residual: Vec<f64>,
+    slopes: Matrix,
+    /// The squared residual of the rest, and its products with the slopes.
+    square: f64,
+    products: Vec<f64>,
+    factor: Cholesky,
+    log_determinant: f64,
+}
+
+impl Score {
+    /// `whiteners` and `means` of the rest with what is left out, and of the rest alone.
+    fn new(
+        explanation: &Explanation<'_, '_>,
+        whiteners: &[Whitener; 2],
+        means: &[Vec<f64>; 2],
+    ) -> Option<Self> {
+        let refitted = fit(explanation.system, &whiteners[1], &means[1], &explanation.fit.at.point);
+        let misfit: Vec<f64> =
+            means[0].iter().zip(&refitted.at.response).map(|(y, m)| y - m).collect();
+        let residual = whiteners[0].whiten(&misfit);
+        let slopes = whiteners[0].whiten_rows(&refitted.at.tangents);
+        let finite = refitted.log_density.is_finite()
+            && slopes.as_slice().iter().chain(&residual).all(|x| x.is_finite());
+        if !finite {
+            return None;
+        }
+        let held = |slopes: &Matrix| {
+            let mut all = multiply_transposed(slopes, slopes);
+            let priors = explanation.system.priors().iter().enumerate();
+            priors.for_each(|(j, prior)| all[(j, j)] += precision(prior));
+            // Units of the priors' widths: unknowns of any size go together.
+            let width: Vec<f64> =
+                explanation.system.priors().iter().map(|p| 1.0 / precision(p).sqrt()).collect();
+            Cholesky::new(&Matrix::from_fn(all.rows(), all.rows(), |i, j| {
+                width[i] * all[(i, j)] * width[j]
+            }))
+            .ok()
+            .map(|factor| (factor, width))
+        };
+        let (factor, width) = held(&slopes)?;
+        let (of_rest, _) = held(&refitted.slopes)?;
+        let scaled = |slopes: &Matrix| {
+            Matrix::from_fn(slopes.rows(), slopes.columns(), |j, i| width[j] * slopes[(j, i)])
+        };
+        let products = multiply_vector(&scaled(&refitted.slopes), &refitted.residual);
+        let square = dot(&refitted.residual, &refitted.residual);
+        let log_determinant = factor.log_determinant() - of_rest.log_determinant();
+        let slopes = scaled(&slopes);
+        Some(Self { residual, slopes, square, products, factor, log_determinant })
+    }
+
+    /// The log density with the whitened means moved by `shift`, up to a constant that depends on the noise only.
+    fn value(&self, shift: &[f64]) -> f64 {
+        let moved: Vec<f64> = self.residual.iter().zip(shift).map(|(z, s)| z + s).collect();
+        let mut gain = multiply_vector(&self.slopes, &moved);
+        gain.iter_mut().zip(&self.products).for_each(|(g, p)| *g -= p);
+        self.factor.whiten(&mut gain);
+        0.5 * (dot(&gain, &gain) - dot(&moved, &moved) + self.square - self.log_determinant)
+    }
+}
+
+fn summary(
+    experiment: &Experiment<'_>,
+    left_out: LeftOut,
+    all: &[FoldScore],
+    tried: usize,
+) -> CrossValidation {
+    let difference: f64 = all.iter().map(|told| told.difference).sum();
+    let of_parts = of_parts(all);
+    let found = if left_out == LeftOut::Replicate {
+        of_replicates(experiment, all).map(|found| (found, true))
+    } else {
+        let paired = jackknife(experiment, all).map(|found| (found, true));
+        paired.or_else(|| of_parts.map(|found| (found, false)))
+    };
+    let (mut corrected, mut p) = (difference, None);
+    if let Some(((error, freedom), _)) = found {
+        corrected -= error * ahead(tried);
+        p = student_t_cdf(freedom, -difference / error.max(f64::MIN_POSITIVE))
+            .map(|one| 1.0 - (1.0 - one).powf(tried.max(1) as f64));
+    }
+    CrossValidation {
+        left_out,
+        parts: all.len(),
+        difference,
+        corrected,
+        error: found.map(|((error, _), _)| error),
+        by_replicates: found.is_some_and(|(_, by_replicates)| by_replicates),
+        scatter: of_parts.map(|(error, _)| error),
+        against: all.iter().filter(|told| told.difference < -STRONG).count(),
+        p,
+    }
+}
+
+/// The mean of the largest of so many standard normal numbers (Blom, Statistical Estimates and Transformed
+/// Beta-Variables, 1958).
+fn ahead(tried: usize) -> f64 {
+    if tried < 2 {
+        return 0.0;
+    }
+    let k = tried as f64;
+    normal_quantile((k - 0.375) / (k + 0.25))
+}
+
+/// The error of a sum over replicates, by their scatter within conditions, and its freedom.
+fn of_replicates(experiment: &Experiment<'_>, all: &[FoldScore]) -> Option<(f64, f64)> {
+    let (mut variance, mut freedom) = (0.0, 0.0);
+    for c in 0..experiment.conditions.len() {
+        let own = all.iter().filter(|told| told.replicate == Some(c)).map(|told| told.difference);
+        let own: Vec<f64> = own.collect();
+        if own.len() < 2 {
+            continue;
+        }
+        let n = own.len() as f64;
+        variance += n / (n - 1.0) * squares(&own);
+        freedom += n - 1.0;
+    }
+    (freedom > 0.0).then(|| (variance.sqrt(), freedom))
+}
+
+/// The error of the sum over the parts by leaving replicates out of what is left out (Efron and Stein, Annals of
+/// Statistics 9 (1981) 586); `None` where a condition has no second replicate.
+fn jackknife(experiment: &Experiment<'_>, all: &[FoldScore]) -> Option<(f64, f64)> {
+    let (mut variance, mut freedom) = (0.0, 0.0);
+    for c in 0..experiment.conditions.len() {
+        let touching: Vec<&FoldScore> =
+            all.iter().filter(|told| !told.without[c].is_empty()).collect();
+        let Some(first) = touching.first() else { continue };
+        let count = first.without[c].len();
+        if count < 2 {
+            return None;
+        }
+        let sum = |r: usize| touching.iter().map(|told| told.without[c][r]).sum::<f64>();
+        let n = count as f64;
+        variance += (n - 1.0) / n * squares(&(0..count).map(sum).collect::<Vec<_>>());
+        freedom += n - 1.0;
+    }
+    (freedom > 0.0).then(|| (variance.sqrt(), freedom))
+}
+
+/// The error of the sum over the parts by their own scatter; three of them at least.
+fn of_parts(all: &[FoldScore]) -> Option<(f64, f64)> {
+    let own: Vec<f64> = all.iter().map(|told| told.difference).collect();
+    let n = own.len() as f64;
+    (own.len() >= 3).then(|| ((n / (n - 1.0) * squares(&own)).sqrt(), n - 1.0))
+}
+
+/// The sum of the squared differences from the mean.
+fn squares(values: &[f64]) -> f64 {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    values.iter().map(|x| (x - mean).powi(2)).sum()
+}

@@ -1,0 +1,26 @@
+//! The search: candidates are fitted together with the calibrated unknowns, compared by their evidences, and added one
+//! at a time.
+
+mod checks;
+mod cross_validate;
+mod diagnostics;
+mod discriminate;
+mod evidence;
+mod folds;
+mod forward;
+pub mod needless;
+mod refit;
+mod state;
+#[cfg(test)]
+mod tests;
+mod verdict;
+
+pub use checks::{consistency, stability};
+pub use cross_validate::{CrossValidation, Explanation, LeftOut, cross_validate};
+pub use diagnostics::{Detectability, Diagnostics, SearchOptions, SearchResult, SearchStep};
+pub use discriminate::{DiscriminatingData, Discrimination, FurtherData, discriminate};
+pub use evidence::{LogEvidence, log_evidence};
+pub use forward::search;
+pub use refit::{RefitSetting, Scored, Weighed, log_prior, most_promising, refit, refit_all};
+pub use state::kinds;
+pub use verdict::{MissingEffect, SURE, Verdict, VerdictKind, class, explains, verdict};

@@ -1,0 +1,267 @@
+//! The placements with the largest scores, refitted together with the calibrated unknowns; groups of sensors; prior
+//! masses.
+
+use std::collections::BTreeMap;
+
+use lacuna::math::random::Stream;
+use lacuna::math::special::ln_binomial;
+use lacuna::plugin::effect::{On, Reach, Situation};
+use lacuna_linalg::Matrix;
+use rayon::prelude::*;
+
+use super::evidence::log_evidence;
+use crate::gap::candidates::{Candidate, Placement};
+use crate::gap::system::System;
+use crate::gap::system::fit::{Fit, fit_from};
+use crate::gap::system::whitener::Whitener;
+use crate::gap::test::{DesignMatrix, Projection, Scores};
+
+/// The smallest number of placements that are refitted.
+const FEWEST: usize = 10;
+
+/// Placements whose squared score is less than this below the largest are refitted too.
+const WITHIN: f64 = 10.0;
+
+/// The largest number of placements that are refitted.
+const MOST: usize = 24;
+
+/// The number of regressors of a placement that give starts, with the sizes that their scores estimate.
+const SCORED: usize = 8;
+
+/// The number of starts of a refit: those nearest to the data.
+const STARTS: usize = 3;
+
+/// A placement with its best fit.
+#[derive(Clone)]
+pub struct Weighed {
+    /// The placement.
+    pub placement: Placement,
+    /// The largest of its studentised scores.
+    pub score: f64,
+    /// The share of its squared whitened length that the calibrated unknowns absorb.
+    pub absorbed: f64,
+    /// The fit of the system with it.
+    pub fit: Fit,
+    /// The log evidence plus the log prior mass.
+    pub log_weight: f64,
+}
+
+/// The calibrated system and everything that a refit with a further placement needs.
+#[derive(Clone, Copy)]
+pub struct RefitSetting<'a, 'b> {
+    /// The system without the placement.
+    pub system: &'b System<'a>,
+    /// The candidates.
+    pub candidates: &'a [Candidate],
+    /// The whitener of the mean.
+    pub whitener: &'b Whitener,
+    /// The replicates' means, one an output, in the response's unit.
+    pub means: &'b [f64],
+    /// The number of sensors.
+    pub sensors: usize,
+}
+
+/// A placement with the regressors that scored best.
+#[derive(Clone)]
+pub struct Scored {
+    /// The placement.
+    pub placement: Placement,
+    /// The largest of its studentised scores.
+    pub score: f64,
+    /// The share of its squared whitened length that the calibrated unknowns absorb.
+    pub absorbed: f64,
+    /// The starts of the effect's unknowns, in their units.
+    pub starts: Vec<Vec<f64>>,
+}
+
+/// The placements of largest score, which are refitted, in decreasing order.
+pub fn most_promising(
+    placements: &[Placement],
+    candidates: &[Candidate],
+    design: &DesignMatrix,
+    scores: &Scores,
+    situation: &Situation<'_>,
+) -> Vec<Scored> {
+    let mut by_placement: BTreeMap<usize, Vec<(f64, usize)>> = BTreeMap::new();
+    for (j, regressor) in design.regressors.iter().enumerate() {
+        let strength = regressor.strength(scores.values[j]);
+        by_placement.entry(regressor.placement).or_default().push((strength, j));
+    }
+    let layout = &situation.layouts.blocks[0];
+    let mut scored: Vec<Scored> = Vec::new();
+    for (placement, mut own) in by_placement {
+        own.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let effect = &candidates[placements[placement].candidate].effect;
+        let absent = effect.absent(layout)[0];
+        let starts = own.iter().take(SCORED).map(|&(_, j)| {
+            let mut start = design.regressors[j].start.clone();
+            // The start is the size that the score itself estimates.
+            start[0] = absent + scores.values[j] / design.regressors[j].length;
+            start
+        });
+        let given = effect.starts(layout, situation);
+        scored.push(Scored {
+            placement: placements[placement].clone(),
+            score: own[0].0,
+            absorbed: design.regressors[own[0].1].absorbed,
+            starts: starts.chain(given).collect(),
+        });
+    }
+    scored.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let best = scored.first().map_or(0.0, |scored| scored.score);
+    let near =
+        |(i, scored): (usize, &Scored)| i < FEWEST || scored.score.powi(2) > best.powi(2) - WITHIN;
+    let count = scored.iter().enumerate().take_while(|(i, scored)| near((*i, scored))).count();
+    scored.truncate(count.min(MOST));
+    scored
+}
+
+/// Refits placements and computes their evidences; the one of largest weight comes first.
+pub fn refit_all(
+    setting: &RefitSetting<'_, '_>,
+    base: &Fit,
+    scored: &[Scored],
+    stream: &Stream,
+) -> Vec<Weighed> {
+    let mut weighed: Vec<Weighed> = scored
+        .par_iter()
+        .enumerate()
+        .filter_map(|(i, scored)| refit(setting, base, scored, &stream.at(i as u64)))
+        .collect();
+    weighed.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
+    weighed
+}
+
+/// Refits one placement from its starts, with the calibrated unknowns from the fit `base`; `None` if the forward map
+/// has no response.
+pub fn refit(
+    setting: &RefitSetting<'_, '_>,
+    base: &Fit,
+    scored: &Scored,
+    stream: &Stream,
+) -> Option<Weighed> {
+    let system = setting.with(&scored.placement);
+    let bounds = system.bounds();
+    let begin = base.at.point.len();
+    let clamped = scored.starts.iter().map(|own| -> Vec<f64> {
+        own.iter().zip(&bounds[begin..]).map(|(x, (lo, hi))| x.clamp(*lo, *hi)).collect()
+    });
+    let starts = setting.nearest(base, &scored.placement, clamped.collect());
+    let starts: Vec<Vec<f64>> =
+        starts.iter().map(|own| base.at.point.iter().chain(own).copied().collect()).collect();
+    let fit = fit_from(&system, setting.whitener, setting.means, &starts)?;
+    let weighed = log_evidence(&system, setting.whitener, setting.means, &fit, stream);
+    Some(Weighed {
+        placement: scored.placement.clone(),
+        score: scored.score,
+        absorbed: scored.absorbed,
+        log_weight: weighed.value + setting.log_prior(&scored.placement),
+        fit,
+    })
+}
+
+impl<'a> RefitSetting<'a, '_> {
+    /// The system with a further placement.
+    pub fn with(&self, placement: &Placement) -> System<'a> {
+        let kind = &self.candidates[placement.candidate].kind;
+        let taken = |name: &str| self.system.effects.iter().any(|e| e.name == name);
+        let mut name = kind.clone();
+        let mut count = 1;
+        while taken(&name) {
+            count += 1;
+            name = format!("{kind}_{count}");
+        }
+        self.system.with(placement.placed(self.system.experiment, self.candidates, &name))
+    }
+
+    /// The starts whose responses are nearest to the data when the calibrated unknowns adapt along their slopes.
+    fn nearest(&self, base: &Fit, placement: &Placement, starts: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        if starts.len() <= STARTS {
+            return starts;
+        }
+        let placed = placement.placed(self.system.experiment, self.candidates, "");
+        let responses: Vec<Vec<f64>> = if placed.effect.switches().is_empty() {
+            starts.iter().map(|start| placed.apply(&base.at.response, start)).collect()
+        } else {
+            let point = |start: &Vec<f64>| [&base.at.point[..], start].concat();
+            self.with(placement).responses(&starts.iter().map(point).collect::<Vec<_>>())
+        };
+        let misfit = |response: Vec<f64>| -> Vec<f64> {
+            self.means.iter().zip(response).map(|(y, m)| y - m).collect()
+        };
+        let misfits = Matrix::from_rows(self.means.len(), responses.into_iter().map(misfit));
+        let white = self.whitener.whiten_rows(&misfits);
+        let (_, squares) = Projection::of(self.system, base).rest_of_rows(white);
+        let mut order: Vec<usize> = (0..starts.len()).filter(|&i| squares[i].is_finite()).collect();
+        order.sort_by(|&a, &b| squares[a].total_cmp(&squares[b]));
+        order.into_iter().take(STARTS).map(|i| starts[i].clone()).collect()
+    }
+
+    /// The log prior mass of a placement within its type, divided among the variants of the type.
+    pub fn log_prior(&self, placement: &Placement) -> f64 {
+        let candidate = &self.candidates[placement.candidate];
+        let versions = self.candidates.iter().filter(|c| c.kind == candidate.kind).count();
+        let chosen = (!placement.on.is_empty()).then(|| chosen(placement));
+        log_prior(candidate.effect.reach(), chosen, self.sensors) - (versions as f64).ln()
+    }
+}
+
+/// The number of sensors that a placement acts on, by the labels of its place.
+fn chosen(placement: &Placement) -> usize {
+    placement.on.values().map(Vec::len).product()
+}
+
+/// Grows a group from a placement on one sensor: each of `others`, the sensors on which the same candidate was weighed
+/// or scored in decreasing order, joins the group if that raises the weight.
+pub fn grow(
+    setting: &RefitSetting<'_, '_>,
+    base: &Fit,
+    seed: &Weighed,
+    others: &[On],
+    stream: &Stream,
+) -> Weighed {
+    let candidate = &setting.candidates[seed.placement.candidate];
+    let mut best = seed.clone();
+    if candidate.effect.reach() != Reach::Any || seed.placement.on.len() != 1 {
+        return best;
+    }
+    let begin = base.at.point.len();
+    for (round, on) in others.iter().enumerate() {
+        let Some(union) = union(&best.placement.on, on) else { continue };
+        let own = best.fit.at.point[begin..].to_vec();
+        let scored = Scored {
+            placement: Placement { candidate: seed.placement.candidate, on: union },
+            score: best.score,
+            absorbed: best.absorbed,
+            starts: vec![own],
+        };
+        let Some(next) = refit(setting, base, &scored, &stream.at(round as u64)) else { continue };
+        if next.log_weight > best.log_weight {
+            best = next;
+        }
+    }
+    best
+}
+
+/// The union of two places along one axis; `None` if the second adds nothing.
+fn union(on: &On, other: &On) -> Option<On> {
+    let (axis, labels) = on.iter().next()?;
+    let added = other.get(axis)?.iter().filter(|label| !labels.contains(label));
+    let all: Vec<String> = labels.iter().chain(added).cloned().collect();
+    (all.len() > labels.len()).then(|| On::from([(axis.clone(), all)]))
+}
+
+/// The log prior mass of a place within a type of effect: a third each for all sensors, for one sensor, and for a group
+/// of a size between, all sizes and all members being equally probable. `chosen` is the number of sensors; `None` for
+/// all.
+pub fn log_prior(reach: Reach, chosen: Option<usize>, sensors: usize) -> f64 {
+    let Some(chosen) = chosen.filter(|_| sensors >= 2) else {
+        return if reach == Reach::Any && sensors >= 2 { -(3.0_f64.ln()) } else { 0.0 };
+    };
+    let sets = ln_binomial(sensors as u64, chosen as u64);
+    match reach {
+        Reach::Single => -sets,
+        Reach::Any | Reach::Whole if chosen == 1 => -(3.0_f64.ln()) - sets,
+        Reach::Any | Reach::Whole => -(3.0_f64.ln()) - ((sensors.max(4) - 2) as f64).ln() - sets,
+    }
+}

@@ -1,0 +1,112 @@
+//! The state of a search: a calibrated system on its path.
+
+use lacuna::math::random::Stream;
+
+use super::refit::RefitSetting;
+use crate::gap::candidates::{Candidate, Placement};
+use crate::gap::experiment::Experiment;
+use crate::gap::noise::Noise;
+use crate::gap::system::System;
+use crate::gap::system::fit::{Fit, fit};
+use crate::gap::system::whitener::Whitener;
+
+/// A system with its fit, its noise and its whitener.
+#[derive(Clone)]
+pub(super) struct SearchState<'a> {
+    /// The system.
+    pub system: System<'a>,
+    /// The effects as placements.
+    pub chosen: Vec<Placement>,
+    /// The best fit.
+    pub fit: Fit,
+    /// The noise around its response.
+    pub noise: Noise,
+    /// The whitener of the mean under that noise.
+    pub whitener: Whitener,
+}
+
+/// The data and candidates of a search, which all its states share.
+#[derive(Clone, Copy)]
+pub(super) struct SearchSetting<'a, 'b> {
+    pub experiment: &'a Experiment<'a>,
+    pub candidates: &'a [Candidate],
+    pub means: &'b [f64],
+    pub sensors: usize,
+}
+
+impl<'a> SearchState<'a> {
+    /// The state as the setting of refits.
+    pub fn refit_setting<'b>(&'b self, shared: &SearchSetting<'a, 'b>) -> RefitSetting<'a, 'b> {
+        RefitSetting {
+            system: &self.system,
+            candidates: shared.candidates,
+            whitener: &self.whitener,
+            means: shared.means,
+            sensors: shared.sensors,
+        }
+    }
+
+    /// The state with a further placement, refitted from these values of its unknowns.
+    pub fn with(&self, shared: &SearchSetting<'a, '_>, placement: &Placement, own: &[f64]) -> Self {
+        let system = self.refit_setting(shared).with(placement);
+        let start: Vec<f64> = self.fit.at.point.iter().chain(own).copied().collect();
+        let mut next = self.clone();
+        next.chosen.push(placement.clone());
+        next.refit(shared, system, &start);
+        next
+    }
+
+    /// Fits the system, estimates the noise around its response again, and fits once more.
+    fn refit(&mut self, shared: &SearchSetting<'a, '_>, system: System<'a>, start: &[f64]) {
+        let first = fit(&system, &self.whitener, shared.means, start);
+        let around = system.around(&first.at);
+        self.noise = Noise::of(shared.experiment, &around, Some(&self.noise));
+        self.whitener = Whitener::new(shared.experiment, &self.noise, &around.response);
+        self.fit = fit(&system, &self.whitener, shared.means, &first.at.point);
+        self.system = system;
+    }
+
+    /// The state without effect `i`, refitted with the same noise.
+    pub fn without(&self, shared: &SearchSetting<'a, '_>, i: usize) -> Self {
+        let mut chosen = self.chosen.clone();
+        chosen.remove(i);
+        let mut effects = self.system.effects.clone();
+        let begin = shared.experiment.parameters.len()
+            + effects[..i].iter().map(|e| e.absent().len()).sum::<usize>();
+        let end = begin + effects.remove(i).absent().len();
+        let system = System::new(shared.experiment, effects);
+        let mut start = self.fit.at.point.clone();
+        start.drain(begin..end);
+        let fit = fit(&system, &self.whitener, shared.means, &start);
+        Self { system, chosen, fit, noise: self.noise.clone(), whitener: self.whitener.clone() }
+    }
+
+    /// The log evidence plus the log prior mass of the effects. Noise that is estimated from single records changes
+    /// with the residual, so that its determinant is included there.
+    pub fn weight(&self, shared: &SearchSetting<'a, '_>, stream: &Stream) -> f64 {
+        let weighed = crate::gap::search::log_evidence(
+            &self.system,
+            &self.whitener,
+            shared.means,
+            &self.fit,
+            stream,
+        );
+        let of_noise = if self.noise.is_assumed() { self.whitener.log_determinant() } else { 0.0 };
+        weighed.value + of_noise + self.prior(shared)
+    }
+
+    /// The log prior mass of the effects: of their types and placements.
+    pub fn prior(&self, shared: &SearchSetting<'a, '_>) -> f64 {
+        let setting = self.refit_setting(shared);
+        let kinds = (kinds(shared.candidates) as f64).ln();
+        self.chosen.iter().map(|s| setting.log_prior(s) - kinds).sum()
+    }
+}
+
+/// The number of types of effects.
+pub fn kinds(candidates: &[Candidate]) -> usize {
+    let mut names: Vec<&str> = candidates.iter().map(|c| c.kind.as_str()).collect();
+    names.sort_unstable();
+    names.dedup();
+    names.len().max(1)
+}

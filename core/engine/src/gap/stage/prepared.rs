@@ -1,0 +1,338 @@
+//! The search of a study, from its data and a model to the result.
+
+use lacuna::data::{Measurements, Observations, Parameter};
+use lacuna::math::moments::mean;
+use lacuna::math::random::Stream;
+use lacuna::plugin::Forward;
+use lacuna::plugin::discrepancy::{CommonError, StatedNoise};
+use lacuna::plugin::effect::Situation;
+use lacuna::run::{Observer, Stop};
+use lacuna_linalg::Matrix;
+use lacuna_run::RunDirectory;
+
+use crate::gap::candidates::{Candidate, proposed};
+use crate::gap::experiment::Experiment;
+use crate::gap::experiment::hold_out::{HeldOutData, HeldOutKind, HoldOutSplit, split};
+use crate::gap::experiment::wider::ExtendedMap;
+use crate::gap::experiment::with_effects::WithEffects;
+use crate::gap::inside;
+use crate::gap::inside::Pieces;
+use crate::gap::noise::{Noise, ResponseTangents};
+use crate::gap::prove::prove;
+use crate::gap::result::{GapResult, HeldOut};
+use crate::gap::search::{SearchOptions, SearchResult, search};
+use crate::gap::system::System;
+use crate::gap::system::emulator_error::error_covariance;
+use crate::gap::system::fit::{Fit, precision};
+use crate::stage::calibrate::stated_variance;
+use crate::stage::inverse_problem::InverseProblem;
+use crate::stage::validate::accuracy;
+use crate::stage::{best_fit, stream};
+use crate::study::Study;
+
+/// The number of local maxima of the base model from which the calibration starts.
+const STARTS: usize = 4;
+
+/// The share of `false_alarm` for the scores; the rest is for scan and energy.
+const NAMES: f64 = 0.6;
+
+/// The candidates inside the model, with the forward map that has them as inputs; empty if the study names none.
+#[derive(Default)]
+pub struct InsideCandidates<'a> {
+    candidates: Vec<Candidate>,
+    wide: Option<ExtendedMap<'a>>,
+}
+
+impl<'a> InsideCandidates<'a> {
+    /// The candidates and the extended forward map of these inputs and terms.
+    pub fn of(
+        pieces: Option<&'a Pieces>,
+        study: &'a Study,
+        problem: &InverseProblem<'a>,
+        run: &mut RunDirectory,
+        observer: &dyn Observer,
+    ) -> Result<Self, Stop> {
+        let Some(pieces) = pieces else { return Ok(Self::default()) };
+        let (candidates, wide) = inside::candidates(pieces, study, problem, run, observer)?;
+        Ok(Self { candidates, wide: Some(wide) })
+    }
+}
+
+/// A model with which a search begins: the study's, or another in its place.
+#[derive(Clone, Copy)]
+pub struct SearchModel<'a> {
+    /// The forward map: from parameters to responses.
+    pub forward: &'a dyn Forward,
+    /// The parameters.
+    pub parameters: &'a [Parameter],
+    /// The bounds within which the forward map is valid, if they are narrower than the priors.
+    pub region: Option<&'a [(f64, f64)]>,
+    /// The candidates inside it.
+    pub inside: &'a InsideCandidates<'a>,
+    /// The covariance of the emulator's error of another model than the study's.
+    pub other: Option<&'a [CommonError]>,
+}
+
+impl<'a> SearchModel<'a> {
+    /// The study's model.
+    pub fn own(
+        study: &'a Study,
+        problem: &InverseProblem<'a>,
+        inside: &'a InsideCandidates<'a>,
+    ) -> Self {
+        let (forward, region) = (problem.forward(), problem.region());
+        Self { forward, parameters: &study.parameters, region, inside, other: None }
+    }
+}
+
+/// The data, candidates and starts of a search.
+pub struct PreparedSearch<'a> {
+    base: &'a BaseModel<'a>,
+    split: &'a HoldOutSplit,
+    starts: Vec<Vec<f64>>,
+    /// The data that are not held out.
+    pub experiment: &'a Experiment<'a>,
+    /// The candidates.
+    pub candidates: &'a [Candidate],
+    /// The levels and limits of the search.
+    pub options: SearchOptions,
+    /// The random stream of the stage.
+    pub random: Stream,
+}
+
+/// Splits the measurements, finds the best fits to those that are not held out, and collects the candidates; then calls
+/// `use_it`.
+pub fn prepared<T>(
+    study: &Study,
+    problem: &InverseProblem<'_>,
+    beginning: &SearchModel<'_>,
+    random: &Stream,
+    use_it: impl FnOnce(&PreparedSearch<'_>) -> Result<T, Stop>,
+) -> Result<T, Stop> {
+    let Some(measured) = &problem.data.value.measured else {
+        return Err(Stop::new("the study has no `[measurements]` to search for a gap"));
+    };
+    let split = apart(study, &measured.used);
+    let forward = WithEffects::new(beginning.forward, study.placed_effects());
+    let parameters = forward.parameters(beginning.parameters);
+    let wide = beginning.inside.wide.as_ref().map(|wide| wide.with_effects(study.placed_effects()));
+    let wide = wide.as_ref();
+    let base =
+        BaseModel { study, problem, beginning, wide, forward: &forward, parameters: &parameters };
+    let starts = base.starts(&split.training, random)?;
+    let experiment = base.experiment(&split.training, &starts[0])?;
+    let response = base.response(&starts[0]);
+    let noise = Noise::of(&experiment, &base.around(&starts[0]), None).sd(&experiment, &response);
+    let situation = Situation { layouts: &study.layouts, response: &response, noise: &noise };
+    let mut candidates = candidates(study, &situation)?;
+    candidates.extend(beginning.inside.candidates.iter().cloned());
+    let made = use_it(&PreparedSearch {
+        base: &base,
+        split: &split,
+        starts,
+        experiment: &experiment,
+        candidates: &candidates,
+        options: options(study),
+        random: random.clone(),
+    });
+    // A result cannot be trusted after an effect has failed.
+    let faults: Vec<_> = candidates.iter().flat_map(|c| c.effect.faults()).collect();
+    match faults.iter().find_map(|fault| fault.said()) {
+        Some(said) => Err(Stop::new(said)),
+        None => made,
+    }
+}
+
+impl<'a> PreparedSearch<'a> {
+    /// Runs the search.
+    pub fn search(&'a self) -> Result<SearchResult<'a>, Stop> {
+        let Self { experiment, candidates, options, .. } = *self;
+        let found = search(experiment, candidates, &self.starts, options, &self.random);
+        if let Some(failure) = self.base.beginning.forward.failure() {
+            return Err(Stop::new(failure));
+        }
+        let stop = || {
+            Stop::new("the model gave no answer at the best fit")
+                .help("check the priors and the model's own limits")
+        };
+        found.ok_or_else(stop)
+    }
+
+    /// The result of a search, with the proof on the held-out part of all measurements against the response `before`.
+    pub fn result(
+        &'a self,
+        found: &SearchResult<'a>,
+        before: &[f64],
+        all: &Observations,
+    ) -> Result<GapResult, Stop> {
+        let mut result = GapResult::of(found, self.candidates, self.options, &self.random);
+        let fitted =
+            FittedSystem { system: &found.system, fit: &found.last.fit, noise: &found.noise };
+        for part in &self.split.held_out {
+            result.held_out.extend(self.base.proof(part, all, before, &fitted)?);
+        }
+        Ok(result)
+    }
+}
+
+/// The measurements of a study in two parts: those of the search, and those that are held out.
+pub(super) fn apart(study: &Study, all: &Observations) -> HoldOutSplit {
+    let stream = stream(study, "gap").named("hold out");
+    split(all, &study.gap.keys.hold_out, &stream)
+}
+
+fn options(study: &Study) -> SearchOptions {
+    let keys = &study.gap.keys;
+    let alarm = keys.false_alarm.get();
+    SearchOptions {
+        naming: NAMES * alarm,
+        unlisted: (1.0 - NAMES) * alarm,
+        simulations: keys.simulations.get(),
+        most: keys.effects.get(),
+    }
+}
+
+/// The candidates of the study: those that the installed effects propose, and those that the study lists.
+fn candidates(study: &Study, situation: &Situation<'_>) -> Result<Vec<Candidate>, Stop> {
+    let mut all = proposed(study.gap.keys.candidates.as_deref(), situation).map_err(Stop::new)?;
+    for section in &study.gap.candidates {
+        let kind = section.common.name.as_ref().map_or(section.built.name, AsRef::as_ref);
+        all.push(
+            Candidate::of(kind, section.built.name, &section.built.options).map_err(Stop::new)?,
+        );
+    }
+    Ok(all)
+}
+
+/// The study's model with the study's effects, its data and its errors.
+pub(super) struct BaseModel<'a> {
+    pub study: &'a Study,
+    pub problem: &'a InverseProblem<'a>,
+    pub beginning: &'a SearchModel<'a>,
+    pub wide: Option<&'a ExtendedMap<'a>>,
+    pub forward: &'a WithEffects<'a>,
+    pub parameters: &'a [Parameter],
+}
+
+impl<'a> BaseModel<'a> {
+    fn starts(&self, data: &Observations, random: &Stream) -> Result<Vec<Vec<f64>>, Stop> {
+        let stream = random.named("best fit");
+        let mut maxima = best_fit::points(self.parameters, data, self.forward, &stream)?;
+        maxima.truncate(STARTS);
+        Ok(maxima)
+    }
+
+    fn response(&self, point: &[f64]) -> Vec<f64> {
+        self.forward.mean(&Matrix::from_vec(1, point.len(), point.to_vec())).into_vec()
+    }
+
+    /// The response at a point with its derivatives by the parameters.
+    pub fn around(&self, point: &[f64]) -> ResponseTangents {
+        let (response, jacobian) = self.forward.mean_and_jacobian(point);
+        let widths: Vec<f64> =
+            self.parameters.iter().map(|p| 1.0 / precision(&p.prior).sqrt()).collect();
+        let slopes = Matrix::from_fn(jacobian.columns(), jacobian.rows(), |j, i| {
+            widths[j] * jacobian[(i, j)]
+        });
+        ResponseTangents { response, slopes }
+    }
+
+    /// The noise as the data state it, otherwise as the study's discrepancy does, for all outputs; `None` if neither
+    /// does.
+    fn stated(&self, data: &Observations, response: &[f64]) -> Result<Option<StatedNoise>, Stop> {
+        if data.blocks.iter().any(|block| block.covariance.is_some()) {
+            let text =
+                "the search for what is missing cannot use a `covariance` of the measurements";
+            return Err(Stop::new(text).help(
+                "state the noise of single values, in a column `sigma`, or let replicates show it",
+            ));
+        }
+        if data.states_noise() {
+            let sd = data.blocks.iter().flat_map(Measurements::stated_sd).collect();
+            return Ok(Some(StatedNoise { sd, correlation_time: None }));
+        }
+        let Some(section) = &self.study.discrepancy else { return Ok(None) };
+        let mut all = StatedNoise { sd: Vec::new(), correlation_time: None };
+        for (layout, range) in self.study.layouts.parts() {
+            let own = section.built.plugin.stated_noise(layout, &response[range]);
+            let Some(own) = own else { return Ok(None) };
+            all.sd.extend(own.sd);
+            if let Some(times) = own.correlation_time {
+                all.correlation_time.get_or_insert_default().extend(times);
+            }
+        }
+        Ok(Some(all))
+    }
+
+    /// The measurements with the forward map and the covariance of its errors.
+    pub fn experiment(&self, data: &Observations, point: &[f64]) -> Result<Experiment<'a>, Stop> {
+        let layouts = &self.study.layouts;
+        let mut experiment = Experiment::new(layouts, self.parameters, self.forward, data);
+        experiment.region = self.beginning.region.map(<[_]>::to_vec);
+        experiment.wide = self.wide;
+        let around = self.around(point);
+        let response = &around.response;
+        experiment.stated = self.stated(data, response)?;
+        let noise = Noise::of(&experiment, &around, None);
+        let all = error_covariance(&experiment, &noise, response, &self.samples(data)?);
+        (experiment.common, experiment.remainder) = (all.common, all.remainder);
+        Ok(experiment)
+    }
+
+    /// Samples of the errors of emulator and numerics.
+    fn samples(&self, data: &Observations) -> Result<Vec<CommonError>, Stop> {
+        let Self { study, problem, wide, beginning, .. } = self;
+        let mut all = Vec::new();
+        if let Some(errors) = beginning.other {
+            all.extend(errors.iter().cloned());
+        } else if let Some(fitted) = problem.fitted() {
+            let stated = stated_variance(study, data, problem.forward())?;
+            all.push(fitted.value.error_samples(study, stated.as_deref()));
+        }
+        if let (Some(kept), Some(section)) = (problem.numerics(), &study.numerical_error) {
+            all.push(kept.value.error_samples(&section.written));
+        }
+        all.extend(wide.iter().flat_map(|wide| wide.common.iter().cloned()));
+        Ok(all)
+    }
+
+    /// The proof of a system against the response `before` on one kind of held-out data.
+    pub fn proof(
+        &self,
+        part: &HeldOutData,
+        all: &Observations,
+        before: &[f64],
+        fitted: &FittedSystem<'_>,
+    ) -> Result<Option<HeldOut>, Stop> {
+        let FittedSystem { system, fit, noise } = fitted;
+        let point = &fit.at.point[..self.parameters.len()];
+        let held_out = self.experiment(&part.data, point)?;
+        let after = &fit.at.response;
+        let noise = if part.kind == HeldOutKind::Replicates {
+            noise.restricted(system.experiment, &held_out)
+        } else {
+            // Outputs without training data have the noise of the held-out replicates.
+            let whole = self.experiment(all, point)?;
+            let around = system.around(&fit.at);
+            Noise::of(&whole, &around, None).restricted(&whole, &held_out)
+        };
+        let proof = prove(&held_out, &noise, before, after);
+        let [without, with] = [before, after].map(|response| average(&part.data, response));
+        let accuracy = without.zip(with).map(|(without, with)| [without, with]);
+        let names = part.names.clone();
+        Ok(proof.map(|proof| HeldOut { kind: part.kind, names, proof, accuracy }))
+    }
+}
+
+/// A system at its best fit to the data of the search, with the noise around it.
+pub(super) struct FittedSystem<'a> {
+    pub system: &'a System<'a>,
+    pub fit: &'a Fit,
+    pub noise: &'a Noise,
+}
+
+/// The accuracy, mean over the groups of sensors.
+fn average(data: &Observations, response: &[f64]) -> Option<f64> {
+    let shares: Vec<f64> = accuracy(data, response).into_iter().map(|(_, share)| share).collect();
+    (!shares.is_empty()).then(|| mean(&shares))
+}

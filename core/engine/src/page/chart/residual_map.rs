@@ -1,0 +1,99 @@
+//! Residuals along curves as coloured strips, one per curve, with outlined intervals.
+
+use super::{Axis, Frame, WIDTH};
+use crate::page::number::{fixed, typeset};
+use crate::page::svg::{Anchor, Area, Svg};
+
+/// One strip of the map.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Strip {
+    /// Name of the curve.
+    pub name: String,
+    /// Points `(x, value)` along the axis.
+    pub points: Vec<(f64, f64)>,
+    /// Intervals on the axis that are outlined, first and last place.
+    pub outlines: Vec<(f64, f64)>,
+}
+
+/// Width reserved for the names beside the strips.
+const NAMES: f64 = 130.0;
+const HEIGHT: f64 = 20.0;
+/// Largest number of cells of a strip.
+const CELLS: usize = 120;
+/// Increase of the value per step of colour.
+const STEP: f64 = 1.2;
+
+/// Draws the map; blue is positive, red negative, and the darkest colour stands for values of six or more.
+pub fn residual_map(strips: &[Strip], x: &Axis, description: &str) -> String {
+    let height = strips.len() as f64 * HEIGHT;
+    let area = Area::new(NAMES, 6.0, WIDTH - NAMES - 12.0, height);
+    let y = Axis::new("", (0.0, strips.len().max(1) as f64)).ticks(0);
+    let frame = Frame::new(area, x, &y);
+    let mut svg = Svg::new(WIDTH, height + 46.0);
+    frame.axes(&mut svg, x, &y);
+    let longest = strips.iter().map(|strip| strip.points.len()).max().unwrap_or(0);
+    let cells = longest.clamp(1, CELLS);
+    for (i, strip) in strips.iter().enumerate() {
+        let top = area.y + i as f64 * HEIGHT;
+        svg.text("tick", (NAMES - 8.0, top + 0.5 * HEIGHT + 4.0), Anchor::End, &strip.name);
+        let width = area.width / cells as f64;
+        for (k, value) in extremes(strip, x.domain, cells).into_iter().enumerate() {
+            let Some((at, value)) = value else { continue };
+            let cell = Area::new(area.x + k as f64 * width, top + 1.0, width + 0.3, HEIGHT - 2.0);
+            let hint = format!(
+                "{}, {}: {}",
+                strip.name,
+                typeset(&crate::page::number::significant(at, 3)),
+                typeset(&fixed(value, 1))
+            );
+            svg.rectangle(&format!("strip {}", shade(value)), cell, &hint);
+        }
+    }
+    for (i, strip) in strips.iter().enumerate() {
+        for &(from, to) in &strip.outlines {
+            let (left, right) = (frame.x.place(from), frame.x.place(to));
+            let (left, right) = (left - 2.0, right.max(left + 3.0) + 2.0);
+            let top = area.y + i as f64 * HEIGHT;
+            svg.rectangle("outline", Area::new(left, top, right - left, HEIGHT), "");
+        }
+    }
+    svg.finish(description)
+}
+
+/// Value farthest from zero in each cell, with its place; `None` for an empty cell.
+fn extremes(strip: &Strip, (low, high): (f64, f64), cells: usize) -> Vec<Option<(f64, f64)>> {
+    let mut found: Vec<Option<(f64, f64)>> = vec![None; cells];
+    let length = if high > low { high - low } else { 1.0 };
+    for &(at, value) in strip.points.iter().filter(|p| p.1.is_finite()) {
+        let share = (at - low) / length * (cells as f64 - 1.0);
+        let cell = &mut found[(share.round().max(0.0) as usize).min(cells - 1)];
+        if cell.is_none_or(|(_, largest)| value.abs() > largest.abs()) {
+            *cell = Some((at, value));
+        }
+    }
+    found
+}
+
+fn shade(value: f64) -> String {
+    let step = ((value.abs() / STEP).round() as i64).min(5);
+    match (step, value < 0.0) {
+        (0, _) => String::from("c-0"),
+        (step, true) => format!("c-minus-{step}"),
+        (step, false) => format!("c-plus-{step}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cell_shows_its_largest_value() {
+        let points = (0..1000).map(|i| (f64::from(i), if i == 500 { -9.0 } else { 0.1 })).collect();
+        let strip = Strip { name: "A".into(), points, outlines: Vec::new() };
+        let cells = extremes(&strip, (0.0, 999.0), 100);
+        assert_eq!(cells.iter().filter(|c| c.is_some_and(|c| c == (500.0, -9.0))).count(), 1);
+        assert_eq!(shade(-9.0), "c-minus-5");
+        assert_eq!(shade(0.1), "c-0");
+    }
+}

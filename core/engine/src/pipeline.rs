@@ -1,0 +1,262 @@
+//! The program in one file: the stages of a study in order, on each of its three routes.
+//!
+//! A study with a `[target]` samples that density. A study with a `[surrogate]` calibrates with an emulator of its
+//! model, any other with the model itself. The stages after the posterior are the same for both.
+//!
+//! ```text
+//! emulated  design  simulate  read  surrogate  calibrate (repeated to refine) ┐
+//! direct                      read             calibrate                      ┴ evidence validate assess gap report
+//! target                                       calibrate                        evidence          assess     report
+//! ```
+
+use lacuna::plugin::Density;
+use lacuna::plugin::registry::{NoKeys, Section};
+use lacuna::run::{Listener, Observer, Stop};
+use lacuna_run::{Kept, RunDirectory, Stage};
+
+use crate::gap::power::{PowerDesign, Rates, stage as power};
+use crate::gap::stage as gap;
+use crate::posterior::{Given, Posterior};
+use crate::report::findings::Findings;
+use crate::report::stage as report;
+use crate::stage::artifacts::Artifacts;
+use crate::stage::calibrate::Calibrated;
+use crate::stage::direct::Direct;
+use crate::stage::emulated::Emulated;
+use crate::stage::evidence::Weighed;
+use crate::stage::inverse_problem::InverseProblem;
+use crate::stage::predictions::Predicting;
+use crate::stage::surrogate::Fitting;
+use crate::stage::{
+    assess, calibrate, contents, design, evidence, inference_data, low_fidelity, manifest,
+    numerical_error, read, refine, simulate, surrogate, target, validate,
+};
+use crate::study::Study;
+
+/// Purpose for which a study is run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Goal<'a> {
+    /// Find the posterior.
+    Calibrate,
+    /// Find the posterior and the physics that the model lacks.
+    FindGap,
+    /// Compare its predictions of held-out data with this response of the study without its effects.
+    Show(&'a [f64]),
+}
+
+/// Runs a study: unchanged results are reused, the rest is made.
+pub fn run(
+    study: &Study,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Findings, Stop> {
+    pursue(study, Goal::Calibrate, run, observer)
+}
+
+/// Runs a study and searches for physics that its model lacks.
+pub fn find_gap(
+    study: &Study,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Findings, Stop> {
+    if study.target.is_some() {
+        return Err(Stop::new("a study with `[target]` has no data to compare with"));
+    }
+    if study.measurements.is_none() {
+        return Err(Stop::new("the study has no `[measurements]` to search for a gap"));
+    }
+    pursue(study, Goal::FindGap, run, observer)
+}
+
+/// Runs a study with added effects, and compares it on held-out data with the study without them: with its response
+/// `before`, calibrated with the remaining data.
+pub fn show(
+    study: &Study,
+    before: &[f64],
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Findings, Stop> {
+    pursue(study, Goal::Show(before), run, observer)
+}
+
+/// Counts which effects a search for what is missing would have found in a study, in many cases made of its own data.
+pub fn power(
+    study: &Study,
+    design: &PowerDesign,
+    simulations: Option<usize>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Rates, Stop> {
+    if study.target.is_some() {
+        return Err(Stop::new(
+            "a study with `[target]` has no data in which anything could be planted",
+        ));
+    }
+    run.watch(study.faults());
+    let kept = if study.surrogate.is_some() {
+        let (emulated, _) = calibrate_emulated(study, run, observer)?;
+        power::stage(study, design, simulations, &emulated.problem(), run, observer)?
+    } else {
+        let direct = Direct::of(study, run, observer)?;
+        power::stage(study, design, simulations, &direct.problem(), run, observer)?
+    };
+    Ok(kept.value)
+}
+
+fn pursue(
+    study: &Study,
+    goal: Goal<'_>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Findings, Stop> {
+    contents::before_all(study)?;
+    manifest::begin(study, run)?;
+    let observer = &Listener::new(observer);
+    let findings = match (&study.target, &study.surrogate) {
+        (Some(given), _) => sample_target(study, given, run, observer)?,
+        (None, Some(_)) => {
+            let (emulated, calibrated) = calibrate_emulated(study, run, observer)?;
+            conclude(study, goal, &emulated.problem(), calibrated.as_ref(), run, observer)?
+        }
+        (None, None) => {
+            let direct = Direct::of(study, run, observer)?;
+            let calibrated = calibrate_direct(study, &direct, run, observer)?;
+            conclude(study, goal, &direct.problem(), calibrated.as_ref(), run, observer)?
+        }
+    };
+    manifest::end(study, run)?;
+    Ok(findings)
+}
+
+/// Stages of a study with a surrogate up to its emulator and the estimates of its errors.
+pub fn emulate(
+    study: &Study,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Emulated, Stop> {
+    let placed = design::stage(study, run, observer)?;
+    let simulated = simulate::stage(study, placed.as_ref(), run, observer)?;
+    let data = read::stage(study, simulated.as_ref(), run, observer)?;
+    let data = low_fidelity::stage(study, placed.as_ref(), data, run, observer)?;
+    let fitting = Fitting::of(study, data.value.runs()?)?;
+    let fitted = surrogate::stage(study, &data, &fitting, run, observer)?;
+    let folders = numerical_error::folders();
+    let numerics = numerical_error::stage(study, &data, None, &folders, run, observer)?;
+    Emulated::new(study, data, fitted, numerics, None)
+}
+
+/// Stages of a study with a surrogate up to the posterior, which exists if the study has measurements.
+pub fn calibrate_emulated(
+    study: &Study,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<(Emulated, Option<Kept<Calibrated>>), Stop> {
+    let emulated = emulate(study, run, observer)?;
+    refine::stage(study, emulated, run, observer)
+}
+
+/// Posterior of a study without a surrogate.
+fn calibrate_direct(
+    study: &Study,
+    direct: &Direct<'_>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Option<Kept<Calibrated>>, Stop> {
+    let folder = Stage::Calibrate.folder();
+    let calibrated = calibrate::stage(study, &direct.problem(), &folder, run, observer)?;
+    if let Some(tally) = direct.tally() {
+        // The number depends on where a run was interrupted; the assessment counts the failures anew.
+        observer.remark(&tally);
+    }
+    Ok(calibrated)
+}
+
+/// Evidence, validation, gap and report of a calibration.
+fn conclude(
+    study: &Study,
+    goal: Goal<'_>,
+    problem: &InverseProblem<'_>,
+    calibrated: Option<&Kept<Calibrated>>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Findings, Stop> {
+    let weighed = weigh(study, problem, calibrated, run, observer)?;
+    let validated = validate::stage(study, problem, calibrated, run, observer)?;
+    let made = Artifacts {
+        problem: Some(problem),
+        calibrated,
+        weighed: weighed.as_ref(),
+        validated: validated.as_ref(),
+    };
+    let assessed = assess::stage(study, &made, run, observer)?;
+    let gap = match goal {
+        Goal::FindGap => gap::stage(study, problem, run, observer)?,
+        // A report that is written again keeps the result of an earlier search.
+        Goal::Calibrate | Goal::Show(_) => gap::kept(study, problem, run, observer)?,
+    };
+    if let Goal::Show(before) = goal {
+        gap::show::stage(study, problem, calibrated, before, run, observer)?;
+    }
+    if let Some(calibrated) = calibrated {
+        let (weighed, validated) = (weighed.as_ref(), validated.as_ref());
+        let finished = inference_data::Finished { calibrated, weighed, validated };
+        inference_data::stage(study, problem, &finished, run)?;
+    }
+    let results = report::Results { artifacts: made, assessed: &assessed, gap: gap.as_ref() };
+    report::stage(study, &results, run, observer)
+}
+
+/// Evidence of a calibration, if there is one.
+fn weigh(
+    study: &Study,
+    problem: &InverseProblem<'_>,
+    calibrated: Option<&Kept<Calibrated>>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Option<Kept<Weighed>>, Stop> {
+    let (Some(calibrated), Some(measured)) = (calibrated, &problem.data.value.measured) else {
+        return Ok(None);
+    };
+    let parts = calibrate::Parts::of(study, measured, problem)?;
+    let posterior = parts.posterior(study, problem);
+    let predicting = Predicting {
+        forward: problem.forward(),
+        likelihood: parts.likelihood(),
+        law: calibrate::Law::of(study, measured, problem)?,
+        data: &measured.likelihood,
+    };
+    evidence::stage(study, &posterior, calibrated, Some(predicting), run, observer).map(Some)
+}
+
+/// Samples a given log density: nothing is simulated, read or emulated.
+fn sample_target(
+    study: &Study,
+    target: &Section<dyn Density, NoKeys>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Findings, Stop> {
+    let density = target.built.plugin.bind(&study.parameters)?;
+    let likelihood = if target.built.plugin.includes_prior() {
+        Given::posterior(&*density, &study.parameters)
+    } else {
+        Given::likelihood(&*density)
+    };
+    let posterior = Posterior::new(&study.parameters, likelihood);
+    let calibrated = target::stage(study, target, &posterior, run, observer)?;
+    let weighed = evidence::stage(study, &posterior, &calibrated, None, run, observer)?;
+    let finished = inference_data::Finished {
+        calibrated: &calibrated,
+        weighed: Some(&weighed),
+        validated: None,
+    };
+    inference_data::of_target(study, &posterior, &finished, run)?;
+    let made = Artifacts {
+        problem: None,
+        calibrated: Some(&calibrated),
+        weighed: Some(&weighed),
+        validated: None,
+    };
+    let assessed = assess::stage(study, &made, run, observer)?;
+    let results = report::Results { artifacts: made, assessed: &assessed, gap: None };
+    report::stage(study, &results, run, observer)
+}

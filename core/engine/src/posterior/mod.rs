@@ -1,0 +1,283 @@
+//! Priors and a log-likelihood combined into one log density with its gradient.
+//!
+//! Coordinates, in this order: the model's parameters in physical units; the parameters of the study's effects; the
+//! discrepancy's hyperparameters. A hyperparameter that is declared `log` is represented by its logarithm, and the
+//! density includes the Jacobian, so that its prior keeps its meaning.
+
+use lacuna::data::Parameter;
+use lacuna::math::distribution::Distribution;
+use lacuna::math::random::{Stream, uniform};
+use lacuna::plugin::{Fact, Hyperparameter, Target};
+use lacuna_linalg::Matrix;
+use rand::Rng;
+use rayon::prelude::*;
+
+pub mod bridge;
+mod given;
+mod joint;
+mod of_data;
+
+pub use given::Given;
+pub use joint::Joint;
+pub use of_data::OfData;
+
+/// Number of points that are evaluated together. It is fixed because the rounding of a matrix product depends on the
+/// number of its rows, and results must not depend on the number of threads.
+const BATCH: usize = 30;
+
+/// Log-likelihood as a function of natural values of the parameters and of further unknowns.
+pub trait LogLikelihood: Sync {
+    /// Unknowns besides the parameters.
+    fn hyperparameters(&self) -> &[Hyperparameter];
+
+    /// Log-likelihood for each row of `theta` (`points x parameters`) and `hyper` (`points x hyperparameters`).
+    fn values(&self, theta: &Matrix, hyper: &Matrix) -> Vec<f64>;
+
+    /// Log-likelihood at one point and its derivatives, by the parameters and then by the hyperparameters.
+    fn value_and_gradient(&self, theta: &[f64], hyper: &[f64]) -> (f64, Vec<f64>);
+
+    /// Facts for the report.
+    fn facts(&self) -> Vec<Fact>;
+
+    /// Reason why the log-likelihood can no longer be computed; `None` while it works.
+    fn failure(&self) -> Option<String> {
+        None
+    }
+}
+
+/// The posterior of a study.
+pub struct Posterior<'a> {
+    parameters: &'a [Parameter],
+    likelihood: Box<dyn LogLikelihood + 'a>,
+    region: Option<Vec<(f64, f64)>>,
+}
+
+impl<'a> Posterior<'a> {
+    /// The posterior with the parameters' priors.
+    pub fn new(parameters: &'a [Parameter], likelihood: impl LogLikelihood + 'a) -> Self {
+        Self { parameters, likelihood: Box::new(likelihood), region: None }
+    }
+
+    /// Restricts each parameter to its interval; the density is zero elsewhere.
+    pub fn within(self, region: Option<Vec<(f64, f64)>>) -> Self {
+        Self { region, ..self }
+    }
+
+    fn is_inside(&self, natural: &[f64]) -> bool {
+        let region = self.region.iter().flatten();
+        region.zip(natural).all(|(&(low, high), &x)| low <= x && x <= high)
+    }
+
+    /// Parameters of the model.
+    pub fn parameters(&self) -> &[Parameter] {
+        self.parameters
+    }
+
+    /// Facts about the likelihood, for the report.
+    pub fn facts(&self) -> Vec<Fact> {
+        self.likelihood.facts()
+    }
+
+    /// Unknowns besides the model's parameters.
+    pub fn hyperparameters(&self) -> &[Hyperparameter] {
+        self.likelihood.hyperparameters()
+    }
+
+    /// Natural values at a point of the coordinates.
+    pub fn natural(&self, point: &[f64]) -> Vec<f64> {
+        self.map_logs(point, f64::exp)
+    }
+
+    /// Coordinates of natural values.
+    pub fn coordinates(&self, natural: &[f64]) -> Vec<f64> {
+        self.map_logs(natural, f64::ln)
+    }
+
+    fn map_logs(&self, point: &[f64], map: impl Fn(f64) -> f64) -> Vec<f64> {
+        let d = self.parameters.len();
+        let is_log = |i: usize| i >= d && self.hyperparameters()[i - d].log;
+        point.iter().enumerate().map(|(i, &x)| if is_log(i) { map(x) } else { x }).collect()
+    }
+
+    /// This density over the same coordinates without the Jacobian of the logarithms: its maximum is the mode of the
+    /// density in natural units.
+    pub fn mode(&'a self) -> Mode<'a> {
+        Mode(self)
+    }
+
+    /// Prior of each coordinate's natural value.
+    pub fn priors(&self) -> impl Iterator<Item = &Distribution> {
+        let parameters = self.parameters.iter().map(|p| &p.prior);
+        parameters.chain(self.hyperparameters().iter().map(|h| &h.prior))
+    }
+
+    /// Log prior density of natural values.
+    fn log_prior(&self, natural: &[f64]) -> f64 {
+        if !self.is_inside(natural) {
+            return f64::NEG_INFINITY;
+        }
+        self.priors().zip(natural).map(|(prior, &x)| prior.log_density(x)).sum()
+    }
+
+    /// Log Jacobian of the logarithmic coordinates, which is the sum of these coordinates.
+    fn log_jacobian(&self, point: &[f64]) -> f64 {
+        let d = self.parameters.len();
+        self.hyperparameters().iter().zip(&point[d..]).filter(|(h, _)| h.log).map(|(_, &x)| x).sum()
+    }
+
+    fn batch(&self, points: &Matrix, jacobian: bool) -> Vec<f64> {
+        let starts: Vec<usize> = (0..points.rows()).step_by(BATCH).collect();
+        let parts: Vec<Vec<f64>> = starts
+            .into_par_iter()
+            .map(|start| {
+                let rows: Vec<usize> = (start..points.rows().min(start + BATCH)).collect();
+                self.block(&points.select_rows(&rows), jacobian)
+            })
+            .collect();
+        parts.concat()
+    }
+
+    fn block(&self, points: &Matrix, jacobian: bool) -> Vec<f64> {
+        let d = self.parameters.len();
+        let natural: Vec<Vec<f64>> = points.iter_rows().map(|p| self.natural(p)).collect();
+        let mut density: Vec<f64> = natural
+            .iter()
+            .zip(points.iter_rows())
+            .map(|(x, p)| self.log_prior(x) + if jacobian { self.log_jacobian(p) } else { 0.0 })
+            .collect();
+        let inside: Vec<usize> = (0..points.rows()).filter(|&i| density[i].is_finite()).collect();
+        if !inside.is_empty() {
+            let theta = Matrix::from_rows(d, inside.iter().map(|&i| &natural[i][..d]));
+            let hyper = Matrix::from_rows(
+                self.hyperparameters().len(),
+                inside.iter().map(|&i| &natural[i][d..]),
+            );
+            for (&i, value) in inside.iter().zip(self.likelihood.values(&theta, &hyper)) {
+                density[i] += value;
+            }
+        }
+        // NaN (an overflow far from the data) counts as zero density.
+        density.iter().map(|&v| if v.is_nan() { f64::NEG_INFINITY } else { v }).collect()
+    }
+
+    fn value_and_gradient(&self, point: &[f64], jacobian: bool) -> (f64, Vec<f64>) {
+        let d = self.parameters.len();
+        let natural = self.natural(point);
+        let nothing = || (f64::NEG_INFINITY, vec![0.0; point.len()]);
+        let prior =
+            self.log_prior(&natural) + if jacobian { self.log_jacobian(point) } else { 0.0 };
+        if !prior.is_finite() {
+            return nothing();
+        }
+        let (value, mut gradient) =
+            self.likelihood.value_and_gradient(&natural[..d], &natural[d..]);
+        let value = prior + value;
+        if !value.is_finite() {
+            return nothing();
+        }
+        for ((g, prior), &x) in gradient.iter_mut().zip(self.priors()).zip(&natural) {
+            *g += prior.log_density_derivative(x);
+        }
+        for (i, hyper) in self.hyperparameters().iter().enumerate().filter(|(_, h)| h.log) {
+            debug_assert!(hyper.log);
+            let g = &mut gradient[d + i];
+            *g = *g * natural[d + i] + if jacobian { 1.0 } else { 0.0 };
+        }
+        (value, gradient)
+    }
+
+    fn coordinate_bounds(&self) -> Vec<(f64, f64)> {
+        let plain = self.parameters.iter().enumerate().map(|(i, p)| {
+            let (low, high) = p.prior.support();
+            self.region.as_ref().map_or((low, high), |r| (low.max(r[i].0), high.min(r[i].1)))
+        });
+        let hyper = self.hyperparameters().iter().map(|h| {
+            let (low, high) = h.prior.support();
+            if h.log { (low.max(0.0).ln(), high.ln()) } else { (low, high) }
+        });
+        plain.chain(hyper).collect()
+    }
+
+    /// A draw from the prior of coordinate `j`, inside the region.
+    fn draw(&self, j: usize, prior: &Distribution, rng: &mut impl Rng) -> f64 {
+        match self.region.as_ref().and_then(|region| region.get(j)) {
+            Some(&(low, high)) => {
+                let (from, to) = (prior.cdf(low), prior.cdf(high));
+                prior.quantile(from + (to - from) * uniform(rng)).clamp(low, high)
+            }
+            None => prior.sample(rng),
+        }
+    }
+
+    /// Logarithm of the prior probability of the region.
+    pub fn log_share(&self) -> f64 {
+        let region = self.region.iter().flatten();
+        let share = |(&(low, high), prior): (&(f64, f64), &Distribution)| {
+            (prior.cdf(high) - prior.cdf(low)).ln()
+        };
+        region.zip(self.priors()).map(share).sum()
+    }
+
+    fn draws(&self, count: usize, stream: &Stream) -> Matrix {
+        let d = self.parameters.len() + self.hyperparameters().len();
+        let draw = |i: usize| {
+            let mut rng = stream.at(i as u64).generator();
+            let natural: Vec<f64> =
+                self.priors().enumerate().map(|(j, p)| self.draw(j, p, &mut rng)).collect();
+            self.coordinates(&natural)
+        };
+        Matrix::from_rows(d, (0..count).map(draw))
+    }
+}
+
+impl Target for Posterior<'_> {
+    fn failure(&self) -> Option<String> {
+        self.likelihood.failure()
+    }
+
+    fn dimension(&self) -> usize {
+        self.parameters.len() + self.hyperparameters().len()
+    }
+    fn log_density(&self, points: &Matrix) -> Vec<f64> {
+        self.batch(points, true)
+    }
+    fn log_prior(&self, points: &Matrix) -> Vec<f64> {
+        points
+            .iter_rows()
+            .map(|p| self.log_prior(&self.natural(p)) + self.log_jacobian(p))
+            .collect()
+    }
+    fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
+        self.value_and_gradient(point, true)
+    }
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        self.coordinate_bounds()
+    }
+    fn prior_draws(&self, count: usize, stream: &Stream) -> Matrix {
+        self.draws(count, stream)
+    }
+}
+
+/// A posterior without the Jacobian of its logarithmic coordinates; see [`Posterior::mode`].
+pub struct Mode<'a>(&'a Posterior<'a>);
+
+impl Target for Mode<'_> {
+    fn dimension(&self) -> usize {
+        self.0.dimension()
+    }
+    fn log_density(&self, points: &Matrix) -> Vec<f64> {
+        self.0.batch(points, false)
+    }
+    fn log_prior(&self, points: &Matrix) -> Vec<f64> {
+        points.iter_rows().map(|p| self.0.log_prior(&self.0.natural(p))).collect()
+    }
+    fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
+        self.0.value_and_gradient(point, false)
+    }
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        self.0.coordinate_bounds()
+    }
+    fn prior_draws(&self, count: usize, stream: &Stream) -> Matrix {
+        self.0.draws(count, stream)
+    }
+}

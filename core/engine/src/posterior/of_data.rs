@@ -1,0 +1,140 @@
+//! Likelihood of measurements for a forward map, effects and a discrepancy.
+
+use std::ops::Range;
+
+use lacuna::plugin::discrepancy::Compressed;
+use lacuna::plugin::effect::{Placed, with_tangents};
+use lacuna::plugin::forward::Linear;
+use lacuna::plugin::{Fact, Forward, Hyperparameter, Likelihood};
+use lacuna_linalg::{Matrix, multiply_vector};
+
+use super::LogLikelihood;
+
+/// Number of values requested from the forward map at once.
+const BATCH: usize = 1 << 20;
+
+/// Likelihood of measurements; see the module. The hyperparameters are those of the effects, then those of the
+/// discrepancy.
+pub struct OfData<'a> {
+    forward: &'a dyn Forward,
+    effects: Vec<(Placed<'a>, Range<usize>)>,
+    likelihood: &'a dyn Likelihood,
+    reduced: Option<(&'a dyn Linear, Box<dyn Compressed>)>,
+    hyper: Vec<Hyperparameter>,
+}
+
+impl<'a> OfData<'a> {
+    /// Combines the parts. Without effects and with a linear forward map the likelihood is compressed.
+    pub fn new(
+        forward: &'a dyn Forward,
+        effects: Vec<Placed<'a>>,
+        likelihood: &'a dyn Likelihood,
+    ) -> Self {
+        let mut hyper = Vec::new();
+        let mut placed = Vec::new();
+        for effect in effects {
+            let begin = hyper.len();
+            hyper.extend(effect.hyperparameters());
+            placed.push((effect, begin..hyper.len()));
+        }
+        hyper.extend_from_slice(likelihood.hyperparameters());
+        let reduced = if placed.is_empty() {
+            forward.linear().and_then(|linear| Some((linear, likelihood.compress(linear)?)))
+        } else {
+            None
+        };
+        Self { forward, effects: placed, likelihood, reduced, hyper }
+    }
+
+    /// Response at natural values: that of the forward map with the effects applied; and the discrepancy's own
+    /// hyperparameters.
+    pub fn response(&self, theta: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let mean = self.forward.mean(&Matrix::from_vec(1, theta.len(), theta.to_vec()));
+        (self.with_effects(mean.row(0).to_vec(), hyper), hyper[self.own()..].to_vec())
+    }
+
+    /// Index at which the discrepancy's own hyperparameters begin.
+    fn own(&self) -> usize {
+        self.effects.last().map_or(0, |(_, range)| range.end)
+    }
+
+    /// Log-likelihood for each row of responses of the forward map (`points x outputs`); rows that are not finite are
+    /// skipped.
+    fn batch(&self, means: Matrix, hyper: &Matrix) -> Vec<f64> {
+        let mut values = vec![f64::NEG_INFINITY; means.rows()];
+        let finite = |&i: &usize| means.row(i).iter().all(|y| y.is_finite());
+        let asked: Vec<usize> = (0..means.rows()).filter(finite).collect();
+        let own: Vec<usize> = (self.own()..hyper.columns()).collect();
+        let own = hyper.select_rows(&asked).select_columns(&own);
+        let responses = match (self.effects.is_empty(), asked.len() == means.rows()) {
+            (true, true) => means,
+            (true, false) => means.select_rows(&asked),
+            (false, _) => {
+                let with = |&i: &usize| self.with_effects(means.row(i).to_vec(), hyper.row(i));
+                Matrix::from_rows(means.columns(), asked.iter().map(with))
+            }
+        };
+        for (&i, value) in asked.iter().zip(self.likelihood.log_likelihoods(&responses, &own)) {
+            values[i] = value;
+        }
+        values
+    }
+
+    fn with_effects(&self, mut response: Vec<f64>, hyper: &[f64]) -> Vec<f64> {
+        for (effect, range) in &self.effects {
+            response = effect.apply(&response, &hyper[range.clone()]);
+        }
+        response
+    }
+}
+
+impl<'a> LogLikelihood for OfData<'a> {
+    fn hyperparameters(&self) -> &[Hyperparameter] {
+        &self.hyper
+    }
+
+    fn values(&self, theta: &Matrix, hyper: &Matrix) -> Vec<f64> {
+        if let Some((linear, compressed)) = &self.reduced {
+            return compressed.log_likelihood_at(*linear, theta, hyper);
+        }
+        // Long records are evaluated in batches, because many at once would fill the memory.
+        let rows: Vec<usize> = (0..theta.rows()).collect();
+        let batches = rows.chunks((BATCH / self.forward.outputs().max(1)).max(1));
+        let batch = |rows: &[usize]| {
+            let mean = self.forward.mean(&theta.select_rows(rows));
+            self.batch(mean, &hyper.select_rows(rows))
+        };
+        batches.flat_map(batch).collect()
+    }
+
+    fn value_and_gradient(&self, theta: &[f64], hyper: &[f64]) -> (f64, Vec<f64>) {
+        if let Some((linear, compressed)) = &self.reduced {
+            let row = |values: &[f64]| Matrix::from_vec(1, values.len(), values.to_vec());
+            let value = compressed.log_likelihood_at(*linear, &row(theta), &row(hyper))[0];
+            let (by_theta, by_hyper) = compressed.gradient_at(*linear, theta, hyper);
+            return (value, [by_theta, by_hyper].concat());
+        }
+        let (mean, jacobian) = self.forward.mean_and_jacobian(theta);
+        let effects = self.effects.iter().map(|(effect, range)| (effect, &hyper[range.clone()]));
+        let (response, tangents) = with_tangents(effects, mean, &jacobian);
+        if response.iter().any(|y| !y.is_finite()) {
+            return (f64::NEG_INFINITY, vec![0.0; theta.len() + hyper.len()]);
+        }
+        let own = &hyper[self.own()..];
+        let value = self.likelihood.log_likelihood(&response, own);
+        let (weight, by_own) = self.likelihood.gradient(&response, own);
+        (value, [multiply_vector(&tangents, &weight), by_own].concat())
+    }
+
+    fn facts(&self) -> Vec<Fact> {
+        self.likelihood.facts()
+    }
+
+    fn failure(&self) -> Option<String> {
+        let of_effect = |(effect, _): &(Placed<'a>, Range<usize>)| {
+            effect.effect.faults().iter().find_map(|fault| fault.said().map(str::to_owned))
+        };
+        let own = self.forward.failure().or_else(|| self.likelihood.failure());
+        own.or_else(|| self.effects.iter().find_map(of_effect))
+    }
+}

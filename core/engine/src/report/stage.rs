@@ -1,0 +1,277 @@
+//! Stage 8: results for people (`report.html`) and for scripts (`summary.json`).
+
+use lacuna::data::{Draws, Ensemble, Observations};
+use lacuna::diagnose::Diagnosis;
+use lacuna::math::moments::Moments;
+use lacuna::math::{fit, moments};
+use lacuna::run::{Observer, Stop, files};
+use lacuna_linalg::Matrix;
+use lacuna_run::directory::Record;
+use lacuna_run::{Kept, RunDirectory, Stage};
+
+use crate::assess::Assessment;
+use crate::gap::result::{GapFindings, GapResult, added};
+use crate::report::findings::{
+    CalibrationFindings, CoordinateFindings, CurvesLeftOutFindings, EnsembleFindings, Findings,
+    FittedDistribution, LeftOutFindings, MeasuredFindings, Role, SurrogateFindings,
+};
+use crate::report::{render, summary};
+use crate::stage::artifacts::Artifacts;
+use crate::stage::calibrate::Calibrated;
+use crate::stage::derived;
+use crate::stage::evidence::Weighed;
+use crate::stage::inverse_problem::InverseProblem;
+use crate::stage::read::Measured;
+use crate::stage::validate::Validated;
+use crate::study::Study;
+
+/// Results to be reported.
+#[derive(Clone, Copy)]
+pub struct Results<'a> {
+    /// Artifacts of the stages up to the validation.
+    pub artifacts: Artifacts<'a>,
+    /// Assessment of whether the results can be trusted.
+    pub assessed: &'a Kept<Assessment>,
+    /// Result of the gap search, if one was made.
+    pub gap: Option<&'a Kept<GapResult>>,
+}
+
+/// Writes the report and the summary; returns the findings.
+pub fn stage(
+    study: &Study,
+    results: &Results<'_>,
+    run: &RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Findings, Stop> {
+    let calibrated = results.artifacts.calibrated.map(|kept| derived::extended(study, &kept.value));
+    let calibrated = calibrated.as_ref();
+    let findings = findings(study, results, calibrated, run, observer);
+    let root = run.root();
+    files::write_json(&root.join("summary.json"), &summary(&findings))?;
+    let page = render(&findings);
+    files::write_atomic(
+        &run.stage_folder(&Stage::Report.folder()).join("report.html"),
+        page.as_bytes(),
+    )?;
+    files::write_atomic(&root.join("report.html"), page.as_bytes())?;
+    Ok(findings)
+}
+
+fn findings(
+    study: &Study,
+    results: &Results<'_>,
+    calibrated: Option<&Calibrated>,
+    run: &RunDirectory,
+    observer: &dyn Observer,
+) -> Findings {
+    let all = &results.artifacts;
+    let measured = all.measured();
+    let weighed = all.weighed.map(|w| &w.value);
+    let calibration = calibrated.map(|c| calibration(study, c, weighed));
+    let validation =
+        all.validated.zip(measured).map(|(kept, measured)| kept.value.findings(measured));
+    let stage = |r: &Record| r.stage.split_once('-').map_or(&*r.stage, |s| s.1).to_owned();
+    let seconds = run.records().iter().map(|r| (stage(r), r.seconds)).collect();
+    let made_by = run.records().iter().map(|r| (stage(r), r.lacuna.clone())).collect();
+    Findings {
+        title: study.about.title.clone(),
+        study: study.name.clone(),
+        seed: study.about.seed,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        components: components(study),
+        parameters: study.parameters.clone(),
+        layouts: study.layouts.clone(),
+        ensemble: all
+            .problem
+            .and_then(|problem| Some(ensemble(study, problem.data.value.ensemble.as_ref()?))),
+        measured: measured.map(|m| measurements(study, m)),
+        surrogate: all.problem.and_then(|problem| surrogate(problem, all.validated)),
+        warnings: warnings(observer),
+        assessment: results.assessed.value.clone(),
+        calibration,
+        validation,
+        gap: results.gap.map(|kept| GapFindings {
+            result: kept.value.clone(),
+            hash: kept.hash.clone(),
+            added: added::kept(run, &kept.hash),
+        }),
+        seconds,
+        made_by,
+        note: study.about.note.clone(),
+    }
+}
+
+fn components(study: &Study) -> Vec<(String, String)> {
+    let chosen = study.components().into_iter();
+    chosen.map(|chosen| (chosen.section.to_owned(), chosen.name.to_owned())).collect()
+}
+
+fn ensemble(study: &Study, e: &Ensemble) -> EnsembleFindings {
+    let inside = |point: &&[f64]| {
+        study.parameters.iter().zip(*point).all(|(p, &x)| p.prior.log_density(x).is_finite())
+    };
+    EnsembleFindings {
+        points: e.points.clone(),
+        valid: e.valid.clone(),
+        failed: e.failed.clone(),
+        in_prior: e.points.iter_rows().filter(inside).count(),
+    }
+}
+
+fn measurements(study: &Study, measured: &Measured) -> MeasuredFindings {
+    let added =
+        study.measurements.as_ref().map(|s| s.common.added_curves.len()).unwrap_or_default();
+    let curves = measured.likelihood.blocks[0].replicates.iter().rev().take(added).rev();
+    MeasuredFindings {
+        used: measured.used.clone(),
+        flagged: measured.flagged.clone(),
+        data_count: measured.likelihood.count(),
+        fingerprint: fingerprint(&measured.likelihood),
+        added_curves: curves.map(|r| r.name.clone()).collect(),
+    }
+}
+
+/// Hash of the data in the likelihood; the evidences of two runs are comparable only if it is equal.
+fn fingerprint(data: &Observations) -> String {
+    let values = data.blocks.iter().flat_map(|b| &b.replicates).flat_map(|r| &r.values);
+    let bytes: Vec<u8> = values.flat_map(|y| y.unwrap_or(f64::NAN).to_le_bytes()).collect();
+    files::hash(&bytes)
+}
+
+fn surrogate(
+    problem: &InverseProblem<'_>,
+    validated: Option<&Kept<Validated>>,
+) -> Option<SurrogateFindings> {
+    let errors = &problem.fitted()?.value.errors;
+    let unit = problem.data.value.ensemble.as_ref().map(|e| e.layouts.unit().to_string());
+    let unit = unit.unwrap_or_default();
+    let of_numerics = problem.numerics().into_iter().flat_map(|kept| kept.value.facts(&unit));
+    let sobol = problem.emulator()?.sensitivity().map(|s| {
+        let total = s.aggregated.total.row(0).iter();
+        s.aggregated.first.row(0).iter().zip(total).map(|(f, t)| (*f, *t)).collect()
+    });
+    Some(SurrogateFindings {
+        refinement: problem.refinement().map(|r| (r.rounds, r.ratio, r.reached)),
+        facts: errors.facts.iter().cloned().chain(of_numerics).collect(),
+        training: errors.training,
+        validation: errors.validation,
+        mae: errors.mae,
+        rmse: errors.rmse,
+        loo: errors.loo,
+        by_group: errors.by_group.clone(),
+        near_posterior: validated.and_then(|v| v.value.emulator_at_posterior),
+        pairs: errors.pairs.clone(),
+        sobol,
+    })
+}
+
+fn calibration(
+    study: &Study,
+    calibrated: &Calibrated,
+    weighed: Option<&Weighed>,
+) -> CalibrationFindings {
+    let outcome = &calibrated.outcome;
+    let kept = calibrated.draws.from_step(outcome.burn_in);
+    let role = |j: usize| match calibrated.outcome.coordinates[j].prior {
+        None => Role::Derived,
+        Some(_) if j < study.parameters.len() => Role::Parameter,
+        Some(_) => Role::Hyperparameter,
+    };
+    let one = |j: usize| coordinate(calibrated, &kept, j, role(j));
+    let coordinates = (0..kept.dimension()).map(one).collect();
+    CalibrationFindings {
+        coordinates,
+        draws: calibrated.draws.values.clone(),
+        chains: calibrated.draws.chains,
+        steps: calibrated.draws.steps,
+        burn_in: outcome.burn_in,
+        correlation: correlation(&kept),
+        acceptance: outcome.acceptance.clone(),
+        stranded: outcome.diagnosis.stranded.to_the_end.clone(),
+        converged: outcome.diagnosis.converged,
+        verdict: verdict(&outcome.diagnosis),
+        log_density: (outcome.map_log_density, outcome.best_draw.1),
+        best_draw: outcome.best_draw.0.clone(),
+        facts: outcome.facts.clone(),
+        evidence: weighed.and_then(|w| w.evidence.clone()),
+        left_out: weighed.and_then(|w| w.left_out.as_ref()).map(|loo| LeftOutFindings {
+            elpd: loo.elpd,
+            error: loo.error,
+            error_by_curve: loo.error_by_curve,
+            parameters: loo.parameters,
+            unreliable: loo.unreliable,
+            limit: loo.limit,
+            count: loo.data.len(),
+            curves: weighed.and_then(|w| w.curves_left_out.as_ref()).map(|curves| {
+                CurvesLeftOutFindings {
+                    elpd: curves.elpd,
+                    error: curves.error,
+                    parameters: curves.parameters,
+                    unreliable: curves.unreliable,
+                    count: curves.data.len(),
+                }
+            }),
+        }),
+    }
+}
+
+fn verdict(diagnosis: &Diagnosis) -> String {
+    if diagnosis.converged && diagnosis.advice.is_empty() {
+        "converged".to_owned()
+    } else {
+        diagnosis.advice.join("; ")
+    }
+}
+
+fn coordinate(calibrated: &Calibrated, kept: &Draws, j: usize, role: Role) -> CoordinateFindings {
+    let outcome = &calibrated.outcome;
+    let about = &outcome.coordinates[j];
+    let judged = &outcome.diagnosis.coordinates[j];
+    let pooled = kept.pooled(j);
+    let sorted = moments::sorted(&pooled);
+    let fits = fit::fit(&pooled, judged.ess_bulk);
+    let best = fits.first().map_or(0.0, |f| f.aic);
+    CoordinateFindings {
+        name: about.name.clone(),
+        symbol: about.symbol.clone(),
+        unit: about.unit.clone(),
+        role,
+        prior: about.prior.clone(),
+        reference: about.reference,
+        mean: moments::mean(&pooled),
+        sd: moments::variance(&pooled).sqrt(),
+        q025: moments::quantile(&sorted, 0.025),
+        median: moments::quantile(&sorted, 0.5),
+        q975: moments::quantile(&sorted, 0.975),
+        map: outcome.map[j],
+        r_hat: judged.r_hat,
+        ess_bulk: judged.ess_bulk,
+        ess_tail: judged.ess_tail,
+        mcse_mean: judged.mcse_mean,
+        autocorrelation_time: judged.autocorrelation_time,
+        fits: fits
+            .into_iter()
+            .map(|f| FittedDistribution {
+                delta_aic: f.aic - best,
+                distribution: f.distribution,
+                ks: f.distance,
+                p_value: f.probability,
+            })
+            .collect(),
+    }
+}
+
+fn correlation(kept: &Draws) -> Matrix {
+    Moments::of_rows(&kept.points()).correlation()
+}
+
+/// Warnings given so far, without repetition.
+fn warnings(observer: &dyn Observer) -> Vec<String> {
+    let mut warnings: Vec<String> = Vec::new();
+    for text in observer.heard() {
+        if !warnings.contains(&text) {
+            warnings.push(text);
+        }
+    }
+    warnings
+}

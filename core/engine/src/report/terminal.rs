@@ -1,0 +1,41 @@
+//! The summary that a terminal shows at the end of a run.
+
+use super::findings::Findings;
+use super::section::{
+    accuracy_table, banner, evidence, group_word, headline, posterior_table, view,
+};
+use crate::gap::report;
+
+/// Result of a run in plain text: the verdict in the first line, its findings, warnings, main results, posterior,
+/// accuracy.
+pub fn summary_text(findings: &Findings) -> String {
+    let mut parts = vec![banner::lines(&findings.assessment).join("\n") + "\n"];
+    if !findings.warnings.is_empty() {
+        let lines: Vec<String> =
+            findings.warnings.iter().map(|warning| format!("warning: {warning}")).collect();
+        parts.push(lines.join("\n") + "\n");
+    }
+    parts.push(headline::sentences(findings).join("\n") + "\n");
+    if let Some(calibration) = &findings.calibration {
+        parts.push(posterior_table(calibration).text());
+        let evidence = evidence::sentences(findings, calibration);
+        if !evidence.is_empty() {
+            parts.push(evidence.join("\n") + "\n");
+        }
+    }
+    if let Some(validation) =
+        findings.validation.as_ref().filter(|v| v.cases.iter().any(|c| !c.accuracy.is_empty()))
+    {
+        let title = "points inside the replicates' 95 % interval";
+        parts.push(format!(
+            "{title}\n{}",
+            accuracy_table(group_word(&findings.layouts), &validation.cases).text()
+        ));
+    }
+    parts.join("\n")
+}
+
+/// Verdict of the gap search and its reasons, one sentence per line; empty without a gap search.
+pub fn gap_text(findings: &Findings) -> String {
+    findings.gap.as_ref().map_or_else(String::new, |gap| report::text(&view(findings), gap))
+}

@@ -1,0 +1,91 @@
+//! `emulator`: the fitted surrogate.
+
+use lacuna::plugin::Emulator;
+use lacuna::plugin::model::EvalError;
+use lacuna_linalg::Matrix;
+
+use super::{Derivatives, Function, Part, Variable, parameters, parts};
+use crate::stage::inverse_problem::InverseProblem;
+use crate::study::Study;
+
+/// Mean of the emulator as a function of the study's parameters.
+pub(super) struct Emulated<'a> {
+    study: &'a Study,
+    emulator: &'a dyn Emulator,
+    /// Interval of each parameter in which it was fitted.
+    region: Vec<(f64, f64)>,
+    parts: Vec<Part>,
+}
+
+impl<'a> Emulated<'a> {
+    /// The emulator of a finished run, if it has one.
+    pub(super) fn of(study: &'a Study, problem: &InverseProblem<'a>) -> Option<Self> {
+        let whole = || study.parameters.iter().map(|p| p.design.support()).collect();
+        let region = problem.region().map_or_else(whole, <[_]>::to_vec);
+        Some(Self { study, emulator: problem.emulator()?, region, parts: parts(study) })
+    }
+
+    /// Rejects points outside the region of the fit, where the emulator is not valid.
+    fn inside(&self, point: &[f64]) -> Result<(), EvalError> {
+        for ((x, (low, high)), p) in point.iter().zip(&self.region).zip(&self.study.parameters) {
+            if !(low..=high).contains(&x) {
+                return Err(EvalError::Rejected(format!(
+                    "`{}` is {x}, outside {low} to {high} where the emulator was fitted",
+                    p.name
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Function for Emulated<'_> {
+    fn name(&self) -> &'static str {
+        "emulator"
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        parameters(self.study)
+    }
+
+    fn outputs(&self) -> usize {
+        self.emulator.outputs()
+    }
+
+    fn scenarios(&self) -> &[Part] {
+        &self.parts
+    }
+
+    fn values(&self, point: &[f64], scenario: Option<usize>) -> Result<Vec<f64>, EvalError> {
+        self.inside(point)?;
+        let row = Matrix::from_vec(1, point.len(), point.to_vec());
+        let all = self.emulator.mean(&row).into_vec();
+        Ok(match scenario {
+            Some(i) => all[self.parts[i].outputs.clone()].to_vec(),
+            None => all,
+        })
+    }
+
+    fn derivatives(&self) -> Option<&dyn Derivatives> {
+        Some(self)
+    }
+}
+
+impl Derivatives for Emulated<'_> {
+    fn jacobian(&self, point: &[f64], scenario: Option<usize>) -> Result<Matrix, EvalError> {
+        self.inside(point)?;
+        let all = self.emulator.jacobian(point);
+        Ok(match scenario {
+            Some(i) => all.select_rows(&self.parts[i].outputs.clone().collect::<Vec<_>>()),
+            None => all,
+        })
+    }
+
+    fn scales(&self) -> Option<Vec<f64>> {
+        let widths = self.study.parameters.iter().map(|p| {
+            let [low, high] = [0.05, 0.95].map(|share| p.design.quantile(share));
+            high - low
+        });
+        Some(widths.collect())
+    }
+}

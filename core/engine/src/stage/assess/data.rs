@@ -1,0 +1,112 @@
+//! Checks of the measurements, alone and against the runs.
+
+use lacuna::data::layout::Group;
+use lacuna::data::{Measurements, Observations};
+use lacuna_linalg::Matrix;
+
+use crate::assess::Finding;
+use crate::assess::envelope::{self, Beside, unanswered};
+use crate::assess::replicates::{self, Curves};
+use crate::stage::inverse_problem::InverseProblem;
+use crate::stage::read::Measured;
+use crate::stage::stream;
+use crate::study::Study;
+
+/// Number of draws from the prior that replace the runs of a study without any.
+const PRIOR_DRAWS: usize = 64;
+/// Length up to which curves are judged together.
+const SHORT: usize = 5;
+
+pub(super) fn findings(
+    study: &Study,
+    problem: &InverseProblem<'_>,
+    measured: &Measured,
+) -> Vec<Finding> {
+    let mut found = Vec::new();
+    for block in &measured.used.blocks {
+        for group in block.layout.groups() {
+            let curves = curves(block, &group);
+            found.extend(replicates::duplicates(&group.name, &curves));
+            found.extend(replicates::symmetric(&group.name, &curves));
+        }
+    }
+    found.extend(dropped(measured));
+    let added = study.measurements.as_ref().map_or(0, |m| m.common.added_curves.len());
+    found.extend(replicates::added(added, measured.used.replicates()));
+    // An effect may shift the response to where no run is.
+    if study.effects.is_empty() {
+        found.extend(beside_runs(study, problem, &measured.used));
+    }
+    found
+}
+
+/// Replicates that have values in a group.
+fn curves<'a>(block: &'a Measurements, group: &Group) -> Curves<'a> {
+    let values = |r: &'a lacuna::data::Replicate| {
+        (r.name.as_str(), group.indices.iter().map(|&i| r.values[i]).collect::<Vec<_>>())
+    };
+    let all = block.replicates.iter().map(values);
+    all.filter(|(_, values)| values.iter().any(Option::is_some)).collect()
+}
+
+fn dropped(measured: &Measured) -> Option<Finding> {
+    let left_out = measured.flagged.iter().filter(|curve| curve.left_out).count();
+    let of = |block: &Measurements| -> usize {
+        block.layout.groups().iter().map(|group| curves(block, group).len()).sum()
+    };
+    replicates::left_out(left_out, measured.read.blocks.iter().map(of).sum())
+}
+
+fn beside_runs(study: &Study, problem: &InverseProblem<'_>, data: &Observations) -> Vec<Finding> {
+    let responses = match &problem.data.value.ensemble {
+        Some(ensemble) => ensemble.responses.clone(),
+        None => at_prior(study, problem),
+    };
+    let answered: Vec<usize> =
+        (0..responses.rows()).filter(|&i| responses.row(i).iter().all(|y| y.is_finite())).collect();
+    let mut found = Vec::new();
+    found.extend(unanswered(responses.rows() - answered.len(), responses.rows()));
+    let responses = responses.select_rows(&answered);
+    let groups = study.layouts.groups();
+    let short = groups.iter().all(|group| group.indices.len() < SHORT);
+    let curves: Vec<(String, Vec<usize>)> = if short {
+        vec![(String::new(), (0..study.layouts.len()).collect())]
+    } else {
+        groups.into_iter().map(|group| (group.name, group.indices)).collect()
+    };
+    let summaries = data.summaries();
+    found.extend(curves.into_iter().filter_map(|(name, indices)| {
+        let measured: Vec<usize> =
+            indices.into_iter().filter(|&i| summaries[i].count > 0).collect();
+        let error = |i: usize| {
+            let s = &summaries[i];
+            s.sd().map_or(0.0, |sd| sd / (s.count as f64).sqrt())
+        };
+        let range = |&i: &usize| {
+            let column = responses.iter_rows().map(|row| row[i]);
+            column.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(y), b.max(y)))
+        };
+        let size = |row: &[f64]| {
+            let square: f64 = measured.iter().map(|&i| row[i] * row[i]).sum();
+            (square / measured.len().max(1) as f64).sqrt()
+        };
+        envelope::outside(&Beside {
+            name,
+            data: measured.iter().map(|&i| (summaries[i].mean, error(i))).collect(),
+            runs: measured.iter().map(range).collect(),
+            sizes: responses.iter_rows().map(size).collect(),
+        })
+    }));
+    found
+}
+
+/// Responses at draws from the prior.
+fn at_prior(study: &Study, problem: &InverseProblem<'_>) -> Matrix {
+    let random = stream(study, "assess").named("prior");
+    let point = |i: usize| -> Vec<f64> {
+        let mut rng = random.at(i as u64).generator();
+        study.parameters.iter().map(|p| p.prior.sample(&mut rng)).collect()
+    };
+    let points = Matrix::from_rows(study.parameters.len(), (0..PRIOR_DRAWS).map(point));
+    problem.forward().mean(&points)
+}

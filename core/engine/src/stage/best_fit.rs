@@ -1,0 +1,118 @@
+//! Least-squares best fit of the model, before any discrepancy is chosen, and the derivatives of the response there.
+
+use lacuna::data::{Measurements, Observations, Parameter};
+use lacuna::math::distribution::Distribution;
+use lacuna::math::random::Stream;
+use lacuna::plugin::Forward;
+use lacuna::plugin::discrepancy::{Hyperparameter, Likelihood, VariancePart};
+use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
+
+use super::start::maxima;
+use super::stream;
+use crate::posterior::{OfData, Posterior};
+use crate::study::Study;
+
+/// Parameters that maximise prior times `|y - m|^-N`: the normal likelihood of independent data with its unknown
+/// variance integrated out under the prior `1 / variance`.
+pub fn point(study: &Study, data: &Observations, forward: &dyn Forward) -> Result<Vec<f64>, Stop> {
+    Ok(points(&study.parameters, data, forward, &stream(study, "best-fit"))?.remove(0))
+}
+
+/// Like [`point`], but all local maxima, the best first.
+pub fn points(
+    parameters: &[Parameter],
+    data: &Observations,
+    forward: &dyn Forward,
+    stream: &Stream,
+) -> Result<Vec<Vec<f64>>, Stop> {
+    let likelihood = LeastSquares::of(data)?;
+    let posterior = Posterior::new(parameters, OfData::new(forward, Vec::new(), &likelihood));
+    Ok(maxima(&posterior, stream)?.into_iter().map(|maximum| maximum.point).collect())
+}
+
+/// Derivative of each output by each parameter at [`point`], per prior standard deviation (`outputs x parameters`).
+pub fn slopes(study: &Study, data: &Observations, forward: &dyn Forward) -> Result<Matrix, Stop> {
+    Ok(standard_slopes(study, forward, &point(study, data, forward)?))
+}
+
+/// Derivative of each output by each parameter at a point, per prior standard deviation (`outputs x parameters`).
+pub fn standard_slopes(study: &Study, forward: &dyn Forward, point: &[f64]) -> Matrix {
+    let jacobian = forward.jacobian(point);
+    let sd: Vec<f64> = study.parameters.iter().map(|p| scale(&p.prior)).collect();
+    Matrix::from_fn(jacobian.rows(), jacobian.columns(), |i, j| jacobian[(i, j)] * sd[j])
+}
+
+/// Standard deviation of a distribution, or a quarter of its central 95 % range if the standard deviation does not
+/// exist.
+pub fn scale(law: &Distribution) -> f64 {
+    let sd = law.variance().sqrt();
+    if sd.is_finite() { sd } else { 0.25 * (law.quantile(0.975) - law.quantile(0.025)) }
+}
+
+/// Likelihood of independent normal data whose common variance is integrated out.
+struct LeastSquares<'a> {
+    data: &'a Observations,
+    /// Number of replicates and their mean, for each output.
+    outputs: Vec<(f64, f64)>,
+    scatter: f64,
+    count: f64,
+}
+
+impl<'a> LeastSquares<'a> {
+    fn of(data: &'a Observations) -> Result<Self, Stop> {
+        let summaries = data.summaries();
+        if summaries.iter().all(|s| s.count == 0) {
+            return Err(Stop::new("the measurements hold no value"));
+        }
+        Ok(Self {
+            data,
+            outputs: summaries.iter().map(|s| (s.count as f64, s.mean)).collect(),
+            scatter: summaries.iter().map(|s| s.scatter).sum(),
+            count: data.count() as f64,
+        })
+    }
+
+    fn squares(&self, response: &[f64]) -> f64 {
+        let each = self.outputs.iter().zip(response).filter(|((n, _), _)| *n > 0.0);
+        self.scatter + each.map(|((n, mean), y)| n * (mean - y).powi(2)).sum::<f64>()
+    }
+}
+
+impl Likelihood for LeastSquares<'_> {
+    fn hyperparameters(&self) -> &[Hyperparameter] {
+        &[]
+    }
+
+    fn log_likelihood(&self, response: &[f64], _hyper: &[f64]) -> f64 {
+        // Data that fit exactly would make the density infinite.
+        -0.5 * self.count * self.squares(response).max(f64::MIN_POSITIVE).ln()
+    }
+
+    fn gradient(&self, response: &[f64], _hyper: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let factor = self.count / self.squares(response).max(f64::MIN_POSITIVE);
+        let slope = |((n, mean), y): (&(f64, f64), &f64)| {
+            if *n > 0.0 { factor * n * (mean - y) } else { 0.0 }
+        };
+        (self.outputs.iter().zip(response).map(slope).collect(), Vec::new())
+    }
+
+    fn predictive(&self, _response: &[f64], _hyper: &[f64]) -> Vec<VariancePart> {
+        Vec::new()
+    }
+
+    /// Data without noise, because the size of the noise is not a parameter of this likelihood.
+    fn simulate(&self, response: &[f64], _hyper: &[f64], _stream: &Stream) -> Vec<Measurements> {
+        let layouts = self.data.layouts();
+        let exact = |(block, range): (&Measurements, std::ops::Range<usize>)| {
+            let mut block = block.clone();
+            for replicate in &mut block.replicates {
+                for (value, y) in replicate.values.iter_mut().zip(&response[range.clone()]) {
+                    *value = value.map(|_| *y);
+                }
+            }
+            block
+        };
+        self.data.blocks.iter().zip(layouts.ranges()).map(exact).collect()
+    }
+}

@@ -1,0 +1,258 @@
+//! Route without a surrogate: the model itself is the forward map.
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use lacuna::math::distribution::Distribution;
+use lacuna::plugin::Forward;
+use lacuna::plugin::model::{Call, EvalError, Gradient, Response};
+use lacuna::run::{Observer, Stop, files};
+use lacuna_linalg::Matrix;
+use lacuna_run::{Kept, RunDirectory};
+use rayon::prelude::*;
+use serde_json::json;
+
+use super::inverse_problem::Route;
+use super::read;
+use super::read::Data;
+use super::simulator::{Setting, Simulator};
+use crate::stage::inverse_problem::InverseProblem;
+use crate::study::Study;
+
+/// Measurements and model, which are all that precedes the posterior.
+pub struct Direct<'a> {
+    data: Kept<Data>,
+    /// The model as the forward map.
+    pub forward: ModelMap<'a>,
+    /// Hash of everything the forward map depends on.
+    pub origin: String,
+}
+
+impl<'a> Direct<'a> {
+    /// Reads the measurements.
+    pub fn of(
+        study: &'a Study,
+        run: &mut RunDirectory,
+        observer: &dyn Observer,
+    ) -> Result<Self, Stop> {
+        let data = read::stage(study, None, run, observer)?;
+        let forward = ModelMap::of(study)?;
+        let model = study.model.as_ref().map(|m| (m.built.identity(), &m.common));
+        let sources = files::hash_sources(&forward.simulator.model.files(&study.directory))?;
+        let origin = json!([model, study.scenarios, study.layouts, study.unknowns, sources]);
+        Ok(Self { data, forward, origin: files::hash(origin.to_string().as_bytes()) })
+    }
+
+    /// The data with the model as the forward map.
+    pub fn problem(&self) -> InverseProblem<'_> {
+        InverseProblem::new(&self.data, Route::Direct(self), None)
+    }
+
+    /// Summary of the model's evaluations; see [`ModelMap::tally`].
+    pub fn tally(&self) -> Option<String> {
+        self.forward.tally()
+    }
+}
+
+/// The model of a study as its forward map.
+///
+/// A failed evaluation gives a row of NaN, and is counted with its reason. Derivatives are the model's own if it has
+/// any, otherwise finite differences.
+pub struct ModelMap<'a> {
+    simulator: Simulator<'a>,
+    priors: Vec<Distribution>,
+    outputs: usize,
+    evaluations: AtomicU64,
+    failures: Mutex<Failures>,
+}
+
+#[derive(Default)]
+struct Failures {
+    reasons: BTreeMap<String, u64>,
+    fatal: Option<String>,
+}
+
+/// Number of different reasons that are reported.
+const TOLD: usize = 5;
+
+impl<'a> ModelMap<'a> {
+    /// The forward map of a study's model.
+    pub fn of(study: &'a Study) -> Result<Self, Stop> {
+        let simulator = Simulator::of(study)?.ok_or_else(|| {
+            Stop::new("the study has neither a surrogate nor a model")
+                .help("add `[model]`, or `[surrogate]` with simulation runs")
+        })?;
+        let priors = study.parameters.iter().map(|p| p.prior.clone()).collect();
+        Ok(Self::with(simulator, priors, study.layouts.len()))
+    }
+
+    /// A simulator as the forward map of its unknowns, which have these priors.
+    pub fn with(simulator: Simulator<'a>, priors: Vec<Distribution>, outputs: usize) -> Self {
+        let (evaluations, failures) = (AtomicU64::new(0), Mutex::default());
+        Self { simulator, priors, outputs, evaluations, failures }
+    }
+
+    /// Number of evaluations and of failures of the model, with the most frequent reasons.
+    pub fn tally(&self) -> Option<String> {
+        let failures = self.failures.lock().ok()?;
+        let failed: u64 = failures.reasons.values().sum();
+        if failed == 0 {
+            return None;
+        }
+        let asked = self.evaluations.load(Ordering::Relaxed);
+        let mut reasons: Vec<(&String, &u64)> = failures.reasons.iter().collect();
+        reasons.sort_by(|a, b| b.1.cmp(a.1).then(a.0.cmp(b.0)));
+        let told: Vec<String> = reasons
+            .iter()
+            .take(TOLD)
+            .map(|(reason, count)| format!("{count} times: {reason}"))
+            .collect();
+        Some(format!("{failed} of {asked} evaluations of the model failed ({})", told.join("; ")))
+    }
+
+    fn note<T>(&self, outcome: Result<T, EvalError>) -> Option<T> {
+        self.evaluations.fetch_add(1, Ordering::Relaxed);
+        let error = match outcome {
+            Ok(answer) => return Some(answer),
+            Err(error) => error,
+        };
+        if let Ok(mut failures) = self.failures.lock() {
+            match error {
+                EvalError::Rejected(reason) => *failures.reasons.entry(reason).or_default() += 1,
+                EvalError::Fatal(reason) => {
+                    failures.fatal.get_or_insert(reason);
+                }
+            }
+        }
+        None
+    }
+
+    /// Responses to one scenario at some rows of `points`.
+    fn some(
+        &self,
+        setting: &Setting<'_>,
+        points: &Matrix,
+        rows: &[usize],
+    ) -> Vec<Option<Vec<f64>>> {
+        if self.failure().is_some() {
+            return vec![None; rows.len()];
+        }
+        let inputs: Vec<Vec<f64>> = rows.iter().map(|&i| setting.inputs(points.row(i))).collect();
+        let calls: Vec<Call<'_>> =
+            inputs.iter().map(|inputs| self.simulator.call(setting, inputs)).collect();
+        let mut responses = self.simulator.model.predict_batch(&calls).into_iter();
+        let missing = || {
+            Err(EvalError::Fatal("the model returned fewer responses than requested".to_owned()))
+        };
+        let mut next = || responses.next().unwrap_or_else(missing);
+        rows.iter().map(|_| self.note(setting.checked(next())).map(|r| r.values)).collect()
+    }
+
+    /// Response to one scenario with its derivatives.
+    fn answered(
+        &self,
+        setting: &Setting<'_>,
+        gradient: &dyn Gradient,
+        point: &[f64],
+    ) -> Option<(Response, Matrix)> {
+        if self.failure().is_some() {
+            return None;
+        }
+        self.note(self.simulator.with_derivatives(setting, gradient, point))
+    }
+
+    /// Response, and derivatives by central differences; one-sided if the model can be evaluated on one side only.
+    fn differences(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
+        let steps: Vec<f64> =
+            self.priors.iter().zip(point).map(|(prior, &x)| step(prior, x)).collect();
+        let mut around = vec![point.to_vec()];
+        for (j, step) in steps.iter().enumerate() {
+            for sign in [1.0, -1.0] {
+                let mut moved = point.to_vec();
+                moved[j] += sign * step;
+                around.push(moved);
+            }
+        }
+        let responses = self.mean(&Matrix::from_rows(point.len(), around));
+        let slope = |i: usize, j: usize| {
+            let [here, above, below] = [0, 2 * j + 1, 2 * j + 2].map(|row| responses[(row, i)]);
+            match (above.is_finite(), below.is_finite()) {
+                (true, true) => (above - below) / (2.0 * steps[j]),
+                (true, false) => (above - here) / steps[j],
+                _ => (here - below) / steps[j],
+            }
+        };
+        (responses.row(0).to_vec(), Matrix::from_fn(self.outputs, point.len(), slope))
+    }
+}
+
+/// Step of the finite difference: small compared with the prior, and large compared with rounding.
+fn step(prior: &Distribution, x: f64) -> f64 {
+    let width = prior.quantile(0.975) - prior.quantile(0.025);
+    (1e-5 * width).max(1e-9 * x.abs()).max(f64::MIN_POSITIVE)
+}
+
+impl Forward for ModelMap<'_> {
+    fn dimension(&self) -> usize {
+        self.priors.len()
+    }
+
+    fn outputs(&self) -> usize {
+        self.outputs
+    }
+
+    fn mean(&self, points: &Matrix) -> Matrix {
+        let size = self.simulator.model.batch().max(1);
+        let rows: Vec<usize> = (0..points.rows()).collect();
+        let tasks: Vec<(&Setting<'_>, &[usize])> = self
+            .simulator
+            .settings
+            .iter()
+            .flat_map(|setting| rows.chunks(size).map(move |some| (setting, some)))
+            .collect();
+        let answers: Vec<Vec<Option<Vec<f64>>>> =
+            tasks.par_iter().map(|(setting, some)| self.some(setting, points, some)).collect();
+        let mut all = Matrix::zeros(points.rows(), self.outputs);
+        for ((setting, some), answers) in tasks.iter().zip(answers) {
+            for (&row, answer) in some.iter().zip(answers) {
+                let place = &mut all.row_mut(row)[setting.outputs.clone()];
+                match answer {
+                    Some(values) => place.copy_from_slice(&values),
+                    None => place.fill(f64::NAN),
+                }
+            }
+        }
+        all
+    }
+
+    fn jacobian(&self, point: &[f64]) -> Matrix {
+        self.mean_and_jacobian(point).1
+    }
+
+    fn mean_and_jacobian(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
+        let Some(gradient) = self.simulator.model.gradient() else {
+            return self.differences(point);
+        };
+        let mut mean = vec![f64::NAN; self.outputs];
+        let mut jacobian = Matrix::from_fn(self.outputs, point.len(), |_, _| f64::NAN);
+        let parts: Vec<Option<(Response, Matrix)>> = self
+            .simulator
+            .settings
+            .par_iter()
+            .map(|setting| self.answered(setting, gradient, point))
+            .collect();
+        for (setting, part) in self.simulator.settings.iter().zip(parts) {
+            let Some((response, slopes)) = part else { continue };
+            mean[setting.outputs.clone()].copy_from_slice(&response.values);
+            for (row, slopes) in setting.outputs.clone().zip(slopes.iter_rows()) {
+                jacobian.row_mut(row).copy_from_slice(slopes);
+            }
+        }
+        (mean, jacobian)
+    }
+
+    fn failure(&self) -> Option<String> {
+        self.failures.lock().ok().and_then(|failures| failures.fatal.clone())
+    }
+}

@@ -1,0 +1,166 @@
+//! Stage 6: evidence of the study, and leave-one-out predictions of each datum and each curve.
+//!
+//! [`compare`](crate::compare) compares these results for several studies of the same data.
+
+mod kept;
+
+use lacuna::data::Draws;
+use lacuna::diagnose::leave_one_out::LeaveOneOut;
+use lacuna::plugin::sampler::Evidence;
+use lacuna::run::{Observer, Stop};
+use lacuna_linalg::Matrix;
+use lacuna_run::{Kept, RunDirectory, Stage};
+use serde_json::json;
+
+use super::calibrate::Calibrated;
+use super::curves::{self, Curves};
+use super::predictions::{self, Chosen, Predicting};
+use super::stream;
+use crate::page::number::significant;
+use crate::posterior::{Posterior, bridge};
+use crate::study::Study;
+
+pub use kept::{curves_left_out, left_out};
+
+/// Measures of a study as a whole.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Weighed {
+    /// Evidence, if it could be estimated.
+    pub evidence: Option<Evidence>,
+    /// Leave-one-out prediction of each datum, if the discrepancy supports it.
+    pub left_out: Option<LeaveOneOut>,
+    /// Leave-one-out prediction of each curve, if the discrepancy supports it and there are several.
+    pub curves_left_out: Option<LeaveOneOut>,
+    /// Log density of each curve given all other data and the parameters, at the draws of [`Chosen`]
+    /// (`draws x curves`).
+    pub by_curve: Option<Matrix>,
+    /// Reasons why something is missing or incomplete.
+    pub missing: Vec<String>,
+}
+
+/// Estimates the evidence and the predictive measures of a calibrated study.
+pub fn stage(
+    study: &Study,
+    posterior: &Posterior<'_>,
+    calibrated: &Kept<Calibrated>,
+    predicting: Option<Predicting<'_>>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Kept<Weighed>, Stop> {
+    observer.begin(Stage::Evidence.label(), "draw", 0);
+    let kept = run.keep(
+        &Stage::Evidence.folder(),
+        &json!([calibrated.hash, study.about.seed]),
+        observer,
+        |_| {
+            let draws = calibrated.value.draws.from_step(calibrated.value.outcome.burn_in);
+            let mut missing = Vec::new();
+            let evidence = match &calibrated.value.outcome.evidence {
+                Some(evidence) => Some(evidence.clone()),
+                None => bridge::bridge(
+                    posterior,
+                    &coordinates(posterior, &thinned(&draws)),
+                    &stream(study, "evidence"),
+                )
+                .map_err(|reason| missing.push(format!("no evidence: {reason}")))
+                .ok(),
+            };
+            let weighed = Weighed { evidence, missing, ..Weighed::default() };
+            match predicting {
+                Some(p) => weighed.predicting(study, &p, &calibrated.value),
+                None => Ok(weighed),
+            }
+        },
+    )?;
+    observer.end(Stage::Evidence.label(), &summary(&kept.value));
+    Ok(kept)
+}
+
+fn summary(weighed: &Weighed) -> String {
+    let evidence = weighed.evidence.as_ref();
+    let mut parts: Vec<String> = evidence
+        .map(|e| format!("log evidence {:.2} ± {}", e.log, significant(e.error, 2)))
+        .into_iter()
+        .collect();
+    let loo = weighed.left_out.as_ref();
+    let error = |l: &LeaveOneOut| l.error_by_curve.unwrap_or(l.error);
+    parts.extend(loo.map(|l| format!("elpd_loo {:.1} ± {:.1}", l.elpd, error(l))));
+    parts.extend(weighed.missing.iter().cloned());
+    parts.join(", ")
+}
+
+/// Approximate number of draws from which the evidence is estimated.
+const WEIGHED: usize = 20_000;
+
+/// Some of the chains, at least four, and only the last steps of long chains.
+fn thinned(draws: &Draws) -> Draws {
+    let wanted = (WEIGHED / draws.steps.max(1)).clamp(4.min(draws.chains), draws.chains);
+    let stride = draws.chains / wanted.max(1);
+    let chains: Vec<usize> = (0..wanted).map(|i| i * stride).collect();
+    let some = draws.of_chains(&chains);
+    let most = WEIGHED / wanted.max(1);
+    some.from_step(some.steps.saturating_sub(most))
+}
+
+/// The draws in the posterior's own coordinates.
+fn coordinates(posterior: &Posterior<'_>, draws: &Draws) -> Draws {
+    let mut draws = draws.clone();
+    let d = draws.dimension();
+    for point in draws.values.chunks_exact_mut(d) {
+        let values = posterior.coordinates(point);
+        point.copy_from_slice(&values);
+    }
+    draws
+}
+
+/// Largest number of data evaluations for leaving out all curves at all draws.
+const WORK: usize = 1 << 33;
+
+impl Weighed {
+    /// Adds the leave-one-out predictions.
+    fn predicting(
+        mut self,
+        study: &Study,
+        p: &Predicting<'_>,
+        calibrated: &Calibrated,
+    ) -> Result<Self, Stop> {
+        let data = p.data.count();
+        let chosen = Chosen::of(calibrated, data);
+        let responses = predictions::responses(study, p, &chosen);
+        let Some(densities) = predictions::pointwise(study, p, &chosen, responses.as_deref())
+        else {
+            return Ok(self);
+        };
+        let count = chosen.points.rows();
+        if !chosen.written {
+            self.missing.push(format!(
+                "leave-one-out predictions of {data} data use {count} draws and are too many to be written to \
+                 `posterior.nc`"
+            ));
+        }
+        let curves = Curves::of(p.data);
+        self.left_out = Some(LeaveOneOut::of(&densities, chosen.efficiency, curves.of.clone()));
+        let work = curves.all.len().saturating_mul(count).saturating_mul(data);
+        let Some(responses) = responses.filter(|_| work <= WORK) else {
+            self.missing.push(format!(
+                "leave-one-out predictions of curves are omitted: {} curves of {data} data are too many",
+                curves.all.len()
+            ));
+            return Ok(self);
+        };
+        let names = p.likelihood.hyperparameters();
+        let d = chosen.points.columns();
+        let own: Vec<usize> = (d - names.len()..d).collect();
+        let hyper = chosen.points.select_columns(&own);
+        let ranges: Vec<_> = study.layouts.ranges().collect();
+        let unknowns = (names, &hyper);
+        self.by_curve = if curves.all.is_empty() {
+            None
+        } else {
+            curves::left_out(&curves.all, &p.law, p.data, &ranges, &responses, unknowns)?
+        };
+        let of = |densities| LeaveOneOut::of(densities, chosen.efficiency, Vec::new());
+        self.curves_left_out = self.by_curve.as_ref().map(of);
+        Ok(self)
+    }
+}

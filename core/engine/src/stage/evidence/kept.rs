@@ -1,0 +1,117 @@
+//! Files of the evidence stage: `evidence.json`, and `left_out.nc` with one value per datum or curve.
+
+use std::path::Path;
+
+use lacuna::diagnose::leave_one_out::{LeaveOneOut, Left};
+use lacuna::diagnose::pareto::LARGEST_K;
+use lacuna::plugin::sampler::Evidence;
+use lacuna::run::{Stop, files};
+use lacuna_run::Artifact;
+use lacuna_run::arrays::{self, Array};
+use serde::{Deserialize, Serialize};
+
+use super::Weighed;
+
+/// Part of the result that is not an array.
+#[derive(Serialize, Deserialize)]
+struct Header {
+    evidence: Option<Evidence>,
+    left_out: bool,
+    curves_left_out: bool,
+    missing: Vec<String>,
+}
+
+const LEFT_OUT: &str = "left_out.nc";
+
+/// Prefix of the names of the arrays by datum.
+const DATUM: &str = "";
+const CURVE: &str = "curve_";
+
+impl Artifact for Weighed {
+    fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
+        let header = Header {
+            evidence: self.evidence.clone(),
+            left_out: self.left_out.is_some(),
+            curves_left_out: self.curves_left_out.is_some(),
+            missing: self.missing.clone(),
+        };
+        files::write_json(&folder.join("evidence.json"), &header)?;
+        let mut names = vec!["evidence.json".to_owned()];
+        let mut all = Vec::new();
+        if let Some(loo) = &self.left_out {
+            all.extend(columns(loo, DATUM, "datum"));
+        }
+        if let Some(loo) = &self.curves_left_out {
+            all.extend(columns(loo, CURVE, "curve"));
+        }
+        if let Some(densities) = &self.by_curve {
+            all.push(Array::matrix("by_curve", "draw", "curve", densities));
+        }
+        if !all.is_empty() {
+            arrays::write(&folder.join(LEFT_OUT), &[], &all)?;
+            names.push(LEFT_OUT.to_owned());
+        }
+        Ok(names)
+    }
+
+    fn load(folder: &Path) -> Result<Self, Stop> {
+        let header: Header = files::read_json(&folder.join("evidence.json"))?;
+        let path = folder.join(LEFT_OUT);
+        let by_curve = header.curves_left_out.then(|| arrays::read(&path, "by_curve"));
+        Ok(Self {
+            evidence: header.evidence,
+            left_out: header.left_out.then(|| left_out(folder)).transpose()?,
+            curves_left_out: header.curves_left_out.then(|| read(&path, CURVE)).transpose()?,
+            by_curve: by_curve.transpose()?.map(Array::into_matrix),
+            missing: header.missing,
+        })
+    }
+}
+
+/// Arrays with one value per datum or curve; includes the curve of each datum if it is known.
+fn columns(loo: &LeaveOneOut, prefix: &str, dimension: &str) -> Vec<Array> {
+    let array = |name: &str, dimension: &str, values: Vec<f64>| Array {
+        name: format!("{prefix}{name}"),
+        dimensions: vec![(dimension.to_owned(), values.len())],
+        values,
+        unit: None,
+    };
+    let column = |name, value: fn(&Left) -> f64| {
+        array(name, dimension, loo.data.iter().map(value).collect())
+    };
+    let mut columns = vec![
+        column("elpd", |left| left.elpd),
+        column("with_it", |left| left.with_it),
+        column("k_hat", |left| left.k_hat),
+        array("limit", "one", vec![loo.limit]),
+    ];
+    if !loo.curve.is_empty() {
+        columns.push(array("curve", dimension, loo.curve.iter().map(|&c| c as f64).collect()));
+    }
+    columns
+}
+
+fn read(path: &Path, prefix: &str) -> Result<LeaveOneOut, Stop> {
+    let column =
+        |name: &str| arrays::read(path, &format!("{prefix}{name}")).map(|array| array.values);
+    let (elpd, with_it, k_hat) = (column("elpd")?, column("with_it")?, column("k_hat")?);
+    let each = elpd.into_iter().zip(with_it).zip(k_hat);
+    // Runs of earlier versions have neither limit nor curves.
+    let limit = column("limit").ok().and_then(|limit| limit.first().copied());
+    let curve = column("curve").unwrap_or_default();
+    Ok(LeaveOneOut::sum(
+        each.map(|((elpd, with_it), k_hat)| Left { elpd, with_it, k_hat }).collect(),
+        limit.unwrap_or(LARGEST_K),
+        curve.into_iter().map(|c| c as usize).collect(),
+    ))
+}
+
+/// Reads the leave-one-out predictions of data that a run kept in the stage's folder.
+pub fn left_out(folder: &Path) -> Result<LeaveOneOut, Stop> {
+    read(&folder.join(LEFT_OUT), DATUM)
+}
+
+/// Reads the leave-one-out predictions of curves; `None` if the run has none.
+pub fn curves_left_out(folder: &Path) -> Option<LeaveOneOut> {
+    read(&folder.join(LEFT_OUT), CURVE).ok()
+}

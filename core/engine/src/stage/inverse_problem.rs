@@ -1,0 +1,136 @@
+//! Inverse problem that calibration solves: data, forward map, and the errors of that map.
+
+use std::sync::OnceLock;
+
+use lacuna::data::Observations;
+use lacuna::math::random::Stream;
+use lacuna::plugin::{Emulator, Forward};
+use lacuna::run::Stop;
+use lacuna_run::Kept;
+
+use super::common_error::Allowance;
+use super::direct::Direct;
+use super::emulated::Emulated;
+use super::numerical_error::NumericalError;
+use super::read::Data;
+use super::refine::Refinement;
+use super::surrogate::Fitted;
+use super::{emulator_error, stream};
+use crate::study::Study;
+use crate::study::file::DiscrepancyKeys;
+
+/// Type of the forward map.
+#[derive(Clone, Copy)]
+pub enum Route<'a> {
+    /// An emulator of the model, with estimates of its errors.
+    Emulated(&'a Emulated),
+    /// The model itself.
+    Direct(&'a Direct<'a>),
+}
+
+/// Data, and a forward map from parameters to responses.
+pub struct InverseProblem<'a> {
+    /// Runs and measurements.
+    pub data: &'a Kept<Data>,
+    /// Forward map.
+    pub route: Route<'a>,
+    /// Trial that the data belong to, if they were generated and not measured.
+    pub trial: Option<Trial>,
+    /// Errors of emulator and numerics for these data, computed on first use.
+    allowances: OnceLock<Vec<Allowance>>,
+}
+
+impl<'a> InverseProblem<'a> {
+    /// Combines data and a forward map; `trial` is set if the data were generated.
+    pub fn new(data: &'a Kept<Data>, route: Route<'a>, trial: Option<Trial>) -> Self {
+        Self { data, route, trial, allowances: OnceLock::new() }
+    }
+
+    /// The forward map: the emulator, including the predicted numerical error, or the model itself.
+    pub fn forward(&self) -> &'a dyn Forward {
+        match self.route {
+            Route::Emulated(by) => by.forward(),
+            Route::Direct(by) => &by.forward,
+        }
+    }
+
+    /// Hash of everything the forward map depends on.
+    pub fn origin(&self) -> &'a str {
+        match self.route {
+            Route::Emulated(by) => &by.origin,
+            Route::Direct(by) => &by.origin,
+        }
+    }
+
+    /// The emulator and its errors, in a study with a surrogate.
+    pub fn emulated(&self) -> Option<&'a Emulated> {
+        match self.route {
+            Route::Emulated(by) => Some(by),
+            Route::Direct(_) => None,
+        }
+    }
+
+    /// The fitted surrogate with its errors, in a study with a surrogate.
+    pub fn fitted(&self) -> Option<&'a Kept<Fitted>> {
+        self.emulated().map(|by| &by.fitted)
+    }
+
+    /// The emulator of the model as it was run, in a study with a surrogate.
+    pub fn emulator(&self) -> Option<&'a dyn Emulator> {
+        self.emulated().map(|by| &*by.emulator)
+    }
+
+    /// The model's numerical error, if the study requests it.
+    pub fn numerics(&self) -> Option<&'a Kept<NumericalError>> {
+        self.emulated()?.numerics.as_ref()
+    }
+
+    /// Interval of each parameter in which the emulator was fitted, if narrower than the design.
+    pub fn region(&self) -> Option<&'a [(f64, f64)]> {
+        self.emulated()?.region.as_deref()
+    }
+
+    /// State of the refinement, if the study requests one.
+    pub fn refinement(&self) -> Option<&'a Refinement> {
+        self.emulated()?.refinement.as_ref()
+    }
+
+    /// Errors of emulator and numerics that the study's likelihood includes, for these data.
+    pub(super) fn allowances(
+        &self,
+        study: &Study,
+        keys: &DiscrepancyKeys,
+        data: &Observations,
+    ) -> Result<&[Allowance], Stop> {
+        if let Some(found) = self.allowances.get() {
+            return Ok(found);
+        }
+        let mut found = Vec::new();
+        if let (Some(fitted), true) = (self.fitted(), keys.emulator_error) {
+            found.push(emulator_error::allowance(study, &fitted.value, data, self.forward())?);
+        }
+        if let (Some(kept), Some(section)) = (self.numerics(), &study.numerical_error) {
+            found.push(kept.value.allowance(study, &section.written, data, self.forward())?);
+        }
+        Ok(self.allowances.get_or_init(|| found))
+    }
+}
+
+/// One of many calibrations of generated data, with its own random streams.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Trial {
+    /// Number of the trial.
+    pub number: u64,
+    /// True if the chains have half of their steps, for samplers whose steps are draws.
+    pub quick: bool,
+}
+
+impl Trial {
+    /// Random stream of a stage: that of the study itself outside of trials.
+    pub(super) fn stream(trial: Option<Self>, study: &Study, stage: &str) -> Stream {
+        match trial {
+            None => stream(study, stage),
+            Some(trial) => stream(study, "trial").at(trial.number).named(stage),
+        }
+    }
+}

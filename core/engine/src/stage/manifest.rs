@@ -1,0 +1,70 @@
+//! Provenance of a run: the study as written, the study as resolved, and a record of every stage.
+
+use std::path::{Path, PathBuf};
+
+use lacuna::plugin::Library;
+use lacuna::run::{Stop, files};
+use lacuna::text::emit;
+use lacuna_run::RunDirectory;
+use serde_json::{Value, json};
+
+use crate::study::Study;
+
+/// File that holds the absolute path of the study's file.
+const ORIGIN: &str = "study.path";
+
+/// The study file that a run directory belongs to; `None` if it was not recorded.
+pub fn origin(root: &Path) -> Option<PathBuf> {
+    let text = std::fs::read_to_string(root.join(ORIGIN)).ok()?;
+    Some(PathBuf::from(text.trim_end_matches('\n')))
+}
+
+/// Writes `study.toml` (byte for byte), `resolved.toml` (which runs as it is) and the path of the study.
+pub fn begin(study: &Study, run: &mut RunDirectory) -> Result<(), Stop> {
+    run.watch(study.faults());
+    let file = std::path::absolute(&study.file).unwrap_or_else(|_| study.file.clone());
+    // A resumed run is read from its own directory, which must not replace the original path.
+    let root = std::path::absolute(run.root()).unwrap_or_else(|_| run.root().to_owned());
+    if !file.starts_with(&root) {
+        let text = format!("{}\n", file.display());
+        files::write_atomic(&run.root().join(ORIGIN), text.as_bytes())?;
+    }
+    files::write_atomic(&run.root().join("study.toml"), study.text.as_bytes())?;
+    let resolved = emit::to_toml(&study.resolved)
+        .map_err(|error| Stop::new(format!("cannot write resolved.toml: {error}")))?;
+    let version = env!("CARGO_PKG_VERSION");
+    let head = format!(
+        "# Written by lacuna {version}: every default filled in. It runs as it stands.\n\n"
+    );
+    files::write_atomic(&run.root().join("resolved.toml"), (head + &resolved).as_bytes())
+}
+
+/// Writes `manifest.json`: versions, and for each stage the hash of its inputs, its files and its time.
+pub fn end(study: &Study, run: &RunDirectory) -> Result<(), Stop> {
+    let manifest = json!({
+        "schema": 1,
+        "study": study.name,
+        "study_sha256": files::hash(study.text.as_bytes()),
+        "lacuna": env!("CARGO_PKG_VERSION"),
+        "seed": study.about.seed,
+        "plugins": study.libraries.loaded.iter().map(|library| described(library)).collect::<Vec<_>>(),
+        "stages": run.records(),
+    });
+    files::write_json(&run.root().join("manifest.json"), &manifest)
+}
+
+/// A library of plugins, as recorded in the manifest.
+fn described(library: &Library) -> Value {
+    let (major, minor) = library.abi;
+    let plugins: Vec<String> =
+        library.plugins.iter().map(|(kind, name)| format!("{kind}.{name}")).collect();
+    json!({
+        "path": library.path,
+        "sha256": library.sha256,
+        "name": library.name,
+        "version": library.version,
+        "sdk": library.sdk,
+        "abi": format!("{major}.{minor}"),
+        "plugins": plugins,
+    })
+}

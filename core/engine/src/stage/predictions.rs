@@ -1,0 +1,196 @@
+//! Predictions of the data at selected draws of the posterior: the log density of each datum.
+
+use lacuna::data::{Draws, Observations};
+use lacuna::diagnose::chains;
+use lacuna::math::moments::mean;
+use lacuna::plugin::{Forward, Likelihood};
+use lacuna_linalg::Matrix;
+use rayon::prelude::*;
+
+use super::calibrate::{Calibrated, Law};
+use super::predict;
+use crate::study::Study;
+
+/// Quantities from which the data are predicted.
+pub struct Predicting<'a> {
+    /// Forward map.
+    pub forward: &'a dyn Forward,
+    /// Likelihood of the data.
+    pub likelihood: &'a dyn Likelihood,
+    /// Discrepancy and common errors of the likelihood, block by block.
+    pub law: Law<'a>,
+    /// Data of the likelihood.
+    pub data: &'a Observations,
+}
+
+/// Number of draws at which the data are predicted, if there are as many.
+const WANTED: usize = 1000;
+
+/// Smallest such number, unless the posterior has fewer draws or they do not fit into memory.
+const FEWEST: usize = 400;
+
+/// Preferred limit on the number of values of one kind written to `posterior.nc`, if it leaves enough draws: 32 MB.
+const PREFERRED: usize = 4_000_000;
+
+/// Hard limit on the number of values written: 80 MB.
+const WRITTEN: usize = 10_000_000;
+
+/// Largest number of response values held at once.
+const HELD: usize = 1 << 24;
+
+/// Number of draws processed together for long records.
+const TOGETHER: usize = 40;
+
+/// Selected draws of the posterior, chain by chain.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chosen {
+    /// Indices of the chains.
+    pub chains: Vec<usize>,
+    /// Indices of the steps in each of these chains, counted after the burn-in.
+    pub steps: Vec<usize>,
+    /// Points in natural units, one per row.
+    pub points: Matrix,
+    /// Ratio of independent to selected draws.
+    pub efficiency: f64,
+    /// True if the numbers for each datum at each draw are few enough to be written.
+    pub written: bool,
+}
+
+impl Chosen {
+    /// Selects draws for the prediction of `data` values: evenly spaced over all chains after the burn-in.
+    pub fn of(calibrated: &Calibrated, data: usize) -> Self {
+        let draws = calibrated.draws.from_step(calibrated.outcome.burn_in);
+        let (count, written) = number(draws.len(), data);
+        let (chains, steps) = grid(draws.chains, draws.steps, count);
+        let d = draws.dimension();
+        let cells = chains.iter().flat_map(|&c| steps.iter().map(move |&s| (c, s)));
+        let points = Matrix::from_rows(d, cells.map(|(c, s)| draws.point(c, s)));
+        let efficiency = efficiency(calibrated, &draws, points.rows());
+        Self { chains, steps, points, efficiency, written }
+    }
+}
+
+/// Number of draws at which this many data are predicted, and whether the numbers are written.
+fn number(draws: usize, data: usize) -> (usize, bool) {
+    let wanted = draws.min(WANTED);
+    let fewest = wanted.min(FEWEST);
+    if WRITTEN / data.max(1) >= fewest {
+        (wanted.min((PREFERRED / data.max(1)).max(fewest)), true)
+    } else {
+        (predict::affordable(fewest, data), false)
+    }
+}
+
+/// Number of draws from the prior at which this many data are predicted; zero if even few draws give too many numbers
+/// to write.
+pub fn from_prior(data: usize) -> usize {
+    let fit = PREFERRED / data.max(1);
+    if fit >= 50 { fit.min(500) } else { 0 }
+}
+
+/// Evenly spaced chains and steps, whose combinations number about `count` and no more.
+fn grid(chains: usize, steps: usize, count: usize) -> (Vec<usize>, Vec<usize>) {
+    let deep = count.div_ceil(chains.max(1)).min(steps);
+    let wide = (count / deep.max(1)).min(chains);
+    (predict::spaced(wide, chains), predict::spaced(deep, steps))
+}
+
+/// Ratio of independent draws to `count` selected draws: the mean effective sample size of the unknowns divided by
+/// their number, as in ArviZ, and at most one for thinned draws. One for a single chain.
+fn efficiency(calibrated: &Calibrated, draws: &Draws, count: usize) -> f64 {
+    if draws.chains < 2 || count == 0 {
+        return 1.0;
+    }
+    let judged = &calibrated.outcome.diagnosis.coordinates;
+    // Draws of a harvest are distributed over artificial chains, whose autocorrelation says nothing about their
+    // effective size.
+    let sizes: Vec<f64> = if calibrated.outcome.acceptance.is_empty() {
+        judged.iter().map(|j| j.ess_bulk).collect()
+    } else {
+        let of = |j| chains::ess_mean(&draws.coordinate(j).collect::<Vec<_>>());
+        (0..draws.dimension()).map(of).collect()
+    };
+    let share = mean(&sizes) / count as f64;
+    let thinned = count < draws.len();
+    if !(share.is_finite() && share > 0.0) {
+        1.0
+    } else if thinned {
+        share.min(1.0)
+    } else {
+        share
+    }
+}
+
+/// Responses at selected draws; `None` if there are too many to hold.
+pub fn responses(study: &Study, p: &Predicting<'_>, chosen: &Chosen) -> Option<Vec<Vec<f64>>> {
+    let held = chosen.points.rows() * p.forward.outputs() <= HELD;
+    held.then(|| predict::responses(study, p.forward, &chosen.points))
+}
+
+/// Log density of each datum given all others and the parameters, `draws x data`; `None` if the discrepancy has no such
+/// form.
+pub fn pointwise(
+    study: &Study,
+    p: &Predicting<'_>,
+    chosen: &Chosen,
+    responses: Option<&[Vec<f64>]>,
+) -> Option<Matrix> {
+    let count = chosen.points.rows();
+    let own = p.likelihood.hyperparameters().len();
+    let mut all: Option<Matrix> = None;
+    for first in (0..count).step_by(TOGETHER) {
+        let rows: Vec<usize> = (first..count.min(first + TOGETHER)).collect();
+        let some = chosen.points.select_rows(&rows);
+        let made;
+        let at = if let Some(held) = responses {
+            &held[first..first + rows.len()]
+        } else {
+            made = predict::responses(study, p.forward, &some);
+            &made[..]
+        };
+        let left_out = |(i, response): (usize, &Vec<f64>)| {
+            p.likelihood.left_out(response, &some.row(i)[some.columns() - own..])
+        };
+        let densities: Option<Vec<_>> = at.par_iter().enumerate().map(left_out).collect();
+        for (row, density) in rows.iter().zip(densities?) {
+            let all = all.get_or_insert_with(|| Matrix::zeros(count, density.len()));
+            all.row_mut(*row).copy_from_slice(&density);
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_records_have_fewer_draws_and_the_longest_are_not_written() {
+        for (draws, data, expected) in [
+            (72_000, 100, (1000, true)),
+            (300, 100, (300, true)),
+            (72_000, 8_000, (500, true)),
+            (72_000, 18_000, (400, true)),
+            (72_000, 25_000, (400, true)),
+            (72_000, 25_001, (400, false)),
+            (72_000, 170_000, (197, false)),
+        ] {
+            assert_eq!(number(draws, data), expected, "{draws} {data}");
+        }
+    }
+
+    #[test]
+    fn long_records_have_fewer_draws_from_the_prior() {
+        assert_eq!([100, 18_000, 80_000, 80_001].map(from_prior), [500, 222, 50, 0]);
+    }
+
+    #[test]
+    fn draws_are_spread_over_chains_and_steps() {
+        assert_eq!(grid(4, 1000, 1000), ((0..4).collect(), (0..250).map(|k| 4 * k + 2).collect()));
+        let (chains, steps) = grid(120, 600, 555);
+        assert_eq!((chains.len(), steps), (111, vec![60, 180, 300, 420, 540]));
+        assert!(chains.windows(2).all(|pair| pair[0] < pair[1]) && chains[110] < 120);
+        assert_eq!(grid(2, 3, 6), (vec![0, 1], vec![0, 1, 2]));
+        assert_eq!(grid(3, 0, 0), (vec![], vec![]));
+    }
+}

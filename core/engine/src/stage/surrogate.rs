@@ -1,0 +1,331 @@
+//! Stage 4: fit of the emulator and estimation of its error.
+
+mod fitted;
+
+use lacuna::data::{Ensemble, Parameter};
+use lacuna::plugin::surrogate::Training;
+use lacuna::plugin::{Emulator, Fact, Surrogate};
+use lacuna::run::{Observer, Progress, Silent, Stop};
+use lacuna_linalg::Matrix;
+use lacuna_run::{Folder, Kept, RunDirectory, Stage};
+use serde_json::json;
+
+pub use self::fitted::{Errors, Fitted};
+use super::emulator_error::{self, Curves};
+use super::idle::Used;
+use super::read::Data;
+use super::{low_fidelity, stream};
+use crate::study::Study;
+use crate::study::file::InvalidRuns;
+
+/// Input of a fit, and the folder in which it is kept.
+pub struct Fitting<'a> {
+    /// Folder of the stage.
+    pub folder: Folder,
+    /// Parameters, with the distributions from which the runs were drawn.
+    pub parameters: &'a [Parameter],
+    /// Indices of the training runs.
+    pub training: Vec<usize>,
+    /// Indices of the validation runs.
+    pub validation: Vec<usize>,
+    /// Use of the emulator.
+    pub purpose: Purpose<'a>,
+}
+
+/// Use of an emulator, which determines its inputs and the way in which its errors are estimated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Purpose<'a> {
+    /// Emulator of the study: without the parameters that the model does not use, with the cheaper runs, and with
+    /// errors by refits to nine tenths of the runs if that is feasible.
+    Study,
+    /// Emulator of further runs in the gap search, under a name such as `gap`: of all its parameters, with errors by
+    /// the leave-one-out formula.
+    Gap(&'a str),
+}
+
+impl Purpose<'_> {
+    /// Name under which progress is reported.
+    fn label(self) -> &'static str {
+        match self {
+            Self::Study => Stage::Surrogate.label(),
+            Self::Gap(_) => "gap-surrogate",
+        }
+    }
+
+    /// Parameters on which the surrogate is trained.
+    fn used(self, study: &Study, parameters: &[Parameter]) -> Result<Used, Stop> {
+        match self {
+            Self::Study => Used::of(study),
+            Self::Gap(_) => Ok(Used::all(parameters.len())),
+        }
+    }
+
+    /// Restores the emulator from its serialised form.
+    fn load(self, study: &Study, bytes: &[u8]) -> Result<Box<dyn Emulator>, Stop> {
+        match self {
+            Self::Study => low_fidelity::load(study, bytes),
+            Self::Gap(_) => plugin(study)?.load(bytes),
+        }
+    }
+}
+
+/// The surrogate plugin of the study.
+fn plugin(study: &Study) -> Result<&dyn Surrogate, Stop> {
+    let section = study.surrogate.as_ref();
+    section.map(|s| &*s.built.plugin).ok_or_else(|| Stop::new("the study has no surrogate"))
+}
+
+impl<'a> Fitting<'a> {
+    /// The split of the study's runs: the first runs for training, the last for validation.
+    pub fn of(study: &'a Study, ensemble: &Ensemble) -> Result<Self, Stop> {
+        let (training, validation) = split(study, ensemble)?;
+        let runs = ensemble.runs.len();
+        let wanted = |rows: std::ops::Range<usize>| -> Vec<usize> {
+            rows.filter(|&i| is_wanted(study, ensemble, i)).collect()
+        };
+        let training = wanted(0..training);
+        if training.is_empty() {
+            return Err(Stop::new("every training run is outside the model's validity").help(
+                "narrow the `design` to the region where the model is valid, or set `invalid_runs = \"train\"` in \
+                 `[surrogate]`",
+            ));
+        }
+        Ok(Self {
+            folder: Stage::Surrogate.folder(),
+            parameters: &study.parameters,
+            training,
+            validation: wanted(runs - validation..runs),
+            purpose: Purpose::Study,
+        })
+    }
+}
+
+/// Fits the surrogate; returns the kept result and the emulator itself.
+pub fn stage(
+    study: &Study,
+    data: &Kept<Data>,
+    fitting: &Fitting<'_>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<(Kept<Fitted>, Box<dyn Emulator>), Stop> {
+    let section =
+        study.surrogate.as_ref().ok_or_else(|| Stop::new("the study has no surrogate"))?;
+    let purpose = fitting.purpose;
+    let used = purpose.used(study, fitting.parameters)?;
+    let parameters = used.parameters(fitting.parameters);
+    let laws: Vec<_> = parameters.iter().map(|p| (&p.name, &p.design)).collect();
+    let inputs = json!([
+        data.hash,
+        section.built.identity(),
+        (&fitting.training, &fitting.validation),
+        laws,
+        study.about.seed
+    ]);
+    let inputs = match low_fidelity::identity(study).filter(|_| purpose == Purpose::Study) {
+        Some(identity) => json!([inputs, { "low_fidelity": identity }]),
+        None => inputs,
+    };
+    let ensemble = data.value.runs()?;
+    observer.begin(purpose.label(), "output", ensemble.layouts.len() as u64);
+    let kept = run.keep(&fitting.folder, &inputs, observer, |_| {
+        fit(study, &data.value, fitting, &used, observer)
+    })?;
+    let emulator = used.widen(purpose.load(study, &kept.value.bytes)?);
+    let errors = &kept.value.errors;
+    let unit = study.layouts.unit();
+    observer
+        .end(purpose.label(), &format!("rmse {:.3e} {unit}, loo {:.2e}", errors.rmse, errors.loo));
+    Ok((kept, emulator))
+}
+
+/// Returns true if a surrogate may be trained on a run: it is inside the model's validity, or the study permits others.
+pub(super) fn is_wanted(study: &Study, ensemble: &Ensemble, run: usize) -> bool {
+    let section = study.surrogate.as_ref();
+    ensemble.valid[run]
+        || section.is_some_and(|section| section.common.invalid_runs == InvalidRuns::Train)
+}
+
+/// Numbers of training and validation runs.
+fn split(study: &Study, ensemble: &Ensemble) -> Result<(usize, usize), Stop> {
+    let common = study.surrogate.as_ref().map(|s| s.common.clone()).unwrap_or_default();
+    let (runs, validation) = (ensemble.runs.len(), common.validation);
+    let training = common.training.map_or_else(|| runs.saturating_sub(validation), usize::from);
+    // Runs that failed reduce the training set, never the validation set.
+    let lost = ensemble.failed.len();
+    let training = training.min(runs.saturating_sub(validation)).max(training.saturating_sub(lost));
+    if training == 0 || training + validation > runs {
+        return Err(Stop::new(format!(
+            "{training} runs for training and {validation} for validation are more than the {runs} runs there are"
+        ))
+        .help("lower `training` or `validation` in `[surrogate]`"));
+    }
+    Ok((training, validation))
+}
+
+fn fit(
+    study: &Study,
+    data: &Data,
+    fitting: &Fitting<'_>,
+    used: &Used,
+    observer: &dyn Observer,
+) -> Result<Fitted, Stop> {
+    let ensemble = data.runs()?;
+    let points = ensemble.points.select_rows(&fitting.training);
+    let responses = ensemble.responses.select_rows(&fitting.training);
+    let fit = Fit { study, data, fitting, used };
+    let rows: Vec<usize> = (0..points.rows()).collect();
+    let emulator = fit.emulator(&points, &responses, &rows, &[], observer)?;
+    let test_points = ensemble.points.select_rows(&fitting.validation);
+    let simulated = ensemble.responses.select_rows(&fitting.validation);
+    let emulated = emulator.mean(&test_points);
+    let held_out = difference(&simulated, &emulated);
+    let left_out = corrected(&*emulator, &responses);
+    let judged = if held_out.rows() > 0 { &held_out } else { &left_out };
+    let loo_by_output = emulator.fit_error().relative.clone();
+    let mut errors = Errors {
+        training: fitting.training.len(),
+        validation: fitting.validation.len(),
+        mae: mean(judged.as_slice().iter().map(|e| e.abs())),
+        rmse: mean(judged.as_slice().iter().map(|e| e * e)).sqrt(),
+        loo: mean(loo_by_output.iter().copied()),
+        by_group: by_group(study, judged, &loo_by_output),
+        loo_by_output,
+        pairs: pairs(&simulated, &emulated),
+        inflation: inflation(&*emulator, &test_points, &held_out),
+        facts: emulator.facts(),
+    };
+    let runs = emulator_error::Runs { points: &points, responses: &responses };
+    let again = match fitting.purpose {
+        Purpose::Study => Curves::refitted(runs, |kept, left| {
+            fit.emulator(&points, &responses, kept, left, &Silent)
+        }),
+        Purpose::Gap(_) => Ok(None),
+    };
+    let refitted = again.unwrap_or_else(|stop| {
+        let why = format!(
+            "by the leave-one-out formula, since a fit to nine tenths of the runs failed: {stop}"
+        );
+        errors.facts.push(Fact::new("errors at runs left out", why));
+        None
+    });
+    let curves = refitted.unwrap_or_else(|| Curves {
+        points: points.clone(),
+        errors: left_out.clone(),
+        stated: None,
+    });
+    let stated = emulator.variance(&test_points);
+    let validated = Curves { points: test_points.clone(), errors: held_out.clone(), stated };
+    let curves = curves.with(validated);
+    let samples = stacked(&left_out, &held_out);
+    let sample_points = stacked(&points, &test_points);
+    Ok(Fitted { bytes: emulator.save()?, errors, samples, sample_points, curves })
+}
+
+/// Runs and settings to which an emulator of the study is fitted.
+struct Fit<'a> {
+    study: &'a Study,
+    data: &'a Data,
+    fitting: &'a Fitting<'a>,
+    used: &'a Used,
+}
+
+impl Fit<'_> {
+    /// Fits the emulator to some of these runs. Cheaper runs at the parameters of the left-out runs are left out too.
+    fn emulator(
+        &self,
+        points: &Matrix,
+        responses: &Matrix,
+        kept: &[usize],
+        left: &[usize],
+        observer: &dyn Observer,
+    ) -> Result<Box<dyn Emulator>, Stop> {
+        let Self { study, data, fitting, used } = *self;
+        let runs = Training {
+            parameters: &used.parameters(fitting.parameters),
+            layouts: &study.layouts,
+            points: &used.points(&points.select_rows(kept)),
+            responses: &responses.select_rows(kept),
+        };
+        let progress = Progress::new(observer);
+        if let Purpose::Gap(name) = fitting.purpose {
+            let stream = stream(study, "gap-surrogate").named(name);
+            return plugin(study)?.fit(&runs, &stream, &progress);
+        }
+        let cheap = data.cheaper.as_ref().map(|cheap| {
+            let known =
+                |point: &[f64]| left.iter().any(|&i| low_fidelity::is_same(points.row(i), point));
+            let rows: Vec<usize> =
+                (0..cheap.points.rows()).filter(|&i| !known(cheap.points.row(i))).collect();
+            (used.points(&cheap.points.select_rows(&rows)), cheap.responses.select_rows(&rows))
+        });
+        let cheap = cheap.as_ref().map(|(points, responses)| (points, responses));
+        let wide = used.parameters(&study.parameters);
+        let emulator = low_fidelity::fit(study, &runs, cheap, &wide, &progress)?;
+        Ok(used.clone().widen(emulator))
+    }
+}
+
+fn inflation(emulator: &dyn Emulator, points: &Matrix, errors: &Matrix) -> Option<f64> {
+    let variance = emulator.variance(points).filter(|_| points.rows() >= 10)?;
+    let squares: f64 = errors.as_slice().iter().map(|e| e * e).sum();
+    let ratio = (squares / variance.as_slice().iter().sum::<f64>()).sqrt();
+    ratio.is_finite().then_some(ratio)
+}
+
+/// Leave-one-out residuals, scaled so that their mean square is the (corrected) leave-one-out error.
+fn corrected(emulator: &dyn Emulator, responses: &Matrix) -> Matrix {
+    let error = emulator.fit_error();
+    let scale: Vec<f64> = (0..responses.columns())
+        .map(|j| {
+            let column = responses.column(j);
+            let centre = mean(column.iter().copied());
+            let variance = mean(column.iter().map(|y| (y - centre).powi(2)));
+            let square = mean(error.residuals.column(j).iter().map(|r| r * r));
+            let expected = error.relative[j] * variance;
+            // Residuals are only enlarged: a correction for the selection of terms cannot make the error smaller.
+            if square > 0.0 && expected > square { (expected / square).sqrt() } else { 1.0 }
+        })
+        .collect();
+    let residuals = &error.residuals;
+    Matrix::from_fn(residuals.rows(), residuals.columns(), |i, j| residuals[(i, j)] * scale[j])
+}
+
+fn by_group(study: &Study, errors: &Matrix, loo: &[f64]) -> Vec<(String, f64, f64, f64)> {
+    let groups = study.layouts.groups();
+    let figures = |group: &lacuna::data::layout::Group| {
+        let all = || errors.iter_rows().flat_map(|row| group.indices.iter().map(|&i| row[i]));
+        let loo = mean(group.indices.iter().map(|&i| loo[i]));
+        (mean(all().map(f64::abs)), mean(all().map(|e| e * e)).sqrt(), loo)
+    };
+    groups
+        .iter()
+        .map(|group| {
+            let (mae, rmse, loo) = figures(group);
+            (group.name.clone(), mae, rmse, loo)
+        })
+        .collect()
+}
+
+/// At most about 3000 pairs of simulated and emulated values, evenly thinned.
+fn pairs(simulated: &Matrix, emulated: &Matrix) -> Vec<(f64, f64)> {
+    let step = (simulated.as_slice().len() / 3000).max(1);
+    let all = simulated.as_slice().iter().zip(emulated.as_slice());
+    all.step_by(step).map(|(a, b)| (*a, *b)).collect()
+}
+
+fn difference(a: &Matrix, b: &Matrix) -> Matrix {
+    Matrix::from_fn(a.rows(), a.columns(), |i, j| a[(i, j)] - b[(i, j)])
+}
+
+fn stacked(a: &Matrix, b: &Matrix) -> Matrix {
+    Matrix::from_rows(a.columns(), a.iter_rows().chain(b.iter_rows()))
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for value in values {
+        sum += value;
+        count += 1.0;
+    }
+    if count > 0.0 { sum / count } else { 0.0 }
+}

@@ -1,0 +1,127 @@
+//! A fitted emulator as it is kept, with its errors.
+
+use std::path::Path;
+
+use lacuna::plugin::Fact;
+use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin};
+use lacuna::run::{Stop, files};
+use lacuna_linalg::Matrix;
+use lacuna_run::Artifact;
+use lacuna_run::arrays::{self, Array};
+use serde::{Deserialize, Serialize};
+
+use crate::stage::emulator_error::{Curves, rows_near_prior};
+use crate::study::Study;
+
+/// Fitted emulator as it is stored, with its measured errors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fitted {
+    /// Serialised emulator.
+    pub bytes: Vec<u8>,
+    /// Errors of the emulator.
+    pub errors: Errors,
+    /// Errors of the emulator at runs it was not trained on, `runs x outputs`, in the unit of the response: the
+    /// leave-one-out errors of the training runs, then those of the validation runs.
+    pub samples: Matrix,
+    /// Parameters of those runs, `runs x parameters`.
+    pub sample_points: Matrix,
+    /// Errors that enter the likelihood: at training runs those of emulators that were fitted without the run if that
+    /// is feasible, otherwise those of `samples`.
+    pub curves: Curves,
+}
+
+/// Errors of an emulator.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Errors {
+    /// Number of training runs.
+    pub training: usize,
+    /// Number of validation runs.
+    pub validation: usize,
+    /// Mean absolute error over validation runs and outputs, in the unit of the response (over leave-one-out errors if
+    /// there are no validation runs).
+    pub mae: f64,
+    /// Root mean square error over the same runs and outputs.
+    pub rmse: f64,
+    /// Leave-one-out error relative to the variance of the output, mean over outputs.
+    pub loo: f64,
+    /// Relative leave-one-out error of each output.
+    pub loo_by_output: Vec<f64>,
+    /// Errors of each group of outputs: name, mean absolute error, root mean square error, relative leave-one-out
+    /// error.
+    pub by_group: Vec<(String, f64, f64, f64)>,
+    /// Pairs of simulated and emulated values of the validation runs, thinned.
+    pub pairs: Vec<(f64, f64)>,
+    /// Facts that the emulator states of itself.
+    pub facts: Vec<Fact>,
+    /// Ratio of the root mean square error at the validation runs to the root mean square of the standard deviations
+    /// that the emulator states there; `None` if it states none or there are fewer than ten such runs.
+    pub inflation: Option<f64>,
+}
+
+impl Artifact for Fitted {
+    fn save(&self, folder: &Path) -> Result<Vec<String>, Stop> {
+        files::write_atomic(&folder.join("emulator.bin"), &self.bytes)?;
+        files::write_json(&folder.join("errors.json"), &self.errors)?;
+        let curves = &self.curves;
+        let mut arrays = vec![
+            Array::matrix("samples", "run", "output", &self.samples),
+            Array::matrix("points", "run", "parameter", &self.sample_points),
+            Array::matrix("left_out", "run", "output", &curves.errors),
+        ];
+        let stated = curves.stated.as_ref();
+        arrays.extend(stated.map(|s| Array::matrix("left_out_variance", "run", "output", s)));
+        arrays::write(&folder.join("errors.nc"), &[], &arrays)?;
+        Ok(["emulator.bin", "errors.json", "errors.nc"].map(str::to_owned).to_vec())
+    }
+
+    fn load(folder: &Path) -> Result<Self, Stop> {
+        let path = folder.join("errors.nc");
+        let sample_points = arrays::read(&path, "points")?.into_matrix();
+        let curves = Curves {
+            points: sample_points.clone(),
+            errors: arrays::read(&path, "left_out")?.into_matrix(),
+            stated: arrays::read_some(&path, "left_out_variance")?.map(Array::into_matrix),
+        };
+        Ok(Self {
+            bytes: files::read(&folder.join("emulator.bin"))?,
+            errors: files::read_json(&folder.join("errors.json"))?,
+            samples: arrays::read(&path, "samples")?.into_matrix(),
+            sample_points,
+            curves,
+        })
+    }
+}
+
+impl Fitted {
+    /// Errors at the runs inside the prior's support, `runs x outputs`; at all runs if fewer than fifty are inside.
+    pub fn errors_near_prior(&self, study: &Study) -> Matrix {
+        self.samples.select_rows(&rows_near_prior(study, &self.sample_points))
+    }
+
+    /// Errors of the emulator near the prior as a factor of their covariance: one sample per column, divided by the
+    /// square root of their number. With `stated`, the variances that the emulator states at the point where the data
+    /// are fitted best (one per output), the errors are scaled to them, times the square of [`Errors::inflation`] if it
+    /// is above 1.
+    pub fn error_samples(&self, study: &Study, stated: Option<&[f64]>) -> CommonError {
+        let mut errors = self.errors_near_prior(study);
+        if let Some(stated) = stated {
+            rescale(&mut errors, stated, self.errors.inflation.map_or(1.0, |r| r.max(1.0)));
+        }
+        let scale = (errors.rows() as f64).sqrt();
+        let factor =
+            Matrix::from_fn(errors.columns(), errors.rows(), |i, k| errors[(k, i)] / scale);
+        CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }
+    }
+}
+
+/// Scales the errors of each output to a mean square of `factor^2` times the stated variance.
+fn rescale(errors: &mut Matrix, stated: &[f64], factor: f64) {
+    let count = errors.rows() as f64;
+    for (j, variance) in stated.iter().enumerate() {
+        let square = errors.column(j).iter().map(|e| e * e).sum::<f64>() / count;
+        if square > 0.0 {
+            let scale = factor * (variance / square).sqrt();
+            (0..errors.rows()).for_each(|i| errors[(i, j)] *= scale);
+        }
+    }
+}

@@ -1,0 +1,346 @@
+//! A study as it is written: the engine's own sections and keys.
+//!
+//! A section that chooses a plugin with `use` has keys of the engine's, which stand here, beside
+//! the plugin's own options.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use lacuna::data::Unit;
+use lacuna::math::distribution::Distribution;
+use lacuna::plugin::effect::On;
+use lacuna::plugin::sampler::Start;
+use lacuna::text::file_name::FileName;
+use lacuna::text::values::{Count, Fraction, Name, Positive};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use super::derived::DerivedSection;
+pub use super::fidelity::{LowFidelitySection, NumericalErrorSection};
+pub use super::scenario::{FunctionSection, ScenarioSection};
+pub use lacuna::text::quantity::Quantity;
+pub use lacuna::text::response::{Axes, AxisSection, GridSection, ResponseSection};
+
+/// Tables inside a section that a study may leave out: `false` takes out what another study has.
+pub(super) const OPTIONAL: [(&str, &str); 3] =
+    [("measurements", "screen"), ("surrogate", "refine"), ("sampler", "stop")];
+
+/// Title, name, random seed and notes of the study.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StudySection {
+    /// Title of the study: one line that says what it is about.
+    pub title: String,
+    /// Name of the study, used as the name of its run directory; a plain file name, not a path. Default: the name of
+    /// the study file without its extension.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<FileName>,
+    /// Seed of all random number streams. Two runs with the same seed and the same study give the same results.
+    #[serde(default)]
+    pub seed: u64,
+    /// Folder from which relative paths in the study start, itself relative to the folder of the study file. Default:
+    /// the folder of the study file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub directory: Option<std::path::PathBuf>,
+    /// Remark printed in the report for its readers, such as that the model or the data are a stand-in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
+}
+
+/// An unknown parameter of the model, which the calibration determines.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ParameterSection {
+    /// Name of the parameter: that of the model input it sets, or a name used in the expressions of `computed` in
+    /// `[model]`.
+    pub name: Name,
+    /// Scenario the parameter belongs to, such as the initial state of one record. `"each"` creates one parameter per
+    /// scenario, called `name[scenario]`. Default: one parameter shared by all scenarios.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scenario: Option<String>,
+    /// Symbol used in figures, such as `x1`. Default: the name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub symbol: Option<String>,
+    /// Unit of the parameter's `prior`, `design` and `reference`, such as `kg/m3`.
+    #[serde(default = "Unit::dimensionless")]
+    pub unit: Unit,
+    /// Distribution from which the parameter's values in the simulation runs are drawn, in the parameter's unit; the
+    /// surrogate is trained on its range. Default: the prior, widened by `margin` of `[design]` if that is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub design: Option<Distribution>,
+    /// Prior distribution of the parameter in the calibration, in its unit. With a surrogate, the central 95 % of it
+    /// must lie inside `design`.
+    pub prior: Distribution,
+    /// Reference value from the literature or from practice, in the parameter's unit. It is compared with the posterior
+    /// and does not enter the calibration.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<f64>,
+}
+
+/// The engine's keys of `[model]`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct ModelKeys {
+    /// Values of model inputs that are not calibrated: numbers in the model's units, or with a unit as in
+    /// `{ value = 20, unit = "degC" }`. Default: the model's own default of each input.
+    pub fixed: BTreeMap<String, Quantity>,
+    /// Model inputs computed from parameters and from the values of scenarios, by expressions such as
+    /// `{ damping = "base + slope * gas_fraction" }`.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub computed: BTreeMap<String, String>,
+}
+
+/// The engine's keys of `[design]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct DesignKeys {
+    /// Number of simulation runs.
+    pub runs: Count,
+    /// Numbers of runs added later, in order: `[97]` adds 97 runs and keeps the existing ones with their results.
+    /// `lacuna campaign extend RUN --runs 97` appends to this list in a run directory.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub extended: Vec<Count>,
+    /// Folders with finished runs to use in addition, relative to the study file: those that
+    /// `lacuna campaign import RUN TABLE` makes from runs performed by hand, or the folder `2-simulate` of another run
+    /// directory.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub imports: Vec<PathBuf>,
+    /// Margin of the design around the prior, as a fraction of the prior's range: each uniform or log-uniform prior is
+    /// widened by this fraction at both ends (on the logarithmic scale for a log-uniform prior) to form the `design` of
+    /// every parameter that gives none. An emulator is least accurate at the edge of its training runs; a margin moves
+    /// that edge outside the prior. The model must give results there. Default: no margin.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub margin: Option<Positive>,
+}
+
+impl DesignKeys {
+    /// Number of runs that the design places, including those added later.
+    pub fn total(&self) -> usize {
+        let more = self.extended.iter().map(|count| count.get());
+        more.fold(self.runs.get(), usize::saturating_add)
+    }
+}
+
+/// The engine's keys of `[simulations]`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct SimulationKeys {
+    /// Treatment of runs whose parameters lie outside the declared `design`.
+    pub outside_design: OutsideDesign,
+}
+
+/// Treatment of runs outside the declared design.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OutsideDesign {
+    /// The program stops and lists these runs: either the design or the table of runs is wrong.
+    #[default]
+    Refuse,
+    /// These runs are used like all others, and the assessment mentions them.
+    Allow,
+}
+
+/// Treatment of runs outside the model's range of validity.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum InvalidRuns {
+    /// These runs are excluded from training and validation of the surrogate.
+    #[default]
+    LeaveOut,
+    /// These runs are used like all others, and the assessment mentions them.
+    Train,
+}
+
+/// The engine's keys of `[measurements]`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct MeasurementKeys {
+    /// Screening of the measurements for faulty curves. Default: no screening.
+    pub screen: Option<Screen>,
+    /// Summary curves of the replicates added to the data of each group: `mean`, `q025`, `q975`. The founding paper
+    /// adds all three. They count the same information twice, so use them only to reproduce such an analysis. Default:
+    /// none.
+    pub added_curves: Vec<AddedCurve>,
+}
+
+/// Screening for curves that deviate strongly from the other replicates of their group (groups of four curves or more).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Screen {
+    /// Threshold above which a curve is flagged: its root mean square distance from the group's median curve,
+    /// standardised by the median and the median absolute deviation of these distances.
+    pub threshold: Positive,
+    /// `true` excludes flagged curves from the calibration; `false` only lists them. The report lists them in either
+    /// case.
+    pub leave_out: bool,
+}
+
+impl Default for Screen {
+    fn default() -> Self {
+        let threshold = Positive::new(10.0).unwrap_or_else(|_| unreachable!("10 is positive"));
+        Self { threshold, leave_out: true }
+    }
+}
+
+/// A summary curve of the replicates of a group.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AddedCurve {
+    /// Mean of the replicates.
+    Mean,
+    /// Lower end of the 95 % interval of a replicate: mean minus 1.96 standard deviations.
+    Q025,
+    /// Upper end of the 95 % interval of a replicate: mean plus 1.96 standard deviations.
+    Q975,
+}
+
+/// The engine's keys of `[surrogate]`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct SurrogateKeys {
+    /// Number of training runs, taken from the start of the design. Default: all runs but the `validation` runs.
+    pub training: Option<Count>,
+    /// Number of validation runs, taken from the end of the design: they are excluded from training and measure the
+    /// surrogate's error.
+    pub validation: usize,
+    /// Treatment of runs that the model reports as outside its range of validity.
+    pub invalid_runs: InvalidRuns,
+    /// Sequential refinement: further runs after the calibration, placed where the posterior density and the emulator's
+    /// error are large. Default: no refinement.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refine: Option<Refine>,
+}
+
+/// Sequential refinement: runs are added where the posterior density and the emulator's error are large, then the
+/// surrogate is refitted and the study recalibrated, until the emulator's error is small compared with the discrepancy.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Refine {
+    /// Number of runs added in each round.
+    pub runs: Count,
+    /// Maximum number of rounds. Default: 5.
+    #[serde(default = "Refine::rounds")]
+    pub rounds: Count,
+    /// Stopping criterion: refinement ends when the emulator's error at new runs near the posterior, measured before it
+    /// is trained on them, is at most this fraction of the discrepancy, both as root mean squares over the outputs.
+    /// Default: 0.1.
+    #[serde(default = "Refine::until")]
+    pub until: Positive,
+    /// Region in which the surrogate is fitted in each round.
+    #[serde(default)]
+    pub region: Region,
+}
+
+/// Region in which a refined surrogate is fitted.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Region {
+    /// A box around the posterior: the surrogate is fitted to the runs inside it and the posterior is restricted to it.
+    /// The box is twice as wide as the posterior's 99.8 % intervals, and in the first round at least half as wide as
+    /// the prior. Each round halves this minimum width, unless the posterior reaches an edge of the box, in which case
+    /// the box only moves.
+    #[default]
+    Posterior,
+    /// The whole design: the surrogate is fitted to all runs.
+    Design,
+}
+
+impl Refine {
+    fn rounds() -> Count {
+        Count::new(5).unwrap_or_else(|_| unreachable!("5 is a count"))
+    }
+    fn until() -> Positive {
+        Positive::new(0.1).unwrap_or_else(|_| unreachable!("0.1 is positive"))
+    }
+}
+
+/// The engine's keys of `[discrepancy]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct DiscrepancyKeys {
+    /// `true` includes the emulator's own error in the likelihood: a covariance, common to all replicates and
+    /// correlated between outputs, estimated from the errors at runs excluded from the fit (cross-validation).
+    pub emulator_error: bool,
+    /// `true` includes the error that all points of a replicate share (its gain, its timing) in the likelihood: a
+    /// covariance of the mean curve, estimated from the replicates. `false` treats all points as independent, which
+    /// makes the posterior too narrow if they are not.
+    pub replicate_error: bool,
+}
+
+impl Default for DiscrepancyKeys {
+    fn default() -> Self {
+        Self { emulator_error: true, replicate_error: true }
+    }
+}
+
+/// The engine's keys of `[[effect]]`: a physical effect that the model lacks, with unknowns of its own that are
+/// calibrated together with the model's parameters.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct EffectKeys {
+    /// Name of the effect. The names of its unknowns begin with it, as in `damping.rate`. Default: the name of the
+    /// plugin.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<Name>,
+    /// Part of the response the effect acts on: labels by axis, such as `{ sensor = ["R", "V"] }`. Default: the whole
+    /// response.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub on: On,
+}
+
+/// The engine's keys of `[sampler]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct SamplerKeys {
+    /// Burn-in: fraction of the steps, from the start of each chain, that is discarded from every summary.
+    pub burn_in: Fraction,
+    /// Starting points of the chains. Default: those recommended by the sampler, which are around the posterior maximum
+    /// unless its page says otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub start: Option<Start>,
+    /// Stopping rule: sampling continues beyond the sampler's own number of steps until this is satisfied. Default: the
+    /// sampler's own number of steps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stop: Option<StopRule>,
+}
+
+/// Stopping rule of a sampler.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StopRule {
+    /// Effective sample size (ESS) to reach: the smallest over all unknowns, of bulk and tail ESS, after the burn-in.
+    pub effective_sample_size: Count,
+    /// Maximum number of steps of each chain, reached even if the ESS is not. Default: fifty times the sampler's own
+    /// number of steps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_steps: Option<Count>,
+}
+
+impl Default for SamplerKeys {
+    fn default() -> Self {
+        let burn_in = Fraction::new(0.5).unwrap_or_else(|_| unreachable!("0.5 is a fraction"));
+        Self { burn_in, start: None, stop: None }
+    }
+}
+
+/// Checks performed after the calibration.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct ValidateSection {
+    /// `true` runs the model itself at the calibrated parameters; `false` uses the emulator's prediction. Default:
+    /// `true` if the study has a model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rerun_model: Option<bool>,
+    /// Values with which the calibrated parameters are compared. Default: no comparison.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub against: Option<Against>,
+    /// Number of posterior draws at which the model is run to measure the emulator's error there. Default: 0, no check.
+    pub emulator_check: usize,
+}
+
+/// Values with which calibrated parameters can be compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Against {
+    /// The `reference` values of the parameters.
+    Reference,
+}

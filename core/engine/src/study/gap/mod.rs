@@ -1,0 +1,129 @@
+//! `[gap]`: settings and candidates of the search for missing effects.
+
+mod held;
+mod inside;
+
+use std::collections::BTreeMap;
+
+use lacuna::plugin::Effect;
+use lacuna::plugin::effect::On;
+use lacuna::plugin::registry::{Section, section};
+use lacuna::text::decode::decode_beside;
+use lacuna::text::values::{Count, Fraction, Interval, Name, OpenFraction};
+use lacuna::text::{Node, Problems};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use held::Held;
+pub(super) use held::{Loose, hold};
+pub use inside::{Inside, Swap, SwapKeys, SwitchSection, TermKeys};
+
+/// Settings of the search for missing effects (`lacuna gap STUDY`).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct GapSection {
+    /// False-alarm rate: the probability that the search reports a gap when nothing is missing. Three fifths of it are
+    /// spent on the tests of named effects, two fifths on the tests for gaps without a name.
+    pub false_alarm: OpenFraction,
+    /// Maximum number of effects added to the model.
+    pub effects: Count,
+    /// Number of data sets simulated under the hypothesis that nothing is missing, from which the null distributions of
+    /// the tests are estimated. The smallest possible p-value is 1 / (simulations + 1).
+    pub simulations: Count,
+    /// Candidate effects, by the names of their plugins (`lacuna plugins effect`); each proposes priors suited to the
+    /// data. `[[gap.candidate]]` adds others. In a study without a surrogate whose model is written as equations, terms
+    /// may be named too (`lacuna plugins term`); each is tried at every place that the equations have for it. Default:
+    /// all installed effects and, in such a study, all terms.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub candidates: Option<Vec<String>>,
+    /// `true` also tries the library's terms that the study does not name, if the study has no surrogate and its model
+    /// is written as equations; `false` restricts terms to those of `[[gap.term]]`.
+    pub terms: bool,
+    /// Data held out before the search, on which it is measured whether the gap became smaller.
+    pub hold_out: HoldOut,
+}
+
+impl Default for GapSection {
+    fn default() -> Self {
+        let count = |n| Count::new(n).unwrap_or_else(|_| unreachable!("{n} is a count"));
+        let level = OpenFraction::new(0.05).unwrap_or_else(|_| unreachable!("0.05 is inside"));
+        Self {
+            false_alarm: level,
+            effects: count(3),
+            simulations: count(399),
+            candidates: None,
+            terms: true,
+            hold_out: HoldOut::default(),
+        }
+    }
+}
+
+/// Data held out of calibration and search.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct HoldOut {
+    /// Fraction of the replicates of each condition to hold out, drawn with the study's seed: at least one of three or
+    /// more, and always leaving two. If no condition has three replicates and nothing else is held out, the same
+    /// fraction of up to 24 blocks of each curve is held out instead, at most every third block.
+    pub replicates: Fraction,
+    /// Scenarios to hold out completely, by name. Default: none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub scenarios: Vec<String>,
+    /// Curves to hold out completely, by their labels, such as `{ sensor = ["B"] }`. Default: none.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub on: On,
+    /// Intervals of the last axis to hold out of every curve, in the unit of the axis, such as `[[0.004, 0.005]]`.
+    /// Default: none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub along: Vec<Interval>,
+}
+
+impl Default for HoldOut {
+    fn default() -> Self {
+        let quarter = Fraction::new(0.25).unwrap_or_else(|_| unreachable!("a quarter"));
+        Self { replicates: quarter, scenarios: Vec::new(), on: On::new(), along: Vec::new() }
+    }
+}
+
+/// The engine's keys of `[[gap.candidate]]`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct CandidateKeys {
+    /// Name of the effect in the results of the search. Default: the name of its plugin.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<Name>,
+}
+
+/// `[gap]` with its lists.
+#[derive(Default)]
+pub struct Gap {
+    /// The section's own keys.
+    pub keys: GapSection,
+    /// `[[gap.candidate]]`: candidate effects with given options.
+    pub candidates: Vec<Section<dyn Effect, CandidateKeys>>,
+    /// `[[gap.switch]]`, `[[gap.term]]`, `[[gap.model]]`: candidates inside the model.
+    pub inside: Inside,
+}
+
+/// The lists of `[gap]`.
+const LISTS: [&str; 4] = ["candidate", "switch", "term", "model"];
+
+/// Reads `[gap]`, with the defaults if the study does not have it; `None` after reporting an error.
+pub(super) fn gap(root: &Node, problems: &mut Problems) -> Option<Gap> {
+    let Some(node) = root.get("gap") else { return Some(Gap::default()) };
+    problems.within("gap", |problems| {
+        let mut own = node.clone();
+        for list in LISTS {
+            own.remove(list);
+        }
+        let keys = decode_beside(&own, &LISTS, problems);
+        let list = node.get("candidate").map(Node::elements).unwrap_or_default();
+        let candidates: Vec<Option<_>> = list
+            .iter()
+            .map(|node| problems.within("candidate", |problems| section(node, None, problems)))
+            .collect();
+        let inside = Inside::of(node, problems);
+        let candidates = candidates.into_iter().collect::<Option<_>>();
+        Some(Gap { keys: keys?, candidates: candidates?, inside: inside? })
+    })
+}

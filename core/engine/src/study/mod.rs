@@ -1,0 +1,26 @@
+//! The study language: from TOML text to a study that can be run.
+
+mod components;
+mod context;
+pub mod derived;
+pub mod fidelity;
+pub mod file;
+pub mod gap;
+pub mod inherit;
+pub mod inputs;
+pub mod language;
+pub mod libraries;
+pub mod overrides;
+mod plain;
+pub mod resolve;
+mod resolved;
+pub mod scenario;
+pub mod schema;
+mod sections;
+mod sizes;
+pub mod table;
+pub mod unknowns;
+
+pub use plain::Study;
+pub use resolve::Checked;
+pub use table::Chosen;

@@ -1,0 +1,69 @@
+//! A study as it is run: plugins built, priors and units checked, everything consistent. Plain data; `resolve` makes it.
+
+use std::ops::Deref;
+use std::path::PathBuf;
+
+use lacuna::data::{Layouts, Parameter, Scenario};
+use lacuna::plugin::registry::Section;
+use lacuna::plugin::{Effect, Given};
+use toml::Table;
+
+use super::fidelity::{LowFidelity, NumericalError};
+use super::file::{DerivedSection, EffectKeys, StudySection, ValidateSection};
+use super::gap::Gap;
+use super::libraries::Libraries;
+use super::table::PluginSections;
+use super::unknowns::Unknown;
+
+/// A study that can be run. The sections that choose one plugin are its fields too: `study.model`.
+pub struct Study {
+    /// Name of the study: that of its `[study]`, else the stem of its file.
+    pub name: String,
+    /// True if the name is set in the study's own file or on the command line, and neither inherited from an extended
+    /// study nor taken from the file name.
+    pub named: bool,
+    /// Path of the study file.
+    pub file: PathBuf,
+    /// Folder from which relative paths start: that of the study file, unless `directory` of `[study]` gives another.
+    pub directory: PathBuf,
+    /// Content of the study file, byte for byte.
+    pub text: String,
+    /// `[study]`.
+    pub about: StudySection,
+    /// `[plugins]`, with the libraries that were loaded.
+    pub libraries: Libraries,
+    /// The unknowns of the model.
+    pub parameters: Vec<Parameter>,
+    /// The known conditions; one without a name where the study has no scenarios.
+    pub scenarios: Vec<Scenario>,
+    /// Name and scenario behind each parameter, in the same order.
+    pub unknowns: Vec<Unknown>,
+    /// Model inputs that the study sets.
+    pub given: Vec<Given>,
+    /// The shapes of the responses to all scenarios.
+    pub layouts: Layouts,
+    /// The sections that choose one plugin.
+    pub plugins: PluginSections,
+    /// `[numerical_error]`.
+    pub numerical_error: Option<NumericalError>,
+    /// `[low_fidelity]`.
+    pub low_fidelity: Option<LowFidelity>,
+    /// `[[derived]]`.
+    pub derived_sections: Vec<DerivedSection>,
+    /// `[[effect]]`.
+    pub effects: Vec<Section<dyn Effect, EffectKeys>>,
+    /// `[validate]`.
+    pub validate: ValidateSection,
+    /// `[gap]`.
+    pub gap: Gap,
+    /// The whole study with every default filled in, for `resolved.toml`.
+    pub resolved: Table,
+}
+
+impl Deref for Study {
+    type Target = PluginSections;
+
+    fn deref(&self) -> &PluginSections {
+        &self.plugins
+    }
+}

@@ -1,0 +1,245 @@
+//! From a file to a study that can be run, or to what is wrong with it.
+//!
+//! Three layers, each reporting all its problems before the next begins: *structure* (syntax, keys, types,
+//! names of plugins), *context* (the sections against each other), *environment* (files and folders).
+
+use std::path::{Path, PathBuf};
+
+use lacuna::data::Layout;
+use lacuna::plugin::Context;
+use lacuna::plugin::registry::loaded::declaring;
+use lacuna::text::decode::decode;
+use lacuna::text::{Node, Problems, Sources, Value};
+use toml::Table;
+
+use super::fidelity::{low_fidelity, numerical_error};
+use super::file::{OPTIONAL, ResponseSection, StudySection, ValidateSection};
+use super::gap::gap;
+pub use super::libraries::Use;
+use super::libraries::{Libraries, Seen, libraries};
+pub use super::plain::Study;
+use super::sections::{
+    derived, effects, layouts, name, parameters, scenarios, table, unknown_sections,
+};
+use super::table::{self, PluginSections, SECTIONS};
+use super::unknowns::unknowns;
+use super::{context, inherit, inputs, overrides, resolved, sizes};
+
+/// A study that was looked at: the texts it comes from, what is wrong with it, and the study itself
+/// when nothing is.
+pub struct Checked {
+    /// The texts.
+    pub sources: Sources,
+    /// Problems found.
+    pub problems: Problems,
+    /// The libraries of plugins that the study loads.
+    pub libraries: Vec<Seen>,
+    /// The study, when nothing is wrong.
+    pub study: Option<Study>,
+}
+
+impl Checked {
+    /// All problems as text; empty when there is none.
+    pub fn complaints(&self) -> String {
+        self.problems.render(&self.sources)
+    }
+}
+
+/// Reads a study file with `--set` arguments and checks all three layers.
+pub fn load(path: &Path, arguments: &[String]) -> Checked {
+    load_for(path, arguments, Use::Run)
+}
+
+/// Like [`load`], but for a given purpose.
+pub fn load_for(path: &Path, arguments: &[String], purpose: Use) -> Checked {
+    let mut sources = Sources::default();
+    let mut problems = Problems::new();
+    let root = inherit::load(path, &common_keys, &mut sources, &mut problems);
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    finish(path, text, root, arguments, purpose, sources, problems)
+}
+
+/// Checks a study given as text, as if it stood in a file at `path`.
+pub fn load_text(path: &Path, text: &str, arguments: &[String]) -> Checked {
+    text_for(path, text, arguments, Use::Run)
+}
+
+/// Like [`load_text`], but for a given purpose and without arguments.
+pub fn load_text_for(path: &Path, text: &str, purpose: Use) -> Checked {
+    text_for(path, text, &[], purpose)
+}
+
+fn text_for(path: &Path, text: &str, arguments: &[String], purpose: Use) -> Checked {
+    let mut sources = Sources::default();
+    let mut problems = Problems::new();
+    let root = inherit::load_text(path, text.to_owned(), &common_keys, &mut sources, &mut problems);
+    finish(path, text.to_owned(), root, arguments, purpose, sources, problems)
+}
+
+fn finish(
+    path: &Path,
+    text: String,
+    root: Option<Node>,
+    arguments: &[String],
+    purpose: Use,
+    mut sources: Sources,
+    mut problems: Problems,
+) -> Checked {
+    let mut seen = Vec::new();
+    let study = root.and_then(|mut root| {
+        overrides::apply(&mut root, arguments, &common_keys, &mut sources, &mut problems);
+        take_out(&mut root);
+        let named = gives_its_name(path, &root, &sources);
+        let libraries = libraries(&root, &directory(path, &root), purpose, &mut problems)?;
+        seen.clone_from(&libraries.seen);
+        let declared = if purpose == Use::Check { libraries.declared() } else { Vec::new() };
+        declaring(declared, || {
+            let mut study = structure(path, text, &root, libraries, &mut problems)?;
+            study.named = named;
+            if problems.is_empty() {
+                context::check(&study, &root, &mut problems);
+            }
+            if problems.is_empty() {
+                environment(&study, purpose, &root, &mut problems);
+            }
+            Some(study)
+        })
+    });
+    let study = study.filter(|_| problems.is_empty());
+    Checked { sources, problems, libraries: seen, study }
+}
+
+/// See [`Study::named`].
+fn gives_its_name(path: &Path, root: &Node, sources: &Sources) -> bool {
+    let source = root.find("study.name").map(|name| sources.get(name.place.source));
+    source.is_some_and(|source| source.path.as_deref().is_none_or(|file| file == path))
+}
+
+/// Takes out what is `false` in the place of a section: `numerical_error = false` removes the section that another study
+/// has, of which this one says what differs.
+fn take_out(root: &mut Node) {
+    let is_false = |node: Option<&Node>| node.is_some_and(|n| n.value == Value::Boolean(false));
+    for name in SECTIONS {
+        if is_false(root.get(name)) {
+            root.remove(name);
+        }
+    }
+    for (section, key) in OPTIONAL {
+        if let Some(section) = root.get_mut(section)
+            && is_false(section.get(key))
+        {
+            section.remove(key);
+        }
+    }
+}
+
+/// Folder from which relative paths of a study start. It is never empty, because an empty path has no absolute form.
+fn directory(path: &Path, root: &Node) -> PathBuf {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new("."));
+    let given = root.find("study.directory").and_then(Node::as_str);
+    given.map_or(folder.to_owned(), |given| folder.join(given))
+}
+
+/// The engine's own keys of a section, which stay when its plugin changes.
+fn common_keys(section: &str) -> &'static [&'static str] {
+    match section {
+        // Elements of named lists, such as the parts of a chain.
+        "" => &["name", "takes", "gives"],
+        _ => table::common_keys(section),
+    }
+}
+
+/// First layer: the sections, their keys and types, the names of the plugins.
+fn structure(
+    path: &Path,
+    text: String,
+    root: &Node,
+    libraries: Libraries,
+    problems: &mut Problems,
+) -> Option<Study> {
+    unknown_sections(root, problems);
+    let about = table::<StudySection>(root, "study", problems);
+    let parameters = parameters(root, problems);
+    let response = match root.get("response") {
+        // A target has no response, so that nothing is said of its shape.
+        None if root.get("target").is_some() => Some(None),
+        _ => table::<ResponseSection>(root, "response", problems).map(Some),
+    };
+    let directory = directory(path, root);
+    let scenarios = scenarios(root, &directory, problems);
+    let before = problems.len();
+    let plugins = PluginSections::read(root, problems);
+    let numerical_error = numerical_error(root, problems);
+    let low_fidelity = low_fidelity(root, problems);
+    let derived_sections = derived(root, problems);
+    let effects = effects(root, problems);
+    let validate = match root.get("validate") {
+        Some(node) => problems.within("validate", |problems| decode(node, problems)),
+        None => Some(ValidateSection::default()),
+    };
+    let gap = gap(root, problems);
+    let reader = plugins.measurements.as_ref().map(|section| &*section.built.plugin);
+    let layouts = match (&response, &scenarios) {
+        (Some(Some(response)), Some((_, sections))) => {
+            layouts(response, sections, reader, &directory, root, problems)
+        }
+        (Some(None), _) => Some(Layout::number("log_density").into()),
+        _ => None,
+    };
+    let (scenarios, sections) = scenarios?;
+    let margin = plugins.design.as_ref().and_then(|design| design.common.margin);
+    let (parameters, unknowns) = unknowns(&parameters?, &scenarios, margin, root, problems);
+    if problems.len() > before {
+        return None;
+    }
+    let mut about = about?;
+    about.directory = None;
+    let name = name(&mut about, path, root, problems)?;
+    let mut study = Study {
+        name,
+        named: false,
+        file: path.to_owned(),
+        directory,
+        text,
+        about,
+        libraries,
+        parameters,
+        scenarios,
+        unknowns,
+        given: Vec::new(),
+        layouts: layouts?,
+        plugins,
+        numerical_error,
+        low_fidelity,
+        derived_sections: derived_sections?,
+        effects: effects?,
+        validate: validate?,
+        gap: gap?,
+        resolved: Table::new(),
+    };
+    study.given = inputs::all_given(&study);
+    match resolved::table(&study, response?.as_ref(), &sections) {
+        Ok(resolved) => study.resolved = resolved,
+        Err(error) => {
+            problems.report(None, format!("the study with its defaults {error}"));
+            return None;
+        }
+    }
+    Some(study)
+}
+
+/// Third layer: what the plugins need of the machine.
+fn environment(study: &Study, purpose: Use, root: &Node, problems: &mut Problems) {
+    if purpose != Use::Look {
+        sizes::environment(study, root, problems);
+    }
+    context::each_plugin(study, root, problems, |section, component, context, complaints| {
+        if purpose != Use::Look
+            || !["model", "numerical_error", "low_fidelity", "executor"].contains(&section)
+        {
+            let starts_programs = purpose != Use::Check;
+            component.environment(&Context { starts_programs, ..*context }, complaints);
+        }
+    });
+}

@@ -1,0 +1,105 @@
+//! A study written out: every default filled in, for `resolved.toml`.
+
+use std::collections::BTreeMap;
+
+use lacuna::text::emit::{Unwritable, to_table};
+use toml::{Table, Value};
+
+use super::file::{ResponseSection, ScenarioSection};
+use super::gap::{Gap, Swap};
+use super::plain::Study;
+use super::table::{SECTIONS, written};
+
+/// The study with every default filled in.
+pub(super) fn table(
+    study: &Study,
+    response: Option<&ResponseSection>,
+    scenarios: &[ScenarioSection],
+) -> Result<Table, Unwritable> {
+    let mut about = to_table(&study.about)?;
+    about.insert("name".to_owned(), study.name.clone().into());
+    let directory = std::path::absolute(&study.directory).unwrap_or(study.directory.clone());
+    about.insert("directory".to_owned(), directory.display().to_string().into());
+    let parameters: Result<Vec<Table>, _> = study
+        .parameters
+        .iter()
+        .zip(&study.unknowns)
+        .map(|(parameter, unknown)| {
+            let mut table = to_table(parameter)?;
+            table.insert("name".to_owned(), unknown.name.clone().into());
+            if let Some(scenario) = unknown.scenario {
+                let name = study.scenarios[scenario].name.clone();
+                // The symbol of one scenario's parameter is made from the written one.
+                let suffix = format!("[{name}]");
+                let symbol = parameter.symbol.strip_suffix(&suffix).unwrap_or(&parameter.symbol);
+                table.insert("symbol".to_owned(), symbol.into());
+                table.insert("scenario".to_owned(), name.into());
+            }
+            Ok(table)
+        })
+        .collect();
+    let mut whole = Table::new();
+    whole.insert("study".to_owned(), about.into());
+    if !study.libraries.section.load.is_empty() {
+        whole.insert("plugins".to_owned(), to_table(&study.libraries.section)?.into());
+    }
+    whole.insert("parameter".to_owned(), parameters?.into());
+    if !study.derived_sections.is_empty() {
+        let derived: Result<Vec<Table>, _> = study.derived_sections.iter().map(to_table).collect();
+        whole.insert("derived".to_owned(), derived?.into());
+    }
+    if !scenarios.is_empty() {
+        let scenarios: Result<Vec<Table>, _> = scenarios.iter().map(to_table).collect();
+        whole.insert("scenario".to_owned(), scenarios?.into());
+    }
+    if let Some(response) = response {
+        whole.insert("response".to_owned(), to_table(response)?.into());
+    }
+    let mut later: BTreeMap<&str, Value> = BTreeMap::new();
+    later.extend(study.plugins.written()?.into_iter().map(|(name, table)| (name, table.into())));
+    if let Some(numerical_error) = &study.numerical_error {
+        later.insert("numerical_error", to_table(&numerical_error.written)?.into());
+    }
+    if let Some(low_fidelity) = &study.low_fidelity {
+        later.insert("low_fidelity", to_table(&low_fidelity.written)?.into());
+    }
+    if !study.effects.is_empty() {
+        let effects: Result<Vec<Table>, _> = study.effects.iter().map(written).collect();
+        later.insert("effect", effects?.into());
+    }
+    later.insert("validate", to_table(&study.validate)?.into());
+    later.insert("gap", gap(&study.gap)?.into());
+    for name in SECTIONS {
+        whole.extend(later.remove(name).map(|section| ((*name).to_owned(), section)));
+    }
+    Ok(whole)
+}
+
+/// `[gap]` with its lists.
+fn gap(section: &Gap) -> Result<Table, Unwritable> {
+    let mut gap = to_table(&section.keys)?;
+    if !section.candidates.is_empty() {
+        let candidates: Result<Vec<Table>, _> = section.candidates.iter().map(written).collect();
+        gap.insert("candidate".to_owned(), candidates?.into());
+    }
+    let inside = &section.inside;
+    let mut list = |name: &str, tables: Result<Vec<Table>, Unwritable>| {
+        let tables = tables?;
+        if !tables.is_empty() {
+            gap.insert(name.to_owned(), tables.into());
+        }
+        Ok(())
+    };
+    list("switch", inside.switches.iter().map(to_table).collect())?;
+    list("term", inside.terms.iter().map(written).collect())?;
+    list("model", inside.models.iter().map(swapped).collect())?;
+    Ok(gap)
+}
+
+/// A model in place of the study's.
+fn swapped(swap: &Swap) -> Result<Table, Unwritable> {
+    let mut table = to_table(&swap.keys)?;
+    table.insert("use".to_owned(), swap.section.built.name.into());
+    table.extend(swap.section.built.options.clone());
+    Ok(table)
+}

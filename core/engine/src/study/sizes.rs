@@ -1,0 +1,150 @@
+//! Memory needed by the sizes in a study: an impossible size is refused before anything is allocated.
+
+use lacuna::plugin::sampler::Plan;
+use lacuna::text::memory::{MOST, NUMBER, amount};
+use lacuna::text::{Complaints, Node, Problems};
+
+use super::plain::Study;
+
+/// The largest whole number among the options of a plugin.
+const LARGEST: i64 = i32::MAX as i64;
+/// Whole numbers that are no sizes, by their names.
+const NO_SIZES: [&str; 2] = ["seed", "id"];
+
+/// Memory needed by one size.
+struct Need {
+    /// Path of the key that sets the size, from the root of the study.
+    key: String,
+    /// The objects that need the memory, as the subject of the message.
+    what: &'static str,
+    /// The value of the key.
+    size: f64,
+    /// The memory that this size takes, in bytes.
+    bytes: f64,
+}
+
+/// Reports a response that is too large, all its axes together.
+pub(super) fn response(places: impl Iterator<Item = usize>, node: &Node, problems: &mut Problems) {
+    let values: f64 = places.map(|n| n as f64).product();
+    if NUMBER * values > MOST {
+        let most = MOST / NUMBER;
+        Complaints::new(node, problems)
+            .at("axes")
+            .say(format!("one response needs {} of memory", amount(NUMBER * values)))
+            .expected(format!("at most {most} values, the product of the axes"))
+            .found(values);
+    }
+}
+
+/// Reports every size that no machine can hold.
+pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
+    let before = problems.len();
+    for (section, options) in study.options() {
+        let mut found = Vec::new();
+        too_large(options, "", &mut found);
+        for (key, value) in found {
+            Complaints::new(root, problems)
+                .at(&format!("{section}.{key}"))
+                .say(format!("`{key}` is no possible size"))
+                .expected(format!("at most {LARGEST}"))
+                .found(value);
+        }
+    }
+    if problems.len() == before {
+        refuse(study, MOST, "a study may ask for", root, problems);
+    }
+}
+
+/// Reports every size that this machine cannot hold.
+pub(super) fn environment(study: &Study, root: &Node, problems: &mut Problems) {
+    if let Some(memory) = memory() {
+        refuse(study, memory, "this machine has", root, problems);
+    }
+}
+
+fn refuse(study: &Study, most: f64, whose: &str, root: &Node, problems: &mut Problems) {
+    let mut complaints = Complaints::new(root, problems);
+    for need in needs(study).into_iter().filter(|need| need.bytes > most) {
+        let Need { key, what, size, bytes } = need;
+        complaints
+            .at(&key)
+            .say(format!("{what} need {} of memory; {whose} {}", amount(bytes), amount(most)))
+            .expected(format!("at most {}", (size * (most / bytes)).floor()))
+            .found(size);
+    }
+}
+
+/// The memory of this machine in bytes; `None` where it does not say.
+fn memory() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
+    let kibibytes: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(1024.0 * kibibytes)
+}
+
+/// Everything in a study that is a size, with what it asks for.
+fn needs(study: &Study) -> Vec<Need> {
+    let mut needs = Vec::new();
+    let mut add = |key: &str, what, size: usize, numbers: f64| {
+        let (size, key) = (size as f64, key.to_owned());
+        needs.push(Need { key, what, size, bytes: NUMBER * size * numbers });
+    };
+    let parameters = study.parameters.len() as f64;
+    let outputs = study.layouts.len() as f64;
+    // The responses of a run, its parameters, and the response once more where the ensemble is read.
+    let run = parameters + 2.0 * outputs;
+    if let Some(design) = &study.design {
+        add("design.runs", "the runs", design.common.runs.get(), run);
+        for (i, more) in design.common.extended.iter().enumerate() {
+            add(&format!("design.extended.{i}"), "the runs", more.get(), run);
+        }
+    }
+    if let Some(refine) = study.surrogate.as_ref().and_then(|s| s.common.refine.as_ref()) {
+        let rounds = refine.rounds.get() as f64;
+        add("surrogate.refine.runs", "the runs of all rounds", refine.runs.get(), rounds * run);
+    }
+    if let Some(error) = &study.numerical_error {
+        add("numerical_error.runs", "the finer runs", error.runs, run);
+    }
+    add("validate.emulator_check", "the runs", study.validate.emulator_check, run);
+    if let Some(section) = &study.sampler {
+        let plan = section.built.plugin.plan(study.parameters.len());
+        let steps = section.built.plugin.uses_starts() && plan.warm_up < plan.steps;
+        let Plan { chains, steps, .. } = Plan { steps: if steps { plan.steps } else { 1 }, ..plan };
+        // The draws twice, as they are read and as they are kept, each with its log density.
+        let numbers = 2.0 * (parameters + 1.0) * chains as f64 * steps as f64;
+        if let Some((key, size)) = largest(&section.built.options) {
+            let key = format!("sampler.{key}");
+            add(&key, "the draws", size as usize, numbers / (size as f64).max(1.0));
+        }
+    }
+    needs
+}
+
+/// The largest whole number among options.
+fn largest(options: &toml::Table) -> Option<(&str, i64)> {
+    let sizes = options.iter().filter(|(key, _)| !NO_SIZES.contains(&key.as_str()));
+    let whole = sizes.filter_map(|(key, value)| Some((key.as_str(), value.as_integer()?)));
+    whole.max_by_key(|(_, n)| *n)
+}
+
+/// The whole numbers among options that are no possible sizes, with their dotted paths.
+fn too_large(options: &toml::Table, path: &str, found: &mut Vec<(String, i64)>) {
+    for (key, value) in options.iter().filter(|(key, _)| !NO_SIZES.contains(&key.as_str())) {
+        look(value, &format!("{path}{key}"), found);
+    }
+}
+
+fn look(value: &toml::Value, path: &str, found: &mut Vec<(String, i64)>) {
+    match value {
+        toml::Value::Integer(n) if *n > LARGEST => found.push((path.to_owned(), *n)),
+        toml::Value::Table(table) => too_large(table, &format!("{path}."), found),
+        toml::Value::Array(items) => {
+            items
+                .iter()
+                .enumerate()
+                .for_each(|(i, item)| look(item, &format!("{path}.{i}"), found));
+        }
+        _ => {}
+    }
+}

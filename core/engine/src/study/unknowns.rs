@@ -1,0 +1,113 @@
+//! The unknowns of a study: shared by all scenarios, or one per scenario.
+
+use lacuna::data::{Parameter, Scenario};
+use lacuna::math::distribution::Distribution;
+use lacuna::text::node::Node;
+use lacuna::text::values::Positive;
+use lacuna::text::{Complaints, Problems, nearest};
+
+use super::file::ParameterSection;
+
+/// Unknown to which a parameter of a study belongs.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Unknown {
+    /// Name in inputs and expressions: that of the parameter without its scenario.
+    pub name: String,
+    /// Scenario to which it belongs; `None` if it is shared by all.
+    pub scenario: Option<usize>,
+}
+
+impl Unknown {
+    /// Returns true if it acts in a scenario.
+    pub fn acts_in(&self, scenario: usize) -> bool {
+        self.scenario.is_none_or(|own| own == scenario)
+    }
+}
+
+/// The parameters of a study and their unknowns: `"each"` makes one parameter per scenario.
+pub(super) fn unknowns(
+    sections: &[ParameterSection],
+    scenarios: &[Scenario],
+    margin: Option<Positive>,
+    root: &Node,
+    problems: &mut Problems,
+) -> (Vec<Parameter>, Vec<Unknown>) {
+    let (mut parameters, mut unknowns) = (Vec::new(), Vec::new());
+    let mut add = |section: &ParameterSection, scenario: Option<usize>| {
+        let name = section.name.as_str().to_owned();
+        let full = |base: &str| match scenario {
+            Some(i) => format!("{base}[{}]", scenarios[i].name),
+            None => base.to_owned(),
+        };
+        parameters.push(Parameter {
+            symbol: full(section.symbol.as_deref().unwrap_or(&name)),
+            name: full(&name),
+            unit: section.unit.clone(),
+            design: section.design.clone().unwrap_or_else(|| match margin {
+                Some(margin) => widened(&section.prior, margin.get()),
+                None => section.prior.clone(),
+            }),
+            prior: section.prior.clone(),
+            reference: section.reference,
+        });
+        unknowns.push(Unknown { name, scenario });
+    };
+    let named: Vec<&str> =
+        scenarios.iter().map(|s| s.name.as_str()).filter(|name| !name.is_empty()).collect();
+    for section in sections {
+        if margin.is_some() && section.design.is_none() && !reaches_out(&section.prior) {
+            let mut complaints = Complaints::new(root, problems);
+            let (name, law) = (&section.name, section.prior.name());
+            complaints
+                .at(&format!("parameter.{name}.prior"))
+                .say(format!("`[design] margin` cannot widen the {law} prior of `{name}`"))
+                .expected("a uniform or log-uniform prior, or a `design` of the parameter's own");
+        }
+        let Some(scenario) = &section.scenario else {
+            add(section, None);
+            continue;
+        };
+        let place = scenarios.iter().position(|s| &s.name == scenario && !s.name.is_empty());
+        match place {
+            Some(place) => add(section, Some(place)),
+            None if scenario == "each" && !named.is_empty() => {
+                (0..scenarios.len()).for_each(|i| add(section, Some(i)));
+            }
+            None => {
+                let mut complaints = Complaints::new(root, problems);
+                let path = format!("parameter.{}.scenario", section.name);
+                let complaint = complaints.at(&path);
+                if named.is_empty() {
+                    complaint.say("the study has no scenarios").help("add `[[scenario]]` sections");
+                    continue;
+                }
+                let problem = complaint.say(format!("there is no scenario `{scenario}`"));
+                problem.expected(nearest::one_of(named.iter().copied().chain(["each"])));
+                if let Some(near) = nearest::nearest(scenario, named.iter().copied()) {
+                    problem.help(format!("did you mean `{near}`?"));
+                }
+            }
+        }
+    }
+    (parameters, unknowns)
+}
+
+/// A bounded law over a wider range; any other law is returned unchanged, because its runs reach as far as its tails.
+fn widened(prior: &Distribution, margin: f64) -> Distribution {
+    let wider = |low: f64, high: f64| [low - margin * (high - low), high + margin * (high - low)];
+    match *prior {
+        Distribution::Uniform([low, high]) => Distribution::Uniform(wider(low, high)),
+        Distribution::LogUniform([low, high]) => {
+            Distribution::LogUniform(wider(low.ln(), high.ln()).map(f64::exp))
+        }
+        ref other => other.clone(),
+    }
+}
+
+/// Returns true if the runs can lie outside the prior's range: it can be widened, or it is unbounded on at least one
+/// side.
+fn reaches_out(prior: &Distribution) -> bool {
+    let (low, high) = prior.support();
+    let boxed = matches!(prior, Distribution::Uniform(_) | Distribution::LogUniform(_));
+    boxed || !(low.is_finite() && high.is_finite())
+}

@@ -1,0 +1,160 @@
+//! Named arrays in a NetCDF file: the format in which stages store numbers, readable by every netCDF tool.
+
+use std::path::Path;
+
+use lacuna::data::{Axis, Coordinates, Layout};
+use lacuna::matrix::Matrix;
+use lacuna::plugin::model::Response;
+use lacuna::run::{Stop, files};
+use netcdf_reader::NcFile;
+use netcdf_writer::{NcAttrValue, NcFileBuilder, NcWriteFormat, NcWriteOptions};
+
+/// An array with named dimensions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Array {
+    /// Name of the array.
+    pub name: String,
+    /// Name and length of each dimension, slowest-varying first.
+    pub dimensions: Vec<(String, usize)>,
+    /// Values, row-major.
+    pub values: Vec<f64>,
+    /// Unit, if there is one.
+    pub unit: Option<String>,
+}
+
+impl Array {
+    /// An array from a matrix, with names for its rows and columns.
+    pub fn matrix(name: &str, rows: &str, columns: &str, matrix: &Matrix) -> Self {
+        let dimensions =
+            vec![(rows.to_owned(), matrix.rows()), (columns.to_owned(), matrix.columns())];
+        Self { name: name.to_owned(), dimensions, values: matrix.as_slice().to_vec(), unit: None }
+    }
+
+    /// The array as a matrix: the first dimension becomes the rows, all others together the columns.
+    pub fn into_matrix(self) -> Matrix {
+        let rows = self.dimensions.first().map_or(1, |d| d.1);
+        let columns = self.dimensions.iter().skip(1).map(|d| d.1).product();
+        Matrix::from_vec(rows, columns, self.values)
+    }
+}
+
+/// Writes arrays and text attributes as a classic netCDF file with 64-bit offsets.
+pub fn write(path: &Path, attributes: &[(&str, String)], arrays: &[Array]) -> Result<(), Stop> {
+    let bytes = encode(attributes, arrays)
+        .map_err(|error| Stop::new(format!("cannot write {}: {error}", path.display())))?;
+    files::write_atomic(path, &bytes)
+}
+
+fn encode(
+    attributes: &[(&str, String)],
+    arrays: &[Array],
+) -> Result<Vec<u8>, netcdf_writer::Error> {
+    let mut builder = NcFileBuilder::new();
+    for (name, value) in attributes {
+        builder.add_attribute(*name, NcAttrValue::Chars(value.clone()))?;
+    }
+    let mut known: Vec<(String, netcdf_writer::DimensionId)> = Vec::new();
+    for array in arrays {
+        let mut dimensions = Vec::new();
+        for (name, length) in &array.dimensions {
+            let id = if let Some((_, id)) = known.iter().find(|(known, _)| known == name) {
+                *id
+            } else {
+                let id = builder.add_dimension(name, *length as u64)?;
+                known.push((name.clone(), id));
+                id
+            };
+            dimensions.push(id);
+        }
+        let variable = builder.add_variable::<f64>(&array.name, &dimensions)?;
+        if let Some(unit) = &array.unit {
+            builder.add_variable_attribute(variable, "units", NcAttrValue::Chars(unit.clone()))?;
+        }
+        builder.write_variable(variable, &array.values)?;
+    }
+    let options = NcWriteOptions { format: NcWriteFormat::Offset64 };
+    Ok(builder.to_vec(options)?.1)
+}
+
+/// Reads one array of a file that [`fn@write`] wrote.
+pub fn read(path: &Path, name: &str) -> Result<Array, Stop> {
+    let missing = || failed(path, &format!("no variable `{name}`"));
+    read_some(path, name)?.ok_or_else(missing)
+}
+
+/// Reads the array with this name; `None` if the file has none.
+pub fn read_some(path: &Path, name: &str) -> Result<Option<Array>, Stop> {
+    let fail = |error: String| failed(path, &error);
+    let file = NcFile::open(path).map_err(|error| fail(error.to_string()))?;
+    let variables = file.variables().map_err(|error| fail(error.to_string()))?;
+    let Some(variable) = variables.iter().find(|v| v.name() == name) else { return Ok(None) };
+    let dimensions: Vec<(String, usize)> =
+        variable.dimensions().iter().map(|d| (d.name.clone(), d.size as usize)).collect();
+    let values = file.read_variable_as_f64(name).map_err(|error| fail(error.to_string()))?;
+    let values = values.iter().copied().collect();
+    let unit = variable.attribute("units").and_then(|attribute| attribute.value.as_string());
+    Ok(Some(Array { name: name.to_owned(), dimensions, values, unit }))
+}
+
+fn failed(path: &Path, error: &str) -> Stop {
+    Stop::new(format!("cannot read {}: {error}", path.display()))
+}
+
+/// Writes the response of one run as `NAME.nc`: a variable with the response's name on the axes of the layout, with
+/// their grids as coordinate variables and their labels as attributes. Returns the file name.
+pub fn write_response(
+    folder: &Path,
+    run: &str,
+    layout: &Layout,
+    response: &Response,
+) -> Result<String, Stop> {
+    let mut arrays = Vec::new();
+    let mut attributes = vec![("title", run.to_owned())];
+    let labels: Vec<(String, String)> = layout.axes.iter().filter_map(axis_labels).collect();
+    for (name, text) in &labels {
+        attributes.push((name, text.clone()));
+    }
+    for axis in &layout.axes {
+        if let Coordinates::Grid { values, unit } = &axis.coordinates {
+            arrays.push(Array {
+                name: axis.name.clone(),
+                dimensions: vec![(axis.name.clone(), values.len())],
+                values: values.clone(),
+                unit: Some(unit.to_string()),
+            });
+        }
+    }
+    arrays.push(Array {
+        name: layout.name.clone(),
+        dimensions: layout.axes.iter().map(|a| (a.name.clone(), a.len())).collect(),
+        values: response.values.clone(),
+        unit: Some(layout.unit.to_string()),
+    });
+    let file = format!("{run}.nc");
+    write(&folder.join(&file), &attributes, &arrays)?;
+    Ok(file)
+}
+
+fn axis_labels(axis: &Axis) -> Option<(String, String)> {
+    match &axis.coordinates {
+        Coordinates::Labels(labels) => Some((format!("{}_labels", axis.name), labels.join(" "))),
+        Coordinates::Grid { .. } => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arrays_come_back_bit_for_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.nc");
+        let matrix = Matrix::from_fn(3, 2, |i, j| (i as f64 + 0.1) / (j as f64 + 0.7));
+        let stored = [Array::matrix("points", "run", "parameter", &matrix)];
+        write(&path, &[("title", "a test".to_owned())], &stored).unwrap();
+        assert_eq!(read(&path, "points").unwrap().into_matrix(), matrix);
+        let missing = read(&path, "draws").unwrap_err();
+        assert!(missing.message.ends_with("no variable `draws`"), "{missing}");
+    }
+}

@@ -1,0 +1,17 @@
+//! Files of a run: artifacts with their provenance, arrays, and the orders and markers of runs that other processes
+//! make.
+
+mod adopt;
+pub mod arrays;
+pub mod directory;
+mod growth;
+pub mod made_by;
+mod provenance;
+pub mod stage;
+#[cfg(test)]
+mod testing;
+pub mod work;
+
+pub use arrays::write_response;
+pub use directory::{Artifact, Kept, RunDirectory, inputs_of};
+pub use stage::{Folder, Stage};

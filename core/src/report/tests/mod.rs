@@ -1,7 +1,0 @@
-//! The report of made-up results of the shape of the mercury target study.
-#![allow(clippy::unwrap_used)]
-
-mod fixture;
-mod page;
-mod summary;
-mod xml;
