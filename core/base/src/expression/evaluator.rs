@@ -10,6 +10,7 @@ pub const DIRECTIONS: usize = 4;
 /// Evaluates a program repeatedly; intermediate results at a point are shared by its values and derivatives.
 ///
 /// ```
+/// # use lacuna_base as lacuna;
 /// use lacuna::expression::{Evaluator, Scope};
 ///
 /// let mut scope = Scope::new();

@@ -64,6 +64,7 @@ impl Fault {
     /// Renders the fault with the line of the text that contains it, marked.
     ///
     /// ```
+    /// # use lacuna_base as lacuna;
     /// let fault = lacuna::expression::check("exp(a, 2)").unwrap_err();
     /// assert_eq!(
     ///     fault.render("exp(a, 2)"),

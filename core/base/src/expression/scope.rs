@@ -16,6 +16,7 @@ use crate::matrix::Matrix;
 /// Names that expressions may use: unknowns, data, and definitions in terms of both.
 ///
 /// ```
+/// # use lacuna_base as lacuna;
 /// use lacuna::expression::{Data, Scope};
 ///
 /// let mut scope = Scope::new();
@@ -90,6 +91,7 @@ impl Scope {
     /// Expressions defined afterwards call it as `name(x)`.
     ///
     /// ```
+    /// # use lacuna_base as lacuna;
     /// use lacuna::data::{Function, Unit};
     /// use lacuna::expression::Scope;
     ///

@@ -37,6 +37,7 @@ impl Scope {
     /// the same unit for all its arguments, and its density is per that unit.
     ///
     /// ```
+    /// # use lacuna_base as lacuna;
     /// use lacuna::data::Unit;
     /// use lacuna::expression::Scope;
     ///
