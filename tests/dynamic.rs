@@ -43,16 +43,25 @@ use lacuna_engine::host::library;
 use lacuna_plugins as _;
 use lacuna_twin as _;
 
-/// Profile for libraries that are built outside this workspace: the same for all, so that they share compiled crates;
-/// the engine in them is less optimised than in the program, because the interface must hold between such builds.
-fn with_profile() -> impl Iterator<Item = &'static str> {
-    let settings = [
-        "profile.dev.package.lacuna-linalg.opt-level=3",
-        "profile.dev.package.lacuna-base.opt-level=0",
-        "profile.dev.package.lacuna-api.opt-level=0",
-        "profile.dev.package.lacuna-abi.opt-level=0",
-    ];
-    settings.into_iter().flat_map(|setting| ["--config", setting])
+/// Arguments with which cargo builds a library outside this workspace: one profile for all, so that they share compiled
+/// crates. It is that of the workspace, except that the engine in them is less optimised than in the program, because
+/// the interface must hold between such builds.
+fn with_profile() -> [&'static str; 2] {
+    static PROFILE: OnceLock<String> = OnceLock::new();
+    let path = PROFILE.get_or_init(|| {
+        let manifest = std::fs::read_to_string(quick::root().join("Cargo.toml")).unwrap();
+        let mut manifest: toml::Table = manifest.parse().unwrap();
+        let mut profile = manifest.remove("profile").unwrap();
+        let packages = profile["dev"]["package"].as_table_mut().unwrap();
+        for part in ["lacuna-base", "lacuna-api", "lacuna-abi"] {
+            packages.insert(part.to_owned(), toml::Value::from(toml::toml! { opt-level = 0 }));
+        }
+        let all = toml::Table::from_iter([("profile".to_owned(), profile)]);
+        let path = std::env::current_exe().unwrap().with_file_name("profile_of_libraries.toml");
+        lacuna::run::files::write_atomic(&path, all.to_string().as_bytes()).unwrap();
+        path.to_str().unwrap().to_owned()
+    });
+    ["--config", path]
 }
 
 /// Path of the library of twins, which was built together with this test.

@@ -1,7 +1,5 @@
 //! Cholesky factorisation of symmetric positive definite matrices.
 
-use std::ops::Range;
-
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{
     LltError, LltRegularization, cholesky_in_place, cholesky_in_place_scratch,
@@ -11,7 +9,7 @@ use faer::{Mat, Par, Spec};
 
 use crate::error::{Error, finite};
 use crate::faer_view::{view, view_mut};
-use crate::triangular::{solve_lower, solve_lower_matrix, solve_lower_transposed};
+use crate::triangular::{solve_lower, solve_lower_matrix, solve_lower_transposed, tiles_of_lower};
 use crate::{Matrix, vector};
 
 /// The factorisation `A = L L'`, with `L` lower triangular and a positive diagonal.
@@ -198,14 +196,6 @@ fn rows_of_lower(a: &Mat<f64>) -> Matrix {
         }
     }
     copy
-}
-
-/// The square tiles, as rows and columns, that cover the lower triangle of an `n x n` matrix. The rows and the columns of a
-/// tile stay in the cache together; a copy of one layout to the other along whole rows would miss it at each entry.
-fn tiles_of_lower(n: usize) -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
-    const SIDE: usize = 32;
-    let range = move |tile: usize| tile * SIDE..((tile + 1) * SIDE).min(n);
-    (0..n.div_ceil(SIDE)).flat_map(move |i| (0..=i).map(move |j| (range(i), range(j))))
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use faer::{Accum, Par};
 
 use crate::Matrix;
 use crate::faer_view::{view, view_mut};
+use crate::triangular::tiles_of_lower;
 
 /// `A B`: `m x k` by `k x n` gives `m x n`.
 ///
@@ -93,9 +94,11 @@ fn gram_of(a: &Matrix, left: BlockStructure, right: BlockStructure) -> Matrix {
         1.0,
         Par::Seq,
     );
-    for i in 0..n {
-        for j in 0..i {
-            product[(j, i)] = product[(i, j)];
+    for (rows, columns) in tiles_of_lower(n) {
+        for i in rows {
+            for j in columns.start..columns.end.min(i) {
+                product[(j, i)] = product[(i, j)];
+            }
         }
     }
     product

@@ -1,5 +1,7 @@
 //! Triangular systems. Only the named triangle of the matrix is read.
 
+use std::ops::Range;
+
 use faer::Par;
 use faer::linalg::triangular_solve::{
     solve_lower_triangular_in_place, solve_upper_triangular_in_place,
@@ -80,6 +82,14 @@ pub fn solve_lower_matrix(l: &Matrix, b: &mut Matrix) {
 pub fn solve_upper_matrix(u: &Matrix, b: &mut Matrix) {
     check(u, b.rows());
     solve_upper_triangular_in_place(view(u), view_mut(b), Par::Seq);
+}
+
+/// The square tiles, as rows and columns, that cover the lower triangle of an `n x n` matrix. The rows and the columns of a
+/// tile stay in the cache together; a transposed copy along whole rows would miss it at each entry.
+pub(crate) fn tiles_of_lower(n: usize) -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
+    const SIDE: usize = 32;
+    let range = move |tile: usize| tile * SIDE..((tile + 1) * SIDE).min(n);
+    (0..n.div_ceil(SIDE)).flat_map(move |i| (0..=i).map(move |j| (range(i), range(j))))
 }
 
 #[cfg(test)]
