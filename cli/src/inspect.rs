@@ -10,7 +10,7 @@ use lacuna::plugin::{Reader, registry};
 use lacuna::run::{Stop, files};
 use lacuna::text::nearest::nearest;
 
-use crate::study::Libraries;
+use crate::plugins::Libraries;
 use crate::{misuse, plugins, print};
 
 /// Runs `lacuna inspect FILE`.

@@ -128,7 +128,7 @@ enum Verb {
         #[arg(long)]
         markdown: bool,
         #[command(flatten)]
-        libraries: study::Libraries,
+        libraries: plugins::Libraries,
     },
     /// Print the JSON Schema of the study language, for editors, or of `summary.json`, for scripts
     Schema {
@@ -136,7 +136,7 @@ enum Verb {
         #[arg(default_value = "study")]
         of: plugins::Described,
         #[command(flatten)]
-        libraries: study::Libraries,
+        libraries: plugins::Libraries,
     },
     /// Show the contents of a file as a reader sees them: variables, axes, units, steps
     Inspect {
@@ -152,7 +152,7 @@ enum Verb {
         #[arg(long, value_name = "NAME")]
         reader: Option<String>,
         #[command(flatten)]
-        libraries: study::Libraries,
+        libraries: plugins::Libraries,
     },
     /// Serve a study's model, emulator and posterior over UM-Bridge, until Ctrl-C
     Serve {

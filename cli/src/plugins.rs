@@ -1,5 +1,7 @@
 //! Commands `plugins` and `schema`.
 
+use std::path::PathBuf;
+
 use lacuna::plugin::Library;
 use lacuna::plugin::registry::{self, KindEntry, Listing};
 use lacuna::text::nearest::{nearest, one_of};
@@ -7,8 +9,15 @@ use lacuna_engine::host::library;
 use lacuna_engine::study::language;
 use lacuna_engine::study::libraries::Seen;
 
-use crate::study::Libraries;
 use crate::{misuse, print};
+
+/// Libraries of plugins named on the command line.
+#[derive(clap::Args)]
+pub struct Libraries {
+    /// Load a library of plugins in addition to those of the study; this executes its code; may be repeated
+    #[arg(long = "plugin", value_name = "PATH")]
+    pub files: Vec<PathBuf>,
+}
 
 /// Runs `lacuna plugins [KIND[.NAME]]`.
 pub fn list(name: Option<&str>, markdown: bool, libraries: &Libraries) -> anyhow::Result<()> {

@@ -28,14 +28,6 @@ pub struct Settings {
     libraries: Libraries,
 }
 
-/// Libraries of plugins named on the command line.
-#[derive(clap::Args)]
-pub struct Libraries {
-    /// Load a library of plugins in addition to those of the study; this executes its code; may be repeated
-    #[arg(long = "plugin", value_name = "PATH")]
-    pub files: Vec<PathBuf>,
-}
-
 impl Settings {
     /// Settings of the command line, with the libraries as those of `[plugins]`.
     pub fn set(&self) -> Vec<String> {

@@ -14,9 +14,11 @@ mod equality;
 mod map;
 mod pieces;
 mod reading;
+mod setting;
 #[cfg(test)]
 mod tests;
 
 pub use equality::Equality;
-pub use map::{DriftMap, DriftOptions, DriftingParameter, WindowEstimate, drift};
+pub use map::{DriftMap, DriftOptions, WindowEstimate, drift};
 pub use reading::{DriftLevel, MisfitShare};
+pub use setting::DriftingParameter;

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::equality::{Equality, WindowSlopes};
-use super::map::{DriftSetting, DriftingParameter};
+use super::setting::{DriftSetting, DriftingParameter};
 use crate::gap::candidates::sensors;
 use crate::gap::experiment::{Experiment, MeasuredCurve};
 use crate::gap::noise::part::part;

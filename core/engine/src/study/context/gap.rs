@@ -74,7 +74,7 @@ fn scenarios(study: &Study, complaints: &mut Complaints<'_>) {
         let problem = spot.say(format!("the study has no scenario `{name}`"));
         if names.is_empty() {
             problem.help(
-                "a study without `[[scenario]]` can set replicates, curves and intervals aside",
+                "a study without `[[scenario]]` can hold out replicates, curves and intervals",
             );
         } else {
             problem.expected(one_of(names.iter().copied()));
@@ -83,7 +83,7 @@ fn scenarios(study: &Study, complaints: &mut Complaints<'_>) {
     if !held.is_empty() && names.iter().all(|name| held.iter().any(|held| held == name)) {
         complaints
             .at("hold_out.scenarios")
-            .say("all scenarios are set aside")
+            .say("all scenarios are held out")
             .expected("at least one that is calibrated with");
     }
 }
