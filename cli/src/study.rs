@@ -15,6 +15,7 @@ use lacuna_engine::study::resolve::{self, Use};
 use lacuna_engine::study::{Checked, Study};
 use lacuna_run::RunDirectory;
 
+use crate::plugins::Libraries;
 use crate::progress::Terminal;
 use crate::{Untrusted, misuse, plugins, print};
 
