@@ -18,3 +18,8 @@ pub fn of_each(states: &[String]) -> impl Iterator<Item = Table> {
 pub fn quantity(value: f64, unit: &Unit) -> String {
     if unit.as_str().is_empty() { format!("{value:?}") } else { format!("{value:?} {{{unit}}}") }
 }
+
+/// Formats a deflection `u` about an equilibrium.
+pub fn deflection(u: &str, about: Option<&str>) -> String {
+    about.map_or_else(|| u.to_owned(), |about| format!("{u} - ({about})"))
+}

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{of, of_each};
+use super::common::{deflection, of, of_each};
 
 /// Cubic stiffness: a spring that hardens (coefficient above zero) or softens (below zero).
 ///
@@ -23,6 +23,10 @@ pub struct CubicStiffness {
     /// Deflection `u`, as an expression. Default: the state itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
+    /// Equilibrium from which the deflection counts, as an expression such as `"0.05 {m}"` or `"mass * 9.81 {m/s2} /
+    /// stiffness"`. Default: zero.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub about: Option<String>,
 }
 
 impl Component for CubicStiffness {}
@@ -45,7 +49,7 @@ impl Term for CubicStiffness {
     }
 
     fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {
-        let u = of(self.of.as_deref(), place);
+        let u = deflection(of(self.of.as_deref(), place), self.about.as_deref());
         Ok(Summand { shape: format!("-({u})^3"), sign: Sign::Either, ..Summand::default() })
     }
 }

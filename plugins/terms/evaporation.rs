@@ -1,7 +1,9 @@
 //! `evaporation`: a heat loss driven by the vapour pressure.
 
+use lacuna::data::Unit;
+use lacuna::math::distribution::Distribution;
 use lacuna::plugin::effect::Description;
-use lacuna::plugin::term::{Place, Sign, Summand};
+use lacuna::plugin::term::{Index, Place, Sign, Summand};
 use lacuna::plugin::{Component, Term};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -27,8 +29,22 @@ pub struct Evaporation {
     /// Temperature of the surroundings, as an expression such as `"293 {K}"`.
     pub ambient: String,
     /// Temperature difference over which the vapour pressure increases by a factor of e, as an expression such as
-    /// `"16 {K}"`.
-    pub scale: String,
+    /// `"16 {K}"`. Default: an unknown, log-uniform from 8 to 40 K.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale: Option<String>,
+}
+
+/// The bounds of an unknown scale, in kelvin: those of water between 0 and 100 degrees Celsius are 14 and 28.
+const BOUNDS: [f64; 2] = [8.0, 40.0];
+
+/// The scales from which a search starts, in kelvin.
+const STARTS: [f64; 3] = [12.0, 18.0, 27.0];
+
+/// The scale as an unknown.
+fn unknown(name: &str) -> Result<Index, String> {
+    let unit = Unit::parse("K").map_err(|error| error.to_string())?;
+    let prior = Distribution::LogUniform(BOUNDS);
+    Ok(Index { name: format!("{name}_scale"), unit, prior, starts: STARTS.to_vec() })
 }
 
 impl Component for Evaporation {}
@@ -43,9 +59,18 @@ impl Term for Evaporation {
     }
 
     fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {
-        let (u, ambient, scale) = (of(self.of.as_deref(), place), &self.ambient, &self.scale);
-        let shape = format!("1 - exp((({u}) - ({ambient})) / ({scale}))");
-        Ok(Summand { shape, sign: Sign::Positive, ..Summand::default() })
+        let (u, ambient) = (of(self.of.as_deref(), place), &self.ambient);
+        let (scale, indices, size) = match &self.scale {
+            Some(scale) => (format!("({scale})"), Vec::new(), None),
+            None => {
+                let index = unknown(place.name)?;
+                // The size of the shape is that for water at room temperature.
+                let size = format!("exp((({u}) - ({ambient})) / 16 {{K}}) - 1");
+                (index.name.clone(), vec![index], Some(size))
+            }
+        };
+        let shape = format!("1 - exp((({u}) - ({ambient})) / {scale})");
+        Ok(Summand { shape, sign: Sign::Positive, indices, scale: size, ..Summand::default() })
     }
 }
 

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{of, of_each};
+use super::common::{deflection, of, of_each};
 
 /// Quadratic stiffness: a restoring force that differs between the two directions.
 ///
@@ -23,6 +23,10 @@ pub struct QuadraticStiffness {
     /// Deflection `u`, as an expression. Default: the state itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
+    /// Equilibrium from which the deflection counts, as an expression such as `"0.05 {m}"` or `"mass * 9.81 {m/s2} /
+    /// stiffness"`. Default: zero.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub about: Option<String>,
 }
 
 impl Component for QuadraticStiffness {}
@@ -42,7 +46,7 @@ impl Term for QuadraticStiffness {
     }
 
     fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {
-        let u = of(self.of.as_deref(), place);
+        let u = deflection(of(self.of.as_deref(), place), self.about.as_deref());
         Ok(Summand { shape: format!("-({u})^2"), sign: Sign::Either, ..Summand::default() })
     }
 }

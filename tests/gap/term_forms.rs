@@ -156,6 +156,101 @@ fn evaporation_cools_by_the_vapour_pressure() {
     assert!(found[39] < 320.0);
 }
 
+/// With an unknown scale the truth is that of the stated one.
+#[test]
+fn evaporation_has_a_scale_of_its_own() {
+    let (start, ambient, scale, c) = (350.0, 293.0, 22.0, 0.8);
+    let body = SINGLE.replace("START", "350.0") + "use = \"evaporation\"\nambient = \"293 {K}\"\n";
+    let found = response(["K/s", "K"], &body, &[0.0, c, scale]);
+    let first = f64::exp(-(start - ambient) / scale);
+    let exact = |t: f64| ambient - scale * f64::ln_1p((first - 1.0) * (-c * t / scale).exp());
+    near(&found, exact, 1e-4);
+}
+
+/// A constant rate adds `c t`.
+#[test]
+fn a_constant_rate_adds_a_line() {
+    let body = SINGLE.replace("START", "2.0") + "use = \"constant_rate\"\n";
+    let found = response(["K/s", "K"], &body, &[0.5, -1.25]);
+    near(&found, |t| 2.0 - 0.75 * t, 1e-9);
+}
+
+/// A vessel that fills at the rate `s` and runs over: `du/dt = s - c w ln(1 + exp((u - h) / w))` reaches `u` after the
+/// integral of `du` over the rate, here by Simpson's rule.
+#[test]
+fn a_vessel_runs_over() {
+    let (supply, c, level, width): (f64, f64, f64, f64) = (3.0, 4.0, 2.0, 0.2);
+    let body = SINGLE.replace("START", "0.0") + "use = \"overflow\"\nwidth = 0.2\n";
+    let found = response(["K/s", "K"], &body, &[supply, c, level]);
+    let slowness = |u: f64| 1.0 / (supply - c * width * ((u - level) / width).exp().ln_1p());
+    let time = |end: f64| {
+        let count = 4000;
+        let value = |k: i32| slowness(end * f64::from(k) / f64::from(count));
+        let odd: f64 = (1..count).step_by(2).map(value).sum();
+        let even: f64 = (2..count).step_by(2).map(value).sum();
+        end / f64::from(count) / 3.0 * (value(0) + 4.0 * odd + 2.0 * even + value(count))
+    };
+    // Later the level hardly changes.
+    for (u, t) in found.iter().zip(times()).take_while(|(_, t)| *t < 1.5) {
+        assert!((time(*u) - t).abs() < 1e-5, "at {t}: {u} is reached at {}", time(*u));
+    }
+    // The limit at which the loss is the supply: c w ln(1 + exp((u - h) / w)) = s.
+    let limit = level + width * (supply / c / width).exp_m1().ln();
+    assert!((found[39] - limit).abs() < 1e-4, "{} {limit}", found[39]);
+}
+
+const SPRING: &str = r#"
+[model]
+use = "equations"
+state = { y = { start = 0.5, unit = "m" }, v = { start = 0.0, unit = "m/s" } }
+rate = { y = "v", v = "supply" }
+observe = "y"
+
+[[gap.term]]
+state = "v"
+of = "y"
+about = "0.2 {m}"
+"#;
+
+/// With `z = y - about` the energy `v²/2 + c z³/3` or `v²/2 + c z⁴/4` is conserved: the time from the release at `z0` to a
+/// deflection is `integral of dz / v`, by the substitution `z = z0 (1 - s²)` without a singularity.
+#[test]
+fn stiffness_acts_about_its_equilibrium() {
+    let (about, release, c) = (0.2, 0.3_f64, 4.0);
+    for (name, power) in [("quadratic_stiffness", 3), ("cubic_stiffness", 4)] {
+        let body = format!("{SPRING}use = \"{name}\"\n");
+        let found = response(["m/s2", "m"], &body, &[0.0, c]);
+        let speed_over_root = |s: f64| {
+            // v / s: the difference of the potentials divided by s² is a polynomial without a zero at s = 0.
+            let z = release * (1.0 - s * s);
+            let fallen = (0..power).map(|k| release.powi(power - 1 - k) * z.powi(k)).sum::<f64>();
+            (2.0 * c / f64::from(power) * release * fallen).sqrt()
+        };
+        let time = |z: f64| {
+            let end = (1.0 - z / release).sqrt();
+            let count = 2000;
+            let value = |k: i32| {
+                let s = end * f64::from(k) / f64::from(count);
+                2.0 * release / speed_over_root(s)
+            };
+            let odd: f64 = (1..count).step_by(2).map(value).sum();
+            let even: f64 = (2..count).step_by(2).map(value).sum();
+            end / f64::from(count) / 3.0 * (value(0) + 4.0 * odd + 2.0 * even + value(count))
+        };
+        // Up to the passage of the equilibrium.
+        let falling: Vec<(f64, f64)> = found
+            .iter()
+            .zip(times())
+            .map(|(y, t)| (y - about, t))
+            .take_while(|(z, _)| *z > 0.05)
+            .collect();
+        assert!(falling.len() > 8, "{found:?}");
+        for (z, t) in falling {
+            assert!((time(z) - t).abs() < 1e-4, "{name} at {t}: {z} is reached at {}", time(z));
+        }
+    }
+}
+
 const ORBIT: &str = r#"
 [model]
 use = "equations"
