@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("  directions of the common error: {}", experiment.common[0].factor.columns());
     let sd = noise.sd(&experiment, &response);
     let situation = Situation { layouts: &layouts, response: &response, noise: &sd };
-    let candidates = stage("candidates", || proposed(None, &situation))??;
+    let candidates = stage("candidates", || proposed(None, &[], &situation))??.candidates;
     println!("  candidates: {}", candidates.len());
     for (what, most) in [("a look, without adding", 0), ("search: look, add, look again", 3)] {
         let options = SearchOptions { naming: 0.03, unlisted: 0.02, simulations: 199, most };

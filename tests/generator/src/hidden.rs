@@ -70,33 +70,8 @@ impl Hidden {
         ratio: f64,
         random: &mut Source,
     ) -> Self {
-        let one_sided = [
-            Kind::LowPass,
-            Kind::Damping,
-            Kind::Saturation,
-            Kind::Drag,
-            Kind::Cubic,
-            Kind::Switching,
-            Kind::Rectified,
-            Kind::PulseHeating,
-        ];
-        let sign = if one_sided.contains(&kind) { 1.0 } else { random.sign() };
-        let shape = match kind {
-            Kind::Echo => [random.uniform(0.6, 2.5), 0.0, 0.0],
-            Kind::SecondaryPulse => [random.uniform(4.0, 8.0), random.uniform(0.3, 0.8), 0.0],
-            Kind::Flash => [random.uniform(0.4, 1.5), 0.0, 0.0],
-            Kind::PulseHeating => [random.uniform(0.5, 2.0), 0.0, 0.0],
-            Kind::LevelJump => [random.uniform(3.0, 7.0), 0.0, 0.0],
-            Kind::Resonance => {
-                [random.uniform(4.0, 9.0), random.uniform(0.01, 0.05), random.uniform(0.0, 6.2)]
-            }
-            Kind::Burst => {
-                let width = random.uniform(1.0, 3.5);
-                let condition = if random.sign() > 0.0 { 1.0 } else { 0.0 };
-                [random.uniform(0.0, 9.9 - width), width, condition]
-            }
-            _ => [0.0; 3],
-        };
+        let sign = if kind.one_sided() { 1.0 } else { random.sign() };
+        let shape = random_shape(kind, random, 1.0);
         let mut hidden = Self { kind, sensors: sensors.to_vec(), size: 0.0, shape };
         let (mut low, mut high) = (0.0, 1e-3);
         let change = |hidden: &mut Self, size: f64| {
@@ -136,62 +111,101 @@ impl Hidden {
         }
         (sum / count).sqrt()
     }
+}
 
-    fn on_sensor(&self, y: &[f64], all: &Fine, sensor: usize, condition: usize) -> Vec<f64> {
-        let h = STEP / FINE as f64;
-        let (a, [p, q, r]) = (self.size, self.shape);
-        let time = |i: usize| h * i as f64;
-        let before = |back: f64, i: usize| {
-            let at = i as f64 - back / h;
-            let low = at.floor().clamp(0.0, (y.len() - 1) as f64);
-            let high = (low + 1.0).min((y.len() - 1) as f64);
-            let share = (at - low).clamp(0.0, 1.0);
-            y[low as usize] * (1.0 - share) + y[high as usize] * share
-        };
-        let mapped = |f: &dyn Fn(usize) -> f64| (0..y.len()).map(f).collect();
-        match self.kind {
-            Kind::Gain => mapped(&|i| (1.0 + a) * y[i]),
-            Kind::Offset => mapped(&|i| y[i] + a),
-            Kind::Drift => mapped(&|i| y[i] + a * time(i)),
-            Kind::Delay => mapped(&|i| before(a, i)),
-            Kind::Echo => mapped(&|i| y[i] + if time(i) >= p { a * before(p, i) } else { 0.0 }),
-            Kind::Damping => mapped(&|i| y[i] * (-a * time(i)).exp()),
-            Kind::Saturation => mapped(&|i| (a * y[i]).tanh() / a.max(1e-12)),
-            Kind::SecondaryPulse => {
-                mapped(&|i| y[i] + a * (-0.5 * ((time(i) - p) / q).powi(2)).exp())
-            }
-            Kind::Flash => mapped(&|i| y[i] + a * (-time(i) / p).exp()),
-            Kind::PulseHeating => mapped(&|i| y[i] + a * (1.0 - (-time(i) / p).exp())),
-            Kind::LevelJump => mapped(&|i| y[i] + if time(i) >= p { a } else { 0.0 }),
-            Kind::Resonance => {
-                mapped(&|i| y[i] + a * (-q * p * time(i)).exp() * (p * time(i) + r).sin())
-            }
-            Kind::Crosstalk => {
-                let other = &all[(sensor + 1) % all.len()];
-                mapped(&|i| y[i] + a * other[i])
-            }
-            Kind::LowPass => {
-                let mut state = y[0];
-                let keep = (-h / a.max(1e-9)).exp();
-                y.iter()
-                    .map(|x| {
-                        state = keep * state + (1.0 - keep) * x;
-                        state
-                    })
-                    .collect()
-            }
-            Kind::Burst if condition as f64 != r => y.to_vec(),
-            Kind::Burst => mapped(&|i| {
-                let u = (time(i) - p) / q;
-                y[i] + if (0.0..=1.0).contains(&u) {
-                    a * (u * std::f64::consts::PI).sin()
-                } else {
-                    0.0
-                }
-            }),
-            Kind::Rectified => mapped(&|i| if y[i] < 0.0 { (1.0 - a) * y[i] } else { y[i] }),
-            Kind::Drag | Kind::Cubic | Kind::Switching => y.to_vec(),
+/// Random times or frequencies of an effect, for records that are `scale` times 9.9 s long.
+pub fn random_shape(kind: Kind, random: &mut Source, scale: f64) -> [f64; 3] {
+    match kind {
+        Kind::Echo => [scale * random.uniform(0.6, 2.5), 0.0, 0.0],
+        Kind::SecondaryPulse => {
+            [scale * random.uniform(4.0, 8.0), scale * random.uniform(0.3, 0.8), 0.0]
         }
+        Kind::Flash => [scale * random.uniform(0.4, 1.5), 0.0, 0.0],
+        Kind::PulseHeating => [scale * random.uniform(0.5, 2.0), 0.0, 0.0],
+        Kind::LevelJump => [scale * random.uniform(3.0, 7.0), 0.0, 0.0],
+        Kind::Resonance => {
+            [random.uniform(4.0, 9.0) / scale, random.uniform(0.01, 0.05), random.uniform(0.0, 6.2)]
+        }
+        Kind::Burst => {
+            let width = random.uniform(1.0, 3.5);
+            let condition = if random.sign() > 0.0 { 1.0 } else { 0.0 };
+            [scale * random.uniform(0.0, 9.9 - width), scale * width, condition]
+        }
+        _ => [0.0; 3],
+    }
+}
+
+impl Kind {
+    /// Returns true if the size of the effect is positive.
+    pub fn one_sided(self) -> bool {
+        matches!(
+            self,
+            Self::LowPass
+                | Self::Damping
+                | Self::Saturation
+                | Self::Drag
+                | Self::Cubic
+                | Self::Switching
+                | Self::Rectified
+                | Self::PulseHeating
+        )
+    }
+}
+
+/// The fine curve `y` of a sensor with an effect, and `other` that of the sensor that couples into it; the time `h`
+/// between its values in s.
+pub fn distorted(
+    kind: Kind,
+    size: f64,
+    shape: [f64; 3],
+    y: &[f64],
+    other: &[f64],
+    h: f64,
+) -> Vec<f64> {
+    let (a, [p, q, r]) = (size, shape);
+    let time = |i: usize| h * i as f64;
+    let before = |back: f64, i: usize| {
+        let at = i as f64 - back / h;
+        let low = at.floor().clamp(0.0, (y.len() - 1) as f64);
+        let high = (low + 1.0).min((y.len() - 1) as f64);
+        let share = (at - low).clamp(0.0, 1.0);
+        y[low as usize] * (1.0 - share) + y[high as usize] * share
+    };
+    let mapped = |f: &dyn Fn(usize) -> f64| (0..y.len()).map(f).collect();
+    match kind {
+        Kind::Gain => mapped(&|i| (1.0 + a) * y[i]),
+        Kind::Offset => mapped(&|i| y[i] + a),
+        Kind::Drift => mapped(&|i| y[i] + a * time(i)),
+        Kind::Delay => mapped(&|i| before(a, i)),
+        Kind::Echo => {
+            mapped(&|i| y[i] + if time(i) >= p { a * (before(p, i) - y[0]) } else { 0.0 })
+        }
+        Kind::Damping => mapped(&|i| y[i] * (-a * time(i)).exp()),
+        Kind::Saturation => mapped(&|i| (a * y[i]).tanh() / a.max(1e-12)),
+        Kind::SecondaryPulse => mapped(&|i| y[i] + a * (-0.5 * ((time(i) - p) / q).powi(2)).exp()),
+        Kind::Flash => mapped(&|i| y[i] + a * (-time(i) / p).exp()),
+        Kind::PulseHeating => mapped(&|i| y[i] + a * (1.0 - (-time(i) / p).exp())),
+        Kind::LevelJump => mapped(&|i| y[i] + if time(i) >= p { a } else { 0.0 }),
+        Kind::Resonance => {
+            mapped(&|i| y[i] + a * (-q * p * time(i)).exp() * (p * time(i) + r).sin())
+        }
+        Kind::Crosstalk => mapped(&|i| y[i] + a * other[i]),
+        Kind::LowPass => {
+            let mut state = y[0];
+            let keep = (-h / a.max(1e-9)).exp();
+            y.iter()
+                .map(|x| {
+                    state = keep * state + (1.0 - keep) * x;
+                    state
+                })
+                .collect()
+        }
+        Kind::Burst => mapped(&|i| {
+            let u = (time(i) - p) / q;
+            y[i] + if (0.0..=1.0).contains(&u) { a * (u * std::f64::consts::PI).sin() } else { 0.0 }
+        }),
+        Kind::Rectified => mapped(&|i| if y[i] < 0.0 { (1.0 - a) * y[i] } else { y[i] }),
+        Kind::Drag | Kind::Cubic | Kind::Switching => y.to_vec(),
     }
 }
 
@@ -209,8 +223,13 @@ pub fn curves(hidden: &[Hidden], truth: [f64; 4], condition: usize) -> Fine {
     let mut curves = chain.curves(condition);
     for effect in hidden {
         let all = curves.clone();
-        for &sensor in &effect.sensors {
-            curves[sensor] = effect.on_sensor(&all[sensor], &all, sensor, condition);
+        if effect.kind == Kind::Burst && condition as f64 != effect.shape[2] {
+            continue;
+        }
+        for &s in &effect.sensors {
+            let other = &all[(s + 1) % all.len()];
+            let h = STEP / FINE as f64;
+            curves[s] = distorted(effect.kind, effect.size, effect.shape, &all[s], other, h);
         }
     }
     curves

@@ -7,8 +7,11 @@
 pub mod chain;
 pub mod hidden;
 pub mod line;
+pub mod mercury_box;
 pub mod noise;
 pub mod oscillator;
+pub mod pipe;
+pub mod world;
 
 pub use chain::{Chain, PARAMETERS, REFERENCE};
 pub use hidden::{Hidden, Kind};

@@ -37,7 +37,7 @@ impl Source {
 }
 
 /// One replicate of some curves: all sensors concatenated.
-pub fn replicate(curves: &[Vec<f64>], sd: &[f64; 4], random: &mut Source) -> Vec<f64> {
+pub fn replicate(curves: &[Vec<f64>], sd: &[f64], random: &mut Source) -> Vec<f64> {
     let mut all = Vec::new();
     for (curve, sd) in curves.iter().zip(sd) {
         let offset = OFFSET * sd * random.normal();

@@ -1,0 +1,276 @@
+//! The workflow on worlds whose missing physics has no form in the library: a box of liquid, and a pipe.
+
+use std::error::Error;
+use std::fmt::Write;
+
+use generator::world::{Measured, Secret, World, measured};
+use lacuna::data::{Axis, Layout, Layouts, Measurements, Observations, Parameter, Replicate, Unit};
+use lacuna::math::distribution::Distribution;
+use lacuna::math::random::Stream;
+use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin};
+use lacuna::plugin::effect::Situation;
+use lacuna::plugin::surrogate::Training;
+use lacuna::plugin::{Design, Emulator, Surrogate, registry};
+use lacuna::run::{Progress, Silent};
+use lacuna_engine::gap::candidates::proposed;
+use lacuna_engine::gap::experiment::Experiment;
+use lacuna_engine::gap::noise::{Noise, ResponseTangents};
+use lacuna_engine::gap::search::{SearchOptions, Support, Verdict, search, verdict};
+use lacuna_engine::gap::system::emulator_error::error_covariance;
+use lacuna_linalg::Matrix;
+use rayon::prelude::*;
+
+/// The number of runs whose errors count.
+const NEAR: usize = 80;
+
+/// A world with its emulator.
+pub struct Emulated<W> {
+    pub world: W,
+    pub layouts: Layouts,
+    pub parameters: Vec<Parameter>,
+    pub emulator: Box<dyn Emulator>,
+    pub error: CommonError,
+}
+
+/// The answer to a case.
+pub struct Answer {
+    pub measured: Measured,
+    pub verdict: Verdict,
+    pub p: [f64; 3],
+    /// The energy of the gap before the search and after it.
+    pub excess: [f64; 2],
+    pub inexact: [f64; 2],
+    pub seconds: f64,
+    pub supports: Vec<Support>,
+    /// The types of each effect with their probabilities.
+    pub types: Vec<Vec<(String, f64)>>,
+}
+
+impl<W: World> Emulated<W> {
+    /// The world with a polynomial chaos expansion of a table of `runs` runs over the ranges of its parameters.
+    pub fn new(world: W, runs: usize, degree: usize) -> Result<Self, Box<dyn Error>> {
+        let seconds = Unit::parse("s")?;
+        let axes = || {
+            let labels = world.sensors();
+            vec![Axis::labels("sensor", labels), Axis::grid("time", world.times(), seconds.clone())]
+        };
+        let layout = || Layout { name: "y".into(), unit: Unit::dimensionless(), axes: axes() };
+        let layouts = if world.conditions() == 1 {
+            Layouts::from(layout())
+        } else {
+            Layouts::of_scenarios(["first", "second"].map(|name| (name, layout())))
+        };
+        let parameters: Vec<Parameter> = world
+            .parameters()
+            .into_iter()
+            .map(|(name, range, _)| Parameter {
+                name: name.into(),
+                symbol: name.into(),
+                unit: Unit::dimensionless(),
+                design: Distribution::Uniform(range),
+                prior: Distribution::Uniform(range),
+                reference: None,
+            })
+            .collect();
+        let d = parameters.len();
+        let design = registry::from_text::<dyn Design>("latin_hypercube", "")?.plugin;
+        let unit = design.points(runs, d, &Stream::root(1))?;
+        let points = Matrix::from_fn(runs, d, |i, j| parameters[j].design.quantile(unit[(i, j)]));
+        let rows: Vec<&[f64]> = points.iter_rows().collect();
+        let rows: Vec<Vec<f64>> = rows.into_par_iter().map(|p| world.response(p)).collect();
+        let responses = Matrix::from_rows(layouts.len(), rows);
+        let options = format!("degree = {{ max = {degree} }}");
+        let surrogate = registry::from_text::<dyn Surrogate>("polynomial_chaos", &options)?;
+        let training = Training {
+            parameters: &parameters,
+            layouts: &layouts,
+            points: &points,
+            responses: &responses,
+        };
+        let fitted = surrogate.plugin.fit(&training, &Stream::root(2), &Progress::new(&Silent));
+        let emulator = fitted?;
+        let residuals = &emulator.fit_error().residuals;
+        // The errors where the data are: those of the runs nearest to the middle.
+        let centre: Vec<f64> = world.parameters().iter().map(|p| p.2).collect();
+        let far = |r: usize| -> f64 {
+            let each = world.parameters().into_iter().enumerate();
+            each.map(|(j, (_, [low, high], _))| {
+                ((points[(r, j)] - centre[j]) / (high - low)).powi(2)
+            })
+            .sum()
+        };
+        let mut near: Vec<usize> = (0..runs).collect();
+        near.sort_by(|a, b| far(*a).total_cmp(&far(*b)));
+        near.truncate(NEAR);
+        let scale = (NEAR as f64).sqrt();
+        let factor = Matrix::from_fn(layouts.len(), NEAR, |i, k| residuals[(near[k], i)] / scale);
+        let error = CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true };
+        Ok(Self { world, layouts, parameters, emulator, error })
+    }
+
+    fn observations(&self, measured: &Measured) -> Observations {
+        let count = measured.replicates[0].len();
+        let replicate = |r: usize| {
+            let values = measured.replicates.iter().flat_map(|c| c[r].iter().map(|y| Some(*y)));
+            Replicate::new(r.to_string(), values.collect())
+        };
+        Measurements::new(self.layouts.blocks[0].clone(), (0..count).map(replicate).collect())
+            .into()
+    }
+
+    /// Asks the workflow, which does not see what is hidden.
+    pub fn ask(
+        &self,
+        seed: u64,
+        secrets: &[Secret],
+        ratio: f64,
+        replicates: usize,
+    ) -> Result<Answer, Box<dyn Error>> {
+        let measured = measured(&self.world, seed, secrets, ratio, replicates);
+        let begun = std::time::Instant::now();
+        let data = self.observations(&measured);
+        let mut experiment =
+            Experiment::new(&self.layouts, &self.parameters, &*self.emulator, &data);
+        let centre: Vec<f64> = self.world.parameters().iter().map(|p| p.2).collect();
+        let response = self.emulator.mean(&Matrix::from_rows(centre.len(), [&centre])).into_vec();
+        let noise = Noise::of(&experiment, &ResponseTangents::fixed(&response), None);
+        let errors = std::slice::from_ref(&self.error);
+        let all = error_covariance(&experiment, &noise, &response, errors);
+        (experiment.common, experiment.independent) = (all.common, all.independent);
+        let sd = noise.sd(&experiment, &response);
+        let situation = Situation { layouts: &self.layouts, response: &response, noise: &sd };
+        let candidates = proposed(None, &[], &situation)?.candidates;
+        let options = SearchOptions { naming: 0.03, unlisted: 0.02, simulations: 199, most: 3 };
+        let stream = Stream::root(seed);
+        let found = search(&experiment, &candidates, &[centre], options, &stream)
+            .ok_or("the emulator has no response")?;
+        let first = found.first();
+        Ok(Answer {
+            p: first.p,
+            excess: [first.tolerant.gap, found.last.tolerant.gap],
+            inexact: [first.tolerant.inexact, found.last.tolerant.inexact],
+            verdict: verdict(&found, &candidates, options),
+            supports: found.support.clone(),
+            types: found.types.clone(),
+            measured,
+            seconds: begun.elapsed().as_secs_f64(),
+        })
+    }
+}
+
+/// The types in decreasing order of probability, with its logarithm.
+fn ahead(types: &[(String, f64)]) -> String {
+    let each = types.iter().take(3).map(|(kind, p)| format!("{kind} {:.1}", p.ln()));
+    each.collect::<Vec<_>>().join(", ")
+}
+
+impl Answer {
+    /// The case and its answer as values that are separated by tabs.
+    pub fn values<W: World>(&self, world: &W, ratio: f64) -> String {
+        let names = world.sensors();
+        let hidden: Vec<String> = self
+            .measured
+            .hidden
+            .iter()
+            .map(|found| match &found.secret {
+                Secret::Fault(kind, sensors) => {
+                    let on: Vec<&str> = sensors.iter().map(|&s| names[s]).collect();
+                    format!("{kind:?}@{}", on.join("+"))
+                }
+                Secret::Inside(i) => format!("inside:{}", world.changes()[*i].name),
+            })
+            .collect();
+        let mut text = format!(
+            "{}\t{ratio:.3}\t{:?}\t{:.3}\t{:.2}\t{:.1}",
+            hidden.join(" & "),
+            self.verdict.word,
+            self.verdict.closed,
+            self.inexact[1],
+            self.seconds
+        );
+        for ((effect, support), types) in
+            self.verdict.effects.iter().zip(&self.supports).zip(&self.types)
+        {
+            let on: Vec<String> = effect.on.values().map(|labels| labels.join("+")).collect();
+            let scores: Vec<String> = support
+                .against_free_form
+                .iter()
+                .map(|c| {
+                    format!("{:?}:{:.1}:{:.1}", c.left_out, c.difference, c.error.unwrap_or(0.0))
+                })
+                .collect();
+            let _ = write!(
+                text,
+                "\t{}@{};{:.3};{:.3};{};{}",
+                effect.class.join("/"),
+                on.join(" "),
+                support.share,
+                support.local,
+                scores.join(","),
+                ahead(types)
+            );
+        }
+        text
+    }
+
+    /// The case and its answer in a line.
+    pub fn said<W: World>(&self, world: &W, ratio: f64) -> String {
+        let names = world.sensors();
+        let hidden: Vec<String> = self
+            .measured
+            .hidden
+            .iter()
+            .map(|found| match &found.secret {
+                Secret::Fault(kind, sensors) => {
+                    let on: Vec<&str> = sensors.iter().map(|&s| names[s]).collect();
+                    format!("{kind:?} on {} {:.3e}", on.join("+"), found.size)
+                }
+                Secret::Inside(i) => format!("{} {:.3e}", world.changes()[*i].name, found.size),
+            })
+            .collect();
+        let mut text = format!(
+            "rms {ratio} [{}] -> {:?} closed {:.2} p {:.2?} gap {:.0} to {:.0} inexact {:.1?} {:.1} s",
+            hidden.join(", "),
+            self.verdict.word,
+            self.verdict.closed,
+            self.p,
+            self.excess[0],
+            self.excess[1],
+            self.inexact,
+            self.seconds
+        );
+        for e in &self.verdict.effects {
+            let places: Vec<String> = e.on.values().map(|labels| labels.join("+")).collect();
+            let values: Vec<String> =
+                e.values.iter().zip(&e.sd).map(|(x, sd)| format!("{x:.3e}±{sd:.1e}")).collect();
+            let _ = write!(
+                text,
+                "\n    {} on {} P {:.2} ({})",
+                e.class.join("/"),
+                places.join(" "),
+                e.probability,
+                values.join(" ")
+            );
+        }
+        for (support, types) in self.supports.iter().zip(&self.types) {
+            let scores: Vec<String> = support
+                .against_free_form
+                .iter()
+                .map(|c| {
+                    format!("{:?} {:.0}±{:.0}", c.left_out, c.difference, c.error.unwrap_or(0.0))
+                })
+                .collect();
+            let (share, local) = (support.share, support.local);
+            let _ = write!(
+                text,
+                "\n    * share {share:.2} local {local:.2} {} | {}",
+                scores.join(", "),
+                ahead(types)
+            );
+        }
+        for reason in &self.verdict.reasons {
+            let _ = write!(text, "\n    - {reason}");
+        }
+        text
+    }
+}
