@@ -118,6 +118,11 @@ impl CurveEffect for Crosstalk {
         found
     }
 
+    /// A displaced sensor shows, to first order, its own curve and a share of its neighbour's.
+    fn looks_like(&self) -> &'static [&'static str] {
+        &["misplacement"]
+    }
+
     fn reach(&self) -> Reach {
         Reach::Single
     }

@@ -70,6 +70,11 @@ pub trait CurveEffect: Sized + Send + Sync {
         Reach::Any
     }
 
+    /// Names of effects that it looks like to first order: where one of them was not tried, it is not named alone.
+    fn looks_like(&self) -> &'static [&'static str] {
+        &[]
+    }
+
     /// Reports a response that the formula does not suit, such as one without curves, and errors in options other than
     /// priors.
     fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
@@ -138,5 +143,9 @@ impl<E: CurveEffect> Effect for E {
 
     fn reach(&self) -> Reach {
         CurveEffect::reach(self)
+    }
+
+    fn looks_like(&self) -> &'static [&'static str] {
+        CurveEffect::looks_like(self)
     }
 }

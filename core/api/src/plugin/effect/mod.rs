@@ -73,6 +73,11 @@ pub trait Effect: Component {
         Reach::Any
     }
 
+    /// Names of effects that it looks like to first order: where one of them was not tried, it is not named alone.
+    fn looks_like(&self) -> &'static [&'static str] {
+        &[]
+    }
+
     /// Inputs of an extended forward map that the parameters of the effect set, in their order, for an effect inside
     /// the model; empty for an effect on the response.
     fn switches(&self) -> &[usize] {
