@@ -4,6 +4,7 @@ mod effects;
 mod gap;
 mod inputs;
 mod inside;
+mod noise;
 mod outputs;
 
 use lacuna::data::{Layout, Parameter, Scenario};
@@ -44,6 +45,7 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     // What is wrong in one scenario is most often wrong in all.
     problems.dedup();
     effects::check(study, root, problems);
+    noise::check(study, root, problems);
     gap::check(study, root, problems);
     super::inputs::check(study, root, problems);
     super::derived::check(study, root, problems);

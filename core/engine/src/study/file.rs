@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 
 pub use super::derived::DerivedSection;
 pub use super::fidelity::{LowFidelitySection, NumericalErrorSection};
+pub use super::noise::{InstrumentNoise, NoiseSection};
 pub use super::scenario::{FunctionSection, ScenarioSection};
 pub use lacuna::text::quantity::Quantity;
 pub use lacuna::text::response::{Axes, AxisSection, GridSection, ResponseSection};
@@ -160,6 +161,11 @@ pub struct MeasurementKeys {
     /// adds all three. They count the same information twice, so use them only to reproduce such an analysis. Default:
     /// none.
     pub added_curves: Vec<AddedCurve>,
+    /// Noise of the instruments as their data sheets state it: `sd`, `resolution` and `memory`, each optional, in one
+    /// table for all curves or in an array of tables with `on`. The search for missing physics (`lacuna gap`) uses it
+    /// for curves without replicates; the calibration uses `[discrepancy]`. Default: estimated from the data.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise: Option<InstrumentNoise>,
 }
 
 /// Screening for curves that deviate strongly from the other replicates of their group (groups of four curves or more).

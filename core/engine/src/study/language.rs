@@ -7,6 +7,7 @@ use lacuna::plugin::{Effect, Model, Reader, Surrogate, Term};
 use serde_json::{Value, json};
 
 use super::gap::{CandidateKeys, SwapKeys, SwitchSection, TermKeys};
+use super::noise::NoiseSection;
 use super::schema::{Language, page};
 use super::table;
 
@@ -51,6 +52,7 @@ pub fn schema_text() -> String {
 pub fn manual() -> Vec<Manual> {
     let mut pages = table::manual();
     pages.extend([
+        page::<NoiseSection>("[[measurements.noise]]"),
         page::<CandidateKeys>("[[gap.candidate]]"),
         page::<SwitchSection>("[[gap.switch]]"),
         page::<TermKeys>("[[gap.term]]"),

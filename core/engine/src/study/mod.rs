@@ -10,6 +10,7 @@ pub mod inherit;
 pub mod inputs;
 pub mod language;
 pub mod libraries;
+pub mod noise;
 pub mod overrides;
 mod plain;
 pub mod resolve;
