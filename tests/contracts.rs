@@ -137,13 +137,18 @@ fn designs() {
 #[test]
 fn terms() {
     let table: &Table = &[
+        ("constant_rate", &[""]),
         ("coulomb_friction", &["", "of = \"v - 1\"\nwidth = \"0.01\""]),
-        ("cubic_stiffness", &["of = \"x\""]),
+        ("cubic_stiffness", &["of = \"x\"", "of = \"x\"\nabout = \"2\""]),
         ("delayed", &["", "of = \"2 * v\"\nstart = \"2\"\nlags = 1"]),
-        ("evaporation", &["ambient = \"293 {K}\"\nscale = \"16 {K}\""]),
+        ("evaporation", &["ambient = \"293 {K}\"\nscale = \"16 {K}\"", "ambient = \"293 {K}\""]),
         ("expression", &["shape = \"v * x\"", "shape = \"t\"\nsign = \"positive\""]),
         ("forcing", &["", "frequency = { uniform = [1, 2] }"]),
         ("linear_friction", &["", "of = \"v - 1\""]),
+        (
+            "overflow",
+            &["", "level = \"2\"", "of = \"x\"\nprior = { uniform = [0, 2] }\nunit = \"m\""],
+        ),
         ("pull", &["of = \"x\"\ndistance = \"hypot(x, y)\"\nbeside = { w = \"y\" }"]),
         ("quadratic_friction", &[""]),
         ("quadratic_stiffness", &["of = \"x\""]),

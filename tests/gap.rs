@@ -20,6 +20,7 @@ mod names;
 mod places;
 mod proofs;
 mod records;
+mod single;
 mod tally;
 mod target;
 mod term_forms;

@@ -7,7 +7,6 @@ use lacuna::run::Stop;
 use lacuna_engine::augment::{Begun, add};
 use lacuna_engine::gap::power::PowerDesign;
 use lacuna_engine::gap::result::{AddedEffect, GapResult};
-use lacuna_engine::gap::search::VerdictKind;
 use lacuna_engine::pipeline;
 use lacuna_engine::report::findings::{Findings, GapFindings};
 use lacuna_engine::report::{gap_text, power_text};
@@ -102,9 +101,7 @@ fn found(findings: &Findings) -> Result<&GapFindings, Stop> {
 /// The result with the effects to be added; none if they have no name.
 fn wanted(result: &GapResult, manner: &Manner) -> anyhow::Result<GapResult> {
     let mut wanted = result.clone();
-    if manner.dry_run || !matches!(result.verdict.word, VerdictKind::Named | VerdictKind::Class) {
-        wanted.additions.clear();
-    }
+    wanted.additions = if manner.dry_run { Vec::new() } else { result.worth_adding() };
     if manner.interactive {
         let mut kept = Vec::new();
         for addition in wanted.additions {

@@ -10,8 +10,8 @@ use lacuna_engine::gap::drift::{DriftLevel, drift};
 use lacuna_engine::gap::experiment::Experiment;
 use lacuna_engine::gap::noise::{Noise, ResponseTangents};
 use lacuna_engine::gap::search::{
-    Explanation, FurtherData, LeftOut, RefitSetting, SearchOptions, SearchResult, cross_validate,
-    discriminate, search,
+    Explanation, FurtherData, LeftOut, SearchOptions, SearchResult, cross_validate, discriminate,
+    search,
 };
 use lacuna_engine::gap::system::System;
 use lacuna_engine::gap::system::fit::fit;
@@ -45,7 +45,7 @@ fn searched<T>(
         let sd = noise.sd(experiment, response);
         let situation = Situation { layouts: experiment.layouts, response, noise: &sd };
         let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
-        let candidates = proposed(Some(&names), &situation).unwrap();
+        let candidates = proposed(Some(&names), &[], &situation).unwrap().candidates;
         let options = SearchOptions { naming: 0.03, unlisted: 0.02, simulations: 99, most: 1 };
         let starts = [REFERENCE.to_vec()];
         let found = search(experiment, &candidates, &starts, options, &Stream::root(1)).unwrap();
@@ -85,7 +85,7 @@ fn the_level_of_a_flaw_is_read() {
             DriftLevel::Response { on } => {
                 kind.is_some() && !model && on["sensor"] == [SENSORS[sensors[0]]]
             }
-            DriftLevel::Either { .. } => false,
+            DriftLevel::Either { .. } | DriftLevel::Explained { .. } => false,
         };
         println!("{kind:?} {sensors:?} {}: {words}", if fits { "right" } else { "WRONG" });
         right += u64::from(fits);
@@ -111,8 +111,8 @@ fn a_right_name_foretells() {
         let base = found.path[0].before.fit.clone();
         let none = System::new(experiment, Vec::new());
         let weighed = &found.path[0].weighed;
-        let winner = Explanation { system: &found.system, fit: &found.last.fit };
-        let without = Explanation { system: &none, fit: &base };
+        let winner = Explanation::exact(&found.system, &found.last.fit);
+        let without = Explanation::exact(&none, &base);
         for own in cross_validate(winner, without, &found.noise, weighed.len()) {
             println!("against none: {own:?}");
             if matches!(own.left_out, LeftOut::Condition | LeftOut::Replicate) {
@@ -121,15 +121,9 @@ fn a_right_name_foretells() {
         }
         let kind = |j: usize| &candidates[weighed[j].placement.candidate].kind;
         let other = (1..weighed.len()).find(|&j| kind(j) != kind(0)).unwrap();
-        let desk = RefitSetting {
-            system: &none,
-            candidates,
-            whitener: &found.whitener,
-            means: &found.means,
-            sensors: 4,
-        };
-        let system = desk.with(&weighed[other].placement);
-        let second = Explanation { system: &system, fit: &weighed[other].fit };
+        let placement = &weighed[other].placement;
+        let system = none.with(placement.placed(experiment, candidates, kind(other)));
+        let second = Explanation::exact(&system, &weighed[other].fit);
         for own in cross_validate(winner, second, &found.noise, weighed.len()) {
             println!("{} against {}: {own:?}", kind(0), kind(other));
         }

@@ -115,10 +115,10 @@ pub fn ask(case: &Case, replicates: usize, seed: u64) -> Answer {
     let response = emulator.mean(&Matrix::from_rows(4, [&centre])).row(0).to_vec();
     let noise = Noise::of(&experiment, &ResponseTangents::fixed(&response), None);
     let all = error_covariance(&experiment, &noise, &response, std::slice::from_ref(error));
-    (experiment.common, experiment.remainder) = (all.common, all.remainder);
+    (experiment.common, experiment.independent) = (all.common, all.independent);
     let sd = noise.sd(&experiment, &response);
     let situation = Situation { layouts: &layouts, response: &response, noise: &sd };
-    let candidates = proposed(None, &situation).unwrap();
+    let candidates = proposed(None, &[], &situation).unwrap().candidates;
     let options = SearchOptions { naming: 0.03, unlisted: 0.02, simulations: 199, most: 3 };
     let stream = Stream::root(seed);
     let found: SearchResult<'_> =
@@ -129,7 +129,7 @@ pub fn ask(case: &Case, replicates: usize, seed: u64) -> Answer {
     let held_out = observations(case, replicates..case.replicates[0].len());
     let mut held_out = Experiment::new(&layouts, &parameters, &**emulator, &held_out);
     held_out.common.clone_from(&experiment.common);
-    held_out.remainder.clone_from(&experiment.remainder);
+    held_out.independent.clone_from(&experiment.independent);
     let (before, after) = (&first.fit.at.response, &found.last.fit.at.response);
     let proof = prove(&held_out, &found.noise, before, after);
     Answer { p: first.p, log_odds, verdict, regions: first.regions.clone(), proof }

@@ -93,16 +93,21 @@ fn asked(length: usize, coefficients: &[f64], gap: &dyn Fn(f64) -> f64, seed: u6
     let around = system.around(&system.linearised(&truth));
     let sd = Noise::of(&experiment, &around, None).sd(&experiment, &around.response);
     let situation = Situation { layouts: &layouts, response: &around.response, noise: &sd };
-    let candidates = proposed(None, &situation).unwrap();
+    let candidates = proposed(None, &[], &situation).unwrap().candidates;
     let options = SearchOptions { naming: 0.03, unlisted: 0.02, simulations: 199, most: 3 };
     let starts = [truth.to_vec()];
     let found = search(&experiment, &candidates, &starts, options, &stream.named("search"));
     verdict(&found.unwrap(), &candidates, options)
 }
 
-/// White noise, two of first order, and one of second order that oscillates.
-const LAWS: [(&str, &[f64]); 4] =
-    [("white", &[]), ("0.5", &[0.5]), ("0.8", &[0.8]), ("1.05, -0.5", &[1.05, -0.5])];
+/// White noise, three of first order, and one of second order that oscillates.
+const LAWS: [(&str, &[f64]); 5] = [
+    ("white", &[]),
+    ("0.5", &[0.5]),
+    ("0.8", &[0.8]),
+    ("0.9", &[0.9]),
+    ("1.05, -0.5", &[1.05, -0.5]),
+];
 
 const LENGTHS: [usize; 4] = [60, 120, 250, 500];
 

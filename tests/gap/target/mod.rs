@@ -93,7 +93,7 @@ fn experiment<T>(
     let mut samples = lab.errors.clone();
     samples.extend(wide.iter().flat_map(|wide| wide.common.clone()));
     let all = error_covariance(&experiment, &noise, &response, &samples);
-    (experiment.common, experiment.remainder) = (all.common, all.remainder);
+    (experiment.common, experiment.independent) = (all.common, all.independent);
     use_it(&experiment, &start)
 }
 
@@ -113,7 +113,7 @@ fn energy(truth: &[f64], seed: u64) -> f64 {
 /// Candidates of the study: all installed effects, displaced gauges, and the quantities that the model fixes, if they
 /// are free.
 fn candidates(situation: &Situation<'_>, wide: Option<&ExtendedMap<'_>>) -> Vec<Candidate> {
-    let mut all = proposed(None, situation).unwrap();
+    let mut all = proposed(None, &[], situation).unwrap().candidates;
     let stations: Table = HOOP.iter().map(|(name, x)| ((*name).into(), (*x).into())).collect();
     for (kind, prior) in [
         ("misplacement", "distance = { normal = [0.0, 0.01] }"),

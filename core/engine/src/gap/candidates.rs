@@ -1,10 +1,14 @@
 //! Candidates: the effects that may be missing, with their options, and the placements in which they may act.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use lacuna::data::Unit;
 use lacuna::plugin::effect::{On, Placed, Reach, Situation};
 use lacuna::plugin::{Effect, registry};
-use toml::Table;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use toml::{Table, Value};
 
 use super::experiment::{Experiment, MeasuredCurve};
 
@@ -45,12 +49,58 @@ impl Candidate {
     }
 }
 
-/// The candidates that all installed effects, or those named, propose for such data.
+/// The coordinates of labels along an axis, such as the places of sensors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Positions {
+    /// The axis.
+    pub axis: String,
+    /// The coordinate of each label, in `unit`.
+    pub at: BTreeMap<String, f64>,
+    /// The unit of the coordinates.
+    pub unit: Unit,
+}
+
+/// The effects that propose themselves for some data, and those that do not.
+#[derive(Default)]
+pub struct Proposed {
+    /// The candidates.
+    pub candidates: Vec<Candidate>,
+    /// The effects that are not tried.
+    pub untried: Vec<Untried>,
+}
+
+/// An effect that is not tried.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Untried {
+    /// Name of the effect.
+    #[serde(rename = "type")]
+    #[schemars(rename = "type")]
+    pub kind: String,
+    /// Reason, in words.
+    pub reason: String,
+}
+
+impl Positions {
+    /// The options of an effect along this axis.
+    fn options(&self) -> Table {
+        let at = self.at.iter().map(|(label, x)| (label.clone(), Value::Float(*x)));
+        let text = |text: &str| Value::String(text.to_owned());
+        Table::from_iter([
+            ("axis".to_owned(), text(&self.axis)),
+            ("positions".to_owned(), Value::Table(at.collect())),
+            ("unit".to_owned(), text(&self.unit.to_string())),
+        ])
+    }
+}
+
+/// The candidates that all installed effects, or those named, propose for such data; `positions` are those of the labels
+/// that the study states.
 pub fn proposed(
     names: Option<&[String]>,
+    positions: &[Positions],
     situation: &Situation<'_>,
-) -> Result<Vec<Candidate>, String> {
-    let mut all = Vec::new();
+) -> Result<Proposed, String> {
+    let mut all = Proposed::default();
     for entry in registry::entries::<dyn Effect>() {
         if names.is_some_and(|names| !names.iter().any(|name| name == entry.name)) {
             continue;
@@ -59,8 +109,26 @@ pub fn proposed(
             registry::from_text::<dyn Effect>(entry.name, &options.to_string())
                 .map_err(|error| format!("the proposal of `{}`: {error}", entry.name))
         };
-        for options in build(&Table::new())?.plugin.proposals(situation) {
-            all.push(Candidate::of(entry.name, entry.name, &options)?);
+        let mut proposals = build(&Table::new())?.plugin.proposals(situation);
+        // Effects along a line of sensors take their positions; others have no such option.
+        for along in positions.iter().filter_map(|axis| build(&axis.options()).ok()) {
+            let further = along.plugin.proposals(situation);
+            proposals.extend(further.into_iter().filter(|own| own.contains_key("positions")));
+        }
+        if proposals.is_empty() {
+            let nowhere =
+                Positions { axis: String::new(), at: BTreeMap::new(), unit: Unit::default() };
+            let needs_positions = positions.is_empty() && build(&nowhere.options()).is_ok();
+            let reason = if needs_positions {
+                "needs the positions of the sensors: `[gap.positions]`"
+            } else {
+                "has nothing to act on in these data"
+            };
+            let (kind, reason) = (entry.name.to_owned(), reason.to_owned());
+            all.untried.push(Untried { kind, reason });
+        }
+        for options in proposals {
+            all.candidates.push(Candidate::of(entry.name, entry.name, &options)?);
         }
     }
     Ok(all)

@@ -3,10 +3,13 @@
 //! The gap of a response is the root of its whitened mean square misfit to held-out replicates less one, the
 //! expectation under pure noise: the part that a perfect model could remove. The part of it that the covariances of the
 //! emulator's and the numerical error could explain is given separately. The misfits of one replicate without and with
-//! the effects share its noise, so that their difference is far more exact than either: the interval is that of
-//! Student's t for the mean of the paired differences, replicates being independent. The differences vary between
-//! conditions, so that the variance is that within conditions (stratified sampling; Cochran, Sampling Techniques, 3rd
-//! ed., section 5.6).
+//! the effects share its noise, so that their difference is far more exact than either. The share that closed is the
+//! ratio of the mean difference to the mean gap without the effects, and its interval is that of Fieller (Journal of the
+//! Royal Statistical Society B 16 (1954) 175) for the ratio of two means that are both uncertain: where the gap itself
+//! is not significant, no interval exists. Replicates are independent; differences vary between conditions, so that
+//! variances are those within conditions (stratified sampling; Cochran, Sampling Techniques, 3rd ed., section 5.6).
+//! Replicates are few, so that their variances are moderated by those that the model of the noise gives (Smyth,
+//! Statistical Applications in Genetics and Molecular Biology 3 (2004) 3).
 
 use lacuna::math::special::student_t_quantile;
 use lacuna_linalg::vector::dot;
@@ -15,6 +18,9 @@ use serde::{Deserialize, Serialize};
 use super::experiment::Experiment;
 use super::noise::Noise;
 use super::system::whitener::Whitener;
+
+/// The degrees of freedom of the variances that the model of the noise gives.
+const MODERATION: f64 = 10.0;
 
 /// The fit of two responses to held-out replicates.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -53,9 +59,9 @@ pub struct Comparison {
     pub after: f64,
     /// The share of the squared gap that closed; negative where it grew.
     pub closed: f64,
-    /// The lower end of its 95 % interval.
+    /// The lower end of its 95 % interval; may be infinite if the gap without the effects is not significant.
     pub lower: f64,
-    /// The upper end.
+    /// The upper end, as the lower one.
     pub upper: f64,
     /// The gap without the part that the covariances of the emulator's and the numerical error could explain, before
     /// and after.
@@ -80,6 +86,8 @@ pub struct Closing {
 struct Misfits {
     before: f64,
     after: f64,
+    /// The squared whitened difference between the responses.
+    change: f64,
     /// Part of the misfits that the known errors of emulator and numerics are expected to cause.
     known: f64,
     values: f64,
@@ -144,7 +152,7 @@ fn of_condition(
             alone[c] = vec![replicate.clone()];
             let mut one = held_out.with_replicates(alone).remeasured();
             // The noise of the replicates alone is the unit.
-            (one.common, one.remainder) = (Vec::new(), Vec::new());
+            (one.common, one.independent) = (Vec::new(), Vec::new());
             let own = noise.restricted(held_out, &one);
             let whitener = Whitener::new(&one, &own, responses[0]);
             let known = of_known_errors(held_out, &whitener);
@@ -161,7 +169,12 @@ fn of_condition(
         };
         let values = replicate.iter().flatten().count() as f64;
         let (before, after) = (square(responses[0]), square(responses[1]));
-        misfits.push(Misfits { before, after, known: *known, values });
+        let mut difference = vec![0.0; held_out.outputs()];
+        for (i, _) in condition.outputs.clone().zip(replicate).filter(|(_, y)| y.is_some()) {
+            difference[i] = responses[0][i] - responses[1][i];
+        }
+        let white = whitener.whiten(&difference);
+        misfits.push(Misfits { before, after, change: dot(&white, &white), known: *known, values });
     }
     misfits
 }
@@ -172,9 +185,9 @@ fn of_known_errors(held_out: &Experiment<'_>, whitener: &Whitener) -> f64 {
         let white = whitener.whiten_rows(&error.factor.transposed());
         white.as_slice().iter().map(|z| z * z).sum::<f64>()
     });
-    // The remainder is white where the innovations of the noise are.
+    // Independent errors are white where the innovations of the noise are.
     let scale = whitener.scale();
-    let rest = held_out.remainder.iter().zip(&scale).map(|(rest, s)| rest * s * s);
+    let rest = held_out.independent.iter().zip(&scale).map(|(rest, s)| rest * s * s);
     factors.sum::<f64>() + rest.sum::<f64>()
 }
 
@@ -198,26 +211,16 @@ impl Comparison {
         // Known errors may explain what is left, as far as they go; their covariance is no estimate of what they are.
         let known = mean(&|m| m.known / m.values);
         let explained = known.min(excess_before).min(excess_after).max(0.0);
-        let gain = |m: &Misfits| (m.before - m.after) / m.values;
-        let mean_gain = mean(&gain);
-        let (mut squares, mut freedom) = (0.0, 0.0);
-        for own in conditions.iter().filter(|own| own.len() >= 2) {
-            let mean = own.iter().map(gain).sum::<f64>() / own.len() as f64;
-            squares += own.iter().map(|m| (gain(m) - mean).powi(2)).sum::<f64>();
-            freedom += own.len() as f64 - 1.0;
-        }
-        let half = if freedom > 0.0 {
-            student_t_quantile(freedom, 0.975)? * (squares / (freedom * count)).sqrt()
-        } else {
-            f64::INFINITY
-        };
+        let mean_gain = mean(&|m| m.gain());
+        let spread = Spread::of(conditions, excess_before, excess_after);
         let closing = |explained: f64| {
             // Where noise hides the gap before, its own size is no scale for what closed.
             let scale = (excess_before - explained).max(mean_gain.abs()).max(1e-12);
+            let [lower, upper] = spread.of_ratio(mean_gain, excess_before - explained, count);
             Closing {
                 before: (excess_before - explained).max(0.0).sqrt(),
                 after: (excess_after - explained).max(0.0).sqrt(),
-                closed: [mean_gain, mean_gain - half, mean_gain + half].map(|x| x / scale),
+                closed: [mean_gain / scale, lower, upper],
             }
         };
         let Closing { before, after, closed: [closed, lower, upper] } = closing(0.0);
@@ -227,13 +230,91 @@ impl Comparison {
     }
 }
 
+impl Misfits {
+    /// The squared misfit that the effects remove, per value.
+    fn gain(&self) -> f64 {
+        (self.before - self.after) / self.values
+    }
+}
+
+/// The covariance of gain and squared misfit per value of one replicate: variances and covariance, with its degrees of
+/// freedom.
+#[derive(Debug, Clone, Copy)]
+struct Spread {
+    gain: f64,
+    before: f64,
+    both: f64,
+    freedom: f64,
+}
+
+impl Spread {
+    /// Of the misfits by condition, with the mean excesses without and with the effects.
+    ///
+    /// White noise `z` about the gaps `a` without and `b` with the effects has the squared misfits `|z + a|^2` and
+    /// `|z + b|^2`: the first has the variance `2 n + 4 |a|^2`, their difference `4 |a - b|^2`, and both together
+    /// `4 a (a - b)`.
+    fn of(conditions: &[Vec<Misfits>], excess_before: f64, excess_after: f64) -> Self {
+        let all: Vec<&Misfits> = conditions.iter().flatten().collect();
+        let mean = |of: &dyn Fn(&Misfits) -> f64| {
+            all.iter().map(|m| of(m)).sum::<f64>() / all.len() as f64
+        };
+        let [a, b] = [excess_before, excess_after].map(|excess| excess.max(0.0));
+        let product = |m: &Misfits| 0.5 * (m.values * (a - b) + m.change);
+        let expected = Self {
+            gain: mean(&|m| 4.0 * m.change / m.values.powi(2)),
+            before: mean(&|m| (2.0 + 4.0 * a) / m.values),
+            both: mean(&|m| 4.0 * product(m) / m.values.powi(2)),
+            freedom: MODERATION,
+        };
+        let mut seen = Self { gain: 0.0, before: 0.0, both: 0.0, freedom: 0.0 };
+        for own in conditions.iter().filter(|own| own.len() >= 2) {
+            let of = |value: &dyn Fn(&Misfits) -> f64| {
+                let mean = own.iter().map(value).sum::<f64>() / own.len() as f64;
+                own.iter().map(|m| value(m) - mean).collect::<Vec<f64>>()
+            };
+            let (gains, squares) = (of(&Misfits::gain), of(&|m| m.before / m.values));
+            seen.gain += dot(&gains, &gains);
+            seen.before += dot(&squares, &squares);
+            seen.both += dot(&gains, &squares);
+            seen.freedom += own.len() as f64 - 1.0;
+        }
+        let freedom = expected.freedom + seen.freedom;
+        let moderated = |expected: f64, seen: f64| (MODERATION * expected + seen) / freedom;
+        Self {
+            gain: moderated(expected.gain, seen.gain),
+            before: moderated(expected.before, seen.before),
+            both: moderated(expected.both, seen.both),
+            freedom,
+        }
+    }
+
+    /// Fieller's 95 % interval of the ratio of a mean gain to a mean gap over so many replicates. Where the gap is not
+    /// significant, one end at least is infinite; the other follows from the sign of the gain, if that is known.
+    fn of_ratio(&self, gain: f64, gap: f64, count: f64) -> [f64; 2] {
+        let nothing = [f64::NEG_INFINITY, f64::INFINITY];
+        let Some(t) = student_t_quantile(self.freedom, 0.975) else { return nothing };
+        let part = t * t / count;
+        let (square, product) = (gap * gap - part * self.before, gap * gain - part * self.both);
+        let root = product * product - square * (gain * gain - part * self.gain);
+        if gap > 0.0 && square > 0.0 && root >= 0.0 {
+            return [-1.0, 1.0].map(|sign| (product + sign * root.sqrt()) / square);
+        }
+        let (half, most) = ((part * self.gain).sqrt(), gap + (part * self.before).sqrt());
+        match gain {
+            gain if gain > half && most > 0.0 => [(gain - half) / most, f64::INFINITY],
+            gain if gain < -half && most > 0.0 => [f64::NEG_INFINITY, (gain + half) / most],
+            _ => nothing,
+        }
+    }
+}
+
 /// The share of values within 1.96 standard deviations of a replicate about a response, the emulator's error included.
 fn coverage(held_out: &Experiment<'_>, noise: &Noise, response: &[f64]) -> f64 {
     let sd = noise.sd(held_out, response);
     let mut variance: Vec<f64> = sd.iter().map(|s| s * s).collect();
     for (curve, law) in held_out.curves.iter().zip(&noise.curves) {
         for &i in &curve.measured {
-            let rest = held_out.remainder.get(i).copied().unwrap_or(0.0);
+            let rest = held_out.independent.get(i).copied().unwrap_or(0.0);
             variance[i] += rest * law.memory.variance();
         }
     }
@@ -255,4 +336,46 @@ fn coverage(held_out: &Experiment<'_>, noise: &Noise, response: &[f64]) -> f64 {
         }
     }
     inside / f64::max(count, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use lacuna::math::random::{Stream, normal};
+
+    use super::*;
+
+    /// Three replicates of 200 values; the gap before is 0.5 or 0.2 standard deviations, of which 96 and 75 % close. The
+    /// interval holds the truth in 95 % of 2000 draws at least, by Monte Carlo to 1.5 % (three standard errors), and in
+    /// no more than 99 %: the moderated variance is exact here, and the quantile of Student's t is wider than it needs.
+    #[test]
+    fn fiellers_interval_holds_the_true_share() {
+        for (gap, left) in [(0.5, 0.1), (0.2, 0.1)] {
+            let (count, values, draws) = (3, 200, 2000);
+            let truth = 1.0 - left * left / (gap * gap);
+            let (mut held, mut without) = (0, 0);
+            for draw in 0..draws {
+                let mut rng = Stream::root(7).at(draw).generator();
+                let own: Vec<Misfits> = (0..count)
+                    .map(|_| {
+                        let z: Vec<f64> = (0..values).map(|_| normal(&mut rng)).collect();
+                        let square = |shift: f64| z.iter().map(|z| (z + shift).powi(2)).sum();
+                        let change = values as f64 * (gap - left) * (gap - left);
+                        let values = values as f64;
+                        Misfits {
+                            before: square(gap),
+                            after: square(left),
+                            change,
+                            known: 0.0,
+                            values,
+                        }
+                    })
+                    .collect();
+                let found = Comparison::of(&[own]).unwrap();
+                held += u32::from(found.lower <= truth && truth <= found.upper);
+                without += u32::from(found.lower.is_infinite());
+            }
+            let share = f64::from(held) / draws as f64;
+            assert!((0.935..0.99).contains(&share), "{share} of gap {gap}, {without} without");
+        }
+    }
 }

@@ -206,3 +206,73 @@ fn unknowns_of_many_decades_are_found() {
         }
     }
 }
+
+/// A level alone: `y = a`, whatever `b`.
+const LEVEL: MeasuredCurve = MeasuredCurve(|[a, _], _| (a, [1.0, 0.0]));
+
+/// Normal noise about a level, `w` being the sum of the weights of the values. In the logarithm `u` of the level a
+/// log-uniform prior is flat and leaves the mean as the mode; a log-normal one shifts it to the root of
+/// `w a (m - a) = (ln a - mu) / sigma^2`. By the method of Laplace in `u` the evidence of the log-uniform prior is that
+/// of a normal density around the mode: `sqrt(2 pi / w)` over `m` times the length of the logarithm's interval.
+#[test]
+fn a_level_of_many_decades_has_its_closed_form() {
+    let layouts = layouts();
+    let mut parameters = parameters();
+    let (level, sigma) = (0.4, 1.5);
+    let measured = data(9, &[level; TIMES], REPLICATES).into();
+    let weight = (REPLICATES * TIMES) as f64 / (NOISE * NOISE);
+    let interval: [f64; 2] = [1e-6, 1e3];
+    for prior in [Distribution::LogUniform(interval), Distribution::LogNormal([-4.0, sigma])] {
+        parameters[0].prior = prior.clone();
+        let experiment = Experiment::new(&layouts, &parameters, &LEVEL, &measured);
+        let (_, means) = experiment.means();
+        let mean = means.iter().sum::<f64>() / TIMES as f64;
+        let whitener = Whitener::new(&experiment, &white(), &means);
+        let system = System::new(&experiment, Vec::new());
+        for start in [1e-6, 1e-3, 1.0, 900.0] {
+            let found = fit(&system, &whitener, &means, &[start, 0.5]);
+            let a = found.at.point[0];
+            if matches!(prior, Distribution::LogUniform(_)) {
+                assert!((a - mean).abs() < 1e-6 * mean, "{start}: {a} {mean}");
+                let square: f64 = found.residual.iter().map(|z| z * z).sum();
+                let alone = 0.5 * (std::f64::consts::TAU / (weight + width(interval, a))).ln()
+                    - (a * (interval[1] / interval[0]).ln()).ln();
+                let other = parameters[1].prior.log_density(0.5)
+                    + (2.0 * std::f64::consts::TAU.sqrt()).ln();
+                let exact = alone + other - 0.5 * square;
+                assert!((found.log_evidence() - exact).abs() < 1e-6, "{exact} {found:?}");
+            } else {
+                let slope = weight * a * (mean - a) - (a.ln() + 4.0) / (sigma * sigma);
+                assert!(slope.abs() < 1e-3 * weight * a * a, "{start}: {a} {slope}");
+            }
+        }
+    }
+}
+
+/// The precision that the width of a log-uniform prior adds at a value.
+fn width([low, high]: [f64; 2], a: f64) -> f64 {
+    12.0 / (a * (high / low).ln()).powi(2)
+}
+
+/// Two unknowns that trade off, in a narrow valley that leaves the box of the priors: the fit ends on the side of the
+/// box where the closed form with one unknown at its bound has its root, not where a clamped joint step would.
+#[test]
+fn a_bound_is_held_while_the_other_unknown_moves_on() {
+    let layouts = layouts();
+    let mut parameters = parameters();
+    parameters[0].prior = Distribution::Uniform([0.0, 1.5]);
+    parameters[1].prior = Distribution::Uniform([-1.0, 1.0]);
+    // The line 2 - 0.4 t: its level is above the bound.
+    let measured = data(7, &line(2.0, -0.4), REPLICATES).into();
+    let experiment = Experiment::new(&layouts, &parameters, &LINE, &measured);
+    let (_, means) = experiment.means();
+    let whitener = Whitener::new(&experiment, &white(), &means);
+    let system = System::new(&experiment, Vec::new());
+    let sum = |f: &dyn Fn(f64) -> f64| (0..TIMES).map(|t| f(t as f64)).sum::<f64>();
+    let slope = sum(&|t| t * (means[t as usize] - 1.5)) / sum(&|t| t * t);
+    for start in [[0.1, 0.9], [1.5, -1.0], [0.0, 1.0], [1.4, -0.3]] {
+        let found = fit(&system, &whitener, &means, &start);
+        let [a, b] = [found.at.point[0], found.at.point[1]];
+        assert!((a - 1.5).abs() < 1e-6 && (b - slope).abs() < 1e-6, "{start:?}: {a} {b} {slope}");
+    }
+}

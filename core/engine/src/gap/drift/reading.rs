@@ -55,6 +55,28 @@ pub enum DriftLevel {
         /// Parameters that differ, beginning with the one that alone would explain most of the differences.
         parameters: Vec<String>,
     },
+    /// The effects that were named explain the difference.
+    Explained {
+        /// Types of the effects.
+        by: Vec<String>,
+    },
+}
+
+impl DriftLevel {
+    /// The reading beside effects that have a name, and the same in words: parameters that differ without them are no
+    /// sign of anything else.
+    pub fn explained(&self, words: &str, by: &[String]) -> (Self, String) {
+        if *self == Self::None {
+            return (Self::None, words.to_owned());
+        }
+        let quoted: Vec<String> = by.iter().map(|kind| format!("`{kind}`")).collect();
+        let verb = if by.len() == 1 { "explains" } else { "explain" };
+        let words = format!(
+            "without effects the parameters differ between conditions or windows, or one sensor has most of the misfit; {} {verb} it",
+            quoted.join(" and ")
+        );
+        (Self::Explained { by: by.to_vec() }, words)
+    }
 }
 
 /// The share of each sensor in the excess misfit, the largest first.

@@ -2,6 +2,8 @@
 
 mod blocks;
 pub mod hold_out;
+pub mod stated;
+pub mod transient;
 pub mod wider;
 pub mod with_effects;
 
@@ -10,9 +12,10 @@ use std::ops::Range;
 use lacuna::data::layouts::SCENARIO;
 use lacuna::data::{Coordinates, Layout, Layouts, Observations, Parameter};
 use lacuna::plugin::Forward;
-use lacuna::plugin::discrepancy::{CommonError, StatedNoise};
+use lacuna::plugin::discrepancy::CommonError;
 
 use super::experiment::wider::ExtendedMap;
+use stated::Statement;
 
 /// Measurements with the forward map that is to explain them.
 #[derive(Clone)]
@@ -31,9 +34,9 @@ pub struct Experiment<'a> {
     /// The part of that covariance outside the span of its factors (see
     /// [`emulator_error`](super::system::emulator_error)): the variance of innovations with the autocorrelation of the
     /// noise, one per output; empty for none.
-    pub remainder: Vec<f64>,
+    pub independent: Vec<f64>,
     /// The noise of one replicate as the study states it, for curves without replicates.
-    pub stated: Option<StatedNoise>,
+    pub stated: Option<Statement>,
     /// The bounds within which the forward map is valid, if they are narrower than the priors.
     pub region: Option<Vec<(f64, f64)>>,
     /// The measurements, by condition.
@@ -141,7 +144,7 @@ impl<'a> Experiment<'a> {
             forward,
             wide: None,
             common: Vec::new(),
-            remainder: Vec::new(),
+            independent: Vec::new(),
             stated: None,
             region: None,
             conditions,
@@ -213,7 +216,7 @@ impl<'a> Experiment<'a> {
     pub fn has_records(&self) -> bool {
         let alone =
             |curve: &MeasuredCurve| !curve.measured.is_empty() && self.complete(curve).len() < 2;
-        self.stated.is_none() && self.curves.iter().any(alone)
+        !self.stated.as_ref().is_some_and(Statement::is_complete) && self.curves.iter().any(alone)
     }
 
     /// The largest number of replicates of a condition.

@@ -188,8 +188,8 @@ impl AlternativeModel<'_> {
         let mut both = own.system.experiment.clone();
         let error = error_covariance(&both, noise, &response, &self.common);
         both.common.extend(error.common);
-        both.remainder.resize(both.outputs(), 0.0);
-        both.remainder.iter_mut().zip(error.remainder).for_each(|(all, rest)| *all += rest);
+        both.independent.resize(both.outputs(), 0.0);
+        both.independent.iter_mut().zip(error.independent).for_each(|(all, rest)| *all += rest);
         let (_, means) = both.means();
         let whitener = Whitener::new(&both, noise, &response);
         let weighed = |side: &ModelFits<'_, '_>, name: &str| {

@@ -8,22 +8,26 @@ mod around;
 mod autoregression;
 mod curve;
 mod expectation;
+mod instrument;
 pub mod part;
 mod products;
+mod provenance;
 mod record;
 mod restricted;
 mod shared;
 mod simulate;
 mod slow;
+mod stated;
 mod succession;
 #[cfg(test)]
 mod tests;
 
-use lacuna::plugin::discrepancy::StatedNoise;
 use lacuna_linalg::Matrix;
 use serde::{Deserialize, Serialize};
 
 use super::experiment::{Experiment, MeasuredCurve};
+use restricted::Known;
+use stated::CurveStatement;
 
 pub use around::ResponseTangents;
 pub use autoregression::Autoregression;
@@ -36,8 +40,10 @@ pub use succession::Succession;
 pub enum Origin {
     /// From its replicates, or from those of the same curve under another condition.
     Replicates,
-    /// From the study's discrepancy.
+    /// As the study states it.
     Stated,
+    /// As the study states it in part; the rest is from the single record.
+    StatedInPart,
     /// From the single record, which may also contain the missing effect: the noise is assumed.
     Record,
 }
@@ -74,15 +80,25 @@ impl Noise {
         let one = |s: usize| {
             let curve = &experiment.curves[s];
             let replicates = || estimated[s].clone().map(|own| (own, Origin::Replicates));
+            let others = || borrowed(experiment, s, &estimated);
+            let said = experiment
+                .stated
+                .as_ref()
+                .map(|all| CurveStatement::of(all, curve))
+                .unwrap_or_default();
             let stated = || {
-                let stated = experiment.stated.as_ref()?;
-                Some((of_statement(curve, stated), Origin::Stated))
+                if let Some(memory) = &said.memory {
+                    return Some((said.with(memory.clone())?, Origin::Stated));
+                }
+                // Replicates elsewhere show how the noise is correlated.
+                Some((said.with(others()?.memory)?, Origin::Stated))
             };
-            let others = || Some((borrowed(experiment, s, &estimated)?, Origin::Replicates));
-            let record = || (of_record(curve, &means, around), Origin::Record);
+            let others = || Some((others()?, Origin::Replicates));
+            let record = || of_record(curve, &means, around, &said);
             replicates().or_else(stated).or_else(others).unwrap_or_else(record)
         };
-        let (curves, origins) = (0..differences.len()).map(one).unzip();
+        let (mut curves, origins): (Vec<_>, Vec<_>) = (0..differences.len()).map(one).unzip();
+        instrument::pool(experiment, &means, around, &origins, &mut curves);
         let conditions = experiment.conditions.len();
         let (shared, across) =
             (vec![ReplicateVariation::default(); conditions], vec![None; conditions]);
@@ -91,9 +107,9 @@ impl Noise {
         noise
     }
 
-    /// Returns true if the noise of some curve is estimated from its single record.
+    /// Returns true if the noise of some curve, or a part of it, is estimated from its single record.
     pub fn is_assumed(&self) -> bool {
-        self.origins.contains(&Origin::Record)
+        self.origins.iter().any(|own| matches!(own, Origin::Record | Origin::StatedInPart))
     }
 
     /// The noise for an experiment `part` that has fewer values of the curves of `whole`.
@@ -151,32 +167,27 @@ fn borrowed(
     Some(CurveNoise { profile: vec![1.0; curve.measured.len()], level: 0.0, ..found.clone() })
 }
 
-/// The noise of a curve, as the study states it.
-fn of_statement(curve: &MeasuredCurve, stated: &StatedNoise) -> CurveNoise {
-    let sd: Vec<f64> = curve.measured.iter().map(|&i| stated.sd[i]).collect();
-    let squares = sd.iter().map(|s| s * s).sum::<f64>();
-    let mean = (squares / sd.len().max(1) as f64).sqrt();
-    let times = stated.correlation_time.as_ref();
-    let time = times.zip(curve.measured.first()).map(|(times, first)| times[*first]);
-    let memory = match time {
-        Some(time) if time > 0.0 => Autoregression::of_reflections(&[(-curve.step() / time).exp()]),
-        _ => Autoregression::white(),
+/// The noise of a curve from its single record and what is stated about it.
+fn of_record(
+    curve: &MeasuredCurve,
+    means: &[f64],
+    around: &ResponseTangents,
+    said: &CurveStatement,
+) -> (CurveNoise, Origin) {
+    let (size, profile) = match said.size() {
+        Some((mean, profile)) => (Some(mean), profile),
+        None => (None, vec![1.0; curve.measured.len()]),
     };
-    CurveNoise {
-        sd: mean / memory.variance().sqrt(),
-        memory,
-        level: 0.0,
-        wander: ReplicateVariation::default(),
-        // The stated noise can be zero where the response is zero.
-        profile: sd.iter().map(|s| (s / mean).max(1e-6)).collect(),
+    let each = curve.measured.iter().zip(&profile);
+    let misfit: Vec<f64> = each.map(|(&i, w)| (means[i] - around.response[i]) / w).collect();
+    let mut slopes = around.slopes.select_columns(&curve.measured);
+    for j in 0..slopes.rows() {
+        slopes.row_mut(j).iter_mut().zip(&profile).for_each(|(x, w)| *x /= w);
     }
-}
-
-/// The noise of a curve from its single record.
-fn of_record(curve: &MeasuredCurve, means: &[f64], around: &ResponseTangents) -> CurveNoise {
-    let misfit: Vec<f64> = curve.measured.iter().map(|&i| means[i] - around.response[i]).collect();
-    let slopes = around.slopes.select_columns(&curve.measured);
-    let (sd, memory) = record::noise(&misfit, &slopes, &curve.places());
-    let profile = vec![1.0; curve.measured.len()];
-    CurveNoise { sd, memory, level: 0.0, wander: ReplicateVariation::default(), profile }
+    let known = Known { size, memory: said.memory.clone() };
+    let (sd, memory) = record::noise(&misfit, &slopes, &curve.places(), &known);
+    let stated = size.is_some() || known.memory.is_some();
+    let origin = if stated { Origin::StatedInPart } else { Origin::Record };
+    let wander = ReplicateVariation::default();
+    (CurveNoise { sd, memory, level: 0.0, wander, profile }, origin)
 }

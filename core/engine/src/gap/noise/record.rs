@@ -8,6 +8,7 @@ use lacuna_linalg::vector::{add_scaled, dot};
 use lacuna_linalg::{Matrix, multiply_transposed, symmetric_eigen};
 
 use super::autoregression::Autoregression;
+use super::restricted::Known;
 use super::slow;
 
 /// Directions in which a prior width of the unknowns changes the record by less than this share of its mean square
@@ -19,18 +20,33 @@ const ROUND_OFF: f64 = 1e-12;
 
 /// The noise of a record from its misfit at these places: the standard deviation of its innovations, and its memory.
 /// `slopes`, `unknowns x places`, are the changes by the unknowns in units of the priors' widths.
-pub(super) fn noise(misfit: &[f64], slopes: &Matrix, places: &[usize]) -> (f64, Autoregression) {
+pub(super) fn noise(
+    misfit: &[f64],
+    slopes: &Matrix,
+    places: &[usize],
+    known: &Known,
+) -> (f64, Autoregression) {
     let largest = misfit.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     let unknowns = directions(slopes, dot(misfit, misfit) / misfit.len().max(1) as f64);
-    let found = slow::law(misfit, &unknowns, places).map(|law| (law.sd, law.memory));
-    let (sd, memory) =
-        found.unwrap_or_else(|| (between_neighbours(misfit), Autoregression::white()));
+    let found = slow::law(misfit, &unknowns, places, known).map(|law| (law.sd, law.memory));
+    let short = || {
+        let memory = known.memory.clone().unwrap_or_else(Autoregression::white);
+        let sd = known.size.map(|size| size / memory.variance().sqrt());
+        (sd.unwrap_or_else(|| between_neighbours(misfit)), memory)
+    };
+    let (sd, memory) = found.unwrap_or_else(short);
+    if known.size.is_some() {
+        return (sd, memory);
+    }
     let sd = sd.max(1e-6 * largest);
     (if sd > 0.0 { sd } else { 1.0 }, memory)
 }
 
 /// Orthonormal directions, `directions x places`, in which a width of the priors moves the curve enough to matter.
 fn directions(slopes: &Matrix, square: f64) -> Vec<Vec<f64>> {
+    if slopes.rows() == 0 {
+        return Vec::new();
+    }
     let Ok(eigen) = symmetric_eigen(&multiply_transposed(slopes, slopes)) else {
         return Vec::new();
     };

@@ -20,6 +20,13 @@ const EACH: usize = 8;
 /// part of the record is not noise but a feature that the record shows once.
 const INDEPENDENT: f64 = 8.0;
 
+/// Longest memory of noise, in steps of the record: what varies more slowly is not noise of an instrument unless the
+/// study states it (`memory` of `noise` in `[measurements]`).
+const LONGEST: f64 = 20.0;
+
+/// Mean of the exponential prior of the memory beyond the first step, in steps.
+const USUAL: f64 = 5.0;
+
 /// Reflection coefficients are sought as `tanh z`, with `z` up to this value: 0.995.
 const FARTHEST: f64 = 3.0;
 
@@ -36,6 +43,15 @@ const STEPS: usize = 6;
 /// The golden section.
 const GOLDEN: f64 = 0.618_033_988_749_895;
 
+/// Parts of a law that are known beforehand.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Known {
+    /// The standard deviation of a single value.
+    pub size: Option<f64>,
+    /// The autocorrelation.
+    pub memory: Option<Autoregression>,
+}
+
 /// A curve of noise plus an unknown combination of known curves.
 pub(super) struct Restricted<'a> {
     /// The curve.
@@ -44,6 +60,8 @@ pub(super) struct Restricted<'a> {
     pub columns: &'a [Vec<f64>],
     /// The places of the values.
     pub places: &'a [usize],
+    /// The known parts of the law.
+    pub known: &'a Known,
 }
 
 /// An autoregression with the standard deviation of its innovations.
@@ -55,8 +73,8 @@ pub(super) struct Law {
     pub deviance: f64,
 }
 
-/// Minus twice the restricted log-likelihood at its best innovation variance, and minus twice the log-likelihood of the
-/// whole curve.
+/// Minus twice the restricted log-likelihood at the innovation variance, and minus twice the log-likelihood of the whole
+/// curve; with the prior of the memory, if it is not known.
 struct Judged {
     restricted: f64,
     whole: f64,
@@ -77,6 +95,9 @@ impl Restricted<'_> {
         if freedom < EACH {
             return None;
         }
+        if let Some(memory) = &self.known.memory {
+            return Some(self.judged(memory)?.law(memory.clone(), 0.0));
+        }
         let mut z: Vec<f64> = Vec::new();
         let mut best: Option<(f64, Law)> = None;
         for order in 0..=most {
@@ -89,8 +110,7 @@ impl Restricted<'_> {
             let penalty = 2.0 * k * n / (n - k - 1.0);
             let criterion = judged.restricted + penalty;
             if best.as_ref().is_none_or(|(least, _)| criterion < *least) {
-                let (sd, deviance) = (judged.variance.sqrt(), judged.whole + penalty);
-                best = Some((criterion, Law { sd, memory: memory(&z), deviance }));
+                best = Some((criterion, judged.law(memory(&z), penalty)));
             }
         }
         best.map(|(_, law)| law)
@@ -136,20 +156,27 @@ impl Restricted<'_> {
         self.at(&moved).map_or(f64::INFINITY, |judged| judged.restricted)
     }
 
-    /// Returns true if a record of these values, with this memory, has enough effectively independent ones: for its
-    /// variance, `n` values count as `n / sum of rho^2` (Bayley and Hammersley, Supplement to the Journal of the Royal
-    /// Statistical Society 8 (1946) 184).
-    fn forgets(&self, memory: &Autoregression) -> bool {
+    /// Minus twice the log prior density of a memory; `None` if it is too long for noise or for this record. The memory
+    /// is the number of values that count as one for the variance, `sum of rho^2` over all lags (Bayley and Hammersley,
+    /// Supplement to the Journal of the Royal Statistical Society 8 (1946) 184): for noise of first order about the
+    /// steps over which its correlation falls to 1/e.
+    fn prior(&self, memory: &Autoregression) -> Option<f64> {
         let covariances = memory.autocovariances(self.values.len());
         let squares: f64 = covariances.iter().map(|c| (c / covariances[0]).powi(2)).sum();
-        self.values.len() as f64 >= INDEPENDENT * (2.0 * squares - 1.0)
+        let steps = 2.0 * squares - 1.0;
+        let longest = LONGEST.min(self.values.len() as f64 / INDEPENDENT);
+        (steps <= longest).then_some(2.0 * (steps - 1.0) / USUAL)
     }
 
     fn at(&self, z: &[f64]) -> Option<Judged> {
         let memory = memory(z);
-        if !self.forgets(&memory) {
-            return None;
-        }
+        let prior = self.prior(&memory)?;
+        let judged = self.judged(&memory)?;
+        let (restricted, whole) = (judged.restricted + prior, judged.whole + prior);
+        Some(Judged { restricted, whole, ..judged })
+    }
+
+    fn judged(&self, memory: &Autoregression) -> Option<Judged> {
         let succession = memory.on(self.places);
         let white = |curve: &[f64]| {
             let mut curve = curve.to_vec();
@@ -174,14 +201,23 @@ impl Restricted<'_> {
             square -= factor.quadratic(&onto);
             of_columns = factor.log_determinant();
         }
-        let n = self.freedom() as f64;
-        let variance = square / n;
+        let (n, all) = (self.freedom() as f64, self.values.len() as f64);
+        let given = self.known.size.map(|size| size * size / memory.variance());
+        let variance = given.unwrap_or(square / n);
+        // About the columns `square` has the expectation of `n` variances, about the true curve that of all.
+        let misfit = square / variance;
         let found = variance > 0.0 && (of_noise + of_columns).is_finite();
         found.then(|| Judged {
-            restricted: n * variance.ln() + of_noise + of_columns,
-            whole: self.values.len() as f64 * variance.ln() + of_noise + n,
+            restricted: n * variance.ln() + of_noise + of_columns + misfit,
+            whole: all * variance.ln() + of_noise + misfit,
             variance,
         })
+    }
+}
+
+impl Judged {
+    fn law(&self, memory: Autoregression, penalty: f64) -> Law {
+        Law { sd: self.variance.sqrt(), memory, deviance: self.whole + penalty }
     }
 }
 
@@ -216,7 +252,9 @@ mod tests {
         let found = (0..curves).map(|b| {
             let values = noise(a, length as usize, &Stream::root(4).at(b));
             let mut z = [0.0];
-            Restricted { values: &values, columns: &columns, places: &places }.improve(&mut z);
+            let known = &Known::default();
+            Restricted { values: &values, columns: &columns, places: &places, known }
+                .improve(&mut z);
             z[0].tanh()
         });
         let mean = found.sum::<f64>() / curves as f64;

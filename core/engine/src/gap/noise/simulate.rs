@@ -32,9 +32,9 @@ impl Noise {
 
     /// A draw from the part of the emulator's error outside the span of its factors, one value an output, in the
     /// response's unit.
-    pub fn remainder(&self, experiment: &Experiment<'_>, stream: &Stream) -> Vec<f64> {
+    pub fn independent(&self, experiment: &Experiment<'_>, stream: &Stream) -> Vec<f64> {
         let mut all = vec![0.0; experiment.outputs()];
-        if experiment.remainder.iter().all(|v| *v <= 0.0) {
+        if experiment.independent.iter().all(|v| *v <= 0.0) {
             return all;
         }
         for (c, condition) in experiment.conditions.iter().enumerate() {
@@ -51,7 +51,7 @@ impl Noise {
             {
                 self.curves[s].succession(curve).colour(values);
                 for (&i, x) in curve.measured.iter().zip(values) {
-                    all[i] = experiment.remainder[i].sqrt() * *x;
+                    all[i] = experiment.independent[i].sqrt() * *x;
                 }
             }
         }

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use lacuna_linalg::vector::{add_scaled, dot};
 
-use super::restricted::{self, Law, Restricted};
+use super::restricted::{self, Known, Law, Restricted};
 
 /// The price of a cosine, as twice a log-likelihood: `sum over j of P(chi2_j > j price) / j` is 0.01.
 const PRICE: f64 = 6.74;
@@ -34,13 +34,19 @@ struct Record<'a> {
     values: &'a [f64],
     places: &'a [usize],
     unknowns: &'a [Vec<f64>],
+    known: &'a Known,
     /// Orthonormal cosines, orthogonal to the unknowns; the slowest first.
     cosines: Vec<Vec<f64>>,
 }
 
 /// The law of a record's noise about its slow part; `unknowns` are orthonormal. `None` if too few values are left.
-pub(super) fn law(values: &[f64], unknowns: &[Vec<f64>], places: &[usize]) -> Option<Law> {
-    let record = Record { values, places, unknowns, cosines: cosines(unknowns, places) };
+pub(super) fn law(
+    values: &[f64],
+    unknowns: &[Vec<f64>],
+    places: &[usize],
+    known: &Known,
+) -> Option<Law> {
+    let record = Record { values, places, unknowns, known, cosines: cosines(unknowns, places) };
     let mut seen: Vec<(Range<usize>, Law)> = Vec::new();
     // Two starts: all of the misfit as noise, and roughly its fast part only.
     for (mut band, mut most) in [(0..0, restricted::MOST), (0..record.cosines.len(), 1)] {
@@ -98,7 +104,8 @@ impl Record<'_> {
     /// The law of the noise about a band, of an order up to `most`.
     fn law(&self, band: &Range<usize>, most: usize) -> Option<Law> {
         let columns = [self.unknowns, &self.cosines[band.clone()]].concat();
-        Restricted { values: self.values, columns: &columns, places: self.places }.law(most)
+        let (values, places, known) = (self.values, self.places, self.known);
+        Restricted { values, columns: &columns, places, known }.law(most)
     }
 
     /// The price of a band, as twice a log-likelihood.
@@ -167,7 +174,8 @@ mod tests {
             memory.colour(&mut values);
             let at = (0..length).map(|t| t as f64 / length as f64);
             values.iter_mut().zip(at).for_each(|(y, x)| *y += slow(x));
-            let law = law(&values, std::slice::from_ref(&level), &places).unwrap();
+            let law =
+                law(&values, std::slice::from_ref(&level), &places, &Known::default()).unwrap();
             [law.sd, law.memory.autocovariances(2)[1] / law.memory.variance()]
         };
         (0..records).map(record).collect()

@@ -7,7 +7,9 @@ use lacuna::plugin::Forward;
 use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin};
 
 use super::*;
+use crate::gap::experiment::stated::Statement;
 use crate::gap::system::whitener::Whitener;
+use crate::study::noise::OutputNoise;
 
 /// A response that depends on nothing.
 struct Fixed(Vec<f64>);
@@ -150,4 +152,108 @@ fn whitening_with_the_true_noise_gives_white_numbers() {
     let rows = whitener.whiten_rows(&Matrix::from_rows(3 * LENGTH, [&bump, &forward.0]));
     let one = whitener.whiten(&bump);
     assert!(rows.row(0).iter().zip(&one).all(|(a, b)| (a - b).abs() < 1e-9));
+}
+
+/// Single records of these misfits about nothing, as those of one sensor under several conditions, and their noise.
+fn noise_of_records(misfits: &[Vec<f64>], stated: Option<OutputNoise>) -> (Noise, Option<String>) {
+    let length = misfits[0].len();
+    let times = (0..length).map(|t| 0.1 * t as f64).collect();
+    let axes = vec![
+        Axis::labels("scenario", (0..misfits.len()).map(|c| format!("run {c}"))),
+        Axis::grid("time", times, Unit::parse("s").unwrap()),
+    ];
+    let layout = Layout { name: "place".into(), unit: Unit::parse("mm").unwrap(), axes };
+    let layouts: Layouts = layout.clone().into();
+    let forward = Fixed(vec![0.0; length * misfits.len()]);
+    let values = misfits.iter().flatten().map(|y| Some(*y)).collect();
+    let data = Measurements::new(layout, vec![Replicate::new("0", values)]).into();
+    let mut experiment = Experiment::new(&layouts, &[], &forward, &data);
+    experiment.stated =
+        stated.map(|own| Statement { outputs: vec![own; length * misfits.len()], by: "the test" });
+    let noise = Noise::of(&experiment, &ResponseTangents::fixed(&forward.0), None);
+    let words = noise.provenance(&experiment);
+    (noise, words)
+}
+
+/// Noise of first order with standard deviation one.
+fn first_order(a: f64, length: usize, seed: u64) -> Vec<f64> {
+    let memory = Autoregression::of_reflections(&[a]);
+    let mut rng = Stream::root(31).at(seed).generator();
+    let mut values: Vec<f64> = (0..length).map(|_| normal(&mut rng)).collect();
+    memory.colour(&mut values);
+    values.iter().map(|y| y / memory.variance().sqrt()).collect()
+}
+
+/// Smooth misfits with kinks, as dry friction leaves them, forty times as large as the noise: most of them are no noise.
+#[test]
+fn what_is_large_and_smooth_is_no_noise() {
+    for length in [300, 1500] {
+        let smooth = |t: usize| {
+            let x = t as f64 / length as f64;
+            40.0 * ((9.0 * x).sin() + (23.0 * x + 1.0).sin().abs() - 0.5 * (51.0 * x * x).cos())
+        };
+        let mut misfit = first_order(0.0, length, 1);
+        misfit.iter_mut().enumerate().for_each(|(t, y)| *y += smooth(t));
+        let (noise, _) = noise_of_records(&[misfit], None);
+        let size = noise.curves[0].size();
+        assert!(size < 8.0, "{length}: {size} {:?}", noise.curves[0].memory);
+    }
+}
+
+/// The standard deviation of n values of first order is found with the error `sqrt(T / 2n)`, `T` being the number that
+/// counts as one: `(1 + a^2) / (1 - a^2)`; the mean of B such records with that over `sqrt(B)`. Besides, a memory is
+/// found shorter by its prior; 20 % are allowed at the longest.
+#[test]
+fn noise_with_a_memory_is_found_in_a_record() {
+    let (length, records) = (300, 40);
+    for (a, bias) in [(0.0, 0.03), (0.5, 0.05), (0.8, 0.1), (0.9, 0.2)] {
+        let found = (0..records)
+            .map(|b| noise_of_records(&[first_order(a, length, b)], None).0.curves[0].size());
+        let mean = found.sum::<f64>() / records as f64;
+        let counted = (1.0 + a * a) / (1.0 - a * a);
+        let error = (counted / (2.0 * length as f64 * records as f64)).sqrt();
+        assert!((mean - 1.0).abs() < bias + 4.0 * error, "{a}: {mean}");
+    }
+}
+
+/// Two records of one instrument, one with a misfit of a form that no slow part describes: the quiet one shows the noise
+/// of both. Where values differ from one to the next by other amounts, the instruments differ.
+#[test]
+fn the_quiet_record_of_an_instrument_shows_its_noise() {
+    let length = 200;
+    let quiet = first_order(0.3, length, 4);
+    let mut loud = first_order(0.3, length, 5);
+    loud.iter_mut().enumerate().for_each(|(t, y)| *y += if t / 20 % 3 == 0 { 15.0 } else { 0.0 });
+    let alone = noise_of_records(std::slice::from_ref(&loud), None).0.curves[0].size();
+    let (noise, words) = noise_of_records(&[quiet.clone(), loud], None);
+    let [a, b] = [0, 1].map(|s| noise.curves[s].size());
+    assert!(alone > 2.0 && a < 1.3 && b < 1.3, "{alone} {a} {b}");
+    assert!(words.unwrap().contains("taken for noise with"));
+    let other: Vec<f64> = first_order(0.3, length, 6).iter().map(|y| 5.0 * y).collect();
+    let (noise, _) = noise_of_records(&[quiet, other], None);
+    assert!(noise.curves[1].size() > 3.5, "{:?}", noise.curves[1]);
+}
+
+#[test]
+fn what_is_stated_is_used_and_the_rest_is_estimated() {
+    let record = first_order(0.6, 400, 7);
+    let (noise, words) =
+        noise_of_records(&[record.clone()], Some(OutputNoise { sd: Some(0.9), memory: Some(0.0) }));
+    assert_eq!(noise.origins, [Origin::Stated]);
+    assert!((noise.curves[0].size() - 0.9).abs() < 1e-12 && noise.curves[0].memory.order() == 0);
+    assert_eq!(words.unwrap(), "noise stated: without replicates, the noise is that of the test");
+    let (noise, _) =
+        noise_of_records(&[record.clone()], Some(OutputNoise { sd: Some(1.0), memory: None }));
+    assert_eq!(noise.origins, [Origin::StatedInPart]);
+    let coefficients = noise.curves[0].memory.coefficients().to_vec();
+    assert!((noise.curves[0].size() - 1.0).abs() < 1e-9, "{noise:?}");
+    assert!((coefficients[0] - 0.6).abs() < 4.0 * (0.64_f64 / 400.0).sqrt(), "{coefficients:?}");
+    // A correlation that falls to 1/e over 0.2 s is exp(-0.5) from one value to the next.
+    let (noise, words) =
+        noise_of_records(&[record], Some(OutputNoise { sd: None, memory: Some(0.2) }));
+    assert_eq!(noise.origins, [Origin::StatedInPart]);
+    assert!((noise.curves[0].memory.coefficients()[0] - (-0.5_f64).exp()).abs() < 1e-12);
+    assert!((noise.curves[0].size() - 1.0).abs() < 4.0 * (2.0_f64 / 800.0).sqrt(), "{noise:?}");
+    let words = words.unwrap();
+    assert!(words.contains("place under run 0") && words.contains("a memory of 0.20 s"), "{words}");
 }

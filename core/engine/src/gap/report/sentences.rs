@@ -3,6 +3,7 @@
 use lacuna::plugin::effect::On;
 
 use super::View;
+use crate::gap::result::remains::Remains;
 use crate::gap::result::replaced::OtherModel;
 use crate::gap::result::{AddedEffect, GapFindings, GapResult, HeldOut, RegionResult};
 use crate::gap::search::VerdictKind;
@@ -31,6 +32,9 @@ pub fn sentences(view: &View<'_>, gap: &GapFindings) -> Vec<String> {
         sentences.push(format!("They disagree at {}{further}.", told.join("; ")));
     }
     sentences.extend(result.additions.iter().map(|addition| addition_sentence(gap, addition)));
+    let is_told = matches!(result.verdict.word, VerdictKind::Approximate | VerdictKind::Unlisted);
+    let remains = result.remains.as_ref().filter(|_| is_told && !result.additions.is_empty());
+    sentences.extend(remains.map(|remains| remains_sentence(view, remains)));
     sentences
         .extend(gap.held_out().iter().map(|part| held_out(part, !result.additions.is_empty())));
     sentences.extend(result.needless.iter().map(Needless::words));
@@ -60,6 +64,11 @@ pub fn verdict(result: &GapResult) -> String {
             format!("The data need the model {} in place of the study's{besides}.", listed(model))
         }
         VerdictKind::Named => format!("The model misses {}.", listed(&result.additions)),
+        VerdictKind::Approximate => format!(
+            "What the model misses acts like {}: {:.0} % of the gap; the rest has another form.",
+            listed(&result.additions),
+            100.0 * result.verdict.closed
+        ),
         VerdictKind::Class => {
             let each: Vec<String> = result
                 .additions
@@ -171,11 +180,38 @@ fn addition_sentence(gap: &GapFindings, addition: &AddedEffect) -> String {
         })
         .collect();
     format!(
-        "{}{}: {} (probability among the candidates {}).",
+        "{}{}: {} ({} of the gap; probability among the candidates {}).",
         capitalised(&addition.title),
         on(&addition.on),
         values.join(", "),
-        fixed(addition.probability, 2)
+        percent(addition.share),
+        probability(addition.probability)
+    )
+}
+
+/// A probability; above 0.99 as a bound, for no count of cases shows more.
+pub fn probability(p: f64) -> String {
+    if p > 0.99 { "above 0.99".to_owned() } else { fixed(p, 2) }
+}
+
+/// The size and the place of what the effects leave.
+fn remains_sentence(view: &View<'_>, remains: &Remains) -> String {
+    let mut labels: Vec<&str> = Vec::new();
+    for label in remains.sensors.iter().flat_map(|on| on.values().flatten()) {
+        if !labels.contains(&label.as_str()) {
+            labels.push(label);
+        }
+    }
+    let at = if labels.is_empty() { String::new() } else { format!(" at {}", labels.join(", ")) };
+    let below = remains.below.map(|frequency| {
+        format!(", below {}", crate::page::curves::frequency_unit(view.layouts).text(frequency, 2))
+    });
+    format!(
+        "{} of the gap remains{at}{}: {} standard deviations of one replicate's noise (log Bayes factor of a remainder {}).",
+        percent(remains.share),
+        below.unwrap_or_default(),
+        fixed(remains.rms, 2),
+        fixed(remains.log_bayes_factor, 1)
     )
 }
 

@@ -191,6 +191,7 @@ pub fn noise(view: &View<'_>, result: &GapResult, numbers: &mut Numbers) -> Mark
         let assumed = match curve.origin {
             Origin::Replicates => "",
             Origin::Stated => " (stated)",
+            Origin::StatedInPart => " (stated in part)",
             Origin::Record => " (assumed)",
         };
         let memory: Vec<String> = curve.memory.iter().map(|a| fixed(*a, 2)).collect();

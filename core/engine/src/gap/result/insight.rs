@@ -67,7 +67,7 @@ impl<'a> SingleEffect<'a> {
     }
 
     fn explanation(&self) -> Explanation<'a, '_> {
-        Explanation { system: &self.system, fit: &self.fit }
+        Explanation::exact(&self.system, &self.fit)
     }
 }
 
@@ -90,14 +90,20 @@ pub fn insight<'a>(
         drift::DriftOptions { simulations: SIMULATIONS, ..drift::DriftOptions::default() };
     let drifting = stream.named("drift map");
     insight.drift = drift(&base, &first.fit, &found.noise, &whitener, options, &drifting);
+    let has_names =
+        matches!(verdict.word, VerdictKind::Named | VerdictKind::Approximate | VerdictKind::Class);
+    if let Some(map) = insight.drift.as_mut().filter(|_| has_names) {
+        let by: Vec<String> = verdict.effects.iter().map(|effect| effect.kind.clone()).collect();
+        (map.reading, map.words) = map.reading.explained(&map.words, &by);
+    }
     if let Some(named) = verdict.effects.first() {
-        let winner = Explanation { system: &found.system, fit: &found.last.fit };
+        let winner = Explanation::exact(&found.system, &found.last.fit);
         let alone = alone(found, candidates);
         let tried = candidates.len();
         // Of several effects, the second has no runner-up that was fitted together with the first.
         let other = alone.iter().find(|single| single.kind != named.kind);
         insight.against = Some(other.map_or(NOTHING.to_owned(), |single| single.kind.clone()));
-        let nothing = Explanation { system: &base, fit: &first.fit };
+        let nothing = Explanation::exact(&base, &first.fit);
         let second = other.map_or(nothing, SingleEffect::explanation);
         insight.cross_validation = cross_validate(winner, second, &found.noise, tried);
         if found.chosen.iter().all(|placement| !placement.on.is_empty()) {
@@ -106,7 +112,7 @@ pub fn insight<'a>(
         }
         insight.discrimination = discrimination(found, &alone, named);
     }
-    if verdict.word == VerdictKind::Unlisted {
+    if matches!(verdict.word, VerdictKind::Unlisted | VerdictKind::Approximate) {
         unnamed(found, &mut insight, stream);
     }
     insight

@@ -1,31 +1,37 @@
 //! The result of the gap workflow as plain data: for the report, for scripts, and for the study that is written.
 
 pub mod added;
+mod addition;
 mod curve;
 pub mod insight;
+pub mod remains;
 pub mod replaced;
 
 use lacuna::data::Unit;
 use lacuna::math::random::Stream;
 use lacuna::plugin::effect::On;
 use serde::{Deserialize, Serialize};
-use toml::Table;
 
 use self::added::Augmented;
-use crate::gap::candidates::{Candidate, Placement};
+use self::addition::additions;
+use crate::gap::candidates::{Candidate, Placement, Untried};
 use crate::gap::experiment::Experiment;
 use crate::gap::experiment::hold_out::HeldOutKind;
 use crate::gap::prove::Proof;
 use crate::gap::result::insight::{Insight, insight, withhold};
+use crate::gap::result::remains::{Remains, remains};
 use crate::gap::result::replaced::OtherModel;
 use crate::gap::search::needless::Needless;
 use crate::gap::search::{
-    Detectability, Diagnostics, SearchOptions, SearchResult, SearchStep, Verdict, verdict,
+    Detectability, Diagnostics, SearchOptions, SearchResult, SearchStep, Verdict, VerdictKind,
+    verdict,
 };
 use crate::gap::system::fit::precision;
 use crate::gap::test::Region;
 
+pub use addition::{AddedEffect, Estimate};
 pub use curve::CurveResult;
+
 /// A search and what was found after it, as reports show it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GapFindings {
@@ -61,6 +67,9 @@ pub struct GapResult {
     pub noise_assumed: bool,
     /// The effects that were found, as a study would add them.
     pub additions: Vec<AddedEffect>,
+    /// The effects that were not tried.
+    #[serde(default)]
+    pub untried: Vec<Untried>,
     /// The steps that led to them.
     pub path: Vec<StepResult>,
     /// The p-values of the largest score, the best cell of the scan and the energy: without the effects and with them.
@@ -86,6 +95,9 @@ pub struct GapResult {
     /// The residual at each output, whitened and projected off the slopes of the unknowns, in standard deviations of
     /// the mean: without the effects and with them.
     pub left: [Vec<f64>; 2],
+    /// The part of the gap that the effects leave; `None` if nothing shows.
+    #[serde(default)]
+    pub remains: Option<Remains>,
     /// The insight besides the verdict.
     pub insight: Insight,
     /// The proof on held-out data, by kind.
@@ -100,57 +112,6 @@ pub struct GapResult {
 
 /// The p-value of the energy above which there is no significant excess misfit that effects could explain.
 const EXCESS: f64 = 0.05;
-
-/// An effect as a study adds it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct AddedEffect {
-    /// The name.
-    pub name: String,
-    /// The type: the name that the study gives the candidate, otherwise that of the plugin.
-    pub kind: String,
-    /// The name of its plugin.
-    pub plugin: String,
-    /// A title for reports.
-    pub title: String,
-    /// The formula.
-    pub formula: String,
-    /// The labels on which it acts, by axis; empty for all.
-    pub on: On,
-    /// The options.
-    pub options: Table,
-    /// The inputs of the extended forward map that it sets free, if it acts inside the model.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub switches: Vec<usize>,
-    /// True if it is another model in place of the study's; its options are then those of `[model]`.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub model: bool,
-    /// The unknowns; for another model, the parameters that it shares with the study's.
-    pub unknowns: Vec<Estimate>,
-    /// The types that these data cannot distinguish from it, itself first.
-    pub class: Vec<String>,
-    /// The probability of its type among the candidates.
-    pub probability: f64,
-}
-
-impl AddedEffect {
-    /// The label in reports: the type, or the name of the other model.
-    pub fn label(&self) -> &str {
-        if self.model { &self.name } else { &self.kind }
-    }
-}
-
-/// An unknown with its value.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Estimate {
-    /// The name.
-    pub name: String,
-    /// The unit.
-    pub unit: Unit,
-    /// The value of largest posterior density, in its unit.
-    pub value: f64,
-    /// The standard deviation by the normal approximation.
-    pub sd: f64,
-}
 
 /// The size of a type of effect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -245,6 +206,21 @@ impl GapResult {
         has_share.then(|| self.verdict.closed.clamp(0.0, 1.0))
     }
 
+    /// The effects that a study may add: those that have a name, unless held-out data contradict them. Held-out data
+    /// do so where the interval of the share that closed holds zero.
+    pub fn worth_adding(&self) -> Vec<AddedEffect> {
+        let contradicted = self.held_out.iter().any(|part| {
+            let all = &part.proof.all;
+            all.closed <= 0.0 || all.lower.is_finite() && all.lower <= 0.0
+        });
+        let is_named = |effect: &&AddedEffect| match self.verdict.word {
+            VerdictKind::Named | VerdictKind::Approximate | VerdictKind::Class => true,
+            VerdictKind::Unlisted => effect.certain,
+            VerdictKind::None | VerdictKind::NotVisible => false,
+        };
+        self.additions.iter().filter(is_named).filter(|_| !contradicted).cloned().collect()
+    }
+
     /// The result of a search, without the proof.
     pub fn of<'a>(
         found: &SearchResult<'a>,
@@ -264,6 +240,7 @@ impl GapResult {
             simulations: options.simulations,
             noise_assumed: found.noise.is_assumed(),
             additions: additions(found, candidates, &verdict),
+            untried: Vec::new(),
             path: found.path.iter().map(|step| passed(step, candidates)).collect(),
             p: both.map(|diagnostics| diagnostics.p),
             regions: both.map(|diagnostics| spots(experiment, &diagnostics.regions)),
@@ -276,6 +253,7 @@ impl GapResult {
             sd: found.noise.sd(experiment, &found.last.fit.at.response),
             response: both.map(|diagnostics| diagnostics.fit.at.response.clone()),
             left: both.map(|diagnostics| diagnostics.statistics.residual.clone()),
+            remains: remains(found),
             insight,
             held_out: Vec::new(),
             models: Vec::new(),
@@ -283,42 +261,6 @@ impl GapResult {
             verdict,
         }
     }
-}
-
-fn additions(
-    found: &SearchResult<'_>,
-    candidates: &[Candidate],
-    verdict: &Verdict,
-) -> Vec<AddedEffect> {
-    let placed = found.system.effects.iter().zip(&found.chosen).zip(&verdict.effects);
-    placed
-        .map(|((effect, placement), named)| {
-            let candidate = &candidates[placement.candidate];
-            let described = candidate.effect.describe();
-            let unknowns = effect.hyperparameters().into_iter().enumerate();
-            AddedEffect {
-                name: named.name.clone(),
-                kind: named.kind.clone(),
-                plugin: candidate.plugin.clone(),
-                title: described.title,
-                formula: described.formula,
-                on: named.on.clone(),
-                options: candidate.options.clone(),
-                switches: candidate.effect.switches().to_vec(),
-                model: false,
-                unknowns: unknowns
-                    .map(|(k, unknown)| Estimate {
-                        name: unknown.name,
-                        unit: unknown.unit,
-                        value: named.values[k],
-                        sd: named.sd[k],
-                    })
-                    .collect(),
-                class: named.class.clone(),
-                probability: named.probability,
-            }
-        })
-        .collect()
 }
 
 fn passed(step: &SearchStep, candidates: &[Candidate]) -> StepResult {

@@ -99,7 +99,7 @@ fn replaced(
         cross_validation,
         idle,
     } = best;
-    let swap = AddedEffect { class, probability, ..swap };
+    let swap = AddedEffect { class, probability, share: closed, ..swap };
     let verdict = &mut other.verdict;
     verdict.closed = closed;
     verdict.effects.insert(0, named(&swap));
@@ -166,6 +166,10 @@ fn named(swap: &AddedEffect) -> MissingEffect {
         sd: swap.unknowns.iter().map(|unknown| unknown.sd).collect(),
         probability: swap.probability,
         class: swap.class.clone(),
+        share: swap.share,
+        supported: true,
+        contradicted: false,
+        certain: false,
     }
 }
 

@@ -7,6 +7,7 @@
 //! left-out part and the rest, and the covariance of the emulator's error, are included.
 
 use lacuna::math::special::{normal_quantile, student_t_cdf};
+use lacuna::plugin::discrepancy::CommonError;
 use lacuna_linalg::vector::dot;
 use lacuna_linalg::{Cholesky, Matrix, multiply_transposed, multiply_vector};
 use rayon::prelude::*;
@@ -58,6 +59,15 @@ pub struct Explanation<'a, 'b> {
     pub system: &'b System<'a>,
     /// The best fit.
     pub fit: &'b Fit,
+    /// The remainder that it leaves, as a further covariance of the mean; `None` for nothing.
+    pub remainder: Option<&'b CommonError>,
+}
+
+impl<'a, 'b> Explanation<'a, 'b> {
+    /// An explanation that leaves nothing.
+    pub fn exact(system: &'b System<'a>, fit: &'b Fit) -> Self {
+        Self { system, fit, remainder: None }
+    }
 }
 
 /// The cross-validation of two explanations.
@@ -93,10 +103,22 @@ pub fn cross_validate(
     noise: &Noise,
     tried: usize,
 ) -> Vec<CrossValidation> {
+    cross_validate_parts(first, second, noise, tried, |_| true)
+}
+
+/// As [`cross_validate`], with the parts for which `is_used` is true.
+pub(super) fn cross_validate_parts(
+    first: Explanation<'_, '_>,
+    second: Explanation<'_, '_>,
+    noise: &Noise,
+    tried: usize,
+    is_used: impl Fn(&Fold) -> bool,
+) -> Vec<CrossValidation> {
     let experiment = first.system.experiment;
     let kinds = [LeftOut::Condition, LeftOut::Replicate, LeftOut::Sensor, LeftOut::Block];
     let compared = kinds.into_iter().filter_map(|left_out| {
-        let folds = folds(experiment, noise, left_out);
+        let mut folds = folds(experiment, noise, left_out);
+        folds.retain(&is_used);
         if folds.len() < 2 {
             return None;
         }
@@ -129,24 +151,50 @@ fn score_of(
     let (both, noise_both) = part(experiment, noise, |c, r, i| !(fold.hidden)(c, r, i));
     let (rest, noise_rest) =
         part(experiment, noise, |c, r, i| !(fold.hidden)(c, r, i) && !(fold.left_out)(c, r, i));
-    let whiteners =
-        [Whitener::new(&both, &noise_both, response), Whitener::new(&rest, &noise_rest, response)];
     let means = [both.means().1, rest.means().1];
+    let whiteners = explanations.map(|explanation| {
+        let whitener = |experiment: &Experiment<'_>, noise: &Noise| {
+            let mut whole = experiment.clone();
+            whole.common.extend(explanation.remainder.cloned());
+            Whitener::new(&whole, noise, response)
+        };
+        [whitener(&both, &noise_both), whitener(&rest, &noise_rest)]
+    });
     let scores: Vec<Score> = explanations
         .iter()
-        .map(|explanation| Score::new(explanation, &whiteners, &means))
+        .zip(&whiteners)
+        .map(|(explanation, whiteners)| Score::new(explanation, whiteners, &means))
         .collect::<Option<Vec<Score>>>()?;
-    let difference = |shift: &[f64]| scores[0].value(shift) - scores[1].value(shift);
+    // Without remainders both have the same covariance, whose determinant cancels.
+    let determinants = if explanations.iter().any(|e| e.remainder.is_some()) {
+        let own = |[both, rest]: &[Whitener; 2]| both.log_determinant() - rest.log_determinant();
+        own(&whiteners[0]) - own(&whiteners[1])
+    } else {
+        0.0
+    };
+    let difference = |shifts: [&[f64]; 2]| {
+        scores[0].value(shifts[0]) - scores[1].value(shifts[1]) + determinants
+    };
     let nothing = vec![0.0; experiment.outputs()];
     let without = if fold.replicate.is_some() {
         Vec::new()
     } else {
         shifts(experiment, fold)
             .into_iter()
-            .map(|own| own.iter().map(|shift| difference(&whiteners[0].whiten(shift))).collect())
+            .map(|own| {
+                let moved = |shift: &Vec<f64>| {
+                    let white = [0, 1].map(|i: usize| whiteners[i][0].whiten(shift));
+                    difference([&white[0], &white[1]])
+                };
+                own.iter().map(moved).collect()
+            })
             .collect()
     };
-    Some(FoldScore { difference: difference(&nothing), replicate: fold.replicate, without })
+    Some(FoldScore {
+        difference: difference([&nothing, &nothing]),
+        replicate: fold.replicate,
+        without,
+    })
 }
 
 /// The change of the means of the left-out part without each replicate, by condition, one value an output.

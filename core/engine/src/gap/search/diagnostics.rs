@@ -4,11 +4,13 @@ use lacuna::math::moments::quantile;
 use lacuna::plugin::effect::On;
 use serde::{Deserialize, Serialize};
 
-use super::refit::Weighed;
+use super::refit::{TolerantEvidence, Weighed};
+use super::support::Support;
 use crate::gap::candidates::{Candidate, Placement};
 use crate::gap::noise::Noise;
 use crate::gap::system::System;
 use crate::gap::system::fit::Fit;
+use crate::gap::system::remainder::Remainder;
 use crate::gap::system::whitener::Whitener;
 use crate::gap::test::{DesignMatrix, NullDistribution, Region, TestStatistics};
 
@@ -42,6 +44,8 @@ pub struct Diagnostics {
     pub regions: Vec<Region>,
     /// The detectability of each placement.
     pub visible: Vec<Detectability>,
+    /// The evidence of its remainder.
+    pub tolerant: TolerantEvidence,
 }
 
 impl Diagnostics {
@@ -92,6 +96,8 @@ pub struct SearchResult<'a> {
     pub last: Diagnostics,
     /// The probability of each type for each effect, in the place of the one chosen, the most probable first.
     pub types: Vec<Vec<(String, f64)>>,
+    /// The support of each effect.
+    pub support: Vec<Support>,
     /// The probability of differences as large between conditions, or between the sensors of a group, if each effect
     /// were the same in all; 1 if there is nothing to compare.
     pub consistency: f64,
@@ -103,6 +109,8 @@ pub struct SearchResult<'a> {
     pub whitener: Whitener,
     /// The replicates' means, one an output, in the response's unit.
     pub means: Vec<f64>,
+    /// The remainder that was tried.
+    pub remainder: Remainder,
 }
 
 impl SearchResult<'_> {

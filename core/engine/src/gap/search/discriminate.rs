@@ -19,8 +19,9 @@ use crate::gap::system::fit::precision;
 use crate::gap::system::whitener::Whitener;
 use crate::gap::test::Projection;
 
-/// The log Bayes factor that distinguishes two explanations.
-const ENOUGH: f64 = 20.0;
+/// The log Bayes factor that distinguishes two explanations: 20 to 1, strong evidence (Kass and Raftery, Journal of the
+/// American Statistical Association 90 (1995) 773).
+const ENOUGH: f64 = 3.0;
 
 /// The largest number of further replicates.
 const MOST: usize = 1024;

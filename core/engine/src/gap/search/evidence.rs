@@ -13,8 +13,14 @@ use crate::gap::system::whitener::Whitener;
 /// Degrees of freedom of the proposal, whose tails are heavier than those of a posterior.
 const FREEDOM: f64 = 6.0;
 
-/// Number of draws from the proposal.
+/// Largest number of draws from the proposal.
 const DRAWS: usize = 400;
+
+/// Number of draws between two checks of the standard error.
+const BATCH: usize = 50;
+
+/// Standard error of the log evidence at which no more draws are made: odds are compared with 20 to 1.
+const ACCURATE: f64 = 0.07;
 
 /// Smallest effective number of draws; below it Laplace's method is used.
 const ENOUGH: f64 = 10.0;
@@ -55,9 +61,7 @@ pub fn log_evidence(
     };
     let Ok(factor) = Cholesky::new(&covariance) else { return laplace };
     let log_scale: f64 = scale.iter().map(|s| s.ln()).sum::<f64>() + 0.5 * factor.log_determinant();
-    let mut points = Vec::new();
-    let mut proposals = Vec::new();
-    for b in 0..DRAWS {
+    let draw = |b: usize| {
         let mut rng = stream.at(b as u64).generator();
         let z: Vec<f64> = (0..d).map(|_| normal(&mut rng)).collect();
         let chi: f64 = (0..FREEDOM as usize).map(|_| normal(&mut rng).powi(2)).sum();
@@ -65,11 +69,19 @@ pub fn log_evidence(
         let shift = multiply_vector(factor.lower(), &z);
         let point: Vec<f64> =
             (0..d).map(|j| fit.at.point[j] + scale[j] * stretch * shift[j]).collect();
-        points.push(point);
-        proposals.push(log_density_of_t(stretch * stretch * dot(&z, &z), d) - log_scale);
+        (point, log_density_of_t(stretch * stretch * dot(&z, &z), d) - log_scale)
+    };
+    let mut weights: Vec<f64> = Vec::new();
+    while weights.len() < DRAWS {
+        let batch = weights.len()..weights.len() + BATCH;
+        let (points, proposals): (Vec<Vec<f64>>, Vec<f64>) = batch.map(draw).unzip();
+        let densities = log_densities(system, whitener, means, &points);
+        weights.extend(densities.iter().zip(&proposals).map(|(p, q)| p - q));
+        // Laplace's method is exact to this accuracy for most systems: a few draws confirm it.
+        if let Some(found) = summary(&weights).filter(|found| found.error < ACCURATE) {
+            return found;
+        }
     }
-    let densities = log_densities(system, whitener, means, &points);
-    let weights: Vec<f64> = densities.iter().zip(&proposals).map(|(p, q)| p - q).collect();
     summary(&weights).unwrap_or(laplace)
 }
 

@@ -1,44 +1,51 @@
 //! Forward selection of effects, with groups of sensors, deletions, exchanges and pairs, as long as the tests reject
 //! and the odds are for a further effect.
 
+use std::sync::Arc;
+
 use lacuna::math::moments::{log_sum, mean, variance};
 use lacuna::math::random::Stream;
 use lacuna::plugin::effect::{On, Situation};
 
 use super::checks::{consistency, shares, stability};
 use super::diagnostics::{Diagnostics, SearchOptions, SearchResult, SearchStep, detectability};
-use super::refit::{Scored, Weighed, grow, most_promising, refit_all};
+use super::refit::{Scored, Weighed, most_promising, refit_all};
 use super::state::{SearchSetting, SearchState, kinds};
+use super::subsets::Screen;
+use super::support::{misfit, supports};
 use crate::gap::candidates::{Candidate, Placement, placements, sensors};
 use crate::gap::experiment::Experiment;
 use crate::gap::noise::Noise;
 use crate::gap::system::System;
-use crate::gap::system::fit::fit_from;
+use crate::gap::system::fit::{Fit, fit_from};
+use crate::gap::system::remainder::Remainder;
 use crate::gap::system::whitener::Whitener;
 use crate::gap::test::{DesignMatrix, Projection, Scan, Scores, TestSetting, differences, regions};
-
-/// Placements whose log weight is lower than the largest by more than this are no seeds of groups.
-const SEED: f64 = 20.0;
 
 /// The smallest log posterior odds of a further effect: what the first one leaves may be an error of its own form, so
 /// that a further effect needs odds of 20 to 1 (strong evidence by Kass and Raftery, Journal of the American
 /// Statistical Association 90 (1995) 773).
-const FURTHER: f64 = 3.0;
+pub(super) const FURTHER: f64 = 3.0;
 
-/// The number of placements of each step that are tried in pairs.
-const PAIRED: usize = 10;
+/// The smallest share of the first gap that an effect has to close, if it does not close most of the misfit on its own
+/// sensors.
+const LEAST: f64 = 0.15;
 
-/// The largest number of rounds of exchanges.
-const EXCHANGES: usize = 10;
+/// That share of the misfit on its own sensors.
+const MOST: f64 = 0.7;
+
+/// The number of standard deviations of the sum of squares of noise from which the misfit of some sensors is significant.
+const CLEAR: f64 = 4.0;
 
 /// The data, candidates and options of a search, which do not change on its path.
-struct Search<'a> {
+pub(super) struct Search<'a> {
     experiment: &'a Experiment<'a>,
     candidates: &'a [Candidate],
     placements: Vec<Placement>,
     scan: Scan,
     means: Vec<f64>,
-    sensors: usize,
+    sensors: Vec<On>,
+    remainder: Remainder,
     options: SearchOptions,
     stream: Stream,
 }
@@ -52,22 +59,26 @@ pub fn search<'a>(
     options: SearchOptions,
     stream: &Stream,
 ) -> Option<SearchResult<'a>> {
+    let means = experiment.means().1;
+    let (mut state, remainder) = base(experiment, &means, starts)?;
     let search = Search {
         experiment,
         candidates,
         placements: placements(experiment, candidates),
         scan: Scan::new(experiment),
-        means: experiment.means().1,
-        sensors: sensors(experiment).len(),
+        means,
+        sensors: sensors(experiment),
+        remainder,
         options,
         stream: stream.named("search"),
     };
-    let mut state = search.base(starts)?;
     let mut path: Vec<SearchStep> = Vec::new();
     let last = loop {
         let round = path.len() as u64;
-        let (diagnostics, design) = search.diagnose(&state, round);
-        let Some(step) = search.step(&mut state, &diagnostics, &design, round) else {
+        let (diagnostics, design, projection) = search.diagnose(&state, round);
+        let first = path.first().map_or(&diagnostics, |step| &step.before).clone();
+        let step = search.step(&mut state, &diagnostics, &design, &projection, round, &first);
+        let Some(step) = step else {
             break diagnostics;
         };
         path.push(step);
@@ -80,49 +91,70 @@ pub fn search<'a>(
         }
         None => 1.0,
     };
+    let first = path.first().map_or(last.tolerant.gap, |step| step.before.tolerant.gap);
+    let stream = search.stream.named("support");
+    let support = supports(&search.setting(), &state, &last.tolerant, first, &stream);
     let consistency = consistency(&state.system, &state.fit, &state.whitener);
     let types = slots.iter().map(|weighed| shares(candidates, weighed)).collect();
     let SearchState { system, chosen, noise, whitener, .. } = state;
-    let means = search.means;
+    let (means, remainder) = (search.means, search.remainder);
     Some(SearchResult {
         path,
         system,
         chosen,
         last,
         types,
+        support,
         consistency,
         stability,
         noise,
         whitener,
         means,
+        remainder,
     })
 }
 
+/// The calibration without effects: noise around a first fit, then around the fit with that noise; and the remainder
+/// around it.
+fn base<'a>(
+    experiment: &'a Experiment<'a>,
+    means: &[f64],
+    starts: &[Vec<f64>],
+) -> Option<(SearchState<'a>, Remainder)> {
+    let system = System::new(experiment, Vec::new());
+    let mut starts = starts.to_vec();
+    let mut calibrated = None;
+    for _ in 0..2 {
+        let around = system.around(&system.linearised(starts.first()?));
+        let noise = Noise::of(experiment, &around, None);
+        let whitener = Whitener::new(experiment, &noise, &around.response);
+        let fit = fit_from(&system, &whitener, means, &starts)?;
+        starts = vec![fit.at.point.clone()];
+        calibrated = Some((fit, noise, whitener));
+    }
+    let (fit, noise, whitener) = calibrated?;
+    let remainder = Remainder::of(experiment, &noise, &system.around(&fit.at));
+    let white = Arc::new(remainder.white(&whitener));
+    Some((SearchState { system, chosen: Vec::new(), fit, noise, whitener, white }, remainder))
+}
+
+/// True when a fit removes as large a share of the squared misfit beyond noise as an effect has to close of the gap: a
+/// free form does not see what is shorter than its lengths.
+fn improves(first: &Diagnostics, now: &Fit, next: &Fit) -> bool {
+    let removed = 2.0 * (next.log_density - now.log_density);
+    let whole = first.excess().max(2.0 * (next.log_density - first.fit.log_density));
+    removed >= LEAST * whole
+}
+
 impl<'a> Search<'a> {
-    fn setting<'b>(&'b self) -> SearchSetting<'a, 'b> {
+    pub(super) fn setting<'b>(&'b self) -> SearchSetting<'a, 'b> {
         SearchSetting {
             experiment: self.experiment,
             candidates: self.candidates,
             means: &self.means,
-            sensors: self.sensors,
+            sensors: self.sensors.len(),
+            remainder: &self.remainder,
         }
-    }
-
-    /// The calibration without effects: noise around a first fit, then around the fit with that noise.
-    fn base(&self, starts: &[Vec<f64>]) -> Option<SearchState<'a>> {
-        let system = System::new(self.experiment, Vec::new());
-        let mut starts = starts.to_vec();
-        let mut state: Option<SearchState<'a>> = None;
-        for _ in 0..2 {
-            let around = system.around(&system.linearised(starts.first()?));
-            let noise = Noise::of(self.experiment, &around, None);
-            let whitener = Whitener::new(self.experiment, &noise, &around.response);
-            let fit = fit_from(&system, &whitener, &self.means, &starts)?;
-            starts = vec![fit.at.point.clone()];
-            let system = system.clone();
-            state = Some(SearchState { system, chosen: Vec::new(), fit, noise, whitener });
-        }
-        state
     }
 
     /// Calls `use_it` with the part of a state that candidates may see: response and noise.
@@ -145,13 +177,28 @@ impl<'a> Search<'a> {
         state: &SearchState<'_>,
         design: &DesignMatrix,
         scores: &Scores,
+        projection: &Projection,
     ) -> Vec<Scored> {
+        let screen = Screen {
+            experiment: self.experiment,
+            candidates: self.candidates,
+            placements: &self.placements,
+            sensors: &self.sensors,
+            whitener: &state.whitener,
+            projection,
+            residual: &projection.rest(&state.fit.residual),
+        };
+        let sets = screen.best(design);
         self.situated(state, |situation| {
-            most_promising(&self.placements, self.candidates, design, scores, situation)
+            most_promising(&self.placements, self.candidates, design, scores, situation, sets)
         })
     }
 
-    fn diagnose(&self, state: &SearchState<'_>, round: u64) -> (Diagnostics, DesignMatrix) {
+    fn diagnose(
+        &self,
+        state: &SearchState<'_>,
+        round: u64,
+    ) -> (Diagnostics, DesignMatrix, Projection) {
         let projection = Projection::of(&state.system, &state.fit);
         let design = self.design(state, &projection);
         let setting = TestSetting {
@@ -178,9 +225,18 @@ impl<'a> Search<'a> {
         let naming = self.options.naming;
         let visible = detectability(self.candidates, &self.placements, &design, &nulls, naming);
         let fit = state.fit.clone();
-        let diagnostics =
-            Diagnostics { fit, statistics, expected_energy, energy_sd, p, regions, visible };
-        (diagnostics, design)
+        let tolerant = state.tolerant(&self.setting(), &self.stream.named("remainder").at(round));
+        let diagnostics = Diagnostics {
+            fit,
+            statistics,
+            expected_energy,
+            energy_sd,
+            p,
+            regions,
+            visible,
+            tolerant,
+        };
+        (diagnostics, design, projection)
     }
 
     /// The next step; `None` if the search ends.
@@ -189,7 +245,9 @@ impl<'a> Search<'a> {
         state: &mut SearchState<'a>,
         diagnostics: &Diagnostics,
         design: &DesignMatrix,
+        projection: &Projection,
         round: u64,
+        first: &Diagnostics,
     ) -> Option<SearchStep> {
         let room = self.options.most.saturating_sub(state.chosen.len());
         let stream = self.stream.named("weigh").at(round);
@@ -200,22 +258,28 @@ impl<'a> Search<'a> {
         if room == 0 || !(named || rest && room >= 2) {
             return None;
         }
-        let weighed = self.weighed(state, design, &diagnostics.statistics.scores, &stream);
+        let scores = &diagnostics.statistics.scores;
+        let weighed = self.weighed(state, design, scores, projection, &stream);
         // The weights of placements have neither the prior mass of their type nor that of the effects chosen before:
         // `nothing` is the weight of no further effect on that scale.
         let now = state.weight(&self.setting(), &stream);
         let nothing = now - state.prior(&self.setting()) + self.kinds();
         let log_odds = log_sum(weighed.iter().map(|j| j.log_weight)) - nothing;
+        let gap = diagnostics.tolerant.gap;
+        let least = LEAST * first.tolerant.gap;
+        let shares = |j: &&Weighed| {
+            gap - j.gap >= least || self.is_local(state, j) || improves(first, &state.fit, &j.fit)
+        };
         let outweighs = |best: &&Weighed| {
             // The gate of the tests already bounds false alarms of the first effect, so that odds above one suffice.
             // Further effects may describe the misfit of the first one's form: each must be strong by itself.
             let alone = state.chosen.is_empty() && log_odds > 0.0;
             alone || !state.chosen.is_empty() && best.log_weight > nothing + FURTHER
         };
-        let alone = weighed.first().filter(|best| named && outweighs(best));
+        let alone = weighed.iter().find(shares).filter(|best| named && outweighs(best));
         let added = match alone {
             Some(best) => vec![best.placement.clone()],
-            None if room >= 2 => self.pair(state, &weighed, now, &stream)?,
+            None if room >= 2 => self.pair(state, &weighed, now, [gap, least], &stream)?,
             None => return None,
         };
         for placement in &added {
@@ -224,6 +288,19 @@ impl<'a> Search<'a> {
         self.exchange(state, &stream);
         let dropped = self.drop_needless(state, &stream);
         Some(SearchStep { before: diagnostics.clone(), weighed, log_odds, added, dropped })
+    }
+
+    /// True when a placement on some sensors closes most of the misfit there: what is small beside the whole gap may be
+    /// all that one sensor shows.
+    fn is_local(&self, state: &SearchState<'_>, weighed: &Weighed) -> bool {
+        let placement = &weighed.placement;
+        if placement.on.is_empty() {
+            return false;
+        }
+        let acts = placement.placed(self.experiment, self.candidates, "").acts;
+        let [before, after] = [&state.fit, &weighed.fit].map(|fit| misfit(fit, &acts));
+        let values = acts.iter().filter(|acts| **acts).count() as f64;
+        before > CLEAR * (2.0 * values).sqrt() && before - after >= MOST * before
     }
 
     /// The log of the number of types.
@@ -237,9 +314,10 @@ impl<'a> Search<'a> {
         state: &SearchState<'a>,
         design: &DesignMatrix,
         scores: &Scores,
+        projection: &Projection,
         stream: &Stream,
     ) -> Vec<Weighed> {
-        let mut scored = self.most_promising(state, design, scores);
+        let mut scored = self.most_promising(state, design, scores, projection);
         // A second effect of the same type in the same place would not be identifiable.
         let is_there = |scored: &Scored| {
             let same = |chosen: &Placement| {
@@ -251,33 +329,12 @@ impl<'a> Search<'a> {
         let common = self.setting();
         let setting = state.refit_setting(&common);
         let mut weighed = refit_all(&setting, &state.fit, &scored, stream);
-        let best = weighed.first().map_or(0.0, |j| j.log_weight);
-        let mut seen: Vec<usize> = Vec::new();
-        let mut grown: Vec<Weighed> = Vec::new();
-        for (i, seed) in weighed.iter().enumerate() {
-            let candidate = seed.placement.candidate;
-            if seen.contains(&candidate)
-                || seed.placement.on.is_empty()
-                || seed.log_weight < best - SEED
-            {
-                continue;
-            }
-            seen.push(candidate);
-            let same = scored.iter().filter(|scored| scored.placement.candidate == candidate);
-            let others: Vec<On> = same.map(|scored| scored.placement.on.clone()).collect();
-            let stream = stream.named("groups").at(i as u64);
-            let group = grow(&setting, &state.fit, seed, &others, &stream);
-            if group.placement.on != seed.placement.on {
-                grown.push(group);
-            }
-        }
-        weighed.extend(grown);
         weighed.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
         weighed
     }
 
     /// The fitted values of the unknowns of a placement, in their units; the absent values if it was not fitted.
-    fn unknowns(&self, placement: &Placement, weighed: &[Weighed]) -> Vec<f64> {
+    pub(super) fn unknowns(&self, placement: &Placement, weighed: &[Weighed]) -> Vec<f64> {
         let effect = &self.candidates[placement.candidate].effect;
         let absent = effect.absent(&self.experiment.layouts.blocks[0]);
         let same = |j: &&Weighed| {
@@ -290,7 +347,7 @@ impl<'a> Search<'a> {
     }
 
     /// The placements that are weighed in place of one of the effects, in decreasing order of weight.
-    fn slot(
+    pub(super) fn slot(
         &self,
         state: &SearchState<'a>,
         i: usize,
@@ -302,86 +359,8 @@ impl<'a> Search<'a> {
         let (rows, spread) = differences(self.experiment);
         let left = projection.rest(&smaller.fit.residual);
         let scores = design.scores_of(&left, &smaller.whitener.whiten_rows(&rows), &spread);
-        let weighed = self.weighed(&smaller, &design, &scores, stream);
+        let weighed = self.weighed(&smaller, &design, &scores, &projection, stream);
         (smaller, weighed)
-    }
-
-    /// Exchanges effects for placements of larger weight.
-    fn exchange(&self, state: &mut SearchState<'a>, stream: &Stream) {
-        if state.chosen.len() < 2 {
-            return;
-        }
-        for round in 0..EXCHANGES {
-            let mut exchanged = false;
-            for i in 0..state.chosen.len() {
-                let stream = stream.named("exchange").at(round as u64).at(i as u64);
-                let (smaller, weighed) = self.slot(state, i, &stream);
-                let Some(best) = weighed.first() else { continue };
-                let chosen = &state.chosen[i];
-                let same =
-                    best.placement.candidate == chosen.candidate && best.placement.on == chosen.on;
-                if same {
-                    continue;
-                }
-                let own = self.unknowns(&best.placement, &weighed);
-                let next = smaller.with(&self.setting(), &best.placement, &own);
-                // The margin is above the error of the evidences: without it two states could alternate.
-                if next.weight(&self.setting(), &stream)
-                    > state.weight(&self.setting(), &stream) + 1.0
-                {
-                    *state = next;
-                    exchanged = true;
-                    break;
-                }
-            }
-            if !exchanged {
-                break;
-            }
-        }
-    }
-
-    /// Drops effects without which the weight is larger, and returns their names. The last one added stays.
-    fn drop_needless(&self, state: &mut SearchState<'a>, stream: &Stream) -> Vec<String> {
-        let common = self.setting();
-        // The last effect was just found necessary beside the others; the others were not tested beside it.
-        let mut dropped = Vec::new();
-        while state.chosen.len() > 1 {
-            let whole = state.weight(&common, stream);
-            let needless = (0..state.chosen.len() - 1).find_map(|i| {
-                let smaller = state.without(&common, i);
-                (smaller.weight(&common, stream) >= whole).then_some((i, smaller))
-            });
-            let Some((i, smaller)) = needless else { break };
-            dropped.push(state.system.effects[i].name.clone());
-            *state = smaller;
-        }
-        dropped
-    }
-
-    /// The pair of placements of largest weight; `None` if the weight is not larger than that of the present system.
-    fn pair(
-        &self,
-        state: &SearchState<'a>,
-        weighed: &[Weighed],
-        now: f64,
-        stream: &Stream,
-    ) -> Option<Vec<Placement>> {
-        let common = self.setting();
-        let promising: Vec<&Weighed> = weighed.iter().take(PAIRED).collect();
-        let mut best: Option<(f64, Vec<Placement>)> = None;
-        for (i, first) in promising.iter().enumerate() {
-            let one =
-                state.with(&common, &first.placement, &self.unknowns(&first.placement, weighed));
-            for second in &promising[i + 1..] {
-                let own = self.unknowns(&second.placement, weighed);
-                let both = one.with(&common, &second.placement, &own);
-                let weight = both.weight(&common, stream);
-                if weight > now + FURTHER && best.as_ref().is_none_or(|(most, _)| weight > *most) {
-                    best = Some((weight, vec![first.placement.clone(), second.placement.clone()]));
-                }
-            }
-        }
-        best.map(|(_, pair)| pair)
     }
 
     /// The placements that are weighed in place of each effect at the end.

@@ -8,9 +8,12 @@ mod discriminate;
 mod evidence;
 mod folds;
 mod forward;
+mod moves;
 pub mod needless;
 mod refit;
 mod state;
+mod subsets;
+mod support;
 #[cfg(test)]
 mod tests;
 mod verdict;
@@ -21,6 +24,9 @@ pub use diagnostics::{Detectability, Diagnostics, SearchOptions, SearchResult, S
 pub use discriminate::{DiscriminatingData, Discrimination, FurtherData, discriminate};
 pub use evidence::{LogEvidence, log_evidence};
 pub use forward::search;
-pub use refit::{RefitSetting, Scored, Weighed, log_prior, most_promising, refit, refit_all};
+pub use refit::{
+    RefitSetting, Scored, Weighed, log_prior, most_promising, placement_prior, refit, refit_all,
+};
 pub use state::kinds;
+pub use support::Support;
 pub use verdict::{MissingEffect, SURE, Verdict, VerdictKind, class, explains, verdict};

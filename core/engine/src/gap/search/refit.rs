@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use lacuna::math::random::Stream;
 use lacuna::math::special::ln_binomial;
-use lacuna::plugin::effect::{On, Reach, Situation};
+use lacuna::plugin::effect::{Reach, Situation};
 use lacuna_linalg::Matrix;
 use rayon::prelude::*;
 
@@ -13,6 +13,7 @@ use super::evidence::log_evidence;
 use crate::gap::candidates::{Candidate, Placement};
 use crate::gap::system::System;
 use crate::gap::system::fit::{Fit, fit_from};
+use crate::gap::system::remainder::{Setting, WhiteRemainder};
 use crate::gap::system::whitener::Whitener;
 use crate::gap::test::{DesignMatrix, Projection, Scores};
 
@@ -44,6 +45,21 @@ pub struct Weighed {
     pub fit: Fit,
     /// The log evidence plus the log prior mass.
     pub log_weight: f64,
+    /// The energy of the gap that is left with it.
+    pub gap: f64,
+}
+
+/// The evidence of a system with a remainder.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TolerantEvidence {
+    /// The log evidence, summed over the sizes of the remainder, up to the determinant of the noise.
+    pub value: f64,
+    /// The log Bayes factor of some remainder against none.
+    pub inexact: f64,
+    /// The energy of the gap that is left: see [`WhiteRemainder::energy`].
+    pub gap: f64,
+    /// The remainder of largest evidence; `None` for none.
+    pub setting: Option<Setting>,
 }
 
 /// The calibrated system and everything that a refit with a further placement needs.
@@ -55,6 +71,8 @@ pub struct RefitSetting<'a, 'b> {
     pub candidates: &'a [Candidate],
     /// The whitener of the mean.
     pub whitener: &'b Whitener,
+    /// The remainder in its coordinates.
+    pub white: &'b WhiteRemainder,
     /// The replicates' means, one an output, in the response's unit.
     pub means: &'b [f64],
     /// The number of sensors.
@@ -74,13 +92,14 @@ pub struct Scored {
     pub starts: Vec<Vec<f64>>,
 }
 
-/// The placements of largest score, which are refitted, in decreasing order.
+/// The placements of largest score, which are refitted, in decreasing order; among them `sets` of sensors.
 pub fn most_promising(
     placements: &[Placement],
     candidates: &[Candidate],
     design: &DesignMatrix,
     scores: &Scores,
     situation: &Situation<'_>,
+    sets: Vec<Scored>,
 ) -> Vec<Scored> {
     let mut by_placement: BTreeMap<usize, Vec<(f64, usize)>> = BTreeMap::new();
     for (j, regressor) in design.regressors.iter().enumerate() {
@@ -106,6 +125,16 @@ pub fn most_promising(
             absorbed: design.regressors[own[0].1].absorbed,
             starts: starts.chain(given).collect(),
         });
+    }
+    for set in sets {
+        let same = |other: &&mut Scored| {
+            let (a, b) = (&other.placement, &set.placement);
+            a.candidate == b.candidate && a.on == b.on
+        };
+        match scored.iter_mut().find(same) {
+            Some(known) => known.starts.extend(set.starts),
+            None => scored.push(set),
+        }
     }
     scored.sort_by(|a, b| b.score.total_cmp(&a.score));
     let best = scored.first().map_or(0.0, |scored| scored.score);
@@ -150,17 +179,34 @@ pub fn refit(
     let starts: Vec<Vec<f64>> =
         starts.iter().map(|own| base.at.point.iter().chain(own).copied().collect()).collect();
     let fit = fit_from(&system, setting.whitener, setting.means, &starts)?;
-    let weighed = log_evidence(&system, setting.whitener, setting.means, &fit, stream);
+    let evidence = setting.weigh(&system, &fit, stream);
     Some(Weighed {
         placement: scored.placement.clone(),
         score: scored.score,
         absorbed: scored.absorbed,
-        log_weight: weighed.value + setting.log_prior(&scored.placement),
+        log_weight: evidence.value + setting.log_prior(&scored.placement),
+        gap: evidence.gap,
         fit,
     })
 }
 
 impl<'a> RefitSetting<'a, '_> {
+    /// The evidence of a system at its best fit, with a remainder. The remainder is weighed by Laplace's method; what
+    /// importance sampling corrects without a remainder is added.
+    pub fn weigh(&self, system: &System<'_>, fit: &Fit, stream: &Stream) -> TolerantEvidence {
+        let exact = log_evidence(system, self.whitener, self.means, fit, stream).value;
+        let Some(grid) = self.white.weigh(system, self.whitener, self.means, fit) else {
+            return TolerantEvidence { value: exact, inexact: 0.0, gap: 0.0, setting: None };
+        };
+        let setting = grid.best();
+        TolerantEvidence {
+            value: grid.sum() + exact - fit.log_evidence(),
+            inexact: grid.inexact(),
+            gap: self.white.energy(fit, setting),
+            setting,
+        }
+    }
+
     /// The system with a further placement.
     pub fn with(&self, placement: &Placement) -> System<'a> {
         let kind = &self.candidates[placement.candidate].kind;
@@ -197,58 +243,23 @@ impl<'a> RefitSetting<'a, '_> {
         order.into_iter().take(STARTS).map(|i| starts[i].clone()).collect()
     }
 
-    /// The log prior mass of a placement within its type, divided among the variants of the type.
+    /// The log prior mass of a placement within its type.
     pub fn log_prior(&self, placement: &Placement) -> f64 {
-        let candidate = &self.candidates[placement.candidate];
-        let versions = self.candidates.iter().filter(|c| c.kind == candidate.kind).count();
-        let chosen = (!placement.on.is_empty()).then(|| chosen(placement));
-        log_prior(candidate.effect.reach(), chosen, self.sensors) - (versions as f64).ln()
+        placement_prior(self.candidates, placement, self.sensors)
     }
+}
+
+/// The log prior mass of a placement within its type, divided among the variants of the type.
+pub fn placement_prior(candidates: &[Candidate], placement: &Placement, sensors: usize) -> f64 {
+    let candidate = &candidates[placement.candidate];
+    let versions = candidates.iter().filter(|c| c.kind == candidate.kind).count();
+    let chosen = (!placement.on.is_empty()).then(|| chosen(placement));
+    log_prior(candidate.effect.reach(), chosen, sensors) - (versions as f64).ln()
 }
 
 /// The number of sensors that a placement acts on, by the labels of its place.
 fn chosen(placement: &Placement) -> usize {
     placement.on.values().map(Vec::len).product()
-}
-
-/// Grows a group from a placement on one sensor: each of `others`, the sensors on which the same candidate was weighed
-/// or scored in decreasing order, joins the group if that raises the weight.
-pub fn grow(
-    setting: &RefitSetting<'_, '_>,
-    base: &Fit,
-    seed: &Weighed,
-    others: &[On],
-    stream: &Stream,
-) -> Weighed {
-    let candidate = &setting.candidates[seed.placement.candidate];
-    let mut best = seed.clone();
-    if candidate.effect.reach() != Reach::Any || seed.placement.on.len() != 1 {
-        return best;
-    }
-    let begin = base.at.point.len();
-    for (round, on) in others.iter().enumerate() {
-        let Some(union) = union(&best.placement.on, on) else { continue };
-        let own = best.fit.at.point[begin..].to_vec();
-        let scored = Scored {
-            placement: Placement { candidate: seed.placement.candidate, on: union },
-            score: best.score,
-            absorbed: best.absorbed,
-            starts: vec![own],
-        };
-        let Some(next) = refit(setting, base, &scored, &stream.at(round as u64)) else { continue };
-        if next.log_weight > best.log_weight {
-            best = next;
-        }
-    }
-    best
-}
-
-/// The union of two places along one axis; `None` if the second adds nothing.
-fn union(on: &On, other: &On) -> Option<On> {
-    let (axis, labels) = on.iter().next()?;
-    let added = other.get(axis)?.iter().filter(|label| !labels.contains(label));
-    let all: Vec<String> = labels.iter().chain(added).cloned().collect();
-    (all.len() > labels.len()).then(|| On::from([(axis.clone(), all)]))
 }
 
 /// The log prior mass of a place within a type of effect: a third each for all sensors, for one sensor, and for a group

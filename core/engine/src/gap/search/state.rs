@@ -1,13 +1,16 @@
 //! The state of a search: a calibrated system on its path.
 
+use std::sync::Arc;
+
 use lacuna::math::random::Stream;
 
-use super::refit::RefitSetting;
+use super::refit::{RefitSetting, TolerantEvidence};
 use crate::gap::candidates::{Candidate, Placement};
 use crate::gap::experiment::Experiment;
 use crate::gap::noise::Noise;
 use crate::gap::system::System;
 use crate::gap::system::fit::{Fit, fit};
+use crate::gap::system::remainder::{Remainder, WhiteRemainder};
 use crate::gap::system::whitener::Whitener;
 
 /// A system with its fit, its noise and its whitener.
@@ -23,6 +26,8 @@ pub(super) struct SearchState<'a> {
     pub noise: Noise,
     /// The whitener of the mean under that noise.
     pub whitener: Whitener,
+    /// The remainder in its coordinates.
+    pub white: Arc<WhiteRemainder>,
 }
 
 /// The data and candidates of a search, which all its states share.
@@ -32,6 +37,7 @@ pub(super) struct SearchSetting<'a, 'b> {
     pub candidates: &'a [Candidate],
     pub means: &'b [f64],
     pub sensors: usize,
+    pub remainder: &'b Remainder,
 }
 
 impl<'a> SearchState<'a> {
@@ -41,6 +47,7 @@ impl<'a> SearchState<'a> {
             system: &self.system,
             candidates: shared.candidates,
             whitener: &self.whitener,
+            white: &self.white,
             means: shared.means,
             sensors: shared.sensors,
         }
@@ -62,6 +69,7 @@ impl<'a> SearchState<'a> {
         let around = system.around(&first.at);
         self.noise = Noise::of(shared.experiment, &around, Some(&self.noise));
         self.whitener = Whitener::new(shared.experiment, &self.noise, &around.response);
+        self.white = Arc::new(shared.remainder.white(&self.whitener));
         self.fit = fit(&system, &self.whitener, shared.means, &first.at.point);
         self.system = system;
     }
@@ -78,21 +86,19 @@ impl<'a> SearchState<'a> {
         let mut start = self.fit.at.point.clone();
         start.drain(begin..end);
         let fit = fit(&system, &self.whitener, shared.means, &start);
-        Self { system, chosen, fit, noise: self.noise.clone(), whitener: self.whitener.clone() }
+        Self { system, chosen, fit, ..self.clone() }
     }
 
     /// The log evidence plus the log prior mass of the effects. Noise that is estimated from single records changes
     /// with the residual, so that its determinant is included there.
     pub fn weight(&self, shared: &SearchSetting<'a, '_>, stream: &Stream) -> f64 {
-        let weighed = crate::gap::search::log_evidence(
-            &self.system,
-            &self.whitener,
-            shared.means,
-            &self.fit,
-            stream,
-        );
         let of_noise = if self.noise.is_assumed() { self.whitener.log_determinant() } else { 0.0 };
-        weighed.value + of_noise + self.prior(shared)
+        self.tolerant(shared, stream).value + of_noise + self.prior(shared)
+    }
+
+    /// The evidence with a remainder.
+    pub fn tolerant(&self, shared: &SearchSetting<'a, '_>, stream: &Stream) -> TolerantEvidence {
+        self.refit_setting(shared).weigh(&self.system, &self.fit, stream)
     }
 
     /// The log prior mass of the effects: of their types and placements.

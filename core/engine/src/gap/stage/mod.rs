@@ -85,6 +85,7 @@ pub fn inputs(study: &Study, problem: &InverseProblem<'_>) -> Value {
         study.gap.keys,
         pieces(study),
         candidates,
+        study.discrepancy.as_ref().map(|section| section.built.identity()),
         study.about.seed,
     ])
 }
@@ -102,6 +103,11 @@ fn summary(result: &GapResult) -> String {
     match result.verdict.word {
         VerdictKind::None => "data and model agree within the noise".to_owned(),
         VerdictKind::Named => format!("missing: {}", names.join(", ")),
+        VerdictKind::Approximate => format!(
+            "missing: something like {}, {:.0} % of the gap",
+            names.join(", "),
+            100.0 * result.verdict.closed
+        ),
         VerdictKind::Class => {
             let class: Vec<&str> =
                 result.additions.iter().flat_map(|a| a.class.iter().map(String::as_str)).collect();

@@ -10,7 +10,7 @@ use crate::gap::result::replaced::{AlternativeSearch, MODEL_SWAP, OtherModel, se
 use crate::gap::result::{AddedEffect, Estimate, GapResult};
 use crate::gap::search::needless::{OwnPiece, needless};
 use crate::gap::search::{
-    Explanation, RefitSetting, SearchResult, cross_validate, explains, kinds,
+    Explanation, SearchResult, cross_validate, explains, kinds, placement_prior,
 };
 use crate::gap::system::fit::precision;
 use crate::stage::inverse_problem::InverseProblem;
@@ -107,8 +107,8 @@ impl ModelSearch<'_> {
             let before = found.first();
             let result = with.result(&found_with, &before.fit.at.response, &measured.used)?;
             let closed = 1.0 - found_with.last.excess() / before.excess().max(f64::MIN_POSITIVE);
-            let winner = Explanation { system: &found_with.system, fit: &found_with.last.fit };
-            let second = Explanation { system: &found.system, fit: &found.last.fit };
+            let winner = Explanation::exact(&found_with.system, &found_with.last.fit);
+            let second = Explanation::exact(&found.system, &found.last.fit);
             Ok(Some(AlternativeSearch {
                 swap: addition(alternative, &found_with),
                 log_odds: odds.log_odds + prior - log_prior(found, own.candidates),
@@ -137,15 +137,9 @@ impl ModelSearch<'_> {
 
 /// The log prior mass of the effects that were found: of their types and of their places.
 fn log_prior(found: &SearchResult<'_>, candidates: &[Candidate]) -> f64 {
-    let setting = RefitSetting {
-        system: &found.system,
-        candidates,
-        whitener: &found.whitener,
-        means: &found.means,
-        sensors: sensors(found.system.experiment).len(),
-    };
+    let sensors = sensors(found.system.experiment).len();
     let types = (kinds(candidates) as f64).ln();
-    found.chosen.iter().map(|placement| setting.log_prior(placement) - types).sum()
+    found.chosen.iter().map(|p| placement_prior(candidates, p, sensors) - types).sum()
 }
 
 /// The model as an addition, with the parameters that it shares with the study's.
@@ -174,6 +168,8 @@ fn addition(alternative: &AlternativeModel<'_>, found: &SearchResult<'_>) -> Add
         unknowns: unknowns.collect(),
         class: Vec::new(),
         probability: 0.0,
+        share: 0.0,
+        certain: false,
     }
 }
 

@@ -10,9 +10,11 @@ use lacuna::run::{Observer, Stop};
 use lacuna_linalg::Matrix;
 use lacuna_run::RunDirectory;
 
-use crate::gap::candidates::{Candidate, proposed};
+use crate::gap::candidates::{Candidate, Positions, Proposed, Untried, proposed};
 use crate::gap::experiment::Experiment;
 use crate::gap::experiment::hold_out::{HeldOutData, HeldOutKind, HoldOutSplit, split};
+use crate::gap::experiment::stated::Statement;
+use crate::gap::experiment::transient::{Transient, transients, without};
 use crate::gap::experiment::wider::ExtendedMap;
 use crate::gap::experiment::with_effects::WithEffects;
 use crate::gap::inside;
@@ -89,11 +91,14 @@ impl<'a> SearchModel<'a> {
 pub struct PreparedSearch<'a> {
     base: &'a BaseModel<'a>,
     split: &'a HoldOutSplit,
+    transients: Vec<Transient>,
     starts: Vec<Vec<f64>>,
     /// The data that are not held out.
     pub experiment: &'a Experiment<'a>,
     /// The candidates.
     pub candidates: &'a [Candidate],
+    /// The effects that are not tried.
+    pub untried: &'a [Untried],
     /// The levels and limits of the search.
     pub options: SearchOptions,
     /// The random stream of the stage.
@@ -112,26 +117,33 @@ pub fn prepared<T>(
     let Some(measured) = &problem.data.value.measured else {
         return Err(Stop::new("the study has no `[measurements]` to search for a gap"));
     };
-    let split = apart(study, &measured.used);
+    let mut split = apart(study, &measured.used);
     let forward = WithEffects::new(beginning.forward, study.placed_effects());
     let parameters = forward.parameters(beginning.parameters);
     let wide = beginning.inside.wide.as_ref().map(|wide| wide.with_effects(study.placed_effects()));
     let wide = wide.as_ref();
     let base =
         BaseModel { study, problem, beginning, wide, forward: &forward, parameters: &parameters };
-    let starts = base.starts(&split.training, random)?;
+    let mut starts = base.starts(&split.training, random)?;
+    let transients = base.transients(&split.training, &starts[0]);
+    if !transients.is_empty() {
+        split.training = without(&split.training, &transients);
+        starts = base.starts(&split.training, random)?;
+    }
     let experiment = base.experiment(&split.training, &starts[0])?;
     let response = base.response(&starts[0]);
     let noise = Noise::of(&experiment, &base.around(&starts[0]), None).sd(&experiment, &response);
     let situation = Situation { layouts: &study.layouts, response: &response, noise: &noise };
-    let mut candidates = candidates(study, &situation)?;
+    let Proposed { mut candidates, untried } = candidates(study, &situation)?;
     candidates.extend(beginning.inside.candidates.iter().cloned());
     let made = use_it(&PreparedSearch {
         base: &base,
         split: &split,
+        transients,
         starts,
         experiment: &experiment,
         candidates: &candidates,
+        untried: &untried,
         options: options(study),
         random: random.clone(),
     });
@@ -166,6 +178,9 @@ impl<'a> PreparedSearch<'a> {
         all: &Observations,
     ) -> Result<GapResult, Stop> {
         let mut result = GapResult::of(found, self.candidates, self.options, &self.random);
+        result.untried = self.untried.to_vec();
+        result.verdict.reasons.extend(self.transients.iter().map(Transient::words));
+        let all = &without(all, &self.transients);
         let fitted =
             FittedSystem { system: &found.system, fit: &found.last.fit, noise: &found.noise };
         for part in &self.split.held_out {
@@ -193,11 +208,20 @@ fn options(study: &Study) -> SearchOptions {
 }
 
 /// The candidates of the study: those that the installed effects propose, and those that the study lists.
-fn candidates(study: &Study, situation: &Situation<'_>) -> Result<Vec<Candidate>, Stop> {
-    let mut all = proposed(study.gap.keys.candidates.as_deref(), situation).map_err(Stop::new)?;
+fn candidates(study: &Study, situation: &Situation<'_>) -> Result<Proposed, Stop> {
+    let keys = &study.gap.keys;
+    let positions = keys.positions.iter().map(|(axis, positions)| Positions {
+        axis: axis.clone(),
+        at: positions.at.clone(),
+        unit: positions.unit.clone(),
+    });
+    let positions: Vec<Positions> = positions.collect();
+    let names = keys.candidates.as_deref();
+    let mut all = proposed(names, &positions, situation).map_err(Stop::new)?;
     for section in &study.gap.candidates {
         let kind = section.common.name.as_ref().map_or(section.built.name, AsRef::as_ref);
-        all.push(
+        all.untried.retain(|untried| untried.kind != section.built.name);
+        all.candidates.push(
             Candidate::of(kind, section.built.name, &section.built.options).map_err(Stop::new)?,
         );
     }
@@ -222,6 +246,13 @@ impl<'a> BaseModel<'a> {
         Ok(maxima)
     }
 
+    /// The first values of records that are off about a fit.
+    fn transients(&self, data: &Observations, point: &[f64]) -> Vec<Transient> {
+        let layouts = &self.study.layouts;
+        let experiment = Experiment::new(layouts, self.parameters, self.forward, data);
+        transients(&experiment, &self.response(point))
+    }
+
     fn response(&self, point: &[f64]) -> Vec<f64> {
         self.forward.mean(&Matrix::from_vec(1, point.len(), point.to_vec())).into_vec()
     }
@@ -237,9 +268,9 @@ impl<'a> BaseModel<'a> {
         ResponseTangents { response, slopes }
     }
 
-    /// The noise as the data state it, otherwise as the study's discrepancy does, for all outputs; `None` if neither
-    /// does.
-    fn stated(&self, data: &Observations, response: &[f64]) -> Result<Option<StatedNoise>, Stop> {
+    /// The noise as the measurements state it, otherwise as the study's discrepancy does, for all outputs; `None` if
+    /// neither does.
+    fn stated(&self, data: &Observations, response: &[f64]) -> Result<Option<Statement>, Stop> {
         if data.blocks.iter().any(|block| block.covariance.is_some()) {
             let text =
                 "the search for what is missing cannot use a `covariance` of the measurements";
@@ -247,9 +278,29 @@ impl<'a> BaseModel<'a> {
                 "state the noise of single values, in a column `sigma`, or let replicates show it",
             ));
         }
+        let instruments = self.study.measurements.as_ref().and_then(|s| s.common.noise.as_ref());
+        let mut stated = instruments.map(|noise| {
+            let blocks = self.study.layouts.blocks.iter();
+            let outputs = blocks.flat_map(|layout| noise.of(layout)).collect();
+            Statement { outputs, by: "`noise` in `[measurements]`" }
+        });
         if data.states_noise() {
-            let sd = data.blocks.iter().flat_map(Measurements::stated_sd).collect();
-            return Ok(Some(StatedNoise { sd, correlation_time: None }));
+            let sd: Vec<f64> = data.blocks.iter().flat_map(Measurements::stated_sd).collect();
+            let Some(stated) = &mut stated else {
+                let stated = StatedNoise { sd, correlation_time: None };
+                return Ok(Some(Statement::complete(stated, "the column `sigma`")));
+            };
+            if stated.outputs.iter().any(|own| own.sd.is_some()) {
+                let text = "the measurements state the size of their noise twice: in a column `sigma` and in `noise` of \
+                            `[measurements]`";
+                return Err(Stop::new(text).help(
+                    "take `sd` and `resolution` out of `noise`, or the column out with `ignore = [\"sigma\"]`",
+                ));
+            }
+            stated.outputs.iter_mut().zip(sd).for_each(|(own, sd)| own.sd = Some(sd));
+        }
+        if stated.is_some() {
+            return Ok(stated);
         }
         let Some(section) = &self.study.discrepancy else { return Ok(None) };
         let mut all = StatedNoise { sd: Vec::new(), correlation_time: None };
@@ -261,7 +312,7 @@ impl<'a> BaseModel<'a> {
                 all.correlation_time.get_or_insert_default().extend(times);
             }
         }
-        Ok(Some(all))
+        Ok(Some(Statement::complete(all, "`discrepancy`")))
     }
 
     /// The measurements with the forward map and the covariance of its errors.
@@ -275,7 +326,7 @@ impl<'a> BaseModel<'a> {
         experiment.stated = self.stated(data, response)?;
         let noise = Noise::of(&experiment, &around, None);
         let all = error_covariance(&experiment, &noise, response, &self.samples(data)?);
-        (experiment.common, experiment.remainder) = (all.common, all.remainder);
+        (experiment.common, experiment.independent) = (all.common, all.independent);
         Ok(experiment)
     }
 

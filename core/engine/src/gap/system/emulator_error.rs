@@ -20,7 +20,7 @@ const WEIGHTS: [f64; 10] = [0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0]
 /// The number of values on either side over which the variance of the errors is averaged along a curve.
 const NEAR: usize = 4;
 
-/// Principal directions with a variance below this share of the noise variance join the remainder.
+/// Principal directions with a variance below this share of the noise variance join the independent errors.
 const MATTERS: f64 = 0.1;
 
 /// Covariance of the model's errors, in the form that a calibration uses.
@@ -28,8 +28,8 @@ const MATTERS: f64 = 0.1;
 pub struct ErrorCovariance {
     /// The part in the span of the samples: factors `outputs x errors`, in the response's unit.
     pub common: Vec<CommonError>,
-    /// The part outside that span: see [`Experiment::remainder`].
-    pub remainder: Vec<f64>,
+    /// The part outside that span: see [`Experiment::independent`].
+    pub independent: Vec<f64>,
 }
 
 /// The covariance of the model's errors from samples of them, around a response. The columns of each factor must be the
@@ -40,11 +40,11 @@ pub fn error_covariance(
     response: &[f64],
     samples: &[CommonError],
 ) -> ErrorCovariance {
-    let alone = Experiment { common: Vec::new(), remainder: Vec::new(), ..experiment.clone() };
+    let alone = Experiment { common: Vec::new(), independent: Vec::new(), ..experiment.clone() };
     let whitener = Whitener::new(&alone, noise, response);
     let scale = whitener.scale();
     let mut all =
-        ErrorCovariance { common: Vec::new(), remainder: vec![0.0; experiment.outputs()] };
+        ErrorCovariance { common: Vec::new(), independent: vec![0.0; experiment.outputs()] };
     for error in samples {
         let count = error.factor.columns();
         if count < 2 {
@@ -61,7 +61,7 @@ pub fn error_covariance(
         let factor =
             Matrix::from_fn(error.factor.rows(), count, |i, k| kept * error.factor[(i, k)]);
         all.common.push(CommonError { factor, ..error.clone() });
-        for ((sum, t), s) in all.remainder.iter_mut().zip(&target).zip(&scale) {
+        for ((sum, t), s) in all.independent.iter_mut().zip(&target).zip(&scale) {
             if *s > 0.0 {
                 *sum += weight * t / (s * s);
             }
@@ -71,8 +71,8 @@ pub fn error_covariance(
 }
 
 impl ErrorCovariance {
-    /// All errors as one factor, in the directions that matter compared with noise and remainder; the variance of the
-    /// other directions is added to the remainder.
+    /// All errors as one factor, in the directions that matter compared with noise and independent errors; the variance of the
+    /// other directions is added to the independent errors.
     fn joined(self, experiment: &Experiment<'_>, noise: &Noise, response: &[f64]) -> Self {
         let columns = self.common.iter().flat_map(|error| {
             (0..error.factor.columns()).map(|k| error.factor.column(k)).collect::<Vec<_>>()
@@ -83,7 +83,7 @@ impl ErrorCovariance {
         }
         let alone = Experiment {
             common: Vec::new(),
-            remainder: self.remainder.clone(),
+            independent: self.independent.clone(),
             ..experiment.clone()
         };
         let whitener = Whitener::new(&alone, noise, response);
@@ -94,9 +94,9 @@ impl ErrorCovariance {
         let vectors = eigen.vectors.select_columns(&kept);
         let inside = transposed_multiply(&vectors, &white);
         let square = |rows: &Matrix, i: usize| rows.iter_rows().map(|r| r[i] * r[i]).sum::<f64>();
-        let mut remainder = self.remainder;
+        let mut independent = self.independent;
         for (i, s) in whitener.scale().iter().enumerate().filter(|(_, s)| **s > 0.0) {
-            remainder[i] += (square(&white, i) - square(&inside, i)).max(0.0) / (s * s);
+            independent[i] += (square(&white, i) - square(&inside, i)).max(0.0) / (s * s);
         }
         let names: Vec<&str> = self.common.iter().map(|error| error.origin.as_str()).collect();
         let (origin, factor) = (names.join(", "), transposed_multiply(&rows, &vectors));
@@ -106,7 +106,7 @@ impl ErrorCovariance {
                 factor,
                 predictive: true,
             }],
-            remainder,
+            independent,
         }
     }
 }

@@ -1,20 +1,38 @@
 //! The best fit of a system to the replicates' means: largest posterior density under known noise.
 //!
 //! Levenberg and Marquardt's method on whitened residuals with rows for the prior (Nocedal and Wright, Numerical
-//! Optimization, 2nd ed., section 10.3), inside the bounds of the priors.
-//!
-//! An unknown with a log-uniform prior is searched in its logarithm, where the prior is flat: in the unknown itself the
-//! density grows as `1/x` toward the lower bound, and one step in units of the prior's width ends at a bound.
+//! Optimization, 2nd ed., section 10.3), inside the bounds of the priors: each step is the least value of the damped
+//! quadratic inside the box that they form, in the [coordinates](super::coordinate) in which the priors are about normal.
 
 use lacuna::math::distribution::Distribution;
 use lacuna_linalg::vector::dot;
 use lacuna_linalg::{Cholesky, Matrix, gram, multiply_vector};
 
+use super::coordinate::{curvature, inner, log_slope, moved, room, slope, unit};
+use super::step::within;
 use super::whitener::Whitener;
 use super::{Linearised, System};
 
 /// Largest number of steps of a fit.
-const STEPS: usize = 40;
+const STEPS: usize = 100;
+
+/// Smallest gain in log density that a step has to promise to be tried.
+const PROMISED: f64 = 1e-9;
+
+/// Largest number of tries of a step, each with eight times the damping.
+const TRIES: usize = 10;
+
+/// Number of steps from each of several starts after which they are compared.
+const FIRST: usize = 6;
+
+/// The multiple of the gain that the next step promises which a start may still gain.
+const HOPE: f64 = 4.0;
+
+/// Smallest damping after a failed try, relative to the curvature.
+const LEAST: f64 = 1e-4;
+
+/// Damping above which a small gain may be that of a short step, so that the fit continues.
+const SHORT: f64 = 1e-2;
 
 /// Smallest gain in log density at which the fit continues.
 const GAIN: f64 = 1e-5;
@@ -28,7 +46,7 @@ pub struct Fit {
     pub residual: Vec<f64>,
     /// The whitened derivatives, `unknowns x outputs`, per unit of each unknown.
     pub slopes: Matrix,
-    /// The curvature of minus the log density of each prior there.
+    /// The curvature of minus the log density of each prior there, in its coordinate.
     pub prior_curvature: Vec<f64>,
     /// Lower bound of the precision that each prior adds: that of its width, so that an unknown which the data do not
     /// determine is not wider than its prior.
@@ -109,100 +127,115 @@ pub fn precision(prior: &Distribution) -> f64 {
     1.0 / (sd * sd)
 }
 
-/// The curvature of minus the log density of a prior at a point; zero if it is negative.
-fn curvature(prior: &Distribution, x: f64) -> f64 {
-    let (low, high) = prior.support();
-    let step = 1e-4 / precision(prior).sqrt();
-    let (a, b) = ((x - step).max(low), (x + step).min(high));
-    let (left, right) = (prior.log_density_derivative(a), prior.log_density_derivative(b));
-    let curvature = (left - right) / (b - a);
-    if curvature.is_finite() { curvature.max(0.0) } else { 0.0 }
-}
-
-/// Returns true if an unknown is searched in its logarithm.
-fn in_logarithm(prior: &Distribution) -> bool {
-    matches!(prior, Distribution::LogUniform(_))
-}
-
-/// The width of a prior in the coordinate in which its unknown is searched.
-fn width(prior: &Distribution) -> f64 {
-    match *prior {
-        // The standard deviation of the uniform logarithm.
-        Distribution::LogUniform([low, high]) => (high.ln() - low.ln()) / 12.0_f64.sqrt(),
-        _ => 1.0 / precision(prior).sqrt(),
-    }
-}
-
-/// The log of the derivatives of the unknowns by the coordinates in which they are searched.
-fn log_slope(priors: &[Distribution], point: &[f64]) -> f64 {
-    let searched = priors.iter().zip(point).filter(|(prior, _)| in_logarithm(prior));
-    searched.map(|(_, x)| x.ln()).sum()
-}
-
 /// The fit of largest posterior density to the means (one per output, in the response's unit), from a start in the
-/// unknowns' units. The density is that of the searched coordinates: the logarithm for log-uniform priors.
+/// unknowns' units. The density is that of the searched coordinates: the logarithm for log-uniform and log-normal
+/// priors.
 pub fn fit(system: &System<'_>, whitener: &Whitener, means: &[f64], start: &[f64]) -> Fit {
-    let bounds = inner(&system.bounds(), system.priors());
-    let start: Vec<f64> =
-        start.iter().zip(&bounds).map(|(x, (low, high))| x.clamp(*low, *high)).collect();
-    let mut best = at(system, whitener, means, &start);
-    let merit = |log_density: f64, point: &[f64]| log_density + log_slope(system.priors(), point);
-    let mut damping = 1e-3;
-    for _ in 0..STEPS {
-        let mut improved = None;
-        // A step that does not improve is repeated with more damping: shorter, and closer to the gradient.
-        for _ in 0..8 {
-            let point = step(system, &best, damping, &bounds);
-            if point == best.at.point {
-                break;
-            }
-            let density = log_density(system, whitener, means, &point);
-            if merit(density, &point) > merit(best.log_density, &best.at.point) {
-                improved = Some(point);
-                break;
-            }
-            damping = (damping * 8.0).max(1e-8);
-        }
-        let Some(point) = improved else { break };
-        damping = (damping * 0.1).max(1e-12);
-        let next = at(system, whitener, means, &point);
-        let gain =
-            merit(next.log_density, &next.at.point) - merit(best.log_density, &best.at.point);
-        best = next;
-        if gain < GAIN {
-            break;
-        }
-    }
-    best
+    let mut ascent = Ascent::from(system, whitener, means, start);
+    ascent.climb(STEPS);
+    ascent.best
 }
 
-/// The fit of largest log density from several starts; the first one if several are equal.
+/// The fit of largest log density from several starts; the first one if several are equal. A start that is far below
+/// another one after some steps, and promises little, is given up.
 pub fn fit_from(
     system: &System<'_>,
     whitener: &Whitener,
     means: &[f64],
     starts: &[Vec<f64>],
 ) -> Option<Fit> {
-    let fits = starts.iter().map(|start| fit(system, whitener, means, start));
+    let begun = starts.iter().map(|start| {
+        let mut ascent = Ascent::from(system, whitener, means, start);
+        ascent.climb(if starts.len() > 1 { FIRST } else { STEPS });
+        ascent
+    });
+    let mut begun: Vec<Ascent<'_, '_>> = begun.collect();
+    begun.retain(|ascent| ascent.best.log_density.is_finite());
+    let ahead = begun.iter().map(Ascent::height).fold(f64::NEG_INFINITY, f64::max);
+    begun.retain(|ascent| ascent.height() + HOPE * ascent.promised + GAIN >= ahead);
     let merit = |fit: &Fit| fit.log_density + log_slope(system.priors(), &fit.at.point);
-    fits.filter(|fit| fit.log_density.is_finite())
-        .reduce(|best, next| if merit(&next) > merit(&best) + GAIN { next } else { best })
+    let fits = begun.into_iter().map(|mut ascent| {
+        ascent.climb(STEPS);
+        ascent.best
+    });
+    fits.reduce(|best, next| if merit(&next) > merit(&best) + GAIN { next } else { best })
 }
 
-/// Bounds slightly inside those of the priors, where densities are finite.
-fn inner(bounds: &[(f64, f64)], priors: &[Distribution]) -> Vec<(f64, f64)> {
-    let inset = |(&(low, high), prior): (&(f64, f64), &Distribution)| {
-        let width = high - low;
-        if in_logarithm(prior) {
-            // A share of the width would cut off decades of a log-uniform prior.
-            (low * (1.0 + 1e-9), high * (1.0 - 1e-9))
-        } else if width.is_finite() {
-            (low + 1e-9 * width, high - 1e-9 * width)
-        } else {
-            (low, high)
+/// A search for the largest density, on its way.
+struct Ascent<'a, 'b> {
+    system: &'b System<'a>,
+    whitener: &'b Whitener,
+    means: &'b [f64],
+    bounds: Vec<(f64, f64)>,
+    best: Fit,
+    damping: f64,
+    /// The gain in log density that the next step promises; zero at the end of the search.
+    promised: f64,
+}
+
+impl<'a, 'b> Ascent<'a, 'b> {
+    fn from(
+        system: &'b System<'a>,
+        whitener: &'b Whitener,
+        means: &'b [f64],
+        start: &[f64],
+    ) -> Self {
+        let bounds = system.priors().iter().zip(system.bounds());
+        let bounds: Vec<(f64, f64)> = bounds.map(|(prior, own)| inner(prior, own)).collect();
+        let start: Vec<f64> =
+            start.iter().zip(&bounds).map(|(x, (low, high))| x.clamp(*low, *high)).collect();
+        let best = at(system, whitener, means, &start);
+        Self { system, whitener, means, bounds, best, damping: 1e-3, promised: f64::INFINITY }
+    }
+
+    /// The log density in the searched coordinates.
+    fn height(&self) -> f64 {
+        self.merit(self.best.log_density, &self.best.at.point)
+    }
+
+    fn merit(&self, log_density: f64, point: &[f64]) -> f64 {
+        log_density + log_slope(self.system.priors(), point)
+    }
+
+    /// Climbs by at most so many steps, or to the end.
+    fn climb(&mut self, steps: usize) {
+        for _ in 0..steps {
+            if self.promised == 0.0 {
+                break;
+            }
+            let Some(point) = self.improved() else {
+                self.promised = 0.0;
+                break;
+            };
+            let short = self.damping > SHORT;
+            self.damping = (self.damping * 0.1).max(1e-12);
+            let before = self.height();
+            self.best = at(self.system, self.whitener, self.means, &point);
+            if self.height() - before < GAIN && !short {
+                self.promised = 0.0;
+            }
         }
-    };
-    bounds.iter().zip(priors).map(inset).collect()
+        if self.promised > 0.0 {
+            self.promised = step(self.system, &self.best, self.damping, &self.bounds).1;
+        }
+    }
+
+    /// A point of larger density. A step that does not improve is repeated with more damping: shorter, and closer to
+    /// the gradient.
+    fn improved(&mut self) -> Option<Vec<f64>> {
+        for _ in 0..TRIES {
+            let (point, promised) = step(self.system, &self.best, self.damping, &self.bounds);
+            if promised < PROMISED {
+                return None;
+            }
+            let density = log_density(self.system, self.whitener, self.means, &point);
+            if self.merit(density, &point) > self.height() {
+                return Some(point);
+            }
+            self.damping = (self.damping * 8.0).max(LEAST);
+        }
+        None
+    }
 }
 
 fn residual(means: &[f64], response: &[f64]) -> Vec<f64> {
@@ -228,54 +261,33 @@ pub fn at(system: &System<'_>, whitener: &Whitener, means: &[f64], point: &[f64]
         if finite { log_prior - 0.5 * dot(&residual, &residual) } else { f64::NEG_INFINITY };
     let priors = system.priors();
     let prior_curvature = priors.iter().zip(point).map(|(p, &x)| curvature(p, x)).collect();
-    // The width of a log-uniform prior is that of the logarithm, whatever the size of the unknown.
-    let own_precision = |(prior, x): (&Distribution, &f64)| {
-        if in_logarithm(prior) { (x * width(prior)).powi(-2) } else { precision(prior) }
-    };
-    let prior_precision = priors.iter().zip(point).map(own_precision).collect();
+    let prior_precision = priors.iter().zip(point).map(|(p, &x)| unit(p, x).powi(-2)).collect();
     let slopes = whitener.whiten_rows(&at.tangents);
     Fit { at, residual, slopes, prior_curvature, prior_precision, log_density, log_prior }
 }
 
-/// The next point: a damped Gauss-Newton step in units of the priors' widths, along the free unknowns. An unknown that
-/// is searched in its logarithm moves by at most one width of its prior.
-fn step(system: &System<'_>, here: &Fit, damping: f64, bounds: &[(f64, f64)]) -> Vec<f64> {
+/// The next point, by a damped Gauss-Newton step in units of the priors' widths, inside the bounds; and the gain in log
+/// density that the damped quadratic promises.
+fn step(system: &System<'_>, here: &Fit, damping: f64, bounds: &[(f64, f64)]) -> (Vec<f64>, f64) {
     let point = &here.at.point;
     let priors = system.priors();
+    let unit: Vec<f64> = priors.iter().zip(point).map(|(prior, &x)| unit(prior, x)).collect();
     let mut gradient = multiply_vector(&here.slopes, &here.residual);
-    for (g, (prior, &x)) in gradient.iter_mut().zip(priors.iter().zip(point)) {
-        // The slope of a flat prior in the logarithm is none: `-1/x`, and `1/x` of the logarithm's own slope.
-        *g += if in_logarithm(prior) { 0.0 } else { prior.log_density_derivative(x) };
+    for (j, g) in gradient.iter_mut().enumerate() {
+        *g = (*g + slope(&priors[j], point[j])) * unit[j];
     }
-    let blocked = |j: usize| {
-        let (low, high) = bounds[j];
-        (point[j] <= low && gradient[j] < 0.0) || (point[j] >= high && gradient[j] > 0.0)
-    };
-    let free: Vec<usize> = (0..point.len()).filter(|&j| !blocked(j)).collect();
     let hessian = here.hessian();
-    // The change of each unknown per width of its prior.
-    let unit: Vec<f64> = priors
-        .iter()
-        .zip(point)
-        .map(|(prior, x)| width(prior) * if in_logarithm(prior) { *x } else { 1.0 })
-        .collect();
-    let reduced = Matrix::from_fn(free.len(), free.len(), |a, b| {
-        let (i, j) = (free[a], free[b]);
+    let damped = Matrix::from_fn(point.len(), point.len(), |i, j| {
         let value = unit[i] * hessian[(i, j)] * unit[j];
-        if a == b { value * (1.0 + damping) + 1e-12 + damping } else { value }
+        if i == j { value * (1.0 + damping) + 1e-12 + damping } else { value }
     });
+    let room = (0..point.len()).map(|j| room(&priors[j], point[j], bounds[j]));
+    let (low, high): (Vec<f64>, Vec<f64>) = room.unzip();
     // Without a Cholesky factor there is no step, and the fit ends at the present point.
-    let Ok(factor) = Cholesky::new(&reduced) else { return point.clone() };
-    let mut shift: Vec<f64> = free.iter().map(|&j| gradient[j] * unit[j]).collect();
-    factor.solve(&mut shift);
-    let mut next = point.clone();
-    for (&j, s) in free.iter().zip(&shift) {
-        let moved = if in_logarithm(&priors[j]) {
-            point[j] * (s.clamp(-1.0, 1.0) * width(&priors[j])).exp()
-        } else {
-            point[j] + s * unit[j]
-        };
-        next[j] = moved.clamp(bounds[j].0, bounds[j].1);
-    }
-    next
+    let Some(shift) = within(&damped, &gradient, &low, &high) else {
+        return (point.clone(), 0.0);
+    };
+    let promised = dot(&gradient, &shift) - 0.5 * dot(&shift, &multiply_vector(&damped, &shift));
+    let next = |j: usize| moved(&priors[j], point[j], shift[j]).clamp(bounds[j].0, bounds[j].1);
+    ((0..point.len()).map(next).collect(), promised)
 }

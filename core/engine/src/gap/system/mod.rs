@@ -1,7 +1,10 @@
 //! A system: a forward map with effects, one vector of unknowns, the response and its derivatives.
 
+mod coordinate;
 pub mod emulator_error;
 pub mod fit;
+pub mod remainder;
+mod step;
 pub mod switched;
 pub mod whitener;
 

@@ -25,15 +25,16 @@ pub struct Whitener {
     /// The curves of each condition with the lower factor of their correlation.
     across: Vec<(std::ops::Range<usize>, Matrix)>,
     outputs: usize,
-    /// The share of the remainder in the variance of each output, without the part of low rank.
-    remainder: Vec<f64>,
-    low_rank: Option<LowRank>,
+    /// The share of independent errors in the variance of each output, without the part of low rank.
+    independent: Vec<f64>,
+    /// Parts of low rank, one on top of the other: random effects and known errors, then a remainder.
+    low_rank: Vec<LowRank>,
 }
 
 #[derive(Debug, Clone)]
 struct CurveWhitener {
     measured: Vec<usize>,
-    /// The inverse of the standard deviation of the innovations of the mean and the remainder, one per measured value.
+    /// The inverse of the standard deviation of the innovations of the mean with independent errors, one per measured value.
     scale: Vec<f64>,
     succession: Succession,
 }
@@ -59,15 +60,15 @@ impl Whitener {
         response: &[f64],
         counts: &[f64],
     ) -> Self {
-        let mut remainder = vec![0.0; experiment.outputs()];
+        let mut independent = vec![0.0; experiment.outputs()];
         let mut curves = Vec::new();
         for (curve, law) in experiment.curves.iter().zip(&noise.curves) {
             let mut scale = Vec::new();
             for (&i, w) in curve.measured.iter().zip(&law.profile) {
-                let rest = experiment.remainder.get(i).copied().unwrap_or(0.0);
+                let rest = experiment.independent.get(i).copied().unwrap_or(0.0);
                 let variance = (law.sd * w).powi(2) / counts[i] + rest;
                 scale.push(1.0 / variance.sqrt());
-                remainder[i] = rest / variance;
+                independent[i] = rest / variance;
             }
             let (measured, succession) = (curve.measured.clone(), law.succession(curve));
             curves.push(CurveWhitener { measured, scale, succession });
@@ -77,14 +78,14 @@ impl Whitener {
             .filter_map(|(condition, factor)| Some((condition.curves.clone(), factor.clone()?)))
             .collect();
         let outputs = experiment.outputs();
-        let mut whitener = Self { curves, across, outputs, remainder, low_rank: None };
+        let mut whitener = Self { curves, across, outputs, independent, low_rank: Vec::new() };
         let mut spread = wander(experiment, noise, response, counts);
         spread.extend(experiment.common.iter().flat_map(|error| {
             (0..error.factor.columns()).map(|j| error.factor.column(j)).collect::<Vec<_>>()
         }));
         let mut columns: Vec<Vec<f64>> = spread.iter().map(|u| whitener.base(u)).collect();
         columns.retain(|u| dot(u, u) > NEGLIGIBLE);
-        whitener.low_rank = LowRank::of(&columns, outputs);
+        whitener.low_rank.extend(LowRank::of(&columns, outputs));
         whitener
     }
 
@@ -92,7 +93,7 @@ impl Whitener {
     /// noise and model errors, and zero if nothing was measured.
     pub fn whiten(&self, differences: &[f64]) -> Vec<f64> {
         let mut white = self.base(differences);
-        if let Some(low_rank) = &self.low_rank {
+        for low_rank in &self.low_rank {
             let along = transposed_multiply_vector(&low_rank.directions, &white);
             let shrunk: Vec<f64> = along.iter().zip(&low_rank.shrink).map(|(a, s)| a * s).collect();
             let taken = multiply_vector(&low_rank.directions, &shrunk);
@@ -105,29 +106,24 @@ impl Whitener {
     pub fn whiten_rows(&self, rows: &Matrix) -> Matrix {
         let base = rows.iter_rows().map(|row| self.base(row));
         let mut white = Matrix::from_rows(self.outputs, base);
-        if let Some(low_rank) = &self.low_rank {
-            let mut along = multiply(&white, &low_rank.directions);
-            for i in 0..along.rows() {
-                along.row_mut(i).iter_mut().zip(&low_rank.shrink).for_each(|(a, s)| *a *= s);
-            }
-            let taken = multiply_transposed(&along, &low_rank.directions);
-            white.as_mut_slice().iter_mut().zip(taken.as_slice()).for_each(|(w, t)| *w -= t);
-        }
+        self.low_rank.iter().for_each(|low_rank| low_rank.shrink_rows(&mut white));
         white
     }
 
-    /// The variance of the product of each whitened row with the remainder of the emulator's error.
-    pub fn of_remainder(&self, rows: &Matrix) -> Vec<f64> {
+    /// This whitener with a further covariance `Q diag(variances) Q'` of whitened differences, `Q` being orthonormal
+    /// rows, `directions x outputs`.
+    pub fn with(&self, directions: &Matrix, variances: &[f64]) -> Self {
+        let mut other = self.clone();
+        let shrink = variances.iter().map(|v| 1.0 - 1.0 / (1.0 + v).sqrt()).collect();
+        other.low_rank.push(LowRank { directions: directions.transposed(), shrink });
+        other
+    }
+
+    /// The variance of the product of each whitened row with the independent part of the emulator's error.
+    pub fn of_independent(&self, rows: &Matrix) -> Vec<f64> {
         let mut seen = rows.clone();
-        if let Some(low_rank) = &self.low_rank {
-            let mut along = multiply(&seen, &low_rank.directions);
-            for i in 0..along.rows() {
-                along.row_mut(i).iter_mut().zip(&low_rank.shrink).for_each(|(a, s)| *a *= s);
-            }
-            let taken = multiply_transposed(&along, &low_rank.directions);
-            seen.as_mut_slice().iter_mut().zip(taken.as_slice()).for_each(|(w, t)| *w -= t);
-        }
-        let one = |row: &[f64]| row.iter().zip(&self.remainder).map(|(x, r)| x * x * r).sum();
+        self.low_rank.iter().rev().for_each(|low_rank| low_rank.shrink_rows(&mut seen));
+        let one = |row: &[f64]| row.iter().zip(&self.independent).map(|(x, r)| x * x * r).sum();
         seen.iter_rows().map(one).collect()
     }
 
@@ -259,6 +255,16 @@ fn wander(
 }
 
 impl LowRank {
+    /// Applies `I - Q diag(shrink) Q'` to each row.
+    fn shrink_rows(&self, rows: &mut Matrix) {
+        let mut along = multiply(rows, &self.directions);
+        for i in 0..along.rows() {
+            along.row_mut(i).iter_mut().zip(&self.shrink).for_each(|(a, s)| *a *= s);
+        }
+        let taken = multiply_transposed(&along, &self.directions);
+        rows.as_mut_slice().iter_mut().zip(taken.as_slice()).for_each(|(w, t)| *w -= t);
+    }
+
     /// The low-rank whitener from the columns of `U`.
     fn of(columns: &[Vec<f64>], outputs: usize) -> Option<Self> {
         if columns.is_empty() {

@@ -234,7 +234,7 @@ impl TestSetting<'_> {
 /// A draw from the covariance of the emulator's error, one value an output, in the response's unit: the same error for
 /// all replicates.
 pub fn common_error(experiment: &Experiment<'_>, noise: &Noise, stream: &Stream) -> Vec<f64> {
-    let mut all = noise.remainder(experiment, &stream.named("remainder"));
+    let mut all = noise.independent(experiment, &stream.named("remainder"));
     let mut rng = stream.generator();
     for error in &experiment.common {
         let draw: Vec<f64> = (0..error.factor.columns()).map(|_| normal(&mut rng)).collect();

@@ -118,6 +118,11 @@ impl DesignMatrix {
         Self { regressors: all, rows, common, changes }
     }
 
+    /// The derivative of the response by the size of a regressor, one value an output, in the response's unit.
+    pub fn change(&self, regressor: usize) -> &[f64] {
+        self.changes.row(regressor)
+    }
+
     /// The `count` regressors of largest score at most, whitened with another noise.
     pub fn strongest(
         &self,
@@ -307,6 +312,6 @@ fn common(experiment: &Experiment<'_>, whitener: &Whitener, rows: &Matrix) -> Ve
             *v += row.iter().map(|x| x * x).sum::<f64>();
         }
     }
-    variance.iter_mut().zip(whitener.of_remainder(rows)).for_each(|(v, own)| *v += own);
+    variance.iter_mut().zip(whitener.of_independent(rows)).for_each(|(v, own)| *v += own);
     variance.iter().map(|v| v.min(1.0)).collect()
 }

@@ -27,6 +27,10 @@ pub struct Effect {
     pub parameters: ByName<Unknown>,
     /// Posterior probability of the type among the candidates.
     pub probability: f64,
+    /// Share of the gap that the effect closes beside the others.
+    pub share: f64,
+    /// True if the effect keeps its name although another part of the gap may have none.
+    pub certain: bool,
     /// Types that the data cannot distinguish from this one, which comes first.
     pub class: Vec<String>,
 }
@@ -61,6 +65,8 @@ impl Effect {
             on: addition.on.clone(),
             parameters: unknowns.collect(),
             probability: addition.probability,
+            share: addition.share,
+            certain: addition.certain,
             class: addition.class.clone(),
         }
     }

@@ -11,8 +11,10 @@ use self::effect::Effect;
 use self::held_out::HeldOut;
 use self::insight::Insight;
 use super::value::{ByName, Quantity};
+use crate::gap::candidates::Untried;
 use crate::gap::experiment::hold_out::HeldOutKind;
 use crate::gap::result::added::Augmented;
+use crate::gap::result::remains::Remains;
 use crate::gap::result::{GapFindings, GapResult, HeldOut as Compared, RegionResult, Shift};
 use crate::gap::search::VerdictKind;
 
@@ -31,6 +33,10 @@ pub struct Gap {
     pub p_after: Tests,
     /// Effects that were found; another model in place of the study's own comes first.
     pub effects: Vec<Effect>,
+    /// Part of the gap that the effects leave; `null` if nothing shows.
+    pub remains: Option<Remains>,
+    /// Effects that were not tried, with the reason.
+    pub untried: Vec<Untried>,
     /// Types that the data cannot distinguish, if the verdict is `class`.
     pub class: Vec<String>,
     /// Regions where data and model disagree, without effects.
@@ -157,6 +163,8 @@ impl Gap {
             p: Tests::of(result.p[0]),
             p_after: Tests::of(result.p[1]),
             effects: result.additions.iter().map(|a| Effect::of(a, added)).collect(),
+            remains: result.remains.clone(),
+            untried: result.untried.clone(),
             class: class(result),
             regions,
             regions_after,

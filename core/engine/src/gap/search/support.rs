@@ -1,0 +1,113 @@
+//! The support of each effect at the end of a search: how much of the gap it closes beside the others, and whether it
+//! predicts left-out data better than a free form in its place.
+//!
+//! The rival of an effect is the system without it and with a remainder, the Gaussian process of
+//! [`remainder`](crate::gap::system::remainder). A wrong effect describes the data from which it was found as well as
+//! any flexible form does; only what is right in its form predicts data of which the free form knows nothing.
+
+use lacuna::math::random::Stream;
+use lacuna::plugin::discrepancy::CommonError;
+use lacuna_linalg::vector::dot;
+use serde::{Deserialize, Serialize};
+
+use super::cross_validate::{CrossValidation, Explanation, cross_validate_parts};
+use super::folds::Fold;
+use super::refit::TolerantEvidence;
+use super::state::{SearchSetting, SearchState};
+use crate::gap::experiment::Experiment;
+use crate::gap::system::fit::Fit;
+
+/// The largest share of an effect in a left-out part: of an effect that is nearly all there, the rest knows only the prior.
+const THERE: f64 = 0.8;
+
+/// The support of one effect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Support {
+    /// The share of the first gap that it closes beside the other effects.
+    pub share: f64,
+    /// The share of the misfit on its own sensors beyond noise that it closes beside the other effects.
+    pub local: f64,
+    /// The cross-validation against a free form in its place.
+    pub against_free_form: Vec<CrossValidation>,
+}
+
+impl Support {
+    /// True when it predicts each kind of left-out data better than the free form, by this number of standard errors.
+    /// Without data that could be left out nothing contradicts it.
+    pub fn transfers(&self, errors: f64) -> bool {
+        let better = |one: &CrossValidation| one.difference > errors * one.error.unwrap_or(0.0);
+        self.against_free_form.iter().all(better)
+    }
+}
+
+/// The support of each effect of a state; `last` is its evidence with a remainder, `first` the energy of the gap before
+/// the first step.
+pub(super) fn supports<'a>(
+    shared: &SearchSetting<'a, '_>,
+    state: &SearchState<'a>,
+    last: &TolerantEvidence,
+    first: f64,
+    stream: &Stream,
+) -> Vec<Support> {
+    let remainder = |evidence: &TolerantEvidence| -> Option<CommonError> {
+        let outputs = shared.experiment.outputs() as f64;
+        evidence.setting.map(|setting| shared.remainder.common(setting, outputs))
+    };
+    let left = remainder(last);
+    let with = Explanation { system: &state.system, fit: &state.fit, remainder: left.as_ref() };
+    let support = |i: usize| {
+        let smaller = state.without(shared, i);
+        let evidence = smaller.tolerant(shared, &stream.at(i as u64));
+        let form = remainder(&evidence);
+        let rival =
+            Explanation { system: &smaller.system, fit: &smaller.fit, remainder: form.as_ref() };
+        let acts = &state.system.effects[i].acts;
+        let change = change(state, shared.experiment, i);
+        let is_used = |fold: &Fold| share_in(shared.experiment, &change, fold) <= THERE;
+        let [before, after] = [&smaller.fit, &state.fit].map(|fit| misfit(fit, acts));
+        Support {
+            share: (evidence.gap - last.gap) / first.max(f64::MIN_POSITIVE),
+            local: (before - after) / before.max(1.0),
+            against_free_form: cross_validate_parts(with, rival, &state.noise, 1, is_used),
+        }
+    };
+    (0..state.chosen.len()).map(support).collect()
+}
+
+/// The squared whitened residual beyond noise of some outputs.
+pub(super) fn misfit(fit: &Fit, acts: &[bool]) -> f64 {
+    let own: Vec<f64> =
+        fit.residual.iter().zip(acts).filter(|(_, acts)| **acts).map(|(z, _)| *z).collect();
+    (dot(&own, &own) - own.len() as f64).max(0.0)
+}
+
+/// The squared change of each output by effect `i` in units of the noise.
+fn change(state: &SearchState<'_>, experiment: &Experiment<'_>, i: usize) -> Vec<f64> {
+    let begin = experiment.parameters.len()
+        + state.system.effects[..i].iter().map(|e| e.absent().len()).sum::<usize>();
+    let absent = state.system.effects[i].absent();
+    let mut point = state.fit.at.point.clone();
+    point[begin..begin + absent.len()].copy_from_slice(&absent);
+    let without = state.system.responses(&[point]).remove(0);
+    let response = &state.fit.at.response;
+    let sd = state.noise.sd(experiment, response);
+    let each = response.iter().zip(without).zip(sd);
+    each.map(|((with, without), sd)| ((with - without) / sd.max(f64::MIN_POSITIVE)).powi(2))
+        .collect()
+}
+
+/// The share of an effect that lies in a part and in the neighbourhood that is hidden with it; zero for a replicate.
+fn share_in(experiment: &Experiment<'_>, change: &[f64], fold: &Fold) -> f64 {
+    if fold.replicate.is_some() {
+        return 0.0;
+    }
+    let (mut inside, mut all) = (0.0, f64::MIN_POSITIVE);
+    for (c, condition) in experiment.conditions.iter().enumerate() {
+        for i in condition.outputs.clone().filter(|&i| change[i].is_finite()) {
+            all += change[i];
+            let is_there = (fold.left_out)(c, 0, i) || (fold.hidden)(c, 0, i);
+            inside += if is_there { change[i] } else { 0.0 };
+        }
+    }
+    inside / all
+}

@@ -1,0 +1,97 @@
+//! The coordinates in which a fit searches: the logarithm of an unknown whose prior is about normal or flat in it, else
+//! the unknown itself; each in units of the width of its prior.
+//!
+//! In the unknown itself the density of a log-uniform prior grows as `1/x` toward the lower bound, and one step in units
+//! of the prior's width ends at a bound.
+
+use lacuna::math::distribution::Distribution;
+
+use super::fit::precision;
+
+/// The farthest that one step moves an unknown with two bounds or a logarithm, in widths of its prior: a linearised
+/// response seldom holds over more, and a bound that is reached in one step may have no slope that leads back.
+const FARTHEST: f64 = 1.0;
+
+/// The distance from a bound, relative to the interval, at which densities are finite.
+const INSIDE: f64 = 1e-9;
+
+/// Returns true if an unknown is searched in its logarithm.
+fn in_logarithm(prior: &Distribution) -> bool {
+    matches!(prior, Distribution::LogUniform(_) | Distribution::LogNormal(_))
+}
+
+/// The standard deviation of a prior in the coordinate in which its unknown is searched.
+fn width(prior: &Distribution) -> f64 {
+    match *prior {
+        Distribution::LogUniform([low, high]) => (high.ln() - low.ln()) / 12.0_f64.sqrt(),
+        Distribution::LogNormal([_, sigma]) => sigma,
+        _ => 1.0 / precision(prior).sqrt(),
+    }
+}
+
+/// The log of the derivatives of the unknowns by their coordinates: a log density plus this is that of the coordinates.
+pub(super) fn log_slope(priors: &[Distribution], point: &[f64]) -> f64 {
+    let searched = priors.iter().zip(point).filter(|(prior, _)| in_logarithm(prior));
+    searched.map(|(_, x)| x.ln()).sum()
+}
+
+/// The change of an unknown per width of its prior, at a value.
+pub(super) fn unit(prior: &Distribution, x: f64) -> f64 {
+    if in_logarithm(prior) { width(prior) * x } else { width(prior) }
+}
+
+/// The slope of the log density of a prior in its coordinate, per unit of the unknown.
+pub(super) fn slope(prior: &Distribution, x: f64) -> f64 {
+    match *prior {
+        Distribution::LogUniform(_) => 0.0,
+        Distribution::LogNormal([mu, sigma]) => (mu - x.ln()) / (sigma * sigma * x),
+        _ => prior.log_density_derivative(x),
+    }
+}
+
+/// The curvature of minus the log density of a prior in its coordinate, per squared unit of the unknown; zero if it is
+/// negative.
+pub(super) fn curvature(prior: &Distribution, x: f64) -> f64 {
+    if in_logarithm(prior) {
+        let normal = matches!(prior, Distribution::LogNormal(_));
+        return if normal { (width(prior) * x).powi(-2) } else { 0.0 };
+    }
+    let (low, high) = prior.support();
+    let step = 1e-4 / precision(prior).sqrt();
+    let (a, b) = ((x - step).max(low), (x + step).min(high));
+    let (left, right) = (prior.log_density_derivative(a), prior.log_density_derivative(b));
+    let curvature = (left - right) / (b - a);
+    if curvature.is_finite() { curvature.max(0.0) } else { 0.0 }
+}
+
+/// The value of an unknown after so many widths of its prior.
+pub(super) fn moved(prior: &Distribution, x: f64, widths: f64) -> f64 {
+    if in_logarithm(prior) { x * (widths * width(prior)).exp() } else { x + widths * width(prior) }
+}
+
+/// The lowest and the highest step that is allowed from a value inside its bounds, in widths of the prior.
+pub(super) fn room(prior: &Distribution, x: f64, (low, high): (f64, f64)) -> (f64, f64) {
+    let [below, above] = [low, high].map(|bound| {
+        if in_logarithm(prior) {
+            (bound.max(0.0) / x).ln() / width(prior)
+        } else {
+            (bound - x) / width(prior)
+        }
+    });
+    let limited = in_logarithm(prior) || (high - low).is_finite();
+    let farthest = if limited { FARTHEST } else { f64::INFINITY };
+    (below.max(-farthest).min(0.0), above.min(farthest).max(0.0))
+}
+
+/// Bounds slightly inside those of a prior, where its density is finite.
+pub(super) fn inner(prior: &Distribution, (low, high): (f64, f64)) -> (f64, f64) {
+    let width = high - low;
+    if in_logarithm(prior) {
+        // A share of the width would cut off decades of a log-uniform prior.
+        (low.max(f64::MIN_POSITIVE) * (1.0 + INSIDE), high * (1.0 - INSIDE))
+    } else if width.is_finite() {
+        (low + INSIDE * width, high - INSIDE * width)
+    } else {
+        (low, high)
+    }
+}
