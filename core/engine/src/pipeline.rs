@@ -14,6 +14,7 @@ use lacuna::plugin::registry::{NoKeys, Section};
 use lacuna::run::{Listener, Observer, Stop};
 use lacuna_run::{Kept, RunDirectory, Stage};
 
+use crate::gap::inside::companion;
 use crate::gap::power::{PowerDesign, Rates, stage as power};
 use crate::gap::stage as gap;
 use crate::posterior::{Given, Posterior};
@@ -110,6 +111,7 @@ fn pursue(
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {
     contents::before_all(study)?;
+    companion::build_added(study)?;
     manifest::begin(study, run)?;
     let observer = &Listener::new(observer);
     let findings = match (&study.target, &study.surrogate) {

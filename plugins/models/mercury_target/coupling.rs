@@ -76,6 +76,8 @@ pub struct Joints {
     pub plate: Option<(Vec<usize>, f64)>,
     /// Fluid nodes of an absorbing rear end, behind which the fluid continues.
     pub open_end: Vec<usize>,
+    /// Share of the pressure that the fluid behind an absorbing rear end reflects.
+    pub reflection: f64,
 }
 
 #[derive(Debug, Clone)]
@@ -125,7 +127,9 @@ impl Motion {
             .map(|&node| Absorber {
                 node,
                 inverse_mass: std::mem::take(&mut inverse.fluid_z[node]),
-                resistance: impedance * area[1][node],
+                // The impedance of the fluid behind is `(1 + r) / (1 - r)` times as large where it reflects `r`.
+                resistance: impedance * area[1][node] * (1.0 + joints.reflection)
+                    / (1.0 - joints.reflection),
             })
             .collect();
         let (mut plate, mut plate_inverse) = (Vec::new(), 0.0);

@@ -30,6 +30,7 @@ pub(super) struct Values {
     pulse_energy: f64,
     beam_width: f64,
     wall_thickness: f64,
+    rear_reflection: f64,
 }
 
 impl Values {
@@ -41,6 +42,7 @@ impl Values {
             pulse_energy: 1.0,
             beam_width: target.pulse.width,
             wall_thickness: 1.0,
+            rear_reflection: 0.0,
         }
     }
 
@@ -66,6 +68,7 @@ impl Values {
         settings.pulse.peak_pressure *= self.pulse_energy;
         settings.pulse.wall_strain *= self.pulse_energy;
         settings.pulse.width = self.beam_width;
+        settings.rear_reflection = self.rear_reflection;
         settings.wall.cap_thickness *= self.wall_thickness;
         settings.wall.cylinder_thickness *= self.wall_thickness;
         settings
@@ -116,7 +119,7 @@ const fn entry(
     Entry { name, part, unit, range, description, place }
 }
 
-const ENTRIES: [Entry; 14] = [
+const ENTRIES: [Entry; 15] = [
     entry(
         Part::Mercury,
         "density",
@@ -228,6 +231,14 @@ const ENTRIES: [Entry; 14] = [
         (0.05, 20.0),
         "thickness of the walls divided by that of the options",
         |v| &mut v.wall_thickness,
+    ),
+    entry(
+        Part::Vessel,
+        "rear_reflection",
+        "1",
+        (-0.999, 0.999),
+        "share of the pressure that the rear end reflects: 0 absorbs all waves, 1 would be a rigid wall",
+        |v| &mut v.rear_reflection,
     ),
 ];
 

@@ -23,8 +23,8 @@ use crate::readers::sierra::write::{History, Origin, write_history};
 /// `time` (s).
 ///
 /// A study may also set the inputs `damping` (1/s: vibrations decay as exp(-damping t / 2)), `pulse_energy` and
-/// `wall_thickness` (relative to the options) and `beam_width` (m); otherwise the options and zero damping apply. The
-/// inputs of `mercury_target_equilibrium_gas` and `mercury_target_bubbles` are accepted without effect, so that a
+/// `wall_thickness` (relative to the options), `beam_width` (m) and `rear_reflection` (the share of the pressure that the
+/// rear end reflects); otherwise the options, zero damping and an absorbing end apply. The inputs of `mercury_target_equilibrium_gas` and `mercury_target_bubbles` are accepted without effect, so that a
 /// study can change the model by its name alone.
 ///
 /// The output times must be whole multiples of the smallest step between them. Each run is written as an Exodus II
@@ -64,6 +64,7 @@ impl MercuryTarget {
             gauges: self.gauges.clone(),
             sampling,
             damping: 0.0,
+            rear_reflection: 0.0,
         }
     }
 

@@ -24,6 +24,9 @@ pub struct Settings {
     /// Decay of all motion in proportion to its mass, 1/s: free vibrations of any frequency decay in amplitude as
     /// `exp(-damping t / 2)`.
     pub damping: f64,
+    /// Share of the pressure that an absorbing rear end reflects, above -1 and below 1: 0 absorbs all waves, 1 would be
+    /// a rigid wall.
+    pub rear_reflection: f64,
 }
 
 /// A cylinder with a spherical cap as beam window; `z` runs from the cap's apex to the rear.
@@ -353,6 +356,7 @@ impl Settings {
         check("numerics.quadratic_viscosity", n.quadratic_viscosity, mild, "in [0, 2]")?;
         check("numerics.hourglass", n.hourglass, |x| (0.0..=0.2).contains(&x), "in [0, 0.2]")?;
         check("damping", self.damping, |x| x >= 0.0, "zero or more")?;
+        check("rear_reflection", self.rear_reflection, |x| x.abs() < 1.0, "above -1 and below 1")?;
         check("sampling.interval", self.sampling.interval, |x| x > 0.0, "a positive number")?;
         if self.sampling.count == 0 {
             return Err(SimulationError::Settings(

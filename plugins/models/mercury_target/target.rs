@@ -44,7 +44,7 @@ impl Target {
         let vessel = Vessel {
             shell: shell(settings, meridian),
             held: held(&mesh, wall.len(), settings.numerics.rear),
-            joints: joints(&mesh, &wall, settings.numerics.rear),
+            joints: joints(&mesh, &wall, settings),
             mesh,
         };
         Ok(Self { settings: settings.clone(), vessel, shapes, sensors })
@@ -202,14 +202,14 @@ fn held(mesh: &Mesh, wall_nodes: usize, rear: Rear) -> Held {
     held
 }
 
-fn joints(mesh: &Mesh, wall: &[usize], rear: Rear) -> Joints {
+fn joints(mesh: &Mesh, wall: &[usize], settings: &Settings) -> Joints {
     let contact = |(s, &n): (usize, &usize)| {
         (n, s, if s == mesh.nr { Contact::Stick } else { Contact::Slip })
     };
-    let open_end = match rear {
+    let open_end = match settings.numerics.rear {
         Rear::Absorbing => (0..=mesh.nr).map(|j| mesh.node(mesh.nz, j)).collect(),
         Rear::Rigid => Vec::new(),
     };
     let contacts = wall[..wall.len() - 1].iter().enumerate().map(contact).collect();
-    Joints { contacts, plate: None, open_end }
+    Joints { contacts, plate: None, open_end, reflection: settings.rear_reflection }
 }

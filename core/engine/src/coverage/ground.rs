@@ -133,8 +133,7 @@ impl<'a> Ground<'a> {
         let study = self.study;
         let laws: Vec<_> =
             study.parameters.iter().map(|p| (&p.name, &p.prior, &p.design)).collect();
-        let effects: Vec<_> =
-            study.effects.iter().map(|e| (e.built.identity(), &e.common)).collect();
+        let effects = study.effects_identity();
         json!([
             self.hash,
             study.measurements.as_ref().map(|m| &m.common),

@@ -73,7 +73,7 @@ fn made(
     for (k, effect) in study.placed_effects().iter().enumerate() {
         let values =
             truths::of_priors(&effect.hyperparameters(), &random.named("effect").at(k as u64));
-        response = effect.apply(&response, &values);
+        response = effect.apply(&response, &values, theta);
         truth.extend(values);
     }
     let measured = ground.measured();

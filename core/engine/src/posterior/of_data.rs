@@ -50,7 +50,7 @@ impl<'a> OfData<'a> {
     /// hyperparameters.
     pub fn response(&self, theta: &[f64], hyper: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let mean = self.forward.mean(&Matrix::from_vec(1, theta.len(), theta.to_vec()));
-        (self.with_effects(mean.row(0).to_vec(), hyper), hyper[self.own()..].to_vec())
+        (self.with_effects(mean.row(0).to_vec(), theta, hyper), hyper[self.own()..].to_vec())
     }
 
     /// Index at which the discrepancy's own hyperparameters begin.
@@ -60,7 +60,7 @@ impl<'a> OfData<'a> {
 
     /// Log-likelihood for each row of responses of the forward map (`points x outputs`); rows that are not finite are
     /// skipped.
-    fn batch(&self, means: Matrix, hyper: &Matrix) -> Vec<f64> {
+    fn batch(&self, means: Matrix, theta: &Matrix, hyper: &Matrix) -> Vec<f64> {
         let mut values = vec![f64::NEG_INFINITY; means.rows()];
         let finite = |&i: &usize| means.row(i).iter().all(|y| y.is_finite());
         let asked: Vec<usize> = (0..means.rows()).filter(finite).collect();
@@ -70,7 +70,9 @@ impl<'a> OfData<'a> {
             (true, true) => means,
             (true, false) => means.select_rows(&asked),
             (false, _) => {
-                let with = |&i: &usize| self.with_effects(means.row(i).to_vec(), hyper.row(i));
+                let with = |&i: &usize| {
+                    self.with_effects(means.row(i).to_vec(), theta.row(i), hyper.row(i))
+                };
                 Matrix::from_rows(means.columns(), asked.iter().map(with))
             }
         };
@@ -80,9 +82,9 @@ impl<'a> OfData<'a> {
         values
     }
 
-    fn with_effects(&self, mut response: Vec<f64>, hyper: &[f64]) -> Vec<f64> {
+    fn with_effects(&self, mut response: Vec<f64>, theta: &[f64], hyper: &[f64]) -> Vec<f64> {
         for (effect, range) in &self.effects {
-            response = effect.apply(&response, &hyper[range.clone()]);
+            response = effect.apply(&response, &hyper[range.clone()], theta);
         }
         response
     }
@@ -101,8 +103,8 @@ impl<'a> LogLikelihood for OfData<'a> {
         let rows: Vec<usize> = (0..theta.rows()).collect();
         let batches = rows.chunks((BATCH / self.forward.outputs().max(1)).max(1));
         let batch = |rows: &[usize]| {
-            let mean = self.forward.mean(&theta.select_rows(rows));
-            self.batch(mean, &hyper.select_rows(rows))
+            let theta = theta.select_rows(rows);
+            self.batch(self.forward.mean(&theta), &theta, &hyper.select_rows(rows))
         };
         batches.flat_map(batch).collect()
     }
@@ -116,7 +118,7 @@ impl<'a> LogLikelihood for OfData<'a> {
         }
         let (mean, jacobian) = self.forward.mean_and_jacobian(theta);
         let effects = self.effects.iter().map(|(effect, range)| (effect, &hyper[range.clone()]));
-        let (response, tangents) = with_tangents(effects, mean, &jacobian);
+        let (response, tangents) = with_tangents(effects, mean, &jacobian, theta);
         if response.iter().any(|y| !y.is_finite()) {
             return (f64::NEG_INFINITY, vec![0.0; theta.len() + hyper.len()]);
         }

@@ -185,7 +185,7 @@ pub fn stage(
         return Ok(None);
     };
     let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.prior, p.reference)).collect();
-    let effects: Vec<_> = study.effects.iter().map(|e| (e.built.identity(), &e.common)).collect();
+    let effects = study.effects_identity();
     let inputs = json!([
         problem.data.hash,
         problem.origin(),

@@ -163,11 +163,10 @@ impl<'a> ModelMap<'a> {
     }
 
     /// Response, and derivatives by central differences; one-sided if the model can be evaluated on one side only.
-    fn differences(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
-        let steps: Vec<f64> =
-            self.priors.iter().zip(point).map(|(prior, &x)| step(prior, x)).collect();
+    fn differences(&self, point: &[f64], columns: &[usize]) -> (Vec<f64>, Matrix) {
+        let steps: Vec<f64> = columns.iter().map(|&j| step(&self.priors[j], point[j])).collect();
         let mut around = vec![point.to_vec()];
-        for (j, step) in steps.iter().enumerate() {
+        for (&j, step) in columns.iter().zip(&steps) {
             for sign in [1.0, -1.0] {
                 let mut moved = point.to_vec();
                 moved[j] += sign * step;
@@ -183,7 +182,7 @@ impl<'a> ModelMap<'a> {
                 _ => (here - below) / steps[j],
             }
         };
-        (responses.row(0).to_vec(), Matrix::from_fn(self.outputs, point.len(), slope))
+        (responses.row(0).to_vec(), Matrix::from_fn(self.outputs, columns.len(), slope))
     }
 }
 
@@ -232,7 +231,8 @@ impl Forward for ModelMap<'_> {
 
     fn mean_and_jacobian(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
         let Some(gradient) = self.simulator.model.gradient() else {
-            return self.differences(point);
+            let all: Vec<usize> = (0..point.len()).collect();
+            return self.differences(point, &all);
         };
         let mut mean = vec![f64::NAN; self.outputs];
         let mut jacobian = Matrix::from_fn(self.outputs, point.len(), |_, _| f64::NAN);
@@ -250,6 +250,14 @@ impl Forward for ModelMap<'_> {
             }
         }
         (mean, jacobian)
+    }
+
+    fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
+        if self.simulator.model.gradient().is_none() {
+            return self.differences(point, parameters);
+        }
+        let (mean, jacobian) = self.mean_and_jacobian(point);
+        (mean, jacobian.select_columns(parameters))
     }
 
     fn failure(&self) -> Option<String> {

@@ -44,7 +44,7 @@ fn batch(study: &Study, forward: &dyn Forward, points: &Matrix) -> Vec<Vec<f64>>
             let mut from = d;
             for effect in &effects {
                 let count = effect.absent().len();
-                response = effect.apply(&response, &point[from..from + count]);
+                response = effect.apply(&response, &point[from..from + count], &point[..d]);
                 from += count;
             }
             response

@@ -176,10 +176,7 @@ fn source_hash(study: &Study) -> Result<String, Stop> {
 }
 
 /// The user's own files that some readers read, without repetition.
-pub(super) fn files_of<'a>(
-    study: &Study,
-    readers: impl Iterator<Item = &'a dyn Reader>,
-) -> Vec<PathBuf> {
+pub fn files_of<'a>(study: &Study, readers: impl Iterator<Item = &'a dyn Reader>) -> Vec<PathBuf> {
     let names: Vec<Option<&str>> = study.scenarios.iter().map(Scenario::label).collect();
     let of = |reader: &dyn Reader| {
         let files = names.iter().flat_map(|name| reader.files(&study.directory, *name));

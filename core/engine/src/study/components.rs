@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use lacuna::data::Layout;
-use lacuna::plugin::effect::Placed;
+use lacuna::plugin::effect::{On, Placed};
 use lacuna::plugin::registry::Section;
 use lacuna::plugin::{Context, Effect};
 use lacuna::run::Fault;
+use serde_json::json;
 
 use super::fidelity::Cheap;
 use super::file::EffectKeys;
@@ -102,12 +103,29 @@ impl Study {
         chosen.chain(other).chain(tried).flatten().collect()
     }
 
-    /// The effects with their names and places.
+    /// Returns true if the study changes the response of its model by effects or by candidates inside its companion.
+    pub fn has_effects(&self) -> bool {
+        !self.effects.is_empty()
+            || self.gap.companion.as_ref().is_some_and(|c| !c.keys.add.is_empty())
+    }
+
+    /// The effects as plain data, for the hash of results that depend on them.
+    pub fn effects_identity(&self) -> Vec<serde_json::Value> {
+        let own = self.effects.iter().map(|e| json!((e.built.identity(), &e.common)));
+        let companion = self.gap.companion.as_ref().filter(|c| !c.keys.add.is_empty());
+        own.chain(companion.map(|c| c.identity())).collect()
+    }
+
+    /// The effects with their names and places: first those of candidates inside the companion, which are physics of the
+    /// model.
     pub fn placed_effects<'a>(&'a self) -> Vec<Placed<'a>> {
         let place = |section: &'a Section<dyn Effect, EffectKeys>| {
             let Section { built, common, .. } = section;
             Placed::new(effect_name(section), &*built.plugin, &self.layouts, &common.on)
         };
-        self.effects.iter().map(place).collect()
+        let inside = self.gap.companion.iter().flat_map(|companion| companion.added());
+        let inside =
+            inside.map(|(name, effect)| Placed::new(name, &**effect, &self.layouts, &On::new()));
+        inside.chain(self.effects.iter().map(place)).collect()
     }
 }

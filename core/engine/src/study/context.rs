@@ -1,11 +1,13 @@
 //! Second layer of checking: the sections of a study against each other.
 
+mod companion;
 mod effects;
 mod gap;
 mod inputs;
 mod inside;
 mod noise;
 mod outputs;
+mod runs;
 
 use lacuna::data::{Layout, Parameter, Scenario};
 use lacuna::plugin::{Component, Context, Surrogate, registry};

@@ -162,7 +162,7 @@ pub struct MeasurementKeys {
     /// none.
     pub added_curves: Vec<AddedCurve>,
     /// Noise of the instruments as their data sheets state it: `sd`, `resolution` and `memory`, each optional, in one
-    /// table for all curves or in an array of tables with `on`. The search for missing physics (`lacuna gap`) uses it
+    /// table for all curves or in an array of tables with `on`. The search for missing physics (`lacuna gap STUDY`) uses it
     /// for curves without replicates; the calibration uses `[discrepancy]`. Default: estimated from the data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<InstrumentNoise>,

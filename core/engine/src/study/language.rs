@@ -6,7 +6,8 @@ use lacuna::plugin::registry::NoKeys;
 use lacuna::plugin::{Effect, Model, Reader, Surrogate, Term};
 use serde_json::{Value, json};
 
-use super::gap::{CandidateKeys, SwapKeys, SwitchSection, TermKeys};
+use super::gap::companion::CompanionKeys;
+use super::gap::{CandidateKeys, RunsKeys, SwapKeys, SwitchSection, TermKeys};
 use super::noise::NoiseSection;
 use super::schema::{Language, page};
 use super::table;
@@ -25,7 +26,9 @@ pub fn schema() -> Value {
         .sections_in::<dyn Effect, CandidateKeys>("gap", "candidate")
         .tables_in::<SwitchSection>("gap", "switch")
         .sections_in::<dyn Term, TermKeys>("gap", "term")
-        .sections_in::<dyn Model, SwapKeys>("gap", "model");
+        .sections_in::<dyn Model, SwapKeys>("gap", "model")
+        .sections_in::<dyn Reader, RunsKeys>("gap", "runs")
+        .section_in::<dyn Model, CompanionKeys>("gap", "companion");
     language.finish()
 }
 
@@ -57,6 +60,8 @@ pub fn manual() -> Vec<Manual> {
         page::<SwitchSection>("[[gap.switch]]"),
         page::<TermKeys>("[[gap.term]]"),
         page::<SwapKeys>("[[gap.model]]"),
+        page::<RunsKeys>("[[gap.runs]]"),
+        page::<CompanionKeys>("[gap.companion]"),
     ]);
     pages
 }

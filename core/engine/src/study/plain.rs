@@ -60,6 +60,43 @@ pub struct Study {
     pub resolved: Table,
 }
 
+impl Study {
+    /// The study of a companion: the same conditions and responses, with these parameters, model and candidates, and with
+    /// neither data nor surrogate.
+    pub(super) fn companion_of(
+        &self,
+        parameters: Vec<Parameter>,
+        unknowns: Vec<Unknown>,
+        plugins: PluginSections,
+        gap: Gap,
+    ) -> Self {
+        let mut companion = Self {
+            name: self.name.clone(),
+            named: self.named,
+            file: self.file.clone(),
+            directory: self.directory.clone(),
+            text: String::new(),
+            about: self.about.clone(),
+            libraries: self.libraries.clone(),
+            parameters,
+            scenarios: self.scenarios.clone(),
+            unknowns,
+            given: Vec::new(),
+            layouts: self.layouts.clone(),
+            plugins,
+            numerical_error: None,
+            low_fidelity: None,
+            derived_sections: Vec::new(),
+            effects: Vec::new(),
+            validate: ValidateSection::default(),
+            gap,
+            resolved: Table::new(),
+        };
+        companion.given = super::inputs::all_given(&companion);
+        companion
+    }
+}
+
 impl Deref for Study {
     type Target = PluginSections;
 

@@ -14,6 +14,7 @@ use toml::Table;
 
 use super::fidelity::{low_fidelity, numerical_error};
 use super::file::{OPTIONAL, ResponseSection, StudySection, ValidateSection};
+use super::gap::companion::companion;
 use super::gap::gap;
 pub use super::libraries::Use;
 use super::libraries::{Libraries, Seen, libraries};
@@ -219,6 +220,12 @@ fn structure(
         resolved: Table::new(),
     };
     study.given = inputs::all_given(&study);
+    if let Some(node) = root.find("gap.companion") {
+        let own = problems.within("gap", |problems| {
+            problems.within("companion", |problems| companion(&study, node, problems))
+        });
+        study.gap.companion = Some(Box::new(own?));
+    }
     match resolved::table(&study, response?.as_ref(), &sections) {
         Ok(resolved) => study.resolved = resolved,
         Err(error) => {

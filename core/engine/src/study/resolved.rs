@@ -6,6 +6,7 @@ use lacuna::text::emit::{Unwritable, to_table};
 use toml::{Table, Value};
 
 use super::file::{ResponseSection, ScenarioSection};
+use super::gap::companion::Companion;
 use super::gap::{Gap, Swap};
 use super::plain::Study;
 use super::table::{SECTIONS, written};
@@ -93,7 +94,26 @@ fn gap(section: &Gap) -> Result<Table, Unwritable> {
     list("switch", inside.switches.iter().map(to_table).collect())?;
     list("term", inside.terms.iter().map(written).collect())?;
     list("model", inside.models.iter().map(swapped).collect())?;
+    list("runs", section.runs.iter().map(written).collect())?;
+    if let Some(own) = &section.companion {
+        gap.insert("companion".to_owned(), companion(own)?.into());
+    }
     Ok(gap)
+}
+
+/// `[gap.companion]` with its terms.
+fn companion(companion: &Companion) -> Result<Table, Unwritable> {
+    let mut table = to_table(&companion.keys)?;
+    if let Some(model) = &companion.study.model {
+        table.insert("use".to_owned(), model.built.name.into());
+        table.extend(model.built.options.clone());
+    }
+    let terms: Result<Vec<Table>, _> =
+        companion.study.gap.inside.terms.iter().map(written).collect();
+    if !companion.keys.term.is_empty() {
+        table.insert("term".to_owned(), terms?.into());
+    }
+    Ok(table)
 }
 
 /// A model in place of the study's.

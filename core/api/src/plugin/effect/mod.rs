@@ -19,7 +19,7 @@ pub use curve::{CurveEffect, Form};
 pub use placed::{On, Placed, acts, with_tangents};
 pub use span::{Span, each_curve, grid};
 pub use starts::{all, apart, propose, signs, spaced, spaced_by_ratio};
-pub use steps::{by_parameter_steps, push_forward_step};
+pub use steps::{by_parameter_steps, by_parameter_steps_of, push_forward_step};
 pub use unknown::{Measure, Unknown};
 
 /// One candidate piece of missing physics: on the model's response, or inside the model through its
@@ -60,6 +60,29 @@ pub trait Effect: Component {
         push_forward_step(self, layout, response, values, tangent)
     }
 
+    /// The response with the effect applied at a point of the forward map's parameters. Only an effect whose change follows
+    /// from the physics of the model depends on the point.
+    fn apply_at(
+        &self,
+        layout: &Layout,
+        response: &[f64],
+        values: &[f64],
+        _point: &[f64],
+    ) -> Vec<f64> {
+        self.apply(layout, response, values)
+    }
+
+    /// Derivative of each value of [`Effect::apply_at`] by each parameter of the effect, `outputs x parameters`.
+    fn by_parameters_at(
+        &self,
+        layout: &Layout,
+        response: &[f64],
+        values: &[f64],
+        _point: &[f64],
+    ) -> Matrix {
+        self.by_parameters(layout, response, values)
+    }
+
     /// Values of the parameters from which a fit finds every mode of the effect: both signs of the size, and a grid of
     /// the indices so fine that no mode lies in between.
     fn starts(&self, layout: &Layout, situation: &Situation<'_>) -> Vec<Vec<f64>>;
@@ -71,6 +94,16 @@ pub trait Effect: Component {
     /// Curves on which a search may place the effect.
     fn reach(&self) -> Reach {
         Reach::Any
+    }
+
+    /// True for physics of the model, which acts before the effects of the measuring chain.
+    fn acts_first(&self) -> bool {
+        false
+    }
+
+    /// Relative error of the size of the effect that its own approximations cause.
+    fn relative_error(&self) -> f64 {
+        0.0
     }
 
     /// Names of effects that it looks like to first order: where one of them was not tried, it is not named alone.

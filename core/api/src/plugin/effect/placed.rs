@@ -48,11 +48,11 @@ impl<'a> Placed<'a> {
         self.effect.absent(&self.layouts.blocks[0])
     }
 
-    /// Responses of all blocks with the effect applied.
-    pub fn apply(&self, response: &[f64], values: &[f64]) -> Vec<f64> {
+    /// Responses of all blocks with the effect applied, at a point of the forward map's parameters.
+    pub fn apply(&self, response: &[f64], values: &[f64], point: &[f64]) -> Vec<f64> {
         let changed = self.layouts.parts().flat_map(|(layout, range)| {
             if self.acts[range.clone()].contains(&true) {
-                self.effect.apply(layout, &response[range], values)
+                self.effect.apply_at(layout, &response[range], values, point)
             } else {
                 response[range].to_vec()
             }
@@ -73,14 +73,16 @@ impl<'a> Placed<'a> {
         self.where_it_acts(changed, tangent)
     }
 
-    /// Derivative of each output by each unknown of the effect, `outputs x unknowns`.
-    pub fn by_parameters(&self, response: &[f64], values: &[f64]) -> Matrix {
+    /// Derivative of each output by each unknown of the effect, `outputs x unknowns`, at a point of the forward map's
+    /// parameters.
+    pub fn by_parameters(&self, response: &[f64], values: &[f64], point: &[f64]) -> Matrix {
         let mut all = Matrix::zeros(response.len(), values.len());
         for (layout, range) in self.layouts.parts() {
             if !self.acts[range.clone()].contains(&true) {
                 continue;
             }
-            let part = self.effect.by_parameters(layout, &response[range.clone()], values);
+            let own = &response[range.clone()];
+            let part = self.effect.by_parameters_at(layout, own, values, point);
             for (row, i) in range.enumerate().filter(|(_, i)| self.acts[*i]) {
                 all.row_mut(i).copy_from_slice(part.row(row));
             }
@@ -98,11 +100,12 @@ impl<'a> Placed<'a> {
 
 /// A response with effects applied, and its derivatives by all unknowns, one per row (`unknowns x outputs`): first
 /// those of the forward map, whose `jacobian` has one per column, then those of the effects, each given with the values
-/// of its unknowns.
+/// of its unknowns. `point` holds the parameters of the forward map.
 pub fn with_tangents<'b>(
     effects: impl Iterator<Item = (&'b Placed<'b>, &'b [f64])>,
     mut response: Vec<f64>,
     jacobian: &Matrix,
+    point: &[f64],
 ) -> (Vec<f64>, Matrix) {
     let mut tangents = jacobian.transposed();
     for (effect, values) in effects {
@@ -110,9 +113,9 @@ pub fn with_tangents<'b>(
         for tangent in tangents.iter_rows() {
             next.push_row(&effect.push_forward(&response, values, tangent));
         }
-        let own = effect.by_parameters(&response, values).transposed();
+        let own = effect.by_parameters(&response, values, point).transposed();
         own.iter_rows().for_each(|row| next.push_row(row));
-        response = effect.apply(&response, values);
+        response = effect.apply(&response, values, point);
         tangents = next;
     }
     (response, tangents)

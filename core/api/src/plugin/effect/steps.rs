@@ -4,6 +4,7 @@ use lacuna_base::data::Layout;
 use lacuna_base::matrix::Matrix;
 
 use super::Effect;
+use crate::plugin::Hyperparameter;
 
 /// Finite differences for [`Effect::by_parameters`].
 pub fn by_parameter_steps<E: Effect + ?Sized>(
@@ -12,13 +13,24 @@ pub fn by_parameter_steps<E: Effect + ?Sized>(
     response: &[f64],
     values: &[f64],
 ) -> Matrix {
-    let parameters = effect.parameters(layout);
-    let mut jacobian = Matrix::zeros(layout.len(), values.len());
+    let at = |values: &[f64]| effect.apply(layout, response, values);
+    by_parameter_steps_of(&effect.parameters(layout), layout.len(), values, at)
+}
+
+/// Derivatives of a function of these parameters by finite differences inside the priors' supports, `outputs x
+/// parameters`.
+pub fn by_parameter_steps_of(
+    parameters: &[Hyperparameter],
+    outputs: usize,
+    values: &[f64],
+    of: impl Fn(&[f64]) -> Vec<f64>,
+) -> Matrix {
+    let mut jacobian = Matrix::zeros(outputs, values.len());
     for (j, parameter) in parameters.iter().enumerate() {
         let at = |x: f64| {
             let mut moved = values.to_vec();
             moved[j] = x;
-            effect.apply(layout, response, &moved)
+            of(&moved)
         };
         let prior = &parameter.prior;
         let width = prior.quantile(0.975) - prior.quantile(0.025);

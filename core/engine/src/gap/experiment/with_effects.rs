@@ -52,10 +52,11 @@ impl Forward for WithEffects<'_> {
         let own: Vec<usize> = (0..self.forward.dimension()).collect();
         let mut means = self.forward.mean(&points.select_columns(&own));
         for i in 0..means.rows() {
-            let response = self
-                .placed(points.row(i))
-                .fold(means.row(i).to_vec(), |response, (effect, values)| {
-                    effect.apply(&response, values)
+            let point = points.row(i);
+            let parameters = &point[..own.len()];
+            let response =
+                self.placed(point).fold(means.row(i).to_vec(), |response, (effect, values)| {
+                    effect.apply(&response, values, parameters)
                 });
             means.row_mut(i).copy_from_slice(&response);
         }
@@ -67,8 +68,9 @@ impl Forward for WithEffects<'_> {
     }
 
     fn mean_and_jacobian(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
-        let (mean, jacobian) = self.forward.mean_and_jacobian(&point[..self.forward.dimension()]);
-        let (response, tangents) = with_tangents(self.placed(point), mean, &jacobian);
+        let parameters = &point[..self.forward.dimension()];
+        let (mean, jacobian) = self.forward.mean_and_jacobian(parameters);
+        let (response, tangents) = with_tangents(self.placed(point), mean, &jacobian, parameters);
         (response, tangents.transposed())
     }
 
@@ -76,7 +78,7 @@ impl Forward for WithEffects<'_> {
         let d = self.forward.dimension();
         let own: Vec<usize> = parameters.iter().copied().filter(|&i| i < d).collect();
         let (mean, jacobian) = self.forward.mean_and_jacobian_by(&point[..d], &own);
-        let (response, tangents) = with_tangents(self.placed(point), mean, &jacobian);
+        let (response, tangents) = with_tangents(self.placed(point), mean, &jacobian, &point[..d]);
         // The derivatives by all unknowns of the effects come after those that were asked for.
         let mut seen = 0;
         let column = |&i: &usize| {

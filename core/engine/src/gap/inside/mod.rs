@@ -3,9 +3,12 @@
 //! All inputs and terms are inputs of one extended model. If the model is its own forward map, it is evaluated with the
 //! inputs that are present; if a surrogate replaces it, the surrogate is trained on further runs.
 
+pub mod advice;
+pub mod companion;
 mod emulated;
 mod narrow;
 mod pieces;
+pub mod runs;
 mod swap;
 mod terms;
 mod unasked;

@@ -45,7 +45,18 @@ pub struct AddedEffect {
     pub certain: bool,
 }
 
+/// The name of the plugin of effects inside a companion, which are no plugins.
+pub const IN_COMPANION: &str = "companion";
+
+/// The name of the plugin of effects that a further table of runs shows, which are no plugins.
+pub const IN_RUNS: &str = "runs";
+
 impl AddedEffect {
+    /// Returns true if it acts inside the companion.
+    pub fn is_in_companion(&self) -> bool {
+        self.plugin == IN_COMPANION
+    }
+
     /// The label in reports: the type, or the name of the other model.
     pub fn label(&self) -> &str {
         if self.model { &self.name } else { &self.kind }

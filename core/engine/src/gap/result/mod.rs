@@ -2,6 +2,7 @@
 
 pub mod added;
 mod addition;
+pub mod companion;
 mod curve;
 pub mod insight;
 pub mod remains;
@@ -18,6 +19,7 @@ use crate::gap::candidates::{Candidate, Placement, Untried};
 use crate::gap::experiment::Experiment;
 use crate::gap::experiment::hold_out::HeldOutKind;
 use crate::gap::prove::Proof;
+use crate::gap::result::companion::IdentifiedCompanion;
 use crate::gap::result::insight::{Insight, insight, withhold};
 use crate::gap::result::remains::{Remains, remains};
 use crate::gap::result::replaced::OtherModel;
@@ -29,7 +31,7 @@ use crate::gap::search::{
 use crate::gap::system::fit::precision;
 use crate::gap::test::Region;
 
-pub use addition::{AddedEffect, Estimate};
+pub use addition::{AddedEffect, Estimate, IN_COMPANION, IN_RUNS};
 pub use curve::CurveResult;
 
 /// A search and what was found after it, as reports show it.
@@ -98,6 +100,9 @@ pub struct GapResult {
     /// The part of the gap that the effects leave; `None` if nothing shows.
     #[serde(default)]
     pub remains: Option<Remains>,
+    /// The companion with its constants; `None` if the study has none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub companion: Option<IdentifiedCompanion>,
     /// The insight besides the verdict.
     pub insight: Insight,
     /// The proof on held-out data, by kind.
@@ -254,6 +259,7 @@ impl GapResult {
             response: both.map(|diagnostics| diagnostics.fit.at.response.clone()),
             left: both.map(|diagnostics| diagnostics.statistics.residual.clone()),
             remains: remains(found),
+            companion: None,
             insight,
             held_out: Vec::new(),
             models: Vec::new(),

@@ -227,7 +227,8 @@ impl<'a> RefitSetting<'a, '_> {
         }
         let placed = placement.placed(self.system.experiment, self.candidates, "");
         let responses: Vec<Vec<f64>> = if placed.effect.switches().is_empty() {
-            starts.iter().map(|start| placed.apply(&base.at.response, start)).collect()
+            let point = self.system.parameters(&base.at.point);
+            starts.iter().map(|start| placed.apply(&base.at.response, start, point)).collect()
         } else {
             let point = |start: &Vec<f64>| [&base.at.point[..], start].concat();
             self.with(placement).responses(&starts.iter().map(point).collect::<Vec<_>>())

@@ -71,7 +71,7 @@ pub fn kept(
 /// All inputs on which the result of the search depends.
 pub fn inputs(study: &Study, problem: &InverseProblem<'_>) -> Value {
     let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.prior)).collect();
-    let effects: Vec<_> = study.effects.iter().map(|e| (e.built.identity(), &e.common)).collect();
+    let effects = study.effects_identity();
     let candidates = study.gap.candidates.iter();
     let candidates: Vec<_> = candidates.map(|c| (c.built.identity(), &c.common)).collect();
     json!([
@@ -95,7 +95,13 @@ fn pieces(study: &Study) -> Value {
     let inside = &study.gap.inside;
     let terms = inside.terms.iter().map(|t| (t.built.identity(), &t.common));
     let models = inside.models.iter().map(|m| (m.section.built.identity(), &m.keys));
-    json!([inside.switches, terms.collect::<Vec<_>>(), models.collect::<Vec<_>>()])
+    let lists = json!([inside.switches, terms.collect::<Vec<_>>(), models.collect::<Vec<_>>()]);
+    let runs: Vec<_> = study.gap.runs.iter().map(|r| (r.built.identity(), &r.common)).collect();
+    let lists = if runs.is_empty() { lists } else { json!([lists, runs]) };
+    match &study.gap.companion {
+        None => lists,
+        Some(companion) => json!([lists, companion.identity()]),
+    }
 }
 
 fn summary(result: &GapResult) -> String {

@@ -19,10 +19,12 @@ use crate::gap::experiment::wider::ExtendedMap;
 use crate::gap::experiment::with_effects::WithEffects;
 use crate::gap::inside;
 use crate::gap::inside::Pieces;
+use crate::gap::inside::advice::what_would_tell;
 use crate::gap::noise::{Noise, ResponseTangents};
 use crate::gap::prove::prove;
+use crate::gap::result::companion::IdentifiedCompanion;
 use crate::gap::result::{GapResult, HeldOut};
-use crate::gap::search::{SearchOptions, SearchResult, search};
+use crate::gap::search::{SearchOptions, SearchResult, VerdictKind, search};
 use crate::gap::system::System;
 use crate::gap::system::emulator_error::error_covariance;
 use crate::gap::system::fit::{Fit, precision};
@@ -43,6 +45,8 @@ const NAMES: f64 = 0.6;
 pub struct InsideCandidates<'a> {
     candidates: Vec<Candidate>,
     wide: Option<ExtendedMap<'a>>,
+    /// The companion with its constants, if the study has one.
+    companion: Option<IdentifiedCompanion>,
 }
 
 impl<'a> InsideCandidates<'a> {
@@ -54,9 +58,15 @@ impl<'a> InsideCandidates<'a> {
         run: &mut RunDirectory,
         observer: &dyn Observer,
     ) -> Result<Self, Stop> {
-        let Some(pieces) = pieces else { return Ok(Self::default()) };
-        let (candidates, wide) = inside::candidates(pieces, study, problem, run, observer)?;
-        Ok(Self { candidates, wide: Some(wide) })
+        let (mut candidates, companion) =
+            inside::companion::candidates(study, problem, run, observer)?;
+        candidates.extend(inside::runs::candidates(study, problem, run, observer)?);
+        let Some(pieces) = pieces else {
+            return Ok(Self { candidates, wide: None, companion });
+        };
+        let (own, wide) = inside::candidates(pieces, study, problem, run, observer)?;
+        candidates.extend(own);
+        Ok(Self { candidates, wide: Some(wide), companion })
     }
 }
 
@@ -180,6 +190,15 @@ impl<'a> PreparedSearch<'a> {
         let mut result = GapResult::of(found, self.candidates, self.options, &self.random);
         result.untried = self.untried.to_vec();
         result.verdict.reasons.extend(self.transients.iter().map(Transient::words));
+        if let (Some(companion), Some(own)) =
+            (&self.base.study.gap.companion, &self.base.beginning.inside.companion)
+        {
+            result.verdict.reasons.push(own.words(companion));
+            result.companion = Some(own.clone());
+        }
+        if matches!(result.verdict.word, VerdictKind::Unlisted | VerdictKind::Approximate) {
+            result.verdict.reasons.extend(what_would_tell(self.base.study));
+        }
         let all = &without(all, &self.transients);
         let fitted =
             FittedSystem { system: &found.system, fit: &found.last.fit, noise: &found.noise };

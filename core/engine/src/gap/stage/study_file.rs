@@ -10,6 +10,7 @@ use serde::Serialize;
 use crate::gap::edit::Edit;
 use crate::gap::inside;
 use crate::gap::inside::Pieces;
+use crate::gap::inside::companion::edit::with_added;
 use crate::gap::result::{AddedEffect, Estimate, GapResult};
 use crate::gap::search::needless::Needless;
 use crate::gap::test::is_at_floor;
@@ -129,6 +130,7 @@ fn text(study: &Study, path: &Path, result: &GapResult) -> Result<String, Stop> 
         }
         None => study.text.clone(),
     };
+    let own = in_companion(own, study, result)?;
     text.push_str(&renamed(own, study, result));
     if !text.ends_with('\n') {
         text.push('\n');
@@ -139,7 +141,7 @@ fn text(study: &Study, path: &Path, result: &GapResult) -> Result<String, Stop> 
         }
         text.push('\n');
     }
-    for addition in on_top {
+    for addition in on_top.iter().filter(|addition| !addition.is_in_companion()) {
         text.push('\n');
         text.push_str(&block(study, addition)?);
     }
@@ -165,6 +167,18 @@ fn divided<'a>(study: &Study, result: &'a GapResult) -> Result<Divided<'a>, Stop
         edit = pieces.edit(study, &places);
     }
     Ok((Some((edit, why)), on_top))
+}
+
+/// The text with the effects that act inside the companion.
+fn in_companion(text: String, study: &Study, result: &GapResult) -> Result<String, Stop> {
+    let own = result.additions.iter().filter(|addition| addition.is_in_companion());
+    let own: Vec<&AddedEffect> = own.collect();
+    let Some(companion) = result.companion.as_ref().filter(|_| !own.is_empty()) else {
+        return Ok(text);
+    };
+    let names: Vec<&str> = own.iter().map(|addition| addition.kind.as_str()).collect();
+    let comments: String = own.iter().map(|addition| found(addition)).collect();
+    with_added(text, study, &names, companion, &comments)
 }
 
 /// The text with a name of its own if it gives one: two studies with the same name would share a run directory.

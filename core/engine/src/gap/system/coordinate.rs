@@ -30,18 +30,18 @@ fn width(prior: &Distribution) -> f64 {
 }
 
 /// The log of the derivatives of the unknowns by their coordinates: a log density plus this is that of the coordinates.
-pub(super) fn log_slope(priors: &[Distribution], point: &[f64]) -> f64 {
+pub(in crate::gap) fn log_slope(priors: &[Distribution], point: &[f64]) -> f64 {
     let searched = priors.iter().zip(point).filter(|(prior, _)| in_logarithm(prior));
     searched.map(|(_, x)| x.ln()).sum()
 }
 
 /// The change of an unknown per width of its prior, at a value.
-pub(super) fn unit(prior: &Distribution, x: f64) -> f64 {
+pub(in crate::gap) fn unit(prior: &Distribution, x: f64) -> f64 {
     if in_logarithm(prior) { width(prior) * x } else { width(prior) }
 }
 
 /// The slope of the log density of a prior in its coordinate, per unit of the unknown.
-pub(super) fn slope(prior: &Distribution, x: f64) -> f64 {
+pub(in crate::gap) fn slope(prior: &Distribution, x: f64) -> f64 {
     match *prior {
         Distribution::LogUniform(_) => 0.0,
         Distribution::LogNormal([mu, sigma]) => (mu - x.ln()) / (sigma * sigma * x),
@@ -51,7 +51,7 @@ pub(super) fn slope(prior: &Distribution, x: f64) -> f64 {
 
 /// The curvature of minus the log density of a prior in its coordinate, per squared unit of the unknown; zero if it is
 /// negative.
-pub(super) fn curvature(prior: &Distribution, x: f64) -> f64 {
+pub(in crate::gap) fn curvature(prior: &Distribution, x: f64) -> f64 {
     if in_logarithm(prior) {
         let normal = matches!(prior, Distribution::LogNormal(_));
         return if normal { (width(prior) * x).powi(-2) } else { 0.0 };
@@ -65,12 +65,12 @@ pub(super) fn curvature(prior: &Distribution, x: f64) -> f64 {
 }
 
 /// The value of an unknown after so many widths of its prior.
-pub(super) fn moved(prior: &Distribution, x: f64, widths: f64) -> f64 {
+pub(in crate::gap) fn moved(prior: &Distribution, x: f64, widths: f64) -> f64 {
     if in_logarithm(prior) { x * (widths * width(prior)).exp() } else { x + widths * width(prior) }
 }
 
 /// The lowest and the highest step that is allowed from a value inside its bounds, in widths of the prior.
-pub(super) fn room(prior: &Distribution, x: f64, (low, high): (f64, f64)) -> (f64, f64) {
+pub(in crate::gap) fn room(prior: &Distribution, x: f64, (low, high): (f64, f64)) -> (f64, f64) {
     let [below, above] = [low, high].map(|bound| {
         if in_logarithm(prior) {
             (bound.max(0.0) / x).ln() / width(prior)
@@ -84,7 +84,7 @@ pub(super) fn room(prior: &Distribution, x: f64, (low, high): (f64, f64)) -> (f6
 }
 
 /// Bounds slightly inside those of a prior, where its density is finite.
-pub(super) fn inner(prior: &Distribution, (low, high): (f64, f64)) -> (f64, f64) {
+pub(in crate::gap) fn inner(prior: &Distribution, (low, high): (f64, f64)) -> (f64, f64) {
     let width = high - low;
     if in_logarithm(prior) {
         // A share of the width would cut off decades of a log-uniform prior.

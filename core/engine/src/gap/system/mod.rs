@@ -1,10 +1,10 @@
 //! A system: a forward map with effects, one vector of unknowns, the response and its derivatives.
 
-mod coordinate;
+pub(in crate::gap) mod coordinate;
 pub mod emulator_error;
 pub mod fit;
 pub mod remainder;
-mod step;
+pub(in crate::gap) mod step;
 pub mod switched;
 pub mod whitener;
 
@@ -107,8 +107,9 @@ impl<'a> System<'a> {
         let means = self.forward().mean(&Matrix::from_rows(columns, inputs));
         let with_effects = |(mean, point): (&[f64], &P)| {
             let mut response = mean.to_vec();
+            let point = point.as_ref();
             for (effect, own) in self.on_the_response() {
-                response = effect.apply(&response, &point.as_ref()[own]);
+                response = effect.apply(&response, &point[own], self.parameters(point));
             }
             response
         };
@@ -126,7 +127,7 @@ impl<'a> System<'a> {
         let columns: Vec<usize> = moved.iter().map(|(_, column)| *column).collect();
         let (mean, jacobian) = self.forward().mean_and_jacobian_by(&self.input(point), &columns);
         let on_top = self.on_the_response().map(|(effect, own)| (effect, &point[own]));
-        let (response, rows) = with_tangents(on_top, mean, &jacobian);
+        let (response, rows) = with_tangents(on_top, mean, &jacobian, self.parameters(point));
         let mut unknowns: Vec<usize> = moved.iter().map(|(unknown, _)| *unknown).collect();
         unknowns.extend(self.on_the_response().flat_map(|(_, own)| own));
         let mut tangents = Matrix::zeros(unknowns.len(), response.len());
@@ -134,6 +135,11 @@ impl<'a> System<'a> {
             tangents.row_mut(unknown).copy_from_slice(row);
         }
         Linearised { point: point.to_vec(), response, tangents }
+    }
+
+    /// The parameters of the forward map at these unknowns.
+    pub fn parameters<'p>(&self, point: &'p [f64]) -> &'p [f64] {
+        &point[..self.experiment.parameters.len()]
     }
 
     /// The extended forward map, if an effect needs it.
@@ -173,7 +179,13 @@ impl<'a> System<'a> {
         self.places().filter(|(effect, _)| !effect.effect.switches().is_empty())
     }
 
+    /// The effects on the response in the order in which they act: physics of the model comes first.
     fn on_the_response(&self) -> impl Iterator<Item = (&Placed<'a>, Range<usize>)> {
-        self.places().filter(|(effect, _)| effect.effect.switches().is_empty())
+        let of = |first: bool| {
+            self.places().filter(move |(effect, _)| {
+                effect.effect.switches().is_empty() && effect.effect.acts_first() == first
+            })
+        };
+        of(true).chain(of(false))
     }
 }

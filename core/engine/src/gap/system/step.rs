@@ -8,7 +8,7 @@ const FLAT: f64 = 1e-12;
 /// The minimum of `s'As / 2 - g's` for `low <= s <= high`, with `A` positive definite and zero inside the box: a primal
 /// active-set method (Nocedal and Wright, Numerical Optimization, 2nd ed., section 16.5; for bounds: Stark and Parker,
 /// Computational Statistics 10 (1995) 129). `None` if `A` has no Cholesky factor.
-pub(super) fn within(a: &Matrix, g: &[f64], low: &[f64], high: &[f64]) -> Option<Vec<f64>> {
+pub(in crate::gap) fn within(a: &Matrix, g: &[f64], low: &[f64], high: &[f64]) -> Option<Vec<f64>> {
     let size = g.len();
     let mut s = vec![0.0; size];
     let mut held = vec![false; size];

@@ -263,6 +263,7 @@ fn slopes(
         return switched::slopes(system, fit, &placed, situation);
     }
     let absent = placed.absent();
+    let point = system.parameters(&fit.at.point);
     let mut by_indices: Vec<(Vec<f64>, bool)> = Vec::new();
     let mut slopes = Vec::new();
     for start in candidate.effect.starts(layout, situation) {
@@ -270,12 +271,12 @@ fn slopes(
         if known.is_some_and(|(_, sloping)| *sloping) {
             continue;
         }
-        let change = placed.apply(situation.response, &start);
+        let change = placed.apply(situation.response, &start, point);
         let over = |(with, without): (&f64, &f64)| (with - without) / (start[0] - absent[0]);
         let mut slope: Vec<f64> = change.iter().zip(situation.response).map(over).collect();
         if known.is_none() {
             let values = [&absent[..1], &start[1..]].concat();
-            let tangent = placed.by_parameters(situation.response, &values).column(0);
+            let tangent = placed.by_parameters(situation.response, &values, point).column(0);
             let sloping = norm(&tangent) > FLAT * norm(&slope);
             by_indices.push((start[1..].to_vec(), sloping));
             if sloping {

@@ -34,7 +34,7 @@ pub(super) fn findings(
     let added = study.measurements.as_ref().map_or(0, |m| m.common.added_curves.len());
     found.extend(replicates::added(added, measured.used.replicates()));
     // An effect may shift the response to where no run is.
-    if study.effects.is_empty() {
+    if !study.has_effects() {
         found.extend(beside_runs(study, problem, &measured.used));
     }
     found

@@ -42,7 +42,7 @@ fn case<'a>(validated: &'a Validated, name: &str) -> Option<&'a ValidationCase> 
 fn reference(judged: &Judged<'_>, validated: &Validated) -> Option<Finding> {
     let (map, reference) = (case(validated, "map")?, case(validated, "reference")?);
     // The responses of the cases are those of the model without effects; only comparable responses are compared.
-    if map.simulated != reference.simulated || !judged.study.effects.is_empty() {
+    if map.simulated != reference.simulated || judged.study.has_effects() {
         return None;
     }
     let hyper = judged.hyper(&judged.calibrated.outcome.map);
@@ -86,7 +86,7 @@ fn accurate(judged: &Judged<'_>, validated: &Validated) -> Option<Finding> {
     let measured = counts.iter().filter(|&&n| n > 0).count();
     let replicated = counts.iter().filter(|&&n| n >= REPLICATES).count();
     // The responses of the cases are without effects.
-    if 2 * replicated < measured || !judged.study.effects.is_empty() {
+    if 2 * replicated < measured || judged.study.has_effects() {
         return None;
     }
     check::accurate(map.average)

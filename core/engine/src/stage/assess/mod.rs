@@ -46,7 +46,7 @@ pub fn stage(
     observer: &dyn Observer,
 ) -> Result<Kept<Assessment>, Stop> {
     let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.design, &p.prior)).collect();
-    let effects: Vec<_> = study.effects.iter().map(|e| (e.built.identity(), &e.common)).collect();
+    let effects = study.effects_identity();
     let problem = all.problem.map(|problem| {
         let refined = problem.refinement().map(|r| (r.rounds, r.ratio, r.clear, r.reached));
         json!([

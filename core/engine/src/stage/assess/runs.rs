@@ -37,7 +37,7 @@ pub(super) fn findings(
         found.extend(suspicious(study, problem, ensemble)?);
     }
     // An effect may use a parameter that the model does not use.
-    if calibrated.is_some() && study.effects.is_empty() {
+    if calibrated.is_some() && !study.has_effects() {
         let idle = idle::parameters(study)?;
         found.extend(idle.iter().map(|&i| check::idle(&study.parameters[i].name)));
     }

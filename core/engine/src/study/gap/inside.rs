@@ -13,6 +13,7 @@ use lacuna::text::{Node, Problems};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::companion::CompanionKeys;
 use crate::study::file::ModelKeys;
 
 /// An input of the model that the study holds fixed and that the search may set free.
@@ -93,6 +94,16 @@ impl Inside {
             terms: each(gap, "term", problems, |node, problems| section(node, None, problems))?,
             models: each(gap, "model", problems, swap)?,
         })
+    }
+
+    /// Reads the candidates from the section `[gap.companion]`, whose keys are known.
+    pub(super) fn of_companion(
+        node: &Node,
+        keys: &CompanionKeys,
+        problems: &mut Problems,
+    ) -> Option<Self> {
+        let terms = each(node, "term", problems, |node, problems| section(node, None, problems))?;
+        Some(Self { switches: keys.switch.clone(), terms, models: Vec::new() })
     }
 
     /// Returns true if there are no candidates inside the model.

@@ -1,23 +1,27 @@
 //! `[gap]`: settings and candidates of the search for missing effects.
 
+pub mod companion;
 mod held;
 mod inside;
+mod runs;
 
 use std::collections::BTreeMap;
 
 use lacuna::data::Unit;
-use lacuna::plugin::Effect;
 use lacuna::plugin::effect::On;
 use lacuna::plugin::registry::{Section, section};
+use lacuna::plugin::{Effect, Reader};
 use lacuna::text::decode::decode_beside;
 use lacuna::text::values::{Count, Fraction, Interval, Name, OpenFraction};
 use lacuna::text::{Node, Problems};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use companion::Companion;
 pub use held::Held;
 pub(super) use held::{Loose, hold};
 pub use inside::{Inside, Swap, SwapKeys, SwitchSection, TermKeys};
+pub use runs::RunsKeys;
 
 /// Settings of the search for missing effects (`lacuna gap STUDY`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -125,10 +129,14 @@ pub struct Gap {
     pub candidates: Vec<Section<dyn Effect, CandidateKeys>>,
     /// `[[gap.switch]]`, `[[gap.term]]`, `[[gap.model]]`: candidates inside the model.
     pub inside: Inside,
+    /// `[[gap.runs]]`: further tables of runs, each with a suspected piece of physics in the simulator.
+    pub runs: Vec<Section<dyn Reader, RunsKeys>>,
+    /// `[gap.companion]`.
+    pub companion: Option<Box<Companion>>,
 }
 
-/// The lists of `[gap]`.
-const LISTS: [&str; 4] = ["candidate", "switch", "term", "model"];
+/// The lists and sections of `[gap]`.
+const LISTS: [&str; 6] = ["candidate", "switch", "term", "model", "runs", "companion"];
 
 /// Reads `[gap]`, with the defaults if the study does not have it; `None` after reporting an error.
 pub(super) fn gap(root: &Node, problems: &mut Problems) -> Option<Gap> {
@@ -145,7 +153,13 @@ pub(super) fn gap(root: &Node, problems: &mut Problems) -> Option<Gap> {
             .map(|node| problems.within("candidate", |problems| section(node, None, problems)))
             .collect();
         let inside = Inside::of(node, problems);
+        let runs = node.get("runs").map(Node::elements).unwrap_or_default().iter();
+        let runs: Vec<Option<_>> = runs
+            .map(|node| problems.within("runs", |problems| section(node, None, problems)))
+            .collect();
+        let runs = runs.into_iter().collect::<Option<_>>();
         let candidates = candidates.into_iter().collect::<Option<_>>();
-        Some(Gap { keys: keys?, candidates: candidates?, inside: inside? })
+        let (keys, candidates, inside, runs) = (keys?, candidates?, inside?, runs?);
+        Some(Gap { keys, candidates, inside, runs, companion: None })
     })
 }

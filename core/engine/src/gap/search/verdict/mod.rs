@@ -3,7 +3,7 @@
 
 mod grounds;
 
-use lacuna::plugin::effect::On;
+use lacuna::plugin::effect::{On, Placed};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -249,7 +249,7 @@ fn named(found: &SearchResult<'_>, candidates: &[Candidate]) -> Vec<MissingEffec
             kind: kind.clone(),
             on: placement.on.clone(),
             values: found.last.fit.at.point[begin..end].to_vec(),
-            sd: sd[begin..end].to_vec(),
+            sd: widened_size(effect, &found.last.fit.at.point[begin..end], &sd[begin..end]),
             probability: own,
             share: support.share,
             supported,
@@ -260,6 +260,14 @@ fn named(found: &SearchResult<'_>, candidates: &[Candidate]) -> Vec<MissingEffec
         begin = end;
     }
     all
+}
+
+/// The standard deviations of the unknowns of an effect, with the error of its size that its approximations cause.
+fn widened_size(effect: &Placed<'_>, values: &[f64], sd: &[f64]) -> Vec<f64> {
+    let mut sd = sd.to_vec();
+    let size = values[0] - effect.absent()[0];
+    sd[0] = sd[0].hypot(effect.effect.relative_error() * size);
+    sd
 }
 
 /// Adds to the class of each effect the effects that it looks like and that are no candidates, and says so.

@@ -1,0 +1,219 @@
+//! `[gap.companion]`: a cheap model of the same physics, inside which candidates act.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, OnceLock};
+
+use lacuna::data::{Layout, Parameter};
+use lacuna::plugin::effect::{Description, Situation};
+use lacuna::plugin::registry::{Section, section};
+use lacuna::plugin::{Component, Effect, Hyperparameter, Model};
+use lacuna::run::Fault;
+use lacuna::text::quantity::Quantity;
+use lacuna::text::values::{Count, Positive};
+use lacuna::text::{Complaints, Node, Problems};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use toml::Table;
+
+use super::inside::{Inside, SwitchSection};
+use super::{Gap, GapSection};
+use crate::study::Study;
+use crate::study::file::{ModelKeys, ParameterSection};
+use crate::study::table::PluginSections;
+use crate::study::unknowns::{Unknown, unknowns};
+
+/// The engine's keys of `[gap.companion]`: a cheap model of the same physics as the simulator, which is a black box.
+///
+/// Candidates act inside it, and the change of its response is added to that of the emulator:
+/// `emulator(parameters) + [companion(parameters, candidate) - companion(parameters)]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct CompanionKeys {
+    /// Values of inputs of the companion that are not calibrated, in addition to those of `fixed` in `[model]` that it
+    /// has too.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub fixed: BTreeMap<String, Quantity>,
+    /// Constants of the companion: inputs that are identified from the simulation runs, each as a `[[parameter]]`.
+    /// Default: none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub parameter: Vec<ParameterSection>,
+    /// Candidates inside the companion: inputs that it holds fixed, each as a `[[gap.switch]]`. Default: none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub switch: Vec<SwitchSection>,
+    /// Candidates inside the companion: terms of its equations, each as a `[[gap.term]]`. Default: none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(with = "Vec<serde_json::Map<String, serde_json::Value>>")]
+    pub term: Vec<Table>,
+    /// `true` also tries the library's terms that the study does not name, if the companion is written as equations.
+    pub terms: bool,
+    /// Largest root mean square error of the companion on simulation runs that did not identify it, divided by the root
+    /// mean square of the response. A companion with a larger error is not used, and the verdict says so.
+    pub gate: Positive,
+    /// Number of simulation runs from which the constants are identified, spread over the parameters.
+    pub runs: Count,
+    /// Values of the constants that were identified earlier, by name, in the units of `[[gap.companion.parameter]]`.
+    /// With a value for each, none is identified again. Default: none.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub constants: BTreeMap<String, f64>,
+    /// Candidates that are part of the study: their changes are added to every response, and their unknowns are
+    /// calibrated. Needs `constants`. Default: none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub add: Vec<String>,
+}
+
+impl Default for CompanionKeys {
+    fn default() -> Self {
+        let gate = Positive::new(0.1).unwrap_or_else(|_| unreachable!("a tenth"));
+        let runs = Count::new(3).unwrap_or_else(|_| unreachable!("three"));
+        Self {
+            fixed: BTreeMap::new(),
+            parameter: Vec::new(),
+            switch: Vec::new(),
+            term: Vec::new(),
+            terms: true,
+            gate,
+            runs,
+            constants: BTreeMap::new(),
+            add: Vec::new(),
+        }
+    }
+}
+
+/// The companion of a study.
+pub struct Companion {
+    /// The keys as written.
+    pub keys: CompanionKeys,
+    /// The companion as the model of a study without a surrogate. The parameters are those of the study, then the
+    /// constants; the candidates are those of the companion.
+    pub study: Arc<Study>,
+    added: OnceLock<Vec<AddedCandidate>>,
+}
+
+/// A candidate that is part of the study: its name, and its effect on the response.
+pub type AddedCandidate = (String, Arc<dyn Effect>);
+
+/// Reads `[gap.companion]` of a study; `None` after reporting an error.
+pub(in crate::study) fn companion(
+    study: &Study,
+    node: &Node,
+    problems: &mut Problems,
+) -> Option<Companion> {
+    let Section { common: keys, built } =
+        section::<dyn Model, CompanionKeys>(node, None, problems)?;
+    let inside = Inside::of_companion(node, &keys, problems)?;
+    let (parameters, unknowns) = with_constants(study, &keys, node, problems)?;
+    let common = ModelKeys { fixed: keys.fixed.clone(), ..ModelKeys::default() };
+    let plugins =
+        PluginSections { model: Some(Section { common, built }), ..PluginSections::default() };
+    let gap = Gap {
+        keys: GapSection { terms: keys.terms, ..GapSection::default() },
+        inside,
+        ..Gap::default()
+    };
+    let study = study.companion_of(parameters, unknowns, plugins, gap);
+    Some(Companion { keys, study: Arc::new(study), added: OnceLock::new() })
+}
+
+/// The parameters of a study, then the constants; those of the study have the names that they have there.
+fn with_constants(
+    study: &Study,
+    keys: &CompanionKeys,
+    node: &Node,
+    problems: &mut Problems,
+) -> Option<(Vec<Parameter>, Vec<Unknown>)> {
+    let before = problems.len();
+    for constant in keys.parameter.iter().filter(|constant| constant.scenario.is_some()) {
+        Complaints::new(node, problems)
+            .at(&format!("parameter.{}.scenario", constant.name))
+            .say("a constant of the companion has one value under all conditions")
+            .help("take `scenario` out");
+    }
+    if problems.len() > before {
+        return None;
+    }
+    let (own, names) = unknowns(&keys.parameter, &[], None, node, problems);
+    let mut parameters = study.parameters.clone();
+    parameters.extend(own);
+    let mut all = study.unknowns.clone();
+    all.extend(names);
+    Some((parameters, all))
+}
+
+impl Companion {
+    /// The number of parameters of the study, which come before the constants.
+    pub fn own(&self) -> usize {
+        self.study.parameters.len() - self.keys.parameter.len()
+    }
+
+    /// The companion as plain data, for the hash of results that depend on it.
+    pub fn identity(&self) -> serde_json::Value {
+        let model = self.study.model.as_ref().map(|model| model.built.identity());
+        let terms = self.study.gap.inside.terms.iter();
+        let terms: Vec<_> = terms.map(|t| (t.built.identity(), &t.common)).collect();
+        json!([model, self.keys, terms])
+    }
+
+    /// Sets the effects of the candidates that are part of the study, which are built from its model once it runs; later
+    /// calls have no effect.
+    pub fn set_added(&self, effects: Vec<AddedCandidate>) {
+        let _ = self.added.set(effects);
+    }
+
+    /// The candidates that are part of the study. Without [`set_added`](Self::set_added) they report a fault, so that no
+    /// result is computed without them.
+    pub fn added(&self) -> &[AddedCandidate] {
+        let unset =
+            |name: &String| -> AddedCandidate { (name.clone(), Arc::new(Unset::new(name))) };
+        self.added.get_or_init(|| self.keys.add.iter().map(unset).collect())
+    }
+
+    /// The values of the constants, in their order, if the study states all of them.
+    pub fn stated(&self) -> Option<Vec<f64>> {
+        let value = |own: &ParameterSection| self.keys.constants.get(own.name.as_str()).copied();
+        self.keys.parameter.iter().map(value).collect()
+    }
+}
+
+/// The place of an added candidate whose effect was not set.
+struct Unset(Arc<Fault>);
+
+impl Unset {
+    fn new(name: &str) -> Self {
+        let fault = Fault::new(format!("the candidate `{name}` of the companion"));
+        fault.report("its effect was not built before it was used");
+        Self(Arc::new(fault))
+    }
+}
+
+impl Component for Unset {
+    fn faults(&self) -> Vec<Arc<Fault>> {
+        vec![Arc::clone(&self.0)]
+    }
+}
+
+impl Effect for Unset {
+    fn describe(&self) -> Description {
+        Description::new("not built", "", "")
+    }
+
+    fn parameters(&self, _layout: &Layout) -> Vec<Hyperparameter> {
+        Vec::new()
+    }
+
+    fn absent(&self, _layout: &Layout) -> Vec<f64> {
+        Vec::new()
+    }
+
+    fn apply(&self, _layout: &Layout, response: &[f64], _values: &[f64]) -> Vec<f64> {
+        vec![f64::NAN; response.len()]
+    }
+
+    fn starts(&self, _layout: &Layout, _situation: &Situation<'_>) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
+
+    fn proposals(&self, _situation: &Situation<'_>) -> Vec<Table> {
+        Vec::new()
+    }
+}
