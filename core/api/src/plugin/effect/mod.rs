@@ -19,7 +19,7 @@ pub use curve::{CurveEffect, Form};
 pub use placed::{On, Placed, acts, with_tangents};
 pub use span::{Span, each_curve, grid};
 pub use starts::{all, apart, propose, signs, spaced, spaced_by_ratio};
-pub use steps::{by_parameter_steps, by_parameter_steps_of, push_forward_step};
+pub use steps::{SIMULATED, SMOOTH, by_parameter_steps, by_parameter_steps_of, push_forward_step};
 pub use unknown::{Measure, Unknown};
 
 /// One candidate piece of missing physics: on the model's response, or inside the model through its

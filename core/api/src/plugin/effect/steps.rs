@@ -6,6 +6,13 @@ use lacuna_base::matrix::Matrix;
 use super::Effect;
 use crate::plugin::Hyperparameter;
 
+/// Share of a prior's width for steps in a formula.
+pub const SMOOTH: f64 = 1e-4;
+
+/// Share of a prior's width for steps in a simulation, whose response to a tiny change is decided by events such as
+/// cavities that open one step earlier.
+pub const SIMULATED: f64 = 0.02;
+
 /// Finite differences for [`Effect::by_parameters`].
 pub fn by_parameter_steps<E: Effect + ?Sized>(
     effect: &E,
@@ -14,15 +21,17 @@ pub fn by_parameter_steps<E: Effect + ?Sized>(
     values: &[f64],
 ) -> Matrix {
     let at = |values: &[f64]| effect.apply(layout, response, values);
-    by_parameter_steps_of(&effect.parameters(layout), layout.len(), values, at)
+    by_parameter_steps_of(&effect.parameters(layout), layout.len(), values, SMOOTH, at)
 }
 
 /// Derivatives of a function of these parameters by finite differences inside the priors' supports, `outputs x
-/// parameters`.
+/// parameters`. A step is this share of the central 95 % of a prior: [`SMOOTH`] for a formula, [`SIMULATED`] for a
+/// simulation.
 pub fn by_parameter_steps_of(
     parameters: &[Hyperparameter],
     outputs: usize,
     values: &[f64],
+    share: f64,
     of: impl Fn(&[f64]) -> Vec<f64>,
 ) -> Matrix {
     let mut jacobian = Matrix::zeros(outputs, values.len());
@@ -34,7 +43,7 @@ pub fn by_parameter_steps_of(
         };
         let prior = &parameter.prior;
         let width = prior.quantile(0.975) - prior.quantile(0.025);
-        let slopes = slope_within(prior.support(), values[j], 1e-4 * width, at);
+        let slopes = slope_within(prior.support(), values[j], share * width, at);
         slopes.iter().enumerate().for_each(|(i, slope)| jacobian[(i, j)] = *slope);
     }
     jacobian

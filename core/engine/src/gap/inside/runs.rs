@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use lacuna::data::{Layout, Layouts, Parameter};
-use lacuna::plugin::effect::{Description, Reach, Situation, by_parameter_steps_of};
+use lacuna::plugin::effect::{Description, Reach, SMOOTH, Situation, by_parameter_steps_of};
 use lacuna::plugin::registry::Section;
 use lacuna::plugin::{Component, Effect, Emulator, Hyperparameter, Reader};
 use lacuna::run::{Observer, Stop, files};
@@ -184,7 +184,7 @@ impl Effect for RunsEffect {
         point: &[f64],
     ) -> Matrix {
         let change = |values: &[f64]| self.change(layout, values, point);
-        by_parameter_steps_of(&self.parameters(layout), layout.len(), values, change)
+        by_parameter_steps_of(&self.parameters(layout), layout.len(), values, SMOOTH, change)
     }
 
     /// The change is added, and its own slopes by the parameters are of second order: they are left out.

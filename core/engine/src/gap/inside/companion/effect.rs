@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use lacuna::data::Layout;
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::effect::{Description, Reach, Situation, by_parameter_steps_of};
+use lacuna::plugin::effect::{Description, Reach, SIMULATED, Situation, by_parameter_steps_of};
 use lacuna::plugin::{Component, Effect, Forward, Hyperparameter};
 use lacuna::run::{Fault, Stop};
 use lacuna_linalg::Matrix;
@@ -175,7 +175,7 @@ impl Effect for CompanionEffect {
         point: &[f64],
     ) -> Matrix {
         let change = |values: &[f64]| self.part(layout, &self.change(values, point)).to_vec();
-        by_parameter_steps_of(&self.parameters(layout), layout.len(), values, change)
+        by_parameter_steps_of(&self.parameters(layout), layout.len(), values, SIMULATED, change)
     }
 
     /// The change is added, and its own slopes by the parameters are of second order: they are left out.
