@@ -20,9 +20,9 @@ use crate::gap::experiment::with_effects::WithEffects;
 use crate::gap::inside;
 use crate::gap::inside::Pieces;
 use crate::gap::inside::advice::what_would_tell;
+use crate::gap::inside::companion::AdmittedCompanion;
 use crate::gap::noise::{Noise, ResponseTangents};
 use crate::gap::prove::prove;
-use crate::gap::result::companion::IdentifiedCompanion;
 use crate::gap::result::{GapResult, HeldOut};
 use crate::gap::search::{SearchOptions, SearchResult, VerdictKind, search};
 use crate::gap::system::System;
@@ -46,7 +46,7 @@ pub struct InsideCandidates<'a> {
     candidates: Vec<Candidate>,
     wide: Option<ExtendedMap<'a>>,
     /// The companion with its constants, if the study has one.
-    companion: Option<IdentifiedCompanion>,
+    companion: Option<AdmittedCompanion>,
 }
 
 impl<'a> InsideCandidates<'a> {
@@ -58,9 +58,8 @@ impl<'a> InsideCandidates<'a> {
         run: &mut RunDirectory,
         observer: &dyn Observer,
     ) -> Result<Self, Stop> {
-        let (mut candidates, companion) =
-            inside::companion::candidates(study, problem, run, observer)?;
-        candidates.extend(inside::runs::candidates(study, problem, run, observer)?);
+        let companion = inside::companion::prepared(study, problem, run, observer)?;
+        let mut candidates = inside::runs::candidates(study, problem, run, observer)?;
         let Some(pieces) = pieces else {
             return Ok(Self { candidates, wide: None, companion });
         };
@@ -144,8 +143,13 @@ pub fn prepared<T>(
     let response = base.response(&starts[0]);
     let noise = Noise::of(&experiment, &base.around(&starts[0]), None).sd(&experiment, &response);
     let situation = Situation { layouts: &study.layouts, response: &response, noise: &noise };
-    let Proposed { mut candidates, untried } = candidates(study, &situation)?;
+    let Proposed { mut candidates, mut untried } = candidates(study, &situation)?;
     candidates.extend(beginning.inside.candidates.iter().cloned());
+    if let Some(companion) = &beginning.inside.companion {
+        let learned = companion.candidates(study, &starts[0])?;
+        candidates.extend(learned.candidates);
+        untried.extend(learned.untried);
+    }
     let made = use_it(&PreparedSearch {
         base: &base,
         split: &split,
@@ -193,8 +197,8 @@ impl<'a> PreparedSearch<'a> {
         if let (Some(companion), Some(own)) =
             (&self.base.study.gap.companion, &self.base.beginning.inside.companion)
         {
-            result.verdict.reasons.push(own.words(companion));
-            result.companion = Some(own.clone());
+            result.verdict.reasons.push(own.identified().words(companion));
+            result.companion = Some(own.identified().clone());
         }
         if matches!(result.verdict.word, VerdictKind::Unlisted | VerdictKind::Approximate) {
             result.verdict.reasons.extend(what_would_tell(self.base.study));

@@ -178,7 +178,8 @@ fn in_companion(text: String, study: &Study, result: &GapResult) -> Result<Strin
     };
     let names: Vec<&str> = own.iter().map(|addition| addition.kind.as_str()).collect();
     let comments: String = own.iter().map(|addition| found(addition)).collect();
-    with_added(text, study, &names, companion, &comments)
+    let around: Vec<f64> = result.parameters.iter().map(|shift| shift.value[1]).collect();
+    with_added(text, study, &names, companion, &around, &comments)
 }
 
 /// The text with a name of its own if it gives one: two studies with the same name would share a run directory.

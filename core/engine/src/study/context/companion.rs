@@ -31,6 +31,7 @@ pub(super) fn check(study: &Study, companion: &Companion, node: &Node, problems:
         constants(companion, &signature, &mut complaints);
         inputs(companion, place, &signature, &mut complaints);
     }
+    around(companion, &mut complaints);
     added(companion, &mut complaints);
     problems.dedup();
     super::inside::check(&companion.study, node, problems);
@@ -134,6 +135,19 @@ fn inputs(
             .say("the companion uses none of the study's parameters")
             .expected(one_of(own.iter().map(|unknown| unknown.name.as_str())))
             .help("it answers as the simulator does only if it depends on the same parameters");
+    }
+}
+
+/// Reports points of parameters that the study does not have.
+fn around(companion: &Companion, complaints: &mut Complaints<'_>) {
+    let own = &companion.study.parameters[..companion.own()];
+    for name in companion.keys.around.keys() {
+        if !own.iter().any(|parameter| &parameter.name == name) {
+            complaints
+                .at(&format!("around.{name}"))
+                .say(format!("the study has no parameter `{name}`"))
+                .expected(one_of(own.iter().map(|parameter| parameter.name.as_str())));
+        }
     }
 }
 

@@ -56,6 +56,10 @@ pub struct CompanionKeys {
     /// With a value for each, none is identified again. Default: none.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub constants: BTreeMap<String, f64>,
+    /// Point of the study's parameters near which the changes of `add` are learned, by name, in the units of
+    /// `[[parameter]]`. Default: the medians of the priors.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub around: BTreeMap<String, f64>,
     /// Candidates that are part of the study: their changes are added to every response, and their unknowns are
     /// calibrated. Needs `constants`. Default: none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -75,6 +79,7 @@ impl Default for CompanionKeys {
             gate,
             runs,
             constants: BTreeMap::new(),
+            around: BTreeMap::new(),
             add: Vec::new(),
         }
     }
@@ -144,6 +149,13 @@ impl Companion {
     /// The number of parameters of the study, which come before the constants.
     pub fn own(&self) -> usize {
         self.study.parameters.len() - self.keys.parameter.len()
+    }
+
+    /// The point of the study's parameters near which changes are learned for `add`.
+    pub fn centre(&self) -> Vec<f64> {
+        let own = self.study.parameters[..self.own()].iter();
+        own.map(|p| self.keys.around.get(&p.name).copied().unwrap_or_else(|| p.prior.quantile(0.5)))
+            .collect()
     }
 
     /// The companion as plain data, for the hash of results that depend on it.

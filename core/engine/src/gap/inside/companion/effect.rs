@@ -2,138 +2,153 @@
 
 use std::sync::Arc;
 
-use lacuna::data::Layout;
-use lacuna::math::distribution::Distribution;
-use lacuna::plugin::effect::{Description, Reach, SIMULATED, Situation, by_parameter_steps_of};
+use lacuna::data::{Layout, Layouts};
+use lacuna::math::random::Stream;
+use lacuna::plugin::effect::{Description, Reach, SMOOTH, Situation, by_parameter_steps_of};
 use lacuna::plugin::{Component, Effect, Forward, Hyperparameter};
-use lacuna::run::{Fault, Stop};
+use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
 use toml::Table;
 
-use super::memory::Memory;
-use crate::gap::candidates::Candidate;
-use crate::gap::inside::pieces::{ExtendedModel, Pieces};
+use super::learned::{Basis, LearnedChange, Region};
+use crate::gap::candidates::{Candidate, Untried};
+use crate::gap::experiment::wider::FreeInput;
+use crate::gap::inside::pieces::{Piece, Pieces};
 use crate::gap::result::IN_COMPANION;
 use crate::gap::result::companion::IdentifiedCompanion;
 use crate::gap::system::switched::InputEffect;
 use crate::stage::direct::ModelMap;
-use crate::stage::simulator::Simulator;
-use crate::study::Study;
-use crate::study::gap::companion::Companion;
-
-/// A companion without candidates.
-pub(super) struct BareCompanion {
-    study: Arc<Study>,
-    constants: Vec<f64>,
-    /// The number of parameters of the study.
-    own: usize,
-    of_changes: f64,
-    /// Responses without candidates.
-    known: Memory,
-    fault: Arc<Fault>,
-}
+use crate::study::gap::Companion;
 
 /// A candidate inside a companion. Its change depends on the study's parameters, the first of those of the forward map.
-pub(super) struct CompanionEffect {
-    bare: Arc<BareCompanion>,
-    pieces: Arc<Pieces>,
-    model: ExtendedModel,
+struct CompanionEffect {
+    change: LearnedChange,
+    /// The number of the study's parameters.
+    own: usize,
+    layouts: Layouts,
     inner: InputEffect,
-    /// Responses with it.
-    known: Memory,
+    of_changes: f64,
 }
 
-impl BareCompanion {
-    pub fn new(companion: &Companion, found: &IdentifiedCompanion) -> Self {
-        Self {
-            study: Arc::clone(&companion.study),
-            constants: found.constants.clone(),
-            own: companion.own(),
-            of_changes: found.of_changes,
-            known: Memory::default(),
-            fault: Arc::new(Fault::new("the companion")),
-        }
-    }
+/// The candidates inside a companion.
+#[derive(Default)]
+pub struct CompanionCandidates {
+    /// The candidates.
+    pub candidates: Vec<Candidate>,
+    /// Those whose change could not be learned.
+    pub untried: Vec<Untried>,
+}
 
-    /// The response at a point of the study's parameters, one value per output; not finite if there is none.
-    fn response(&self, parameters: &[f64]) -> Arc<Vec<f64>> {
-        let point = [parameters, &self.constants].concat();
-        self.known.or(&point, || {
-            let none = || Stop::new("the companion has no model");
-            let simulator = Simulator::of(&self.study).and_then(|own| own.ok_or_else(none));
-            self.evaluated(simulator, &point)
-        })
-    }
+/// A companion with its constants, from which changes are learned near a point of the study's parameters.
+pub(super) struct Learning<'a> {
+    pub companion: &'a Companion,
+    pub found: &'a IdentifiedCompanion,
+    pub pieces: &'a Pieces,
+    pub region: Region,
+    pub random: Stream,
+}
 
-    fn evaluated(&self, simulator: Result<Simulator<'_>, Stop>, point: &[f64]) -> Vec<f64> {
-        let outputs = self.study.layouts.len();
-        let simulator = match simulator {
-            Ok(simulator) => simulator,
-            Err(stop) => {
-                self.fault.report(stop);
-                return vec![f64::NAN; outputs];
+impl Learning<'_> {
+    /// The candidates with these names, or all.
+    pub fn candidates(&self, wanted: impl Fn(&str) -> bool) -> Result<CompanionCandidates, Stop> {
+        let study = &self.companion.study;
+        let bare = ModelMap::of(study)?;
+        let mut without = Matrix::zeros(0, study.layouts.len());
+        let mut all = CompanionCandidates::default();
+        for (p, piece) in self.pieces.all.iter().enumerate() {
+            let kind = self.kind(piece);
+            if !wanted(&kind) {
+                continue;
             }
-        };
-        // Only the widths of derivatives, which are not taken here, depend on the priors.
-        let priors = vec![Distribution::Uniform([0.0, 1.0]); point.len()];
-        let map = ModelMap::with(simulator, priors, outputs);
-        let response = map.mean(&Matrix::from_vec(1, point.len(), point.to_vec())).into_vec();
-        if let Some(fatal) = map.failure() {
-            self.fault.report(fatal);
+            let inputs: Vec<FreeInput> =
+                piece.places.iter().map(|&i| self.pieces.inputs[i].clone()).collect();
+            let basis = Basis::new(self.region.clone(), &inputs);
+            let points = basis.points(&self.random);
+            // All candidates are learned at the same points of the parameters.
+            if points.len() > without.rows() {
+                without = self.answers(&bare, points.iter().map(|(own, _)| (own, &[][..])))?;
+            }
+            let model = self.pieces.wider(study, &[p])?;
+            let model = model.ok_or_else(|| Stop::new("the companion has no model"))?;
+            let priors = study.parameters.iter().map(|p| p.prior.clone());
+            let priors = priors.chain(inputs.iter().map(|i| i.prior.clone())).collect();
+            let simulator = self.pieces.simulator(study, &model)?;
+            let map = ModelMap::with(simulator, priors, study.layouts.len());
+            let with = self.answers(&map, points.iter().map(|(own, values)| (own, &values[..])))?;
+            let difference = |i: usize| -> Vec<f64> {
+                with.row(i).iter().zip(without.row(i)).map(|(a, b)| a - b).collect()
+            };
+            let differences: Vec<Vec<f64>> = (0..points.len()).map(difference).collect();
+            match LearnedChange::of(basis, &points, &differences) {
+                Some(change) => all.candidates.push(self.candidate(kind, piece, inputs, change)),
+                None => all.untried.push(Untried {
+                    kind,
+                    reason: format!(
+                        "the companion has no answer for most of its values{}",
+                        map.tally().map_or(String::new(), |why| format!(": {why}"))
+                    ),
+                }),
+            }
         }
-        response
+        Ok(all)
+    }
+
+    /// The type: an input has its own name, also where an effect on the response has the same, for both are the same
+    /// physics.
+    fn kind(&self, piece: &Piece) -> String {
+        match &piece.addition {
+            None => self.pieces.inputs[piece.places[0]].name.clone(),
+            Some(_) => piece.kind.clone(),
+        }
+    }
+
+    /// The responses of a map at points of the study's parameters and values of its inputs.
+    fn answers<'p>(
+        &self,
+        map: &ModelMap<'_>,
+        points: impl Iterator<Item = (&'p Vec<f64>, &'p [f64])>,
+    ) -> Result<Matrix, Stop> {
+        let rows = points.map(|(own, values)| [own, &self.found.constants[..], values].concat());
+        let answers = map.mean(&Matrix::from_rows(map.dimension(), rows));
+        match map.failure() {
+            Some(fatal) => Err(Stop::new(format!("the companion: {fatal}"))),
+            None => Ok(answers),
+        }
+    }
+
+    fn candidate(
+        &self,
+        kind: String,
+        piece: &Piece,
+        inputs: Vec<FreeInput>,
+        change: LearnedChange,
+    ) -> Candidate {
+        // The places are those of an extended map, which is not used.
+        let inner =
+            InputEffect { places: Vec::new(), inputs, description: piece.description.clone() };
+        let effect: Arc<dyn Effect> = Arc::new(CompanionEffect {
+            change,
+            own: self.companion.own(),
+            layouts: self.companion.study.layouts.clone(),
+            inner,
+            of_changes: self.found.of_changes,
+        });
+        Candidate { kind, plugin: IN_COMPANION.to_owned(), options: Table::new(), effect }
     }
 }
 
 impl CompanionEffect {
-    /// Piece `p` of a companion as a candidate of a search.
-    pub fn candidate(
-        bare: &Arc<BareCompanion>,
-        pieces: &Arc<Pieces>,
-        p: usize,
-    ) -> Result<Candidate, Stop> {
-        let piece = &pieces.all[p];
-        let model = pieces
-            .wider(&bare.study, &[p])?
-            .ok_or_else(|| Stop::new("the companion has no model"))?;
-        let inputs = piece.places.iter().map(|&i| pieces.inputs[i].clone()).collect();
-        // The places are those of an extended map, which is not used: each candidate has a model of its own.
-        let inner =
-            InputEffect { places: Vec::new(), inputs, description: piece.description.clone() };
-        let (bare, pieces) = (Arc::clone(bare), Arc::clone(pieces));
-        // An input has its own name, also where an effect on the response has the same: both are the same physics.
-        let kind = match &piece.addition {
-            None => pieces.inputs[piece.places[0]].name.clone(),
-            Some(_) => piece.kind.clone(),
-        };
-        let known = Memory::default();
-        let effect: Arc<dyn Effect> = Arc::new(Self { bare, pieces, model, inner, known });
-        Ok(Candidate { kind, plugin: IN_COMPANION.to_owned(), options: Table::new(), effect })
-    }
-
-    /// The change of the response, one value per output of the study.
-    fn change(&self, values: &[f64], point: &[f64]) -> Vec<f64> {
-        let own = &point[..self.bare.own];
-        let without = self.bare.response(own);
-        let point = [own, &self.bare.constants, values].concat();
-        let with = self.known.or(&point, || {
-            self.bare.evaluated(self.pieces.simulator(&self.bare.study, &self.model), &point)
-        });
-        with.iter().zip(without.iter()).map(|(a, b)| a - b).collect()
-    }
-
-    /// The part of a change that belongs to a block.
-    fn part<'c>(&self, layout: &Layout, change: &'c [f64]) -> &'c [f64] {
-        let mut parts = self.bare.study.layouts.parts();
-        parts.find(|(block, _)| *block == layout).map_or(&[], |(_, range)| &change[range])
+    /// The change of the response of a block.
+    fn change(&self, layout: &Layout, values: &[f64], point: &[f64]) -> Vec<f64> {
+        let mut parts = self.layouts.parts();
+        let range = parts.find(|(block, _)| *block == layout).map(|(_, range)| range);
+        range.map_or_else(Vec::new, |range| {
+            self.change.at(&point[..self.own], values)[range].to_vec()
+        })
     }
 }
 
-impl Component for CompanionEffect {
-    fn faults(&self) -> Vec<Arc<Fault>> {
-        vec![Arc::clone(&self.bare.fault)]
-    }
-}
+impl Component for CompanionEffect {}
 
 impl Effect for CompanionEffect {
     fn describe(&self) -> Description {
@@ -160,11 +175,8 @@ impl Effect for CompanionEffect {
         values: &[f64],
         point: &[f64],
     ) -> Vec<f64> {
-        if values[0] == self.inner.inputs[0].absent {
-            return response.to_vec();
-        }
-        let change = self.change(values, point);
-        response.iter().zip(self.part(layout, &change)).map(|(y, d)| y + d).collect()
+        let change = self.change(layout, values, point);
+        response.iter().zip(change).map(|(y, d)| y + d).collect()
     }
 
     fn by_parameters_at(
@@ -174,8 +186,8 @@ impl Effect for CompanionEffect {
         values: &[f64],
         point: &[f64],
     ) -> Matrix {
-        let change = |values: &[f64]| self.part(layout, &self.change(values, point)).to_vec();
-        by_parameter_steps_of(&self.parameters(layout), layout.len(), values, SIMULATED, change)
+        let change = |values: &[f64]| self.change(layout, values, point);
+        by_parameter_steps_of(&self.parameters(layout), layout.len(), values, SMOOTH, change)
     }
 
     /// The change is added, and its own slopes by the parameters are of second order: they are left out.
@@ -206,6 +218,6 @@ impl Effect for CompanionEffect {
     }
 
     fn relative_error(&self) -> f64 {
-        self.bare.of_changes
+        self.of_changes
     }
 }

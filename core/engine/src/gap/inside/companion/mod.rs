@@ -9,7 +9,7 @@ pub mod edit;
 mod effect;
 mod gate;
 mod identify;
-mod memory;
+mod learned;
 
 use std::sync::Arc;
 
@@ -18,9 +18,9 @@ use lacuna::run::{Observer, Stop};
 use lacuna_run::{RunDirectory, Stage};
 use serde_json::json;
 
-use self::effect::{BareCompanion, CompanionEffect};
+use self::effect::{CompanionCandidates, Learning};
+use self::learned::Region;
 use super::pieces::Pieces;
-use crate::gap::candidates::Candidate;
 use crate::gap::result::companion::IdentifiedCompanion;
 use crate::stage::direct::ModelMap;
 use crate::stage::inverse_problem::InverseProblem;
@@ -28,25 +28,52 @@ use crate::stage::stream;
 use crate::study::Study;
 use crate::study::gap::companion::Companion;
 
-/// The candidates inside the companion of a study; none if it has no companion, or if that is not admitted.
-pub fn candidates(
+/// A companion that is admitted, from which candidates are learned.
+pub struct AdmittedCompanion {
+    found: IdentifiedCompanion,
+    pieces: Option<Pieces>,
+}
+
+/// The companion of a study with its constants; `None` if the study has none.
+pub fn prepared(
     study: &Study,
     problem: &InverseProblem<'_>,
     run: &mut RunDirectory,
     observer: &dyn Observer,
-) -> Result<(Vec<Candidate>, Option<IdentifiedCompanion>), Stop> {
-    let Some(companion) = &study.gap.companion else { return Ok((Vec::new(), None)) };
-    let ensemble = problem.data.value.runs()?;
-    let found = identified(study, companion, ensemble, problem, run, observer)?;
-    if !found.admitted {
-        return Ok((Vec::new(), Some(found)));
+) -> Result<Option<AdmittedCompanion>, Stop> {
+    let Some(companion) = &study.gap.companion else { return Ok(None) };
+    let found = identified(study, companion, problem.data.value.runs()?, problem, run, observer)?;
+    let pieces = if found.admitted { Pieces::of(&companion.study)? } else { None };
+    Ok(Some(AdmittedCompanion { found, pieces }))
+}
+
+impl AdmittedCompanion {
+    /// The companion with its constants.
+    pub fn identified(&self) -> &IdentifiedCompanion {
+        &self.found
     }
-    let Some(pieces) = Pieces::of(&companion.study)? else { return Ok((Vec::new(), Some(found))) };
-    let (pieces, bare) = (Arc::new(pieces), Arc::new(BareCompanion::new(companion, &found)));
-    let all = (0..pieces.all.len()).map(|p| CompanionEffect::candidate(&bare, &pieces, p));
-    let mut candidates: Vec<Candidate> = all.collect::<Result<_, Stop>>()?;
-    candidates.retain(|candidate| !companion.keys.add.contains(&candidate.kind));
-    Ok((candidates, Some(found)))
+
+    /// The candidates, learned near a point of the study's parameters; none if the companion is not admitted. Those that
+    /// are part of the study are left out.
+    pub fn candidates(&self, study: &Study, point: &[f64]) -> Result<CompanionCandidates, Stop> {
+        let (Some(companion), Some(pieces)) = (&study.gap.companion, &self.pieces) else {
+            return Ok(CompanionCandidates::default());
+        };
+        learning(study, companion, &self.found, pieces, point)
+            .candidates(|name| !companion.keys.add.iter().any(|added| added == name))
+    }
+}
+
+fn learning<'a>(
+    study: &Study,
+    companion: &'a Companion,
+    found: &'a IdentifiedCompanion,
+    pieces: &'a Pieces,
+    point: &[f64],
+) -> Learning<'a> {
+    let region = Region::around(&study.parameters, point);
+    let random = stream(study, "gap").named("changes");
+    Learning { companion, found, pieces, region, random }
 }
 
 /// Builds the effects of the candidates inside the companion that are part of the study, which every stage after this
@@ -60,21 +87,24 @@ pub fn build_added(study: &Study) -> Result<(), Stop> {
         Stop::new("`[gap.companion]` adds candidates, but its constants have no values")
     })?;
     let found = IdentifiedCompanion { constants, ..IdentifiedCompanion::default() };
-    let bare = Arc::new(BareCompanion::new(companion, &found));
-    let pieces = Pieces::of(&companion.study)?.map(Arc::new);
-    let mut added = Vec::new();
-    for name in &companion.keys.add {
-        let missing = || {
-            Stop::new(format!("the companion has no candidate `{name}`"))
-                .help("list it in `[[gap.companion.switch]]` or `[[gap.companion.term]]`, or take it out of `add`")
-        };
-        let pieces = pieces.as_ref().ok_or_else(missing)?;
-        let all = (0..pieces.all.len()).map(|p| CompanionEffect::candidate(&bare, pieces, p));
-        let all: Vec<Candidate> = all.collect::<Result<_, Stop>>()?;
-        let own = all.into_iter().find(|candidate| candidate.kind == *name);
-        added.push((name.clone(), own.ok_or_else(missing)?.effect));
-    }
-    companion.set_added(added);
+    let names = &companion.keys.add;
+    let candidates = match Pieces::of(&companion.study)? {
+        Some(pieces) => {
+            let point = companion.centre();
+            let learning = learning(study, companion, &found, &pieces, &point);
+            learning.candidates(|name| names.iter().any(|added| added == name))?.candidates
+        }
+        None => Vec::new(),
+    };
+    let of_name = |name: &String| {
+        let own = candidates.iter().find(|candidate| candidate.kind == *name);
+        own.map(|own| (name.clone(), Arc::clone(&own.effect))).ok_or_else(|| {
+            Stop::new(format!("the companion has no candidate `{name}` that it answers")).help(
+                "list it in `[[gap.companion.switch]]` or `[[gap.companion.term]]`, or take it out of `add`",
+            )
+        })
+    };
+    companion.set_added(names.iter().map(of_name).collect::<Result<_, Stop>>()?);
     Ok(())
 }
 
