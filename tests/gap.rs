@@ -13,6 +13,7 @@
 mod beside;
 mod cases;
 mod chain;
+mod classes;
 mod companion;
 mod falling_balls;
 mod inside;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use crate::gap::candidates::Candidate;
-use crate::gap::search::{SearchResult, Verdict};
+use crate::gap::search::{CrossValidation, SearchResult, Verdict};
 
 /// An effect as a study adds it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,6 +43,10 @@ pub struct AddedEffect {
     /// True when it keeps its name also where another part of the gap has none.
     #[serde(default)]
     pub certain: bool,
+    /// The comparisons with its rival on left-out data: with a free form in its place, or for another model with the
+    /// study's model and its effects.
+    #[serde(default)]
+    pub rivals: Vec<CrossValidation>,
 }
 
 /// The name of the plugin of effects inside a companion, which are no plugins.
@@ -84,7 +88,8 @@ pub(super) fn additions(
 ) -> Vec<AddedEffect> {
     let placed = found.system.effects.iter().zip(&found.chosen).zip(&verdict.effects);
     placed
-        .map(|((effect, placement), named)| {
+        .zip(&found.support)
+        .map(|(((effect, placement), named), support)| {
             let candidate = &candidates[placement.candidate];
             let described = candidate.effect.describe();
             let unknowns = effect.hyperparameters().into_iter().enumerate();
@@ -110,6 +115,7 @@ pub(super) fn additions(
                 probability: named.probability,
                 share: named.share,
                 certain: named.certain,
+                rivals: support.against_free_form.clone(),
             }
         })
         .collect()

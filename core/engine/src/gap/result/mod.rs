@@ -2,9 +2,12 @@
 
 pub mod added;
 mod addition;
+mod alike;
 pub mod companion;
 mod curve;
 pub mod insight;
+pub mod members;
+pub mod names;
 pub mod remains;
 pub mod replaced;
 
@@ -21,12 +24,13 @@ use crate::gap::experiment::hold_out::HeldOutKind;
 use crate::gap::prove::Proof;
 use crate::gap::result::companion::IdentifiedCompanion;
 use crate::gap::result::insight::{Insight, insight, withhold};
+use crate::gap::result::members::{Member, members};
+use crate::gap::result::names::NameProof;
 use crate::gap::result::remains::{Remains, remains};
 use crate::gap::result::replaced::OtherModel;
 use crate::gap::search::needless::Needless;
 use crate::gap::search::{
-    Detectability, Diagnostics, SearchOptions, SearchResult, SearchStep, Verdict, VerdictKind,
-    verdict,
+    Detectability, Diagnostics, SearchOptions, SearchResult, SearchStep, Verdict, verdict,
 };
 use crate::gap::system::fit::precision;
 use crate::gap::test::Region;
@@ -53,6 +57,11 @@ impl GapFindings {
             _ => &self.result.held_out,
         }
     }
+
+    /// The proof of the names; `None` if no effect was found.
+    pub fn proof(&self) -> Option<NameProof> {
+        NameProof::of(&self.result, self.held_out())
+    }
 }
 
 /// The whole result of the gap workflow.
@@ -69,6 +78,9 @@ pub struct GapResult {
     pub noise_assumed: bool,
     /// The effects that were found, as a study would add them.
     pub additions: Vec<AddedEffect>,
+    /// The members of the class, if the verdict is one; the effects above are one of them.
+    #[serde(default)]
+    pub members: Vec<Member>,
     /// The effects that were not tried.
     #[serde(default)]
     pub untried: Vec<Untried>,
@@ -211,21 +223,6 @@ impl GapResult {
         has_share.then(|| self.verdict.closed.clamp(0.0, 1.0))
     }
 
-    /// The effects that a study may add: those that have a name, unless held-out data contradict them. Held-out data
-    /// do so where the interval of the share that closed holds zero.
-    pub fn worth_adding(&self) -> Vec<AddedEffect> {
-        let contradicted = self.held_out.iter().any(|part| {
-            let all = &part.proof.all;
-            all.closed <= 0.0 || all.lower.is_finite() && all.lower <= 0.0
-        });
-        let is_named = |effect: &&AddedEffect| match self.verdict.word {
-            VerdictKind::Named | VerdictKind::Approximate | VerdictKind::Class => true,
-            VerdictKind::Unlisted => effect.certain,
-            VerdictKind::None | VerdictKind::NotVisible => false,
-        };
-        self.additions.iter().filter(is_named).filter(|_| !contradicted).cloned().collect()
-    }
-
     /// The result of a search, without the proof.
     pub fn of<'a>(
         found: &SearchResult<'a>,
@@ -239,12 +236,15 @@ impl GapResult {
         let mut verdict = verdict(found, candidates, options);
         let insight = insight(found, candidates, &verdict, stream);
         withhold(&mut verdict, &insight);
+        verdict.reasons.extend(alike::opposites(found, candidates));
+        let additions = additions(found, candidates, &verdict);
         let (counts, _) = experiment.means();
         Self {
             levels: [options.naming, options.unlisted],
             simulations: options.simulations,
             noise_assumed: found.noise.is_assumed(),
-            additions: additions(found, candidates, &verdict),
+            members: members(found, candidates, &verdict, &additions),
+            additions,
             untried: Vec::new(),
             path: found.path.iter().map(|step| passed(step, candidates)).collect(),
             p: both.map(|diagnostics| diagnostics.p),

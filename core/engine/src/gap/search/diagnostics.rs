@@ -96,6 +96,8 @@ pub struct SearchResult<'a> {
     pub last: Diagnostics,
     /// The probability of each type for each effect, in the place of the one chosen, the most probable first.
     pub types: Vec<Vec<(String, f64)>>,
+    /// The placements that were weighed in the place of each effect, in decreasing order of weight.
+    pub slots: Vec<Vec<Weighed>>,
     /// The support of each effect.
     pub support: Vec<Support>,
     /// The probability of differences as large between conditions, or between the sensors of a group, if each effect

@@ -104,6 +104,7 @@ pub fn search<'a>(
         chosen,
         last,
         types,
+        slots,
         support,
         consistency,
         stability,

@@ -29,4 +29,4 @@ pub use refit::{
 };
 pub use state::kinds;
 pub use support::Support;
-pub use verdict::{MissingEffect, SURE, Verdict, VerdictKind, class, explains, verdict};
+pub use verdict::{MissingEffect, PROVEN, SURE, Verdict, VerdictKind, class, explains, verdict};

@@ -43,7 +43,7 @@ const MOST: f64 = 0.6;
 const SIGNIFICANT: f64 = 3.0;
 
 /// The number of standard errors by which an effect has to predict left-out data better than a free form in its place.
-const PROVEN: f64 = 2.5;
+pub const PROVEN: f64 = 2.5;
 
 /// The number of standard errors by which a free form in the place of an effect has to predict left-out data better to
 /// contradict it.
@@ -284,7 +284,7 @@ fn with_untried(
             effect.class.push((*kind).to_owned());
             effect.certain = false;
             reasons.push(format!(
-                "`{}` looks like `{kind}`, which was not tried: the positions of the sensors in `[gap.positions]` would tell",
+                "`{}` looks like `{kind}`, which was not tried: the `positions` of the sensors on their axis in `[response]` would tell",
                 effect.kind
             ));
         }

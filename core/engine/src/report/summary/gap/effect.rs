@@ -28,7 +28,9 @@ pub struct Effect {
     /// Posterior probability of the type among the candidates.
     pub probability: f64,
     /// Share of the gap that the effect closes beside the others.
-    pub share: f64,
+    pub explained: Quantity,
+    /// True if no remainder is significant beside the effects.
+    pub exact: bool,
     /// True if the effect keeps its name although another part of the gap may have none.
     pub certain: bool,
     /// Types that the data cannot distinguish from this one, which comes first.
@@ -53,7 +55,7 @@ pub struct Unknown {
 }
 
 impl Effect {
-    pub fn of(addition: &AddedEffect, added: Option<&Augmented>) -> Self {
+    pub fn of(addition: &AddedEffect, exact: bool, added: Option<&Augmented>) -> Self {
         let unknowns = addition.unknowns.iter().map(|unknown| {
             let short = unknown.name.rsplit('.').next().unwrap_or_default();
             (short.to_owned(), Unknown::of(unknown, addition, added))
@@ -65,7 +67,8 @@ impl Effect {
             on: addition.on.clone(),
             parameters: unknowns.collect(),
             probability: addition.probability,
-            share: addition.share,
+            explained: addition.share.into(),
+            exact,
             certain: addition.certain,
             class: addition.class.clone(),
         }
