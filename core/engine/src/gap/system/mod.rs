@@ -3,6 +3,7 @@
 mod coordinate;
 pub mod emulator_error;
 pub mod fit;
+pub mod noise_scale;
 pub mod remainder;
 mod step;
 pub mod switched;
