@@ -22,6 +22,7 @@ mod names;
 mod places;
 mod proofs;
 mod records;
+mod sets;
 mod single;
 mod tally;
 mod target;

@@ -157,6 +157,11 @@ pub fn place(curve: &MeasuredCurve) -> On {
 }
 
 impl Placement {
+    /// True for the same candidate in the same place.
+    pub fn is(&self, other: &Self) -> bool {
+        self.candidate == other.candidate && self.on == other.on
+    }
+
     /// The effect on the labels of the placement, called `name`.
     pub fn placed<'a>(
         &self,
