@@ -18,6 +18,7 @@ mod inside;
 mod models;
 mod names;
 mod places;
+mod power;
 mod proofs;
 mod records;
 mod single;

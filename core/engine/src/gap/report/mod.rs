@@ -3,6 +3,7 @@
 mod figures;
 mod insight;
 pub mod power;
+pub mod reliability;
 mod sentences;
 mod tables;
 
@@ -55,6 +56,9 @@ pub fn section(view: &View<'_>, gap: &GapFindings, numbers: &mut Numbers) -> Sec
             (figures::leaders(step, numbers))
         }
         @if !result.path.is_empty() { (tables::path(result, numbers)) }
+        @if let Some(counted) = &result.reliability {
+            (reliability::figure(&[("before the correction by this count", counted)], numbers))
+        }
         (insight::all(view, result, numbers))
         (tables::parameters(gap, numbers))
         (tables::visible(result, numbers))

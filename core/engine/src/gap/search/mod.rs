@@ -29,4 +29,7 @@ pub use refit::{
 };
 pub use state::kinds;
 pub use support::Support;
-pub use verdict::{MissingEffect, SURE, Verdict, VerdictKind, class, explains, verdict};
+pub use verdict::{
+    Bin, Brier, CEILING, MissingEffect, Reliability, SURE, Told, Traits, Verdict, VerdictKind,
+    class, explains, verdict,
+};

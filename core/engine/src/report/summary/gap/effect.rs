@@ -25,8 +25,11 @@ pub struct Effect {
     /// posterior density with the normal approximation.
     #[schemars(extend("propertyNames" = { "title": "unknown" }))]
     pub parameters: ByName<Unknown>,
-    /// Posterior probability of the type among the candidates.
+    /// Probability that the type is right, as counted in simulated cases of which half hide physics that no candidate has:
+    /// of the study itself if `lacuna power` was run on it, otherwise of other systems. Never above 0.99.
     pub probability: f64,
+    /// Posterior probability of the type among the candidates, as if one of them were exactly true.
+    pub posterior_probability: Quantity,
     /// Share of the gap that the effect closes beside the others.
     pub share: f64,
     /// True if the effect keeps its name although another part of the gap may have none.
@@ -65,6 +68,7 @@ impl Effect {
             on: addition.on.clone(),
             parameters: unknowns.collect(),
             probability: addition.probability,
+            posterior_probability: addition.posterior_probability.into(),
             share: addition.share,
             certain: addition.certain,
             class: addition.class.clone(),
