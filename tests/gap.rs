@@ -20,6 +20,7 @@ mod inside;
 mod models;
 mod names;
 mod places;
+mod power;
 mod proofs;
 mod records;
 mod sets;

@@ -50,6 +50,7 @@
 //! | [`Symbolic`](unlisted::Symbolic) | sparse regression over a dictionary with group sparsity | de Silva et al., Frontiers in Artificial Intelligence 3 (2020) 25 |
 //! | [`Smoother`](unlisted::Smoother) | Gaussian process orthogonal to the sensitivities | Plumlee, Journal of the American Statistical Association 112 (2017) 1274 |
 //! | coverage | share of held-out values inside the 95 % band | |
+//! | [`Traits`](search::Traits), [`Reliability`](search::Reliability) | calibration of probabilities; reliability diagram, Brier score with its parts | Murphy, Journal of Applied Meteorology 12 (1973) 595; Niculescu-Mizil and Caruana, ICML 2005 |
 //! | injection | injection and recovery: power by simulation | |
 
 pub mod candidates;

@@ -4,6 +4,7 @@ mod figures;
 mod insight;
 pub mod power;
 mod proof;
+pub mod reliability;
 mod sentences;
 mod tables;
 
@@ -59,6 +60,9 @@ pub fn section(view: &View<'_>, gap: &GapFindings, numbers: &mut Numbers) -> Sec
             (figures::leaders(step, numbers))
         }
         @if !result.path.is_empty() { (tables::path(result, numbers)) }
+        @if let Some(counted) = &result.reliability {
+            (reliability::figure(&[("before the correction by this count", counted)], numbers))
+        }
         (insight::all(view, result, numbers))
         @if let Some(warning) = proof::warning(gap) { p { b { (paragraph(&warning)) } } }
         (tables::parameters(gap, numbers))

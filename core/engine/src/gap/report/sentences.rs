@@ -183,13 +183,20 @@ fn addition_sentence(gap: &GapFindings, addition: &AddedEffect) -> String {
         })
         .collect();
     format!(
-        "{}{}: {} ({} of the gap; probability among the candidates {}).",
+        "{}{}: {} ({} of the gap; probability {}{}).",
         capitalised(&addition.title),
         on(&addition.on),
         values.join(", "),
         percent(addition.share),
-        probability(addition.probability)
+        probability(addition.probability),
+        none_of_these(gap)
     )
+}
+
+/// The probability beside that of an effect: that what is missing is of no type that is named.
+fn none_of_these(gap: &GapFindings) -> String {
+    let none = gap.result.verdict.none_of_these;
+    none.map(|p| format!(", of none of these {}", fixed(p, 2))).unwrap_or_default()
 }
 
 /// A probability; above 0.99 as a bound, for no count of cases shows more.

@@ -35,8 +35,11 @@ pub struct AddedEffect {
     pub unknowns: Vec<Estimate>,
     /// The types that these data cannot distinguish from it, itself first.
     pub class: Vec<String>,
-    /// The probability of its type among the candidates.
+    /// The probability that its type is right, as counted in cases of which half hide what no candidate is.
     pub probability: f64,
+    /// The posterior probability of its type among the candidates, as if one of them were exactly true.
+    #[serde(default)]
+    pub posterior_probability: f64,
     /// The share of the gap that it closes beside the other effects.
     #[serde(default)]
     pub share: f64,
@@ -113,6 +116,7 @@ pub(super) fn additions(
                     .collect(),
                 class: named.class.clone(),
                 probability: named.probability,
+                posterior_probability: named.posterior_probability,
                 share: named.share,
                 certain: named.certain,
                 rivals: support.against_free_form.clone(),

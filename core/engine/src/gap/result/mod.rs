@@ -30,7 +30,8 @@ use crate::gap::result::remains::{Remains, remains};
 use crate::gap::result::replaced::OtherModel;
 use crate::gap::search::needless::Needless;
 use crate::gap::search::{
-    Detectability, Diagnostics, SearchOptions, SearchResult, SearchStep, Verdict, verdict,
+    Detectability, Diagnostics, Reliability, SearchOptions, SearchResult, SearchStep, Verdict,
+    verdict,
 };
 use crate::gap::system::fit::precision;
 use crate::gap::test::Region;
@@ -125,6 +126,9 @@ pub struct GapResult {
     /// The terms and effects of the study that are not needed beside those that were found.
     #[serde(default)]
     pub needless: Vec<Needless>,
+    /// The count in simulated cases of the study itself by which the probabilities are corrected, if there is one.
+    #[serde(skip)]
+    pub reliability: Option<Reliability>,
 }
 
 /// The p-value of the energy above which there is no significant excess misfit that effects could explain.
@@ -223,6 +227,24 @@ impl GapResult {
         has_share.then(|| self.verdict.closed.clamp(0.0, 1.0))
     }
 
+    /// The result with the probabilities corrected by a count in simulated cases of the study itself.
+    pub fn corrected(mut self, reliability: Reliability) -> Self {
+        let mut least: Option<f64> = None;
+        for (i, effect) in self.verdict.effects.iter_mut().enumerate() {
+            let Some(traits) = &effect.traits else { continue };
+            let before = traits.probability();
+            let after = reliability.corrected(before);
+            effect.probability *= after / before;
+            least = Some(least.map_or(after, |least| least.min(after)));
+            if let Some(addition) = self.additions.get_mut(i) {
+                addition.probability = effect.probability;
+            }
+        }
+        self.verdict.none_of_these = least.map(|least| 1.0 - least).or(self.verdict.none_of_these);
+        self.reliability = Some(reliability);
+        self
+    }
+
     /// The result of a search, without the proof.
     pub fn of<'a>(
         found: &SearchResult<'a>,
@@ -264,6 +286,7 @@ impl GapResult {
             held_out: Vec::new(),
             models: Vec::new(),
             needless: Vec::new(),
+            reliability: None,
             verdict,
         }
     }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::insight::{NOTHING, withhold};
 use super::members::{self, Member};
 use super::{AddedEffect, Estimate, GapResult, Shift, StepResult};
-use crate::gap::search::{CrossValidation, MissingEffect, SURE, VerdictKind, class};
+use crate::gap::search::{CEILING, CrossValidation, MissingEffect, SURE, VerdictKind, class};
 
 /// The type of an added effect that is another model in place of the study's.
 pub const MODEL_SWAP: &str = "model_swap";
@@ -106,8 +106,10 @@ fn kept(mut own: GapResult, probability: f64, shares: &[(String, f64)]) -> GapRe
     let Some(first) = own.additions.first_mut() else { return own };
     let with = class(&first.kind, probability, shares);
     first.probability *= probability;
+    first.posterior_probability *= probability;
     first.class.extend(with.into_iter().skip(1));
     own.verdict.effects[0].probability = first.probability;
+    own.verdict.effects[0].posterior_probability = first.posterior_probability;
     own.verdict.effects[0].class.clone_from(&first.class);
     if own.verdict.word == VerdictKind::Named && first.class.len() > 1 {
         own.verdict.word = VerdictKind::Class;
@@ -132,10 +134,20 @@ fn replaced(
         idle,
     } = best;
     let rivals = cross_validation.clone();
-    let swap = AddedEffect { class, probability, share: closed, rivals, ..swap };
+    let posterior_probability = probability;
+    let swap = AddedEffect {
+        class,
+        probability: probability.min(CEILING),
+        posterior_probability,
+        share: closed,
+        rivals,
+        ..swap
+    };
     let verdict = &mut other.verdict;
     verdict.closed = closed;
     verdict.effects.insert(0, named(&swap));
+    let others = verdict.none_of_these.unwrap_or(0.0);
+    verdict.none_of_these = Some(others.max(1.0 - swap.probability));
     let adequate = match verdict.word {
         VerdictKind::None | VerdictKind::NotVisible => true,
         VerdictKind::Unlisted if explains => {
@@ -198,6 +210,8 @@ fn named(swap: &AddedEffect) -> MissingEffect {
         values: swap.unknowns.iter().map(|unknown| unknown.value).collect(),
         sd: swap.unknowns.iter().map(|unknown| unknown.sd).collect(),
         probability: swap.probability,
+        posterior_probability: swap.posterior_probability,
+        traits: None,
         class: swap.class.clone(),
         share: swap.share,
         supported: true,

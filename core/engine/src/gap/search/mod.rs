@@ -34,5 +34,8 @@ pub use refit::{
 };
 pub use state::kinds;
 pub use support::Support;
-pub use verdict::{MissingEffect, PROVEN, SURE, Verdict, VerdictKind, class, explains, verdict};
+pub use verdict::{
+    Bin, Brier, CEILING, MissingEffect, PROVEN, Reliability, SURE, Told, Traits, Verdict,
+    VerdictKind, class, explains, verdict,
+};
 pub use visited::{Inclusion, ModelAverage, VisitedModel};

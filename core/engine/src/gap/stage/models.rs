@@ -170,6 +170,7 @@ fn addition(alternative: &AlternativeModel<'_>, found: &SearchResult<'_>) -> Add
         unknowns: unknowns.collect(),
         class: Vec::new(),
         probability: 0.0,
+        posterior_probability: 0.0,
         share: 0.0,
         certain: false,
         rivals: Vec::new(),

@@ -25,8 +25,11 @@ pub struct Effect {
     /// posterior density with the normal approximation.
     #[schemars(extend("propertyNames" = { "title": "unknown" }))]
     pub parameters: ByName<Unknown>,
-    /// Posterior probability of the type among the candidates.
+    /// Probability that the type is right, as counted in simulated cases of which half hide physics that no candidate has:
+    /// of the study itself if `lacuna power` was run on it, otherwise of other systems. Never above 0.99.
     pub probability: f64,
+    /// Posterior probability of the type among the candidates, as if one of them were exactly true.
+    pub posterior_probability: Quantity,
     /// Share of the gap that the effect closes beside the others.
     pub explained: Quantity,
     /// True if no remainder is significant beside the effects.
@@ -67,6 +70,7 @@ impl Effect {
             on: addition.on.clone(),
             parameters: unknowns.collect(),
             probability: addition.probability,
+            posterior_probability: addition.posterior_probability.into(),
             explained: addition.share.into(),
             exact,
             certain: addition.certain,

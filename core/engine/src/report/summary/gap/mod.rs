@@ -35,6 +35,9 @@ pub struct Gap {
     pub p_after: Tests,
     /// Effects that were found; another model in place of the study's own comes first.
     pub effects: Vec<Effect>,
+    /// Probability that what is missing is of no type that is named: what the probability of the least probable effect, with
+    /// that of its class, leaves of one. `null` without effects.
+    pub none_of_these: Option<f64>,
     /// Part of the gap that the effects leave; `null` if nothing shows.
     pub remains: Option<Remains>,
     /// Proof of the names on data that were not used; `null` if no effect was found.
@@ -177,6 +180,7 @@ impl Gap {
             p: Tests::of(result.p[0]),
             p_after: Tests::of(result.p[1]),
             effects: result.additions.iter().map(|a| Effect::of(a, exact, added)).collect(),
+            none_of_these: result.verdict.none_of_these,
             remains: result.remains.clone(),
             proof: gap.proof().as_ref().map(Proof::of),
             not_tried: result.untried.clone(),
