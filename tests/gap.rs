@@ -13,14 +13,17 @@
 mod beside;
 mod cases;
 mod chain;
+mod classes;
 mod companion;
 mod falling_balls;
 mod inside;
 mod models;
 mod names;
 mod places;
+mod power;
 mod proofs;
 mod records;
+mod sets;
 mod single;
 mod tally;
 mod target;

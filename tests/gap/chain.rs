@@ -13,10 +13,11 @@ use lacuna::plugin::effect::Situation;
 use lacuna::plugin::surrogate::Training;
 use lacuna::plugin::{Design, Emulator, Surrogate, registry};
 use lacuna::run::{Progress, Silent};
-use lacuna_engine::gap::candidates::proposed;
+use lacuna_engine::gap::candidates::{Candidate, proposed};
 use lacuna_engine::gap::experiment::Experiment;
 use lacuna_engine::gap::noise::{Noise, ResponseTangents};
 use lacuna_engine::gap::prove::{Proof, prove};
+use lacuna_engine::gap::result::GapResult;
 use lacuna_engine::gap::search::{SearchOptions, SearchResult, Verdict, search, verdict};
 use lacuna_engine::gap::system::emulator_error::error_covariance;
 use lacuna_engine::gap::test::Region;
@@ -107,6 +108,30 @@ pub struct Answer {
 /// Runs the workflow on a case: the search with some of its replicates, the proof with the others. The workflow does
 /// not see what is hidden.
 pub fn ask(case: &Case, replicates: usize, seed: u64) -> Answer {
+    run(case, replicates, seed, None, |found, candidates, options, _, proof| {
+        let verdict = verdict(found, candidates, options);
+        let log_odds = found.path.first().map_or(f64::NAN, |step| step.log_odds);
+        let first = found.first();
+        Answer { p: first.p, log_odds, verdict, regions: first.regions.clone(), proof }
+    })
+}
+
+/// The result of the workflow among the candidates of these names, and its proof on the other replicates.
+pub fn searched(case: &Case, replicates: usize, seed: u64, names: &[&str]) -> (GapResult, Proof) {
+    let names: Vec<String> = names.iter().map(ToString::to_string).collect();
+    run(case, replicates, seed, Some(&names), |found, candidates, options, stream, proof| {
+        (GapResult::of(found, candidates, options, stream), proof.unwrap())
+    })
+}
+
+/// Searches in some replicates of a case, with all candidates or those of these names, and proves with the others.
+fn run<T>(
+    case: &Case,
+    replicates: usize,
+    seed: u64,
+    names: Option<&[String]>,
+    use_it: impl FnOnce(&SearchResult<'_>, &[Candidate], SearchOptions, &Stream, Option<Proof>) -> T,
+) -> T {
     let (layouts, parameters) = (layouts(), parameters());
     let (emulator, error) = emulator();
     let data = observations(case, 0..replicates);
@@ -118,21 +143,18 @@ pub fn ask(case: &Case, replicates: usize, seed: u64) -> Answer {
     (experiment.common, experiment.independent) = (all.common, all.independent);
     let sd = noise.sd(&experiment, &response);
     let situation = Situation { layouts: &layouts, response: &response, noise: &sd };
-    let candidates = proposed(None, &[], &situation).unwrap().candidates;
+    let candidates = proposed(names, &[], &situation).unwrap().candidates;
     let options = SearchOptions { naming: 0.03, unlisted: 0.02, simulations: 199, most: 3 };
     let stream = Stream::root(seed);
     let found: SearchResult<'_> =
         search(&experiment, &candidates, &[centre], options, &stream).unwrap();
-    let first = found.path.first().map_or(&found.last, |step| &step.before);
-    let verdict = verdict(&found, &candidates, options);
-    let log_odds = found.path.first().map_or(f64::NAN, |step| step.log_odds);
     let held_out = observations(case, replicates..case.replicates[0].len());
     let mut held_out = Experiment::new(&layouts, &parameters, &**emulator, &held_out);
     held_out.common.clone_from(&experiment.common);
     held_out.independent.clone_from(&experiment.independent);
-    let (before, after) = (&first.fit.at.response, &found.last.fit.at.response);
+    let (before, after) = (&found.first().fit.at.response, &found.last.fit.at.response);
     let proof = prove(&held_out, &found.noise, before, after);
-    Answer { p: first.p, log_odds, verdict, regions: first.regions.clone(), proof }
+    use_it(&found, &candidates, options, &stream, proof)
 }
 
 /// Computes what all cases share, before they run in parallel.

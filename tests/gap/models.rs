@@ -120,7 +120,7 @@ fn the_model_that_made_the_data_takes_the_place_of_the_studys() {
         (&effects[0]["type"], &effects[0]["name"]),
         (&"model_swap".into(), &"newton".into())
     );
-    assert!(effects[0]["probability"].as_f64().unwrap() > 0.99, "{told:#}");
+    assert!(effects[0]["posterior_probability"].as_f64().unwrap() > 0.99, "{told:#}");
     assert!(told["models"]["newton"]["log_odds"].as_f64().unwrap() > 10.0, "{told:#}");
     assert!(told["models"]["vacuum"]["log_odds"].as_f64().unwrap() < -10.0, "{told:#}");
     assert_eq!(told["held_out"]["shrank"], true, "{told:#}");

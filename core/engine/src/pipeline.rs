@@ -11,11 +11,12 @@
 
 use lacuna::plugin::Density;
 use lacuna::plugin::registry::{NoKeys, Section};
-use lacuna::run::{Listener, Observer, Stop};
+use lacuna::run::{Listener, Observer, Stop, files};
 use lacuna_run::{Kept, RunDirectory, Stage};
 
 use crate::gap::inside::companion;
 use crate::gap::power::{PowerDesign, Rates, stage as power};
+use crate::gap::report::reliability::power_page;
 use crate::gap::stage as gap;
 use crate::posterior::{Given, Posterior};
 use crate::report::findings::Findings;
@@ -101,6 +102,8 @@ pub fn power(
         let direct = Direct::of(study, run, observer)?;
         power::stage(study, design, simulations, &direct.problem(), run, observer)?
     };
+    let page = run.stage_folder(&Stage::Power.folder()).join("power.html");
+    files::write_atomic(&page, power_page(&study.about.title, &kept.value).as_bytes())?;
     Ok(kept.value)
 }
 
@@ -196,6 +199,10 @@ fn conclude(
         // A report that is written again keeps the result of an earlier search.
         Goal::Calibrate | Goal::Show(_) => gap::kept(study, problem, run, observer)?,
     };
+    let gap = gap.map(|kept| match power::kept(study, problem, run) {
+        Some(counted) => Kept { value: kept.value.corrected(counted.reliability), ..kept },
+        None => kept,
+    });
     if let Goal::Show(before) = goal {
         gap::show::stage(study, problem, calibrated, before, run, observer)?;
     }

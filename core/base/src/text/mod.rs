@@ -1,12 +1,13 @@
 //! Text layer of a study: from TOML to values that know their place in the text, and back.
 //!
 //! [`mod@read`] parses text to nodes, [`mod@decode`] decodes nodes to types and reports every fault at its place as
-//! [`Problems`]; [`emit`] writes types as TOML. [`values`], [`quantity`], [`file_name`] and [`response`] are the types
-//! that sections share.
+//! [`Problems`]; [`emit`] writes types as TOML. [`values`], [`quantity`], [`file_name`], [`labels`] and [`response`]
+//! are the types that sections share.
 
 pub mod decode;
 pub mod emit;
 pub mod file_name;
+pub mod labels;
 pub mod memory;
 pub mod nearest;
 pub mod node;

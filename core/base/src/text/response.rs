@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::de::{self, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
 
+use super::labels::{self, LabelSection};
 use super::memory;
 use super::values::{Count, Name};
 use crate::data::{Axis, Unit};
@@ -28,12 +29,14 @@ pub struct ResponseSection {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Axes(pub Vec<(Name, AxisSection)>);
 
-/// One axis: a list of labels, or a grid of numbers with a unit.
+/// One axis: labels, with their positions if they are known, or a grid of numbers with a unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum AxisSection {
     /// Labels, such as the names of sensors.
     Labels(Vec<String>),
+    /// Labels with their positions on a line.
+    Placed(LabelSection),
     /// Numbers with a unit, such as times.
     Grid(GridSection),
 }
@@ -121,17 +124,8 @@ impl AxisSection {
         measured: impl FnOnce(&Unit) -> Result<Vec<f64>, String>,
     ) -> Result<Axis, String> {
         match self {
-            Self::Labels(labels) => {
-                if labels.is_empty() {
-                    return Err("expected at least one label, found none".to_owned());
-                }
-                match labels.iter().enumerate().find(|(i, label)| labels[..*i].contains(label)) {
-                    Some((_, twice)) => {
-                        Err(format!("expected different labels, found `{twice}` twice"))
-                    }
-                    None => Ok(Axis::labels(name, labels.iter().cloned())),
-                }
-            }
+            Self::Labels(labels) => labels::axis(name, labels),
+            Self::Placed(section) => labels::axis(name, &section.labels),
             Self::Grid(grid) => Ok(Axis::grid(name, grid.numbers(measured)?, grid.unit.clone())),
         }
     }
@@ -169,18 +163,55 @@ impl<'de> Deserialize<'de> for AxisSection {
         impl<'de> Visitor<'de> for Either {
             type Value = AxisSection;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a list of labels or a table with `first`, `last`, `count` and `unit`")
+                f.write_str(
+                    "a list of labels, a table with `labels` and `positions`, or a table with `first`, `last`, `count` \
+                     and `unit`",
+                )
             }
             fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<AxisSection, A::Error> {
                 let labels = Vec::deserialize(de::value::SeqAccessDeserializer::new(seq))?;
                 Ok(AxisSection::Labels(labels))
             }
             fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<AxisSection, A::Error> {
-                let grid = GridSection::deserialize(de::value::MapAccessDeserializer::new(map))?;
-                Ok(AxisSection::Grid(grid))
+                let table = AxisTable::deserialize(de::value::MapAccessDeserializer::new(map))?;
+                table.section().map_err(de::Error::custom)
             }
         }
         deserializer.deserialize_any(Either)
+    }
+}
+
+/// The keys of both kinds of axes that are tables.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AxisTable {
+    labels: Option<Vec<String>>,
+    positions: Option<Vec<f64>>,
+    first: Option<f64>,
+    last: Option<f64>,
+    count: Option<Count>,
+    values: Option<Vec<f64>>,
+    #[serde(default)]
+    measured: bool,
+    unit: Option<Unit>,
+}
+
+impl AxisTable {
+    fn section(self) -> Result<AxisSection, &'static str> {
+        let Self { labels, positions, first, last, count, values, measured, unit } = self;
+        let has_numbers = first.or(last).is_some() || count.is_some() || values.is_some();
+        match (labels, positions, has_numbers || measured) {
+            (None, None, _) => {
+                let unit = unit.unwrap_or_else(Unit::dimensionless);
+                Ok(AxisSection::Grid(GridSection { first, last, count, values, measured, unit }))
+            }
+            (Some(labels), positions, false) => {
+                let unit = unit.unwrap_or_else(labels::metre);
+                Ok(AxisSection::Placed(LabelSection { labels, positions, unit }))
+            }
+            (None, Some(_), _) => Err("expected `labels` beside `positions`, found none"),
+            (Some(_), _, true) => Err("expected labels or numbers, found both"),
+        }
     }
 }
 
@@ -189,11 +220,12 @@ impl JsonSchema for Axes {
         "Axes".into()
     }
     fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let labels = generator.subschema_for::<LabelSection>();
         let grid = generator.subschema_for::<GridSection>();
         schemars::json_schema!({
             "type": "object",
             "additionalProperties": {
-                "anyOf": [{ "type": "array", "items": { "type": "string" } }, grid]
+                "anyOf": [{ "type": "array", "items": { "type": "string" } }, labels, grid]
             }
         })
     }

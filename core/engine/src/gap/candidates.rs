@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
 use super::experiment::{Experiment, MeasuredCurve};
+use crate::study::positions::Positions;
 
 /// An effect that may be missing.
 #[derive(Clone)]
@@ -49,17 +50,6 @@ impl Candidate {
     }
 }
 
-/// The coordinates of labels along an axis, such as the places of sensors.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Positions {
-    /// The axis.
-    pub axis: String,
-    /// The coordinate of each label, in `unit`.
-    pub at: BTreeMap<String, f64>,
-    /// The unit of the coordinates.
-    pub unit: Unit,
-}
-
 /// The effects that propose themselves for some data, and those that do not.
 #[derive(Default)]
 pub struct Proposed {
@@ -80,17 +70,15 @@ pub struct Untried {
     pub reason: String,
 }
 
-impl Positions {
-    /// The options of an effect along this axis.
-    fn options(&self) -> Table {
-        let at = self.at.iter().map(|(label, x)| (label.clone(), Value::Float(*x)));
-        let text = |text: &str| Value::String(text.to_owned());
-        Table::from_iter([
-            ("axis".to_owned(), text(&self.axis)),
-            ("positions".to_owned(), Value::Table(at.collect())),
-            ("unit".to_owned(), text(&self.unit.to_string())),
-        ])
-    }
+/// The options of an effect along an axis with positions.
+fn options_along(line: &Positions) -> Table {
+    let at = line.at.iter().map(|(label, x)| (label.clone(), Value::Float(*x)));
+    let text = |text: &str| Value::String(text.to_owned());
+    Table::from_iter([
+        ("axis".to_owned(), text(&line.axis)),
+        ("positions".to_owned(), Value::Table(at.collect())),
+        ("unit".to_owned(), text(&line.unit.to_string())),
+    ])
 }
 
 /// The candidates that all installed effects, or those named, propose for such data; `positions` are those of the labels
@@ -111,16 +99,16 @@ pub fn proposed(
         };
         let mut proposals = build(&Table::new())?.plugin.proposals(situation);
         // Effects along a line of sensors take their positions; others have no such option.
-        for along in positions.iter().filter_map(|axis| build(&axis.options()).ok()) {
+        for along in positions.iter().filter_map(|axis| build(&options_along(axis)).ok()) {
             let further = along.plugin.proposals(situation);
             proposals.extend(further.into_iter().filter(|own| own.contains_key("positions")));
         }
         if proposals.is_empty() {
             let nowhere =
                 Positions { axis: String::new(), at: BTreeMap::new(), unit: Unit::default() };
-            let needs_positions = positions.is_empty() && build(&nowhere.options()).is_ok();
+            let needs_positions = positions.is_empty() && build(&options_along(&nowhere)).is_ok();
             let reason = if needs_positions {
-                "needs the positions of the sensors: `[gap.positions]`"
+                "needs the `positions` of the sensors on their axis in `[response]`"
             } else {
                 "has nothing to act on in these data"
             };
@@ -169,6 +157,11 @@ pub fn place(curve: &MeasuredCurve) -> On {
 }
 
 impl Placement {
+    /// True for the same candidate in the same place.
+    pub fn is(&self, other: &Self) -> bool {
+        self.candidate == other.candidate && self.on == other.on
+    }
+
     /// The effect on the labels of the placement, called `name`.
     pub fn placed<'a>(
         &self,

@@ -43,11 +43,14 @@
 //! | [`BayesFactor`](inside::BayesFactor), `log_odds` | ratio of two marginal likelihoods; times the prior masses, posterior odds. 20 to 1 is strong evidence | Kass and Raftery, Journal of the American Statistical Association 90 (1995) 773 |
 //! | class | a set of types that together has 95 % of the posterior probability | |
 //! | [`cross_validate`](search::cross_validate) | leave-group-out cross-validation: joint log predictive density of what is left out | Bürkner, Gabry and Vehtari, Computational Statistics 36 (2021) 1243 |
+//! | [`NameProof`](result::names::NameProof) | comparison with a nonparametric alternative on left-out groups | Bürkner, Gabry and Vehtari 2021 |
+//! | averages over a class | Bayesian model averaging | Hoeting et al., Statistical Science 14 (1999) 382 |
 //! | [`discriminate`](search::discriminate) | design of experiments for model discrimination | |
 //! | [`drift`](mod@drift) | parameters that vary between conditions as a sign of a wrong model; tests of equality in seemingly unrelated regressions | Zellner, Journal of the American Statistical Association 57 (1962) 348 |
 //! | [`Symbolic`](unlisted::Symbolic) | sparse regression over a dictionary with group sparsity | de Silva et al., Frontiers in Artificial Intelligence 3 (2020) 25 |
 //! | [`Smoother`](unlisted::Smoother) | Gaussian process orthogonal to the sensitivities | Plumlee, Journal of the American Statistical Association 112 (2017) 1274 |
 //! | coverage | share of held-out values inside the 95 % band | |
+//! | [`Traits`](search::Traits), [`Reliability`](search::Reliability) | calibration of probabilities; reliability diagram, Brier score with its parts | Murphy, Journal of Applied Meteorology 12 (1973) 595; Niculescu-Mizil and Caruana, ICML 2005 |
 //! | injection | injection and recovery: power by simulation | |
 
 pub mod candidates;

@@ -85,7 +85,7 @@ impl SyntheticExperiment {
             curves: vec![curve; curves],
             shared: vec![ReplicateVariation::default(); conditions.len()],
             across: vec![None; conditions.len()],
-            origins: vec![Origin::Replicates; curves],
+            origins: vec![Origin::Stated; curves],
         };
         let parameters = names.iter().map(parameter).collect();
         Self { layouts, parameters, forward: LinearModel { slopes }, noise }

@@ -86,7 +86,10 @@ fn findings(
             .and_then(|problem| Some(ensemble(study, problem.data.value.ensemble.as_ref()?))),
         measured: measured.map(|m| measurements(study, m)),
         surrogate: all.problem.and_then(|problem| surrogate(problem, all.validated)),
-        warnings: warnings(observer),
+        warnings: {
+            let named = results.gap.and_then(|kept| kept.value.warning()).map(str::to_owned);
+            warnings(observer).into_iter().chain(named).collect()
+        },
         assessment: results.assessed.value.clone(),
         calibration,
         validation,

@@ -13,6 +13,7 @@ pub mod libraries;
 pub mod noise;
 pub mod overrides;
 mod plain;
+pub mod positions;
 pub mod resolve;
 mod resolved;
 pub mod scenario;

@@ -12,6 +12,7 @@ use super::fidelity::{LowFidelity, NumericalError};
 use super::file::{DerivedSection, EffectKeys, StudySection, ValidateSection};
 use super::gap::Gap;
 use super::libraries::Libraries;
+use super::positions::Positions;
 use super::table::PluginSections;
 use super::unknowns::Unknown;
 
@@ -42,6 +43,8 @@ pub struct Study {
     pub given: Vec<Given>,
     /// The shapes of the responses to all scenarios.
     pub layouts: Layouts,
+    /// The positions of labels along the axes of the responses.
+    pub positions: Vec<Positions>,
     /// The sections that choose one plugin.
     pub plugins: PluginSections,
     /// `[numerical_error]`.
@@ -83,6 +86,7 @@ impl Study {
             unknowns,
             given: Vec::new(),
             layouts: self.layouts.clone(),
+            positions: self.positions.clone(),
             plugins,
             numerical_error: None,
             low_fidelity: None,

@@ -19,6 +19,7 @@ use super::gap::gap;
 pub use super::libraries::Use;
 use super::libraries::{Libraries, Seen, libraries};
 pub use super::plain::Study;
+use super::positions::positions;
 use super::sections::{
     derived, effects, layouts, name, parameters, scenarios, table, unknown_sections,
 };
@@ -188,6 +189,12 @@ fn structure(
         (Some(None), _) => Some(Layout::number("log_density").into()),
         _ => None,
     };
+    let positions = match (&response, &scenarios) {
+        (Some(Some(response)), Some((_, sections))) => {
+            positions(response, sections, root, problems)
+        }
+        _ => Some(Vec::new()),
+    };
     let (scenarios, sections) = scenarios?;
     let margin = plugins.design.as_ref().and_then(|design| design.common.margin);
     let (parameters, unknowns) = unknowns(&parameters?, &scenarios, margin, root, problems);
@@ -210,6 +217,7 @@ fn structure(
         unknowns,
         given: Vec::new(),
         layouts: layouts?,
+        positions: positions?,
         plugins,
         numerical_error,
         low_fidelity,

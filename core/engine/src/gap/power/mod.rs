@@ -1,7 +1,8 @@
-//! The power of the workflow: effects, pairs, bumps, changes that no candidate makes, and no effect at all are injected
-//! into simulated data with the noise of a study's own replicates, and the whole search is run on each.
+//! The power of the workflow: effects, pairs, bumps, changes of another form than those of the candidates, and no effect at
+//! all are injected into simulated data with the noise of a study's own replicates, and the whole search is run on each.
 
 mod inject;
+mod open_world;
 pub mod stage;
 mod tally;
 
@@ -14,13 +15,15 @@ use serde::{Deserialize, Serialize};
 use super::candidates::Candidate;
 use super::experiment::Experiment;
 use super::noise::Noise;
-use super::search::{SearchOptions, VerdictKind, search, verdict};
+use super::search::{SearchOptions, Traits, VerdictKind, search, verdict};
 use super::system::System;
 use super::system::fit::Fit;
 use super::system::whitener::Whitener;
 use super::test::{Projection, common_error};
 
-pub use inject::{Injected, Injection, UnlistedShape, inject, plan};
+pub use inject::outside::{Distributed, Nearest, OtherForm, OutsideKind, Screen, UnlistedShape};
+pub use inject::{Bump, Injected, Injection, Outside, inject, plan};
+pub use open_world::{OutsideRates, told};
 pub use tally::{Alarm, KindRates, Rates, SizeRates, rates};
 
 /// The number and the sizes of injections.
@@ -37,20 +40,20 @@ pub struct PowerDesign {
     pub pairs: usize,
     /// Cases with a bump on one curve at each size.
     pub bumps: usize,
-    /// Cases with a change that no candidate makes, at the largest size.
-    pub unlisted: usize,
+    /// Cases with a change of another form than those of the candidates, at the largest size.
+    pub outside: usize,
 }
 
 impl PowerDesign {
     /// A design that determines rates to a few per cent.
     pub fn thorough() -> Self {
         let ratios = vec![0.25, 0.5, 1.0, 2.0];
-        Self { ratios, repeats: 10, nothing: 200, pairs: 30, bumps: 20, unlisted: 40 }
+        Self { ratios, repeats: 10, nothing: 200, pairs: 30, bumps: 20, outside: 200 }
     }
 
     /// A small design for a first look at the rates.
     pub fn quick() -> Self {
-        Self { ratios: vec![0.5, 1.0], repeats: 2, nothing: 40, pairs: 6, bumps: 4, unlisted: 8 }
+        Self { ratios: vec![0.5, 1.0], repeats: 2, nothing: 40, pairs: 6, bumps: 4, outside: 40 }
     }
 }
 
@@ -67,6 +70,10 @@ pub struct PowerSetting<'a> {
     pub fit: &'a Fit,
     /// The noise of its replicates.
     pub noise: &'a Noise,
+    /// The place of the sensor of each curve, from 0 to 1.
+    pub places: &'a [f64],
+    /// The candidates' answer to a change, by linearisation.
+    pub screen: &'a Screen,
 }
 
 /// The outcome of the search on a case.
@@ -95,7 +102,12 @@ pub struct NamedInCase {
     pub on: On,
     /// The types that the data cannot distinguish from it, itself first.
     pub class: Vec<String>,
+    /// The quantities from which its probability follows.
+    pub traits: Option<Traits>,
 }
+
+/// The share above which an injection counts as absorbed by the calibrated parameters.
+const ABSORBED: f64 = 0.99;
 
 /// Runs the search on one case; `None` if the injection cannot be made as large as requested.
 pub fn run(
@@ -104,7 +116,7 @@ pub fn run(
     wanted: &Injection,
     stream: &Stream,
 ) -> Option<CaseOutcome> {
-    let PowerSetting { experiment, candidates, options, fit, noise } = *setting;
+    let PowerSetting { experiment, candidates, options, noise, .. } = *setting;
     let (planted, response) = inject(setting, wanted, &stream.named("plant"))?;
     let absorbed = absorbed(setting, &response);
     let error = common_error(experiment, noise, &stream.named("common"));
@@ -118,17 +130,22 @@ pub fn run(
         }
     }
     let simulated = experiment.with_replicates(replicates);
-    let starts = [fit.at.point.clone()];
+    let starts = [setting.fit.at.point.clone()];
     let found = search(&simulated, candidates, &starts, options, &stream.named("search"))?;
     let first = found.path.first().map_or(&found.last, |step| &step.before);
     let overlap = planted.bump.as_ref().map(|bump| bump.overlap(experiment, &first.regions));
     let verdict = verdict(&found, candidates, options);
-    let effects = verdict.effects.into_iter();
+    let effects = verdict.effects.into_iter().map(|e| NamedInCase {
+        kind: e.kind,
+        on: e.on,
+        class: e.class,
+        traits: e.traits,
+    });
     Some(CaseOutcome {
         case,
         planted,
         word: verdict.word,
-        effects: effects.map(|e| NamedInCase { kind: e.kind, on: e.on, class: e.class }).collect(),
+        effects: effects.collect(),
         absorbed,
         overlap,
     })

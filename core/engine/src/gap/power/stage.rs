@@ -11,8 +11,10 @@ use lacuna_run::{Artifact, Kept, RunDirectory, Stage};
 use rayon::prelude::*;
 use serde_json::json;
 
+use crate::gap::candidates::{place, sensors};
+use crate::gap::experiment::{Experiment, MeasuredCurve};
 use crate::gap::inside::Pieces;
-use crate::gap::power::{CaseOutcome, PowerDesign, PowerSetting, Rates, plan, rates, run};
+use crate::gap::power::{CaseOutcome, PowerDesign, PowerSetting, Rates, Screen, plan, rates, run};
 use crate::gap::stage as gap;
 use crate::gap::stage::prepared::{InsideCandidates, PreparedSearch, SearchModel, prepared};
 use crate::stage::inverse_problem::InverseProblem;
@@ -49,14 +51,49 @@ pub fn stage(
     directory.keep(&Stage::Power.folder(), &inputs, observer, |folder| {
         let beginning = SearchModel::own(study, problem, &inside);
         prepared(study, problem, &beginning, &stream(study, "gap"), |prepared| {
-            outcomes(prepared, design, simulations, folder, observer)
+            outcomes(study, prepared, design, simulations, folder, observer)
         })
-        .map(|outcomes| rates(&outcomes))
+        .map(|outcomes| Rates { search: search(study, problem), ..rates(&outcomes) })
     })
+}
+
+/// The rates of an earlier run for the same search, if there is one in the run directory.
+pub fn kept(
+    study: &Study,
+    problem: &InverseProblem<'_>,
+    directory: &RunDirectory,
+) -> Option<Rates> {
+    let rates = Rates::load(&directory.stage_folder(&Stage::Power.folder())).ok()?;
+    (rates.search == search(study, problem)).then_some(rates)
+}
+
+/// The hash of the inputs of the search of a study.
+fn search(study: &Study, problem: &InverseProblem<'_>) -> String {
+    files::hash(gap::inputs(study, problem).to_string().as_bytes())
+}
+
+/// The place of the sensor of each curve, from 0 to 1: by the positions of the sensors if the study states them for all,
+/// otherwise by their order.
+fn places(study: &Study, experiment: &Experiment<'_>) -> Vec<f64> {
+    let stated = |curve: &MeasuredCurve| {
+        let mut labels = curve.labels.iter();
+        labels.find_map(|(axis, label)| study.gap.keys.positions.get(axis)?.at.get(label).copied())
+    };
+    let known: Option<Vec<f64>> = experiment.curves.iter().map(stated).collect();
+    let all = known.unwrap_or_else(|| {
+        let sensors = sensors(experiment);
+        let order = |curve| sensors.iter().position(|on| *on == place(curve)).unwrap_or(0) as f64;
+        experiment.curves.iter().map(order).collect()
+    });
+    let low = all.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let length = if high > low { high - low } else { 1.0 };
+    all.iter().map(|x| (x - low) / length).collect()
 }
 
 /// The outcomes of all cases, those of an interrupted run taken from its file.
 fn outcomes(
+    study: &Study,
     prepared: &PreparedSearch<'_>,
     design: &PowerDesign,
     simulations: Option<usize>,
@@ -68,12 +105,16 @@ fn outcomes(
     let first = found.path.first().map_or(&found.last, |step| &step.before);
     let mut options = prepared.options;
     options.simulations = simulations.unwrap_or(options.simulations);
+    let (experiment, candidates) = (prepared.experiment, prepared.candidates);
+    let (fit, noise) = (&first.fit, &found.noise);
     let setting = PowerSetting {
-        experiment: prepared.experiment,
-        candidates: prepared.candidates,
+        experiment,
+        candidates,
         options,
-        fit: &first.fit,
-        noise: &found.noise,
+        fit,
+        noise,
+        places: &places(study, experiment),
+        screen: &Screen::of(experiment, candidates, fit, noise),
     };
     let plan = plan(design, prepared.candidates);
     let path = folder.join(CASES);

@@ -5,18 +5,19 @@ use std::collections::BTreeMap;
 use lacuna::diagnose::coverage::binomial;
 use serde::{Deserialize, Serialize};
 
-use super::CaseOutcome;
-use crate::gap::search::VerdictKind;
+use super::open_world::{OutsideRates, outside, told};
+use super::{ABSORBED, CaseOutcome};
+use crate::gap::search::{Reliability, Told, Traits, VerdictKind};
 
 /// The share of cases at which a size counts as *found*.
 const FOUND: f64 = 0.8;
 
-/// The share above which an injection counts as absorbed by the calibrated parameters.
-const ABSORBED: f64 = 0.99;
-
 /// Detection rates of the workflow in a study.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Rates {
+    /// The hash of the inputs of the search that was run on the cases.
+    #[serde(default)]
+    pub search: String,
     /// False alarms in cases without an injection.
     pub alarms: Alarm,
     /// Each type of effect.
@@ -28,10 +29,15 @@ pub struct Rates {
     pub named: [usize; 2],
     /// Pairs: number of cases, and of cases in which both effects were named or in their classes.
     pub pairs: [usize; 2],
-    /// Changes that no candidate makes: cases, cases without a name, cases with a confident false name.
-    pub unlisted: [usize; 3],
+    /// Changes of another form than those of the candidates, by kind.
+    pub outside: Vec<OutsideRates>,
     /// Bumps by size: ratio, cases, cases that were found, mean overlap of the regions.
     pub bumps: Vec<(f64, usize, usize, f64)>,
+    /// The probabilities that `gap` prints, by its own default, beside the share that was right: effects and pairs of the
+    /// library have half of the weight, changes of another form the other half.
+    pub reliability: Reliability,
+    /// The same for the posterior probabilities, which assume that one of the candidates is exactly true.
+    pub of_posterior: Reliability,
 }
 
 /// False alarms with their 95 % interval (Clopper and Pearson, Biometrika 26 (1934) 404).
@@ -90,7 +96,12 @@ pub fn rates(outcomes: &[CaseOutcome]) -> Rates {
     let both = |o: &&&CaseOutcome| o.planted.effects.iter().all(|(kind, ..)| in_class(o, kind));
     let sure = |o: &&&CaseOutcome| o.word == VerdictKind::Named;
     let right = |o: &&&CaseOutcome| o.effects.iter().all(|said| said.kind == o.planted.what);
+    let reliability = |by: &dyn Fn(&Traits) -> f64| -> Reliability {
+        let all: Vec<Told> = told(outcomes, by);
+        Reliability::of(&all)
+    };
     Rates {
+        search: String::new(),
         alarms: Alarm { cases: nothing, alarms, interval: interval(alarms, nothing) },
         kinds: kinds(&single),
         confusion: confusion(&single),
@@ -99,12 +110,10 @@ pub fn rates(outcomes: &[CaseOutcome]) -> Rates {
             single.iter().filter(sure).filter(right).count(),
         ],
         pairs: [pairs.len(), pairs.iter().filter(both).count()],
-        unlisted: [
-            of("unlisted").count(),
-            of("unlisted").filter(|o| o.word == VerdictKind::Unlisted).count(),
-            of("unlisted").filter(|o| o.word == VerdictKind::Named).count(),
-        ],
+        outside: outside(outcomes),
         bumps: bumps(&of("bump").collect::<Vec<_>>()),
+        reliability: reliability(&Traits::probability),
+        of_posterior: reliability(&Traits::posterior),
     }
 }
 
@@ -220,6 +229,7 @@ mod tests {
                 sizes: vec![0.05],
                 ratio,
                 bump: None,
+                outside: None,
             },
             word: if found { VerdictKind::Named } else { VerdictKind::None },
             effects: found
@@ -227,6 +237,7 @@ mod tests {
                     kind: "gain".into(),
                     on: On::new(),
                     class: vec!["gain".into()],
+                    traits: None,
                 })
                 .into_iter()
                 .collect(),

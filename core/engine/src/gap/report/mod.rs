@@ -3,6 +3,8 @@
 mod figures;
 mod insight;
 pub mod power;
+mod proof;
+pub mod reliability;
 mod sentences;
 mod tables;
 
@@ -48,6 +50,9 @@ pub fn section(view: &View<'_>, gap: &GapFindings, numbers: &mut Numbers) -> Sec
             (tables::held_out(gap, numbers))
             (tables::scores(view, gap, numbers))
         }
+        @if let Some(proof) = gap.proof().filter(|proof| !proof.rivals.is_empty()) {
+            (proof::table(gap, &proof, numbers))
+        }
         (figures::maps(view, result, numbers))
         (figures::curves(view, result, numbers))
         (figures::differences(view, result, numbers))
@@ -55,8 +60,13 @@ pub fn section(view: &View<'_>, gap: &GapFindings, numbers: &mut Numbers) -> Sec
             (figures::leaders(step, numbers))
         }
         @if !result.path.is_empty() { (tables::path(result, numbers)) }
+        @if let Some(counted) = &result.reliability {
+            (reliability::figure(&[("before the correction by this count", counted)], numbers))
+        }
         (insight::all(view, result, numbers))
+        @if let Some(warning) = proof::warning(gap) { p { b { (paragraph(&warning)) } } }
         (tables::parameters(gap, numbers))
+        @if let Some(averages) = proof::averages(gap, numbers) { (averages) }
         (tables::visible(result, numbers))
         (tables::noise(view, result, numbers))
         @if let Some(added) = &gap.added {

@@ -1,5 +1,6 @@
 //! The power of the workflow in a study, as a text for the terminal.
 
+use super::reliability::reliability_text;
 use crate::gap::power::Rates;
 use crate::page::number::{fixed, percent};
 use crate::page::table::Table;
@@ -42,12 +43,10 @@ pub fn power_text(rates: &Rates) -> String {
     if rates.pairs[0] > 0 {
         parts.push(format!("Pairs: {} of {} with both found.\n", rates.pairs[1], rates.pairs[0]));
     }
-    if rates.unlisted[0] > 0 {
-        let [cases, unlisted, named] = rates.unlisted;
-        parts.push(format!(
-            "What no candidate is: {unlisted} of {cases} called unlisted, {named} with a false name.\n"
-        ));
+    if !rates.outside.is_empty() {
+        parts.push(outside(rates).text());
     }
+    parts.extend(reliability_text(rates));
     for (ratio, cases, found, overlap) in &rates.bumps {
         parts.push(format!(
             "Bumps on one curve of {} times the noise: {found} of {cases} found; places overlap by {}.\n",
@@ -83,6 +82,20 @@ fn kinds(rates: &Rates) -> Table {
         cells.push(
             smallest.map_or_else(String::new, |s| crate::page::number::significant(s.size, 2)),
         );
+        table.row(cells);
+    }
+    table
+}
+
+/// The answers to changes of another form than those of the candidates.
+fn outside(rates: &Rates) -> Table {
+    let columns =
+        ["cases", "unnoticed", "`unlisted`", "nearest type", "wrong name", "of these exact"];
+    let mut table = Table::new(&["injected: of no candidate's form", "sort"], &columns);
+    for own in &rates.outside {
+        let counts = [own.cases, own.unnoticed, own.unlisted, own.nearest, own.wrong, own.named];
+        let mut cells = vec![own.kind.clone(), own.sort.clone()];
+        cells.extend(counts.map(|count| count.to_string()));
         table.row(cells);
     }
     table

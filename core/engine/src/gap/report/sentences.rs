@@ -2,7 +2,8 @@
 
 use lacuna::plugin::effect::On;
 
-use super::View;
+use super::{View, proof};
+use crate::gap::experiment::hold_out::HeldOutKind;
 use crate::gap::result::remains::Remains;
 use crate::gap::result::replaced::OtherModel;
 use crate::gap::result::{AddedEffect, GapFindings, GapResult, HeldOut, RegionResult};
@@ -37,6 +38,8 @@ pub fn sentences(view: &View<'_>, gap: &GapFindings) -> Vec<String> {
     sentences.extend(remains.map(|remains| remains_sentence(view, remains)));
     sentences
         .extend(gap.held_out().iter().map(|part| held_out(part, !result.additions.is_empty())));
+    sentences.extend(proof::sentences(gap));
+    sentences.extend(proof::members(gap));
     sentences.extend(result.needless.iter().map(Needless::words));
     sentences.extend(result.models.iter().map(other_model));
     sentences
@@ -180,13 +183,20 @@ fn addition_sentence(gap: &GapFindings, addition: &AddedEffect) -> String {
         })
         .collect();
     format!(
-        "{}{}: {} ({} of the gap; probability among the candidates {}).",
+        "{}{}: {} ({} of the gap; probability {}{}).",
         capitalised(&addition.title),
         on(&addition.on),
         values.join(", "),
         percent(addition.share),
-        probability(addition.probability)
+        probability(addition.probability),
+        none_of_these(gap)
     )
+}
+
+/// The probability beside that of an effect: that what is missing is of no type that is named.
+fn none_of_these(gap: &GapFindings) -> String {
+    let none = gap.result.verdict.none_of_these;
+    none.map(|p| format!(", of none of these {}", fixed(p, 2))).unwrap_or_default()
 }
 
 /// A probability; above 0.99 as a bound, for no count of cases shows more.
@@ -248,9 +258,13 @@ fn held_out(part: &HeldOut, with: bool) -> String {
     let interval = if all.lower.is_finite() && all.upper.is_finite() {
         format!(" (95 % interval {} to {})", percent(all.lower), percent(all.upper))
     } else {
-        " (too few for an interval)".to_owned()
+        " (the gap is too small for an interval)".to_owned()
     };
-    let outcome = if part.proof.shrank { "It shrank" } else { "That it shrank is not shown" };
+    let outcome = match part.proof.shrank {
+        true if part.kind == HeldOutKind::Replicates => "It is reproducible that the gap closes",
+        true => "It shrank",
+        false => "That it closes is not shown",
+    };
     format!(
         "On {} held-out {kind} the gap is {} standard deviations of the noise without and {} with what was found: {} of it closed{interval}. {outcome}.",
         all.replicates,

@@ -26,6 +26,46 @@ pub struct Augmented {
     pub log_evidence: Option<[f64; 2]>,
     /// The proof on held-out data, with the study calibrated without them.
     pub held_out: Vec<HeldOut>,
+    /// The studies of the members of a class, this one among them; empty without a class.
+    #[serde(default)]
+    pub members: Vec<MemberRun>,
+    /// The posteriors of the parameters and derived quantities, averaged over the members; empty without a class.
+    #[serde(default)]
+    pub averaged: Vec<Averaged>,
+}
+
+/// The study of a member of a class.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MemberRun {
+    /// The types of its effects.
+    pub kinds: Vec<String>,
+    /// Its posterior probability among the members.
+    pub weight: f64,
+    /// The file.
+    pub study: PathBuf,
+    /// The run directory.
+    pub run: PathBuf,
+    /// The posteriors of its parameters and of the unknowns of its effects.
+    pub unknowns: Vec<UnknownPosterior>,
+}
+
+/// A posterior averaged over the members of a class: their mixture.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Averaged {
+    /// The name.
+    pub name: String,
+    /// The unit.
+    pub unit: Unit,
+    /// The mean.
+    pub mean: f64,
+    /// The standard deviation.
+    pub sd: f64,
+    /// The 2.5 % quantile.
+    pub q025: f64,
+    /// The median.
+    pub median: f64,
+    /// The 97.5 % quantile.
+    pub q975: f64,
 }
 
 /// A parameter in the study without the effects and in that with them.

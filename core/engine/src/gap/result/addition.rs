@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use crate::gap::candidates::Candidate;
-use crate::gap::search::{SearchResult, Verdict};
+use crate::gap::search::{CrossValidation, SearchResult, Verdict};
 
 /// An effect as a study adds it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -35,14 +35,21 @@ pub struct AddedEffect {
     pub unknowns: Vec<Estimate>,
     /// The types that these data cannot distinguish from it, itself first.
     pub class: Vec<String>,
-    /// The probability of its type among the candidates.
+    /// The probability that its type is right, as counted in cases of which half hide what no candidate is.
     pub probability: f64,
+    /// The posterior probability of its type among the candidates, as if one of them were exactly true.
+    #[serde(default)]
+    pub posterior_probability: f64,
     /// The share of the gap that it closes beside the other effects.
     #[serde(default)]
     pub share: f64,
     /// True when it keeps its name also where another part of the gap has none.
     #[serde(default)]
     pub certain: bool,
+    /// The comparisons with its rival on left-out data: with a free form in its place, or for another model with the
+    /// study's model and its effects.
+    #[serde(default)]
+    pub rivals: Vec<CrossValidation>,
 }
 
 /// The name of the plugin of effects inside a companion, which are no plugins.
@@ -84,7 +91,8 @@ pub(super) fn additions(
 ) -> Vec<AddedEffect> {
     let placed = found.system.effects.iter().zip(&found.chosen).zip(&verdict.effects);
     placed
-        .map(|((effect, placement), named)| {
+        .zip(&found.support)
+        .map(|(((effect, placement), named), support)| {
             let candidate = &candidates[placement.candidate];
             let described = candidate.effect.describe();
             let unknowns = effect.hyperparameters().into_iter().enumerate();
@@ -108,8 +116,10 @@ pub(super) fn additions(
                     .collect(),
                 class: named.class.clone(),
                 probability: named.probability,
+                posterior_probability: named.posterior_probability,
                 share: named.share,
                 certain: named.certain,
+                rivals: support.against_free_form.clone(),
             }
         })
         .collect()

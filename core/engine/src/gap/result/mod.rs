@@ -2,9 +2,12 @@
 
 pub mod added;
 mod addition;
+mod alike;
 pub mod companion;
 mod curve;
 pub mod insight;
+pub mod members;
+pub mod names;
 pub mod remains;
 pub mod replaced;
 
@@ -21,11 +24,13 @@ use crate::gap::experiment::hold_out::HeldOutKind;
 use crate::gap::prove::Proof;
 use crate::gap::result::companion::IdentifiedCompanion;
 use crate::gap::result::insight::{Insight, insight, withhold};
+use crate::gap::result::members::{Member, members};
+use crate::gap::result::names::NameProof;
 use crate::gap::result::remains::{Remains, remains};
 use crate::gap::result::replaced::OtherModel;
 use crate::gap::search::needless::Needless;
 use crate::gap::search::{
-    Detectability, Diagnostics, SearchOptions, SearchResult, SearchStep, Verdict, VerdictKind,
+    Detectability, Diagnostics, Reliability, SearchOptions, SearchResult, SearchStep, Verdict,
     verdict,
 };
 use crate::gap::system::fit::precision;
@@ -53,6 +58,11 @@ impl GapFindings {
             _ => &self.result.held_out,
         }
     }
+
+    /// The proof of the names; `None` if no effect was found.
+    pub fn proof(&self) -> Option<NameProof> {
+        NameProof::of(&self.result, self.held_out())
+    }
 }
 
 /// The whole result of the gap workflow.
@@ -69,6 +79,9 @@ pub struct GapResult {
     pub noise_assumed: bool,
     /// The effects that were found, as a study would add them.
     pub additions: Vec<AddedEffect>,
+    /// The members of the class, if the verdict is one; the effects above are one of them.
+    #[serde(default)]
+    pub members: Vec<Member>,
     /// The effects that were not tried.
     #[serde(default)]
     pub untried: Vec<Untried>,
@@ -113,6 +126,9 @@ pub struct GapResult {
     /// The terms and effects of the study that are not needed beside those that were found.
     #[serde(default)]
     pub needless: Vec<Needless>,
+    /// The count in simulated cases of the study itself by which the probabilities are corrected, if there is one.
+    #[serde(skip)]
+    pub reliability: Option<Reliability>,
 }
 
 /// The p-value of the energy above which there is no significant excess misfit that effects could explain.
@@ -211,19 +227,22 @@ impl GapResult {
         has_share.then(|| self.verdict.closed.clamp(0.0, 1.0))
     }
 
-    /// The effects that a study may add: those that have a name, unless held-out data contradict them. Held-out data
-    /// do so where the interval of the share that closed holds zero.
-    pub fn worth_adding(&self) -> Vec<AddedEffect> {
-        let contradicted = self.held_out.iter().any(|part| {
-            let all = &part.proof.all;
-            all.closed <= 0.0 || all.lower.is_finite() && all.lower <= 0.0
-        });
-        let is_named = |effect: &&AddedEffect| match self.verdict.word {
-            VerdictKind::Named | VerdictKind::Approximate | VerdictKind::Class => true,
-            VerdictKind::Unlisted => effect.certain,
-            VerdictKind::None | VerdictKind::NotVisible => false,
-        };
-        self.additions.iter().filter(is_named).filter(|_| !contradicted).cloned().collect()
+    /// The result with the probabilities corrected by a count in simulated cases of the study itself.
+    pub fn corrected(mut self, reliability: Reliability) -> Self {
+        let mut least: Option<f64> = None;
+        for (i, effect) in self.verdict.effects.iter_mut().enumerate() {
+            let Some(traits) = &effect.traits else { continue };
+            let before = traits.probability();
+            let after = reliability.corrected(before);
+            effect.probability *= after / before;
+            least = Some(least.map_or(after, |least| least.min(after)));
+            if let Some(addition) = self.additions.get_mut(i) {
+                addition.probability = effect.probability;
+            }
+        }
+        self.verdict.none_of_these = least.map(|least| 1.0 - least).or(self.verdict.none_of_these);
+        self.reliability = Some(reliability);
+        self
     }
 
     /// The result of a search, without the proof.
@@ -239,12 +258,15 @@ impl GapResult {
         let mut verdict = verdict(found, candidates, options);
         let insight = insight(found, candidates, &verdict, stream);
         withhold(&mut verdict, &insight);
+        verdict.reasons.extend(alike::opposites(found, candidates));
+        let additions = additions(found, candidates, &verdict);
         let (counts, _) = experiment.means();
         Self {
             levels: [options.naming, options.unlisted],
             simulations: options.simulations,
             noise_assumed: found.noise.is_assumed(),
-            additions: additions(found, candidates, &verdict),
+            members: members(found, candidates, &verdict, &additions),
+            additions,
             untried: Vec::new(),
             path: found.path.iter().map(|step| passed(step, candidates)).collect(),
             p: both.map(|diagnostics| diagnostics.p),
@@ -264,6 +286,7 @@ impl GapResult {
             held_out: Vec::new(),
             models: Vec::new(),
             needless: Vec::new(),
+            reliability: None,
             verdict,
         }
     }

@@ -8,8 +8,9 @@ use lacuna::plugin::effect::On;
 use serde::{Deserialize, Serialize};
 
 use super::insight::{NOTHING, withhold};
+use super::members::{self, Member};
 use super::{AddedEffect, Estimate, GapResult, Shift, StepResult};
-use crate::gap::search::{CrossValidation, MissingEffect, SURE, VerdictKind, class};
+use crate::gap::search::{CEILING, CrossValidation, MissingEffect, SURE, VerdictKind, class};
 
 /// The type of an added effect that is another model in place of the study's.
 pub const MODEL_SWAP: &str = "model_swap";
@@ -58,15 +59,46 @@ pub fn settled(own: GapResult, others: Vec<AlternativeSearch>) -> GapResult {
         shares.push((kind.clone(), share(0.0)));
     }
     shares.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let sets = sets(&own, &others, share);
     let best = others.into_iter().max_by(|a, b| a.log_odds.total_cmp(&b.log_odds));
-    match best {
+    let mut result = match best {
         Some(best) if best.log_odds > 0.0 => {
             let probability = share(best.log_odds);
             let class = class(&best.swap.name, probability, &shares);
             replaced(&own, best, probability, class)
         }
         _ => kept(own, share(0.0), &shares),
+    };
+    result.members = match result.additions.first() {
+        Some(first) if result.verdict.word == VerdictKind::Class => members::settled(
+            sets.into_iter().filter(|set| first.class.contains(&set.kinds[0])).collect(),
+        ),
+        _ => Vec::new(),
+    };
+    result
+}
+
+/// The explanations with the study's model and with each of the others, with their probabilities.
+fn sets(own: &GapResult, others: &[AlternativeSearch], share: impl Fn(f64) -> f64) -> Vec<Member> {
+    let set = |additions: Vec<AddedEffect>, weight: f64| Member {
+        kinds: additions.iter().map(|addition| addition.label().to_owned()).collect(),
+        weight,
+        additions,
+    };
+    let mut all = own.members.clone();
+    if all.is_empty() && !own.additions.is_empty() {
+        all.push(set(own.additions.clone(), 1.0));
     }
+    all.iter_mut().for_each(|member| member.weight *= share(0.0));
+    all.extend(others.iter().map(|other| {
+        let weight = share(other.log_odds);
+        let class = vec![other.swap.name.clone()];
+        let swap =
+            AddedEffect { probability: weight, share: other.closed, class, ..other.swap.clone() };
+        let additions = std::iter::once(swap).chain(other.result.additions.iter().cloned());
+        set(additions.collect(), weight)
+    }));
+    all
 }
 
 /// The result with the study's model if others may be as good.
@@ -74,8 +106,10 @@ fn kept(mut own: GapResult, probability: f64, shares: &[(String, f64)]) -> GapRe
     let Some(first) = own.additions.first_mut() else { return own };
     let with = class(&first.kind, probability, shares);
     first.probability *= probability;
+    first.posterior_probability *= probability;
     first.class.extend(with.into_iter().skip(1));
     own.verdict.effects[0].probability = first.probability;
+    own.verdict.effects[0].posterior_probability = first.posterior_probability;
     own.verdict.effects[0].class.clone_from(&first.class);
     if own.verdict.word == VerdictKind::Named && first.class.len() > 1 {
         own.verdict.word = VerdictKind::Class;
@@ -99,10 +133,21 @@ fn replaced(
         cross_validation,
         idle,
     } = best;
-    let swap = AddedEffect { class, probability, share: closed, ..swap };
+    let rivals = cross_validation.clone();
+    let posterior_probability = probability;
+    let swap = AddedEffect {
+        class,
+        probability: probability.min(CEILING),
+        posterior_probability,
+        share: closed,
+        rivals,
+        ..swap
+    };
     let verdict = &mut other.verdict;
     verdict.closed = closed;
     verdict.effects.insert(0, named(&swap));
+    let others = verdict.none_of_these.unwrap_or(0.0);
+    verdict.none_of_these = Some(others.max(1.0 - swap.probability));
     let adequate = match verdict.word {
         VerdictKind::None | VerdictKind::NotVisible => true,
         VerdictKind::Unlisted if explains => {
@@ -165,6 +210,8 @@ fn named(swap: &AddedEffect) -> MissingEffect {
         values: swap.unknowns.iter().map(|unknown| unknown.value).collect(),
         sd: swap.unknowns.iter().map(|unknown| unknown.sd).collect(),
         probability: swap.probability,
+        posterior_probability: swap.posterior_probability,
+        traits: None,
         class: swap.class.clone(),
         share: swap.share,
         supported: true,

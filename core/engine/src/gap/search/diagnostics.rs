@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::refit::{TolerantEvidence, Weighed};
 use super::support::Support;
+use super::visited::{ModelAverage, VisitedModel};
 use crate::gap::candidates::{Candidate, Placement};
 use crate::gap::noise::Noise;
 use crate::gap::system::System;
@@ -81,6 +82,8 @@ pub struct SearchStep {
     pub added: Vec<Placement>,
     /// The names of effects that were dropped after it.
     pub dropped: Vec<String>,
+    /// The models that were compared.
+    pub visited: Vec<VisitedModel>,
 }
 
 /// The result of a search.
@@ -96,6 +99,10 @@ pub struct SearchResult<'a> {
     pub last: Diagnostics,
     /// The probability of each type for each effect, in the place of the one chosen, the most probable first.
     pub types: Vec<Vec<(String, f64)>>,
+    /// The placements that were weighed in the place of each effect, in decreasing order of weight.
+    pub slots: Vec<Vec<Weighed>>,
+    /// The posterior probabilities of all types, over the models that the search compared.
+    pub average: ModelAverage,
     /// The support of each effect.
     pub support: Vec<Support>,
     /// The probability of differences as large between conditions, or between the sensors of a group, if each effect

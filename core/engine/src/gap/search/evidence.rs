@@ -89,7 +89,7 @@ pub fn log_evidence(
 /// point suggests: the density of a time between two samples, for example, is flat there and falls steeply at both
 /// samples.
 fn narrowed(system: &System<'_>, whitener: &Whitener, means: &[f64], fit: &Fit) -> Matrix {
-    let mut precision = fit.precision();
+    let mut precision = fit.precision_of_evidence();
     let (point, bounds) = (&fit.at.point, system.bounds());
     let mut steep: Vec<usize> = (0..point.len()).collect();
     for _ in 0..HALVINGS {
@@ -103,8 +103,8 @@ fn narrowed(system: &System<'_>, whitener: &Whitener, means: &[f64], fit: &Fit) 
             }
         }
         let densities = log_densities(system, whitener, means, &moved);
-        let falls =
-            |k: usize| densities[2 * k..2 * k + 2].iter().any(|x| *x < fit.log_density - STEEP);
+        let best = fit.log_prior + fit.noise_scale.log_density(dot(&fit.residual, &fit.residual));
+        let falls = |k: usize| densities[2 * k..2 * k + 2].iter().any(|x| *x < best - STEEP);
         steep = (0..steep.len()).filter(|&k| falls(k)).map(|k| steep[k]).collect();
         if steep.is_empty() {
             break;
@@ -147,7 +147,7 @@ fn log_densities(
         .map(|response| -> Vec<f64> { means.iter().zip(response).map(|(y, m)| y - m).collect() });
     let white = whitener.whiten_rows(&Matrix::from_rows(means.len(), misfits));
     for (&b, z) in used.iter().zip(white.iter_rows()) {
-        let density = system.log_prior(&points[b]) - 0.5 * dot(z, z);
+        let density = system.log_prior(&points[b]) + whitener.noise_scale.log_density(dot(z, z));
         densities[b] = if density.is_nan() { f64::NEG_INFINITY } else { density };
     }
     densities

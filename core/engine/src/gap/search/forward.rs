@@ -9,18 +9,20 @@ use lacuna::plugin::effect::{On, Situation};
 
 use super::checks::{consistency, shares, stability};
 use super::diagnostics::{Diagnostics, SearchOptions, SearchResult, SearchStep, detectability};
+use super::pairs::Pair;
 use super::refit::{Scored, Weighed, most_promising, refit_all};
 use super::state::{SearchSetting, SearchState, kinds};
 use super::subsets::Screen;
 use super::support::{misfit, supports};
-use crate::gap::candidates::{Candidate, Placement, placements, sensors};
+use super::visited::{ModelAverage, VisitedModel};
+use crate::gap::candidates::{Candidate, Placement, place, placements, sensors};
 use crate::gap::experiment::Experiment;
 use crate::gap::noise::Noise;
 use crate::gap::system::System;
 use crate::gap::system::fit::{Fit, fit_from};
 use crate::gap::system::remainder::Remainder;
 use crate::gap::system::whitener::Whitener;
-use crate::gap::test::{DesignMatrix, Projection, Scan, Scores, TestSetting, differences, regions};
+use crate::gap::test::{DesignMatrix, Projection, Scan, Scores, TestSetting, regions};
 
 /// The smallest log posterior odds of a further effect: what the first one leaves may be an error of its own form, so
 /// that a further effect needs odds of 20 to 1 (strong evidence by Kass and Raftery, Journal of the American
@@ -39,15 +41,15 @@ const CLEAR: f64 = 4.0;
 
 /// The data, candidates and options of a search, which do not change on its path.
 pub(super) struct Search<'a> {
-    experiment: &'a Experiment<'a>,
-    candidates: &'a [Candidate],
-    placements: Vec<Placement>,
+    pub(super) experiment: &'a Experiment<'a>,
+    pub(super) candidates: &'a [Candidate],
+    pub(super) placements: Vec<Placement>,
     scan: Scan,
     means: Vec<f64>,
-    sensors: Vec<On>,
+    pub(super) sensors: Vec<On>,
     remainder: Remainder,
     options: SearchOptions,
-    stream: Stream,
+    pub(super) stream: Stream,
 }
 
 /// Searches for the effects that the forward map lacks, from starts of the parameters in their units; `None` if the
@@ -83,7 +85,9 @@ pub fn search<'a>(
         };
         path.push(step);
     };
-    let slots = search.slots(&state, &path);
+    let (slots, compared) = search.slots(&state, &path);
+    let visited = path.iter().flat_map(|step| step.visited.clone()).chain(compared);
+    let average = ModelAverage::of(&visited.collect::<Vec<_>>());
     let stability = match slots.last() {
         Some(weighed) => {
             let smaller = state.without(&search.setting(), state.chosen.len() - 1);
@@ -104,6 +108,8 @@ pub fn search<'a>(
         chosen,
         last,
         types,
+        slots,
+        average,
         support,
         consistency,
         stability,
@@ -135,7 +141,8 @@ fn base<'a>(
     let (fit, noise, whitener) = calibrated?;
     let remainder = Remainder::of(experiment, &noise, &system.around(&fit.at));
     let white = Arc::new(remainder.white(&whitener));
-    Some((SearchState { system, chosen: Vec::new(), fit, noise, whitener, white }, remainder))
+    let chosen = Vec::new();
+    Some((SearchState { system, chosen, fit, noise, whitener, white, slots: None }, remainder))
 }
 
 /// True when a fit removes as large a share of the squared misfit beyond noise as an effect has to close of the gap: a
@@ -164,7 +171,7 @@ impl<'a> Search<'a> {
         use_it(&Situation { layouts: self.experiment.layouts, response, noise: &noise })
     }
 
-    fn design(&self, state: &SearchState<'_>, projection: &Projection) -> DesignMatrix {
+    pub(super) fn design(&self, state: &SearchState<'_>, projection: &Projection) -> DesignMatrix {
         let (whitener, placements) = (&state.whitener, &self.placements);
         self.situated(state, |situation| {
             let (system, fit, candidates) = (&state.system, &state.fit, self.candidates);
@@ -265,6 +272,8 @@ impl<'a> Search<'a> {
         let now = state.weight(&self.setting(), &stream);
         let nothing = now - state.prior(&self.setting()) + self.kinds();
         let log_odds = log_sum(weighed.iter().map(|j| j.log_weight)) - nothing;
+        let mut visited =
+            VisitedModel::around(self.candidates, &state.chosen, &weighed, [now, nothing]);
         let gap = diagnostics.tolerant.gap;
         let least = LEAST * first.tolerant.gap;
         let shares = |j: &&Weighed| {
@@ -278,16 +287,26 @@ impl<'a> Search<'a> {
         };
         let alone = weighed.iter().find(shares).filter(|best| named && outweighs(best));
         let added = match alone {
-            Some(best) => vec![best.placement.clone()],
-            None if room >= 2 => self.pair(state, &weighed, now, [gap, least], &stream)?,
+            Some(best) => vec![(best.placement.clone(), self.unknowns(&best.placement, &weighed))],
+            None if room >= 2 => {
+                let pairs = self.pairs(state, &weighed, design, projection, &stream);
+                visited.extend(pairs.iter().map(|pair| pair.visited(self, state, now - nothing)));
+                let is_strong = |pair: &Pair| pair.log_weight > nothing + FURTHER;
+                let best =
+                    pairs.into_iter().find(|pair| gap - pair.gap >= least && is_strong(pair));
+                Vec::from(best?.parts)
+            }
             None => return None,
         };
-        for placement in &added {
-            *state = state.with(&self.setting(), placement, &self.unknowns(placement, &weighed));
+        for (placement, own) in &added {
+            *state = state.with(&self.setting(), placement, own);
         }
         self.exchange(state, &stream);
+        self.merge(state, &stream);
         let dropped = self.drop_needless(state, &stream);
-        Some(SearchStep { before: diagnostics.clone(), weighed, log_odds, added, dropped })
+        let added = added.into_iter().map(|(placement, _)| placement).collect();
+        let before = diagnostics.clone();
+        Some(SearchStep { before, weighed, log_odds, added, dropped, visited })
     }
 
     /// True when a placement on some sensors closes most of the misfit there: what is small beside the whole gap may be
@@ -303,13 +322,19 @@ impl<'a> Search<'a> {
         before > CLEAR * (2.0 * values).sqrt() && before - after >= MOST * before
     }
 
+    /// The outputs of a sensor.
+    pub(super) fn outputs_of(&self, sensor: &On) -> impl Iterator<Item = usize> {
+        let curves = self.experiment.curves.iter().filter(move |curve| place(curve) == *sensor);
+        curves.flat_map(|curve| curve.measured.iter().copied())
+    }
+
     /// The log of the number of types.
-    fn kinds(&self) -> f64 {
+    pub(super) fn kinds(&self) -> f64 {
         (kinds(self.candidates) as f64).ln()
     }
 
     /// The refitted placements with the groups grown from them, in decreasing order of weight.
-    fn weighed(
+    pub(super) fn weighed(
         &self,
         state: &SearchState<'a>,
         design: &DesignMatrix,
@@ -319,59 +344,13 @@ impl<'a> Search<'a> {
     ) -> Vec<Weighed> {
         let mut scored = self.most_promising(state, design, scores, projection);
         // A second effect of the same type in the same place would not be identifiable.
-        let is_there = |scored: &Scored| {
-            let same = |chosen: &Placement| {
-                chosen.candidate == scored.placement.candidate && chosen.on == scored.placement.on
-            };
-            state.chosen.iter().any(same)
-        };
-        scored.retain(|scored| !is_there(scored));
+        let is_there = |one: &Placement| state.chosen.iter().any(|chosen| chosen.is(one));
+        scored.retain(|scored| !is_there(&scored.placement));
         let common = self.setting();
         let setting = state.refit_setting(&common);
         let mut weighed = refit_all(&setting, &state.fit, &scored, stream);
-        weighed.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
+        self.move_places(state, &mut weighed, stream);
+        weighed.retain(|weighed| !is_there(&weighed.placement));
         weighed
-    }
-
-    /// The fitted values of the unknowns of a placement, in their units; the absent values if it was not fitted.
-    pub(super) fn unknowns(&self, placement: &Placement, weighed: &[Weighed]) -> Vec<f64> {
-        let effect = &self.candidates[placement.candidate].effect;
-        let absent = effect.absent(&self.experiment.layouts.blocks[0]);
-        let same = |j: &&Weighed| {
-            j.placement.candidate == placement.candidate && j.placement.on == placement.on
-        };
-        weighed.iter().find(same).map_or(absent.clone(), |j| {
-            let point = &j.fit.at.point;
-            point[point.len() - absent.len()..].to_vec()
-        })
-    }
-
-    /// The placements that are weighed in place of one of the effects, in decreasing order of weight.
-    pub(super) fn slot(
-        &self,
-        state: &SearchState<'a>,
-        i: usize,
-        stream: &Stream,
-    ) -> (SearchState<'a>, Vec<Weighed>) {
-        let smaller = state.without(&self.setting(), i);
-        let projection = Projection::of(&smaller.system, &smaller.fit);
-        let design = self.design(&smaller, &projection);
-        let (rows, spread) = differences(self.experiment);
-        let left = projection.rest(&smaller.fit.residual);
-        let scores = design.scores_of(&left, &smaller.whitener.whiten_rows(&rows), &spread);
-        let weighed = self.weighed(&smaller, &design, &scores, &projection, stream);
-        (smaller, weighed)
-    }
-
-    /// The placements that are weighed in place of each effect at the end.
-    fn slots(&self, state: &SearchState<'a>, path: &[SearchStep]) -> Vec<Vec<Weighed>> {
-        if let ([step], 1) = (path, state.chosen.len())
-            && step.added.len() == 1
-        {
-            return vec![step.weighed.clone()];
-        }
-        let stream = self.stream.named("types");
-        let slot = |i: usize| self.slot(state, i, &stream.at(i as u64)).1;
-        (0..state.chosen.len()).map(slot).collect()
     }
 }

@@ -6,17 +6,22 @@ mod cross_validate;
 mod diagnostics;
 mod discriminate;
 mod evidence;
+mod fold_score;
 mod folds;
 mod forward;
 mod moves;
 pub mod needless;
+mod pairs;
+mod places;
 mod refit;
+mod slots;
 mod state;
 mod subsets;
 mod support;
 #[cfg(test)]
 mod tests;
 mod verdict;
+mod visited;
 
 pub use checks::{consistency, stability};
 pub use cross_validate::{CrossValidation, Explanation, LeftOut, cross_validate};
@@ -29,4 +34,8 @@ pub use refit::{
 };
 pub use state::kinds;
 pub use support::Support;
-pub use verdict::{MissingEffect, SURE, Verdict, VerdictKind, class, explains, verdict};
+pub use verdict::{
+    Bin, Brier, CEILING, MissingEffect, PROVEN, Reliability, SURE, Told, Traits, Verdict,
+    VerdictKind, class, explains, verdict,
+};
+pub use visited::{Inclusion, ModelAverage, VisitedModel};

@@ -1,14 +1,16 @@
-//! Moves of the forward selection after a step: exchanges, deletions, and pairs where no single effect helps.
+//! Moves of the forward selection after a step: exchanges, deletions, and effects that are joined into one.
+
+use std::sync::Arc;
 
 use lacuna::math::random::Stream;
+use lacuna::plugin::effect::Reach;
 
-use super::forward::{FURTHER, Search};
-use super::refit::Weighed;
+use super::forward::Search;
+use super::slots::Slot;
 use super::state::SearchState;
+use super::subsets::{members, place_of};
 use crate::gap::candidates::Placement;
-
-/// The number of placements of each step that are tried in pairs.
-const PAIRED: usize = 10;
+use crate::gap::system::fit::fit;
 
 /// The largest number of rounds of exchanges.
 const EXCHANGES: usize = 10;
@@ -21,14 +23,15 @@ impl<'a> Search<'a> {
         }
         for round in 0..EXCHANGES {
             let mut exchanged = false;
+            let mut slots = Vec::new();
             for i in 0..state.chosen.len() {
                 let stream = stream.named("exchange").at(round as u64).at(i as u64);
-                let (smaller, weighed) = self.slot(state, i, &stream);
+                let slot = self.slot(state, i, &stream);
+                slots.push(slot.clone());
+                let Slot { smaller, weighed } = slot;
                 let Some(best) = weighed.first() else { continue };
                 let chosen = &state.chosen[i];
-                let same =
-                    best.placement.candidate == chosen.candidate && best.placement.on == chosen.on;
-                if same {
+                if best.placement.is(chosen) {
                     continue;
                 }
                 let own = self.unknowns(&best.placement, &weighed);
@@ -43,6 +46,7 @@ impl<'a> Search<'a> {
                 }
             }
             if !exchanged {
+                state.slots = Some(Arc::new(slots));
                 break;
             }
         }
@@ -70,34 +74,49 @@ impl<'a> Search<'a> {
         dropped
     }
 
-    /// The pair of placements of largest weight; `None` if the weight is not larger than that of the present system.
-    pub(super) fn pair(
-        &self,
-        state: &SearchState<'a>,
-        weighed: &[Weighed],
-        now: f64,
-        [gap, least]: [f64; 2],
-        stream: &Stream,
-    ) -> Option<Vec<Placement>> {
+    /// Joins effects of one candidate on several sets of sensors into one effect on all of them, as long as that has the
+    /// larger weight: one size in place of several.
+    pub(super) fn merge(&self, state: &mut SearchState<'a>, stream: &Stream) {
         let common = self.setting();
-        let promising: Vec<&Weighed> = weighed.iter().take(PAIRED).collect();
-        let mut best: Option<(f64, Vec<Placement>)> = None;
-        for (i, first) in promising.iter().enumerate() {
-            let one =
-                state.with(&common, &first.placement, &self.unknowns(&first.placement, weighed));
-            for second in &promising[i + 1..] {
-                let own = self.unknowns(&second.placement, weighed);
-                let both = one.with(&common, &second.placement, &own);
-                let weight = both.weight(&common, stream);
-                let shares = || gap - both.tolerant(&common, stream).gap >= least;
-                if weight > now + FURTHER
-                    && shares()
-                    && best.as_ref().is_none_or(|(most, _)| weight > *most)
-                {
-                    best = Some((weight, vec![first.placement.clone(), second.placement.clone()]));
+        while let Some(joined) = self.joined(state) {
+            if joined.weight(&common, stream) < state.weight(&common, stream) {
+                break;
+            }
+            *state = joined;
+        }
+    }
+
+    /// The state of largest weight, by Laplace's method, in which two effects of one candidate are one; `None` if none
+    /// has a larger weight than the state itself.
+    fn joined(&self, state: &SearchState<'a>) -> Option<SearchState<'a>> {
+        let common = self.setting();
+        let mut best: Option<(f64, SearchState<'a>, Placement, Vec<f64>)> = None;
+        for j in 1..state.chosen.len() {
+            for i in 0..j {
+                let [a, b] = [&state.chosen[i], &state.chosen[j]];
+                let reach = self.candidates[a.candidate].effect.reach();
+                if a.candidate != b.candidate || reach != Reach::Any {
+                    continue;
+                }
+                let sets = [a, b].map(|p| members(&self.sensors, &p.on));
+                let [Some(first), Some(second)] = sets else { continue };
+                let on = place_of(&self.sensors, first | second);
+                let placement = Placement { candidate: a.candidate, on };
+                let own = state.unknowns_of(i);
+                let smaller = state.without(&common, j).without(&common, i);
+                let setting = smaller.refit_setting(&common);
+                let start = [&smaller.fit.at.point[..], &own].concat();
+                let one = fit(&setting.with(&placement), setting.whitener, setting.means, &start);
+                let Some(glance) = setting.glance(&placement, &one) else { continue };
+                let weight = glance + smaller.prior(&common) - self.kinds();
+                if best.as_ref().is_none_or(|(most, ..)| weight > *most) {
+                    let own = one.at.point[smaller.fit.at.point.len()..].to_vec();
+                    best = Some((weight, smaller, placement, own));
                 }
             }
         }
-        best.map(|(_, pair)| pair)
+        let now = state.white.glance(&state.fit)? + state.prior(&common);
+        let (weight, smaller, placement, own) = best?;
+        (weight > now).then(|| smaller.with(&common, &placement, &own))
     }
 }

@@ -207,6 +207,12 @@ impl<'a> RefitSetting<'a, '_> {
         }
     }
 
+    /// The log evidence of a fit with a remainder, by Laplace's method at its point, plus the log prior mass of a
+    /// placement: what [`RefitSetting::weigh`] gives without its corrections. `None` if the fit is singular.
+    pub fn glance(&self, placement: &Placement, fit: &Fit) -> Option<f64> {
+        Some(self.white.glance(fit)? + self.log_prior(placement))
+    }
+
     /// The system with a further placement.
     pub fn with(&self, placement: &Placement) -> System<'a> {
         let kind = &self.candidates[placement.candidate].kind;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use lacuna::math::random::Stream;
 
 use super::refit::{RefitSetting, TolerantEvidence};
+use super::slots::Slot;
 use crate::gap::candidates::{Candidate, Placement};
 use crate::gap::experiment::Experiment;
 use crate::gap::noise::Noise;
@@ -28,6 +29,8 @@ pub(super) struct SearchState<'a> {
     pub whitener: Whitener,
     /// The remainder in its coordinates.
     pub white: Arc<WhiteRemainder>,
+    /// The slots of its effects, if they were weighed.
+    pub slots: Option<Arc<Vec<Slot<'a>>>>,
 }
 
 /// The data and candidates of a search, which all its states share.
@@ -72,6 +75,7 @@ impl<'a> SearchState<'a> {
         self.white = Arc::new(shared.remainder.white(&self.whitener));
         self.fit = fit(&system, &self.whitener, shared.means, &first.at.point);
         self.system = system;
+        self.slots = None;
     }
 
     /// The state without effect `i`, refitted with the same noise.
@@ -86,7 +90,15 @@ impl<'a> SearchState<'a> {
         let mut start = self.fit.at.point.clone();
         start.drain(begin..end);
         let fit = fit(&system, &self.whitener, shared.means, &start);
-        Self { system, chosen, fit, ..self.clone() }
+        Self { system, chosen, fit, slots: None, ..self.clone() }
+    }
+
+    /// The fitted values of the unknowns of effect `i`, in their units.
+    pub fn unknowns_of(&self, i: usize) -> Vec<f64> {
+        let effects = &self.system.effects;
+        let begin = self.system.experiment.parameters.len()
+            + effects[..i].iter().map(|e| e.absent().len()).sum::<usize>();
+        self.fit.at.point[begin..begin + effects[i].absent().len()].to_vec()
     }
 
     /// The log evidence plus the log prior mass of the effects. Noise that is estimated from single records changes

@@ -94,14 +94,7 @@ impl Screen<'_> {
     }
 
     fn scored(&self, candidate: usize, set: Set, start: Vec<f64>, absorbed: f64) -> Scored {
-        let mut on = On::new();
-        let chosen = (0..self.sensors.len()).filter(|k| set.members >> k & 1 == 1);
-        if (set.members.count_ones() as usize) < self.sensors.len() {
-            for (axis, labels) in chosen.flat_map(|k| &self.sensors[k]) {
-                on.entry(axis.clone()).or_default().extend(labels.iter().cloned());
-            }
-        }
-        let placement = Placement { candidate, on };
+        let placement = Placement { candidate, on: place_of(self.sensors, set.members) };
         Scored { placement, score: set.square.sqrt(), absorbed, starts: vec![start] }
     }
 
@@ -142,6 +135,34 @@ impl Screen<'_> {
         let size = if square > 0.0 { product / square } else { 0.0 };
         Set { members, merit: 0.5 * score + prior, square: score, size }
     }
+}
+
+/// The place of a set of sensors along one axis.
+pub(super) fn place_of(sensors: &[On], members: u128) -> On {
+    let mut on = On::new();
+    if (members.count_ones() as usize) < sensors.len() {
+        let chosen = (0..sensors.len()).filter(|k| members >> k & 1 == 1);
+        for (axis, labels) in chosen.flat_map(|k| &sensors[k]) {
+            on.entry(axis.clone()).or_default().extend(labels.iter().cloned());
+        }
+    }
+    on
+}
+
+/// The set of the sensors of a place; `None` if the place is not a set of them.
+pub(super) fn members(sensors: &[On], on: &On) -> Option<u128> {
+    if on.is_empty() {
+        return (sensors.len() <= 128).then(|| u128::MAX >> (128 - sensors.len()));
+    }
+    let contains = |sensor: &On| {
+        let named = |(axis, own): (&String, &Vec<String>)| {
+            on.get(axis).is_some_and(|labels| own.iter().all(|label| labels.contains(label)))
+        };
+        sensor.len() == on.len() && sensor.iter().all(named)
+    };
+    let members = (0..sensors.len()).filter(|&k| contains(&sensors[k]));
+    let members = members.fold(0, |all, k| all | 1 << k);
+    (members != 0).then_some(members)
 }
 
 /// All sets, in the order of Gray's code, so that each differs from the one before by one sensor.

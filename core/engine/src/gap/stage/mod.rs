@@ -83,6 +83,7 @@ pub fn inputs(study: &Study, problem: &InverseProblem<'_>) -> Value {
         laws,
         effects,
         study.gap.keys,
+        study.positions,
         pieces(study),
         candidates,
         study.discrepancy.as_ref().map(|section| section.built.identity()),

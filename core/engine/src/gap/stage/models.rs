@@ -59,7 +59,9 @@ impl ModelSearch<'_> {
             let others: Result<Vec<AlternativeSearch>, Stop> = others
                 .filter_map(|alternative| self.contest(alternative, own, &found).transpose())
                 .collect();
-            Ok(settled(result, others?))
+            let mut result = settled(result, others?);
+            result.verdict.reasons.extend(result.not_added());
+            Ok(result)
         })
     }
 
@@ -168,8 +170,10 @@ fn addition(alternative: &AlternativeModel<'_>, found: &SearchResult<'_>) -> Add
         unknowns: unknowns.collect(),
         class: Vec::new(),
         probability: 0.0,
+        posterior_probability: 0.0,
         share: 0.0,
         certain: false,
+        rivals: Vec::new(),
     }
 }
 

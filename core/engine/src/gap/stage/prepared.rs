@@ -10,7 +10,7 @@ use lacuna::run::{Observer, Stop};
 use lacuna_linalg::Matrix;
 use lacuna_run::RunDirectory;
 
-use crate::gap::candidates::{Candidate, Positions, Proposed, Untried, proposed};
+use crate::gap::candidates::{Candidate, Proposed, Untried, proposed};
 use crate::gap::experiment::Experiment;
 use crate::gap::experiment::hold_out::{HeldOutData, HeldOutKind, HoldOutSplit, split};
 use crate::gap::experiment::stated::Statement;
@@ -233,14 +233,8 @@ fn options(study: &Study) -> SearchOptions {
 /// The candidates of the study: those that the installed effects propose, and those that the study lists.
 fn candidates(study: &Study, situation: &Situation<'_>) -> Result<Proposed, Stop> {
     let keys = &study.gap.keys;
-    let positions = keys.positions.iter().map(|(axis, positions)| Positions {
-        axis: axis.clone(),
-        at: positions.at.clone(),
-        unit: positions.unit.clone(),
-    });
-    let positions: Vec<Positions> = positions.collect();
     let names = keys.candidates.as_deref();
-    let mut all = proposed(names, &positions, situation).map_err(Stop::new)?;
+    let mut all = proposed(names, &study.positions, situation).map_err(Stop::new)?;
     for section in &study.gap.candidates {
         let kind = section.common.name.as_ref().map_or(section.built.name, AsRef::as_ref);
         all.untried.retain(|untried| untried.kind != section.built.name);

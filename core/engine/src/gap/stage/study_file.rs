@@ -240,10 +240,7 @@ fn found(addition: &AddedEffect) -> String {
     let own = addition.class.iter().filter(|kind| **kind != addition.label());
     let others: Vec<String> = own.map(|kind| format!("`{kind}`")).collect();
     if others.is_empty() {
-        text.push_str(&format!(
-            "# probability among the candidates: {:.2}\n",
-            addition.probability
-        ));
+        text.push_str(&format!("# probability: {:.2}\n", addition.probability));
     } else {
         text.push_str(&format!(
             "# These data cannot tell it from {} (its own probability: {:.2}).\n",

@@ -9,6 +9,7 @@ use lacuna_linalg::vector::dot;
 use lacuna_linalg::{Cholesky, Matrix, gram, multiply_vector};
 
 use super::coordinate::{curvature, inner, log_slope, moved, room, slope, unit};
+use super::noise_scale::NoiseScale;
 use super::step::within;
 use super::whitener::Whitener;
 use super::{Linearised, System};
@@ -56,6 +57,8 @@ pub struct Fit {
     pub log_density: f64,
     /// The log prior density.
     pub log_prior: f64,
+    /// The uncertainty of the size of the noise.
+    pub noise_scale: NoiseScale,
 }
 
 impl Fit {
@@ -76,7 +79,22 @@ impl Fit {
     /// The precision matrix of the normal approximation to the posterior, `unknowns x unknowns`, in the inverse units
     /// of the unknowns.
     pub fn precision(&self) -> Matrix {
-        let mut precision = self.hessian();
+        self.precision_at(1.0)
+    }
+
+    /// The same with the precision that the residual leaves to the noise.
+    pub fn precision_of_evidence(&self) -> Matrix {
+        let square = dot(&self.residual, &self.residual);
+        self.precision_at(self.noise_scale.precision(square))
+    }
+
+    /// The precision if that of the noise is this multiple of its estimate.
+    fn precision_at(&self, multiple: f64) -> Matrix {
+        let mut precision = gram(&self.slopes.transposed());
+        precision.as_mut_slice().iter_mut().for_each(|x| *x *= multiple);
+        for (j, p) in self.prior_curvature.iter().enumerate() {
+            precision[(j, j)] += p;
+        }
         let least = self.prior_precision.iter().zip(&self.prior_curvature);
         for (j, (least, curvature)) in least.enumerate() {
             precision[(j, j)] += (least - curvature).max(0.0);
@@ -96,14 +114,16 @@ impl Fit {
         }
     }
 
-    /// The log evidence by Laplace's method, up to the determinant of the noise. The normal density is integrated over
-    /// all values, also beyond a bound of the prior.
+    /// The log evidence by Laplace's method, up to the determinant of the noise, with the [uncertainty of its
+    /// size](NoiseScale). The normal density is integrated over all values, also beyond a bound of the prior.
     pub fn log_evidence(&self) -> f64 {
-        let (scaled, scale) = equilibrated(&self.precision());
+        let square = dot(&self.residual, &self.residual);
+        let (scaled, scale) = equilibrated(&self.precision_of_evidence());
         let Ok(factor) = Cholesky::new(&scaled) else { return f64::NEG_INFINITY };
         let log_scale: f64 = scale.iter().map(|s| s.ln()).sum();
         let half = 0.5 * scale.len() as f64 * std::f64::consts::TAU.ln();
-        self.log_density + half + log_scale - 0.5 * factor.log_determinant()
+        let log_density = self.log_prior + self.noise_scale.log_density(square);
+        log_density + half + log_scale - 0.5 * factor.log_determinant()
     }
 }
 
@@ -263,7 +283,17 @@ pub fn at(system: &System<'_>, whitener: &Whitener, means: &[f64], point: &[f64]
     let prior_curvature = priors.iter().zip(point).map(|(p, &x)| curvature(p, x)).collect();
     let prior_precision = priors.iter().zip(point).map(|(p, &x)| unit(p, x).powi(-2)).collect();
     let slopes = whitener.whiten_rows(&at.tangents);
-    Fit { at, residual, slopes, prior_curvature, prior_precision, log_density, log_prior }
+    let noise_scale = whitener.noise_scale;
+    Fit {
+        at,
+        residual,
+        slopes,
+        prior_curvature,
+        prior_precision,
+        log_density,
+        log_prior,
+        noise_scale,
+    }
 }
 
 /// The next point, by a damped Gauss-Newton step in units of the priors' widths, inside the bounds; and the gain in log

@@ -3,6 +3,7 @@
 pub(in crate::gap) mod coordinate;
 pub mod emulator_error;
 pub mod fit;
+pub mod noise_scale;
 pub mod remainder;
 pub(in crate::gap) mod step;
 pub mod switched;

@@ -8,10 +8,11 @@
 use lacuna::plugin::discrepancy::CommonError;
 use lacuna_linalg::vector::dot;
 use lacuna_linalg::{
-    Matrix, multiply, multiply_transposed, multiply_vector, symmetric_eigen, transposed_multiply,
-    transposed_multiply_vector,
+    Cholesky, Matrix, multiply, multiply_transposed, multiply_vector, solve_lower_matrix,
+    symmetric_eigen, transposed_multiply, transposed_multiply_vector,
 };
 
+use super::noise_scale::NoiseScale;
 use crate::gap::experiment::Experiment;
 use crate::gap::noise::{Noise, Succession, directions};
 
@@ -25,6 +26,8 @@ pub struct Whitener {
     /// The curves of each condition with the lower factor of their correlation.
     across: Vec<(std::ops::Range<usize>, Matrix)>,
     outputs: usize,
+    /// The uncertainty of the size of the noise.
+    pub noise_scale: NoiseScale,
     /// The share of independent errors in the variance of each output, without the part of low rank.
     independent: Vec<f64>,
     /// Parts of low rank, one on top of the other: random effects and known errors, then a remainder.
@@ -39,11 +42,24 @@ struct CurveWhitener {
     succession: Succession,
 }
 
-/// `(I + U U')^-1/2 = I - Q diag(shrink) Q'`.
+/// A whitener of `I + U U'`, `I - left right'`.
 #[derive(Debug, Clone)]
 struct LowRank {
-    directions: Matrix,
-    shrink: Vec<f64>,
+    /// `outputs x directions`.
+    left: Matrix,
+    /// `outputs x directions`.
+    right: Matrix,
+    /// The log of its determinant.
+    log_determinant: f64,
+}
+
+/// The form of the part of low rank.
+#[derive(Debug, Clone, Copy)]
+enum Root {
+    /// The symmetric root, which changes each value as little as possible.
+    Symmetric,
+    /// The root by Cholesky's method.
+    Triangular,
 }
 
 impl Whitener {
@@ -53,12 +69,27 @@ impl Whitener {
         Self::of_counts(experiment, noise, response, &experiment.means().0)
     }
 
+    /// As [`Whitener::new`], up to a rotation: for lengths, products and determinants alone. It needs no eigenvectors.
+    pub fn rotated(experiment: &Experiment<'_>, noise: &Noise, response: &[f64]) -> Self {
+        Self::build(experiment, noise, response, &experiment.means().0, Root::Triangular)
+    }
+
     /// The whitener of means over other numbers of replicates, one per output.
     pub fn of_counts(
         experiment: &Experiment<'_>,
         noise: &Noise,
         response: &[f64],
         counts: &[f64],
+    ) -> Self {
+        Self::build(experiment, noise, response, counts, Root::Symmetric)
+    }
+
+    fn build(
+        experiment: &Experiment<'_>,
+        noise: &Noise,
+        response: &[f64],
+        counts: &[f64],
+        root: Root,
     ) -> Self {
         let mut independent = vec![0.0; experiment.outputs()];
         let mut curves = Vec::new();
@@ -78,14 +109,16 @@ impl Whitener {
             .filter_map(|(condition, factor)| Some((condition.curves.clone(), factor.clone()?)))
             .collect();
         let outputs = experiment.outputs();
-        let mut whitener = Self { curves, across, outputs, independent, low_rank: Vec::new() };
+        let noise_scale = NoiseScale::of(experiment, noise);
+        let mut whitener =
+            Self { curves, across, outputs, noise_scale, independent, low_rank: Vec::new() };
         let mut spread = wander(experiment, noise, response, counts);
         spread.extend(experiment.common.iter().flat_map(|error| {
             (0..error.factor.columns()).map(|j| error.factor.column(j)).collect::<Vec<_>>()
         }));
         let mut columns: Vec<Vec<f64>> = spread.iter().map(|u| whitener.base(u)).collect();
         columns.retain(|u| dot(u, u) > NEGLIGIBLE);
-        whitener.low_rank.extend(LowRank::of(&columns, outputs));
+        whitener.low_rank.extend(LowRank::of(&columns, outputs, root));
         whitener
     }
 
@@ -94,9 +127,8 @@ impl Whitener {
     pub fn whiten(&self, differences: &[f64]) -> Vec<f64> {
         let mut white = self.base(differences);
         for low_rank in &self.low_rank {
-            let along = transposed_multiply_vector(&low_rank.directions, &white);
-            let shrunk: Vec<f64> = along.iter().zip(&low_rank.shrink).map(|(a, s)| a * s).collect();
-            let taken = multiply_vector(&low_rank.directions, &shrunk);
+            let along = transposed_multiply_vector(&low_rank.right, &white);
+            let taken = multiply_vector(&low_rank.left, &along);
             white.iter_mut().zip(taken).for_each(|(w, t)| *w -= t);
         }
         white
@@ -106,7 +138,8 @@ impl Whitener {
     pub fn whiten_rows(&self, rows: &Matrix) -> Matrix {
         let base = rows.iter_rows().map(|row| self.base(row));
         let mut white = Matrix::from_rows(self.outputs, base);
-        self.low_rank.iter().for_each(|low_rank| low_rank.shrink_rows(&mut white));
+        let parts = self.low_rank.iter();
+        parts.for_each(|part| take_rows(&mut white, &part.left, &part.right));
         white
     }
 
@@ -114,15 +147,15 @@ impl Whitener {
     /// rows, `directions x outputs`.
     pub fn with(&self, directions: &Matrix, variances: &[f64]) -> Self {
         let mut other = self.clone();
-        let shrink = variances.iter().map(|v| 1.0 - 1.0 / (1.0 + v).sqrt()).collect();
-        other.low_rank.push(LowRank { directions: directions.transposed(), shrink });
+        other.low_rank.push(LowRank::symmetric(directions.transposed(), variances));
         other
     }
 
     /// The variance of the product of each whitened row with the independent part of the emulator's error.
     pub fn of_independent(&self, rows: &Matrix) -> Vec<f64> {
         let mut seen = rows.clone();
-        self.low_rank.iter().rev().for_each(|low_rank| low_rank.shrink_rows(&mut seen));
+        let parts = self.low_rank.iter().rev();
+        parts.for_each(|part| take_rows(&mut seen, &part.right, &part.left));
         let one = |row: &[f64]| row.iter().zip(&self.independent).map(|(x, r)| x * x * r).sum();
         seen.iter_rows().map(one).collect()
     }
@@ -147,8 +180,7 @@ impl Whitener {
             let length = self.curves[curves.start].measured.len() as f64;
             -length * (0..factor.rows()).map(|i| factor[(i, i)].ln()).sum::<f64>()
         });
-        let shrink = self.low_rank.iter().flat_map(|low_rank| &low_rank.shrink);
-        let low_rank = shrink.map(|s| (1.0 - s).ln()).sum::<f64>();
+        let low_rank = self.low_rank.iter().map(|part| part.log_determinant).sum::<f64>();
         curves.sum::<f64>() + across.sum::<f64>() + low_rank
     }
 
@@ -254,23 +286,48 @@ fn wander(
     factors
 }
 
+/// Takes `left right'` of each row from it.
+fn take_rows(rows: &mut Matrix, left: &Matrix, right: &Matrix) {
+    let taken = multiply_transposed(&multiply(rows, right), left);
+    rows.as_mut_slice().iter_mut().zip(taken.as_slice()).for_each(|(w, t)| *w -= t);
+}
+
 impl LowRank {
-    /// Applies `I - Q diag(shrink) Q'` to each row.
-    fn shrink_rows(&self, rows: &mut Matrix) {
-        let mut along = multiply(rows, &self.directions);
-        for i in 0..along.rows() {
-            along.row_mut(i).iter_mut().zip(&self.shrink).for_each(|(a, s)| *a *= s);
+    /// The symmetric root `I - Q diag(1 - (1 + v)^-1/2) Q'` for orthonormal directions `Q`, `outputs x directions`, and
+    /// their variances `v`.
+    fn symmetric(directions: Matrix, variances: &[f64]) -> Self {
+        let shrink: Vec<f64> = variances.iter().map(|v| 1.0 - 1.0 / (1.0 + v).sqrt()).collect();
+        let mut left = directions.clone();
+        for i in 0..left.rows() {
+            left.row_mut(i).iter_mut().zip(&shrink).for_each(|(x, s)| *x *= s);
         }
-        let taken = multiply_transposed(&along, &self.directions);
-        rows.as_mut_slice().iter_mut().zip(taken.as_slice()).for_each(|(w, t)| *w -= t);
+        let log_determinant = -0.5 * variances.iter().map(|v| v.ln_1p()).sum::<f64>();
+        Self { left, right: directions, log_determinant }
     }
 
-    /// The low-rank whitener from the columns of `U`.
-    fn of(columns: &[Vec<f64>], outputs: usize) -> Option<Self> {
+    /// The root `I - U (L + I)^-T L^-1 U'` with `L L' = I + U'U`, from the rows `U'`.
+    fn triangular(u: &Matrix) -> Option<Self> {
+        let mut inner = multiply_transposed(u, u);
+        (0..inner.rows()).for_each(|k| inner[(k, k)] += 1.0);
+        let factor = Cholesky::new(&inner).ok()?;
+        let mut more = factor.lower().clone();
+        (0..more.rows()).for_each(|k| more[(k, k)] += 1.0);
+        let mut left = u.clone();
+        solve_lower_matrix(&more, &mut left);
+        let right = factor.whiten_matrix(u).transposed();
+        let log_determinant = -0.5 * factor.log_determinant();
+        Some(Self { left: left.transposed(), right, log_determinant })
+    }
+
+    /// The whitener of the columns of `U`.
+    fn of(columns: &[Vec<f64>], outputs: usize, root: Root) -> Option<Self> {
         if columns.is_empty() {
             return None;
         }
         let u = Matrix::from_rows(outputs, columns);
+        if matches!(root, Root::Triangular) {
+            return Self::triangular(&u);
+        }
         let eigen = symmetric_eigen(&multiply_transposed(&u, &u)).ok()?;
         let kept: Vec<usize> =
             (0..eigen.values.len()).filter(|&k| eigen.values[k] > NEGLIGIBLE).collect();
@@ -280,8 +337,7 @@ impl LowRank {
         let scaled = Matrix::from_fn(columns.len(), kept.len(), |i, k| {
             eigen.vectors[(i, kept[k])] / eigen.values[kept[k]].sqrt()
         });
-        let directions = transposed_multiply(&u, &scaled);
-        let shrink = kept.iter().map(|&k| 1.0 - 1.0 / (1.0 + eigen.values[k]).sqrt()).collect();
-        Some(Self { directions, shrink })
+        let variances: Vec<f64> = kept.iter().map(|&k| eigen.values[k]).collect();
+        Some(Self::symmetric(transposed_multiply(&u, &scaled), &variances))
     }
 }

@@ -13,4 +13,4 @@ pub use null::{
 pub use projection::Projection;
 pub use regions::{Region, regions};
 pub use scan::{Cell, Scan};
-pub use score::{DesignMatrix, Regressor, Scores, Spread, differences};
+pub use score::{DesignMatrix, Regressor, Scores, Spread, differences, slopes};

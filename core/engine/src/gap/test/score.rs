@@ -250,7 +250,7 @@ const FLAT: f64 = 1e-6;
 
 /// The derivatives of the response by the size of a candidate that acts everywhere, each with a start: for each setting
 /// of its other unknowns the derivative at absence, or where that vanishes the difference quotient over each start.
-fn slopes(
+pub fn slopes(
     system: &System<'_>,
     fit: &Fit,
     candidate: &Candidate,

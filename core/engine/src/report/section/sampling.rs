@@ -177,7 +177,7 @@ pub fn marks(coordinate: &CoordinateFindings, unit: &ShownUnit) -> Vec<Mark> {
 
 impl CalibrationFindings {
     /// One draw of one coordinate; `None` if an index is out of range.
-    fn draw(&self, chain: usize, step: usize, coordinate: usize) -> Option<f64> {
+    pub fn draw(&self, chain: usize, step: usize, coordinate: usize) -> Option<f64> {
         let width = self.coordinates.len();
         self.draws.get((chain * self.steps + step) * width + coordinate).copied()
     }

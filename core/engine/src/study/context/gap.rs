@@ -1,7 +1,6 @@
 //! Consistency of `[gap]` with the rest of the study: the candidates and the held-out data must exist.
 
 use lacuna::data::{Axis, Coordinates};
-use lacuna::plugin::effect::On;
 use lacuna::plugin::{Effect, Term, registry};
 use lacuna::text::nearest::{nearest, one_of};
 use lacuna::text::{Complaints, Node, Problems};
@@ -15,10 +14,6 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
         let mut complaints = Complaints::new(node, problems);
         candidates(study, &mut complaints);
         scenarios(study, &mut complaints);
-        for (axis, positions) in &study.gap.keys.positions {
-            let on = On::from([(axis.clone(), positions.at.keys().cloned().collect())]);
-            super::effects::places(study, "positions", &on, &mut complaints);
-        }
         super::effects::places(study, "hold_out.on", &study.gap.keys.hold_out.on, &mut complaints);
         along(study, &mut complaints);
         if study.measurements.is_none() {

@@ -7,7 +7,6 @@ mod runs;
 
 use std::collections::BTreeMap;
 
-use lacuna::data::Unit;
 use lacuna::plugin::effect::On;
 use lacuna::plugin::registry::{Section, section};
 use lacuna::plugin::{Effect, Reader};
@@ -44,10 +43,6 @@ pub struct GapSection {
     /// `true` also tries the library's terms that the study does not name, if the study has no surrogate and its model
     /// is written as equations; `false` restricts terms to those of `[[gap.term]]`.
     pub terms: bool,
-    /// Positions of labels along an axis, by the axis: effects that act between places, such as `misplacement`, are
-    /// tried only where the positions of the sensors are known. Default: none.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub positions: BTreeMap<String, AxisPositions>,
     /// Data held out before the search, on which it is measured whether the gap became smaller.
     pub hold_out: HoldOut,
 }
@@ -62,26 +57,9 @@ impl Default for GapSection {
             simulations: count(399),
             candidates: None,
             terms: true,
-            positions: BTreeMap::new(),
             hold_out: HoldOut::default(),
         }
     }
-}
-
-/// Positions of the labels of an axis.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct AxisPositions {
-    /// Coordinate of each label on a line, in `unit`, such as `{ A = 0.10, B = 0.15 }`. Labels that are not listed are
-    /// not on the line.
-    pub at: BTreeMap<String, f64>,
-    /// Unit of the coordinates.
-    #[serde(default = "metre")]
-    pub unit: Unit,
-}
-
-fn metre() -> Unit {
-    Unit::parse("m").unwrap_or_default()
 }
 
 /// Data held out of calibration and search.

@@ -21,8 +21,7 @@ pub(super) struct Grounds {
 
 impl Grounds {
     pub fn of(found: &SearchResult<'_>, options: SearchOptions, effects: &[MissingEffect]) -> Self {
-        let [before, left] = [found.first(), &found.last].map(|of| of.tolerant.gap);
-        let closed = if before > 0.0 { 1.0 - left / before } else { 0.0 };
+        let closed = closed(found);
         let disagree = found.last.p[1].min(found.last.p[2]) <= 0.5 * options.unlisted;
         let explained = !effects.is_empty() && explains(closed, &found.last);
         let scores = !effects.is_empty() && found.last.p[0] <= options.naming;
@@ -37,6 +36,12 @@ impl Grounds {
         let doubts = if effects.is_empty() { Vec::new() } else { Vec::from(doubts) };
         Self { closed, disagree, explained, gap, doubts: doubts.into_iter().flatten().collect() }
     }
+}
+
+/// The share of the gap that the effects of a search close.
+pub(super) fn closed(found: &SearchResult<'_>) -> f64 {
+    let [before, left] = [found.first(), &found.last].map(|of| of.tolerant.gap);
+    if before > 0.0 { 1.0 - left / before } else { 0.0 }
 }
 
 /// Returns true if effects that close this share of the gap explain it, even if a single region still disagrees.

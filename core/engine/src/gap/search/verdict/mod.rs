@@ -2,6 +2,8 @@
 //! show.
 
 mod grounds;
+mod probability;
+mod reliability;
 
 use lacuna::plugin::effect::{On, Placed};
 use schemars::JsonSchema;
@@ -13,6 +15,8 @@ use crate::gap::test::is_at_floor;
 use grounds::Grounds;
 
 pub use grounds::explains;
+pub use probability::{CEILING, Traits};
+pub use reliability::{Bin, Brier, Reliability, Told};
 
 /// Smallest posterior probability at which a type is named alone.
 pub const SURE: f64 = 0.9;
@@ -43,7 +47,7 @@ const MOST: f64 = 0.6;
 const SIGNIFICANT: f64 = 3.0;
 
 /// The number of standard errors by which an effect has to predict left-out data better than a free form in its place.
-const PROVEN: f64 = 2.5;
+pub const PROVEN: f64 = 2.5;
 
 /// The number of standard errors by which a free form in the place of an effect has to predict left-out data better to
 /// contradict it.
@@ -90,8 +94,15 @@ pub struct MissingEffect {
     pub values: Vec<f64>,
     /// The standard deviations.
     pub sd: Vec<f64>,
-    /// The probability of its type among the candidates.
+    /// The probability that its type is right, as counted in cases of which half hide what no candidate is; never above
+    /// [`CEILING`].
     pub probability: f64,
+    /// The posterior probability of its type among the candidates, as if one of them were exactly true.
+    #[serde(default)]
+    pub posterior_probability: f64,
+    /// The quantities from which its probability follows; `None` for another model.
+    #[serde(default)]
+    pub traits: Option<Traits>,
     /// The types that these data cannot distinguish from it, itself first; itself alone if they can.
     pub class: Vec<String>,
     /// The share of the gap that it closes beside the other effects.
@@ -115,6 +126,10 @@ pub struct Verdict {
     pub effects: Vec<MissingEffect>,
     /// The share of the excess misfit that they close, in the replicates they were fitted to.
     pub closed: f64,
+    /// The probability that what is missing is of no type that is named: the remaining probability of the effect of
+    /// least; `None` without effects.
+    #[serde(default)]
+    pub none_of_these: Option<f64>,
     /// The reasons, in words.
     pub reasons: Vec<String>,
 }
@@ -147,7 +162,14 @@ pub fn verdict(
         );
     }
     reasons.extend(found.noise.provenance(found.system.experiment));
-    Verdict { word, effects, closed: grounds.closed, reasons }
+    let none_of_these = none_of_these(&effects);
+    Verdict { word, effects, closed: grounds.closed, none_of_these, reasons }
+}
+
+/// The probability that what is missing is of no type that is named.
+fn none_of_these(effects: &[MissingEffect]) -> Option<f64> {
+    let each = effects.iter().map(|e| e.traits.map_or(e.probability, |t| t.probability()));
+    each.reduce(f64::min).map(|least| 1.0 - least)
 }
 
 fn without_effects(
@@ -244,13 +266,16 @@ fn named(found: &SearchResult<'_>, candidates: &[Candidate]) -> Vec<MissingEffec
         let own = types.iter().find(|(name, _)| name == kind).map_or(0.0, |(_, p)| *p);
         let class = class(kind, own, types);
         let supported = support.local >= HALF && support.transfers(PROVEN);
+        let traits = Traits::of(found, support, &class, types);
         all.push(MissingEffect {
             name: effect.name.clone(),
             kind: kind.clone(),
             on: placement.on.clone(),
             values: found.last.fit.at.point[begin..end].to_vec(),
             sd: widened_size(effect, &found.last.fit.at.point[begin..end], &sd[begin..end]),
-            probability: own,
+            probability: traits.of_type(own, &class, types),
+            posterior_probability: own,
+            traits: Some(traits),
             share: support.share,
             supported,
             contradicted: !support.transfers(-CONTRADICTED),
@@ -284,7 +309,7 @@ fn with_untried(
             effect.class.push((*kind).to_owned());
             effect.certain = false;
             reasons.push(format!(
-                "`{}` looks like `{kind}`, which was not tried: the positions of the sensors in `[gap.positions]` would tell",
+                "`{}` looks like `{kind}`, which was not tried: the `positions` of the sensors on their axis in `[response]` would tell",
                 effect.kind
             ));
         }

@@ -41,7 +41,7 @@ impl<'a> Expansion<'a> {
     /// their best values under another remainder: far from linear, that would promise what no point keeps.
     pub fn log_evidence(&self, setting: Option<Setting>) -> Option<f64> {
         let d = self.gram.rows();
-        let z = &self.fit.residual;
+        let (z, noise) = (&self.fit.residual, self.fit.noise_scale);
         let (mut square, mut hessian, mut log_determinant) = (dot(z, z), self.gram.clone(), 0.0);
         if let Some(setting) = setting {
             let (residual, slopes) = &self.along[setting.length];
@@ -56,6 +56,8 @@ impl<'a> Expansion<'a> {
                 }
             }
         }
+        let precision = noise.precision(square);
+        hessian.as_mut_slice().iter_mut().for_each(|x| *x *= precision);
         for (j, p) in self.prior.iter().enumerate() {
             hessian[(j, j)] += p;
         }
@@ -65,6 +67,7 @@ impl<'a> Expansion<'a> {
         let factor = Cholesky::new(&scaled).ok()?;
         let widths = scale.iter().map(|s| s.ln()).sum::<f64>() - 0.5 * factor.log_determinant();
         let half = 0.5 * d as f64 * TAU.ln();
-        Some(self.fit.log_prior - 0.5 * (square + log_determinant) + half + widths)
+        let log_density = noise.log_density(square) - 0.5 * log_determinant;
+        Some(self.fit.log_prior + log_density + half + widths)
     }
 }

@@ -316,6 +316,11 @@ impl WhiteRemainder {
         Some(Evidences { exact, with: with.collect::<Option<_>>()? })
     }
 
+    /// The log evidence of a fit, summed over the grid, by Laplace's method at its point; `None` if the fit is singular.
+    pub fn glance(&self, fit: &Fit) -> Option<f64> {
+        self.evidences(fit).map(|all| all.sum())
+    }
+
     /// The energy of the gap that a fit leaves: what the remainder of a setting takes out of its whitened residual, less
     /// what it would take out of noise.
     pub fn energy(&self, fit: &Fit, setting: Option<Setting>) -> f64 {

@@ -25,10 +25,15 @@ pub struct Effect {
     /// posterior density with the normal approximation.
     #[schemars(extend("propertyNames" = { "title": "unknown" }))]
     pub parameters: ByName<Unknown>,
-    /// Posterior probability of the type among the candidates.
+    /// Probability that the type is right, as counted in simulated cases of which half hide physics that no candidate has:
+    /// of the study itself if `lacuna power` was run on it, otherwise of other systems. Never above 0.99.
     pub probability: f64,
+    /// Posterior probability of the type among the candidates, as if one of them were exactly true.
+    pub posterior_probability: Quantity,
     /// Share of the gap that the effect closes beside the others.
-    pub share: f64,
+    pub explained: Quantity,
+    /// True if no remainder is significant beside the effects.
+    pub exact: bool,
     /// True if the effect keeps its name although another part of the gap may have none.
     pub certain: bool,
     /// Types that the data cannot distinguish from this one, which comes first.
@@ -53,7 +58,7 @@ pub struct Unknown {
 }
 
 impl Effect {
-    pub fn of(addition: &AddedEffect, added: Option<&Augmented>) -> Self {
+    pub fn of(addition: &AddedEffect, exact: bool, added: Option<&Augmented>) -> Self {
         let unknowns = addition.unknowns.iter().map(|unknown| {
             let short = unknown.name.rsplit('.').next().unwrap_or_default();
             (short.to_owned(), Unknown::of(unknown, addition, added))
@@ -65,7 +70,9 @@ impl Effect {
             on: addition.on.clone(),
             parameters: unknowns.collect(),
             probability: addition.probability,
-            share: addition.share,
+            posterior_probability: addition.posterior_probability.into(),
+            explained: addition.share.into(),
+            exact,
             certain: addition.certain,
             class: addition.class.clone(),
         }

@@ -3,6 +3,7 @@
 mod effect;
 mod held_out;
 mod insight;
+mod proof;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -10,6 +11,7 @@ use serde::Serialize;
 use self::effect::Effect;
 use self::held_out::HeldOut;
 use self::insight::Insight;
+use self::proof::{Averaged, Member, Proof};
 use super::value::{ByName, Quantity};
 use crate::gap::candidates::Untried;
 use crate::gap::experiment::hold_out::HeldOutKind;
@@ -33,12 +35,24 @@ pub struct Gap {
     pub p_after: Tests,
     /// Effects that were found; another model in place of the study's own comes first.
     pub effects: Vec<Effect>,
+    /// Probability that what is missing is of no type that is named: what the probability of the least probable effect, with
+    /// that of its class, leaves of one. `null` without effects.
+    pub none_of_these: Option<f64>,
     /// Part of the gap that the effects leave; `null` if nothing shows.
     pub remains: Option<Remains>,
+    /// Proof of the names on data that were not used; `null` if no effect was found.
+    pub proof: Option<Proof>,
     /// Effects that were not tried, with the reason.
-    pub untried: Vec<Untried>,
+    pub not_tried: Vec<Untried>,
     /// Types that the data cannot distinguish, if the verdict is `class`.
     pub class: Vec<String>,
+    /// Members of the class, the most probable first; empty unless the verdict is `class`.
+    pub members: Vec<Member>,
+    /// Posteriors of the parameters and derived quantities, averaged over the members by their weights; only if the
+    /// studies of the members were run.
+    #[serde(skip_serializing_if = "ByName::is_empty")]
+    #[schemars(extend("propertyNames" = { "title": "parameter" }))]
+    pub averaged: ByName<Averaged>,
     /// Regions where data and model disagree, without effects.
     pub regions: Vec<Region>,
     /// Regions where data and model disagree, with the effects that were found.
@@ -156,16 +170,23 @@ impl Gap {
         let shifts = result.parameters.iter();
         let models = result.models.iter();
         let needless = result.needless.iter();
+        let exact = result.is_exact();
+        let runs = added.map(|added| &added.members[..]).unwrap_or_default();
+        let averaged = added.iter().flat_map(|added| &added.averaged);
         Self {
             verdict: result.verdict.word,
             reasons: result.verdict.reasons.clone(),
             noise_assumed: result.noise_assumed,
             p: Tests::of(result.p[0]),
             p_after: Tests::of(result.p[1]),
-            effects: result.additions.iter().map(|a| Effect::of(a, added)).collect(),
+            effects: result.additions.iter().map(|a| Effect::of(a, exact, added)).collect(),
+            none_of_these: result.verdict.none_of_these,
             remains: result.remains.clone(),
-            untried: result.untried.clone(),
+            proof: gap.proof().as_ref().map(Proof::of),
+            not_tried: result.untried.clone(),
             class: class(result),
+            members: result.members.iter().map(|m| Member::of(m, runs)).collect(),
+            averaged: averaged.map(|a| (a.name.clone(), Averaged::of(a))).collect(),
             regions,
             regions_after,
             held_out,

@@ -1,14 +1,21 @@
 //! The injected effects, and the response with them.
 
+mod bump;
+pub mod outside;
+mod sized;
+
 use lacuna::math::random::{Stream, below, uniform};
 use lacuna::plugin::effect::{On, Reach, Situation};
 use serde::{Deserialize, Serialize};
 
+use self::bump::add_bump;
+use self::outside::{Nearest, OutsideKind, outside};
+use self::sized::sized;
 use super::{PowerDesign, PowerSetting};
 use crate::gap::candidates::{Candidate, Placement, sensors};
-use crate::gap::experiment::Experiment;
 use crate::gap::system::System;
-use crate::gap::test::Region;
+
+pub use bump::Bump;
 
 /// The requested injection of a case.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -21,30 +28,14 @@ pub enum Injection {
     Pair([String; 2], f64),
     /// A half sine on one curve.
     Bump(f64),
-    /// A change that no candidate can reproduce.
-    Unlisted(UnlistedShape, f64),
-}
-
-/// A shape that no effect of the library has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum UnlistedShape {
-    /// Time runs faster from the middle of the record on, on all curves of one condition.
-    Stretch,
-    /// Each curve has a part of its own reversed copy.
-    Reversed,
-    /// A swelling and fading oscillation whose frequency rises, on half of the curves.
-    Chirp,
-}
-
-impl UnlistedShape {
-    const ALL: [Self; 3] = [Self::Stretch, Self::Reversed, Self::Chirp];
+    /// A change of another form than those of the candidates.
+    Outside(OutsideKind, f64),
 }
 
 /// The injection of a case.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Injected {
-    /// The injection in words: `nothing`, `bump`, or the types.
+    /// The injection in words: `nothing`, `bump`, `unlisted`, or the types.
     pub what: String,
     /// The effects: type, place and values of the unknowns.
     pub effects: Vec<(String, On, Vec<f64>)>,
@@ -54,15 +45,21 @@ pub struct Injected {
     pub ratio: f64,
     /// The bump, if there is one.
     pub bump: Option<Bump>,
+    /// The change of another form, if there is one.
+    pub outside: Option<Outside>,
 }
 
-/// A bump on one curve.
+/// A change of another form than those of the candidates.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Bump {
-    /// The index of the curve.
-    pub curve: usize,
-    /// The indices of the first and the last of its measured values.
-    pub window: (usize, usize),
+pub struct Outside {
+    /// The kind.
+    pub kind: OutsideKind,
+    /// The form in words.
+    pub form: String,
+    /// The candidates that come nearest to it.
+    pub nearest: Nearest,
+    /// The number of forms that were drawn before and rejected.
+    pub rejected: u64,
 }
 
 /// The cases of a design, in their order.
@@ -83,8 +80,9 @@ pub fn plan(design: &PowerDesign, candidates: &[Candidate]) -> Vec<Injection> {
         let second = (first + apart) % kinds.len();
         all.push(Injection::Pair([kinds[first], kinds[second]].map(str::to_owned), largest));
     }
+    let outside = OutsideKind::all();
     all.extend(
-        (0..design.unlisted).map(|i| Injection::Unlisted(UnlistedShape::ALL[i % 3], largest)),
+        (0..design.outside).map(|i| Injection::Outside(outside[i % outside.len()], largest)),
     );
     all
 }
@@ -114,12 +112,11 @@ pub fn inject(
             planted.ratio = *ratio;
             planted.bump = Some(add_bump(setting, *ratio, &mut response, stream)?);
         }
-        Injection::Unlisted(shape, ratio) => {
+        Injection::Outside(kind, ratio) => {
             planted.what = "unlisted".into();
             planted.ratio = *ratio;
-            let change = unlisted(setting.experiment, *shape, &response, stream);
-            let scale = ratio / ratio_of(setting, &change)?;
-            response.iter_mut().zip(&change).for_each(|(y, c)| *y += scale * c);
+            let made = outside(setting, *kind, *ratio, stream)?;
+            (planted.outside, response) = (Some(made.0), made.1);
         }
     }
     Some((planted, response))
@@ -209,35 +206,11 @@ fn with_effect<'a>(
         let change: Vec<f64> = response.iter().zip(&truth.response).map(|(a, b)| a - b).collect();
         let reached = ratio_of(setting, &change).unwrap_or(0.0);
         let next = Truth { system: system.clone(), point, response };
-        (low..=high).contains(&size).then_some((reached, values, next))
+        (low..=high).contains(&size).then_some((reached, (values, next)))
     };
-    // The change grows with the size: the size is doubled until the change is large enough, then the interval is
-    // bisected.
-    let (mut small, mut large) = (0.0, SMALLEST);
-    while at(large)?.0 < ratio {
-        (small, large) = (large, 2.0 * large);
-        if large > LARGEST {
-            return None;
-        }
-    }
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (small + large);
-        if at(middle)?.0 < ratio {
-            small = middle;
-        } else {
-            large = middle;
-        }
-    }
-    let (_, values, next) = at(large)?;
+    let (values, next) = sized(ratio, at)?;
     next.response.iter().all(|y| y.is_finite()).then_some((on, values, next))
 }
-
-/// The smallest size that is tried, relative to a start of the effect.
-const SMALLEST: f64 = 1e-3;
-/// The largest size that is tried, relative to a start of the effect.
-const LARGEST: f64 = 1e6;
-/// The number of bisections of the interval that holds the size.
-const HALVINGS: usize = 30;
 
 /// The root mean square of a change over the noise, on the curves that it touches.
 fn ratio_of(setting: &PowerSetting<'_>, change: &[f64]) -> Option<f64> {
@@ -255,89 +228,4 @@ fn ratio_of(setting: &PowerSetting<'_>, change: &[f64]) -> Option<f64> {
     }
     let ratio = f64::sqrt(sum / f64::max(count, 1.0));
     (ratio > 0.0 && ratio.is_finite()).then_some(ratio)
-}
-
-/// A half sine over a tenth to a third of one curve; its size is the root mean square over itself.
-fn add_bump(
-    setting: &PowerSetting<'_>,
-    ratio: f64,
-    response: &mut [f64],
-    stream: &Stream,
-) -> Option<Bump> {
-    let mut rng = stream.generator();
-    let long: Vec<usize> = (0..setting.experiment.curves.len())
-        .filter(|&s| setting.experiment.curves[s].measured.len() >= 20)
-        .collect();
-    if long.is_empty() {
-        return None;
-    }
-    let curve = long[below(&mut rng, long.len())];
-    let measured = &setting.experiment.curves[curve].measured;
-    let share = 0.1 + 0.25 * uniform(&mut rng);
-    let width = ((share * measured.len() as f64) as usize).max(4);
-    let begin = below(&mut rng, measured.len() - width);
-    let noise = setting.noise.sd(setting.experiment, &setting.fit.at.response);
-    for (k, &i) in measured[begin..begin + width].iter().enumerate() {
-        let phase = std::f64::consts::PI * (k as f64 + 0.5) / width as f64;
-        response[i] += ratio * std::f64::consts::SQRT_2 * noise[i] * phase.sin();
-    }
-    Some(Bump { curve, window: (begin, begin + width - 1) })
-}
-
-impl Bump {
-    /// The intersection over union of the bump with the regions, zero to one.
-    pub fn overlap(&self, experiment: &Experiment<'_>, regions: &[Region]) -> f64 {
-        let (mut found, mut both) = (0, 0);
-        for (s, curve) in experiment.curves.iter().enumerate() {
-            for k in 0..curve.measured.len() {
-                let inside = |r: &Region| {
-                    r.curves.contains(&s) && (r.span.0..=r.span.1).contains(&curve.at[k])
-                };
-                let is_found = regions.iter().any(inside);
-                found += usize::from(is_found);
-                let is_bump = s == self.curve && (self.window.0..=self.window.1).contains(&k);
-                both += usize::from(is_found && is_bump);
-            }
-        }
-        let bump = self.window.1 - self.window.0 + 1;
-        both as f64 / (found + bump - both) as f64
-    }
-}
-
-/// The change that a shape makes, of arbitrary size.
-fn unlisted(
-    experiment: &Experiment<'_>,
-    shape: UnlistedShape,
-    response: &[f64],
-    stream: &Stream,
-) -> Vec<f64> {
-    let mut rng = stream.generator();
-    let condition = below(&mut rng, experiment.conditions.len());
-    let (middle, turns) = (0.3 + 0.4 * uniform(&mut rng), 2.0 + 4.0 * uniform(&mut rng));
-    let mut change = vec![0.0; response.len()];
-    for (s, curve) in experiment.curves.iter().enumerate() {
-        let length = curve.measured.len();
-        if length < 3 {
-            continue;
-        }
-        let value = |k: usize| response[curve.measured[k]];
-        let largest = (0..length).map(|k| value(k).abs()).fold(0.0, f64::max).max(1e-300);
-        for k in 0..length {
-            let share = k as f64 / (length - 1) as f64;
-            let moved = match shape {
-                UnlistedShape::Stretch if curve.condition == condition && share > middle => {
-                    let slope = value((k + 1).min(length - 1)) - value(k - 1);
-                    (share - middle) * slope
-                }
-                UnlistedShape::Reversed => value(length - 1 - k),
-                UnlistedShape::Chirp if s % 2 == 0 => {
-                    let envelope = (std::f64::consts::PI * share).sin().powi(2);
-                    largest * envelope * (std::f64::consts::TAU * turns * share * share).sin()
-                }
-                _ => 0.0,
-            };
-            change[curve.measured[k]] = moved;
-        }
-    }
-    change
 }

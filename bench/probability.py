@@ -1,0 +1,251 @@
+"""Fit of the probability that a name of the gap workflow is right, to counts in worlds that share no code with the engine.
+
+    python bench/probability.py [--worlds COMMAND] [--cases 60] [--seed 1] [--out FOLDER] [--check SEED] [--write]
+
+Draws CASES random cases in each of the two worlds of `bench/src/bin/worlds` (a box of liquid, a pipe), runs the search on them, and fits a
+logistic regression of *the class of an effect holds the type that is hidden* on the quantities of `Traits` in
+`core/engine/src/gap/search/verdict/probability.rs`; `--write` puts the coefficients there. Lines of finished cases in FOLDER are
+reused, also those of an interrupted run. Cases whose cause is a fault of the measuring chain, which the library has, have half of the
+weight, cases with physics inside the simulator the other half. No slope may be negative: what would be is left out.
+
+Prints the shares that were right by told probability, for the posterior probability and for the fitted one, within the cases of the fit by
+ten-fold cross-validation, and with `--check SEED` in further cases that the fit has not seen. Needs only Python.
+"""
+
+import argparse
+import math
+import os
+import random
+import re
+import subprocess
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+TARGET = os.path.join(HERE, "..", "core", "engine", "src", "gap", "search", "verdict", "probability.rs")
+WORLDS = ("box", "pipe")
+EDGES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0)
+FLOOR, CEILING = 0.01, 0.99
+NAMES = ("log_odds", "local", "transfer", "closed", "inexact")
+# The strength of a normal prior of the slopes: a standard deviation of 4 on quantities of a range of about one.
+RIDGE = 1.0 / 16.0
+
+FAULTS = {"LowPass": "low_pass", "SecondaryPulse": "secondary_pulse", "PulseHeating": "pulse_heating", "LevelJump": "level_jumps"}
+# Physics inside the simulators with a listed type near to it; the second entry tells whether the type is the physics itself, so that
+# `named` is right too.
+INSIDE = {
+    "damping everywhere": ({"damping"}, True),
+    "damping in the rear": ({"damping"}, True),
+    "moved gauge": ({"crosstalk", "misplacement"}, True),
+    "quadratic friction": ({"damping"}, False),
+    "unsteady friction": ({"damping"}, False),
+    "exponent of the friction": ({"damping"}, False),
+}
+
+
+class Effect:
+    """One effect that was found: its quantities, whether it is right, and the case."""
+
+    def __init__(self, traits, right, case, outside):
+        self.traits, self.right, self.case, self.outside, self.weight = traits, right, case, outside, 1.0
+
+    def posterior(self):
+        return logistic(self.traits[0])
+
+    def scaled(self):
+        log_odds, local, transfer, closed, inexact = self.traits
+        within = lambda x, low, high: min(max(x, low), high)
+        return [within(log_odds, -5, 10) / 10, within(local, 0, 1), within(transfer, -5, 10) / 10, within(closed, 0, 1),
+                -math.log1p(within(inexact, 0, 100)) / 5]
+
+
+def logistic(x):
+    return 1 / (1 + math.exp(-x)) if x > -700 else 0.0
+
+
+def collected(options, seed):
+    """The lines of the cases of a seed, made where they are missing."""
+    lines = []
+    for world in WORLDS:
+        path = os.path.join(options.out, f"{world}-{seed}.tsv")
+        have = []
+        if os.path.exists(path):
+            with open(path) as file:
+                have = [line for line in file.read().split("\n")[:-1] if line.count("\t") >= 8]
+        done = {int(line.split("\t")[1]) % 10000 for line in have}
+        missing = [i for i in range(options.cases) if i not in done]
+        if missing and not options.reuse:
+            command = options.worlds.split() + [world, "--random", str(options.cases), "--seed", str(seed), "--only",
+                                                ",".join(map(str, missing))]
+            with open(path, "w") as file:
+                file.writelines(line + "\n" for line in have)
+                file.flush()
+                with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+                    for line in process.stdout:
+                        if line.startswith(world + "\t"):
+                            have.append(line.rstrip("\n"))
+                            file.write(line)
+                            file.flush()
+        lines += have
+    return lines
+
+
+def read(lines):
+    """The effects of all cases, and the numbers of cases inside and outside the library."""
+    effects, counts = [], [0, 0]
+    for line in lines:
+        world, seed, _, hidden, _, word, closed, inexact, _, *found = line.split("\t")
+        causes = hidden.split(" & ")
+        outside = any(cause.startswith("inside:") for cause in causes)
+        counts[outside] += 1
+        for text in found:
+            name, _, local, scores, ahead = text.split(";")
+            types = name.split("@")[0].split("/")
+            listed = [entry.rsplit(" ", 1) for entry in ahead.split(", ") if entry]
+            inside = sum(math.exp(float(p)) for kind, p in listed if kind in types)
+            others = sum(math.exp(float(p)) for kind, p in listed if kind not in types)
+            log_odds = math.log(max(inside, 1e-300)) - math.log(max(others, 1e-300))
+            each = [entry.rsplit(":", 2)[1:] for entry in scores.split(",") if entry]
+            errors = [float(a) / float(b) for a, b in each if float(b) > 0]
+            traits = (log_odds, float(local), min(errors, default=0.0), float(closed), float(inexact))
+            right = any(is_right(cause, word, types) for cause in causes)
+            effects.append(Effect(traits, right, (world, seed), outside))
+    for effect in effects:
+        effect.weight = 0.5 * sum(counts) / max(counts[effect.outside], 1)
+    return effects, counts
+
+
+def is_right(cause, word, types):
+    if cause.startswith("inside:"):
+        near, itself = INSIDE.get(cause[len("inside:"):], (set(), False))
+        return bool(near & set(types)) and (itself or word != "Named")
+    kind = cause.split("@")[0]
+    return FAULTS.get(kind, kind.lower()) in types
+
+
+def solved(matrix, right):
+    """The solution of a small system, by elimination with pivots."""
+    n = len(right)
+    rows = [list(row) + [value] for row, value in zip(matrix, right)]
+    for k in range(n):
+        pivot = max(range(k, n), key=lambda i: abs(rows[i][k]))
+        rows[k], rows[pivot] = rows[pivot], rows[k]
+        for i in range(k + 1, n):
+            factor = rows[i][k] / rows[k][k]
+            rows[i] = [a - factor * b for a, b in zip(rows[i], rows[k])]
+    x = [0.0] * n
+    for k in reversed(range(n)):
+        x[k] = (rows[k][n] - sum(rows[k][j] * x[j] for j in range(k + 1, n))) / rows[k][k]
+    return x
+
+
+def regression(effects, used):
+    """Intercept and slopes of the used quantities, by Newton's method."""
+    x = [[1.0] + [effect.scaled()[j] for j in used] for effect in effects]
+    b = [0.0] * (len(used) + 1)
+    for _ in range(60):
+        gradient = [0.0] + [-RIDGE * value for value in b[1:]]
+        hessian = [[(RIDGE if i == j and i else 1e-9 * (i == j)) for j in range(len(b))] for i in range(len(b))]
+        for row, effect in zip(x, effects):
+            p = logistic(sum(a * c for a, c in zip(row, b)))
+            for i, a in enumerate(row):
+                gradient[i] += effect.weight * (effect.right - p) * a
+                for j, c in enumerate(row):
+                    hessian[i][j] += effect.weight * p * (1 - p) * a * c
+        step = solved(hessian, gradient)
+        b = [value + min(max(move, -2), 2) for value, move in zip(b, step)]
+        if max(map(abs, step)) < 1e-9:
+            break
+    return b
+
+
+def fitted(effects):
+    """Intercept and the slopes of all quantities, none of which is negative."""
+    used = list(range(len(NAMES)))
+    while True:
+        b = regression(effects, used)
+        negative = [k for k in range(len(used)) if b[k + 1] < 0]
+        if not negative:
+            slopes = [0.0] * len(NAMES)
+            for j, value in zip(used, b[1:]):
+                slopes[j] = value
+            return b[0], slopes
+        worst = min(negative, key=lambda k: b[k + 1])
+        used.pop(worst)
+
+
+def told(fit, effect):
+    intercept, slopes = fit
+    p = logistic(intercept + sum(a * b for a, b in zip(slopes, effect.scaled())))
+    return min(max(p, FLOOR), CEILING)
+
+
+def cross_validated(effects):
+    """The probability of each effect by a fit to nine tenths of the cases, of which its own is none."""
+    cases = sorted({effect.case for effect in effects})
+    random.Random(1).shuffle(cases)
+    fold = {case: i % 10 for i, case in enumerate(cases)}
+    fits = [fitted([e for e in effects if fold[e.case] != k]) for k in range(10)]
+    return [told(fits[fold[e.case]], e) for e in effects]
+
+
+def table(title, effects, probabilities):
+    """The shares that were right by told probability, and the weighted scores."""
+    weight = sum(e.weight for e in effects)
+    brier = sum(e.weight * (p - e.right) ** 2 for e, p in zip(effects, probabilities)) / weight
+    clipped = [min(max(p, 1e-3), 1 - 1e-3) for p in probabilities]
+    score = sum(e.weight * math.log(p if e.right else 1 - p) for e, p in zip(effects, clipped)) / weight
+    print(f"{title}: {len(effects)} names, Brier score {brier:.3f}, mean log score {score:.3f}")
+    for low, high in zip(EDGES, EDGES[1:]):
+        own = [(e, p) for e, p in zip(effects, probabilities) if low <= p < high or p == high == 1.0]
+        if own:
+            all_of = sum(e.weight for e, _ in own)
+            mean = sum(e.weight * p for e, p in own) / all_of
+            share = sum(e.weight * e.right for e, _ in own) / all_of
+            print(f"  {low:.1f} to {high:.1f}: {len(own):3} names, {sum(e.right for e, _ in own):3} right; told {mean:.2f}, "
+                  f"weighted share {share:.2f}")
+
+
+def written(fit, effects, counts, options):
+    """The constant in the source."""
+    intercept, slopes = fit
+    doc = (f"/// The fit to {len(effects)} names of {sum(counts)} cases of the worlds in `tests/generator`, {counts[1]} of them with\n"
+           f"/// physics inside the simulator, by `python bench/probability.py --cases {options.cases} --seed {options.seed} --write`.\n")
+    values = ", ".join(f"{slope:.3f}" for slope in slopes)
+    constant = f"const FITTED: Regression =\n    Regression {{ intercept: {intercept:.3f}, slopes: [{values}] }};\n"
+    with open(TARGET) as file:
+        source = file.read()
+    source, count = re.subn(r"(///[^\n]*\n)+const FITTED: Regression =\s+Regression \{[^}]*\};\n", lambda _: doc + constant, source)
+    if count != 1:
+        raise SystemExit(f"{TARGET} has no constant FITTED")
+    with open(TARGET, "w") as file:
+        file.write(source)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--worlds", default="cargo run --release -p lacuna-bench --bin worlds --")
+    parser.add_argument("--cases", type=int, default=60)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--check", type=int)
+    parser.add_argument("--out", default="target/probability")
+    parser.add_argument("--reuse", action="store_true", help="take the finished cases alone")
+    parser.add_argument("--write", action="store_true")
+    options = parser.parse_args()
+    os.makedirs(options.out, exist_ok=True)
+    effects, counts = read(collected(options, options.seed))
+    print(f"{sum(counts)} cases, {counts[1]} with physics inside the simulator, {len(effects)} names")
+    table("posterior", effects, [e.posterior() for e in effects])
+    fit = fitted(effects)
+    print("intercept %.3f, slopes %s" % (fit[0], ", ".join(f"{n} {s:.3f}" for n, s in zip(NAMES, fit[1]))))
+    table("fitted", effects, [told(fit, e) for e in effects])
+    table("fitted, cross-validated", effects, cross_validated(effects))
+    if options.write:
+        written(fit, effects, counts, options)
+    if options.check is not None:
+        further, counts = read(collected(options, options.check))
+        print(f"further cases: {sum(counts)}, {counts[1]} with physics inside the simulator")
+        table("posterior", further, [e.posterior() for e in further])
+        table("fitted before", further, [told(fit, e) for e in further])
+
+
+if __name__ == "__main__":
+    main()
