@@ -16,7 +16,7 @@ use lacuna::run::{Progress, Silent};
 use lacuna_engine::gap::candidates::{Candidate, proposed};
 use lacuna_engine::gap::experiment::Experiment;
 use lacuna_engine::gap::noise::{Noise, ResponseTangents};
-use lacuna_engine::gap::prove::{Proof, prove};
+use lacuna_engine::gap::prove::{Proof, freedoms, prove};
 use lacuna_engine::gap::result::GapResult;
 use lacuna_engine::gap::search::{SearchOptions, SearchResult, Verdict, search, verdict};
 use lacuna_engine::gap::system::emulator_error::error_covariance;
@@ -153,7 +153,7 @@ fn run<T>(
     held_out.common.clone_from(&experiment.common);
     held_out.independent.clone_from(&experiment.independent);
     let (before, after) = (&found.first().fit.at.response, &found.last.fit.at.response);
-    let proof = prove(&held_out, &found.noise, before, after);
+    let proof = prove(&held_out, &found.noise, &freedoms(&experiment), before, after);
     use_it(&found, &candidates, options, &stream, proof)
 }
 

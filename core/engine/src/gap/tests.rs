@@ -151,7 +151,7 @@ fn a_gap_that_closes_is_proven() {
     let held_out = data(8, &truth, count).into();
     let experiment = Experiment::new(&layouts, &parameters, &LINE, &held_out);
     let wrong: Vec<f64> = truth.iter().map(|y| y + NOISE).collect();
-    let proof = prove(&experiment, &white(), &wrong, &truth).unwrap();
+    let proof = prove(&experiment, &white(), &[f64::INFINITY], &wrong, &truth).unwrap();
     let bound = 4.0 * (2.0 / (count * TIMES) as f64).sqrt();
     assert!((proof.all.before.powi(2) - 1.0).abs() < 2.0 * bound, "{proof:?}");
     assert!(proof.all.after.powi(2) < bound, "{proof:?}");
@@ -168,7 +168,7 @@ fn a_gap_that_closes_is_proven() {
     let each = values.flat_map(|r| r.iter().flatten().enumerate().map(|(i, y)| ratio(y, i)));
     let gained: f64 = each.sum();
     assert!((proof.log_score - gained).abs() < 1e-9 * gained, "{proof:?} {gained}");
-    let back = prove(&experiment, &white(), &truth, &wrong).unwrap();
+    let back = prove(&experiment, &white(), &[f64::INFINITY], &truth, &wrong).unwrap();
     assert!(!back.shrank && back.all.upper < 0.0, "{back:?}");
 }
 

@@ -22,7 +22,7 @@ use crate::gap::inside::Pieces;
 use crate::gap::inside::advice::what_would_tell;
 use crate::gap::inside::companion::AdmittedCompanion;
 use crate::gap::noise::{Noise, ResponseTangents};
-use crate::gap::prove::prove;
+use crate::gap::prove::{freedoms, prove};
 use crate::gap::result::{GapResult, HeldOut};
 use crate::gap::search::{SearchOptions, SearchResult, VerdictKind, search};
 use crate::gap::system::System;
@@ -376,15 +376,15 @@ impl<'a> BaseModel<'a> {
         let point = &fit.at.point[..self.parameters.len()];
         let held_out = self.experiment(&part.data, point)?;
         let after = &fit.at.response;
-        let noise = if part.kind == HeldOutKind::Replicates {
-            noise.restricted(system.experiment, &held_out)
+        let (noise, freedoms) = if part.kind == HeldOutKind::Replicates {
+            (noise.restricted(system.experiment, &held_out), freedoms(system.experiment))
         } else {
             // Outputs without training data have the noise of the held-out replicates.
             let whole = self.experiment(all, point)?;
             let around = system.around(&fit.at);
-            Noise::of(&whole, &around, None).restricted(&whole, &held_out)
+            (Noise::of(&whole, &around, None).restricted(&whole, &held_out), freedoms(&whole))
         };
-        let proof = prove(&held_out, &noise, before, after);
+        let proof = prove(&held_out, &noise, &freedoms, before, after);
         let [without, with] = [before, after].map(|response| average(&part.data, response));
         let accuracy = without.zip(with).map(|(without, with)| [without, with]);
         let names = part.names.clone();
