@@ -25,8 +25,9 @@ WORLDS = ("box", "pipe")
 EDGES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0)
 FLOOR, CEILING = 0.01, 0.99
 NAMES = ("log_odds", "local", "transfer", "closed", "inexact")
-# The strength of a normal prior of the slopes: a standard deviation of 4 on quantities of a range of about one.
-RIDGE = 1.0 / 16.0
+# A weak normal prior, for few cases: every quantity is evidence for the name, by a slope of 2 +- 2 over its range of about one, and
+# without any evidence a name is improbable. A hundred cases outweigh it.
+PRIOR_SLOPE, PRIOR_INTERCEPT = (2.0, 2.0), (-5.0, 3.0)
 
 FAULTS = {"LowPass": "low_pass", "SecondaryPulse": "secondary_pulse", "PulseHeating": "pulse_heating", "LevelJump": "level_jumps"}
 # Physics inside the simulators with a listed type near to it; the second entry tells whether the type is the physics itself, so that
@@ -140,10 +141,11 @@ def solved(matrix, right):
 def regression(effects, used):
     """Intercept and slopes of the used quantities, by Newton's method."""
     x = [[1.0] + [effect.scaled()[j] for j in used] for effect in effects]
-    b = [0.0] * (len(used) + 1)
+    prior = [PRIOR_INTERCEPT] + [PRIOR_SLOPE] * len(used)
+    b = [mean for mean, _ in prior]
     for _ in range(60):
-        gradient = [0.0] + [-RIDGE * value for value in b[1:]]
-        hessian = [[(RIDGE if i == j and i else 1e-9 * (i == j)) for j in range(len(b))] for i in range(len(b))]
+        gradient = [(mean - value) / sd ** 2 for value, (mean, sd) in zip(b, prior)]
+        hessian = [[(i == j) / sd ** 2 for j in range(len(b))] for i, (_, sd) in enumerate(prior)]
         for row, effect in zip(x, effects):
             p = logistic(sum(a * c for a, c in zip(row, b)))
             for i, a in enumerate(row):

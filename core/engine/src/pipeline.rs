@@ -200,8 +200,10 @@ fn conclude(
         Goal::Calibrate | Goal::Show(_) => gap::kept(study, problem, run, observer)?,
     };
     let gap = gap.map(|kept| match power::kept(study, problem, run) {
-        Some(counted) => Kept { value: kept.value.corrected(counted.reliability), ..kept },
-        None => kept,
+        Some(counted) if counted.reliability.cases() > 0 => {
+            Kept { value: kept.value.corrected(counted.reliability), ..kept }
+        }
+        _ => kept,
     });
     if let Goal::Show(before) = goal {
         gap::show::stage(study, problem, calibrated, before, run, observer)?;

@@ -35,8 +35,8 @@ pub struct Gap {
     pub p_after: Tests,
     /// Effects that were found; another model in place of the study's own comes first.
     pub effects: Vec<Effect>,
-    /// Probability that what is missing is of no type that is named: what the probability of the least probable effect, with
-    /// that of its class, leaves of one. `null` without effects.
+    /// Probability that what is missing is of no type that is named: one minus the probability of the class of the least
+    /// certain effect; `null` without effects.
     pub none_of_these: Option<f64>,
     /// Part of the gap that the effects leave; `null` if nothing shows.
     pub remains: Option<Remains>,
