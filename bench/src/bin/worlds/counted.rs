@@ -32,19 +32,23 @@ const REPLICATES: [usize; 4] = [6, 8, 12, 20];
 /// The range of sizes in units of the noise.
 const SIZES: [f64; 2] = [0.25, 2.5];
 
-/// Draws cases and prints them.
+/// Draws cases and prints them; with `nothing` nothing is hidden in them.
 pub fn count<W: World>(
     emulated: &Emulated<W>,
     name: &str,
     seed: u64,
     count: usize,
+    nothing: bool,
     only: Option<&[usize]>,
 ) -> Result<(), Box<dyn Error>> {
     let is_drawn = |i: &u64| only.is_none_or(|only| only.contains(&(*i as usize)));
     for i in (0..count as u64).filter(is_drawn) {
         let seed = 1_000_000 + 10_000 * seed + i;
         let mut random = Source::new(seed);
-        let secrets = drawn(&emulated.world, &mut random);
+        let mut secrets = drawn(&emulated.world, &mut random);
+        if nothing {
+            secrets.clear();
+        }
         let replicates = REPLICATES[(random.uniform(0.0, 1.0) * 4.0) as usize];
         let ratio = SIZES[0] * (SIZES[1] / SIZES[0]).powf(random.uniform(0.0, 1.0));
         let answer = emulated.ask(seed, &secrets, ratio, replicates)?;

@@ -40,7 +40,9 @@ pub struct Answer {
     /// The energy of the gap before the search and after it.
     pub excess: [f64; 2],
     pub inexact: [f64; 2],
+    /// The time of the answer, s, and that of all processors together, s.
     pub seconds: f64,
+    pub processors: f64,
     pub supports: Vec<Support>,
     /// The types of each effect with their probabilities.
     pub types: Vec<Vec<(String, f64)>>,
@@ -127,7 +129,7 @@ impl<W: World> Emulated<W> {
         replicates: usize,
     ) -> Result<Answer, Box<dyn Error>> {
         let measured = measured(&self.world, seed, secrets, ratio, replicates);
-        let begun = std::time::Instant::now();
+        let begun = (std::time::Instant::now(), of_processors());
         let data = self.observations(&measured);
         let mut experiment =
             Experiment::new(&self.layouts, &self.parameters, &*self.emulator, &data);
@@ -153,9 +155,20 @@ impl<W: World> Emulated<W> {
             supports: found.support.clone(),
             types: found.types.clone(),
             measured,
-            seconds: begun.elapsed().as_secs_f64(),
+            seconds: begun.0.elapsed().as_secs_f64(),
+            processors: of_processors() - begun.1,
         })
     }
+}
+
+/// The time of all processors that this process used, s; NaN where the system does not tell.
+fn of_processors() -> f64 {
+    let told = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    // The name of the program, in parentheses, may contain spaces; times are in hundredths of a second.
+    let after = told.rsplit(") ").next().unwrap_or_default();
+    let times = after.split(' ').skip(11).take(2).filter_map(|n| n.parse::<f64>().ok());
+    let times: Vec<f64> = times.collect();
+    if times.len() == 2 { times.iter().sum::<f64>() / 100.0 } else { f64::NAN }
 }
 
 /// The types in decreasing order of probability, with its logarithm.
@@ -229,7 +242,7 @@ impl Answer {
             })
             .collect();
         let mut text = format!(
-            "rms {ratio} [{}] -> {:?} closed {:.2} p {:.2?} gap {:.0} to {:.0} inexact {:.1?} {:.1} s",
+            "rms {ratio} [{}] -> {:?} closed {:.2} p {:.2?} gap {:.0} to {:.0} inexact {:.1?} {:.1} s, {:.1} s of processors",
             hidden.join(", "),
             self.verdict.word,
             self.verdict.closed,
@@ -237,7 +250,8 @@ impl Answer {
             self.excess[0],
             self.excess[1],
             self.inexact,
-            self.seconds
+            self.seconds,
+            self.processors
         );
         for e in &self.verdict.effects {
             let places: Vec<String> = e.on.values().map(|labels| labels.join("+")).collect();

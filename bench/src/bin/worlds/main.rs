@@ -1,7 +1,8 @@
 //! Verdicts of the gap workflow in worlds whose physics has no form in the library: `cargo run --release -p lacuna-bench
 //! --bin worlds -- box` (or `pipe`), with `--seed N`, `--only 3,4`, and `--scale 0.5`, a factor of all sizes.
 //!
-//! With `--random N` so many cases are drawn instead, and a line of tab-separated values is printed for each.
+//! With `--random N` so many cases are drawn instead, and a line of tab-separated values is printed for each; with
+//! `--nothing` nothing is hidden in them.
 //!
 //! Simulators and data come from `tests/generator`, which shares no code with the engine. Each case is printed with what
 //! is hidden and what is said.
@@ -32,18 +33,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     let scale = after("--scale").and_then(|n| n.parse().ok()).unwrap_or(1.0);
     let only: Option<Vec<usize>> =
         after("--only").map(|text| text.split(',').filter_map(|n| n.parse().ok()).collect());
-    if let Some(count) = after("--random").and_then(|n| n.parse().ok()) {
+    if let Some(cases) = after("--random").and_then(|n| n.parse().ok()) {
+        let nothing = arguments.iter().any(|a| a == "--nothing");
+        let only = only.as_deref();
         return match arguments.first().map(String::as_str) {
             Some("pipe") => {
-                counted::count(&Emulated::new(Pipe, 250, 8)?, "pipe", seed, count, only.as_deref())
+                counted::count(&Emulated::new(Pipe, 250, 8)?, "pipe", seed, cases, nothing, only)
             }
-            _ => counted::count(
-                &Emulated::new(MercuryBox, 400, 16)?,
-                "box",
-                seed,
-                count,
-                only.as_deref(),
-            ),
+            _ => {
+                let world = Emulated::new(MercuryBox, 400, 16)?;
+                counted::count(&world, "box", seed, cases, nothing, only)
+            }
         };
     }
     match arguments.first().map(String::as_str) {

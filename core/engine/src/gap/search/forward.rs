@@ -219,7 +219,8 @@ impl<'a> Search<'a> {
         };
         let statistics = setting.statistics();
         let stream = self.stream.named("null").at(round);
-        let nulls = setting.nulls(&statistics, self.options.simulations, &stream);
+        let least = self.options.naming.min(0.5 * self.options.unlisted);
+        let nulls = setting.nulls(&statistics, self.options.simulations, least, &stream);
         let p = [
             nulls.of_score(&statistics, &design),
             nulls.of_scan(&statistics),

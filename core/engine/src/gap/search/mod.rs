@@ -30,7 +30,7 @@ pub use discriminate::{DiscriminatingData, Discrimination, FurtherData, discrimi
 pub use evidence::{LogEvidence, log_evidence};
 pub use forward::search;
 pub use refit::{
-    RefitSetting, Scored, Weighed, log_prior, most_promising, placement_prior, refit, refit_all,
+    RefitSetting, Scored, Weighed, log_prior, most_promising, placement_prior, refit_all,
 };
 pub use state::kinds;
 pub use support::Support;

@@ -13,7 +13,7 @@ use super::evidence::log_evidence;
 use crate::gap::candidates::{Candidate, Placement};
 use crate::gap::system::System;
 use crate::gap::system::fit::{Fit, fit_from};
-use crate::gap::system::remainder::{Setting, WhiteRemainder};
+use crate::gap::system::remainder::{Evidences, Setting, WhiteRemainder};
 use crate::gap::system::whitener::Whitener;
 use crate::gap::test::{DesignMatrix, Projection, Scores};
 
@@ -31,6 +31,13 @@ const SCORED: usize = 8;
 
 /// The number of starts of a refit: those nearest to the data.
 const STARTS: usize = 3;
+
+/// The log weight below the best that no fit under a remainder makes up for.
+const FAR: f64 = 30.0;
+
+/// The log weight below the best from which a placement has no part in a probability that is printed, whatever the error
+/// of Laplace's method.
+const NEAR: f64 = 12.0;
 
 /// A placement with its best fit.
 #[derive(Clone)]
@@ -145,49 +152,50 @@ pub fn most_promising(
     scored
 }
 
-/// Refits placements and computes their evidences; the one of largest weight comes first.
+/// Refits placements and computes their evidences; the one of largest weight comes first. Every evidence is computed by
+/// Laplace's method at the best fit; that of placements [not far](FAR) below the best also at the fits under a
+/// remainder, and of those [near](NEAR) it with the correction by importance sampling.
 pub fn refit_all(
     setting: &RefitSetting<'_, '_>,
     base: &Fit,
     scored: &[Scored],
     stream: &Stream,
 ) -> Vec<Weighed> {
-    let mut weighed: Vec<Weighed> = scored
-        .par_iter()
-        .enumerate()
-        .filter_map(|(i, scored)| refit(setting, base, scored, &stream.at(i as u64)))
-        .collect();
+    let mut fitted: Vec<Refitted<'_>> =
+        scored.par_iter().filter_map(|scored| setting.refitted(base, scored)).collect();
+    let best = |fitted: &[Refitted<'_>]| {
+        fitted.iter().map(|one| one.log_weight).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let least = best(&fitted) - FAR;
+    fitted.par_iter_mut().filter(|one| one.log_weight >= least).for_each(|one| {
+        if let Some(grid) =
+            setting.white.weigh(&one.system, setting.whitener, setting.means, &one.fit)
+        {
+            one.log_weight += grid.sum() - one.grid.sum();
+            one.grid = grid;
+        }
+    });
+    let least = best(&fitted) - NEAR;
+    fitted.par_iter_mut().enumerate().filter(|(_, one)| one.log_weight >= least).for_each(
+        |(i, one)| {
+            let stream = stream.at(i as u64);
+            let (whitener, means) = (setting.whitener, setting.means);
+            let exact = log_evidence(&one.system, whitener, means, &one.fit, &stream);
+            one.log_weight += exact.value - one.fit.log_evidence();
+        },
+    );
+    let mut weighed: Vec<Weighed> = fitted.into_iter().map(|one| setting.weighed(one)).collect();
     weighed.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
     weighed
 }
 
-/// Refits one placement from its starts, with the calibrated unknowns from the fit `base`; `None` if the forward map
-/// has no response.
-pub fn refit(
-    setting: &RefitSetting<'_, '_>,
-    base: &Fit,
-    scored: &Scored,
-    stream: &Stream,
-) -> Option<Weighed> {
-    let system = setting.with(&scored.placement);
-    let bounds = system.bounds();
-    let begin = base.at.point.len();
-    let clamped = scored.starts.iter().map(|own| -> Vec<f64> {
-        own.iter().zip(&bounds[begin..]).map(|(x, (lo, hi))| x.clamp(*lo, *hi)).collect()
-    });
-    let starts = setting.nearest(base, &scored.placement, clamped.collect());
-    let starts: Vec<Vec<f64>> =
-        starts.iter().map(|own| base.at.point.iter().chain(own).copied().collect()).collect();
-    let fit = fit_from(&system, setting.whitener, setting.means, &starts)?;
-    let evidence = setting.weigh(&system, &fit, stream);
-    Some(Weighed {
-        placement: scored.placement.clone(),
-        score: scored.score,
-        absorbed: scored.absorbed,
-        log_weight: evidence.value + setting.log_prior(&scored.placement),
-        gap: evidence.gap,
-        fit,
-    })
+/// A placement with its best fit and its evidence by Laplace's method.
+struct Refitted<'a> {
+    scored: Scored,
+    system: System<'a>,
+    fit: Fit,
+    grid: Evidences,
+    log_weight: f64,
 }
 
 impl<'a> RefitSetting<'a, '_> {
@@ -204,6 +212,35 @@ impl<'a> RefitSetting<'a, '_> {
             inexact: grid.inexact(),
             gap: self.white.energy(fit, setting),
             setting,
+        }
+    }
+
+    /// Refits one placement from its starts, with the calibrated unknowns from the fit `base`; `None` if the forward map
+    /// has no response, or if the fit is singular.
+    fn refitted(&self, base: &Fit, scored: &Scored) -> Option<Refitted<'a>> {
+        let system = self.with(&scored.placement);
+        let bounds = system.bounds();
+        let begin = base.at.point.len();
+        let clamped = scored.starts.iter().map(|own| -> Vec<f64> {
+            own.iter().zip(&bounds[begin..]).map(|(x, (lo, hi))| x.clamp(*lo, *hi)).collect()
+        });
+        let starts = self.nearest(base, &scored.placement, clamped.collect());
+        let starts: Vec<Vec<f64>> =
+            starts.iter().map(|own| base.at.point.iter().chain(own).copied().collect()).collect();
+        let fit = fit_from(&system, self.whitener, self.means, &starts)?;
+        let grid = self.white.evidences(&fit)?;
+        let log_weight = grid.sum() + self.log_prior(&scored.placement);
+        Some(Refitted { scored: scored.clone(), system, fit, grid, log_weight })
+    }
+
+    fn weighed(&self, one: Refitted<'_>) -> Weighed {
+        Weighed {
+            gap: self.white.energy(&one.fit, one.grid.best()),
+            placement: one.scored.placement,
+            score: one.scored.score,
+            absorbed: one.scored.absorbed,
+            log_weight: one.log_weight,
+            fit: one.fit,
         }
     }
 

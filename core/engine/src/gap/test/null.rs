@@ -72,11 +72,16 @@ pub fn probability(null: &[f64], value: f64) -> f64 {
     (above + 1) as f64 / (null.len() + 1) as f64
 }
 
-/// Returns true if a p-value is the smallest that this number of simulations can give, `1 / (simulations + 1)`: an
-/// upper bound of the true one.
+/// Returns true if a p-value is the smallest that the simulations can give, `1 / (n + 1)`: an upper bound of the true
+/// one. `n` is the largest number of simulations, or a multiple of fifty below it where they ended early.
 pub fn is_at_floor(p: f64, simulations: usize) -> bool {
+    if simulations == 0 {
+        return false;
+    }
     // No p-value lies between the floor and twice the floor.
-    simulations > 0 && p * (simulations as f64 + 1.0) < 1.5
+    let rounds = (1.0 / p - 1.0) / ROUND as f64;
+    let ended = rounds > 0.5 && (rounds - rounds.round()).abs() < 1e-6;
+    ended || p * (simulations as f64 + 1.0) < 1.5
 }
 
 impl NullDistribution {
@@ -100,12 +105,17 @@ impl NullDistribution {
         self.cells.iter().map(best).collect()
     }
 
-    /// Returns true if none of the statistics of the data can become significant any more.
-    fn settled(&self, data: &TestStatistics, design: &DesignMatrix) -> bool {
-        let reached = |null: &[f64], value: f64| null.iter().filter(|x| **x >= value).count();
-        reached(&self.energy, data.energy) >= ENOUGH
-            && reached(&self.score, data.scores.largest(design)) >= ENOUGH
-            && reached(&self.best_cells(), data.best_cell()) >= ENOUGH
+    /// Returns true if none of the decisions at a level can change: each statistic of the data is either reached too often
+    /// to become significant, or by no simulation of so many that it is.
+    fn settled(&self, data: &TestStatistics, design: &DesignMatrix, level: f64) -> bool {
+        let is_settled = |null: &[f64], value: f64| {
+            let reached = null.iter().filter(|x| **x >= value).count();
+            reached >= ENOUGH || reached == 0 && 1.0 / (null.len() + 1) as f64 <= level
+        };
+        !self.energy.is_empty()
+            && is_settled(&self.energy, data.energy)
+            && is_settled(&self.score, data.scores.largest(design))
+            && is_settled(&self.best_cells(), data.best_cell())
     }
 }
 
@@ -149,12 +159,20 @@ impl TestSetting<'_> {
         TestStatistics { scores, cells, energy, residual: left }
     }
 
-    /// The null distribution from at most `count` simulations, and from fewer if all three statistics of the data have
-    /// been exceeded often enough (sequential Monte Carlo p-values: Besag and Clifford, Biometrika 78 (1991) 301).
-    pub fn nulls(&self, data: &TestStatistics, count: usize, stream: &Stream) -> NullDistribution {
+    /// The null distribution from at most `count` simulations, and from fewer if the decisions about all three statistics
+    /// of the data are made: each has been exceeded often enough (sequential Monte Carlo p-values: Besag and Clifford,
+    /// Biometrika 78 (1991) 301), or never in so many that its p-value is below `level`. If nothing is missing, the
+    /// probability that none of `n` simulations exceeds a statistic is `1 / (n + 1)`: the p-value stays valid.
+    pub fn nulls(
+        &self,
+        data: &TestStatistics,
+        count: usize,
+        level: f64,
+        stream: &Stream,
+    ) -> NullDistribution {
         let mut nulls = NullDistribution::default();
         let around = self.system.around(&self.fit.at);
-        while nulls.energy.len() < count && !nulls.settled(data, self.design) {
+        while nulls.energy.len() < count && !nulls.settled(data, self.design, level) {
             let begin = nulls.energy.len();
             let end = count.min(begin + ROUND);
             let chunks: Vec<usize> = (begin..end).step_by(CHUNK).collect();
@@ -219,8 +237,13 @@ impl TestSetting<'_> {
         let projection = Projection::off(&slopes, &precisions);
         let left = projection.rest(&whitener.whiten(misfit));
         // The noise of a record is estimated from its misfit and may differ much from that of the data.
-        let count = if simulated.has_records() { usize::MAX } else { STRONGEST };
-        let strongest = self.design.strongest(near, count, simulated, &whitener, &projection);
+        let strongest = if simulated.has_records() {
+            self.design
+                .strongest(near, usize::MAX, &whitener, &projection)
+                .with_common(simulated, &whitener)
+        } else {
+            self.design.strongest(near, STRONGEST, &whitener, &projection)
+        };
         let (rows, spread) = differences(simulated);
         let scores = strongest.scores_of(&left, &whitener.whiten_rows(&rows), &spread);
         Drawn {

@@ -123,12 +123,12 @@ impl DesignMatrix {
         self.changes.row(regressor)
     }
 
-    /// The `count` regressors of largest score at most, whitened with another noise.
+    /// The `count` regressors of largest score at most, whitened with another noise. The share of the emulator's error in
+    /// their variance is that under the noise of this matrix.
     pub fn strongest(
         &self,
         scores: &Scores,
         count: usize,
-        experiment: &Experiment<'_>,
         whitener: &Whitener,
         projection: &Projection,
     ) -> Self {
@@ -142,9 +142,15 @@ impl DesignMatrix {
             let length = square.max(f64::MIN_POSITIVE).sqrt();
             left.row_mut(j).iter_mut().for_each(|x| *x /= length);
         }
-        let common = common(experiment, whitener, &left);
+        let common = chosen.iter().map(|&j| self.common[j]).collect();
         let all = chosen.iter().map(|&j| self.regressors[j].clone()).collect();
         Self { regressors: all, rows: left, common, changes }
+    }
+
+    /// The matrix with the share of the emulator's error under the noise of a whitener.
+    pub fn with_common(mut self, experiment: &Experiment<'_>, whitener: &Whitener) -> Self {
+        self.common = common(experiment, whitener, &self.rows);
+        self
     }
 
     /// The different regressors of one placement.

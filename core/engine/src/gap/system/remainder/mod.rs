@@ -309,7 +309,7 @@ fn waves(at: &[f64], share: f64) -> Vec<(f64, Vec<f64>)> {
 impl WhiteRemainder {
     /// The evidences of a system on the grid at the point of a fit, whose whitener is that of this remainder; `None` if
     /// the fit is singular.
-    fn evidences(&self, fit: &Fit) -> Option<Evidences> {
+    pub fn evidences(&self, fit: &Fit) -> Option<Evidences> {
         let expansion = Expansion::of(self, fit);
         let exact = expansion.log_evidence(None)?;
         let with = Setting::all().map(|setting| expansion.log_evidence(Some(setting)));
