@@ -77,7 +77,10 @@ fn search(study: &Study, problem: &InverseProblem<'_>) -> String {
 fn places(study: &Study, experiment: &Experiment<'_>) -> Vec<f64> {
     let stated = |curve: &MeasuredCurve| {
         let mut labels = curve.labels.iter();
-        labels.find_map(|(axis, label)| study.gap.keys.positions.get(axis)?.at.get(label).copied())
+        labels.find_map(|(axis, label)| {
+            let along = study.positions.iter().find(|positions| positions.axis == *axis)?;
+            along.at.get(label).copied()
+        })
     };
     let known: Option<Vec<f64>> = experiment.curves.iter().map(stated).collect();
     let all = known.unwrap_or_else(|| {

@@ -127,6 +127,7 @@ fn form(
         unknowns: unknowns.into_iter().enumerate().map(estimate).collect(),
         class: Vec::new(),
         probability: 0.0,
+        posterior_probability: 0.0,
         share: 0.0,
         certain: false,
         rivals: Vec::new(),
