@@ -14,6 +14,8 @@ use lacuna::data::{Coordinates, Layout, Layouts, Observations, Parameter};
 use lacuna::plugin::Forward;
 use lacuna::plugin::discrepancy::CommonError;
 
+use lacuna_linalg::Matrix;
+
 use super::experiment::wider::ExtendedMap;
 use stated::Statement;
 
@@ -35,6 +37,9 @@ pub struct Experiment<'a> {
     /// [`emulator_error`](super::system::emulator_error)): the variance of innovations with the autocorrelation of the
     /// noise, one per output; empty for none.
     pub independent: Vec<f64>,
+    /// Forms that a remainder may have besides smooth ones, `forms x outputs`, in the response's unit: the errors of a
+    /// companion; no row for none.
+    pub forms: Matrix,
     /// The noise of one replicate as the study states it, for curves without replicates.
     pub stated: Option<Statement>,
     /// The bounds within which the forward map is valid, if they are narrower than the priors.
@@ -145,6 +150,7 @@ impl<'a> Experiment<'a> {
             wide: None,
             common: Vec::new(),
             independent: Vec::new(),
+            forms: Matrix::default(),
             stated: None,
             region: None,
             conditions,

@@ -13,6 +13,7 @@ mod swap;
 mod terms;
 mod unasked;
 
+use companion::AdmittedCompanion;
 use lacuna::run::{Observer, Stop};
 use lacuna_run::RunDirectory;
 use narrow::RestrictedMap;
@@ -24,6 +25,37 @@ use crate::study::Study;
 
 pub use pieces::{Piece, Pieces};
 pub use swap::{AlternativeModel, BayesFactor, ModelFits, alternatives, swapped};
+
+/// The candidates inside the model, with the forward map that has them as inputs; empty if the study names none.
+#[derive(Default)]
+pub struct InsideCandidates<'a> {
+    /// The candidates but for those inside the companion.
+    pub candidates: Vec<Candidate>,
+    /// The forward map that has the inputs and terms of `[gap]` as inputs.
+    pub wide: Option<ExtendedMap<'a>>,
+    /// The companion with its constants, if the study has one.
+    pub companion: Option<AdmittedCompanion>,
+}
+
+impl<'a> InsideCandidates<'a> {
+    /// The candidates and the extended forward map of these inputs and terms.
+    pub fn of(
+        pieces: Option<&'a Pieces>,
+        study: &'a Study,
+        problem: &InverseProblem<'a>,
+        run: &mut RunDirectory,
+        observer: &dyn Observer,
+    ) -> Result<Self, Stop> {
+        let companion = companion::prepared(study, problem, run, observer)?;
+        let mut candidates = runs::candidates(study, problem, run, observer)?;
+        let Some(pieces) = pieces else {
+            return Ok(Self { candidates, wide: None, companion });
+        };
+        let (own, wide) = self::candidates(pieces, study, problem, run, observer)?;
+        candidates.extend(own);
+        Ok(Self { candidates, wide: Some(wide), companion })
+    }
+}
 
 /// The candidates inside the model, and the extended forward map of which they are inputs. With a surrogate, further
 /// runs are made.

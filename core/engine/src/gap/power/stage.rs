@@ -13,10 +13,11 @@ use serde_json::json;
 
 use crate::gap::candidates::{place, sensors};
 use crate::gap::experiment::{Experiment, MeasuredCurve};
+use crate::gap::inside::InsideCandidates;
 use crate::gap::inside::Pieces;
 use crate::gap::power::{CaseOutcome, PowerDesign, PowerSetting, Rates, Screen, plan, rates, run};
 use crate::gap::stage as gap;
-use crate::gap::stage::prepared::{InsideCandidates, PreparedSearch, SearchModel, prepared};
+use crate::gap::stage::prepared::{PreparedSearch, SearchModel, prepared};
 use crate::stage::inverse_problem::InverseProblem;
 use crate::stage::stream;
 use crate::study::Study;

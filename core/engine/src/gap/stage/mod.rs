@@ -12,11 +12,11 @@ use std::path::Path;
 use lacuna::run::{Observer, Stop, files};
 use lacuna_run::{Artifact, Kept, RunDirectory, Stage};
 use models::ModelSearch;
-use prepared::InsideCandidates;
 use serde_json::{Value, json};
 
 use super::inside;
 use super::inside::Pieces;
+use crate::gap::inside::InsideCandidates;
 use crate::gap::result::GapResult;
 use crate::gap::search::VerdictKind;
 use crate::stage::inverse_problem::InverseProblem;

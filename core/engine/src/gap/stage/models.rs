@@ -3,8 +3,9 @@
 use lacuna::plugin::effect::On;
 use lacuna::run::{Observer, Stop};
 
-use super::prepared::{InsideCandidates, PreparedSearch, SearchModel, prepared};
+use super::prepared::{PreparedSearch, SearchModel, prepared};
 use crate::gap::candidates::{Candidate, sensors};
+use crate::gap::inside::InsideCandidates;
 use crate::gap::inside::{AlternativeModel, ModelFits};
 use crate::gap::result::replaced::{AlternativeSearch, MODEL_SWAP, OtherModel, settled};
 use crate::gap::result::{AddedEffect, Estimate, GapResult};

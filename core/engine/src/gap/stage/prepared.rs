@@ -6,9 +6,8 @@ use lacuna::math::random::Stream;
 use lacuna::plugin::Forward;
 use lacuna::plugin::discrepancy::{CommonError, StatedNoise};
 use lacuna::plugin::effect::Situation;
-use lacuna::run::{Observer, Stop};
+use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
-use lacuna_run::RunDirectory;
 
 use crate::gap::candidates::{Candidate, Proposed, Untried, proposed};
 use crate::gap::experiment::Experiment;
@@ -17,10 +16,8 @@ use crate::gap::experiment::stated::Statement;
 use crate::gap::experiment::transient::{Transient, transients, without};
 use crate::gap::experiment::wider::ExtendedMap;
 use crate::gap::experiment::with_effects::WithEffects;
-use crate::gap::inside;
-use crate::gap::inside::Pieces;
+use crate::gap::inside::InsideCandidates;
 use crate::gap::inside::advice::what_would_tell;
-use crate::gap::inside::companion::AdmittedCompanion;
 use crate::gap::noise::{Noise, ResponseTangents};
 use crate::gap::prove::{freedoms, prove};
 use crate::gap::result::{GapResult, HeldOut};
@@ -39,35 +36,6 @@ const STARTS: usize = 4;
 
 /// The share of `false_alarm` for the scores; the rest is for scan and energy.
 const NAMES: f64 = 0.6;
-
-/// The candidates inside the model, with the forward map that has them as inputs; empty if the study names none.
-#[derive(Default)]
-pub struct InsideCandidates<'a> {
-    candidates: Vec<Candidate>,
-    wide: Option<ExtendedMap<'a>>,
-    /// The companion with its constants, if the study has one.
-    companion: Option<AdmittedCompanion>,
-}
-
-impl<'a> InsideCandidates<'a> {
-    /// The candidates and the extended forward map of these inputs and terms.
-    pub fn of(
-        pieces: Option<&'a Pieces>,
-        study: &'a Study,
-        problem: &InverseProblem<'a>,
-        run: &mut RunDirectory,
-        observer: &dyn Observer,
-    ) -> Result<Self, Stop> {
-        let companion = inside::companion::prepared(study, problem, run, observer)?;
-        let mut candidates = inside::runs::candidates(study, problem, run, observer)?;
-        let Some(pieces) = pieces else {
-            return Ok(Self { candidates, wide: None, companion });
-        };
-        let (own, wide) = inside::candidates(pieces, study, problem, run, observer)?;
-        candidates.extend(own);
-        Ok(Self { candidates, wide: Some(wide), companion })
-    }
-}
 
 /// A model with which a search begins: the study's, or another in its place.
 #[derive(Clone, Copy)]
@@ -344,6 +312,9 @@ impl<'a> BaseModel<'a> {
         let noise = Noise::of(&experiment, &around, None);
         let all = error_covariance(&experiment, &noise, response, &self.samples(data)?);
         (experiment.common, experiment.independent) = (all.common, all.independent);
+        if let Some(companion) = &self.beginning.inside.companion {
+            experiment.forms = companion.forms();
+        }
         Ok(experiment)
     }
 

@@ -11,8 +11,9 @@ use lacuna_run::{Artifact, Kept, RunDirectory, Stage};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::prepared::{BaseModel, FittedSystem, InsideCandidates, SearchModel, apart};
+use super::prepared::{BaseModel, FittedSystem, SearchModel, apart};
 use crate::gap::experiment::with_effects::WithEffects;
+use crate::gap::inside::InsideCandidates;
 use crate::gap::noise::Noise;
 use crate::gap::result::HeldOut;
 use crate::gap::system::System;

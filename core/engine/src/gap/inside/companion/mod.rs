@@ -15,6 +15,7 @@ use std::sync::Arc;
 
 use lacuna::data::Ensemble;
 use lacuna::run::{Observer, Stop};
+use lacuna_linalg::Matrix;
 use lacuna_run::{RunDirectory, Stage};
 use serde_json::json;
 
@@ -51,6 +52,11 @@ impl AdmittedCompanion {
     /// The companion with its constants.
     pub fn identified(&self) -> &IdentifiedCompanion {
         &self.found
+    }
+
+    /// The forms of its errors, `forms x outputs`, in the response's unit; none if it is not admitted.
+    pub fn forms(&self) -> Matrix {
+        if self.pieces.is_some() { self.found.errors.clone() } else { Matrix::default() }
     }
 
     /// The candidates, learned near a point of the study's parameters; none if the companion is not admitted. Those that

@@ -10,11 +10,11 @@
 //! `K_sensors` mixes the correlation of the sensors' responses to the parameters with the identity: physics that is
 //! missing acts on the sensors as the known physics does, or on one alone. `K_time` is the squared exponential in the
 //! cosine basis of Solin and Särkkä (Statistics and Computing 30 (2020) 419), which needs no decomposition and no
-//! regular grid.
+//! regular grid. Where candidates act inside a companion, a further covariance is that of the companion's errors on the
+//! simulation runs: what such a candidate leaves may have their form.
 
+mod directions;
 mod expansion;
-
-use std::f64::consts::{PI, TAU};
 
 use lacuna::math::moments::log_sum;
 use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin};
@@ -26,25 +26,17 @@ use lacuna_linalg::{
 use super::System;
 use super::fit::{Fit, fit};
 use super::whitener::Whitener;
+use directions::{groups, of_forms, of_group};
 use expansion::Expansion;
 
-use crate::gap::experiment::{Experiment, MeasuredCurve};
+use crate::gap::experiment::Experiment;
 use crate::gap::noise::{Noise, ResponseTangents};
-
-/// The share of the correlation between sensors that the responses to the parameters give.
-const TOGETHER: f64 = 0.9;
 
 /// The lengths of the process, as shares of a curve.
 const LENGTHS: [f64; 2] = [0.03, 0.1];
 
-/// The shortest length, in steps of a curve.
-const SHORTEST: f64 = 2.0;
-
 /// The sizes, in standard deviations of the noise of the mean.
 const SIZES: [f64; 7] = [0.3, 0.55, 1.0, 1.8, 3.0, 5.5, 10.0];
-
-/// The interval of the cosine basis over that of a curve.
-const WIDER: f64 = 1.2;
 
 /// The largest number of directions of one length.
 const DIRECTIONS: usize = 500;
@@ -58,7 +50,8 @@ const MATTERS: f64 = 0.3;
 /// The smallest variance of a whitened direction at the largest size.
 const NEGLIGIBLE: f64 = 1e-4;
 
-/// The remainder of an experiment: one factor `directions x outputs` a length, in the response's unit at size one.
+/// The remainder of an experiment: one factor `directions x outputs` a length, and one of known forms if there are any, in
+/// the response's unit at size one.
 #[derive(Debug, Clone)]
 pub struct Remainder {
     factors: Vec<Matrix>,
@@ -80,10 +73,10 @@ struct Spectrum {
     variances: Vec<f64>,
 }
 
-/// A remainder on the grid: the index of its length, and its size.
+/// A remainder on the grid: the index of its factor, and its size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setting {
-    /// The index of its length.
+    /// The index of its length; after the lengths comes that of known forms.
     pub length: usize,
     /// The size, in standard deviations of the noise of the mean.
     pub size: f64,
@@ -99,10 +92,10 @@ pub struct Evidences {
 }
 
 impl Setting {
-    /// The settings of the grid.
-    pub fn all() -> impl Iterator<Item = Self> {
+    /// The settings of a grid with so many lengths.
+    pub fn all(lengths: usize) -> impl Iterator<Item = Self> {
         let sizes = |length| SIZES.into_iter().map(move |size| Self { length, size });
-        (0..LENGTHS.len()).flat_map(sizes)
+        (0..lengths).flat_map(sizes)
     }
 }
 
@@ -132,7 +125,7 @@ impl Evidences {
 
     /// The setting of largest evidence; `None` for no remainder.
     pub fn best(&self) -> Option<Setting> {
-        let each = Setting::all().zip(&self.with);
+        let each = Setting::all(self.with.len() / SIZES.len()).zip(&self.with);
         let (setting, value) = each.max_by(|a, b| a.1.total_cmp(b.1))?;
         (*value > self.exact).then_some(setting)
     }
@@ -153,17 +146,21 @@ impl Remainder {
                 (curve.measured.iter().map(square).sum::<f64>() / n).sqrt()
             })
             .collect();
-        let of_length = |share: &f64| {
-            let mut columns: Vec<(f64, Vec<f64>)> = Vec::new();
-            for group in groups(experiment) {
-                columns.extend(of_group(experiment, &group, &scale, &around.slopes, *share));
-            }
+        let ordered = |mut columns: Vec<(f64, Vec<f64>)>| {
             columns.sort_by(|a, b| b.0.total_cmp(&a.0));
             columns.truncate(DIRECTIONS);
             let (variances, columns): (Vec<f64>, Vec<Vec<f64>>) = columns.into_iter().unzip();
             (variances, Matrix::from_rows(experiment.outputs(), columns))
         };
-        let (variances, factors) = LENGTHS.iter().map(of_length).unzip();
+        let of_length = |share: &f64| {
+            let groups = groups(experiment);
+            let each = groups
+                .iter()
+                .flat_map(|group| of_group(experiment, group, &scale, &around.slopes, *share));
+            ordered(each.collect())
+        };
+        let forms = (experiment.forms.rows() > 0).then(|| ordered(of_forms(experiment, &scale)));
+        let (variances, factors) = LENGTHS.iter().map(of_length).chain(forms).unzip();
         Self { factors, variances }
     }
 
@@ -225,94 +222,14 @@ impl Remainder {
     }
 }
 
-/// The curves of each condition that have the same places.
-fn groups(experiment: &Experiment<'_>) -> Vec<Vec<usize>> {
-    let mut groups: Vec<Vec<usize>> = Vec::new();
-    for (s, curve) in experiment.curves.iter().enumerate().filter(|(_, c)| !c.measured.is_empty()) {
-        let same =
-            |other: &MeasuredCurve| other.condition == curve.condition && other.at == curve.at;
-        match groups.iter_mut().find(|group| same(&experiment.curves[group[0]])) {
-            Some(group) => group.push(s),
-            None => groups.push(vec![s]),
-        }
-    }
-    groups
-}
-
-/// The directions of the curves of a group, each with its variance without the noise's scale.
-fn of_group(
-    experiment: &Experiment<'_>,
-    group: &[usize],
-    scale: &[f64],
-    slopes: &Matrix,
-    share: f64,
-) -> Vec<(f64, Vec<f64>)> {
-    let correlation = correlation(experiment, group, slopes);
-    let Ok(eigen) = symmetric_eigen(&correlation) else { return Vec::new() };
-    let waves = waves(&experiment.curves[group[0]].at, share);
-    let mut columns = Vec::new();
-    for (a, &variance) in eigen.values.iter().enumerate().filter(|(_, v)| **v > 1e-9) {
-        for (power, wave) in &waves {
-            let mut column = vec![0.0; experiment.outputs()];
-            for (k, &s) in group.iter().enumerate() {
-                let size = scale[s] * eigen.vectors[(k, a)] * variance.sqrt() * power.sqrt();
-                let measured = experiment.curves[s].measured.iter();
-                measured.zip(wave).for_each(|(&i, w)| column[i] = size * w);
-            }
-            columns.push((variance * power, column));
-        }
-    }
-    columns
-}
-
-/// `TOGETHER` times the correlation of the curves' changes by the unknowns, and the identity.
-fn correlation(experiment: &Experiment<'_>, group: &[usize], slopes: &Matrix) -> Matrix {
-    let product = |a: usize, b: usize| -> f64 {
-        let (a, b) = (&experiment.curves[a].measured, &experiment.curves[b].measured);
-        slopes
-            .iter_rows()
-            .map(|row| a.iter().zip(b).map(|(&i, &j)| row[i] * row[j]).sum::<f64>())
-            .sum()
-    };
-    let own: Vec<f64> = group.iter().map(|&s| product(s, s)).collect();
-    Matrix::from_fn(group.len(), group.len(), |a, b| {
-        if a == b {
-            return 1.0;
-        }
-        let norm = (own[a] * own[b]).sqrt();
-        if norm > 0.0 { TOGETHER * product(group[a], group[b]) / norm } else { 0.0 }
-    })
-}
-
-/// The basis functions of a squared exponential process of variance one over these places, with the variance of each.
-fn waves(at: &[f64], share: f64) -> Vec<(f64, Vec<f64>)> {
-    let (first, last) = (at[0], at[at.len() - 1]);
-    let half = 0.5 * (last - first);
-    if at.len() < 4 || half <= 0.0 {
-        return vec![(1.0, vec![1.0; at.len()])];
-    }
-    // In units of half the curve.
-    let length = 2.0 * share.max(SHORTEST / at.len() as f64);
-    let count = (1.75 * WIDER / length).ceil() as usize + 1;
-    let wave = |k: usize| {
-        let frequency = PI * k as f64 / (2.0 * WIDER);
-        let power = TAU.sqrt() * length * (-0.5 * (frequency * length).powi(2)).exp();
-        let value = |t: &f64| {
-            let x = (t - first) / half - 1.0;
-            (frequency * (x + WIDER)).sin() / WIDER.sqrt()
-        };
-        (power, at.iter().map(value).collect())
-    };
-    (1..=count).map(wave).collect()
-}
-
 impl WhiteRemainder {
     /// The evidences of a system on the grid at the point of a fit, whose whitener is that of this remainder; `None` if
     /// the fit is singular.
     pub fn evidences(&self, fit: &Fit) -> Option<Evidences> {
         let expansion = Expansion::of(self, fit);
         let exact = expansion.log_evidence(None)?;
-        let with = Setting::all().map(|setting| expansion.log_evidence(Some(setting)));
+        let settings = Setting::all(self.spectra.len());
+        let with = settings.map(|setting| expansion.log_evidence(Some(setting)));
         Some(Evidences { exact, with: with.collect::<Option<_>>()? })
     }
 
