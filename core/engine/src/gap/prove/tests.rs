@@ -20,8 +20,8 @@ fn fiellers_interval_holds_the_true_share() {
                 .map(|_| {
                     let z: Vec<f64> = (0..values).map(|_| normal(&mut rng)).collect();
                     let square = |shift: f64| z.iter().map(|z| (z + shift).powi(2)).sum();
-                    let change = values as f64 * (gap - left) * (gap - left);
-                    let values = values as f64;
+                    let change = f64::from(values) * (gap - left) * (gap - left);
+                    let values = f64::from(values);
                     Misfits { before: square(gap), after: square(left), change, known: 0.0, values }
                 })
                 .collect();

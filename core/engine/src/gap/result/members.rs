@@ -62,7 +62,9 @@ pub(super) fn settled(mut all: Vec<Member>) -> Vec<Member> {
     if all.len() < 2 || sum <= 0.0 {
         return Vec::new();
     }
-    all.iter_mut().for_each(|member| member.weight /= sum);
+    for member in &mut all {
+        member.weight /= sum;
+    }
     all
 }
 

@@ -89,7 +89,9 @@ fn sets(own: &GapResult, others: &[AlternativeSearch], share: impl Fn(f64) -> f6
     if all.is_empty() && !own.additions.is_empty() {
         all.push(set(own.additions.clone(), 1.0));
     }
-    all.iter_mut().for_each(|member| member.weight *= share(0.0));
+    for member in &mut all {
+        member.weight *= share(0.0);
+    }
     all.extend(others.iter().map(|other| {
         let weight = share(other.log_odds);
         let class = vec![other.swap.name.clone()];
