@@ -17,7 +17,7 @@ pub enum Instrument {
     Coloured,
     /// Independent errors and a reading in whole steps of three standard deviations.
     Rounded,
-    /// Independent errors and a slow drift twice as large.
+    /// A slow drift, twice as large as the errors of the others.
     Drifting,
     /// Independent errors; the first values, so many, are far off.
     Settling(usize),
@@ -64,7 +64,7 @@ impl Instrument {
             Self::White | Self::Settling(_) => of(sd, 0.0),
             Self::Coloured => of(sd, -step / MEMORY.ln()),
             Self::Rounded => Stated { sd, resolution: 3.0 * sd, memory: 0.0 },
-            Self::Drifting => of(sd * 5.0_f64.sqrt(), -step / SLOW.ln()),
+            Self::Drifting => of(2.0 * sd, -step / SLOW.ln()),
         }
     }
 
@@ -87,7 +87,7 @@ impl Instrument {
         let mut all = Vec::with_capacity(exact.len());
         for (i, y) in exact.iter().enumerate() {
             let error = match self {
-                Self::Drifting => 2.0 * state + random.normal(),
+                Self::Drifting => 2.0 * state,
                 _ => state,
             };
             let off = match self {
