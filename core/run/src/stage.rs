@@ -83,7 +83,7 @@ impl Stage {
             Self::Evidence => (6, "evidence", OnVersion(2)),
             Self::Validate => (6, "validate", OnVersion(4)),
             Self::Assess => (6, "assess", OnVersion(6)),
-            Self::Gap => (7, "gap", OnVersion(2)),
+            Self::Gap => (7, "gap", OnVersion(3)),
             Self::Show => (7, "show", OnVersion(1)),
             Self::Power => (7, "power", OnVersion(1)),
             Self::Coverage => (7, "coverage", OnVersion(2)),

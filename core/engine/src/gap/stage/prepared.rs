@@ -136,6 +136,11 @@ pub fn prepared<T>(
     let situation = Situation { layouts: &study.layouts, response: &response, noise: &noise };
     let Proposed { mut candidates, untried } = candidates(study, &situation)?;
     candidates.extend(beginning.inside.candidates.iter().cloned());
+    let odds = &study.gap.keys.prior_odds;
+    for candidate in &mut candidates {
+        let own = if candidate.is_inside() { odds.inside } else { odds.response };
+        candidate.odds = own.get();
+    }
     let made = use_it(&PreparedSearch {
         base: &base,
         split: &split,

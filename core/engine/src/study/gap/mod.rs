@@ -10,7 +10,7 @@ use lacuna::plugin::Effect;
 use lacuna::plugin::effect::On;
 use lacuna::plugin::registry::{Section, section};
 use lacuna::text::decode::decode_beside;
-use lacuna::text::values::{Count, Fraction, Interval, Name, OpenFraction};
+use lacuna::text::values::{Count, Fraction, Interval, Name, OpenFraction, Positive};
 use lacuna::text::{Node, Problems};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -40,6 +40,9 @@ pub struct GapSection {
     /// `true` also tries the library's terms that the study does not name, if the study has no surrogate and its model
     /// is written as equations; `false` restricts terms to those of `[[gap.term]]`.
     pub terms: bool,
+    /// Prior odds of physics inside the model (`[[gap.switch]]`, terms) against effects on the response, such as
+    /// `{ inside = 1, response = 1 }`, the default. The types of each share its probability equally.
+    pub prior_odds: PriorOdds,
     /// Positions of labels along an axis, by the axis: effects that act between places, such as `misplacement`, are
     /// tried only where the positions of the sensors are known. Default: none.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
@@ -58,9 +61,27 @@ impl Default for GapSection {
             simulations: count(399),
             candidates: None,
             terms: true,
+            prior_odds: PriorOdds::default(),
             positions: BTreeMap::new(),
             hold_out: HoldOut::default(),
         }
+    }
+}
+
+/// Prior odds of the two groups of candidates.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct PriorOdds {
+    /// Odds of physics inside the model: inputs that are set free, and terms of the equations.
+    pub inside: Positive,
+    /// Odds of effects on the response: sensors, and what the library describes there.
+    pub response: Positive,
+}
+
+impl Default for PriorOdds {
+    fn default() -> Self {
+        let one = Positive::new(1.0).unwrap_or_else(|_| unreachable!("1 is positive"));
+        Self { inside: one, response: one }
     }
 }
 
