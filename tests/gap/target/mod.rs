@@ -50,6 +50,7 @@ fn switches(wide: &ExtendedMap<'_>) -> Vec<Candidate> {
             inputs: vec![input.clone()],
             description: description(&input.name),
         }),
+        odds: 1.0,
     };
     wide.inputs.iter().enumerate().map(one).collect()
 }

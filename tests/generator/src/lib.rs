@@ -11,6 +11,7 @@ pub mod mercury_box;
 pub mod noise;
 pub mod oscillator;
 pub mod pipe;
+pub mod single;
 pub mod world;
 
 pub use chain::{Chain, PARAMETERS, REFERENCE};

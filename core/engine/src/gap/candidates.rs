@@ -24,6 +24,8 @@ pub struct Candidate {
     pub options: Table,
     /// The effect.
     pub effect: Arc<dyn Effect>,
+    /// The prior odds of its group, which are those of all physics inside the model or of all effects on the response.
+    pub odds: f64,
 }
 
 /// A candidate with the labels on which it acts.
@@ -46,8 +48,30 @@ impl Candidate {
             plugin: plugin.to_owned(),
             options: options.clone(),
             effect,
+            odds: 1.0,
         })
     }
+
+    /// Returns true if it acts inside the model.
+    pub fn is_inside(&self) -> bool {
+        !self.effect.switches().is_empty() || self.effect.acts_first()
+    }
+}
+
+/// The log prior mass of a type of the group of `candidate`, times the number of types: the groups share the prior mass
+/// by their odds, and the types of a group share that of the group.
+pub fn log_group_share(candidates: &[Candidate], candidate: &Candidate) -> f64 {
+    let mut seen: Vec<&Candidate> = Vec::new();
+    for other in candidates {
+        if !seen.iter().any(|known| known.kind == other.kind) {
+            seen.push(other);
+        }
+    }
+    let own = seen.iter().filter(|other| other.is_inside() == candidate.is_inside());
+    let others = seen.iter().find(|other| other.is_inside() != candidate.is_inside());
+    let Some(others) = others else { return 0.0 };
+    let share = candidate.odds / (candidate.odds + others.odds);
+    (share * seen.len() as f64 / own.count() as f64).ln()
 }
 
 /// The effects that propose themselves for some data, and those that do not.
@@ -171,5 +195,43 @@ impl Placement {
     ) -> Placed<'a> {
         let effect = &*candidates[self.candidate].effect;
         Placed::new(name, effect, experiment.layouts, &self.on)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gap::experiment::wider::FreeInput;
+    use crate::gap::system::switched::InputEffect;
+    use lacuna::math::distribution::Distribution;
+    use lacuna::plugin::effect::Description;
+
+    fn candidate(kind: &str, places: Vec<usize>, odds: f64) -> Candidate {
+        let prior = Distribution::Normal([0.0, 1.0]);
+        let description =
+            Description { title: String::new(), formula: String::new(), source: String::new() };
+        let inputs = vec![FreeInput::new(kind, Unit::default(), 0.0, prior)];
+        Candidate {
+            kind: kind.to_owned(),
+            plugin: kind.to_owned(),
+            options: Table::new(),
+            effect: Arc::new(InputEffect { places, inputs, description }),
+            odds,
+        }
+    }
+
+    /// The shares of all types add up to one, those of the groups are in the ratio of their odds, and a group alone has
+    /// everything.
+    #[test]
+    fn groups_share_by_their_odds() {
+        let response = ["gain", "gain", "delay", "offset"].map(|kind| candidate(kind, vec![], 1.0));
+        let inside = ["drag", "spring"].map(|kind| candidate(kind, vec![0], 4.0));
+        let all = [&response[..], &inside[..]].concat();
+        let mass = |one: &Candidate| log_group_share(&all, one).exp() / 5.0;
+        let of_response = 3.0 * mass(&response[0]);
+        let of_inside = 2.0 * mass(&inside[0]);
+        assert!((of_response + of_inside - 1.0).abs() < 1e-12, "{of_response} {of_inside}");
+        assert!((of_inside / of_response - 4.0).abs() < 1e-12);
+        assert!(log_group_share(&inside, &inside[0]).abs() < 1e-12);
     }
 }

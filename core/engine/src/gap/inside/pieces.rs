@@ -115,6 +115,7 @@ impl Pieces {
                 plugin: piece.kind.clone(),
                 options: Table::new(),
                 effect,
+                odds: 1.0,
             }
         };
         self.all.iter().map(candidate).collect()

@@ -88,7 +88,7 @@ fn candidate(
         relative_error,
     });
     let (kind, plugin) = (name.to_owned(), IN_RUNS.to_owned());
-    Ok(Candidate { kind, plugin, options: Table::new(), effect })
+    Ok(Candidate { kind, plugin, options: Table::new(), odds: 1.0, effect })
 }
 
 /// The study's parameters, and the size if the table varies it.

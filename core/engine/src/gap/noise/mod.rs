@@ -9,6 +9,7 @@ mod autoregression;
 mod curve;
 mod expectation;
 mod instrument;
+mod lagged;
 pub mod part;
 mod products;
 mod provenance;

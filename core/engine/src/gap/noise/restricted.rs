@@ -5,10 +5,10 @@
 //! 320; for autocorrelated noise about smooth curves: Krivobokova and Kauermann, Journal of the American Statistical
 //! Association 102 (2007) 1328).
 
-use lacuna_linalg::vector::dot;
 use lacuna_linalg::{Cholesky, Matrix};
 
 use super::autoregression::Autoregression;
+use super::lagged::Lagged;
 
 /// The highest order of autoregression that is tried.
 pub(super) const MOST: usize = 3;
@@ -87,6 +87,12 @@ impl Restricted<'_> {
         self.values.len().saturating_sub(self.columns.len())
     }
 
+    /// The known curves and the curve itself, for autoregressions up to an order.
+    fn lagged(&self, most: usize) -> Lagged<'_> {
+        let columns = self.columns.iter().map(|column| &column[..]);
+        Lagged::new(columns.chain([self.values]).collect(), self.places, most)
+    }
+
     /// The law of largest likelihood, with the order, up to `most`, chosen by the corrected Akaike criterion; `None` if
     /// too few values are left, or if their residual is zero.
     pub fn law(&self, most: usize) -> Option<Law> {
@@ -96,16 +102,18 @@ impl Restricted<'_> {
             return None;
         }
         if let Some(memory) = &self.known.memory {
-            return Some(self.judged(memory)?.law(memory.clone(), 0.0));
+            let lagged = self.lagged(memory.order());
+            return Some(self.judged(&lagged, memory)?.law(memory.clone(), 0.0));
         }
+        let lagged = self.lagged(most);
         let mut z: Vec<f64> = Vec::new();
         let mut best: Option<(f64, Law)> = None;
         for order in 0..=most {
             if order > 0 {
                 z.push(0.0);
-                self.improve(&mut z);
+                self.improve(&lagged, &mut z);
             }
-            let judged = self.at(&z)?;
+            let judged = self.at(&lagged, &z)?;
             let (k, n) = ((order + 1) as f64, freedom as f64);
             let penalty = 2.0 * k * n / (n - k - 1.0);
             let criterion = judged.restricted + penalty;
@@ -117,43 +125,43 @@ impl Restricted<'_> {
     }
 
     /// Optimises the last coefficient, then all in turn beginning with the last.
-    fn improve(&self, z: &mut [f64]) {
+    fn improve(&self, lagged: &Lagged<'_>, z: &mut [f64]) {
         let last = z.len() - 1;
         let count = ((FARTHEST - NEAREST) / COARSE) as usize;
         let coarse = (0..=count).map(|k| NEAREST + k as f64 * COARSE);
-        let tried = coarse.map(|x| (self.deviance(z, last, x), x));
+        let tried = coarse.map(|x| (self.deviance(lagged, z, last, x), x));
         let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
         z[last] = best.map_or(0.0, |(_, x)| x);
         for j in (0..=last).rev() {
-            z[j] = self.section(z, j);
+            z[j] = self.section(lagged, z, j);
         }
     }
 
     /// The best value of a coefficient near its present one, by golden section.
-    fn section(&self, z: &mut [f64], j: usize) -> f64 {
+    fn section(&self, lagged: &Lagged<'_>, z: &[f64], j: usize) -> f64 {
         let (mut low, mut high) = ((z[j] - COARSE).max(-FARTHEST), (z[j] + COARSE).min(FARTHEST));
         let inner =
             |low: f64, high: f64| [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
         let mut at = inner(low, high);
-        let mut value = at.map(|x| self.deviance(z, j, x));
+        let mut value = at.map(|x| self.deviance(lagged, z, j, x));
         for _ in 0..STEPS {
             if value[0] < value[1] {
                 high = at[1];
                 at = [inner(low, high)[0], at[0]];
-                value = [self.deviance(z, j, at[0]), value[0]];
+                value = [self.deviance(lagged, z, j, at[0]), value[0]];
             } else {
                 low = at[0];
                 at = [at[1], inner(low, high)[1]];
-                value = [value[1], self.deviance(z, j, at[1])];
+                value = [value[1], self.deviance(lagged, z, j, at[1])];
             }
         }
         at[usize::from(value[1] < value[0])]
     }
 
-    fn deviance(&self, z: &[f64], j: usize, x: f64) -> f64 {
+    fn deviance(&self, lagged: &Lagged<'_>, z: &[f64], j: usize, x: f64) -> f64 {
         let mut moved = z.to_vec();
         moved[j] = x;
-        self.at(&moved).map_or(f64::INFINITY, |judged| judged.restricted)
+        self.at(lagged, &moved).map_or(f64::INFINITY, |judged| judged.restricted)
     }
 
     /// Minus twice the log prior density of a memory; `None` if it is too long for noise or for this record. The memory
@@ -168,36 +176,26 @@ impl Restricted<'_> {
         (steps <= longest).then_some(2.0 * (steps - 1.0) / USUAL)
     }
 
-    fn at(&self, z: &[f64]) -> Option<Judged> {
+    fn at(&self, lagged: &Lagged<'_>, z: &[f64]) -> Option<Judged> {
         let memory = memory(z);
         let prior = self.prior(&memory)?;
-        let judged = self.judged(&memory)?;
+        let judged = self.judged(lagged, &memory)?;
         let (restricted, whole) = (judged.restricted + prior, judged.whole + prior);
         Some(Judged { restricted, whole, ..judged })
     }
 
-    fn judged(&self, memory: &Autoregression) -> Option<Judged> {
+    fn judged(&self, lagged: &Lagged<'_>, memory: &Autoregression) -> Option<Judged> {
         let succession = memory.on(self.places);
-        let white = |curve: &[f64]| {
-            let mut curve = curve.to_vec();
-            succession.whiten(&mut curve);
-            curve
-        };
-        let values = white(self.values);
-        let columns: Vec<Vec<f64>> = self.columns.iter().map(|column| white(column)).collect();
-        let mut square = dot(&values, &values);
+        let products = lagged.gram(memory, &succession);
+        let size = self.columns.len();
+        let at = |k: usize, l: usize| products[k * (k + 1) / 2 + l];
+        let mut square = at(size, size);
         let of_noise = -2.0 * succession.log_determinant();
         let mut of_columns = 0.0;
-        if !columns.is_empty() {
-            let mut gram = Matrix::zeros(columns.len(), columns.len());
-            for i in 0..columns.len() {
-                for j in 0..=i {
-                    gram[(i, j)] = dot(&columns[i], &columns[j]);
-                    gram[(j, i)] = gram[(i, j)];
-                }
-            }
+        if size > 0 {
+            let gram = Matrix::from_fn(size, size, |i, j| at(i.max(j), i.min(j)));
             let factor = Cholesky::new(&gram).ok()?;
-            let onto: Vec<f64> = columns.iter().map(|column| dot(column, &values)).collect();
+            let onto: Vec<f64> = (0..size).map(|l| at(size, l)).collect();
             square -= factor.quadratic(&onto);
             of_columns = factor.log_determinant();
         }
@@ -253,8 +251,8 @@ mod tests {
             let values = noise(a, length as usize, &Stream::root(4).at(b));
             let mut z = [0.0];
             let known = &Known::default();
-            Restricted { values: &values, columns: &columns, places: &places, known }
-                .improve(&mut z);
+            let record = Restricted { values: &values, columns: &columns, places: &places, known };
+            record.improve(&record.lagged(1), &mut z);
             z[0].tanh()
         });
         let mean = found.sum::<f64>() / curves as f64;

@@ -47,7 +47,7 @@ impl Succession {
     }
 
     /// The weights of the values before one, the nearest first, and the standard deviation of the error.
-    fn predictor(&self, t: usize) -> (&[f64], f64) {
+    pub(super) fn predictor(&self, t: usize) -> (&[f64], f64) {
         match self.apart.binary_search_by_key(&t, |apart| apart.at) {
             Ok(k) => (&self.apart[k].weights, self.apart[k].error),
             Err(_) => self.memory.predictor(t.min(self.memory.order())),

@@ -21,7 +21,7 @@ use crate::gap::system::fit::Fit;
 
 /// A log score that is strong evidence: 20 to 1 (Kass and Raftery, Journal of the American Statistical Association 90
 /// (1995) 773).
-const STRONG: f64 = 3.0;
+pub(super) const STRONG: f64 = 3.0;
 
 /// A kind of part that is left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -33,7 +33,8 @@ pub enum LeftOut {
     Replicate,
     /// One sensor under all conditions.
     Sensor,
-    /// A block of the last axis under one condition, and nothing of its neighbourhood in the rest.
+    /// A block of the last axis under one condition, and nothing of its neighbourhood in the rest. Without replicates
+    /// nothing after it is in the rest: each block is foretold.
     Block,
 }
 

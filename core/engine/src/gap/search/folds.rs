@@ -8,6 +8,12 @@ use crate::gap::noise::Noise;
 /// Blocks of the last axis under each condition.
 const BLOCKS: usize = 4;
 
+/// Blocks of a single record, of which each is predicted from those before it.
+const FORWARD: usize = 6;
+
+/// The number of blocks at the beginning of a single record that are not predicted.
+const BEFORE: usize = 2;
+
 /// True when a value is meant, by condition, replicate and output.
 type Chosen = Box<dyn Fn(usize, usize, usize) -> bool + Send + Sync>;
 
@@ -60,7 +66,8 @@ fn chosen(experiment: &Experiment<'_>, outputs: impl Iterator<Item = usize>) -> 
     all
 }
 
-/// Blocks of a condition of equally many places each; none where noise goes together over whole blocks.
+/// Blocks of a condition of equally many places each; none where noise goes together over whole blocks. A block of a
+/// single record is predicted from what precedes it: both sides together show a missing curve to any smooth form.
 fn blocks(experiment: &Experiment<'_>, noise: &Noise, c: usize) -> Vec<Fold> {
     let curves = experiment.conditions[c].curves.clone();
     let mut places: Vec<f64> = experiment.curves[curves.clone()]
@@ -72,7 +79,9 @@ fn blocks(experiment: &Experiment<'_>, noise: &Noise, c: usize) -> Vec<Fold> {
     // An exponential correlation, whose sum over both sides is twice its time, falls to a fiftieth over twice that sum.
     let together = noise.curves[curves.clone()].iter().map(|law| law.memory.inflation());
     let apart = (2.0 * together.fold(1.0, f64::max)).ceil() as usize;
-    let length = places.len() / BLOCKS;
+    let is_single = experiment.conditions[c].replicates.len() < 2;
+    let count = if is_single { FORWARD } else { BLOCKS };
+    let length = places.len() / count;
     if length <= apart {
         return Vec::new();
     }
@@ -83,13 +92,15 @@ fn blocks(experiment: &Experiment<'_>, noise: &Noise, c: usize) -> Vec<Fold> {
         });
         chosen(experiment, own)
     };
-    (0..BLOCKS)
+    let first = if is_single { BEFORE } else { 0 };
+    (first..count)
         .map(|b| {
-            let begin = b * places.len() / BLOCKS;
-            let end = (b + 1) * places.len() / BLOCKS;
+            let begin = b * places.len() / count;
+            let end = (b + 1) * places.len() / count;
             let own = within(places[begin], places[end - 1]);
-            let (low, high) =
-                (begin.saturating_sub(apart), (end - 1 + apart).min(places.len() - 1));
+            let last = places.len() - 1;
+            let high = if is_single { last } else { (end - 1 + apart).min(last) };
+            let low = begin.saturating_sub(apart);
             let around = within(places[low], places[high]);
             let hidden: Vec<bool> =
                 own.iter().zip(around).map(|(own, near)| near && !own).collect();
@@ -100,4 +111,35 @@ fn blocks(experiment: &Experiment<'_>, noise: &Noise, c: usize) -> Vec<Fold> {
             }
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::gap::testing::SyntheticExperiment;
+    use lacuna::math::random::Stream;
+
+    /// The blocks of a single record are predicted from what precedes them; those of replicates from both sides.
+    #[test]
+    fn a_single_record_is_foretold() {
+        let world = SyntheticExperiment::new(&["a"], &["B"], 60, 0.0, &["level"], |_, _, _, _| 1.0);
+        for (replicates, forward) in [(1, true), (2, false)] {
+            let experiment = world.experiment(&[0.0; 60], replicates, &Stream::root(1));
+            let folds = folds(&experiment, &world.noise, LeftOut::Block);
+            assert_eq!(folds.len(), 4);
+            let mut predicted = 0;
+            for fold in folds {
+                let own: Vec<usize> = (0..60).filter(|&i| (fold.left_out)(0, 0, i)).collect();
+                let used: Vec<usize> = (0..60)
+                    .filter(|&i| !(fold.left_out)(0, 0, i) && !(fold.hidden)(0, 0, i))
+                    .collect();
+                predicted += own.len();
+                let later = used.iter().filter(|&&i| i > own[0]).count();
+                let earlier = used.len() - later;
+                assert!(if forward { later == 0 && earlier >= 15 } else { used.len() >= 35 });
+            }
+            assert_eq!(predicted, if forward { 40 } else { 60 });
+        }
+    }
 }

@@ -10,7 +10,7 @@ use lacuna_linalg::Matrix;
 use rayon::prelude::*;
 
 use super::evidence::log_evidence;
-use crate::gap::candidates::{Candidate, Placement};
+use crate::gap::candidates::{Candidate, Placement, log_group_share};
 use crate::gap::system::System;
 use crate::gap::system::fit::{Fit, fit_from};
 use crate::gap::system::remainder::{Evidences, Setting, WhiteRemainder};
@@ -293,12 +293,14 @@ impl<'a> RefitSetting<'a, '_> {
     }
 }
 
-/// The log prior mass of a placement within its type, divided among the variants of the type.
+/// The log prior mass of a placement within its type, divided among the variants of the type, plus the log of the
+/// type's share by the [odds](log_group_share) of its group.
 pub fn placement_prior(candidates: &[Candidate], placement: &Placement, sensors: usize) -> f64 {
     let candidate = &candidates[placement.candidate];
     let versions = candidates.iter().filter(|c| c.kind == candidate.kind).count();
     let chosen = (!placement.on.is_empty()).then(|| chosen(placement));
-    log_prior(candidate.effect.reach(), chosen, sensors) - (versions as f64).ln()
+    let place = log_prior(candidate.effect.reach(), chosen, sensors) - (versions as f64).ln();
+    place + log_group_share(candidates, candidate)
 }
 
 /// The number of sensors that a placement acts on, by the labels of its place.

@@ -10,7 +10,7 @@ use lacuna::plugin::discrepancy::CommonError;
 use lacuna_linalg::vector::dot;
 use serde::{Deserialize, Serialize};
 
-use super::cross_validate::{CrossValidation, Explanation, cross_validate_parts};
+use super::cross_validate::{CrossValidation, Explanation, LeftOut, STRONG, cross_validate_parts};
 use super::folds::Fold;
 use super::refit::TolerantEvidence;
 use super::state::{SearchSetting, SearchState};
@@ -37,6 +37,14 @@ impl Support {
     pub fn transfers(&self, errors: f64) -> bool {
         let better = |one: &CrossValidation| one.difference > errors * one.error.unwrap_or(0.0);
         self.against_free_form.iter().all(better)
+    }
+
+    /// True when it foretells the blocks together better than the free form, by 20 to 1, and none of them worse by as
+    /// much. Where no block can be foretold nothing speaks against it.
+    pub fn foretells(&self) -> bool {
+        let is_foretold = |one: &CrossValidation| one.difference > STRONG && one.against == 0;
+        let all = &self.against_free_form;
+        all.iter().all(|one| one.left_out != LeftOut::Block || is_foretold(one))
     }
 }
 

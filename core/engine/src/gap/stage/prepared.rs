@@ -118,6 +118,11 @@ pub fn prepared<T>(
         candidates.extend(learned.candidates);
         untried.extend(learned.untried);
     }
+    let odds = &study.gap.keys.prior_odds;
+    for candidate in &mut candidates {
+        let own = if candidate.is_inside() { odds.inside } else { odds.response };
+        candidate.odds = own.get();
+    }
     let made = use_it(&PreparedSearch {
         base: &base,
         split: &split,

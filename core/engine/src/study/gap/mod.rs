@@ -11,7 +11,7 @@ use lacuna::plugin::effect::On;
 use lacuna::plugin::registry::{Section, section};
 use lacuna::plugin::{Effect, Reader};
 use lacuna::text::decode::decode_beside;
-use lacuna::text::values::{Count, Fraction, Interval, Name, OpenFraction};
+use lacuna::text::values::{Count, Fraction, Interval, Name, OpenFraction, Positive};
 use lacuna::text::{Node, Problems};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -43,6 +43,9 @@ pub struct GapSection {
     /// `true` also tries the library's terms that the study does not name, if the study has no surrogate and its model
     /// is written as equations; `false` restricts terms to those of `[[gap.term]]`.
     pub terms: bool,
+    /// Prior odds of physics inside the model (`[[gap.switch]]`, terms, `[gap.companion]`, `[[gap.runs]]`) against effects on
+    /// the response, such as `{ inside = 1, response = 1 }`, the default. The types of each share its probability equally.
+    pub prior_odds: PriorOdds,
     /// Data held out before the search, on which it is measured whether the gap became smaller.
     pub hold_out: HoldOut,
 }
@@ -57,8 +60,26 @@ impl Default for GapSection {
             simulations: count(399),
             candidates: None,
             terms: true,
+            prior_odds: PriorOdds::default(),
             hold_out: HoldOut::default(),
         }
+    }
+}
+
+/// Prior odds of the two groups of candidates.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct PriorOdds {
+    /// Odds of physics inside the model: inputs that are set free, and terms of the equations.
+    pub inside: Positive,
+    /// Odds of effects on the response: sensors, and what the library describes there.
+    pub response: Positive,
+}
+
+impl Default for PriorOdds {
+    fn default() -> Self {
+        let one = Positive::new(1.0).unwrap_or_else(|_| unreachable!("1 is positive"));
+        Self { inside: one, response: one }
     }
 }
 

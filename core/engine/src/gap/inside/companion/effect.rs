@@ -133,7 +133,13 @@ impl Learning<'_> {
             inner,
             of_changes: self.found.of_changes,
         });
-        Candidate { kind, plugin: IN_COMPANION.to_owned(), options: Table::new(), effect }
+        Candidate {
+            kind,
+            plugin: IN_COMPANION.to_owned(),
+            options: Table::new(),
+            odds: 1.0,
+            effect,
+        }
     }
 }
 

@@ -55,6 +55,19 @@ pub(super) fn unproven(effects: &[MissingEffect]) -> Option<String> {
     Some(format!("a free form in place of {names} predicts left-out data as well"))
 }
 
+/// Effects that do not foretell the later blocks of single records better than a free form does.
+pub(super) fn unforetold(found: &SearchResult<'_>, effects: &[MissingEffect]) -> Option<String> {
+    if found.system.experiment.most_replicates() > 1 {
+        return None;
+    }
+    let fails = effects.iter().zip(&found.support).filter(|(_, support)| !support.foretells());
+    let names: Vec<String> = fails.map(|(effect, _)| format!("`{}`", effect.name)).collect();
+    (!names.is_empty()).then(|| {
+        let names = names.join(" and ");
+        format!("a free form in place of {names} foretells the later parts of the record as well")
+    })
+}
+
 /// Effects in whose place a free form predicts left-out data better.
 fn contradicted(effects: &[MissingEffect]) -> Option<String> {
     let names = names(effects, |effect| effect.contradicted)?;

@@ -208,6 +208,7 @@ fn with_effects(
     let mut reasons = grounds.doubts.clone();
     // Several effects are flexible enough to describe another form without a visible rest: each has to be supported.
     reasons.extend(grounds::unproven(effects).filter(|_| effects.len() > 1));
+    reasons.extend(grounds::unforetold(found, effects));
     let sure = effects.iter().all(|e| e.class.len() == 1) && found.stability >= STABLE;
     if !reasons.is_empty() {
         return (VerdictKind::Unlisted, reasons);

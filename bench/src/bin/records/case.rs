@@ -1,0 +1,174 @@
+//! One case: a record, its study, and what the workflow says about it.
+
+use std::error::Error;
+use std::fs;
+use std::time::Instant;
+
+use generator::single::{Record, record};
+use lacuna::run::Silent;
+use lacuna_bench::clock::timed;
+use lacuna_engine::gap::result::GapResult;
+use lacuna_engine::gap::search::VerdictKind;
+use lacuna_engine::study::resolve::load_text;
+use lacuna_run::RunDirectory;
+
+use crate::studies::{study, table};
+
+/// The names of the columns.
+pub const HEADER: &str = "case\tsystem\thidden\tform\tinstrument\tstated\tvalues\tratio\tjudged\tverdict\teffects\tprobability\tclosed\tinterval\tnoise_said\tseconds\tprocessor";
+
+/// The judgement of a verdict.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Judgement {
+    /// The right names; no form named where there is none; nothing found where nothing is hidden.
+    Right,
+    /// Part of a sum named.
+    Part,
+    /// A nearly right form named as if it were exact.
+    Near,
+    /// A false name.
+    False,
+    /// Without a name though there is one.
+    Unnamed,
+    /// Nothing said.
+    Missed,
+}
+
+/// A case with its answer.
+pub struct Answer {
+    index: usize,
+    pub record: Record,
+    pub stated: bool,
+    pub verdict: VerdictKind,
+    pub reasons: Vec<String>,
+    effects: Vec<(String, f64)>,
+    closed: Option<(f64, [f64; 2])>,
+    /// True when the verdict says what was taken for noise.
+    pub noise_said: bool,
+    /// Wall time and processor time.
+    pub seconds: [f64; 2],
+}
+
+/// Asks the workflow, which does not see what is hidden.
+pub fn ask(seed: u64, index: usize) -> Result<Answer, Box<dyn Error>> {
+    let record = record(seed, index);
+    // Whole rounds of the systems alternate, so that each missing physics has both.
+    let stated = (index + index / generator::single::kinds()).is_multiple_of(2);
+    let step = record.times[1] - record.times[0];
+    let said = record.instrument.stated(record.sd, step);
+    let folder =
+        std::env::temp_dir().join(format!("lacuna-records-{}-{seed}-{index}", std::process::id()));
+    fs::create_dir_all(&folder)?;
+    fs::write(folder.join("data.csv"), table(&record))?;
+    let text = study(&record, stated.then_some(&said));
+    let checked = load_text(&folder.join("study.toml"), &text, &[]);
+    let complaints = checked.complaints();
+    let loaded = checked.study.ok_or_else(|| format!("{complaints}\n{text}"))?;
+    let mut run = RunDirectory::open(&folder.join("run"))?;
+    let begun = Instant::now();
+    let (findings, processor) =
+        timed(|| lacuna_engine::pipeline::find_gap(&loaded, &mut run, &Silent))?;
+    let (findings, seconds) = (findings?, begun.elapsed().as_secs_f64());
+    fs::remove_dir_all(&folder)?;
+    let result = findings.gap.ok_or("the study has no gap")?.result;
+    Ok(Answer::of(index, record, stated, &result, [seconds, processor]))
+}
+
+impl Answer {
+    fn of(
+        index: usize,
+        record: Record,
+        stated: bool,
+        result: &GapResult,
+        seconds: [f64; 2],
+    ) -> Self {
+        let verdict = &result.verdict;
+        let effects = verdict.effects.iter();
+        let proof = result.held_out.first().map(|held| &held.proof.all);
+        Self {
+            index,
+            record,
+            stated,
+            verdict: verdict.word,
+            reasons: verdict.reasons.clone(),
+            effects: effects.map(|e| (e.class.join("/"), e.probability)).collect(),
+            closed: proof.map(|all| (all.closed, [all.lower, all.upper])),
+            noise_said: verdict.reasons.iter().any(|reason| reason.contains("taken for noise")),
+            seconds,
+        }
+    }
+
+    /// The judgement: a class counts by its first type, and an approximate name of a near form is right, for that is
+    /// what it says.
+    pub fn judged(&self) -> Judgement {
+        let missing = &self.record.missing;
+        let said: Vec<&str> =
+            self.effects.iter().filter_map(|(class, _)| class.split('/').next()).collect();
+        let names = matches!(
+            self.verdict,
+            VerdictKind::Named | VerdictKind::Class | VerdictKind::Approximate
+        );
+        let has_gap = !missing.laws.is_empty();
+        match (has_gap, names) {
+            (false, false) if self.verdict == VerdictKind::Unlisted => Judgement::False,
+            (false, names) => {
+                if names {
+                    Judgement::False
+                } else {
+                    Judgement::Right
+                }
+            }
+            (true, false) if self.verdict != VerdictKind::Unlisted => Judgement::Missed,
+            (true, false) if missing.exact.is_empty() => Judgement::Right,
+            (true, false) => Judgement::Unnamed,
+            (true, true) => self.judged_names(&said),
+        }
+    }
+
+    fn judged_names(&self, said: &[&str]) -> Judgement {
+        let missing = &self.record.missing;
+        let all_in = |list: &[&str]| said.iter().all(|kind| list.contains(kind));
+        if !missing.exact.is_empty() && all_in(missing.exact) {
+            let whole = missing.exact.iter().all(|kind| said.contains(kind));
+            return if whole { Judgement::Right } else { Judgement::Part };
+        }
+        match (all_in(missing.near), self.verdict) {
+            (true, VerdictKind::Named) => Judgement::Near,
+            (true, _) if missing.exact.is_empty() => Judgement::Right,
+            (true, _) => Judgement::Near,
+            (false, _) => Judgement::False,
+        }
+    }
+
+    /// The case as values that are separated by tabs.
+    pub fn line(&self) -> String {
+        let Record { system, missing, instrument, values, ratio, .. } = &self.record;
+        let form = match (missing.laws.is_empty(), missing.exact.is_empty()) {
+            (true, _) => "nothing",
+            (_, true) => "outside",
+            (_, false) => "inside",
+        };
+        let names: Vec<&str> = self.effects.iter().map(|(class, _)| class.as_str()).collect();
+        let probabilities: Vec<String> =
+            self.effects.iter().map(|(_, p)| format!("{p:.2}")).collect();
+        let closed = self.closed.map_or("-\t-".to_owned(), |(closed, [low, high])| {
+            format!("{:.0} %\t{:.0} to {:.0} %", 100.0 * closed, 100.0 * low, 100.0 * high)
+        });
+        format!(
+            "{}\t{:?}\t{}\t{form}\t{}\t{}\t{}\t{ratio:.1}\t{:?}\t{:?}\t{}\t{}\t{closed}\t{}\t{:.1}\t{:.1}",
+            self.index,
+            system.kind,
+            missing.name,
+            instrument.name(),
+            if self.stated { "stated" } else { "assumed" },
+            values.len(),
+            self.judged(),
+            self.verdict,
+            names.join(" + "),
+            probabilities.join(" "),
+            self.noise_said,
+            self.seconds[0],
+            self.seconds[1]
+        )
+    }
+}
