@@ -15,7 +15,7 @@ use lacuna::run::{Progress, Silent};
 use lacuna_engine::gap::candidates::proposed;
 use lacuna_engine::gap::experiment::Experiment;
 use lacuna_engine::gap::noise::{Noise, ResponseTangents};
-use lacuna_engine::gap::search::{SearchOptions, Support, Verdict, search, verdict};
+use lacuna_engine::gap::search::{ModelAverage, SearchOptions, Support, Verdict, search, verdict};
 use lacuna_engine::gap::system::emulator_error::error_covariance;
 use lacuna_linalg::Matrix;
 use rayon::prelude::*;
@@ -46,6 +46,8 @@ pub struct Answer {
     pub supports: Vec<Support>,
     /// The types of each effect with their probabilities.
     pub types: Vec<Vec<(String, f64)>>,
+    /// The probabilities of all types over the models that were compared.
+    pub average: ModelAverage,
 }
 
 impl<W: World> Emulated<W> {
@@ -154,6 +156,7 @@ impl<W: World> Emulated<W> {
             verdict: verdict(&found, &candidates, options),
             supports: found.support.clone(),
             types: found.types.clone(),
+            average: found.average.clone(),
             measured,
             seconds: begun.0.elapsed().as_secs_f64(),
             processors: of_processors() - begun.1,
@@ -282,6 +285,14 @@ impl Answer {
                 ahead(types)
             );
         }
+        let ModelAverage { models: [compared, inside], nothing, inclusion } = &self.average;
+        let included = inclusion.iter().take(4).map(|i| format!("{} {:.3}", i.kind, i.probability));
+        let included: Vec<String> = included.collect();
+        let _ = write!(
+            text,
+            "\n    * {inside} of {compared} models: nothing {nothing:.3}, {}",
+            included.join(", ")
+        );
         for reason in &self.verdict.reasons {
             let _ = write!(text, "\n    - {reason}");
         }

@@ -125,6 +125,10 @@ impl<'a> Search<'a> {
         let absent = |p: &Placement| self.candidates[p.candidate].effect.absent(layout)[0];
         let mut best: Vec<Option<(f64, usize)>> = vec![None; self.placements.len()];
         for (j, regressor) in design.regressors.iter().enumerate() {
+            // A second effect of the same type in the same place would not be identifiable.
+            if state.chosen.iter().any(|chosen| chosen.is(&self.placements[regressor.placement])) {
+                continue;
+            }
             let strength = regressor.strength(dot(design.rows.row(j), residual));
             let own = &mut best[regressor.placement];
             if own.is_none_or(|(most, _)| strength > most) {

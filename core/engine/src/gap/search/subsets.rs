@@ -215,3 +215,44 @@ fn climbed(count: usize, merit: impl Fn(u128) -> Set) -> Vec<Set> {
     }
     best
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sensors(count: usize) -> Vec<On> {
+        (0..count).map(|k| On::from([("sensor".to_owned(), vec![format!("s{k}")])])).collect()
+    }
+
+    #[test]
+    fn a_set_is_a_place_and_back() {
+        let sensors = sensors(5);
+        for set in 1_u128..32 {
+            let on = place_of(&sensors, set);
+            assert_eq!(on.is_empty(), set == 31);
+            assert_eq!(members(&sensors, &on), Some(set));
+        }
+        assert_eq!(members(&sensors, &On::from([("other".to_owned(), vec!["s1".into()])])), None);
+    }
+
+    /// Sums over members are the definition; the order of Gray's code must not change them.
+    #[test]
+    fn all_sets_have_the_sums_of_their_members() {
+        let count = 5;
+        let gram = Matrix::from_fn(count, count, |i, j| {
+            if i == j { 2.0 + i as f64 } else { 0.1 * (i + j) as f64 }
+        });
+        let products = [1.0, -2.0, 0.5, 3.0, 0.1];
+        let seen = std::cell::RefCell::new(vec![false; 1 << count]);
+        every(&gram, &products, |members, product, square| {
+            let own: Vec<usize> = (0..count).filter(|k| members >> k & 1 == 1).collect();
+            let sum: f64 = own.iter().map(|&k| products[k]).sum();
+            let all: f64 =
+                own.iter().flat_map(|&i| own.iter().map(move |&j| (i, j))).map(|ij| gram[ij]).sum();
+            assert!((product - sum).abs() < 1e-12 && (square - all).abs() < 1e-12);
+            seen.borrow_mut()[members as usize] = true;
+            Set { members, merit: sum, square, size: 0.0 }
+        });
+        assert_eq!(seen.borrow().iter().filter(|seen| **seen).count(), (1 << count) - 1);
+    }
+}

@@ -56,6 +56,8 @@ pub struct NullDistribution {
     pub cells: Vec<Vec<f64>>,
     /// The energy.
     pub energy: Vec<f64>,
+    /// The number of simulations after which they end if none of them reaches the data; zero if they do not.
+    pub early: usize,
 }
 
 /// The statistics of one simulation.
@@ -70,6 +72,29 @@ struct Drawn {
 pub fn probability(null: &[f64], value: f64) -> f64 {
     let above = null.iter().filter(|x| **x >= value).count();
     (above + 1) as f64 / (null.len() + 1) as f64
+}
+
+/// The p-value of a statistic whose simulations end after `early` of them if none reaches it. These outcomes are the
+/// most extreme, whether or not the simulations did end; the others are ordered by the number of simulations that reach
+/// the statistic. If nothing is missing all ranks of the data are equally probable, which gives each outcome its
+/// probability; the p-value is that of all outcomes as extreme.
+fn probability_with_look(null: &[f64], value: f64, early: usize) -> f64 {
+    let n = null.len();
+    if early == 0 || n < early {
+        return probability(null, value);
+    }
+    let mut p = 1.0 / (early + 1) as f64;
+    if null[..early].iter().all(|x| *x < value) {
+        return p;
+    }
+    let reached = null.iter().filter(|x| **x >= value).count();
+    // The probability that none of so many exceedances is among the first simulations.
+    let mut later = 1.0;
+    for j in 0..reached {
+        later *= (n - j).saturating_sub(early) as f64 / (n - j) as f64;
+        p += (1.0 - later) / (n + 1) as f64;
+    }
+    p
 }
 
 /// Returns true if a p-value is the smallest that the simulations can give, `1 / (n + 1)`: an upper bound of the true
@@ -87,17 +112,22 @@ pub fn is_at_floor(p: f64, simulations: usize) -> bool {
 impl NullDistribution {
     /// The p-value of the largest score.
     pub fn of_score(&self, statistics: &TestStatistics, design: &DesignMatrix) -> f64 {
-        probability(&self.score, statistics.scores.largest(design))
+        self.probability(&self.score, statistics.scores.largest(design))
     }
 
     /// The p-value of the largest cell statistic.
     pub fn of_scan(&self, statistics: &TestStatistics) -> f64 {
-        probability(&self.best_cells(), statistics.best_cell())
+        self.probability(&self.best_cells(), statistics.best_cell())
     }
 
     /// The p-value of the energy.
     pub fn of_energy(&self, statistics: &TestStatistics) -> f64 {
-        probability(&self.energy, statistics.energy)
+        self.probability(&self.energy, statistics.energy)
+    }
+
+    /// The p-value of a statistic from its values in all simulations.
+    pub fn probability(&self, null: &[f64], value: f64) -> f64 {
+        probability_with_look(null, value, self.early)
     }
 
     fn best_cells(&self) -> Vec<f64> {
@@ -105,18 +135,20 @@ impl NullDistribution {
         self.cells.iter().map(best).collect()
     }
 
-    /// Returns true if none of the decisions at a level can change: each statistic of the data is either reached too often
-    /// to become significant, or by no simulation of so many that it is.
-    fn settled(&self, data: &TestStatistics, design: &DesignMatrix, level: f64) -> bool {
-        let is_settled = |null: &[f64], value: f64| {
-            let reached = null.iter().filter(|x| **x >= value).count();
-            reached >= ENOUGH || reached == 0 && 1.0 / (null.len() + 1) as f64 <= level
-        };
-        !self.energy.is_empty()
-            && is_settled(&self.energy, data.energy)
-            && is_settled(&self.score, data.scores.largest(design))
-            && is_settled(&self.best_cells(), data.best_cell())
+    /// Returns true if no decision can change.
+    fn settled(&self, data: &TestStatistics, design: &DesignMatrix) -> bool {
+        let early = self.early;
+        is_decided(&self.energy, data.energy, early)
+            && is_decided(&self.score, data.scores.largest(design), early)
+            && is_decided(&self.best_cells(), data.best_cell(), early)
     }
+}
+
+/// Returns true if a statistic is either reached too often to become significant, or by none of the first simulations.
+fn is_decided(null: &[f64], value: f64, early: usize) -> bool {
+    let reached = |null: &[f64]| null.iter().filter(|x| **x >= value).count();
+    let many = null.len() >= early && early > 0;
+    reached(null) >= ENOUGH || many && reached(&null[..early]) == 0
 }
 
 impl TestStatistics {
@@ -161,8 +193,8 @@ impl TestSetting<'_> {
 
     /// The null distribution from at most `count` simulations, and from fewer if the decisions about all three statistics
     /// of the data are made: each has been exceeded often enough (sequential Monte Carlo p-values: Besag and Clifford,
-    /// Biometrika 78 (1991) 301), or never in so many that its p-value is below `level`. If nothing is missing, the
-    /// probability that none of `n` simulations exceeds a statistic is `1 / (n + 1)`: the p-value stays valid.
+    /// Biometrika 78 (1991) 301), or never in so many that its p-value is below `level`. The p-values allow for this look
+    /// at the first simulations.
     pub fn nulls(
         &self,
         data: &TestStatistics,
@@ -170,9 +202,11 @@ impl TestSetting<'_> {
         level: f64,
         stream: &Stream,
     ) -> NullDistribution {
-        let mut nulls = NullDistribution::default();
+        let rounds = (1.0 / level - 1.0) / ROUND as f64;
+        let early = ROUND * (rounds - 1e-9).ceil() as usize;
+        let mut nulls = NullDistribution { early, ..NullDistribution::default() };
         let around = self.system.around(&self.fit.at);
-        while nulls.energy.len() < count && !nulls.settled(data, self.design, level) {
+        while nulls.energy.len() < count && !nulls.settled(data, self.design) {
             let begin = nulls.energy.len();
             let end = count.min(begin + ROUND);
             let chunks: Vec<usize> = (begin..end).step_by(CHUNK).collect();
@@ -266,4 +300,47 @@ pub fn common_error(experiment: &Experiment<'_>, noise: &Noise, stream: &Stream)
         all.iter_mut().zip(moved.as_slice()).for_each(|(a, m)| *a += m);
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lacuna::math::random::uniform;
+
+    /// If data and simulations have one law, p-values are valid whatever the level: `P(p <= x) <= x`, although the number
+    /// of simulations depends on the data. The share of `n` cases has the standard error `sqrt(x (1 - x) / n)`.
+    #[test]
+    fn simulations_that_end_early_keep_p_values_valid() {
+        let (cases, most, early) = (20_000, 400, 100);
+        let mut rng = Stream::root(4).generator();
+        let (mut ended, mut p): (usize, Vec<f64>) = (0, Vec::new());
+        for _ in 0..cases {
+            let value = uniform(&mut rng);
+            let mut null: Vec<f64> = Vec::new();
+            while null.len() < most && !is_decided(&null, value, early) {
+                null.extend((0..ROUND).map(|_| uniform(&mut rng)));
+            }
+            ended += usize::from(null.len() < most);
+            p.push(probability_with_look(&null, value, early));
+        }
+        assert!(ended > cases * 9 / 10, "{ended}");
+        for x in [0.01, 0.03, 0.1] {
+            let share = p.iter().filter(|p| **p <= x).count() as f64 / cases as f64;
+            let error = (x * (1.0 - x) / cases as f64).sqrt();
+            assert!(share < x + 4.0 * error, "{x}: {share}");
+            assert!(share > 0.7 * x, "{x}: {share}");
+        }
+    }
+
+    #[test]
+    fn the_smallest_p_value_is_an_upper_bound() {
+        for (p, simulations) in [(1.0 / 101.0, 199), (1.0 / 200.0, 199), (1.0 / 400.0, 399)] {
+            assert!(is_at_floor(p, simulations));
+        }
+        for (p, simulations) in
+            [(2.0 / 200.0, 199), (3.0 / 400.0, 399), (0.5, 199), (1.0, 199), (0.01, 0)]
+        {
+            assert!(!is_at_floor(p, simulations), "{p}");
+        }
+    }
 }

@@ -40,7 +40,7 @@ pub fn regions(
         let largest =
             |null: &Vec<f64>| rest.iter().map(|&q| null[q]).fold(f64::NEG_INFINITY, f64::max);
         let null: Vec<f64> = nulls.cells.iter().map(largest).collect();
-        p = p.max(crate::gap::test::probability(&null, cells[place].statistic));
+        p = p.max(nulls.probability(&null, cells[place].statistic));
         if p > level {
             break;
         }
