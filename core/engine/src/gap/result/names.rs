@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{AddedEffect, GapResult, HeldOut};
-use crate::gap::search::{CrossValidation, LeftOut, PROVEN, VerdictKind};
+use crate::gap::search::{CrossValidation, LeftOut, PROVEN, VerdictKind, decides};
 
 /// Kind of a proof.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -37,7 +37,8 @@ pub struct RivalComparison {
     pub effect: String,
     /// The log predictive density with the effect less that with its rival, summed over the parts, and its error.
     pub score: CrossValidation,
-    /// True when the effect predicts better, by 2.5 standard errors.
+    /// True when the effect predicts better, by 2.5 standard errors; replicates beside other kinds only must not contradict
+    /// it by as much.
     pub passed: bool,
 }
 
@@ -61,7 +62,7 @@ impl NameProof {
             let each = effect.rivals.iter().map(|score| RivalComparison {
                 effect: effect.name.clone(),
                 score: score.clone(),
-                passed: score.difference > PROVEN * score.error.unwrap_or(0.0),
+                passed: passed(score, &effect.rivals),
             });
             each.collect()
         };
@@ -73,6 +74,12 @@ impl NameProof {
             && contradiction(held_out).is_none();
         Some(Self { kind, passed, rivals })
     }
+}
+
+/// True when an effect predicts left-out data better than its rival; data that do not decide only must not contradict it.
+fn passed(score: &CrossValidation, all: &[CrossValidation]) -> bool {
+    let errors = if decides(score, all) { PROVEN } else { -PROVEN };
+    score.difference > errors * score.error.unwrap_or(0.0)
 }
 
 /// The reason, in words, for which held-out data contradict effects: the gap grew, or the interval of the share that

@@ -33,7 +33,7 @@ pub use refit::{
     RefitSetting, Scored, Weighed, log_prior, most_promising, placement_prior, refit_all,
 };
 pub use state::kinds;
-pub use support::Support;
+pub use support::{Support, decides};
 pub use verdict::{
     Bin, Brier, CEILING, MissingEffect, PROVEN, Reliability, SURE, Told, Traits, Verdict,
     VerdictKind, class, explains, verdict,

@@ -20,6 +20,9 @@ use crate::gap::system::fit::Fit;
 /// The largest share of an effect in a left-out part: of an effect that is nearly all there, the rest knows only the prior.
 const THERE: f64 = 0.8;
 
+/// The smallest share of an effect in a left-out part: one in which it changes next to nothing says nothing of it.
+const LITTLE: f64 = 0.01;
+
 /// The support of one effect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Support {
@@ -32,11 +35,12 @@ pub struct Support {
 }
 
 impl Support {
-    /// True when it predicts each kind of left-out data better than the free form, by this number of standard errors.
-    /// Without data that could be left out nothing contradicts it.
+    /// True when it predicts each deciding kind of left-out data better than the free form, by this number of standard
+    /// errors; of a negative number, each kind. Without data that could be left out nothing contradicts it.
     pub fn transfers(&self, errors: f64) -> bool {
+        let all = &self.against_free_form;
         let better = |one: &CrossValidation| one.difference > errors * one.error.unwrap_or(0.0);
-        self.against_free_form.iter().all(better)
+        all.iter().filter(|one| errors <= 0.0 || decides(one, all)).all(better)
     }
 
     /// True when it foretells the blocks together better than the free form, by 20 to 1, and none of them worse by as
@@ -46,6 +50,14 @@ impl Support {
         let all = &self.against_free_form;
         all.iter().all(|one| one.left_out != LeftOut::Block || is_foretold(one))
     }
+}
+
+/// True when a kind of left-out data decides whether a name transfers: conditions, sensors and blocks, where some could be
+/// left out. Replicates share the mean curve, to which a free form fits as well, so that they decide only where nothing
+/// else could be left out.
+pub fn decides(one: &CrossValidation, all: &[CrossValidation]) -> bool {
+    let elsewhere = |other: &CrossValidation| other.left_out != LeftOut::Replicate;
+    elsewhere(one) || !all.iter().any(elsewhere)
 }
 
 /// The support of each effect of a state; `last` is its evidence with a remainder, `first` the energy of the gap before
@@ -71,7 +83,10 @@ pub(super) fn supports<'a>(
             Explanation { system: &smaller.system, fit: &smaller.fit, remainder: form.as_ref() };
         let acts = &state.system.effects[i].acts;
         let change = change(state, shared.experiment, i);
-        let is_used = |fold: &Fold| share_in(shared.experiment, &change, fold) <= THERE;
+        let is_used = |fold: &Fold| {
+            let share = share_in(shared.experiment, &change, fold);
+            fold.replicate.is_some() || (LITTLE..=THERE).contains(&share)
+        };
         let [before, after] = [&smaller.fit, &state.fit].map(|fit| misfit(fit, acts));
         Support {
             share: (evidence.gap - last.gap) / first.max(f64::MIN_POSITIVE),
@@ -104,11 +119,8 @@ fn change(state: &SearchState<'_>, experiment: &Experiment<'_>, i: usize) -> Vec
         .collect()
 }
 
-/// The share of an effect that lies in a part and in the neighbourhood that is hidden with it; zero for a replicate.
+/// The share of an effect that lies in a part and in the neighbourhood that is hidden with it.
 fn share_in(experiment: &Experiment<'_>, change: &[f64], fold: &Fold) -> f64 {
-    if fold.replicate.is_some() {
-        return 0.0;
-    }
     let (mut inside, mut all) = (0.0, f64::MIN_POSITIVE);
     for (c, condition) in experiment.conditions.iter().enumerate() {
         for i in condition.outputs.clone().filter(|&i| change[i].is_finite()) {

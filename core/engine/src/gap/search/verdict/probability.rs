@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::grounds;
 use crate::gap::search::cross_validate::CrossValidation;
 use crate::gap::search::diagnostics::SearchResult;
-use crate::gap::search::support::Support;
+use crate::gap::search::support::{Support, decides};
 
 /// The largest probability that is printed: no count of cases shows more.
 pub const CEILING: f64 = 0.99;
@@ -58,7 +58,8 @@ impl Traits {
             own.map(|(_, p)| p).sum()
         };
         let standard = |c: &CrossValidation| Some(c.difference / c.error.filter(|e| *e > 0.0)?);
-        let each = support.against_free_form.iter().filter_map(standard);
+        let all = &support.against_free_form;
+        let each = all.iter().filter(|one| decides(one, all)).filter_map(standard);
         let least = f64::MIN_POSITIVE;
         Self {
             log_odds: sum(true).max(least).ln() - sum(false).max(least).ln(),
