@@ -43,7 +43,7 @@ struct Regression {
 }
 
 /// The fit to 21 names of 16 cases of the worlds in `tests/generator`, 3 of them with
-/// physics inside the simulator, by `python bench/probability.py --cases 30 --seed 31 --write`.
+/// physics inside the simulator: the first of those of `python bench/probability.py --cases 30 --seed 31 --write`.
 const FITTED: Regression =
     Regression { intercept: -4.597, slopes: [1.651, 2.943, 2.181, 1.955, 4.066] };
 
