@@ -209,8 +209,9 @@ def table(title, effects, probabilities):
 def written(fit, effects, counts, options):
     """The constant in the source."""
     intercept, slopes = fit
+    part = "" if sum(counts) == len(WORLDS) * options.cases else "the first of "
     doc = (f"/// The fit to {len(effects)} names of {sum(counts)} cases of the worlds in `tests/generator`, {counts[1]} of them with\n"
-           f"/// physics inside the simulator, by `python bench/probability.py --cases {options.cases} --seed {options.seed} --write`.\n")
+           f"/// physics inside the simulator: {part}those of `python bench/probability.py --cases {options.cases} --seed {options.seed} --write`.\n")
     values = ", ".join(f"{slope:.3f}" for slope in slopes)
     constant = f"const FITTED: Regression =\n    Regression {{ intercept: {intercept:.3f}, slopes: [{values}] }};\n"
     with open(TARGET) as file:

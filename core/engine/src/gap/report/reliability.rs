@@ -126,7 +126,7 @@ mod tests {
     fn a_count_is_told_and_drawn() {
         let told = |i: usize| Told { probability: 0.7, right: i < 5, weight: 1.0 };
         let count = Reliability::of(&(0..10).map(told).collect::<Vec<_>>());
-        assert!(table(&count).text().contains("50 %"), "{}", table(&count).text());
+        assert!(table(&count).text().contains("50.0 %"), "{}", table(&count).text());
         let drawn = figure(&[("ours", &count)], &mut Numbers::default()).into_string();
         assert!(drawn.contains("Brier score 0.290") && drawn.contains("<svg"), "{drawn}");
     }
