@@ -1,8 +1,9 @@
-//! Cross-validation and discrimination in linear models whose densities are known.
+//! Cross-validation, discrimination and whitening in linear models whose densities are known.
 #![allow(clippy::unwrap_used)]
 
-use lacuna::math::random::Stream;
-use lacuna_linalg::{Cholesky, Matrix};
+use lacuna::math::random::{Stream, normal};
+use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin};
+use lacuna_linalg::{Cholesky, Matrix, multiply_transposed};
 
 use super::{Explanation, FurtherData, LeftOut, cross_validate, discriminate};
 use crate::gap::experiment::Experiment;
@@ -191,4 +192,31 @@ fn what_would_separate_has_its_closed_form() {
     let order = found.ranked.iter().map(|own| own.replicates.unwrap_or(usize::MAX));
     assert!(order.clone().zip(order.skip(1)).all(|(a, b)| a <= b));
     assert!(found.ranked.iter().any(|own| matches!(own.what, FurtherData::Input { .. })));
+}
+
+/// The two roots of a covariance with a part of low rank differ by a rotation: all products and the determinant are equal.
+#[test]
+fn a_rotated_whitener_has_the_same_lengths() {
+    let world = world("rate", 1);
+    let truth = world.response(&[0.3, 0.8]);
+    let mut experiment = world.experiment(&truth, REPLICATES, &Stream::root(3));
+    let outputs = truth.len();
+    let mut rng = Stream::root(4).generator();
+    let factor = Matrix::from_fn(outputs, 5, |_, _| normal(&mut rng));
+    let origin = ErrorOrigin::Emulator;
+    experiment.common.push(CommonError { origin, factor, predictive: true });
+    let whiteners = [
+        Whitener::new(&experiment, &world.noise, &truth),
+        Whitener::rotated(&experiment, &world.noise, &truth),
+    ];
+    let rows = Matrix::from_fn(3, outputs, |_, _| normal(&mut rng));
+    let products = whiteners.each_ref().map(|whitener| {
+        let white = whitener.whiten_rows(&rows);
+        multiply_transposed(&white, &white)
+    });
+    for (a, b) in products[0].as_slice().iter().zip(products[1].as_slice()) {
+        assert!((a - b).abs() < 1e-9 * products[0][(0, 0)], "{a} {b}");
+    }
+    let [a, b] = whiteners.map(|whitener| whitener.log_determinant());
+    assert!((a - b).abs() < 1e-9 * a.abs().max(1.0), "{a} {b}");
 }

@@ -62,7 +62,7 @@ mod tests {
     fn the_density_is_the_average_over_the_size_of_the_noise() {
         let scale = NoiseScale { freedom: 12.0, count: 8.0 };
         let averaged = |square: f64| {
-            let each = (-4000..4000).map(|k| {
+            let each = (-4000..12000).map(|k| {
                 let log = f64::from(k) / 1000.0;
                 let s = log.exp();
                 let law = -0.5 * scale.freedom * (log + 1.0 / s);
