@@ -60,14 +60,13 @@ impl Term for Evaporation {
 
     fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {
         let (u, ambient) = (of(self.of.as_deref(), place), &self.ambient);
-        let (scale, indices, size) = match &self.scale {
-            Some(scale) => (format!("({scale})"), Vec::new(), None),
-            None => {
-                let index = unknown(place.name)?;
-                // The size of the shape is that for water at room temperature.
-                let size = format!("exp((({u}) - ({ambient})) / 16 {{K}}) - 1");
-                (index.name.clone(), vec![index], Some(size))
-            }
+        let (scale, indices, size) = if let Some(scale) = &self.scale {
+            (format!("({scale})"), Vec::new(), None)
+        } else {
+            let index = unknown(place.name)?;
+            // The size of the shape is that for water at room temperature.
+            let size = format!("exp((({u}) - ({ambient})) / 16 {{K}}) - 1");
+            (index.name.clone(), vec![index], Some(size))
         };
         let shape = format!("1 - exp((({u}) - ({ambient})) / {scale})");
         Ok(Summand { shape, sign: Sign::Positive, indices, scale: size, ..Summand::default() })

@@ -98,12 +98,11 @@ impl Term for Overflow {
         }
         let width = quantity(width, unit);
         let fixed = self.width.is_none().then(|| format!("width = {width}"));
-        let (level, indices) = match &self.level {
-            Some(level) => (format!("({level})"), Vec::new()),
-            None => {
-                let index = self.unknown(place, unit, size);
-                (index.name.clone(), vec![index])
-            }
+        let (level, indices) = if let Some(level) = &self.level {
+            (format!("({level})"), Vec::new())
+        } else {
+            let index = self.unknown(place, unit, size);
+            (index.name.clone(), vec![index])
         };
         // The shape is as large as the quantity: the level itself has no value before the term is there.
         let scale = (!indices.is_empty()).then(|| format!("({u})"));

@@ -86,7 +86,7 @@ fn share_of_the_library(setting: &PowerSetting<'_>, change: &[f64]) -> f64 {
             // A small size in place of a derivative.
             let mut small = start.clone();
             small[0] = absent[0] + 1e-4 * (start[0] - absent[0]);
-            let with = placed.apply(response, &small);
+            let with = placed.apply(response, &small, &setting.fit.at.point);
             let slope: Vec<f64> = with.iter().zip(response).map(|(a, b)| a - b).collect();
             let slope = off(&basis, over_noise(&slope));
             let length = dot(&slope, &slope);

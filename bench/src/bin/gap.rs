@@ -19,7 +19,7 @@ use lacuna_bench::clock::timed;
 use lacuna_engine::gap::candidates::proposed;
 use lacuna_engine::gap::experiment::Experiment;
 use lacuna_engine::gap::noise::{Noise, ResponseTangents};
-use lacuna_engine::gap::prove::prove;
+use lacuna_engine::gap::prove::{freedoms, prove};
 use lacuna_engine::gap::search::{SearchOptions, search, verdict};
 use lacuna_engine::gap::system::whitener::condensed;
 use lacuna_linalg::Matrix;
@@ -71,7 +71,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             let mut new = Experiment::new(&layouts, &parameters, &*emulator, &held_out);
             new.common.clone_from(&experiment.common);
             let (before, after) = (&first.before.fit.at.response, &found.last.fit.at.response);
-            let proof = stage("proof", || prove(&new, &found.noise, before, after))?;
+            let proof = stage("proof", || {
+                prove(&new, &found.noise, &freedoms(&experiment), before, after)
+            })?;
             println!("  {:?}", proof.map(|proof| proof.all));
         }
     }

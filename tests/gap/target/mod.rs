@@ -173,7 +173,7 @@ fn ask(truth: Truth, wide: Option<&ExtendedMap<'_>>) -> Answer {
 impl Answer {
     /// Description of the answer in a few lines.
     fn said(&self) -> String {
-        let Verdict { word, effects, closed, reasons } = &self.verdict;
+        let Verdict { word, effects, closed, reasons, .. } = &self.verdict;
         let Self { truth, p, gauges, parameters, size, .. } = self;
         let mut text =
             format!("{truth:?}, rms {size:.2}: {word:?} {p:.2?}, closed {closed:.2}, {gauges:?}\n");

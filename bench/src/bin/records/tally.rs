@@ -2,19 +2,32 @@
 
 use std::fmt::Write as _;
 
+use lacuna::diagnose::coverage::binomial::interval;
 use lacuna_engine::gap::search::VerdictKind;
 
 use crate::case::{Answer, Judgement};
 
+/// Sort of a case.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Hidden {
+    Nothing,
+    /// Physics of a term's form, or a sum of two.
+    Exact,
+    /// Physics of no term's form.
+    Other,
+}
+
 /// A case as the tables count it.
 struct Counted {
-    exact: bool,
-    hidden: bool,
+    hidden: Hidden,
     stated: bool,
     judged: Judgement,
     silent: bool,
     seconds: f64,
 }
+
+/// A row of the table: its words, the cases that it counts, and those that it counts as events.
+type Row<'a> = (&'a str, fn(&Counted) -> bool, &'a dyn Fn(&Counted) -> bool);
 
 /// All cases so far.
 #[derive(Default)]
@@ -26,8 +39,11 @@ impl Tally {
         let missing = &answer.record.missing;
         let none = matches!(answer.verdict, VerdictKind::None | VerdictKind::NotVisible);
         self.0.push(Counted {
-            exact: !missing.exact.is_empty(),
-            hidden: !missing.laws.is_empty(),
+            hidden: match (missing.laws.is_empty(), missing.exact.is_empty()) {
+                (true, _) => Hidden::Nothing,
+                (false, false) => Hidden::Exact,
+                (false, true) => Hidden::Other,
+            },
             stated: answer.stated,
             judged: answer.judged(),
             silent: none && !answer.noise_said,
@@ -41,23 +57,31 @@ impl Tally {
             "| | noise assumed | | noise stated | |\n| --- | --- | --- | --- | --- |\n".to_owned();
         let is = |judged: Judgement| move |case: &Counted| case.judged == judged;
         let false_name = |case: &Counted| case.judged == Judgement::False;
-        let rows: [(&str, fn(&Counted) -> bool, &dyn Fn(&Counted) -> bool); 12] = [
-            ("form of a term: right names", |c| c.exact, &is(Judgement::Right)),
-            ("part of a sum named", |c| c.exact, &is(Judgement::Part)),
-            ("a near form named", |c| c.exact, &is(Judgement::Near)),
-            ("found without a name", |c| c.exact, &is(Judgement::Unnamed)),
-            ("false name", |c| c.exact, &false_name),
-            ("not found", |c| c.exact, &is(Judgement::Missed)),
+        let rows: [Row<'_>; 12] = [
+            ("form of a term: right names", |c| c.hidden == Hidden::Exact, &is(Judgement::Right)),
+            ("part of a sum named", |c| c.hidden == Hidden::Exact, &is(Judgement::Part)),
+            ("a near form named", |c| c.hidden == Hidden::Exact, &is(Judgement::Near)),
+            ("found without a name", |c| c.hidden == Hidden::Exact, &is(Judgement::Unnamed)),
+            ("false name", |c| c.hidden == Hidden::Exact, &false_name),
+            ("not found", |c| c.hidden == Hidden::Exact, &is(Judgement::Missed)),
             (
                 "no form of a term: no name, or an approximate one",
-                |c| c.hidden && !c.exact,
+                |c| c.hidden == Hidden::Other,
                 &is(Judgement::Right),
             ),
-            ("a near form named", |c| c.hidden && !c.exact, &is(Judgement::Near)),
-            ("false name", |c| c.hidden && !c.exact, &false_name),
-            ("not found", |c| c.hidden && !c.exact, &is(Judgement::Missed)),
-            ("nothing hidden: nothing said", |c| !c.hidden, &is(Judgement::Right)),
-            ("not found, without a word about the noise", |c| c.hidden, &|c: &Counted| c.silent),
+            ("a near form named", |c| c.hidden == Hidden::Other, &is(Judgement::Near)),
+            ("false name", |c| c.hidden == Hidden::Other, &false_name),
+            ("not found", |c| c.hidden == Hidden::Other, &is(Judgement::Missed)),
+            (
+                "nothing hidden: nothing said",
+                |c| c.hidden == Hidden::Nothing,
+                &is(Judgement::Right),
+            ),
+            (
+                "not found, without a word about the noise",
+                |c| c.hidden != Hidden::Nothing,
+                &|c: &Counted| c.silent,
+            ),
         ];
         for (what, among, holds) in rows {
             let cell = |stated: bool| {
@@ -88,42 +112,10 @@ fn rate(events: u64, trials: u64) -> String {
     if trials == 0 {
         return "0/0 | -".to_owned();
     }
-    let [low, high] = interval(events, trials).map(|p| 100.0 * p);
+    let share = interval(events as f64, trials as f64, 0.95);
+    let [low, high] = share.map(|p| 100.0 * p);
     format!(
         "{events}/{trials} = {:.0} % | {low:.0} to {high:.0} %",
         100.0 * events as f64 / trials as f64
     )
-}
-
-fn interval(events: u64, trials: u64) -> [f64; 2] {
-    let low =
-        if events == 0 { 0.0 } else { bisected(|p| 1.0 - at_most(events - 1, trials, p) < 0.025) };
-    let high =
-        if events == trials { 1.0 } else { bisected(|p| at_most(events, trials, p) > 0.025) };
-    [low, high]
-}
-
-/// Probability of at most this many events.
-fn at_most(events: u64, trials: u64, p: f64) -> f64 {
-    let mut term = (trials as f64 * (-p).ln_1p()).exp();
-    let mut sum = term;
-    for k in 0..events {
-        term *= (trials - k) as f64 / (k + 1) as f64 * p / (1.0 - p);
-        sum += term;
-    }
-    sum
-}
-
-/// The largest number between zero and one for which a monotone condition holds.
-fn bisected(holds: impl Fn(f64) -> bool) -> f64 {
-    let (mut low, mut high) = (0.0, 1.0);
-    for _ in 0..50 {
-        let middle = 0.5 * (low + high);
-        if holds(middle) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    low
 }

@@ -36,14 +36,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     if let Some(cases) = after("--random").and_then(|n| n.parse().ok()) {
         let nothing = arguments.iter().any(|a| a == "--nothing");
         let only = only.as_deref();
-        return match arguments.first().map(String::as_str) {
-            Some("pipe") => {
-                counted::count(&Emulated::new(Pipe, 250, 8)?, "pipe", seed, cases, nothing, only)
-            }
-            _ => {
-                let world = Emulated::new(MercuryBox, 400, 16)?;
-                counted::count(&world, "box", seed, cases, nothing, only)
-            }
+        return if arguments.first().is_some_and(|world| world == "pipe") {
+            counted::count(&Emulated::new(Pipe, 250, 8)?, "pipe", seed, cases, nothing, only)
+        } else {
+            let world = Emulated::new(MercuryBox, 400, 16)?;
+            counted::count(&world, "box", seed, cases, nothing, only)
         };
     }
     match arguments.first().map(String::as_str) {

@@ -237,13 +237,17 @@ fn the_quiet_record_of_an_instrument_shows_its_noise() {
 #[test]
 fn what_is_stated_is_used_and_the_rest_is_estimated() {
     let record = first_order(0.6, 400, 7);
-    let (noise, words) =
-        noise_of_records(&[record.clone()], Some(OutputNoise { sd: Some(0.9), memory: Some(0.0) }));
+    let (noise, words) = noise_of_records(
+        std::slice::from_ref(&record),
+        Some(OutputNoise { sd: Some(0.9), memory: Some(0.0) }),
+    );
     assert_eq!(noise.origins, [Origin::Stated]);
     assert!((noise.curves[0].size() - 0.9).abs() < 1e-12 && noise.curves[0].memory.order() == 0);
     assert_eq!(words.unwrap(), "noise stated: without replicates, the noise is that of the test");
-    let (noise, _) =
-        noise_of_records(&[record.clone()], Some(OutputNoise { sd: Some(1.0), memory: None }));
+    let (noise, _) = noise_of_records(
+        std::slice::from_ref(&record),
+        Some(OutputNoise { sd: Some(1.0), memory: None }),
+    );
     assert_eq!(noise.origins, [Origin::StatedInPart]);
     let coefficients = noise.curves[0].memory.coefficients().to_vec();
     assert!((noise.curves[0].size() - 1.0).abs() < 1e-9, "{noise:?}");

@@ -86,7 +86,7 @@ impl<'a> Search<'a> {
         let fitted: Vec<(f64, Pair)> = best
             .par_iter()
             .filter_map(|&(i, j, sizes)| {
-                self.fitted(&setting, state, [&parts[i], &parts[j]], sizes)
+                Self::fitted(&setting, state, [&parts[i], &parts[j]], sizes)
             })
             .collect();
         let mut order: Vec<usize> = (0..fitted.len()).collect();
@@ -180,7 +180,6 @@ impl<'a> Search<'a> {
 
     /// A pair fitted from its sizes, with its weight by Laplace's method.
     fn fitted(
-        &self,
         setting: &RefitSetting<'a, '_>,
         state: &SearchState<'a>,
         parts: [&Part; 2],
@@ -210,12 +209,15 @@ impl<'a> Search<'a> {
     }
 }
 
+/// Two parts by their indices, with their sizes in standard errors.
+type Joint = (usize, usize, [f64; 2]);
+
 /// The pairs of largest score with their prior masses, each with the sizes of both in standard errors.
-fn screened(parts: &[Part]) -> Vec<(usize, usize, [f64; 2])> {
+fn screened(parts: &[Part]) -> Vec<Joint> {
     let outputs = parts.first().map_or(0, |part| part.row.len());
     let rows = Matrix::from_rows(outputs, parts.iter().map(|part| part.row.as_slice()));
     let gram = multiply_transposed(&rows, &rows);
-    let mut all: Vec<(f64, (usize, usize, [f64; 2]))> = Vec::new();
+    let mut all: Vec<(f64, Joint)> = Vec::new();
     for i in 0..parts.len() {
         for j in i + 1..parts.len() {
             let (a, b) = (&parts[i], &parts[j]);

@@ -74,7 +74,9 @@ impl<'a> Search<'a> {
                 // An evidence that is known comes from a fit from several starts.
                 Some(known) if weighed[known].log_weight >= log_weight => {}
                 known => {
-                    known.into_iter().for_each(|known| drop(weighed.remove(known)));
+                    if let Some(known) = known {
+                        weighed.remove(known);
+                    }
                     let (score, absorbed) = (seed.score, seed.absorbed);
                     let (fit, gap) = (moved.fit, evidence.gap);
                     weighed.push(Weighed { placement, score, absorbed, fit, log_weight, gap });

@@ -26,6 +26,9 @@ const WITHIN: f64 = 10.0;
 /// The largest number of placements that are refitted.
 const MOST: usize = 24;
 
+/// The smallest score with which the best placement of a type is refitted.
+const VISIBLE: f64 = 3.0;
+
 /// The number of regressors of a placement that give starts, with the sizes that their scores estimate.
 const SCORED: usize = 8;
 
@@ -148,7 +151,14 @@ pub fn most_promising(
     let near =
         |(i, scored): (usize, &Scored)| i < FEWEST || scored.score.powi(2) > best.powi(2) - WITHIN;
     let count = scored.iter().enumerate().take_while(|(i, scored)| near((*i, scored))).count();
-    scored.truncate(count.min(MOST));
+    let further = scored.split_off(count.min(MOST));
+    // Each type has its best placement among them: a score says little of an effect that is not linear in its size.
+    for one in further.into_iter().filter(|one| one.score >= VISIBLE) {
+        let kind = |scored: &Scored| candidates[scored.placement.candidate].kind.as_str();
+        if !scored.iter().any(|other| kind(other) == kind(&one)) {
+            scored.push(one);
+        }
+    }
     scored
 }
 

@@ -134,12 +134,11 @@ fn identified(
         observer.begin("gap-companion", "", 0);
         let map = ModelMap::of(&companion.study)?;
         let split = gate::split(ensemble, companion)?;
-        let (constants, used) = match companion.stated() {
-            Some(constants) => (constants, Vec::new()),
-            None => {
-                let random = stream(study, "gap").named("companion");
-                (identify::constants(&map, companion, ensemble, &split, &random)?, split.identify)
-            }
+        let (constants, used) = if let Some(constants) = companion.stated() {
+            (constants, Vec::new())
+        } else {
+            let random = stream(study, "gap").named("companion");
+            (identify::constants(&map, companion, ensemble, &split, &random)?, split.identify)
         };
         let found = gate::checked(&map, companion, ensemble, &split.check, &constants)?;
         let runs = used.iter().map(|&r| ensemble.runs[r].clone()).collect();

@@ -121,13 +121,15 @@ mod tests {
     const BAD: Traits =
         Traits { log_odds: -1e3, local: -1.0, transfer: -1e3, closed: -1.0, inexact: 1e6 };
 
+    /// Sets one of the quantities.
+    type Set = fn(&mut Traits, f64);
+
     /// Better evidence never lowers the probability, and no evidence makes it one.
     #[test]
     fn the_probability_is_bounded_and_rises_with_the_evidence() {
         assert!(GOOD.probability() <= CEILING && BAD.probability() >= FLOOR);
         assert!(GOOD.probability() > BAD.probability());
         let middle = Traits { log_odds: 3.0, local: 0.7, transfer: 2.0, closed: 0.7, inexact: 5.0 };
-        type Set = fn(&mut Traits, f64);
         let each: [(Set, [f64; 2]); 5] = [
             (|t, x| t.log_odds = x, [-10.0, 20.0]),
             (|t, x| t.local = x, [-0.5, 1.5]),

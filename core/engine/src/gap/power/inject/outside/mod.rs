@@ -48,9 +48,9 @@ impl OutsideKind {
         let forms = OtherForm::ALL.map(Self::Form);
         let along = Distributed::ALL.map(Self::Distributed);
         let mut all = Vec::new();
-        for i in 0..forms.len() {
+        for (i, form) in forms.into_iter().enumerate() {
             all.push(Self::Grammar);
-            all.push(forms[i]);
+            all.push(form);
             all.extend(along.get(i));
             all.extend(shapes.get(i));
         }

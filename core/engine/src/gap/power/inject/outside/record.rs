@@ -85,7 +85,9 @@ impl Record {
 pub fn normed(mut values: Vec<f64>) -> Vec<f64> {
     let largest = values.iter().fold(0.0, |most: f64, y| most.max(y.abs()));
     if largest > 0.0 {
-        values.iter_mut().for_each(|y| *y /= largest);
+        for y in &mut values {
+            *y /= largest;
+        }
     }
     values
 }
