@@ -117,7 +117,7 @@ pub struct Found {
 pub struct Measured {
     /// True parameters.
     pub truth: Vec<f64>,
-    /// What is hidden.
+    /// The hidden causes.
     pub hidden: Vec<Found>,
     /// Replicates by condition; each holds the curves of all sensors, concatenated.
     pub replicates: Vec<Vec<Vec<f64>>>,

@@ -23,7 +23,7 @@ pub enum Instrument {
     Settling(usize),
 }
 
-/// What the data sheet of an instrument says.
+/// The data sheet of an instrument.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stated {
     /// The standard deviation of one value.
@@ -57,7 +57,7 @@ impl Instrument {
         }
     }
 
-    /// What its data sheet says, if errors have this standard deviation and values this distance in time.
+    /// The data sheet, if errors have this standard deviation and values this distance in time.
     pub fn stated(self, sd: f64, step: f64) -> Stated {
         let of = |sd, memory| Stated { sd, resolution: 0.0, memory };
         match self {

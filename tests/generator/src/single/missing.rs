@@ -12,12 +12,12 @@ type Types = &'static [&'static str];
 const DRAG: Types = &["linear_friction", "quadratic_friction", "coulomb_friction"];
 const SPRING: Types = &["cubic_stiffness", "quadratic_stiffness"];
 
-/// What has the form of terms of these types.
+/// Missing physics of the form of these types of terms.
 fn form(name: &'static str, laws: &[(Law, f64)], exact: Types, near: Types) -> Missing {
     Missing { name, laws: laws.to_vec(), exact, near }
 }
 
-/// What has the form of no term; nearly those of these types.
+/// Missing physics of the form of no term, but nearly of these types.
 fn outside(name: &'static str, law: Law, share: f64, near: Types) -> Missing {
     form(name, &[(law, share)], &[], near)
 }

@@ -1,5 +1,5 @@
-//! What would tell physics inside the simulator where no candidate has a name: inputs that the model has, a companion,
-//! runs with the physics on.
+//! Advice where no candidate has a name: inputs that the model has, a companion or further runs that would tell which
+//! physics is missing inside the simulator.
 
 use lacuna::text::nearest::one_of;
 

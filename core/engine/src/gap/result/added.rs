@@ -39,7 +39,7 @@ pub struct Augmented {
 pub struct MemberRun {
     /// The types of its effects.
     pub kinds: Vec<String>,
-    /// Its posterior probability among the members.
+    /// The posterior probability among the members.
     pub weight: f64,
     /// The file.
     pub study: PathBuf,

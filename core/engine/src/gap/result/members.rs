@@ -15,9 +15,9 @@ const MOST: usize = 6;
 pub struct Member {
     /// The types of its effects.
     pub kinds: Vec<String>,
-    /// Its posterior probability among the members.
+    /// The posterior probability among the members.
     pub weight: f64,
-    /// Its effects.
+    /// The effects.
     pub additions: Vec<AddedEffect>,
 }
 
