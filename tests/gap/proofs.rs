@@ -126,7 +126,7 @@ fn named(case: &Case, seed: u64, candidates: &[&str]) -> (GapResult, Option<Name
 }
 
 /// Damping acts on all sensors and in both conditions. Named `damping` it passes the proof. Where only wrong candidates
-/// may be named, none passes, although some close the gap on held-out replicates, which share the mean curve.
+/// may be named, none is, or its proof fails.
 #[test]
 fn a_wrong_name_fails_where_the_right_one_transfers() {
     chain::prepare();
@@ -145,13 +145,10 @@ fn a_wrong_name_fails_where_the_right_one_transfers() {
     let (_, right) = &all[0];
     let right = right.as_ref().unwrap();
     assert_eq!((right.kind, right.passed), (ProofKind::Transfer, true), "{right:?}");
-    let mut fooled = 0;
     for (name, (result, proof)) in candidates.iter().zip(&all).skip(1) {
         let Some(proof) = proof else { continue };
-        assert_eq!((proof.kind, proof.passed), (ProofKind::Transfer, false), "{name} {proof:?}");
-        fooled += u32::from(result.held_out[0].proof.shrank);
+        assert!(!proof.passed, "{name} {:?} {proof:?}", result.verdict);
     }
-    assert!(fooled > 0, "no wrong name closes the gap on held-out replicates");
 }
 
 const SHORT: &str = r#"

@@ -50,12 +50,12 @@ fn each_model_lists_its_own_inputs_and_those_that_a_study_sets() {
     assert_eq!(listed("mercury_target", &[]), mercury);
     let gas = listed("mercury_target_equilibrium_gas", &[]);
     let bubbles = listed("mercury_target_bubbles", &[]);
-    assert_eq!((gas.len(), bubbles.len()), (13, 14));
+    assert_eq!((gas.len(), bubbles.len()), (14, 15));
     assert!(!gas.contains(&"bubble_radius".to_owned()));
     let given = ["bubble_radius", "damping", "void_fraction", "viscosity"];
     let more = listed("mercury_target", &given);
     assert_eq!(more[3..], ["void_fraction", "bubble_radius", "damping"]);
-    assert_eq!(listed("mercury_target_equilibrium_gas", &given).len(), 14);
+    assert_eq!(listed("mercury_target_equilibrium_gas", &given).len(), 15);
 }
 
 #[test]
@@ -74,6 +74,7 @@ fn inputs_of_the_vessel_count_in_every_model_and_those_of_the_gas_where_there_is
         ("pulse_energy", 1.1),
         ("beam_width", 0.03),
         ("wall_thickness", 1.1),
+        ("rear_reflection", 0.3),
         ("void_fraction", 1e-4),
         ("void_gradient", 0.5),
         ("void_depletion", 0.5),
@@ -85,7 +86,7 @@ fn inputs_of_the_vessel_count_in_every_model_and_those_of_the_gas_where_there_is
         let base = values(name, &[]);
         for (i, change) in changes.into_iter().enumerate() {
             let response = respond(name, &[change]).unwrap();
-            let counts = i < [4, 9, 10][k];
+            let counts = i < [5, 10, 11][k];
             assert_eq!(response.values != base, counts, "{name} {}", change.0);
             let idle = response.facts.iter().find(|fact| fact.name == "inputs without effect");
             let expected = (!counts).then(|| change.0.to_owned());

@@ -270,8 +270,9 @@ impl<'a> Search<'a> {
         let weighed = self.weighed(state, design, scores, projection, &stream);
         // The weights of placements have neither the prior mass of their type nor that of the effects chosen before:
         // `nothing` is the weight of no further effect on that scale.
+        // Both have the noise of this state, so that its determinant is in neither.
         let now = state.weight(&self.setting(), &stream);
-        let nothing = now - state.prior(&self.setting()) + self.kinds();
+        let nothing = state.tolerant(&self.setting(), &stream).value + self.kinds();
         let log_odds = log_sum(weighed.iter().map(|j| j.log_weight)) - nothing;
         let mut visited =
             VisitedModel::around(self.candidates, &state.chosen, &weighed, [now, nothing]);

@@ -114,7 +114,7 @@ pub fn prepared<T>(
     let Proposed { mut candidates, mut untried } = candidates(study, &situation)?;
     candidates.extend(beginning.inside.candidates.iter().cloned());
     if let Some(companion) = &beginning.inside.companion {
-        let learned = companion.candidates(study, &starts[0])?;
+        let learned = companion.candidates(study, &starts[0], misfit(&experiment, &response))?;
         candidates.extend(learned.candidates);
         untried.extend(learned.untried);
     }
@@ -184,6 +184,14 @@ impl<'a> PreparedSearch<'a> {
         }
         Ok(result)
     }
+}
+
+/// The root mean square of the replicates' means less a response, in its unit.
+fn misfit(experiment: &Experiment<'_>, response: &[f64]) -> f64 {
+    let (counts, means) = experiment.means();
+    let measured = counts.iter().zip(&means).zip(response).filter(|((count, _), _)| **count > 0.0);
+    let squares: Vec<f64> = measured.map(|((_, mean), y)| (mean - y).powi(2)).collect();
+    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
 }
 
 /// The measurements of a study in two parts: those of the search, and those that are held out.

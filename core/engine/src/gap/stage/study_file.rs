@@ -1,5 +1,6 @@
 //! The study with the effects, as a file beside the original one.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use lacuna::run::{Stop, files};
@@ -178,7 +179,11 @@ fn in_companion(text: String, study: &Study, result: &GapResult) -> Result<Strin
     };
     let names: Vec<&str> = own.iter().map(|addition| addition.kind.as_str()).collect();
     let comments: String = own.iter().map(|addition| found(addition)).collect();
-    let around: Vec<f64> = result.parameters.iter().map(|shift| shift.value[1]).collect();
+    let parameters = result.parameters.iter().zip(&study.parameters);
+    let mut around: BTreeMap<&str, f64> =
+        parameters.map(|(shift, own)| (own.name.as_str(), shift.value[1])).collect();
+    let sizes = own.iter().map(|addition| (addition.kind.as_str(), addition.unknowns[0].value));
+    around.extend(sizes);
     with_added(text, study, &names, companion, &around, &comments)
 }
 

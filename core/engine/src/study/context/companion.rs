@@ -138,14 +138,15 @@ fn inputs(
     }
 }
 
-/// Reports points of parameters that the study does not have.
+/// Reports values of parameters and candidates that the study does not have.
 fn around(companion: &Companion, complaints: &mut Complaints<'_>) {
     let own = &companion.study.parameters[..companion.own()];
     for name in companion.keys.around.keys() {
-        if !own.iter().any(|parameter| &parameter.name == name) {
+        let known = own.iter().any(|parameter| &parameter.name == name);
+        if !known && !companion.keys.add.contains(name) {
             complaints
                 .at(&format!("around.{name}"))
-                .say(format!("the study has no parameter `{name}`"))
+                .say(format!("the study has no parameter and `add` no candidate `{name}`"))
                 .expected(one_of(own.iter().map(|parameter| parameter.name.as_str())));
         }
     }

@@ -56,8 +56,8 @@ pub struct CompanionKeys {
     /// With a value for each, none is identified again. Default: none.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub constants: BTreeMap<String, f64>,
-    /// Point of the study's parameters near which the changes of `add` are learned, by name, in the units of
-    /// `[[parameter]]`. Default: the medians of the priors.
+    /// Point near which the changes of `add` are learned: values of the study's parameters, and sizes of the candidates, by
+    /// name, in their units. Default: the medians of the parameters' priors, and the whole priors of the sizes.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub around: BTreeMap<String, f64>,
     /// Candidates that are part of the study: their changes are added to every response, and their unknowns are

@@ -12,13 +12,13 @@ use crate::gap::result::companion::IdentifiedCompanion;
 use crate::study::Study;
 
 /// The text of a study in which its companion has these further candidates, by their names, with the constants that were
-/// identified and the point `around` which their changes are learned; `comments` are lines that say why.
+/// identified and the point `around` which their changes are learned, by name; `comments` are lines that say why.
 pub fn with_added(
     mut text: String,
     study: &Study,
     names: &[&str],
     found: &IdentifiedCompanion,
-    around: &[f64],
+    around: &BTreeMap<&str, f64>,
     comments: &str,
 ) -> Result<String, Stop> {
     let Some(companion) = &study.gap.companion else { return Ok(text) };
@@ -31,9 +31,7 @@ pub fn with_added(
     if !constants.is_empty() {
         new.push(("constants", line(&constants)?));
     }
-    let around = study.parameters.iter().zip(around);
-    let around: BTreeMap<&str, f64> = around.map(|(p, x)| (p.name.as_str(), *x)).collect();
-    new.push(("around", line(&around)?));
+    new.push(("around", line(around)?));
     let mut missing = String::new();
     for (key, value) in new {
         match span(&text, &format!("gap.companion.{key}")) {

@@ -1,5 +1,6 @@
 //! A candidate inside a companion, as an effect on the response of the emulator.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use lacuna::data::{Layout, Layouts};
@@ -10,7 +11,7 @@ use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
 use toml::Table;
 
-use super::learned::{Basis, LearnedChange, Region};
+use super::learned::{Basis, LearnedChange, Region, distances};
 use crate::gap::candidates::{Candidate, Untried};
 use crate::gap::experiment::wider::FreeInput;
 use crate::gap::inside::pieces::{Piece, Pieces};
@@ -19,6 +20,9 @@ use crate::gap::result::companion::IdentifiedCompanion;
 use crate::gap::system::switched::InputEffect;
 use crate::stage::direct::ModelMap;
 use crate::study::gap::Companion;
+
+/// Changes are learned up to this multiple of the misfit, or of the size that was found.
+const FAR: f64 = 3.0;
 
 /// A candidate inside a companion. Its change depends on the study's parameters, the first of those of the forward map.
 struct CompanionEffect {
@@ -45,7 +49,18 @@ pub(super) struct Learning<'a> {
     pub found: &'a IdentifiedCompanion,
     pub pieces: &'a Pieces,
     pub region: Region,
+    /// The point of the study's parameters in the middle of the region.
+    pub point: Vec<f64>,
+    pub extent: Extent,
     pub random: Stream,
+}
+
+/// The extent of the sizes for which changes are learned.
+pub(super) enum Extent {
+    /// As large as changes of the response of this root mean square, in its unit.
+    Change(f64),
+    /// As far from absence as these sizes by the names of candidates; for others as far as their priors.
+    Sizes(BTreeMap<String, f64>),
 }
 
 impl Learning<'_> {
@@ -62,18 +77,19 @@ impl Learning<'_> {
             }
             let inputs: Vec<FreeInput> =
                 piece.places.iter().map(|&i| self.pieces.inputs[i].clone()).collect();
-            let basis = Basis::new(self.region.clone(), &inputs);
-            let points = basis.points(&self.random);
-            // All candidates are learned at the same points of the parameters.
-            if points.len() > without.rows() {
-                without = self.answers(&bare, points.iter().map(|(own, _)| (own, &[][..])))?;
-            }
             let model = self.pieces.wider(study, &[p])?;
             let model = model.ok_or_else(|| Stop::new("the companion has no model"))?;
             let priors = study.parameters.iter().map(|p| p.prior.clone());
             let priors = priors.chain(inputs.iter().map(|i| i.prior.clone())).collect();
             let simulator = self.pieces.simulator(study, &model)?;
             let map = ModelMap::with(simulator, priors, study.layouts.len());
+            let reach = self.reach(&kind, &inputs, &bare, &map)?;
+            let basis = Basis::new(self.region.clone(), &inputs, reach);
+            let points = basis.points(&self.random);
+            // All candidates are learned at the same points of the parameters.
+            if points.len() > without.rows() {
+                without = self.answers(&bare, points.iter().map(|(own, _)| (own, &[][..])))?;
+            }
             let with = self.answers(&map, points.iter().map(|(own, values)| (own, &values[..])))?;
             let difference = |i: usize| -> Vec<f64> {
                 with.row(i).iter().zip(without.row(i)).map(|(a, b)| a - b).collect()
@@ -91,6 +107,40 @@ impl Learning<'_> {
             }
         }
         Ok(all)
+    }
+
+    /// The distance of a size from absence up to which its change is learned.
+    fn reach(
+        &self,
+        kind: &str,
+        inputs: &[FreeInput],
+        bare: &ModelMap<'_>,
+        map: &ModelMap<'_>,
+    ) -> Result<f64, Stop> {
+        let all = distances(&inputs[0]);
+        let most = match &self.extent {
+            Extent::Sizes(sizes) => {
+                let size = sizes.get(kind).map(|size| FAR * (size - inputs[0].absent).abs());
+                return Ok(size.filter(|far| *far > 0.0).map_or(all[0], |far| far.min(all[0])));
+            }
+            Extent::Change(rms) => FAR * rms,
+        };
+        let (low, high) = inputs[0].prior.support();
+        let values = |far: &f64| -> Vec<f64> {
+            let above = inputs[0].absent + far;
+            let size = if above <= high { above } else { (inputs[0].absent - far).max(low) };
+            let index = |input: &FreeInput| input.starts.first().copied().unwrap_or(input.absent);
+            std::iter::once(size).chain(inputs[1..].iter().map(index)).collect()
+        };
+        let values: Vec<Vec<f64>> = all.iter().map(values).collect();
+        let with = self.answers(map, values.iter().map(|values| (&self.point, &values[..])))?;
+        let without = self.answers(bare, std::iter::once((&self.point, &[][..])))?;
+        let rms = |row: &[f64]| {
+            let square: f64 = row.iter().zip(without.row(0)).map(|(a, b)| (a - b).powi(2)).sum();
+            (square / row.len().max(1) as f64).sqrt()
+        };
+        let fits = |k: &usize| rms(with.row(*k)) <= most;
+        Ok((0..all.len()).find(fits).map_or(all[all.len() - 1], |k| all[k]))
     }
 
     /// The type: an input has its own name, also where an effect on the response has the same, for both are the same

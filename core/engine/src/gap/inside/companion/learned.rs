@@ -16,8 +16,19 @@ use crate::gap::experiment::wider::FreeInput;
 /// Half the width of the region around the point, as a share of the central 95 % of each prior.
 const REGION: f64 = 0.15;
 
-/// The part of a size's prior in which changes are learned: the quantiles between this and its complement.
+/// The part of an index's prior in which changes are learned: the quantiles between this and its complement. The size
+/// reaches as far at most.
 const TAIL: f64 = 0.01;
+
+/// The share of the reach at which a difference has half the weight of one at absence: relative errors matter where a
+/// change is large, jumps of the simulator where it is small.
+const SMALL: f64 = 0.05;
+
+/// The farthest that a size is followed beyond its reach, in units of it.
+const BEYOND: f64 = 1.5;
+
+/// The number of halvings of the farthest distance of a size from absence.
+const HALVINGS: i32 = 12;
 
 /// The number of differences for each monomial.
 const EACH: usize = 5;
@@ -41,7 +52,7 @@ pub(super) struct Region {
 pub(super) struct Basis {
     region: Region,
     inputs: Vec<FreeInput>,
-    /// The width of each input's prior.
+    /// The distance of the size from absence up to which the change is learned, then the width of each index's prior.
     widths: Vec<f64>,
     /// The exponents of each monomial: of the parameters, of the indices, of the size.
     exponents: Vec<Vec<usize>>,
@@ -83,11 +94,12 @@ impl Region {
 }
 
 impl Basis {
-    /// The basis of a candidate with these inputs, the size first.
-    pub fn new(region: Region, inputs: &[FreeInput]) -> Self {
+    /// The basis of a candidate with these inputs, the size first, whose distance from absence reaches so far.
+    pub fn new(region: Region, inputs: &[FreeInput], reach: f64) -> Self {
         let variables = region.centre.len() + inputs.len();
         let width = |prior: &Distribution| prior.quantile(1.0 - TAIL) - prior.quantile(TAIL);
-        let widths = inputs.iter().map(|input| width(&input.prior)).collect();
+        let mut widths: Vec<f64> = inputs.iter().map(|input| width(&input.prior)).collect();
+        widths[0] = reach;
         let exponents = monomials(variables, DEGREE);
         // The size comes last among the variables.
         let exponents = exponents.into_iter().filter(|own| own[variables - 1] > 0).collect();
@@ -101,12 +113,26 @@ impl Basis {
             let mut rng = random.named("parameters").at(i as u64).generator();
             let shares: Vec<f64> = (0..d).map(|_| uniform(&mut rng)).collect();
             let mut rng = random.named("inputs").at(i as u64).generator();
-            let value = |input: &FreeInput| {
+            // More of the small sizes, where the change is small as well.
+            let share = uniform(&mut rng).powi(2);
+            let side = if uniform(&mut rng) < 0.5 { -1.0 } else { 1.0 };
+            let mut values = vec![self.size(side * share * self.widths[0])];
+            let index = |input: &FreeInput| {
                 input.prior.quantile(TAIL + (1.0 - 2.0 * TAIL) * uniform(&mut rng))
             };
-            (self.region.at(&shares), self.inputs.iter().map(value).collect())
+            values.extend(self.inputs[1..].iter().map(index));
+            (self.region.at(&shares), values)
         };
         (0..EACH * self.exponents.len()).map(one).collect()
+    }
+
+    /// The size at a distance from absence, on the other side where the prior does not reach there.
+    fn size(&self, distance: f64) -> f64 {
+        let FreeInput { prior, absent, .. } = &self.inputs[0];
+        let (low, high) = prior.support();
+        let inside = |x: &f64| (low..=high).contains(x);
+        let sizes = [absent + distance, absent - distance];
+        sizes.into_iter().find(inside).unwrap_or_else(|| sizes[0].clamp(low, high))
     }
 
     /// The monomials at a point.
@@ -114,12 +140,19 @@ impl Basis {
         let mut x = self.region.scaled(parameters);
         let scaled = |k: usize| (values[k] - self.inputs[k].absent) / self.widths[k];
         x.extend((1..self.inputs.len()).map(scaled));
-        x.push(scaled(0));
+        x.push(scaled(0).clamp(-BEYOND, BEYOND));
         let monomial = |own: &Vec<usize>| -> f64 {
             own.iter().zip(&x).map(|(&e, x)| x.powi(e as i32)).product()
         };
         self.exponents.iter().map(monomial).collect()
     }
+}
+
+/// The distances of a size from absence that a search for its reach tries, the largest first.
+pub(super) fn distances(size: &FreeInput) -> Vec<f64> {
+    let far = |p: f64| (size.prior.quantile(p) - size.absent).abs();
+    let most = far(TAIL).max(far(1.0 - TAIL));
+    (0..HALVINGS).map(|k| most * 0.5_f64.powi(k)).collect()
 }
 
 /// The exponents of all monomials up to a total degree.
@@ -148,10 +181,14 @@ impl LearnedChange {
         if used.len() < terms + terms / 2 {
             return None;
         }
-        let rows = used.iter().map(|&i| basis.row(&points[i].0, &points[i].1));
+        let absent = basis.inputs[0].absent;
+        let weight = |i: usize| 1.0 / (((points[i].1[0] - absent) / basis.widths[0]).abs() + SMALL);
+        let weighed =
+            |i: usize, row: &[f64]| -> Vec<f64> { row.iter().map(|x| weight(i) * x).collect() };
+        let rows = used.iter().map(|&i| weighed(i, &basis.row(&points[i].0, &points[i].1)));
         let design = Matrix::from_rows(terms, rows);
         let outputs = differences[used[0]].len();
-        let values = Matrix::from_rows(outputs, used.iter().map(|&i| &differences[i]));
+        let values = Matrix::from_rows(outputs, used.iter().map(|&i| weighed(i, &differences[i])));
         let mut normal = gram(&design);
         let mean = (0..terms).map(|k| normal[(k, k)]).sum::<f64>() / terms as f64;
         (0..terms).for_each(|k| normal[(k, k)] += RIDGE * mean);
@@ -183,7 +220,7 @@ mod tests {
     fn jumps_are_averaged() {
         let parameters = [Parameter::plain("a", Distribution::Uniform([0.0, 10.0]))];
         let size = FreeInput::new("s", Unit::dimensionless(), 0.0, Distribution::HalfNormal(0.5));
-        let basis = Basis::new(Region::around(&parameters, &[5.0]), &[size]);
+        let basis = Basis::new(Region::around(&parameters, &[5.0]), &[size], 1.2);
         let truth = |a: f64, s: f64| -> Vec<f64> {
             let at = |t: usize| 0.02 * t as f64;
             (0..50).map(|t| (a * at(t)).cos() * ((-s * at(t)).exp() - 1.0)).collect()

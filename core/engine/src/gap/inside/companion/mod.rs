@@ -19,7 +19,7 @@ use lacuna_linalg::Matrix;
 use lacuna_run::{RunDirectory, Stage};
 use serde_json::json;
 
-use self::effect::{CompanionCandidates, Learning};
+use self::effect::{CompanionCandidates, Extent, Learning};
 use self::learned::Region;
 use super::pieces::Pieces;
 use crate::gap::result::companion::IdentifiedCompanion;
@@ -59,13 +59,19 @@ impl AdmittedCompanion {
         if self.pieces.is_some() { self.found.errors.clone() } else { Matrix::default() }
     }
 
-    /// The candidates, learned near a point of the study's parameters; none if the companion is not admitted. Those that
+    /// The candidates, learned near a point of the study's parameters for changes as large as a misfit (root mean square, in
+    /// the response's unit); none if the companion is not admitted. Those that
     /// are part of the study are left out.
-    pub fn candidates(&self, study: &Study, point: &[f64]) -> Result<CompanionCandidates, Stop> {
+    pub fn candidates(
+        &self,
+        study: &Study,
+        point: &[f64],
+        misfit: f64,
+    ) -> Result<CompanionCandidates, Stop> {
         let (Some(companion), Some(pieces)) = (&study.gap.companion, &self.pieces) else {
             return Ok(CompanionCandidates::default());
         };
-        learning(study, companion, &self.found, pieces, point)
+        learning(study, companion, &self.found, pieces, point, Extent::Change(misfit))
             .candidates(|name| !companion.keys.add.iter().any(|added| added == name))
     }
 }
@@ -76,10 +82,12 @@ fn learning<'a>(
     found: &'a IdentifiedCompanion,
     pieces: &'a Pieces,
     point: &[f64],
+    extent: Extent,
 ) -> Learning<'a> {
-    let region = Region::around(&study.parameters, point);
+    let point = point[..study.parameters.len()].to_vec();
+    let region = Region::around(&study.parameters, &point);
     let random = stream(study, "gap").named("changes");
-    Learning { companion, found, pieces, region, random }
+    Learning { companion, found, pieces, region, point, extent, random }
 }
 
 /// Builds the effects of the candidates inside the companion that are part of the study, which every stage after this
@@ -97,7 +105,8 @@ pub fn build_added(study: &Study) -> Result<(), Stop> {
     let candidates = match Pieces::of(&companion.study)? {
         Some(pieces) => {
             let point = companion.centre();
-            let learning = learning(study, companion, &found, &pieces, &point);
+            let sizes = Extent::Sizes(companion.keys.around.clone());
+            let learning = learning(study, companion, &found, &pieces, &point, sizes);
             learning.candidates(|name| names.iter().any(|added| added == name))?.candidates
         }
         None => Vec::new(),

@@ -26,7 +26,7 @@ pub struct Effect {
     #[schemars(extend("propertyNames" = { "title": "unknown" }))]
     pub parameters: ByName<Unknown>,
     /// Probability that the type is right, as counted in simulated cases of which half hide physics that no candidate has:
-    /// of the study itself if `lacuna power` was run on it, otherwise of other systems. Never above 0.99.
+    /// of the study itself if `lacuna power STUDY` was run on it, otherwise of other systems. Never above 0.99.
     pub probability: f64,
     /// Posterior probability of the type among the candidates, as if one of them were exactly true.
     pub posterior_probability: Quantity,
