@@ -79,7 +79,7 @@ impl Check<'_> {
                 "enum" if !rule.as_array().unwrap().contains(value) => {
                     self.say(path, &format!("{value} is none of {rule}"));
                 }
-                "minimum" if value.as_f64() < rule.as_f64() => {
+                "minimum" if value.is_number() && value.as_f64() < rule.as_f64() => {
                     self.say(path, &format!("{value} is below {rule}"));
                 }
                 "anyOf" | "oneOf" => self.cases(rule.as_array().unwrap(), value, path),
