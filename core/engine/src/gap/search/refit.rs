@@ -163,8 +163,8 @@ pub fn most_promising(
 }
 
 /// Refits placements and computes their evidences; the one of largest weight comes first. Every evidence is computed by
-/// Laplace's method at the best fit; that of placements [not far](FAR) below the best also at the fits under a
-/// remainder, and of those [near](NEAR) it with the correction by importance sampling.
+/// Laplace's method at the best fit; that of placements not far (30) below the best also at the fits under a
+/// remainder, and of those near (12) it with the correction by importance sampling.
 pub fn refit_all(
     setting: &RefitSetting<'_, '_>,
     base: &Fit,

@@ -2,7 +2,7 @@
 //!
 //! Levenberg and Marquardt's method on whitened residuals with rows for the prior (Nocedal and Wright, Numerical
 //! Optimization, 2nd ed., section 10.3), inside the bounds of the priors: each step is the least value of the damped
-//! quadratic inside the box that they form, in the [coordinates](super::coordinate) in which the priors are about normal.
+//! quadratic inside the box that they form, in the coordinates in which the priors are about normal.
 
 use lacuna::math::distribution::Distribution;
 use lacuna_linalg::vector::dot;

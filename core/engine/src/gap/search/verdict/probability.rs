@@ -98,7 +98,7 @@ impl Traits {
         ]
     }
 
-    /// The probability that the class of the effect has the type that is missing; between [`FLOOR`] and [`CEILING`],
+    /// The probability that the class of the effect has the type that is missing; between 0.01 and [`CEILING`],
     /// and monotone in every quantity.
     pub fn probability(&self) -> f64 {
         let each = self.scaled().into_iter().zip(FITTED.slopes);

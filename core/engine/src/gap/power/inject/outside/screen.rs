@@ -29,7 +29,7 @@ pub struct Nearest {
     /// The share of the squared whitened length of the change, off the slopes of the parameters, that the best candidate
     /// explains with a size of its own on each sensor.
     pub explained: f64,
-    /// The types that explain nearly as much, the best first; empty if that is less than [`NEAR`].
+    /// The types that explain nearly as much, the best first; empty if that is less than 0.6 of it.
     pub types: Vec<String>,
     /// The squared whitened length that the best candidate leaves with one size on all sensors on which the change acts:
     /// the part that shows that its form is another one, in squared standard deviations.
