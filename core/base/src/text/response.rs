@@ -222,10 +222,15 @@ impl JsonSchema for Axes {
     fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
         let labels = generator.subschema_for::<LabelSection>();
         let grid = generator.subschema_for::<GridSection>();
+        // Told apart by the key `labels`: of an `anyOf`, a validator could not say which key is wrong.
+        let placed = serde_json::json!({ "type": "object", "required": ["labels"] });
+        let numbers = serde_json::json!({ "type": "object", "not": { "required": ["labels"] } });
         schemars::json_schema!({
             "type": "object",
             "additionalProperties": {
-                "anyOf": [{ "type": "array", "items": { "type": "string" } }, labels, grid]
+                "type": ["array", "object"],
+                "items": { "type": "string" },
+                "allOf": [{ "if": placed, "then": labels }, { "if": numbers, "then": grid }]
             }
         })
     }
