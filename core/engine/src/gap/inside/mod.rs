@@ -4,6 +4,7 @@
 //! inputs that are present; if a surrogate replaces it, the surrogate is trained on further runs.
 
 pub mod advice;
+mod change;
 pub mod companion;
 mod emulated;
 mod narrow;

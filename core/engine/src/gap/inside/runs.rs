@@ -6,10 +6,10 @@
 
 use std::sync::Arc;
 
-use lacuna::data::{Layout, Layouts, Parameter};
-use lacuna::plugin::effect::{Description, Reach, SMOOTH, Situation, by_parameter_steps_of};
+use lacuna::data::Parameter;
+use lacuna::plugin::effect::Description;
 use lacuna::plugin::registry::Section;
-use lacuna::plugin::{Component, Effect, Emulator, Hyperparameter, Reader};
+use lacuna::plugin::{Effect, Emulator, Reader};
 use lacuna::run::{Observer, Stop, files};
 use lacuna_linalg::Matrix;
 use lacuna_run::{Kept, RunDirectory, Stage};
@@ -18,6 +18,7 @@ use toml::Table;
 
 use crate::gap::candidates::Candidate;
 use crate::gap::experiment::wider::FreeInput;
+use crate::gap::inside::change::{Change, ChangeEffect};
 use crate::gap::result::IN_RUNS;
 use crate::gap::system::switched::InputEffect;
 use crate::stage::inverse_problem::InverseProblem;
@@ -26,16 +27,13 @@ use crate::stage::surrogate::{self, Fitting, Purpose};
 use crate::study::Study;
 use crate::study::gap::RunsKeys;
 
-/// The physics of a table as an effect on the response of the study's emulator.
-struct RunsEffect {
+/// The change that the physics of a table makes, learned by the study's surrogate.
+struct RunsChange {
     /// The change of the response over the study's parameters, and over the size if the table varies it.
-    change: Box<dyn Emulator>,
-    /// The number of the study's parameters.
-    own: usize,
+    learned: Box<dyn Emulator>,
     varies: bool,
-    layouts: Layouts,
-    inner: InputEffect,
-    relative_error: f64,
+    /// The size without the physics.
+    absent: f64,
 }
 
 /// The candidates of all tables of a study.
@@ -68,9 +66,9 @@ fn candidate(
         validation: Vec::new(),
         purpose: Purpose::Gap(name),
     };
-    let (_, change) = surrogate::stage(study, &data, &fitting, run, observer)?;
+    let (_, learned) = surrogate::stage(study, &data, &fitting, run, observer)?;
     let square = |m: &Matrix| m.as_slice().iter().map(|y| y * y).sum::<f64>();
-    let left = square(&change.fit_error().residuals);
+    let left = square(&learned.fit_error().residuals);
     let relative_error =
         (left / square(&data.value.runs()?.responses).max(f64::MIN_POSITIVE)).sqrt();
     let size = FreeInput::new(keys.size_name(), keys.unit.clone(), keys.absent, keys.prior.clone());
@@ -79,10 +77,9 @@ fn candidate(
         formula: "y + change of the response between two tables of runs".to_owned(),
         source: "the simulator's own".to_owned(),
     };
-    let effect: Arc<dyn Effect> = Arc::new(RunsEffect {
-        change,
+    let effect: Arc<dyn Effect> = Arc::new(ChangeEffect {
+        change: RunsChange { learned, varies: keys.size.is_some(), absent: keys.absent },
         own: study.parameters.len(),
-        varies: keys.size.is_some(),
         layouts: study.layouts.clone(),
         inner: InputEffect { places: Vec::new(), inputs: vec![size], description },
         relative_error,
@@ -126,95 +123,17 @@ fn data(
     })
 }
 
-impl RunsEffect {
-    /// The change of the response of a block.
-    fn change(&self, layout: &Layout, values: &[f64], point: &[f64]) -> Vec<f64> {
+impl Change for RunsChange {
+    fn at(&self, point: &[f64], values: &[f64]) -> Vec<f64> {
         let at = |size: Option<f64>| {
-            let point: Vec<f64> = point[..self.own].iter().copied().chain(size).collect();
-            self.change.mean(&Matrix::from_vec(1, point.len(), point)).into_vec()
+            let point: Vec<f64> = point.iter().copied().chain(size).collect();
+            self.learned.mean(&Matrix::from_vec(1, point.len(), point)).into_vec()
         };
-        let absent = self.inner.inputs[0].absent;
-        let all: Vec<f64> = if self.varies {
-            at(Some(values[0])).iter().zip(at(Some(absent))).map(|(a, b)| a - b).collect()
+        if self.varies {
+            let absent = at(Some(self.absent));
+            at(Some(values[0])).iter().zip(absent).map(|(a, b)| a - b).collect()
         } else {
-            at(None).iter().map(|y| (values[0] - absent) * y).collect()
-        };
-        let mut parts = self.layouts.parts();
-        let range = parts.find(|(block, _)| *block == layout).map(|(_, range)| range);
-        range.map_or_else(Vec::new, |range| all[range].to_vec())
-    }
-}
-
-impl Component for RunsEffect {}
-
-impl Effect for RunsEffect {
-    fn describe(&self) -> Description {
-        self.inner.describe()
-    }
-
-    fn parameters(&self, layout: &Layout) -> Vec<Hyperparameter> {
-        self.inner.parameters(layout)
-    }
-
-    fn absent(&self, layout: &Layout) -> Vec<f64> {
-        self.inner.absent(layout)
-    }
-
-    /// The response is returned unchanged: the change depends on a point of the parameters.
-    fn apply(&self, _layout: &Layout, response: &[f64], _values: &[f64]) -> Vec<f64> {
-        response.to_vec()
-    }
-
-    fn apply_at(
-        &self,
-        layout: &Layout,
-        response: &[f64],
-        values: &[f64],
-        point: &[f64],
-    ) -> Vec<f64> {
-        let change = self.change(layout, values, point);
-        response.iter().zip(change).map(|(y, d)| y + d).collect()
-    }
-
-    fn by_parameters_at(
-        &self,
-        layout: &Layout,
-        _response: &[f64],
-        values: &[f64],
-        point: &[f64],
-    ) -> Matrix {
-        let change = |values: &[f64]| self.change(layout, values, point);
-        by_parameter_steps_of(&self.parameters(layout), layout.len(), values, SMOOTH, change)
-    }
-
-    /// The change is added, and its own slopes by the parameters are of second order: they are left out.
-    fn push_forward(
-        &self,
-        _layout: &Layout,
-        _response: &[f64],
-        _values: &[f64],
-        tangent: &[f64],
-    ) -> Vec<f64> {
-        tangent.to_vec()
-    }
-
-    fn starts(&self, layout: &Layout, situation: &Situation<'_>) -> Vec<Vec<f64>> {
-        self.inner.starts(layout, situation)
-    }
-
-    fn proposals(&self, _situation: &Situation<'_>) -> Vec<Table> {
-        Vec::new()
-    }
-
-    fn reach(&self) -> Reach {
-        Reach::Whole
-    }
-
-    fn acts_first(&self) -> bool {
-        true
-    }
-
-    fn relative_error(&self) -> f64 {
-        self.relative_error
+            at(None).iter().map(|y| (values[0] - self.absent) * y).collect()
+        }
     }
 }

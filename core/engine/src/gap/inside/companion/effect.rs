@@ -3,10 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use lacuna::data::{Layout, Layouts};
 use lacuna::math::random::Stream;
-use lacuna::plugin::effect::{Description, Reach, SMOOTH, Situation, by_parameter_steps_of};
-use lacuna::plugin::{Component, Effect, Forward, Hyperparameter};
+use lacuna::plugin::{Effect, Forward};
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
 use toml::Table;
@@ -14,6 +12,7 @@ use toml::Table;
 use super::learned::{Basis, LearnedChange, Region, distances};
 use crate::gap::candidates::{Candidate, Untried};
 use crate::gap::experiment::wider::FreeInput;
+use crate::gap::inside::change::ChangeEffect;
 use crate::gap::inside::pieces::{Piece, Pieces};
 use crate::gap::result::IN_COMPANION;
 use crate::gap::result::companion::IdentifiedCompanion;
@@ -23,16 +22,6 @@ use crate::study::gap::Companion;
 
 /// Changes are learned up to this multiple of the misfit, or of the size that was found.
 const FAR: f64 = 3.0;
-
-/// A candidate inside a companion. Its change depends on the study's parameters, the first of those of the forward map.
-struct CompanionEffect {
-    change: LearnedChange,
-    /// The number of the study's parameters.
-    own: usize,
-    layouts: Layouts,
-    inner: InputEffect,
-    of_changes: f64,
-}
 
 /// The candidates inside a companion.
 #[derive(Default)]
@@ -176,12 +165,12 @@ impl Learning<'_> {
         // The places are those of an extended map, which is not used.
         let inner =
             InputEffect { places: Vec::new(), inputs, description: piece.description.clone() };
-        let effect: Arc<dyn Effect> = Arc::new(CompanionEffect {
+        let effect: Arc<dyn Effect> = Arc::new(ChangeEffect {
             change,
             own: self.companion.own(),
             layouts: self.companion.study.layouts.clone(),
             inner,
-            of_changes: self.found.of_changes,
+            relative_error: self.found.of_changes,
         });
         Candidate {
             kind,
@@ -190,90 +179,5 @@ impl Learning<'_> {
             odds: 1.0,
             effect,
         }
-    }
-}
-
-impl CompanionEffect {
-    /// The change of the response of a block.
-    fn change(&self, layout: &Layout, values: &[f64], point: &[f64]) -> Vec<f64> {
-        let mut parts = self.layouts.parts();
-        let range = parts.find(|(block, _)| *block == layout).map(|(_, range)| range);
-        range.map_or_else(Vec::new, |range| {
-            self.change.at(&point[..self.own], values)[range].to_vec()
-        })
-    }
-}
-
-impl Component for CompanionEffect {}
-
-impl Effect for CompanionEffect {
-    fn describe(&self) -> Description {
-        self.inner.describe()
-    }
-
-    fn parameters(&self, layout: &Layout) -> Vec<Hyperparameter> {
-        self.inner.parameters(layout)
-    }
-
-    fn absent(&self, layout: &Layout) -> Vec<f64> {
-        self.inner.absent(layout)
-    }
-
-    /// The response is returned unchanged: without a point of the parameters the companion has no answer.
-    fn apply(&self, _layout: &Layout, response: &[f64], _values: &[f64]) -> Vec<f64> {
-        response.to_vec()
-    }
-
-    fn apply_at(
-        &self,
-        layout: &Layout,
-        response: &[f64],
-        values: &[f64],
-        point: &[f64],
-    ) -> Vec<f64> {
-        let change = self.change(layout, values, point);
-        response.iter().zip(change).map(|(y, d)| y + d).collect()
-    }
-
-    fn by_parameters_at(
-        &self,
-        layout: &Layout,
-        _response: &[f64],
-        values: &[f64],
-        point: &[f64],
-    ) -> Matrix {
-        let change = |values: &[f64]| self.change(layout, values, point);
-        by_parameter_steps_of(&self.parameters(layout), layout.len(), values, SMOOTH, change)
-    }
-
-    /// The change is added, and its own slopes by the parameters are of second order: they are left out.
-    fn push_forward(
-        &self,
-        _layout: &Layout,
-        _response: &[f64],
-        _values: &[f64],
-        tangent: &[f64],
-    ) -> Vec<f64> {
-        tangent.to_vec()
-    }
-
-    fn starts(&self, layout: &Layout, situation: &Situation<'_>) -> Vec<Vec<f64>> {
-        self.inner.starts(layout, situation)
-    }
-
-    fn proposals(&self, _situation: &Situation<'_>) -> Vec<Table> {
-        Vec::new()
-    }
-
-    fn reach(&self) -> Reach {
-        Reach::Whole
-    }
-
-    fn acts_first(&self) -> bool {
-        true
-    }
-
-    fn relative_error(&self) -> f64 {
-        self.of_changes
     }
 }

@@ -12,6 +12,7 @@ use lacuna::math::random::{Stream, uniform};
 use lacuna_linalg::{Cholesky, Matrix, gram, transposed_multiply, transposed_multiply_vector};
 
 use crate::gap::experiment::wider::FreeInput;
+use crate::gap::inside::change::Change;
 
 /// Half the width of the region around the point, as a share of the central 95 % of each prior.
 const REGION: f64 = 0.15;
@@ -199,10 +200,11 @@ impl LearnedChange {
         }
         Some(Self { basis, coefficients: products.transposed() })
     }
+}
 
-    /// The change at a point, one value per output.
-    pub fn at(&self, parameters: &[f64], values: &[f64]) -> Vec<f64> {
-        transposed_multiply_vector(&self.coefficients, &self.basis.row(parameters, values))
+impl Change for LearnedChange {
+    fn at(&self, point: &[f64], values: &[f64]) -> Vec<f64> {
+        transposed_multiply_vector(&self.coefficients, &self.basis.row(point, values))
     }
 }
 
