@@ -96,6 +96,22 @@ fn axial_momentum_changes_by_the_reactions_of_the_rear() {
 }
 
 #[test]
+fn an_end_that_reflects_more_comes_closer_to_a_rigid_one() {
+    let mercury = Mercury { tensile_cutoff: 1e12, ..RIEMER };
+    let strain = |settings: &Settings| simulate(settings, &mercury).unwrap();
+    let mut rigid = coarse();
+    rigid.numerics.rear = Rear::Rigid;
+    let rigid = strain(&rigid);
+    let distance = |reflection: f64| {
+        let outcome = strain(&Settings { rear_reflection: reflection, ..coarse() });
+        let pairs = outcome.strain.iter().flatten().zip(rigid.strain.iter().flatten());
+        pairs.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs())) / largest(&rigid)
+    };
+    let [none, half, nearly] = [0.0, 0.5, 0.999].map(distance);
+    assert!(none > half && half > 10.0 * nearly && nearly < 0.02, "{none} {half} {nearly}");
+}
+
+#[test]
 fn undamped_uncavitated_motion_runs_backwards() {
     let target = Target::new(&undamped(0.7)).unwrap();
     let mut solver = by_hand(&target, INVISCID, 1e12);
