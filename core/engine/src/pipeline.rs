@@ -14,7 +14,7 @@ use lacuna::plugin::registry::{NoKeys, Section};
 use lacuna::run::{Listener, Observer, Stop, files};
 use lacuna_run::{Kept, RunDirectory, Stage};
 
-use crate::gap::inside::companion;
+use crate::gap::inside::{companion, runs};
 use crate::gap::power::{PowerDesign, Rates, stage as power};
 use crate::gap::report::reliability::power_page;
 use crate::gap::stage as gap;
@@ -114,7 +114,6 @@ fn pursue(
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {
     contents::before_all(study)?;
-    companion::build_added(study)?;
     manifest::begin(study, run)?;
     let observer = &Listener::new(observer);
     let findings = match (&study.target, &study.surrogate) {
@@ -139,6 +138,7 @@ pub fn emulate(
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Emulated, Stop> {
+    companion::build_added(study)?;
     let placed = design::stage(study, run, observer)?;
     let simulated = simulate::stage(study, placed.as_ref(), run, observer)?;
     let data = read::stage(study, simulated.as_ref(), run, observer)?;
@@ -147,7 +147,9 @@ pub fn emulate(
     let fitted = surrogate::stage(study, &data, &fitting, run, observer)?;
     let folders = numerical_error::folders();
     let numerics = numerical_error::stage(study, &data, None, &folders, run, observer)?;
-    Emulated::new(study, data, fitted, numerics, None)
+    let emulated = Emulated::new(study, data, fitted, numerics, None)?;
+    runs::build_added(study, &emulated.problem(), run, observer)?;
+    Ok(emulated)
 }
 
 /// Stages of a study with a surrogate up to the posterior, which exists if the study has measurements.

@@ -103,29 +103,27 @@ impl Study {
         chosen.chain(other).chain(tried).flatten().collect()
     }
 
-    /// Returns true if the study changes the response of its model by effects or by candidates inside its companion.
+    /// Returns true if the study changes the response of its model by effects or by candidates of `[gap]`.
     pub fn has_effects(&self) -> bool {
-        !self.effects.is_empty()
-            || self.gap.companion.as_ref().is_some_and(|c| !c.keys.add.is_empty())
+        !self.effects.is_empty() || self.gap.has_added()
     }
 
     /// The effects as plain data, for the hash of results that depend on them.
     pub fn effects_identity(&self) -> Vec<serde_json::Value> {
         let own = self.effects.iter().map(|e| json!((e.built.identity(), &e.common)));
-        let companion = self.gap.companion.as_ref().filter(|c| !c.keys.add.is_empty());
-        own.chain(companion.map(|c| c.identity())).collect()
+        own.chain(self.gap.added().map(|added| json!((&added.name, &added.origin)))).collect()
     }
 
-    /// The effects with their names and places: first those of candidates inside the companion, which are physics of the
-    /// model.
+    /// The effects with their names and places: first those of added candidates, which are physics of the model.
     pub fn placed_effects<'a>(&'a self) -> Vec<Placed<'a>> {
         let place = |section: &'a Section<dyn Effect, EffectKeys>| {
             let Section { built, common, .. } = section;
             Placed::new(effect_name(section), &*built.plugin, &self.layouts, &common.on)
         };
-        let inside = self.gap.companion.iter().flat_map(|companion| companion.added());
-        let inside =
-            inside.map(|(name, effect)| Placed::new(name, &**effect, &self.layouts, &On::new()));
+        let inside = self
+            .gap
+            .added()
+            .map(|added| Placed::new(&added.name, &*added.effect, &self.layouts, &On::new()));
         inside.chain(self.effects.iter().map(place)).collect()
     }
 }

@@ -1,5 +1,6 @@
 //! Changes that a study needs to include an effect inside its model, or another model.
 
+mod keys;
 mod swap;
 mod text;
 
@@ -8,6 +9,8 @@ use lacuna::math::distribution::Distribution;
 use lacuna::plugin::amend::{Change, changed};
 use lacuna::text::emit::{Unwritable, to_table};
 use toml::{Table, Value};
+
+pub use keys::with_keys;
 
 /// Changes of a study.
 #[derive(Debug, Clone, Default, PartialEq)]

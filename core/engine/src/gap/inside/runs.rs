@@ -25,7 +25,7 @@ use crate::stage::inverse_problem::InverseProblem;
 use crate::stage::read::{self, Data};
 use crate::stage::surrogate::{self, Fitting, Purpose};
 use crate::study::Study;
-use crate::study::gap::RunsKeys;
+use crate::study::gap::{AddedCandidate, RunsKeys};
 
 /// The change that the physics of a table makes, learned by the study's surrogate.
 struct RunsChange {
@@ -36,25 +36,52 @@ struct RunsChange {
     absent: f64,
 }
 
-/// The candidates of all tables of a study.
+/// The candidates of the tables of a study whose physics is not part of it.
 pub fn candidates(
     study: &Study,
     problem: &InverseProblem<'_>,
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Vec<Candidate>, Stop> {
-    let one =
-        |section: &Section<dyn Reader, RunsKeys>| candidate(study, section, problem, run, observer);
-    study.gap.runs.iter().map(one).collect()
+    let others = study.gap.runs.iter().filter(|section| !study.gap.is_added(&section.common));
+    let one = |section: &Section<dyn Reader, RunsKeys>| {
+        let kind = section.common.name.as_str().to_owned();
+        let (effect, _) = learned(study, section, problem, run, observer)?;
+        let plugin = IN_RUNS.to_owned();
+        Ok(Candidate { kind, plugin, options: Table::new(), odds: 1.0, effect })
+    };
+    others.map(one).collect()
 }
 
-fn candidate(
+/// Learns the effects of the tables whose physics is part of the study, which every stage after the emulator uses.
+pub fn build_added(
+    study: &Study,
+    problem: &InverseProblem<'_>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<(), Stop> {
+    let added = study
+        .gap
+        .keys
+        .add
+        .iter()
+        .filter_map(|name| study.gap.runs.iter().find(|section| section.common.name == *name));
+    let one = |section: &Section<dyn Reader, RunsKeys>| {
+        let (effect, origin) = learned(study, section, problem, run, observer)?;
+        Ok(AddedCandidate { name: section.common.name.as_str().to_owned(), effect, origin })
+    };
+    study.gap.set_added(added.map(one).collect::<Result<_, Stop>>()?);
+    Ok(())
+}
+
+/// The physics of a table as an effect, with the hash of everything from which it was learned.
+fn learned(
     study: &Study,
     section: &Section<dyn Reader, RunsKeys>,
     problem: &InverseProblem<'_>,
     run: &mut RunDirectory,
     observer: &dyn Observer,
-) -> Result<Candidate, Stop> {
+) -> Result<(Arc<dyn Effect>, String), Stop> {
     let keys = &section.common;
     let parameters = parameters(study, keys);
     let data = data(study, section, &parameters, problem, run, observer)?;
@@ -66,7 +93,7 @@ fn candidate(
         validation: Vec::new(),
         purpose: Purpose::Gap(name),
     };
-    let (_, learned) = surrogate::stage(study, &data, &fitting, run, observer)?;
+    let (fitted, learned) = surrogate::stage(study, &data, &fitting, run, observer)?;
     let square = |m: &Matrix| m.as_slice().iter().map(|y| y * y).sum::<f64>();
     let left = square(&learned.fit_error().residuals);
     let relative_error =
@@ -84,8 +111,8 @@ fn candidate(
         inner: InputEffect { places: Vec::new(), inputs: vec![size], description },
         relative_error,
     });
-    let (kind, plugin) = (name.to_owned(), IN_RUNS.to_owned());
-    Ok(Candidate { kind, plugin, options: Table::new(), odds: 1.0, effect })
+    let laws = json!([fitted.hash, keys]);
+    Ok((effect, files::hash(laws.to_string().as_bytes())))
 }
 
 /// The study's parameters, and the size if the table varies it.

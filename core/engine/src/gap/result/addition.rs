@@ -64,6 +64,11 @@ impl AddedEffect {
         self.plugin == IN_COMPANION
     }
 
+    /// Returns true if a further table of runs shows it.
+    pub fn is_in_runs(&self) -> bool {
+        self.plugin == IN_RUNS
+    }
+
     /// The label in reports: the type, or the name of the other model.
     pub fn label(&self) -> &str {
         if self.model { &self.name } else { &self.kind }

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 
 use lacuna::run::{Stop, files};
 use lacuna::text::emit::{key, string, to_line};
+use lacuna::text::values::Name;
 use lacuna::text::{Problems, Sources, read};
 use serde::Serialize;
 
-use crate::gap::edit::Edit;
+use crate::gap::edit::{Edit, with_keys};
 use crate::gap::inside;
 use crate::gap::inside::Pieces;
 use crate::gap::inside::companion::edit::with_added;
@@ -132,6 +133,7 @@ fn text(study: &Study, path: &Path, result: &GapResult) -> Result<String, Stop> 
         None => study.text.clone(),
     };
     let own = in_companion(own, study, result)?;
+    let own = in_runs(own, study, result)?;
     text.push_str(&renamed(own, study, result));
     if !text.ends_with('\n') {
         text.push('\n');
@@ -142,7 +144,9 @@ fn text(study: &Study, path: &Path, result: &GapResult) -> Result<String, Stop> 
         }
         text.push('\n');
     }
-    for addition in on_top.iter().filter(|addition| !addition.is_in_companion()) {
+    let is_plugin =
+        |addition: &&&AddedEffect| !addition.is_in_companion() && !addition.is_in_runs();
+    for addition in on_top.iter().filter(is_plugin) {
         text.push('\n');
         text.push_str(&block(study, addition)?);
     }
@@ -185,6 +189,19 @@ fn in_companion(text: String, study: &Study, result: &GapResult) -> Result<Strin
     let sizes = own.iter().map(|addition| (addition.kind.as_str(), addition.unknowns[0].value));
     around.extend(sizes);
     with_added(text, study, &names, companion, &around, &comments)
+}
+
+/// The text with the effects that further tables of runs show.
+fn in_runs(text: String, study: &Study, result: &GapResult) -> Result<String, Stop> {
+    let own = result.additions.iter().filter(|addition| addition.is_in_runs());
+    let own: Vec<&AddedEffect> = own.collect();
+    if own.is_empty() {
+        return Ok(text);
+    }
+    let before = study.gap.keys.add.iter().map(Name::as_str);
+    let names: Vec<&str> = before.chain(own.iter().map(|added| added.kind.as_str())).collect();
+    let comments: String = own.iter().map(|addition| found(addition)).collect();
+    Ok(with_keys(text, "[gap]", vec![("add", line(&names)?)], &comments))
 }
 
 /// The text with a name of its own if it gives one: two studies with the same name would share a run directory.

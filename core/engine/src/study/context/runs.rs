@@ -1,5 +1,7 @@
 //! Consistency of `[[gap.runs]]` with the rest of the study.
 
+use lacuna::text::nearest::one_of;
+use lacuna::text::values::Name;
 use lacuna::text::{Complaints, Node, Problems};
 
 use crate::study::Study;
@@ -7,6 +9,14 @@ use crate::study::Study;
 /// Reports tables that a study without an emulator cannot use, sizes that are parameters, and priors without the size of
 /// absence; `gap` is the section.
 pub(super) fn check(study: &Study, gap: &Node, problems: &mut Problems) {
+    let named = |name: &Name| study.gap.runs.iter().any(|section| section.common.name == *name);
+    for name in study.gap.keys.add.iter().filter(|name| !named(name)) {
+        let tables = study.gap.runs.iter().map(|section| section.common.name.as_str());
+        Complaints::new(gap, problems)
+            .at("add")
+            .say(format!("there is no table `{name}` of `[[gap.runs]]` to add"))
+            .expected(one_of(tables));
+    }
     let nodes = gap.get("runs").map(Node::elements).unwrap_or_default();
     for (i, (section, node)) in study.gap.runs.iter().zip(nodes).enumerate() {
         problems.within("runs", |problems| {

@@ -1,13 +1,11 @@
 //! `[gap.companion]`: a cheap model of the same physics, inside which candidates act.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
-use lacuna::data::{Layout, Parameter};
-use lacuna::plugin::effect::{Description, Situation};
+use lacuna::data::Parameter;
+use lacuna::plugin::Model;
 use lacuna::plugin::registry::{Section, section};
-use lacuna::plugin::{Component, Effect, Hyperparameter, Model};
-use lacuna::run::Fault;
 use lacuna::text::quantity::Quantity;
 use lacuna::text::values::{Count, Positive};
 use lacuna::text::{Complaints, Node, Problems};
@@ -16,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use toml::Table;
 
+use super::added::{Added, AddedCandidate};
 use super::inside::{Inside, SwitchSection};
 use super::{Gap, GapSection};
 use crate::study::Study;
@@ -92,11 +91,8 @@ pub struct Companion {
     /// The companion as the model of a study without a surrogate. The parameters are those of the study, then the
     /// constants; the candidates are those of the companion.
     pub study: Arc<Study>,
-    added: OnceLock<Vec<AddedCandidate>>,
+    added: Added,
 }
-
-/// A candidate that is part of the study: its name, and its effect on the response.
-pub type AddedCandidate = (String, Arc<dyn Effect>);
 
 /// Reads `[gap.companion]` of a study; `None` after reporting an error.
 pub(in crate::study) fn companion(
@@ -117,7 +113,7 @@ pub(in crate::study) fn companion(
         ..Gap::default()
     };
     let study = study.companion_of(parameters, unknowns, plugins, gap);
-    Some(Companion { keys, study: Arc::new(study), added: OnceLock::new() })
+    Some(Companion { keys, study: Arc::new(study), added: Added::default() })
 }
 
 /// The parameters of a study, then the constants; those of the study have the names that they have there.
@@ -166,66 +162,19 @@ impl Companion {
         json!([model, self.keys, terms])
     }
 
-    /// Sets the effects of the candidates that are part of the study, which are built from its model once it runs; later
-    /// calls have no effect.
+    /// Sets the effects of the candidates that are part of the study, which are built from its model once it runs.
     pub fn set_added(&self, effects: Vec<AddedCandidate>) {
-        let _ = self.added.set(effects);
+        self.added.set(effects);
     }
 
-    /// The candidates that are part of the study. Without [`set_added`](Self::set_added) they report a fault, so that no
-    /// result is computed without them.
+    /// The candidates that are part of the study.
     pub fn added(&self) -> &[AddedCandidate] {
-        let unset =
-            |name: &String| -> AddedCandidate { (name.clone(), Arc::new(Unset::new(name))) };
-        self.added.get_or_init(|| self.keys.add.iter().map(unset).collect())
+        self.added.of(self.keys.add.iter().map(String::as_str))
     }
 
     /// The values of the constants, in their order, if the study states all of them.
     pub fn stated(&self) -> Option<Vec<f64>> {
         let value = |own: &ParameterSection| self.keys.constants.get(own.name.as_str()).copied();
         self.keys.parameter.iter().map(value).collect()
-    }
-}
-
-/// The place of an added candidate whose effect was not set.
-struct Unset(Arc<Fault>);
-
-impl Unset {
-    fn new(name: &str) -> Self {
-        let fault = Fault::new(format!("the candidate `{name}` of the companion"));
-        fault.report("its effect was not built before it was used");
-        Self(Arc::new(fault))
-    }
-}
-
-impl Component for Unset {
-    fn faults(&self) -> Vec<Arc<Fault>> {
-        vec![Arc::clone(&self.0)]
-    }
-}
-
-impl Effect for Unset {
-    fn describe(&self) -> Description {
-        Description::new("not built", "", "")
-    }
-
-    fn parameters(&self, _layout: &Layout) -> Vec<Hyperparameter> {
-        Vec::new()
-    }
-
-    fn absent(&self, _layout: &Layout) -> Vec<f64> {
-        Vec::new()
-    }
-
-    fn apply(&self, _layout: &Layout, response: &[f64], _values: &[f64]) -> Vec<f64> {
-        vec![f64::NAN; response.len()]
-    }
-
-    fn starts(&self, _layout: &Layout, _situation: &Situation<'_>) -> Vec<Vec<f64>> {
-        Vec::new()
-    }
-
-    fn proposals(&self, _situation: &Situation<'_>) -> Vec<Table> {
-        Vec::new()
     }
 }

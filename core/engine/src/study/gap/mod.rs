@@ -1,5 +1,6 @@
 //! `[gap]`: settings and candidates of the search for missing effects.
 
+pub mod added;
 pub mod companion;
 mod held;
 mod inside;
@@ -16,6 +17,8 @@ use lacuna::text::{Node, Problems};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use added::Added;
+pub use added::AddedCandidate;
 pub use companion::Companion;
 pub use held::Held;
 pub(super) use held::{Loose, hold};
@@ -48,6 +51,10 @@ pub struct GapSection {
     pub prior_odds: PriorOdds,
     /// Data held out before the search, on which it is measured whether the gap became smaller.
     pub hold_out: HoldOut,
+    /// Names of the `[[gap.runs]]` whose physics is part of the study: its change is added to every response, and its size
+    /// is calibrated. Default: none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub add: Vec<Name>,
 }
 
 impl Default for GapSection {
@@ -62,6 +69,7 @@ impl Default for GapSection {
             terms: true,
             prior_odds: PriorOdds::default(),
             hold_out: HoldOut::default(),
+            add: Vec::new(),
         }
     }
 }
@@ -132,6 +140,31 @@ pub struct Gap {
     pub runs: Vec<Section<dyn Reader, RunsKeys>>,
     /// `[gap.companion]`.
     pub companion: Option<Box<Companion>>,
+    added: Added,
+}
+
+impl Gap {
+    /// Returns true if the physics of a table of runs is part of the study.
+    pub fn is_added(&self, runs: &RunsKeys) -> bool {
+        self.keys.add.contains(&runs.name)
+    }
+
+    /// Sets the effects of the tables of runs whose physics is part of the study, which are learned once it runs.
+    pub fn set_added(&self, effects: Vec<AddedCandidate>) {
+        self.added.set(effects);
+    }
+
+    /// The candidates that are part of the study: those inside the companion, then those of tables of runs.
+    pub fn added(&self) -> impl Iterator<Item = &AddedCandidate> {
+        let inside = self.companion.iter().flat_map(|companion| companion.added());
+        inside.chain(self.added.of(self.keys.add.iter().map(Name::as_str)))
+    }
+
+    /// Returns true if the study has such candidates.
+    pub fn has_added(&self) -> bool {
+        let companion = self.companion.as_ref();
+        !self.keys.add.is_empty() || companion.is_some_and(|c| !c.keys.add.is_empty())
+    }
 }
 
 /// The lists and sections of `[gap]`.
@@ -159,6 +192,6 @@ pub(super) fn gap(root: &Node, problems: &mut Problems) -> Option<Gap> {
         let runs = runs.into_iter().collect::<Option<_>>();
         let candidates = candidates.into_iter().collect::<Option<_>>();
         let (keys, candidates, inside, runs) = (keys?, candidates?, inside?, runs?);
-        Some(Gap { keys, candidates, inside, runs, companion: None })
+        Some(Gap { keys, candidates, inside, runs, ..Gap::default() })
     })
 }

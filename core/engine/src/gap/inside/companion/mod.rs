@@ -14,7 +14,7 @@ mod learned;
 use std::sync::Arc;
 
 use lacuna::data::Ensemble;
-use lacuna::run::{Observer, Stop};
+use lacuna::run::{Observer, Stop, files};
 use lacuna_linalg::Matrix;
 use lacuna_run::{RunDirectory, Stage};
 use serde_json::json;
@@ -22,12 +22,13 @@ use serde_json::json;
 use self::effect::{CompanionCandidates, Extent, Learning};
 use self::learned::Region;
 use super::pieces::Pieces;
+use crate::gap::candidates::Candidate;
 use crate::gap::result::companion::IdentifiedCompanion;
 use crate::stage::direct::ModelMap;
 use crate::stage::inverse_problem::InverseProblem;
 use crate::stage::stream;
 use crate::study::Study;
-use crate::study::gap::companion::Companion;
+use crate::study::gap::{AddedCandidate, Companion};
 
 /// A companion that is admitted, from which candidates are learned.
 pub struct AdmittedCompanion {
@@ -113,7 +114,12 @@ pub fn build_added(study: &Study) -> Result<(), Stop> {
     };
     let of_name = |name: &String| {
         let own = candidates.iter().find(|candidate| candidate.kind == *name);
-        own.map(|own| (name.clone(), Arc::clone(&own.effect))).ok_or_else(|| {
+        let added = |own: &Candidate| AddedCandidate {
+            name: name.clone(),
+            effect: Arc::clone(&own.effect),
+            origin: files::hash(companion.identity().to_string().as_bytes()),
+        };
+        own.map(added).ok_or_else(|| {
             Stop::new(format!("the companion has no candidate `{name}` that it answers")).help(
                 "list it in `[[gap.companion.switch]]` or `[[gap.companion.term]]`, or take it out of `add`",
             )
