@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{CLEAR, HALF, MissingEffect, NEARLY, REMAINS};
+use super::{CLEAR, HALF, LIKELY, MissingEffect, NEARLY, REMAINS};
 use crate::gap::search::diagnostics::{Diagnostics, SearchOptions, SearchResult};
 
 /// The quantities on which a verdict rests.
@@ -53,6 +53,15 @@ pub fn explains(closed: f64, last: &Diagnostics) -> bool {
 pub(super) fn unproven(effects: &[MissingEffect]) -> Option<String> {
     let names = names(effects, |effect| !effect.supported && !effect.contradicted)?;
     Some(format!("a free form in place of {names} predicts left-out data as well"))
+}
+
+/// Effects whose class is wrong in most of the simulated cases like this one.
+pub(super) fn improbable(effects: &[MissingEffect]) -> Option<String> {
+    let is_one = |e: &MissingEffect| e.traits.is_some_and(|t| t.probability() < LIKELY);
+    let names = names(effects, is_one)?;
+    Some(format!(
+        "in simulated cases like this one, names such as {names} are more often wrong than right"
+    ))
 }
 
 /// Effects that do not foretell the later blocks of single records better than a free form does.

@@ -46,6 +46,9 @@ const MOST: f64 = 0.6;
 /// Statistical Association 90 (1995) 773).
 const SIGNIFICANT: f64 = 3.0;
 
+/// The smallest probability at which a type or class is named: a name that is more often wrong than right is none.
+const LIKELY: f64 = 0.5;
+
 /// The number of standard errors by which an effect has to predict left-out data better than a free form in its place.
 pub const PROVEN: f64 = 2.5;
 
@@ -209,6 +212,7 @@ fn with_effects(
     // Several effects are flexible enough to describe another form without a visible rest: each has to be supported.
     reasons.extend(grounds::unproven(effects).filter(|_| effects.len() > 1));
     reasons.extend(grounds::unforetold(found, effects));
+    reasons.extend(grounds::improbable(effects));
     let sure = effects.iter().all(|e| e.class.len() == 1) && found.stability >= STABLE;
     if !reasons.is_empty() {
         return (VerdictKind::Unlisted, reasons);
