@@ -10,11 +10,11 @@ use toml::Table;
 
 /// A candidate that is part of the study.
 pub struct AddedCandidate {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its effect on the response.
+    /// Effect on the response.
     pub effect: Arc<dyn Effect>,
-    /// The hash of everything from which the effect was learned.
+    /// Hash of everything from which the effect was learned.
     pub origin: String,
 }
 
