@@ -14,24 +14,19 @@ use tempfile::TempDir;
 use super::inside::loaded;
 use super::two_masses::{DRAG, STUDY, curves, folder, rows, searched};
 
-const VARIED: &str = r#"
+const TABLE: &str = r#"
 [[gap.runs]]
 name = "drag"
 use = "csv"
 parameters = "runs_with_drag.csv"
 responses = "responses_with_drag.csv"
-size = "coefficient"
-prior = { uniform = [0.0, 0.5] }
 "#;
 
-const FIXED: &str = r#"
-[[gap.runs]]
-name = "drag"
-use = "csv"
-parameters = "runs_with_drag.csv"
-responses = "responses_with_drag.csv"
-prior = { uniform = [0.0, 2.0] }
-"#;
+/// Keys of a table that varies the drag.
+const VARIED: &str = "size = \"coefficient\"\nprior = { uniform = [0.0, 0.5] }\n";
+
+/// Keys of a table in which the drag has one size.
+const FIXED: &str = "prior = { uniform = [0.0, 2.0] }\n";
 
 /// The size of the drag in a table in which it does not vary.
 const SIZE: f64 = 0.2;
@@ -55,10 +50,10 @@ fn write_runs_with_drag(folder: &TempDir, varied: bool) {
 }
 
 /// The drag is named, sized and proven; the study that is written has its size among the unknowns.
-fn is_found(table: &str, varied: bool, size: f64, error: f64) {
+fn is_found(keys: &str, varied: bool, size: f64, error: f64) {
     let folder = folder(DRAG);
     write_runs_with_drag(&folder, varied);
-    let text = [STUDY, table].concat();
+    let text = [STUDY, TABLE, keys].concat();
     let result = searched(&folder, &text);
     let verdict = &result.verdict;
     let word = verdict.word;
@@ -112,7 +107,7 @@ fn a_table_with_one_drag_names_its_share() {
 fn a_table_of_other_physics_names_nothing() {
     let folder = folder(0.0);
     write_runs_with_drag(&folder, true);
-    let result = searched(&folder, &[STUDY, VARIED].concat());
+    let result = searched(&folder, &[STUDY, TABLE, VARIED].concat());
     assert!(result.additions.is_empty(), "{:?}", result.verdict);
 }
 
@@ -120,7 +115,7 @@ fn a_table_of_other_physics_names_nothing() {
 fn a_name_without_a_table_is_refused() {
     let folder = folder(0.0);
     write_runs_with_drag(&folder, true);
-    let text = [&STUDY.replace("[gap]", "[gap]\nadd = [\"helium\"]"), VARIED].concat();
+    let text = [&STUDY.replace("[gap]", "[gap]\nadd = [\"helium\"]"), TABLE, VARIED].concat();
     let checked = resolve::load_text(&folder.path().join("study.toml"), &text, &[]);
     let complaints = checked.complaints();
     assert!(
