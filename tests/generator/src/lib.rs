@@ -5,6 +5,8 @@
 //! only the last assertion of a test should use.
 
 pub mod chain;
+pub mod companion_box;
+pub mod companion_pipe;
 pub mod hidden;
 pub mod line;
 pub mod mercury_box;

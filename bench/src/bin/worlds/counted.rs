@@ -6,7 +6,7 @@ use generator::Kind;
 use generator::noise::Source;
 use generator::world::{Secret, World};
 
-use crate::emulated::Emulated;
+use crate::{Cases, Workflow};
 
 /// The kinds of faults that are drawn.
 const FAULTS: [Kind; 14] = [
@@ -32,30 +32,27 @@ const REPLICATES: [usize; 4] = [6, 8, 12, 20];
 /// The range of sizes in units of the noise.
 const SIZES: [f64; 2] = [0.25, 2.5];
 
-/// Draws cases and prints them; with `nothing` nothing is hidden in them.
-pub fn count<W: World>(
-    emulated: &Emulated<W>,
-    name: &str,
-    seed: u64,
+/// Draws so many cases and prints a line for each.
+pub fn count<W: Workflow>(
+    workflow: &W,
+    cases: &Cases<'_>,
     count: usize,
-    nothing: bool,
-    only: Option<&[usize]>,
 ) -> Result<(), Box<dyn Error>> {
-    let is_drawn = |i: &u64| only.is_none_or(|only| only.contains(&(*i as usize)));
+    let is_drawn = |i: &u64| cases.only.is_none_or(|only| only.contains(&(*i as usize)));
     for i in (0..count as u64).filter(is_drawn) {
-        let seed = 1_000_000 + 10_000 * seed + i;
+        let seed = 1_000_000 + 10_000 * cases.seed + i;
         let mut random = Source::new(seed);
-        let mut secrets = drawn(&emulated.world, &mut random);
-        if nothing {
+        let mut secrets = drawn(workflow.world(), &mut random);
+        if cases.nothing {
             secrets.clear();
         }
         let replicates = REPLICATES[(random.uniform(0.0, 1.0) * 4.0) as usize];
         let ratio = SIZES[0] * (SIZES[1] / SIZES[0]).powf(random.uniform(0.0, 1.0));
-        let answer = emulated.ask(seed, &secrets, ratio, replicates)?;
-        if only.is_some() {
-            println!("{}", answer.said(&emulated.world, ratio));
+        let told = workflow.ask(seed, &secrets, ratio, replicates)?;
+        if cases.only.is_some() {
+            println!("{}", told.said);
         }
-        println!("{name}\t{seed}\t{replicates}\t{}", answer.values(&emulated.world, ratio));
+        println!("{}\t{seed}\t{replicates}\t{}", workflow.name(), told.values);
     }
     Ok(())
 }

@@ -15,10 +15,14 @@ use lacuna::run::{Progress, Silent};
 use lacuna_engine::gap::candidates::proposed;
 use lacuna_engine::gap::experiment::Experiment;
 use lacuna_engine::gap::noise::{Noise, ResponseTangents};
-use lacuna_engine::gap::search::{ModelAverage, SearchOptions, Support, Verdict, search, verdict};
+use lacuna_engine::gap::search::{
+    MissingEffect, ModelAverage, SearchOptions, Support, Verdict, search, verdict,
+};
 use lacuna_engine::gap::system::emulator_error::error_covariance;
 use lacuna_linalg::Matrix;
 use rayon::prelude::*;
+
+use crate::{Told, Workflow};
 
 /// The number of runs whose errors count.
 const NEAR: usize = 80;
@@ -26,6 +30,7 @@ const NEAR: usize = 80;
 /// A world with its emulator.
 pub struct Emulated<W> {
     pub world: W,
+    pub name: &'static str,
     pub layouts: Layouts,
     pub parameters: Vec<Parameter>,
     pub emulator: Box<dyn Emulator>,
@@ -33,7 +38,7 @@ pub struct Emulated<W> {
 }
 
 /// The answer to a case.
-pub struct Answer {
+struct Answer {
     pub measured: Measured,
     pub verdict: Verdict,
     pub p: [f64; 3],
@@ -52,7 +57,12 @@ pub struct Answer {
 
 impl<W: World> Emulated<W> {
     /// The world with a polynomial chaos expansion of a table of `runs` runs over the ranges of its parameters.
-    pub fn new(world: W, runs: usize, degree: usize) -> Result<Self, Box<dyn Error>> {
+    pub fn new(
+        world: W,
+        name: &'static str,
+        runs: usize,
+        degree: usize,
+    ) -> Result<Self, Box<dyn Error>> {
         let seconds = Unit::parse("s")?;
         let axes = || {
             let labels = world.sensors();
@@ -109,7 +119,7 @@ impl<W: World> Emulated<W> {
         let scale = (NEAR as f64).sqrt();
         let factor = Matrix::from_fn(layouts.len(), NEAR, |i, k| residuals[(near[k], i)] / scale);
         let error = CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true };
-        Ok(Self { world, layouts, parameters, emulator, error })
+        Ok(Self { world, name, layouts, parameters, emulator, error })
     }
 
     fn observations(&self, measured: &Measured) -> Observations {
@@ -122,8 +132,7 @@ impl<W: World> Emulated<W> {
             .into()
     }
 
-    /// Asks the workflow, which does not see what is hidden.
-    pub fn ask(
+    fn answer(
         &self,
         seed: u64,
         secrets: &[Secret],
@@ -164,6 +173,30 @@ impl<W: World> Emulated<W> {
     }
 }
 
+impl<W: World> Workflow for Emulated<W> {
+    type World = W;
+
+    fn world(&self) -> &W {
+        &self.world
+    }
+
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn ask(
+        &self,
+        seed: u64,
+        secrets: &[Secret],
+        ratio: f64,
+        replicates: usize,
+    ) -> Result<Told, Box<dyn Error>> {
+        let answer = self.answer(seed, secrets, ratio, replicates)?;
+        let (said, values) = (answer.said(&self.world, ratio), answer.values(&self.world, ratio));
+        Ok(Told { said, values })
+    }
+}
+
 /// The time of all processors that this process used, s; NaN where the system does not tell.
 fn of_processors() -> f64 {
     let told = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
@@ -182,7 +215,7 @@ fn ahead(types: &[(String, f64)]) -> String {
 
 impl Answer {
     /// The case and its answer as values that are separated by tabs.
-    pub fn values<W: World>(&self, world: &W, ratio: f64) -> String {
+    fn values<W: World>(&self, world: &W, ratio: f64) -> String {
         let names = world.sensors();
         let hidden: Vec<String> = self
             .measured
@@ -230,7 +263,7 @@ impl Answer {
     }
 
     /// The case and its answer in a line.
-    pub fn said<W: World>(&self, world: &W, ratio: f64) -> String {
+    fn said<W: World>(&self, world: &W, ratio: f64) -> String {
         let names = world.sensors();
         let hidden: Vec<String> = self
             .measured
@@ -257,17 +290,7 @@ impl Answer {
             self.processors
         );
         for e in &self.verdict.effects {
-            let places: Vec<String> = e.on.values().map(|labels| labels.join("+")).collect();
-            let values: Vec<String> =
-                e.values.iter().zip(&e.sd).map(|(x, sd)| format!("{x:.3e}±{sd:.1e}")).collect();
-            let _ = write!(
-                text,
-                "\n    {} on {} P {:.2} ({})",
-                e.class.join("/"),
-                places.join(" "),
-                e.probability,
-                values.join(" ")
-            );
+            let _ = write!(text, "\n    {}", words(e));
         }
         for (support, types) in self.supports.iter().zip(&self.types) {
             let scores: Vec<String> = support
@@ -298,4 +321,19 @@ impl Answer {
         }
         text
     }
+}
+
+/// An effect with its places, its probability and its values.
+pub fn words(e: &MissingEffect) -> String {
+    let places: Vec<String> = e.on.values().map(|labels| labels.join("+")).collect();
+    let values: Vec<String> =
+        e.values.iter().zip(&e.sd).map(|(x, sd)| format!("{x:.3e}±{sd:.1e}")).collect();
+    let certain = if e.certain { ", certain" } else { "" };
+    format!(
+        "{} on {} P {:.2}{certain} ({})",
+        e.class.join("/"),
+        places.join(" "),
+        e.probability,
+        values.join(" ")
+    )
 }

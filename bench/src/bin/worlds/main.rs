@@ -1,14 +1,18 @@
 //! Verdicts of the gap workflow in worlds whose physics has no form in the library: `cargo run --release -p lacuna-bench
 //! --bin worlds -- box` (or `pipe`), with `--seed N`, `--only 3,4`, and `--scale 0.5`, a factor of all sizes.
 //!
+//! With `--companion` each case is a whole study with a companion, as `lacuna gap` runs it.
+//!
 //! With `--random N` so many cases are drawn instead, and a line of tab-separated values is printed for each; with
 //! `--nothing` nothing is hidden in them.
 //!
 //! Simulators and data come from `tests/generator`, which shares no code with the engine. Each case is printed with what
 //! is hidden and what is said.
 
+mod companions;
 mod counted;
 mod emulated;
+mod studied;
 
 use std::error::Error;
 
@@ -19,6 +23,7 @@ use generator::world::{Secret, World};
 use lacuna_plugins as _;
 
 use crate::emulated::Emulated;
+use crate::studied::Studied;
 
 /// Hidden causes, and their size in units of the noise.
 type Case = (Vec<Secret>, f64);
@@ -33,47 +38,82 @@ fn main() -> Result<(), Box<dyn Error>> {
     let scale = after("--scale").and_then(|n| n.parse().ok()).unwrap_or(1.0);
     let only: Option<Vec<usize>> =
         after("--only").map(|text| text.split(',').filter_map(|n| n.parse().ok()).collect());
-    if let Some(cases) = after("--random").and_then(|n| n.parse().ok()) {
-        let nothing = arguments.iter().any(|a| a == "--nothing");
-        let only = only.as_deref();
-        return if arguments.first().is_some_and(|world| world == "pipe") {
-            counted::count(&Emulated::new(Pipe, 250, 8)?, "pipe", seed, cases, nothing, only)
-        } else {
-            let world = Emulated::new(MercuryBox, 400, 16)?;
-            counted::count(&world, "box", seed, cases, nothing, only)
-        };
-    }
-    match arguments.first().map(String::as_str) {
-        Some("pipe") => {
-            run(&Emulated::new(Pipe, 250, 8)?, &in_the_pipe(), 8, seed, scale, only.as_deref())
+    let only = only.as_deref();
+    let count = after("--random").and_then(|n| n.parse().ok());
+    let nothing = arguments.iter().any(|a| a == "--nothing");
+    let cases = Cases { seed, scale, count, nothing, only };
+    let companion = arguments.iter().any(|a| a == "--companion");
+    match (arguments.first().map(String::as_str), companion) {
+        (Some("pipe"), true) => cases.ask(&Studied::new(Pipe, "pipe", 250)?, &in_the_pipe(), 8),
+        (Some("pipe"), false) => {
+            cases.ask(&Emulated::new(Pipe, "pipe", 250, 8)?, &in_the_pipe(), 8)
         }
-        _ => run(
-            &Emulated::new(MercuryBox, 400, 16)?,
-            &in_the_box(),
-            12,
-            seed,
-            scale,
-            only.as_deref(),
-        ),
+        (_, true) => cases.ask(&Studied::new(MercuryBox, "box", 400)?, &in_the_box(), 12),
+        (_, false) => cases.ask(&Emulated::new(MercuryBox, "box", 400, 16)?, &in_the_box(), 12),
     }
 }
 
-fn run<W: World>(
-    emulated: &Emulated<W>,
-    cases: &[Case],
-    replicates: usize,
+/// The gap workflow on a world.
+trait Workflow {
+    /// The world.
+    type World: World;
+
+    fn world(&self) -> &Self::World;
+
+    /// The name of the world in tables.
+    fn name(&self) -> &'static str;
+
+    /// Asks the workflow, which does not see what is hidden: `ratio` is the size of each cause in units of the noise.
+    fn ask(
+        &self,
+        seed: u64,
+        secrets: &[Secret],
+        ratio: f64,
+        replicates: usize,
+    ) -> Result<Told, Box<dyn Error>>;
+}
+
+/// The answer to a case.
+struct Told {
+    /// In words.
+    said: String,
+    /// As values that are separated by tabs.
+    values: String,
+}
+
+/// The cases that are asked.
+struct Cases<'a> {
     seed: u64,
+    /// A factor of all sizes of the fixed cases.
     scale: f64,
-    only: Option<&[usize]>,
-) -> Result<(), Box<dyn Error>> {
-    for (i, (secrets, ratio)) in cases.iter().enumerate() {
-        if only.is_some_and(|only| !only.contains(&i)) {
-            continue;
+    /// The number of cases drawn at random; `None` for the fixed ones.
+    count: Option<usize>,
+    /// True if nothing is hidden in random cases.
+    nothing: bool,
+    /// The places of those that are asked; `None` for all.
+    only: Option<&'a [usize]>,
+}
+
+impl Cases<'_> {
+    fn ask<W: Workflow>(
+        &self,
+        workflow: &W,
+        fixed: &[Case],
+        replicates: usize,
+    ) -> Result<(), Box<dyn Error>> {
+        if let Some(count) = self.count {
+            return counted::count(workflow, self, count);
         }
-        let answer = emulated.ask(1000 * seed + i as u64, secrets, scale * ratio, replicates)?;
-        println!("{i} {}", answer.said(&emulated.world, scale * ratio));
+        for (i, (secrets, ratio)) in fixed.iter().enumerate() {
+            if self.only.is_some_and(|only| !only.contains(&i)) {
+                continue;
+            }
+            let seed = 1000 * self.seed + i as u64;
+            let told = workflow.ask(seed, secrets, self.scale * ratio, replicates)?;
+            println!("{i} {}", told.said);
+        }
+        Ok(())
     }
-    Ok(())
 }
 
 fn fault(kind: Kind, sensors: &[usize]) -> Vec<Secret> {
