@@ -30,15 +30,24 @@ NAMES = ("log_odds", "local", "transfer", "closed", "inexact")
 PRIOR_SLOPE, PRIOR_INTERCEPT = (2.0, 2.0), (-5.0, 3.0)
 
 FAULTS = {"LowPass": "low_pass", "SecondaryPulse": "secondary_pulse", "PulseHeating": "pulse_heating", "LevelJump": "level_jumps"}
-# Physics inside the simulators with a listed type near to it; the second entry tells whether the type is the physics itself, so that
-# `named` is right too.
+# Physics inside the simulators: the types that are the physics itself, of the library or of a companion, and the listed types near to
+# it, which are right unless they are named as if they were exact. A companion has its candidates beside the places where the physics is.
 INSIDE = {
-    "damping everywhere": ({"damping"}, True),
-    "damping in the rear": ({"damping"}, True),
-    "moved gauge": ({"crosstalk", "misplacement"}, True),
-    "quadratic friction": ({"damping"}, False),
-    "unsteady friction": ({"damping"}, False),
-    "exponent of the friction": ({"damping"}, False),
+    "damping everywhere": ({"damping"}, set()),
+    "damping in the rear": ({"damping", "damping_rear"}, {"damping_last"}),
+    "screen": ({"screen_2"}, set()),
+    "gas in the rear": ({"gas_last", "gas_rear"}, set()),
+    "rigid rear wall": ({"rear_stiffness"}, set()),
+    "late cavities": ({"late_cavities"}, set()),
+    "moved gauge": ({"crosstalk", "misplacement"}, set()),
+    "quadratic friction": ({"square_friction"}, {"damping"}),
+    "leak": ({"leak_3"}, set()),
+    "blockage": ({"throttle_2"}, set()),
+    "air": ({"air_2", "air_3"}, set()),
+    "creep": ({"creep"}, set()),
+    "leaking valve": ({"valve_leak"}, set()),
+    "unsteady friction": ({"unsteady_friction"}, {"damping", "linear_friction"}),
+    "exponent of the friction": ({"friction_power"}, {"damping", "linear_friction"}),
 }
 
 
@@ -116,8 +125,8 @@ def read(lines):
 
 def is_right(cause, word, types):
     if cause.startswith("inside:"):
-        near, itself = INSIDE.get(cause[len("inside:"):], (set(), False))
-        return bool(near & set(types)) and (itself or word != "Named")
+        itself, near = INSIDE.get(cause[len("inside:"):], (set(), set()))
+        return bool(itself & set(types)) or word != "Named" and bool(near & set(types))
     kind = cause.split("@")[0]
     return FAULTS.get(kind, kind.lower()) in types
 

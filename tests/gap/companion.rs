@@ -86,3 +86,31 @@ fn a_companion_that_does_not_answer_as_the_runs_is_not_used() {
     let says = |words: &str| result.verdict.reasons.iter().any(|reason| reason.contains(words));
     assert!(says("the companion is not used: its error on"), "{:?}", result.verdict.reasons);
 }
+
+/// A companion that takes whatever the study gives, as a function does, has the inputs of its candidates without being given
+/// them in `fixed`: at the value of absence, and with the unit that is stated.
+#[test]
+fn a_companion_that_is_a_function_has_the_inputs_of_its_candidates() {
+    let folder = folder(DRAG);
+    fs::write(folder.path().join("masses.py"), "def simulate(**inputs): return []").unwrap();
+    let text = r#"
+[gap.companion]
+use = "python"
+file = "masses.py"
+
+[[gap.companion.switch]]
+input = "drag"
+prior = { half_normal = 0.2 }
+
+[[gap.companion.switch]]
+input = "length"
+unit = "mm"
+absent = 3.0
+prior = { normal = [3.0, 0.2] }
+"#;
+    let study = loaded(&folder, &[STUDY, text].concat());
+    let companion = &study.gap.companion.as_ref().unwrap().study;
+    let held = |name: &str| companion.held(name).unwrap();
+    assert_eq!((held("drag").value, held("length").value), (0.0, 3.0));
+    assert_eq!(held("length").input.unit.to_string(), "mm");
+}

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::fmt::Write;
 
-use generator::world::{Measured, Secret, World, measured};
+use generator::world::{Found, Measured, Secret, World, measured};
 use lacuna::data::{Axis, Layout, Layouts, Measurements, Observations, Parameter, Replicate, Unit};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
@@ -216,22 +216,9 @@ fn ahead(types: &[(String, f64)]) -> String {
 impl Answer {
     /// The case and its answer as values that are separated by tabs.
     fn values<W: World>(&self, world: &W, ratio: f64) -> String {
-        let names = world.sensors();
-        let hidden: Vec<String> = self
-            .measured
-            .hidden
-            .iter()
-            .map(|found| match &found.secret {
-                Secret::Fault(kind, sensors) => {
-                    let on: Vec<&str> = sensors.iter().map(|&s| names[s]).collect();
-                    format!("{kind:?}@{}", on.join("+"))
-                }
-                Secret::Inside(i) => format!("inside:{}", world.changes()[*i].name),
-            })
-            .collect();
         let mut text = format!(
             "{}\t{ratio:.3}\t{:?}\t{:.3}\t{:.2}\t{:.1}",
-            hidden.join(" & "),
+            hidden(world, &self.measured.hidden, false),
             self.verdict.word,
             self.verdict.closed,
             self.inexact[1],
@@ -240,7 +227,6 @@ impl Answer {
         for ((effect, support), types) in
             self.verdict.effects.iter().zip(&self.supports).zip(&self.types)
         {
-            let on: Vec<String> = effect.on.values().map(|labels| labels.join("+")).collect();
             let scores: Vec<String> = support
                 .against_free_form
                 .iter()
@@ -250,9 +236,8 @@ impl Answer {
                 .collect();
             let _ = write!(
                 text,
-                "\t{}@{};{:.3};{:.3};{};{}",
-                effect.class.join("/"),
-                on.join(" "),
+                "\t{};{:.3};{:.3};{};{}",
+                place(effect),
                 support.share,
                 support.local,
                 scores.join(","),
@@ -264,22 +249,9 @@ impl Answer {
 
     /// The case and its answer in a line.
     fn said<W: World>(&self, world: &W, ratio: f64) -> String {
-        let names = world.sensors();
-        let hidden: Vec<String> = self
-            .measured
-            .hidden
-            .iter()
-            .map(|found| match &found.secret {
-                Secret::Fault(kind, sensors) => {
-                    let on: Vec<&str> = sensors.iter().map(|&s| names[s]).collect();
-                    format!("{kind:?} on {} {:.3e}", on.join("+"), found.size)
-                }
-                Secret::Inside(i) => format!("{} {:.3e}", world.changes()[*i].name, found.size),
-            })
-            .collect();
         let mut text = format!(
             "rms {ratio} [{}] -> {:?} closed {:.2} p {:.2?} gap {:.0} to {:.0} inexact {:.1?} {:.1} s, {:.1} s of processors",
-            hidden.join(", "),
+            hidden(world, &self.measured.hidden, true),
             self.verdict.word,
             self.verdict.closed,
             self.p,
@@ -336,4 +308,27 @@ pub fn words(e: &MissingEffect) -> String {
         e.probability,
         values.join(" ")
     )
+}
+
+/// The types of an effect with its places, and an exclamation mark if it is certain.
+pub fn place(e: &MissingEffect) -> String {
+    let on: Vec<String> = e.on.values().map(|labels| labels.join("+")).collect();
+    let certain = if e.certain { "!" } else { "" };
+    format!("{}@{}{certain}", e.class.join("/"), on.join(" "))
+}
+
+/// The hidden causes, with their sizes or without.
+pub fn hidden<W: World>(world: &W, all: &[Found], sized: bool) -> String {
+    let names = world.sensors();
+    let each = all.iter().map(|found| {
+        let cause = match &found.secret {
+            Secret::Fault(kind, sensors) => {
+                let on: Vec<&str> = sensors.iter().map(|&s| names[s]).collect();
+                format!("{kind:?}@{}", on.join("+"))
+            }
+            Secret::Inside(i) => format!("inside:{}", world.changes()[*i].name),
+        };
+        if sized { format!("{cause} {:.3e}", found.size) } else { cause }
+    });
+    each.collect::<Vec<_>>().join(" & ")
 }

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use generator::noise::Source;
-use generator::world::{Found, Measured, Secret, World, measured};
+use generator::world::{Measured, Secret, World, measured};
 use lacuna::run::Silent;
 use lacuna_bench::clock::timed;
 use lacuna_engine::gap::result::GapResult;
@@ -16,7 +16,7 @@ use lacuna_engine::study::resolve::load_text;
 use lacuna_run::RunDirectory;
 use rayon::prelude::*;
 
-use crate::emulated::words;
+use crate::emulated::{hidden, place, words};
 use crate::{Told, Workflow};
 
 /// A world with a companion.
@@ -220,7 +220,7 @@ impl Answer {
         let verdict = &self.result.verdict;
         let mut text = format!(
             "rms {ratio} [{}] -> {:?} closed {:.2} p {:.2?} {:.1} s, {:.1} s of processors",
-            hidden(world, &self.measured.hidden),
+            hidden(world, &self.measured.hidden, true),
             verdict.word,
             verdict.closed,
             self.result.p[0],
@@ -267,27 +267,14 @@ impl Answer {
             proof.map_or([f64::NAN; 3], |all| [all.closed, all.lower, all.upper]);
         let mut text = format!(
             "{}\t{ratio:.3}\t{:?}\t{:.3}\t{closed:.3} {lower:.3} {upper:.3}\t{:.1}",
-            hidden(world, &self.measured.hidden),
+            hidden(world, &self.measured.hidden, false),
             verdict.word,
             verdict.closed,
             self.seconds[0]
         );
         for e in &verdict.effects {
-            let on: Vec<String> = e.on.values().map(|labels| labels.join("+")).collect();
-            let _ = write!(text, "\t{}@{};{:.2}", e.class.join("/"), on.join(" "), e.probability);
+            let _ = write!(text, "\t{};{:.3};{:.2}", place(e), e.share, e.probability);
         }
         text
     }
-}
-
-fn hidden<W: World>(world: &W, all: &[Found]) -> String {
-    let names = world.sensors();
-    let each = all.iter().map(|found| match &found.secret {
-        Secret::Fault(kind, sensors) => {
-            let on: Vec<&str> = sensors.iter().map(|&s| names[s]).collect();
-            format!("{kind:?}@{} {:.3e}", on.join("+"), found.size)
-        }
-        Secret::Inside(i) => format!("inside:{} {:.3e}", world.changes()[*i].name, found.size),
-    });
-    each.collect::<Vec<_>>().join(" & ")
 }

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use lacuna::data::{Layouts, Parameter, Scenario};
 use lacuna::plugin::registry::Section;
 use lacuna::plugin::{Effect, Given};
+use lacuna::text::quantity::Quantity;
 use toml::Table;
 
 use super::fidelity::{LowFidelity, NumericalError};
@@ -97,7 +98,24 @@ impl Study {
             resolved: Table::new(),
         };
         companion.given = super::inputs::all_given(&companion);
+        companion.give_candidates();
         companion
+    }
+
+    /// Gives the model those inputs of `[[gap.switch]]` that it does not know of itself, as a command or a function knows
+    /// none: at the values at which they are absent, 0 where none is stated.
+    fn give_candidates(&mut self) {
+        let unknown = |name: &str| !self.has_input(name) && self.takes(name);
+        let switches = self.gap.inside.switches.iter().filter(|switch| unknown(&switch.input));
+        let given = switches.map(|switch| {
+            let value = switch.absent.unwrap_or(0.0);
+            (switch.input.clone(), Quantity { value, unit: switch.unit.clone() })
+        });
+        let given: Vec<(String, Quantity)> = given.collect();
+        if let Some(model) = self.plugins.model.as_mut().filter(|_| !given.is_empty()) {
+            model.common.fixed.extend(given);
+            self.given = super::inputs::all_given(self);
+        }
     }
 }
 

@@ -105,6 +105,8 @@ pub struct SearchResult<'a> {
     pub average: ModelAverage,
     /// The support of each effect.
     pub support: Vec<Support>,
+    /// The names of effects that were found beside these and are not certain: they are left to the remainder.
+    pub uncertain: Vec<String>,
     /// The probability of differences as large between conditions, or between the sensors of a group, if each effect
     /// were the same in all; 1 if there is nothing to compare.
     pub consistency: f64,

@@ -7,14 +7,13 @@ use lacuna::math::moments::{log_sum, mean, variance};
 use lacuna::math::random::Stream;
 use lacuna::plugin::effect::{On, Situation};
 
-use super::checks::{consistency, shares, stability};
 use super::diagnostics::{Diagnostics, SearchOptions, SearchResult, SearchStep, detectability};
 use super::pairs::Pair;
 use super::refit::{Scored, Weighed, most_promising, refit_all};
 use super::state::{SearchSetting, SearchState, kinds};
 use super::subsets::Screen;
-use super::support::{misfit, supports};
-use super::visited::{ModelAverage, VisitedModel};
+use super::support::misfit;
+use super::visited::VisitedModel;
 use crate::gap::candidates::{Candidate, Placement, place, placements, sensors};
 use crate::gap::experiment::Experiment;
 use crate::gap::noise::Noise;
@@ -45,10 +44,10 @@ pub(super) struct Search<'a> {
     pub(super) candidates: &'a [Candidate],
     pub(super) placements: Vec<Placement>,
     scan: Scan,
-    means: Vec<f64>,
+    pub(super) means: Vec<f64>,
     pub(super) sensors: Vec<On>,
-    remainder: Remainder,
-    options: SearchOptions,
+    pub(super) remainder: Remainder,
+    pub(super) options: SearchOptions,
     pub(super) stream: Stream,
 }
 
@@ -85,39 +84,8 @@ pub fn search<'a>(
         };
         path.push(step);
     };
-    let (slots, compared) = search.slots(&state, &path);
-    let visited = path.iter().flat_map(|step| step.visited.clone()).chain(compared);
-    let average = ModelAverage::of(&visited.collect::<Vec<_>>());
-    let stability = match slots.last() {
-        Some(weighed) => {
-            let smaller = state.without(&search.setting(), state.chosen.len() - 1);
-            stability(experiment, &smaller.refit_setting(&search.setting()), weighed)
-        }
-        None => 1.0,
-    };
-    let first = path.first().map_or(last.tolerant.gap, |step| step.before.tolerant.gap);
-    let stream = search.stream.named("support");
-    let support = supports(&search.setting(), &state, &last.tolerant, first, &stream);
-    let consistency = consistency(&state.system, &state.fit, &state.whitener);
-    let types = slots.iter().map(|weighed| shares(candidates, weighed)).collect();
-    let SearchState { system, chosen, noise, whitener, .. } = state;
-    let (means, remainder) = (search.means, search.remainder);
-    Some(SearchResult {
-        path,
-        system,
-        chosen,
-        last,
-        types,
-        slots,
-        average,
-        support,
-        consistency,
-        stability,
-        noise,
-        whitener,
-        means,
-        remainder,
-    })
+    let whole = search.finished(&state, path, last);
+    Some(search.certain_part(whole, &state))
 }
 
 /// The calibration without effects: noise around a first fit, then around the fit with that noise; and the remainder
@@ -201,7 +169,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    fn diagnose(
+    pub(super) fn diagnose(
         &self,
         state: &SearchState<'_>,
         round: u64,

@@ -6,6 +6,7 @@ mod cross_validate;
 mod diagnostics;
 mod discriminate;
 mod evidence;
+mod finish;
 mod fold_score;
 mod folds;
 mod forward;

@@ -83,6 +83,11 @@ fn one_switch(study: &Study, switch: &SwitchSection, twice: bool, complaints: &m
             if let Some(near) = near {
                 problem.help(format!("did you mean `{near}`?"));
             }
+            if study.takes(input) {
+                problem.help(format!(
+                    "the model has the inputs that the study gives it: add `fixed = {{ {input} = 0 }}` to `[model]`"
+                ));
+            }
         }
         Err(loose) => {
             let (what, help) = match loose {

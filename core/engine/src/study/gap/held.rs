@@ -1,7 +1,7 @@
 //! Inputs of the model that a study holds at a value.
 
-use lacuna::plugin::Model;
 use lacuna::plugin::model::{Input, Signature};
+use lacuna::plugin::{Context, Given, Model};
 
 use crate::study::Study;
 
@@ -35,6 +35,11 @@ impl Study {
         hold(self, name).ok()
     }
 
+    /// True if the model has an input of this name.
+    pub(in crate::study) fn has_input(&self, name: &str) -> bool {
+        self.signature().is_some_and(|s| s.inputs.iter().any(|input| input.name == name))
+    }
+
     fn signature(&self) -> Option<Signature> {
         self.signature_of(&*self.model.as_ref()?.built.plugin)
     }
@@ -43,6 +48,18 @@ impl Study {
     pub fn signature_of(&self, model: &dyn Model) -> Option<Signature> {
         let (layout, _) = self.layouts.of_scenario(&self.scenarios.first()?.name)?;
         Some(model.signature(&self.context_of(&layout)))
+    }
+
+    /// True if the model has an input of this name once the study gives it, as a command or a function has.
+    pub(in crate::study) fn takes(&self, name: &str) -> bool {
+        let given = Given { name: name.to_owned(), unit: None };
+        let given = [&self.given[..], &[given]].concat();
+        let with = |model: &dyn Model| {
+            let (layout, _) = self.layouts.of_scenario(&self.scenarios.first()?.name)?;
+            Some(model.signature(&Context { given: &given, ..self.context_of(&layout) }))
+        };
+        let signature = self.model.as_ref().and_then(|model| with(&*model.built.plugin));
+        signature.is_some_and(|signature| signature.inputs.iter().any(|input| input.name == name))
     }
 }
 

@@ -64,6 +64,17 @@ pub(super) fn improbable(effects: &[MissingEffect]) -> Option<String> {
     ))
 }
 
+/// Effects that are left to the remainder.
+pub(super) fn left_out(uncertain: &[String]) -> Option<String> {
+    let names: Vec<String> = uncertain.iter().map(|name| format!("`{name}`")).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{} would explain more, but not with certainty: it counts as a remainder",
+            names.join(" and ")
+        )
+    })
+}
+
 /// Effects that do not foretell the later blocks of single records better than a free form does.
 pub(super) fn unforetold(found: &SearchResult<'_>, effects: &[MissingEffect]) -> Option<String> {
     if found.system.experiment.most_replicates() > 1 {

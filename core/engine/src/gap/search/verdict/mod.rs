@@ -158,6 +158,7 @@ pub fn verdict(
         );
     }
     reasons.extend(untried);
+    reasons.extend(grounds::left_out(&found.uncertain));
     if word == VerdictKind::Unlisted {
         reasons.push(
             "the calibrated parameters make up for what has no name: they may be farther from the truth than their standard deviations say"

@@ -1,5 +1,6 @@
 //! The keys of the gap between the data and the model.
 
+mod companion;
 mod effect;
 mod held_out;
 mod insight;
@@ -8,6 +9,7 @@ mod proof;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use self::companion::Companion;
 use self::effect::Effect;
 use self::held_out::HeldOut;
 use self::insight::Insight;
@@ -42,6 +44,9 @@ pub struct Gap {
     pub remains: Option<Remains>,
     /// Proof of the names on data that were not used; `null` if no effect was found.
     pub proof: Option<Proof>,
+    /// Companion of the simulator, inside which candidates act; only if the study has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub companion: Option<Companion>,
     /// Effects that were not tried, with the reason.
     pub not_tried: Vec<Untried>,
     /// Types that the data cannot distinguish, if the verdict is `class`.
@@ -183,6 +188,7 @@ impl Gap {
             none_of_these: result.verdict.none_of_these,
             remains: result.remains.clone(),
             proof: gap.proof().as_ref().map(Proof::of),
+            companion: result.companion.as_ref().map(Companion::of),
             not_tried: result.untried.clone(),
             class: class(result),
             members: result.members.iter().map(|m| Member::of(m, runs)).collect(),
