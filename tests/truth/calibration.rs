@@ -22,7 +22,7 @@ use super::runs;
 /// Number of draws among which a value is ranked; the ranks are sorted into [`BINS`] bins of equal probability.
 const DRAWS: usize = 63;
 const BINS: usize = 8;
-const SIMULATIONS: u64 = 96;
+const SIMULATIONS: u64 = 64;
 
 /// The straight line `y = a + b t` of each sensor, as an emulator with the basis `(1, a, b)`.
 struct Line {

@@ -102,7 +102,7 @@ fn no_u_turn() {
 
 #[test]
 fn hamiltonian() {
-    all(&PLAIN, ("hamiltonian", ""));
+    all(&PLAIN, ("hamiltonian", "warm_up = 500\nsteps = 1200"));
 }
 
 #[test]

@@ -2,6 +2,7 @@
 //! those of an instrument that has not settled. They are no physics of the record, and left out of the search.
 
 use lacuna::data::{Measurements, Observations};
+use lacuna_linalg::{Cholesky, Matrix, gram, transposed_multiply_vector};
 
 use super::{Experiment, MeasuredCurve};
 use crate::page::number::significant;
@@ -9,8 +10,15 @@ use crate::page::number::significant;
 /// The largest number of values of a transient.
 const MOST: usize = 3;
 
-/// The number of following values from which a value is extrapolated, by a straight line.
+/// The number of following values from which a value is extrapolated by a straight line.
 const FOLLOWING: usize = 4;
+
+/// The largest number of following values of linear prediction, and the number of values of a record for each.
+const ORDER: usize = 8;
+const EACH: usize = 8;
+
+/// The ridge of linear prediction, relative to the sum of the squares.
+const RIDGE: f64 = 1e-9;
 
 /// The smallest number of values of a record in which a transient is sought.
 const FEWEST: usize = 20;
@@ -21,7 +29,8 @@ const BEYOND: f64 = 2.0;
 /// The smallest distance from the extrapolation in standard deviations of all of them, by their median.
 const FAR: f64 = 8.0;
 
-/// The share of the distance that the response itself may have: a response that begins with a jump explains it.
+/// The share of the distance that the response itself may have, if it is a jump of the response: twice as far from its own
+/// extrapolation as elsewhere. A response that begins with a jump explains values that are off.
 const RESPONSE: f64 = 0.25;
 
 /// The median absolute value of a standard normal variable.
@@ -55,11 +64,32 @@ impl Transient {
     }
 }
 
-/// The transients of the records without replicates, about a response with one value per output.
-pub fn transients(experiment: &Experiment<'_>, response: &[f64]) -> Vec<Transient> {
+/// The transients of the records without replicates, about a response with one value per output, beside those that are
+/// known, whose values the data do not have any more.
+pub fn transients(
+    experiment: &Experiment<'_>,
+    response: &[f64],
+    known: &[Transient],
+) -> Vec<Transient> {
     let (_, means) = experiment.means();
     let alone = experiment.curves.iter().filter(|curve| experiment.complete(curve).len() < 2);
-    alone.filter_map(|curve| of_curve(experiment, curve, &means, response)).collect()
+    let found = alone.filter_map(|curve| {
+        let name = curve.name(experiment.layouts);
+        let most = MOST - known.iter().find(|own| own.name == name).map_or(0, |t| t.outputs.len());
+        of_curve(experiment, curve, &means, response, most)
+    });
+    found.collect()
+}
+
+/// Transients with further values of the same curves.
+pub fn joined(mut known: Vec<Transient>, further: Vec<Transient>) -> Vec<Transient> {
+    for one in further {
+        match known.iter_mut().find(|own| own.name == one.name) {
+            Some(own) => own.outputs.extend(one.outputs),
+            None => known.push(one),
+        }
+    }
+    known
 }
 
 /// The measurements without the values of transients.
@@ -80,51 +110,118 @@ fn of_curve(
     curve: &MeasuredCurve,
     means: &[f64],
     response: &[f64],
+    most: usize,
 ) -> Option<Transient> {
     if curve.measured.len() < FEWEST {
         return None;
     }
     let misfit: Vec<f64> = curve.measured.iter().map(|&i| means[i] - response[i]).collect();
     let own: Vec<f64> = curve.measured.iter().map(|&i| response[i]).collect();
-    let rest = MOST..misfit.len() - FOLLOWING;
-    let mut others: Vec<f64> = rest.map(|k| away(&misfit, &curve.at, k, k + 1).abs()).collect();
-    others.sort_by(f64::total_cmp);
-    let sd = others[others.len() / 2] / MEDIAN;
-    let largest = others[others.len() - 1];
+    let [misfit, own] = [misfit, own].map(|values| Backward::of(values, &curve.at));
     let is_off = |k: usize, from: usize| {
-        let off = away(&misfit, &curve.at, k, from).abs();
-        // The extrapolation over several steps is less certain.
-        let steps = (from - k) as f64;
-        let explained = away(&own, &curve.at, k, from).abs() > RESPONSE * off;
-        off > steps * (BEYOND * largest).max(FAR * sd) && !explained
+        let off = misfit.away(k, from).abs();
+        let [of_misfit, of_own] = [&misfit, &own].map(|b| b.elsewhere[from - k - 1]);
+        let jump = (BEYOND * of_own.largest).max(RESPONSE * off);
+        let far = (BEYOND * of_misfit.largest).max(FAR * of_misfit.sd);
+        off > far && own.away(k, from).abs() <= jump
     };
-    let count = (1..=MOST).rev().find(|&count| (0..count).all(|k| is_off(k, count)))?;
-    let off = (0..count).map(|k| away(&misfit, &curve.at, k, count).abs()).fold(0.0, f64::max);
+    let count = (1..=most).rev().find(|&count| (0..count).all(|k| is_off(k, count)))?;
+    let off = (0..count).map(|k| misfit.away(k, count).abs()).fold(0.0, f64::max);
     let unit = &experiment.layouts.blocks[0].unit;
     let unit = if unit.is_dimensionless() { String::new() } else { format!(" {unit}") };
     Some(Transient {
         outputs: curve.measured[..count].to_vec(),
         name: curve.name(experiment.layouts),
         off: format!("{}{unit}", significant(off, 2)),
-        far: off / sd.max(f64::MIN_POSITIVE),
+        far: off / misfit.elsewhere[0].sd.max(f64::MIN_POSITIVE),
     })
 }
 
-/// The distance of a value from the straight line through the values that begin with `from`, by least squares.
-fn away(values: &[f64], at: &[f64], k: usize, from: usize) -> f64 {
-    let used = from..(from + FOLLOWING).min(values.len());
-    let count = used.len() as f64;
-    let (x, y) = (
-        at[used.clone()].iter().sum::<f64>() / count,
-        values[used.clone()].iter().sum::<f64>() / count,
-    );
-    let (mut products, mut squares) = (0.0, 0.0);
-    for i in used {
-        products += (at[i] - x) * (values[i] - y);
-        squares += (at[i] - x).powi(2);
+/// Values along a curve with their extrapolation to the beginning: by a straight line through the values that follow, or by
+/// linear prediction, which also continues oscillations (Makhoul, Proceedings of the IEEE 63 (1975) 561); the one that is
+/// nearer along the rest of the curve.
+struct Backward<'a> {
+    values: Vec<f64>,
+    at: &'a [f64],
+    /// The coefficients of linear prediction from the next values; empty for the straight line.
+    filter: Vec<f64>,
+    /// The distances from the extrapolation along the rest of the curve, by the number of steps.
+    elsewhere: [Elsewhere; MOST],
+}
+
+/// Distances of values from their extrapolation.
+#[derive(Clone, Copy, Default)]
+struct Elsewhere {
+    largest: f64,
+    /// Their standard deviation, by their median.
+    sd: f64,
+}
+
+impl<'a> Backward<'a> {
+    fn of(values: Vec<f64>, at: &'a [f64]) -> Self {
+        let elsewhere = [Elsewhere::default(); MOST];
+        let line = Self { values, at, filter: Vec::new(), elsewhere }.judged();
+        let order = ORDER.min(line.values.len() / EACH);
+        let Some(filter) = line.filter_of(order) else { return line };
+        let other = Self { values: line.values.clone(), filter, ..line }.judged();
+        if other.elsewhere[0].sd < line.elsewhere[0].sd { other } else { line }
     }
-    let slope = if squares > 0.0 { products / squares } else { 0.0 };
-    values[k] - y - slope * (at[k] - x)
+
+    fn judged(mut self) -> Self {
+        let end = self.values.len() - self.filter.len().max(FOLLOWING) - MOST;
+        self.elsewhere = std::array::from_fn(|steps| {
+            let mut all: Vec<f64> =
+                (MOST..end).map(|k| self.away(k, k + 1 + steps).abs()).collect();
+            all.sort_by(f64::total_cmp);
+            Elsewhere { largest: all[all.len() - 1], sd: all[all.len() / 2] / MEDIAN }
+        });
+        self
+    }
+
+    /// The coefficients of least squares along the rest of the curve.
+    fn filter_of(&self, order: usize) -> Option<Vec<f64>> {
+        let rest = MOST..self.values.len() - order;
+        let rows = rest.clone().map(|k| self.values[k + 1..=k + order].to_vec());
+        let design = Matrix::from_rows(order, rows);
+        let mut normal = gram(&design);
+        let ridge = RIDGE * (0..order).map(|j| normal[(j, j)]).sum::<f64>();
+        (0..order).for_each(|j| normal[(j, j)] += ridge.max(f64::MIN_POSITIVE));
+        let mut filter = transposed_multiply_vector(&design, &self.values[rest]);
+        Cholesky::new(&normal).ok()?.solve(&mut filter);
+        Some(filter)
+    }
+
+    /// The distance of a value from the extrapolation of those that begin with `from`.
+    fn away(&self, k: usize, from: usize) -> f64 {
+        if self.filter.is_empty() {
+            return self.away_from_line(k, from);
+        }
+        let mut next = self.values[from..from + self.filter.len()].to_vec();
+        for _ in k..from {
+            let before = next.iter().zip(&self.filter).map(|(y, a)| y * a).sum();
+            next.pop();
+            next.insert(0, before);
+        }
+        self.values[k] - next[0]
+    }
+
+    /// The distance of a value from the straight line through the values that begin with `from`, by least squares.
+    fn away_from_line(&self, k: usize, from: usize) -> f64 {
+        let (values, at) = (&self.values, self.at);
+        let used = from..(from + FOLLOWING).min(values.len());
+        let count = used.len() as f64;
+        let (x, y) = (
+            at[used.clone()].iter().sum::<f64>() / count,
+            values[used.clone()].iter().sum::<f64>() / count,
+        );
+        let (mut products, mut squares) = (0.0, 0.0);
+        for i in used {
+            products += (at[i] - x) * (values[i] - y);
+            squares += (at[i] - x).powi(2);
+        }
+        let slope = if squares > 0.0 { products / squares } else { 0.0 };
+        values[k] - y - slope * (at[k] - x)
+    }
 }
 
 #[cfg(test)]
@@ -134,7 +231,6 @@ mod tests {
     use crate::gap::testing::LinearModel;
     use lacuna::data::{Axis, Layout, Layouts, Replicate, Unit};
     use lacuna::math::random::{Stream, normal};
-    use lacuna_linalg::Matrix;
 
     /// A record of this misfit about a response.
     fn found(misfit: &[f64], response: &[f64]) -> Vec<Transient> {
@@ -147,7 +243,7 @@ mod tests {
         let data = Measurements::new(layout, vec![Replicate::new("0", values)]).into();
         let forward = LinearModel { slopes: Matrix::zeros(0, misfit.len()) };
         let experiment = Experiment::new(&layouts, &[], &forward, &data);
-        transients(&experiment, response)
+        transients(&experiment, response, &[])
     }
 
     /// Noise of first order, and of heavier tails than normal if `cubed`.

@@ -13,7 +13,7 @@ use crate::gap::candidates::{Candidate, Proposed, Untried, proposed};
 use crate::gap::experiment::Experiment;
 use crate::gap::experiment::hold_out::{HeldOutData, HeldOutKind, HoldOutSplit, split};
 use crate::gap::experiment::stated::Statement;
-use crate::gap::experiment::transient::{Transient, transients, without};
+use crate::gap::experiment::transient::{Transient, joined, transients, without};
 use crate::gap::experiment::wider::ExtendedMap;
 use crate::gap::experiment::with_effects::WithEffects;
 use crate::gap::inside::InsideCandidates;
@@ -102,9 +102,11 @@ pub fn prepared<T>(
     let base =
         BaseModel { study, problem, beginning, wide, forward: &forward, parameters: &parameters };
     let mut starts = base.starts(&split.training, random)?;
-    let transients = base.transients(&split.training, &starts[0]);
-    if !transients.is_empty() {
-        split.training = without(&split.training, &transients);
+    let mut transients = Vec::new();
+    // A fit to values that are off hides those beside them: they are sought again about the fit without them.
+    while let Some(further) = base.transients(&split.training, &starts[0], &transients) {
+        split.training = without(&split.training, &further);
+        transients = joined(transients, further);
         starts = base.starts(&split.training, random)?;
     }
     let experiment = base.experiment(&split.training, &starts[0])?;
@@ -244,11 +246,17 @@ impl<'a> BaseModel<'a> {
         Ok(maxima)
     }
 
-    /// The first values of records that are off about a fit.
-    fn transients(&self, data: &Observations, point: &[f64]) -> Vec<Transient> {
+    /// The first values of records that are off about a fit, beside those that are known; `None` if there are none.
+    fn transients(
+        &self,
+        data: &Observations,
+        point: &[f64],
+        known: &[Transient],
+    ) -> Option<Vec<Transient>> {
         let layouts = &self.study.layouts;
         let experiment = Experiment::new(layouts, self.parameters, self.forward, data);
-        transients(&experiment, &self.response(point))
+        let found = transients(&experiment, &self.response(point), known);
+        (!found.is_empty()).then_some(found)
     }
 
     fn response(&self, point: &[f64]) -> Vec<f64> {
