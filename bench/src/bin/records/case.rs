@@ -7,7 +7,7 @@ use std::time::Instant;
 use generator::single::{Record, record};
 use lacuna::run::Silent;
 use lacuna_bench::clock::timed;
-use lacuna_engine::gap::result::GapResult;
+use lacuna_engine::gap::result::{GapResult, StepResult};
 use lacuna_engine::gap::search::VerdictKind;
 use lacuna_engine::study::resolve::load_text;
 use lacuna_run::RunDirectory;
@@ -41,6 +41,8 @@ pub struct Answer {
     pub stated: bool,
     pub verdict: VerdictKind,
     pub reasons: Vec<String>,
+    /// The candidates of largest weight of each step, with the logarithm of their weight.
+    pub leaders: Vec<String>,
     effects: Vec<(String, f64)>,
     closed: Option<(f64, [f64; 2])>,
     /// True when the verdict says what was taken for noise.
@@ -91,6 +93,7 @@ impl Answer {
             stated,
             verdict: verdict.word,
             reasons: verdict.reasons.clone(),
+            leaders: result.path.iter().map(leaders).collect(),
             effects: effects.map(|e| (e.class.join("/"), e.probability)).collect(),
             closed: proof.map(|all| (all.closed, [all.lower, all.upper])),
             noise_said: verdict.reasons.iter().any(|reason| reason.contains("taken for noise")),
@@ -171,4 +174,10 @@ impl Answer {
             self.seconds[1]
         )
     }
+}
+
+/// The candidates of largest weight of a step.
+fn leaders(step: &StepResult) -> String {
+    let each = step.leaders.iter().take(8).map(|l| format!("{} {:.1}", l.kind, l.log_weight));
+    each.collect::<Vec<_>>().join(", ")
 }

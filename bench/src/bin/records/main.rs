@@ -1,5 +1,5 @@
 //! Verdicts of the gap workflow on single records: `nice cargo run --release -p lacuna-bench --bin records -- --seed N
-//! --count M`, with `--from K` for the first case, `--only 3,4` for some cases, and `--say` for the reasons.
+//! --count M`, with `--from K` for the first case, `--only 3,4` for some cases, and `--say` for the candidates and the reasons.
 //!
 //! Records come from `tests/generator`, which shares no code with the engine. Each case is a study of one record as a
 //! user would write it, with the noise of the instrument stated in every second case, and runs as `lacuna gap` does. A
@@ -37,6 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let answer = ask(seed as u64, index)?;
         println!("{}", answer.line());
         if say {
+            answer.leaders.iter().for_each(|step| println!("    * {step}"));
             answer.reasons.iter().for_each(|reason| println!("    - {reason}"));
         }
         tally.add(&answer);

@@ -121,9 +121,9 @@ pub fn prepared<T>(
         untried.extend(learned.untried);
     }
     let odds = &study.gap.keys.prior_odds;
+    let inside = odds.of_inside(experiment.most_replicates() > 1);
     for candidate in &mut candidates {
-        let own = if candidate.is_inside() { odds.inside } else { odds.response };
-        candidate.odds = own.get();
+        candidate.odds = if candidate.is_inside() { inside } else { odds.response.get() };
     }
     let made = use_it(&PreparedSearch {
         base: &base,

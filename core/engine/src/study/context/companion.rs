@@ -110,7 +110,7 @@ fn inputs(
     let set = |input: &&Input| {
         of_study(&input.name)
             || study.scenarios[scenario].value(&input.name).is_some()
-            || companion.keys.fixed.contains_key(&input.name)
+            || study.model.iter().any(|model| model.common.fixed.contains_key(&input.name))
             || input.default.is_some()
     };
     if let Some(input) = signature.inputs.iter().find(|input| !set(input)) {

@@ -78,8 +78,10 @@ impl Default for GapSection {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PriorOdds {
-    /// Odds of physics inside the model: inputs that are set free, and terms of the equations.
-    pub inside: Positive,
+    /// Odds of physics inside the model: inputs that are set free, and terms of the equations. Default: 1 if some curve has
+    /// replicates, 4 if none has.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inside: Option<Positive>,
     /// Odds of effects on the response: sensors, and what the library describes there.
     pub response: Positive,
 }
@@ -87,7 +89,18 @@ pub struct PriorOdds {
 impl Default for PriorOdds {
     fn default() -> Self {
         let one = Positive::new(1.0).unwrap_or_else(|_| unreachable!("1 is positive"));
-        Self { inside: one, response: one }
+        Self { inside: None, response: one }
+    }
+}
+
+impl PriorOdds {
+    /// The odds of physics inside the model in measurements with replicates or without.
+    ///
+    /// What a single instrument recorded once lacks physics more often than the instrument is at fault in a way that
+    /// depends on the response: all seven records with a known missing effect of other people's that the project has were
+    /// so, which makes the odds 8 to 1 by Laplace's rule of succession; the default is half of it.
+    pub fn of_inside(&self, has_replicates: bool) -> f64 {
+        self.inside.map_or(if has_replicates { 1.0 } else { 4.0 }, Positive::get)
     }
 }
 

@@ -18,11 +18,9 @@ pub use grounds::explains;
 pub use probability::{CEILING, Traits};
 pub use reliability::{Bin, Brier, Reliability, Told};
 
-/// Smallest posterior probability at which a type is named alone.
-pub const SURE: f64 = 0.9;
-
-/// Posterior probability that the types of a class reach together.
-const CLASS: f64 = 0.95;
+/// Smallest posterior probability at which a type is named alone, and which the types of a class reach together: about 20 to 1,
+/// strong evidence by Kass and Raftery (Journal of the American Statistical Association 90 (1995) 773).
+pub const SURE: f64 = 0.95;
 
 /// Smallest share of replicates without which the type stays the same.
 const STABLE: f64 = 0.8;
@@ -323,7 +321,7 @@ fn with_untried(
     reasons
 }
 
-/// The most probable types that together reach 95 %; the chosen type alone if its probability is at least 0.9.
+/// The most probable types that together reach 95 %; the chosen type alone if it does by itself.
 pub fn class(kind: &str, own: f64, types: &[(String, f64)]) -> Vec<String> {
     let mut class = vec![kind.to_owned()];
     let mut sum = own;
@@ -331,7 +329,7 @@ pub fn class(kind: &str, own: f64, types: &[(String, f64)]) -> Vec<String> {
         return class;
     }
     for (other, p) in types.iter().filter(|(other, _)| other != kind) {
-        if sum >= CLASS {
+        if sum >= SURE {
             break;
         }
         class.push(other.clone());
