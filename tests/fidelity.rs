@@ -144,10 +144,9 @@ fn errors(case: &Case, surrogate: &str, rivals: &[Rival]) -> (f64, Vec<f64>) {
 /// The rival that both ensembles must not be worse than.
 fn rival(case: &Case, surrogate: &str) -> Rival {
     match (case.name.as_str(), surrogate) {
-        // Fine runs alone are so accurate that the cheap ones do not help, as in the other program, or are misleading.
-        ("misleading" | "park_a", _) => Rival::Same,
-        // Eleven runs are too few for polynomials of this function, cheap or fine.
-        ("forrester", "polynomial_chaos") => Rival::Same,
+        // Fine runs alone are so accurate that the cheap ones do not help, as in the other program, or are misleading;
+        // eleven runs are too few for polynomials of the function of Forrester, cheap or fine.
+        ("misleading" | "park_a", _) | ("forrester", "polynomial_chaos") => Rival::Same,
         _ => Rival::Alone,
     }
 }
