@@ -18,6 +18,13 @@ done
 for group in $groups; do kill -s KILL -- \"-$group\" 2>/dev/null; done
 ";
 
+static GUARD: OnceLock<Option<Mutex<ChildStdin>>> = OnceLock::new();
+
+/// Starts the guard, if it is not running: a group that begins before its guard would run on after a kill in between.
+pub fn ready() {
+    GUARD.get_or_init(start);
+}
+
 /// Registers a running group.
 pub fn watch(group: u32) {
     tell('+', group);
@@ -29,7 +36,6 @@ pub fn release(group: u32) {
 }
 
 fn tell(change: char, group: u32) {
-    static GUARD: OnceLock<Option<Mutex<ChildStdin>>> = OnceLock::new();
     let Some(pipe) = GUARD.get_or_init(start) else { return };
     let mut pipe = pipe.lock().unwrap_or_else(PoisonError::into_inner);
     // A run is possible without the guard.

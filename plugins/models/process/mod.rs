@@ -29,6 +29,7 @@ impl Process {
     /// Starts a command in a process group of its own.
     pub fn start(command: &mut Command) -> io::Result<Self> {
         group::lead(command);
+        guard::ready();
         let child = command.spawn()?;
         guard::watch(child.id());
         Ok(Self { child, status: None })
