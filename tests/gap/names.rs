@@ -4,6 +4,7 @@ use generator::{Kind, SENSORS};
 use lacuna_engine::gap::search::{MissingEffect, VerdictKind};
 
 use super::cases::{Asked, LISTED, Plan, UNLISTED, asked, count};
+use super::chain::ask;
 use super::tally::{Rate, confusion};
 
 /// One effect on one sensor, and in every fifth case on two.
@@ -231,4 +232,19 @@ fn two_effects_are_both_named() {
     table("Two effects, rms 1 each", &all, &rows);
     misses(&all, |a| !right(a));
     both.assert_above("both right", 0.85);
+}
+
+/// Beside an echo on three sensors, the fourth is rectified, which no candidate has: a gain stands for that in part, and the
+/// sum has no name. The echo alone is certain and keeps it; the gain is left to the remainder. The seed is one with such a
+/// sum.
+#[test]
+fn a_certain_part_keeps_its_name_beside_what_has_none() {
+    let hidden = [(Kind::Echo, vec![0, 1, 3]), (Kind::Rectified, vec![2])];
+    let answer = ask(&generator::case(901, &hidden, 2.0, 8), 8, 901).verdict;
+    assert_eq!(answer.word, VerdictKind::Approximate, "{answer:?}");
+    let [echo] = &answer.effects[..] else { panic!("{:?}", answer.effects) };
+    assert!(echo.kind == "echo" && echo.certain, "{echo:?}");
+    assert_eq!(echo.on["sensor"], [0, 1, 3].map(|s| SENSORS[s]), "{echo:?}");
+    let is_left_out = |reason: &String| reason.starts_with("`gain` would explain more");
+    assert!(answer.reasons.iter().any(is_left_out), "{:?}", answer.reasons);
 }

@@ -190,6 +190,13 @@ impl<'a> Experiment<'a> {
         self.layouts.len()
     }
 
+    /// True at each output that was measured.
+    pub fn measured(&self) -> Vec<bool> {
+        let mut all = vec![false; self.outputs()];
+        self.curves.iter().flat_map(|curve| &curve.measured).for_each(|&i| all[i] = true);
+        all
+    }
+
     /// The number of replicates at each output, and their mean in the response's unit; zero if nothing was measured.
     pub fn means(&self) -> (Vec<f64>, Vec<f64>) {
         let mut counts = vec![0.0; self.outputs()];

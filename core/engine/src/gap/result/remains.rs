@@ -51,9 +51,9 @@ pub(super) fn remains(found: &SearchResult<'_>) -> Option<Remains> {
         count += curve.measured.len() as f64;
     }
     let all: f64 = by_sensor.values().sum();
-    let first = found.first().tolerant.gap;
+    let whole = found.explained.total();
     Some(Remains {
-        share: if first > 0.0 { last.gap / first } else { 1.0 },
+        share: if whole > 0.0 { found.explained.left / whole } else { 1.0 },
         log_bayes_factor: last.inexact,
         rms: (all / f64::max(count, 1.0)).sqrt(),
         sensors: largest(by_sensor, all),

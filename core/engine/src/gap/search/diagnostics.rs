@@ -4,6 +4,7 @@ use lacuna::math::moments::quantile;
 use lacuna::plugin::effect::On;
 use serde::{Deserialize, Serialize};
 
+use super::explained::Explained;
 use super::refit::{TolerantEvidence, Weighed};
 use super::support::Support;
 use super::visited::{ModelAverage, VisitedModel};
@@ -103,6 +104,8 @@ pub struct SearchResult<'a> {
     pub slots: Vec<Vec<Weighed>>,
     /// The posterior probabilities of all types, over the models that the search compared.
     pub average: ModelAverage,
+    /// The part of the gap that the effects close together.
+    pub explained: Explained,
     /// The support of each effect.
     pub support: Vec<Support>,
     /// The names of effects that were found beside these and are not certain: they are left to the remainder.

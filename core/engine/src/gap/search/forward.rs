@@ -8,11 +8,11 @@ use lacuna::math::random::Stream;
 use lacuna::plugin::effect::{On, Situation};
 
 use super::diagnostics::{Diagnostics, SearchOptions, SearchResult, SearchStep, detectability};
+use super::explained::misfit;
 use super::pairs::Pair;
 use super::refit::{Scored, Weighed, most_promising, refit_all};
 use super::state::{SearchSetting, SearchState, kinds};
 use super::subsets::Screen;
-use super::support::misfit;
 use super::visited::VisitedModel;
 use crate::gap::candidates::{Candidate, Placement, place, placements, sensors};
 use crate::gap::experiment::Experiment;

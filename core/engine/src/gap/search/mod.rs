@@ -6,6 +6,7 @@ mod cross_validate;
 mod diagnostics;
 mod discriminate;
 mod evidence;
+mod explained;
 mod finish;
 mod fold_score;
 mod folds;
@@ -29,6 +30,7 @@ pub use cross_validate::{CrossValidation, Explanation, LeftOut, cross_validate};
 pub use diagnostics::{Detectability, Diagnostics, SearchOptions, SearchResult, SearchStep};
 pub use discriminate::{DiscriminatingData, Discrimination, FurtherData, discriminate};
 pub use evidence::{LogEvidence, log_evidence};
+pub use explained::Explained;
 pub use forward::search;
 pub use refit::{
     RefitSetting, Scored, Weighed, log_prior, most_promising, placement_prior, refit_all,

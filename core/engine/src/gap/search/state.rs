@@ -4,14 +4,15 @@ use std::sync::Arc;
 
 use lacuna::math::random::Stream;
 
+use super::explained::Explained;
 use super::refit::{RefitSetting, TolerantEvidence};
 use super::slots::Slot;
 use crate::gap::candidates::{Candidate, Placement};
 use crate::gap::experiment::Experiment;
 use crate::gap::noise::Noise;
 use crate::gap::system::System;
-use crate::gap::system::fit::{Fit, fit};
-use crate::gap::system::remainder::{Remainder, WhiteRemainder};
+use crate::gap::system::fit::{Fit, fit, fit_from};
+use crate::gap::system::remainder::{Remainder, Setting, WhiteRemainder};
 use crate::gap::system::whitener::Whitener;
 
 /// A system with its fit, its noise and its whitener.
@@ -91,6 +92,22 @@ impl<'a> SearchState<'a> {
         start.drain(begin..end);
         let fit = fit(&system, &self.whitener, shared.means, &start);
         Self { system, chosen, fit, slots: None, ..self.clone() }
+    }
+
+    /// The part of the gap that the effects close together, of which a remainder of this setting is left; `first` is the
+    /// calibration without them.
+    pub fn explained(
+        &self,
+        shared: &SearchSetting<'a, '_>,
+        first: &Fit,
+        setting: Option<Setting>,
+    ) -> Explained {
+        let bare = System::new(shared.experiment, Vec::new());
+        let own = self.system.parameters(&self.fit.at.point).to_vec();
+        let starts = [own, first.at.point.clone()];
+        let fit = fit_from(&bare, &self.whitener, shared.means, &starts);
+        let before = fit.as_ref().unwrap_or(&self.fit);
+        Explained::of(&self.white, [before, &self.fit], setting, &shared.experiment.measured())
     }
 
     /// The fitted values of the unknowns of effect `i`, in their units.

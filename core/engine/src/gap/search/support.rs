@@ -7,15 +7,14 @@
 
 use lacuna::math::random::Stream;
 use lacuna::plugin::discrepancy::CommonError;
-use lacuna_linalg::vector::dot;
 use serde::{Deserialize, Serialize};
 
 use super::cross_validate::{CrossValidation, Explanation, LeftOut, STRONG, cross_validate_parts};
+use super::explained::Explained;
 use super::folds::Fold;
 use super::refit::TolerantEvidence;
 use super::state::{SearchSetting, SearchState};
 use crate::gap::experiment::Experiment;
-use crate::gap::system::fit::Fit;
 
 /// The largest share of an effect in a left-out part: of an effect that is nearly all there, the rest knows only the prior.
 const THERE: f64 = 0.8;
@@ -26,7 +25,7 @@ const LITTLE: f64 = 0.01;
 /// The support of one effect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Support {
-    /// The share of the first gap that it closes beside the other effects.
+    /// The share of the whole gap that it closes beside the other effects.
     pub share: f64,
     /// The share of the misfit on its own sensors beyond noise that it closes beside the other effects.
     pub local: f64,
@@ -60,13 +59,12 @@ pub fn decides(one: &CrossValidation, all: &[CrossValidation]) -> bool {
     elsewhere(one) || !all.iter().any(elsewhere)
 }
 
-/// The support of each effect of a state; `last` is its evidence with a remainder, `first` the energy of the gap before
-/// the first step.
+/// The support of each effect of a state; `last` is its evidence with a remainder, `whole` the gap without any effect.
 pub(super) fn supports<'a>(
     shared: &SearchSetting<'a, '_>,
     state: &SearchState<'a>,
     last: &TolerantEvidence,
-    first: f64,
+    whole: &Explained,
     stream: &Stream,
 ) -> Vec<Support> {
     let remainder = |evidence: &TolerantEvidence| -> Option<CommonError> {
@@ -74,6 +72,7 @@ pub(super) fn supports<'a>(
         evidence.setting.map(|setting| shared.remainder.common(setting, outputs))
     };
     let left = remainder(last);
+    let measured = shared.experiment.measured();
     let with = Explanation { system: &state.system, fit: &state.fit, remainder: left.as_ref() };
     let support = |i: usize| {
         let smaller = state.without(shared, i);
@@ -87,21 +86,17 @@ pub(super) fn supports<'a>(
             let share = share_in(shared.experiment, &change, fold);
             fold.replicate.is_some() || (LITTLE..=THERE).contains(&share)
         };
-        let [before, after] = [&smaller.fit, &state.fit].map(|fit| misfit(fit, acts));
+        let explained = |acts: &[bool]| {
+            Explained::of(&state.white, [&smaller.fit, &state.fit], last.setting, acts)
+        };
+        let own: Vec<bool> = acts.iter().zip(&measured).map(|(a, b)| *a && *b).collect();
         Support {
-            share: (evidence.gap - last.gap) / first.max(f64::MIN_POSITIVE),
-            local: (before - after) / before.max(1.0),
+            share: explained(&measured).closed / whole.total().max(1.0),
+            local: explained(&own).share(),
             against_free_form: cross_validate_parts(with, rival, &state.noise, 1, is_used),
         }
     };
     (0..state.chosen.len()).map(support).collect()
-}
-
-/// The squared whitened residual beyond noise of some outputs.
-pub(super) fn misfit(fit: &Fit, acts: &[bool]) -> f64 {
-    let own: Vec<f64> =
-        fit.residual.iter().zip(acts).filter(|(_, acts)| **acts).map(|(z, _)| *z).collect();
-    (dot(&own, &own) - own.len() as f64).max(0.0)
 }
 
 /// The squared change of each output by effect `i` in units of the noise.

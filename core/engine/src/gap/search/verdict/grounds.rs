@@ -40,8 +40,7 @@ impl Grounds {
 
 /// The share of the gap that the effects of a search close.
 pub(super) fn closed(found: &SearchResult<'_>) -> f64 {
-    let [before, left] = [found.first(), &found.last].map(|of| of.tolerant.gap);
-    if before > 0.0 { 1.0 - left / before } else { 0.0 }
+    if found.chosen.is_empty() { 0.0 } else { found.explained.share() }
 }
 
 /// Returns true if effects that close this share of the gap explain it, even if a single region still disagrees.

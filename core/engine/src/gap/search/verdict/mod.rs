@@ -37,8 +37,9 @@ const REMAINS: f64 = 0.05;
 /// The share of the excess misfit that an effect must close to be named if an excess remains.
 const HALF: f64 = 0.5;
 
-/// The share of the gap that the effects of an approximate name close at least.
-const MOST: f64 = 0.6;
+/// The share of the gap that the effects of an approximate name close at least: of physics inside a simulator, candidates of the
+/// right type close more in other people's cases, and those of a wrong type less.
+const MOST: f64 = 0.8;
 
 /// The log Bayes factor of a remainder above which it is significant: 20 to 1 (Kass and Raftery, Journal of the American
 /// Statistical Association 90 (1995) 773).
@@ -57,8 +58,8 @@ const CONTRADICTED: f64 = 2.0;
 /// The number of [`PROVEN`] for an effect beside which another part of the gap has no name.
 const CERTAIN: f64 = 4.0;
 
-/// The 95 % quantile of the normal distribution, for the test that more than half remains.
-const CLEAR: f64 = 1.645;
+/// The 95 % quantile of the normal distribution: an excess of so many standard deviations is clear.
+pub(super) const CLEAR: f64 = 1.645;
 
 /// The absorbed share of a candidate above which it counts as not visible.
 const INVISIBLE: f64 = 0.95;
@@ -221,27 +222,27 @@ fn with_effects(
         100.0 * grounds.closed,
         found.last.tolerant.inexact
     );
+    let free = grounds::unproven(effects);
+    let is_like = grounds.closed >= MOST && sure && free.is_none();
     let inexact = found.last.tolerant.inexact > SIGNIFICANT;
     if inexact || grounds.gap && grounds.closed < NEARLY {
         reasons.push(left);
-        let like = grounds.closed >= MOST && sure;
-        let free = grounds::unproven(effects);
-        let word =
-            if like && free.is_none() { VerdictKind::Approximate } else { VerdictKind::Unlisted };
         reasons.extend(free);
+        let word = if is_like { VerdictKind::Approximate } else { VerdictKind::Unlisted };
         return (word, reasons);
     }
     if grounds.gap {
         reasons.push(left);
     }
     if found.consistency < INCONSISTENT {
-        // Effects that explain the whole misfit are of the right type; that they differ between conditions shows that
-        // their form is not exact.
+        // That effects which explain the misfit differ between conditions shows that their form is not exact.
+        let differ =
+            "the effects that explain most differ between conditions or between their sensors";
+        reasons.push(differ.to_owned());
+        if is_like {
+            return (VerdictKind::Approximate, reasons);
+        }
         let kind = grounds.explained && widened(effects, &found.types);
-        let though = if kind { ", though they explain the whole misfit" } else { "" };
-        reasons.push(format!(
-            "the effects that explain most differ between conditions or between their sensors{though}"
-        ));
         return (if kind { VerdictKind::Class } else { VerdictKind::Unlisted }, reasons);
     }
     (if sure { VerdictKind::Named } else { VerdictKind::Class }, reasons)

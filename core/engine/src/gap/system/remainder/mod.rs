@@ -251,6 +251,25 @@ impl WhiteRemainder {
         along.iter().zip(variances).map(taken).sum::<f64>().max(0.0)
     }
 
+    /// The [energy](Self::energy) on the outputs where `acts` is true.
+    pub fn energy_on(&self, fit: &Fit, setting: Option<Setting>, acts: &[bool]) -> f64 {
+        let Some(Setting { length, size }) = setting else { return 0.0 };
+        let Spectrum { directions, variances } = &self.spectra[length];
+        let along = multiply_vector(directions, &fit.residual);
+        let mut mean = vec![0.0; fit.residual.len()];
+        let mut noise = vec![0.0; fit.residual.len()];
+        for ((row, r), v) in directions.iter_rows().zip(along).zip(variances) {
+            let share = v * size * size / (1.0 + v * size * size);
+            for (i, d) in row.iter().enumerate() {
+                mean[i] += share * r * d;
+                noise[i] += (1.0 - (1.0 - share).powi(2)) * d * d;
+            }
+        }
+        let taken = |i: usize| fit.residual[i].powi(2) - (fit.residual[i] - mean[i]).powi(2);
+        let own = (0..mean.len()).filter(|&i| acts[i]);
+        own.map(|i| taken(i) - noise[i]).sum::<f64>().max(0.0)
+    }
+
     /// The evidences of a system on the grid, from its best fit without a remainder; it is fitted again with the
     /// remainder of largest evidence.
     pub fn weigh(
