@@ -9,7 +9,8 @@ use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
 use toml::Table;
 
-use super::learned::{Basis, LearnedChange, Region, distances};
+use super::learned::{Basis, LearnedChange, Region};
+use super::reach::Reach;
 use crate::gap::candidates::{Candidate, Untried};
 use crate::gap::experiment::wider::FreeInput;
 use crate::gap::inside::change::ChangeEffect;
@@ -19,9 +20,6 @@ use crate::gap::result::companion::IdentifiedCompanion;
 use crate::gap::system::switched::InputEffect;
 use crate::stage::direct::ModelMap;
 use crate::study::gap::Companion;
-
-/// Changes are learned up to this multiple of the misfit, or of the size that was found.
-const FAR: f64 = 3.0;
 
 /// The candidates inside a companion.
 #[derive(Default)]
@@ -46,7 +44,7 @@ pub(super) struct Learning<'a> {
 
 /// The extent of the sizes for which changes are learned.
 pub(super) enum Extent {
-    /// As large as changes of the response of this root mean square, in its unit.
+    /// As large as changes of the response of this root mean square, in its unit, that the parameters cannot make up for.
     Change(f64),
     /// As far from absence as these sizes by the names of candidates; for others as far as their priors.
     Sizes(BTreeMap<String, f64>),
@@ -59,6 +57,7 @@ impl Learning<'_> {
         let bare = ModelMap::of(study)?;
         let mut without = Matrix::zeros(0, study.layouts.len());
         let mut all = CompanionCandidates::default();
+        let reach = Reach::new(self, &bare)?;
         for (p, piece) in self.pieces.all.iter().enumerate() {
             let kind = self.kind(piece);
             if !wanted(&kind) {
@@ -72,8 +71,8 @@ impl Learning<'_> {
             let priors = priors.chain(inputs.iter().map(|i| i.prior.clone())).collect();
             let simulator = self.pieces.simulator(study, &model)?;
             let map = ModelMap::with(simulator, priors, study.layouts.len());
-            let reach = self.reach(&kind, &inputs, &bare, &map)?;
-            let basis = Basis::new(self.region.clone(), &inputs, reach);
+            let far = reach.of(&kind, &inputs, &map)?;
+            let basis = Basis::new(self.region.clone(), &inputs, far);
             let points = basis.points(&self.random);
             // All candidates are learned at the same points of the parameters.
             if points.len() > without.rows() {
@@ -98,40 +97,6 @@ impl Learning<'_> {
         Ok(all)
     }
 
-    /// The distance of a size from absence up to which its change is learned.
-    fn reach(
-        &self,
-        kind: &str,
-        inputs: &[FreeInput],
-        bare: &ModelMap<'_>,
-        map: &ModelMap<'_>,
-    ) -> Result<f64, Stop> {
-        let all = distances(&inputs[0]);
-        let most = match &self.extent {
-            Extent::Sizes(sizes) => {
-                let size = sizes.get(kind).map(|size| FAR * (size - inputs[0].absent).abs());
-                return Ok(size.filter(|far| *far > 0.0).map_or(all[0], |far| far.min(all[0])));
-            }
-            Extent::Change(rms) => FAR * rms,
-        };
-        let (low, high) = inputs[0].prior.support();
-        let values = |far: &f64| -> Vec<f64> {
-            let above = inputs[0].absent + far;
-            let size = if above <= high { above } else { (inputs[0].absent - far).max(low) };
-            let index = |input: &FreeInput| input.starts.first().copied().unwrap_or(input.absent);
-            std::iter::once(size).chain(inputs[1..].iter().map(index)).collect()
-        };
-        let values: Vec<Vec<f64>> = all.iter().map(values).collect();
-        let with = self.answers(map, values.iter().map(|values| (&self.point, &values[..])))?;
-        let without = self.answers(bare, std::iter::once((&self.point, &[][..])))?;
-        let rms = |row: &[f64]| {
-            let square: f64 = row.iter().zip(without.row(0)).map(|(a, b)| (a - b).powi(2)).sum();
-            (square / row.len().max(1) as f64).sqrt()
-        };
-        let fits = |k: &usize| rms(with.row(*k)) <= most;
-        Ok((0..all.len()).find(fits).map_or(all[all.len() - 1], |k| all[k]))
-    }
-
     /// The type: an input has its own name, also where an effect on the response has the same, for both are the same
     /// physics.
     fn kind(&self, piece: &Piece) -> String {
@@ -142,7 +107,7 @@ impl Learning<'_> {
     }
 
     /// The responses of a map at points of the study's parameters and values of its inputs.
-    fn answers<'p>(
+    pub fn answers<'p>(
         &self,
         map: &ModelMap<'_>,
         points: impl Iterator<Item = (&'p Vec<f64>, &'p [f64])>,

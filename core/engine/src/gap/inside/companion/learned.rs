@@ -87,6 +87,18 @@ impl Region {
         (0..self.centre.len()).map(place).collect()
     }
 
+    /// The middle of the region, then for each parameter the points half way to the edge below and above it.
+    pub fn cross(&self) -> Vec<Vec<f64>> {
+        let d = self.centre.len();
+        let point = |j: usize, share: f64| {
+            let mut shares = vec![0.5; d];
+            shares[j] = share;
+            self.at(&shares)
+        };
+        let sides = (0..d).flat_map(|j| [point(j, 0.25), point(j, 0.75)]);
+        std::iter::once(self.centre.clone()).chain(sides).collect()
+    }
+
     /// The parameters in units of the region, moved to its edge where they are outside.
     fn scaled(&self, point: &[f64]) -> Vec<f64> {
         let scale = |j: usize| ((point[j] - self.centre[j]) / self.half[j]).clamp(-1.0, 1.0);

@@ -10,6 +10,7 @@ mod effect;
 mod gate;
 mod identify;
 mod learned;
+mod reach;
 
 use std::sync::Arc;
 
