@@ -2,8 +2,8 @@
 
     python bench/probability.py [--worlds COMMAND] [--cases 60] [--seed 1] [--out FOLDER] [--check SEED] [--write]
 
-Draws CASES random cases in each of the two worlds of `bench/src/bin/worlds` (a box of liquid, a pipe), runs the search on them, and fits a
-logistic regression of *the class of an effect holds the type that is hidden* on the quantities of `Traits` in
+Draws up to CASES random cases in each of two worlds of `bench/src/bin/worlds` (a box of liquid, a pipe), without a companion and with one,
+runs the search on them, and fits a logistic regression of *the class of an effect holds the type that is hidden* on the quantities of `Traits` in
 `core/engine/src/gap/search/verdict/probability.rs`; `--write` puts the coefficients there. Lines of finished cases in FOLDER are
 reused, also those of an interrupted run. Cases whose cause is a fault of the measuring chain, which the library has, have half of the
 weight, cases with physics inside the simulator the other half. No slope may be negative: what would be is left out.
@@ -21,7 +21,8 @@ import subprocess
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 TARGET = os.path.join(HERE, "..", "core", "engine", "src", "gap", "search", "verdict", "probability.rs")
-WORLDS = ("box", "pipe")
+# The worlds without a companion and with one, and the numbers of cases.
+WORLDS = (("box", 60), ("pipe", 60), ("box --companion", 40), ("pipe --companion", 40))
 EDGES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0)
 FLOOR, CEILING = 0.01, 0.99
 NAMES = ("log_odds", "local", "transfer", "closed", "inexact")
@@ -74,23 +75,24 @@ def logistic(x):
 def collected(options, seed):
     """The lines of the cases of a seed, made where they are missing."""
     lines = []
-    for world in WORLDS:
-        path = os.path.join(options.out, f"{world}-{seed}.tsv")
+    for world, count in WORLDS:
+        count = min(count, options.cases)
+        path = os.path.join(options.out, f"{world.replace(' --', '-')}-{seed}.tsv")
         have = []
         if os.path.exists(path):
             with open(path) as file:
                 have = [line for line in file.read().split("\n")[:-1] if line.count("\t") >= 8]
         done = {int(line.split("\t")[1]) % 10000 for line in have}
-        missing = [i for i in range(options.cases) if i not in done]
+        missing = [i for i in range(count) if i not in done]
         if missing and not options.reuse:
-            command = options.worlds.split() + [world, "--random", str(options.cases), "--seed", str(seed), "--only",
-                                                ",".join(map(str, missing))]
+            command = options.worlds.split() + world.split() + ["--random", str(count), "--seed", str(seed), "--only",
+                                                                ",".join(map(str, missing))]
             with open(path, "w") as file:
                 file.writelines(line + "\n" for line in have)
                 file.flush()
                 with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
                     for line in process.stdout:
-                        if line.startswith(world + "\t"):
+                        if line.startswith(world.split()[0] + "\t"):
                             have.append(line.rstrip("\n"))
                             file.write(line)
                             file.flush()
@@ -102,20 +104,14 @@ def read(lines):
     """The effects of all cases, and the numbers of cases inside and outside the library."""
     effects, counts = [], [0, 0]
     for line in lines:
-        world, seed, _, hidden, _, word, closed, inexact, _, *found = line.split("\t")
+        world, seed, _, hidden, _, word, _, _, _, *found = line.split("\t")
         causes = hidden.split(" & ")
         outside = any(cause.startswith("inside:") for cause in causes)
         counts[outside] += 1
         for text in found:
-            name, _, local, scores, ahead = text.split(";")
+            name, _, _, traits = text.split(";")
             types = name.split("@")[0].split("/")
-            listed = [entry.rsplit(" ", 1) for entry in ahead.split(", ") if entry]
-            inside = sum(math.exp(float(p)) for kind, p in listed if kind in types)
-            others = sum(math.exp(float(p)) for kind, p in listed if kind not in types)
-            log_odds = math.log(max(inside, 1e-300)) - math.log(max(others, 1e-300))
-            each = [entry.rsplit(":", 2)[1:] for entry in scores.split(",") if entry]
-            errors = [float(a) / float(b) for a, b in each if float(b) > 0]
-            traits = (log_odds, float(local), min(errors, default=0.0), float(closed), float(inexact))
+            traits = tuple(map(float, traits.split(" ")))
             right = any(is_right(cause, word, types) for cause in causes)
             effects.append(Effect(traits, right, (world, seed), outside))
     for effect in effects:
@@ -218,7 +214,7 @@ def table(title, effects, probabilities):
 def written(fit, effects, counts, options):
     """The constant in the source."""
     intercept, slopes = fit
-    part = "" if sum(counts) == len(WORLDS) * options.cases else "the first of "
+    part = "" if sum(counts) == sum(min(count, options.cases) for _, count in WORLDS) else "the first of "
     doc = (f"/// The fit to {len(effects)} names of {sum(counts)} cases of the worlds in `tests/generator`, {counts[1]} of them with\n"
            f"/// physics inside the simulator: {part}those of `python bench/probability.py --cases {options.cases} --seed {options.seed} --write`.\n")
     values = ", ".join(f"{slope:.3f}" for slope in slopes)

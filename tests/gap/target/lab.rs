@@ -1,5 +1,4 @@
-//! The study of the vessel: a polynomial chaos expansion in place of the model, including quantities that the model
-//! fixes, with their errors.
+//! The study of the vessel: a polynomial chaos expansion in place of the model, with its errors.
 
 use std::sync::OnceLock;
 
@@ -8,46 +7,32 @@ use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
 use lacuna::plugin::discrepancy::CommonError;
 use lacuna::plugin::surrogate::Training;
-use lacuna::plugin::{Design, Emulator, Forward, Surrogate, registry};
+use lacuna::plugin::{Design, Emulator, Surrogate, registry};
 use lacuna::run::{Progress, Silent};
-use lacuna_engine::gap::experiment::wider::{ExtendedMap, FreeInput};
 use lacuna_linalg::Matrix;
-use lacuna_plugins::models::mercury_target::{Gas, Mercury, Target};
+use lacuna_plugins::models::mercury_target::{Mercury, Target};
 use rayon::prelude::*;
 
 use super::vessel::{SENSORS, settings, strain};
 
 pub const OUTPUTS: usize = 1000;
 const RUNS: usize = 150;
-const WIDE_RUNS: usize = 300;
 const FINER_RUNS: usize = 30;
 
 /// Order of convergence of the mesh, as in `configs/sns`.
 const ORDER: f64 = 1.8;
 
-/// Three parameters, followed by the quantities that the model fixes: name, value at which the effect is absent, prior.
-fn unknowns() -> Vec<(&'static str, f64, Distribution)> {
-    use Distribution::{TruncatedNormal, Uniform};
-    vec![
-        ("tensile_cutoff", 1.5e5, Uniform([0.0, 5e5])),
-        ("density", 13_500.0, Uniform([10_000.0, 13_600.0])),
-        ("sound_speed", 1456.0, Uniform([800.0, 1800.0])),
-        ("void_fraction", 0.0, Uniform([0.0, 4e-4])),
-        ("void_gradient", 0.0, Uniform([-0.8, 0.8])),
-        ("void_depletion", 0.0, Uniform([0.0, 0.9])),
-        ("pulse_energy", 1.0, TruncatedNormal([1.0, 0.05, 0.8, 1.2])),
-        ("beam_width", 0.032, TruncatedNormal([0.032, 0.002, 0.026, 0.038])),
-        ("wall_thickness", 1.0, TruncatedNormal([1.0, 0.05, 0.85, 1.15])),
-    ]
-}
-
 fn parameters() -> Vec<Parameter> {
-    let parameter = |(name, _, prior): (&str, f64, Distribution)| {
-        let (low, high) = prior.support();
-        let design = Distribution::Uniform([low, high]);
-        Parameter { design, ..Parameter::plain(name, prior) }
+    let parameter = |(name, range): (&str, [f64; 2])| {
+        let law = Distribution::Uniform(range);
+        Parameter { design: law.clone(), ..Parameter::plain(name, law) }
     };
-    unknowns().into_iter().map(parameter).collect()
+    let ranges = [
+        ("tensile_cutoff", [0.0, 5e5]),
+        ("density", [10_000.0, 13_600.0]),
+        ("sound_speed", [800.0, 1800.0]),
+    ];
+    ranges.into_iter().map(parameter).collect()
 }
 
 pub fn layouts() -> Layouts {
@@ -59,23 +44,11 @@ pub fn layouts() -> Layouts {
     Layout { name: "strain".into(), unit: Unit::dimensionless(), axes }.into()
 }
 
-/// The model as a function of its parameters, followed by the other free quantities.
+/// The model as a function of its parameters.
 fn model(fineness: usize, x: &[f64]) -> Vec<f64> {
-    let mut settings = settings(fineness);
+    let settings = settings(fineness);
     let mercury = Mercury { tensile_cutoff: x[0], density: x[1], sound_speed: x[2] };
-    if x.len() == 3 {
-        let outcome = Target::new(&settings).unwrap().simulate(&mercury).unwrap();
-        return strain(&settings, &outcome);
-    }
-    let (void_fraction, gradient, depletion) = (x[3], x[4], x[5]);
-    let gas = Gas { void_fraction, gradient, depletion, bubble_radius: 0.0, ..Gas::default() };
-    settings.pulse.peak_pressure *= x[6];
-    settings.pulse.wall_strain *= x[6];
-    settings.pulse.width = x[7];
-    settings.wall.cap_thickness *= x[8];
-    settings.wall.cylinder_thickness *= x[8];
-    let outcome = Target::new(&settings).unwrap().simulate_with_gas(&mercury, &gas).unwrap();
-    strain(&settings, &outcome)
+    strain(&settings, &Target::new(&settings).unwrap().simulate(&mercury).unwrap())
 }
 
 pub fn design(parameters: &[Parameter], runs: usize, seed: u64) -> Matrix {
@@ -109,47 +82,6 @@ fn difference(a: &Matrix, b: &Matrix) -> Matrix {
     Matrix::from_fn(a.rows(), a.columns(), |i, j| a[(i, j)] - b[(i, j)])
 }
 
-/// The study's emulator, plus its change if further quantities are free: `base(x) + change(x, s) - change(x, absent)`.
-struct Widened {
-    base: &'static dyn Emulator,
-    change: Box<dyn Emulator>,
-    absent: Vec<f64>,
-}
-
-impl Widened {
-    fn without(&self, point: &[f64]) -> Vec<f64> {
-        [&point[..3], &self.absent[..]].concat()
-    }
-}
-
-impl Forward for Widened {
-    fn dimension(&self) -> usize {
-        self.change.dimension()
-    }
-
-    fn outputs(&self) -> usize {
-        OUTPUTS
-    }
-
-    fn mean(&self, points: &Matrix) -> Matrix {
-        let rows = points.iter_rows().map(|p| self.without(p));
-        let without = self.change.mean(&Matrix::from_rows(points.columns(), rows));
-        let change = difference(&self.change.mean(points), &without);
-        let base = self.base.mean(&points.select_columns(&[0, 1, 2]));
-        Matrix::from_fn(points.rows(), OUTPUTS, |i, j| base[(i, j)] + change[(i, j)])
-    }
-
-    fn jacobian(&self, point: &[f64]) -> Matrix {
-        let base = self.base.jacobian(&point[..3]);
-        let without = self.change.jacobian(&self.without(point));
-        let mut all = self.change.jacobian(point);
-        for i in 0..OUTPUTS {
-            (0..3).for_each(|j| all[(i, j)] += base[(i, j)] - without[(i, j)]);
-        }
-        all
-    }
-}
-
 /// The study: its emulator with samples of its errors.
 pub struct Lab {
     pub parameters: Vec<Parameter>,
@@ -160,7 +92,7 @@ pub struct Lab {
 pub fn lab() -> &'static Lab {
     static MADE: OnceLock<Lab> = OnceLock::new();
     MADE.get_or_init(|| {
-        let parameters = parameters()[..3].to_vec();
+        let parameters = parameters();
         let points = design(&parameters, RUNS, 1);
         let responses = simulated(1, &points);
         let base = fitted(&parameters, &points, &responses);
@@ -171,22 +103,5 @@ pub fn lab() -> &'static Lab {
         let errors =
             vec![error("emulator", &base.fit_error().residuals, 1.0), error("mesh", &mesh, whole)];
         Lab { parameters, base, errors }
-    })
-}
-
-pub fn wide() -> &'static ExtendedMap<'static> {
-    static MADE: OnceLock<ExtendedMap<'static>> = OnceLock::new();
-    MADE.get_or_init(|| {
-        let (lab, all, unknowns) = (lab(), parameters(), unknowns());
-        let points = design(&all, WIDE_RUNS, 3);
-        let base = lab.base.mean(&points.select_columns(&[0, 1, 2]));
-        let change = fitted(&all, &points, &difference(&simulated(1, &points), &base));
-        let common = vec![error("emulator of what is free", &change.fit_error().residuals, 1.0)];
-        let freed = |(name, absent, prior): &(&str, f64, Distribution)| {
-            FreeInput::new(name, Unit::dimensionless(), *absent, prior.clone())
-        };
-        let absent = unknowns[3..].iter().map(|(_, absent, _)| *absent).collect();
-        let forward = Box::new(Widened { base: &*lab.base, change, absent });
-        ExtendedMap { forward, inputs: unknowns[3..].iter().map(freed).collect(), common }
     })
 }

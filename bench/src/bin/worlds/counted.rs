@@ -46,6 +46,10 @@ pub fn count<W: Workflow>(
         if cases.nothing {
             secrets.clear();
         }
+        if cases.inside {
+            let changes = workflow.world().changes().len() as u64;
+            secrets = vec![Secret::Inside((i % changes) as usize)];
+        }
         let replicates = REPLICATES[(random.uniform(0.0, 1.0) * 4.0) as usize];
         let ratio = SIZES[0] * (SIZES[1] / SIZES[0]).powf(random.uniform(0.0, 1.0));
         let told = workflow.ask(seed, &secrets, ratio, replicates)?;

@@ -16,7 +16,7 @@ use lacuna_engine::gap::candidates::proposed;
 use lacuna_engine::gap::experiment::Experiment;
 use lacuna_engine::gap::noise::{Noise, ResponseTangents};
 use lacuna_engine::gap::search::{
-    MissingEffect, ModelAverage, SearchOptions, Support, Verdict, search, verdict,
+    MissingEffect, ModelAverage, SearchOptions, Support, Traits, Verdict, search, verdict,
 };
 use lacuna_engine::gap::system::emulator_error::error_covariance;
 use lacuna_linalg::Matrix;
@@ -224,26 +224,7 @@ impl Answer {
             self.inexact[1],
             self.seconds
         );
-        for ((effect, support), types) in
-            self.verdict.effects.iter().zip(&self.supports).zip(&self.types)
-        {
-            let scores: Vec<String> = support
-                .against_free_form
-                .iter()
-                .map(|c| {
-                    format!("{:?}:{:.1}:{:.1}", c.left_out, c.difference, c.error.unwrap_or(0.0))
-                })
-                .collect();
-            let _ = write!(
-                text,
-                "\t{};{:.3};{:.3};{};{}",
-                place(effect),
-                support.share,
-                support.local,
-                scores.join(","),
-                ahead(types)
-            );
-        }
+        self.verdict.effects.iter().for_each(|effect| text += &traits(effect));
         text
     }
 
@@ -311,10 +292,21 @@ pub fn words(e: &MissingEffect) -> String {
 }
 
 /// The types of an effect with its places, and an exclamation mark if it is certain.
-pub fn place(e: &MissingEffect) -> String {
+fn place(e: &MissingEffect) -> String {
     let on: Vec<String> = e.on.values().map(|labels| labels.join("+")).collect();
     let certain = if e.certain { "!" } else { "" };
     format!("{}@{}{certain}", e.class.join("/"), on.join(" "))
+}
+
+/// An effect with its share, its probability and the quantities from which that follows.
+pub fn traits(e: &MissingEffect) -> String {
+    let Traits { log_odds, local, transfer, closed, inexact } = e.traits.unwrap_or_default();
+    format!(
+        "\t{};{:.3};{:.2};{log_odds:.2} {local:.3} {transfer:.2} {closed:.3} {inexact:.2}",
+        place(e),
+        e.share,
+        e.probability
+    )
 }
 
 /// The hidden causes, with their sizes or without.

@@ -1,7 +1,8 @@
 //! Verdicts of the gap workflow in worlds whose physics has no form in the library: `cargo run --release -p lacuna-bench
-//! --bin worlds -- box` (or `pipe`), with `--seed N`, `--only 3,4`, and `--scale 0.5`, a factor of all sizes.
+//! --bin worlds -- box` (or `pipe`, `vessel`), with `--seed N`, `--only 3,4`, and `--scale 0.5`, a factor of all sizes.
 //!
-//! With `--companion` each case is a whole study with a companion, as `lacuna gap` runs it.
+//! With `--companion` each case is a whole study with a companion, as `lacuna gap` runs it; those of the vessel always are.
+//! `--inside` draws physics inside the simulator alone.
 //!
 //! With `--random N` so many cases are drawn instead, and a line of tab-separated values is printed for each; with
 //! `--nothing` nothing is hidden in them.
@@ -13,6 +14,7 @@ mod companions;
 mod counted;
 mod emulated;
 mod studied;
+mod vessel;
 
 use std::error::Error;
 
@@ -24,6 +26,7 @@ use lacuna_plugins as _;
 
 use crate::emulated::Emulated;
 use crate::studied::Studied;
+use crate::vessel::Vessel;
 
 /// Hidden causes, and their size in units of the noise.
 type Case = (Vec<Secret>, f64);
@@ -41,12 +44,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     let only = only.as_deref();
     let count = after("--random").and_then(|n| n.parse().ok());
     let nothing = arguments.iter().any(|a| a == "--nothing");
-    let cases = Cases { seed, scale, count, nothing, only };
+    let inside = arguments.iter().any(|a| a == "--inside");
+    let cases = Cases { seed, scale, count, nothing, inside, only };
     let companion = arguments.iter().any(|a| a == "--companion");
     match (arguments.first().map(String::as_str), companion) {
         (Some("pipe"), true) => cases.ask(&Studied::new(Pipe, "pipe", 250)?, &in_the_pipe(), 8),
         (Some("pipe"), false) => {
             cases.ask(&Emulated::new(Pipe, "pipe", 250, 8)?, &in_the_pipe(), 8)
+        }
+        (Some("vessel"), _) => {
+            cases.ask(&Studied::new(Vessel, "vessel", 200)?, &in_the_vessel(), 8)
         }
         (_, true) => cases.ask(&Studied::new(MercuryBox, "box", 400)?, &in_the_box(), 12),
         (_, false) => cases.ask(&Emulated::new(MercuryBox, "box", 400, 16)?, &in_the_box(), 12),
@@ -90,6 +97,8 @@ struct Cases<'a> {
     count: Option<usize>,
     /// True if nothing is hidden in random cases.
     nothing: bool,
+    /// True if only physics inside the simulator is hidden in random cases.
+    inside: bool,
     /// The places of those that are asked; `None` for all.
     only: Option<&'a [usize]>,
 }
@@ -145,6 +154,10 @@ fn in_the_box() -> Vec<Case> {
         (inside(5), 0.7),
         (inside(6), 0.7),
     ]
+}
+
+fn in_the_vessel() -> Vec<Case> {
+    (0..11).map(|i| (vec![Secret::Inside(i)], 1.0)).collect()
 }
 
 fn in_the_pipe() -> Vec<Case> {

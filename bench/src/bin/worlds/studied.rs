@@ -16,7 +16,7 @@ use lacuna_engine::study::resolve::load_text;
 use lacuna_run::RunDirectory;
 use rayon::prelude::*;
 
-use crate::emulated::{hidden, place, words};
+use crate::emulated::{hidden, traits, words};
 use crate::{Told, Workflow};
 
 /// A world with a companion.
@@ -26,6 +26,11 @@ pub trait Accompanied: World {
 
     /// The degree of the polynomial chaos expansion.
     fn degree(&self) -> usize;
+
+    /// The units of the parameters.
+    fn units(&self) -> Vec<&'static str> {
+        vec!["1"; self.parameters().len()]
+    }
 }
 
 /// A world with its table of runs, in a folder.
@@ -106,10 +111,10 @@ impl<W: Accompanied> Studied<W> {
     fn text(&self, seed: u64) -> String {
         let world = &self.world;
         let mut text = format!("[study]\ntitle = \"a world\"\nseed = {seed}\n");
-        for (name, [low, high], _) in world.parameters() {
+        for ((name, [low, high], _), unit) in world.parameters().into_iter().zip(world.units()) {
             let _ = write!(
                 text,
-                "\n[[parameter]]\nname = \"{name}\"\nprior = {{ uniform = [{low:?}, {high:?}] }}\n"
+                "\n[[parameter]]\nname = \"{name}\"\nunit = \"{unit}\"\nprior = {{ uniform = [{low:?}, {high:?}] }}\n"
             );
         }
         if world.conditions() > 1 {
@@ -125,7 +130,7 @@ name = "y"
 
 [response.axes]
 sensor = {:?}
-time = {{ first = 0.0, last = {:?}, count = {}, unit = "s" }}
+time = {{ first = {:?}, last = {:?}, count = {}, unit = "s" }}
 
 [simulations]
 use = "csv"
@@ -151,6 +156,7 @@ warm_up = 60
 steps = 120
 "#,
             world.sensors(),
+            times[0],
             times[times.len() - 1],
             times.len(),
             world.degree(),
@@ -272,9 +278,7 @@ impl Answer {
             verdict.closed,
             self.seconds[0]
         );
-        for e in &verdict.effects {
-            let _ = write!(text, "\t{};{:.3};{:.2}", place(e), e.share, e.probability);
-        }
+        verdict.effects.iter().for_each(|effect| text += &traits(effect));
         text
     }
 }
