@@ -114,3 +114,32 @@ prior = { normal = [3.0, 0.2] }
     assert_eq!((held("drag").value, held("length").value), (0.0, 3.0));
     assert_eq!(held("length").input.unit.to_string(), "mm");
 }
+
+/// Inputs at several places are one candidate with one law; a study's own model has no such places.
+#[test]
+fn places_are_checked() {
+    let folder = folder(DRAG);
+    fs::write(folder.path().join("masses.py"), "def simulate(**inputs): return []").unwrap();
+    let input = |name: &str, width: f64, at: f64| {
+        format!(
+            "[[gap.companion.switch]]\ninput = \"{name}\"\nprior = {{ half_normal = {width} }}\n\
+             place = {{ of = \"leak\", at = {at} }}\n"
+        )
+    };
+    let said = |switches: &[String]| {
+        let companion = "\n[gap.companion]\nuse = \"python\"\nfile = \"masses.py\"\n\n";
+        let text = [STUDY, companion, &switches.concat()].concat();
+        resolve::load_text(&folder.path().join("study.toml"), &text, &[]).complaints()
+    };
+    let first = input("leak_1", 0.1, 0.25);
+    assert_eq!(said(&[first.clone(), input("leak_2", 0.1, 0.5)]), "");
+    let twice = said(&[first.clone(), input("leak_2", 0.1, 0.25)]);
+    assert!(twice.contains("`leak_1` is `leak` at 0.25 too"), "{twice}");
+    let wider = said(&[first.clone(), input("leak_2", 0.2, 0.5)]);
+    assert!(wider.contains("`leak` has another law, unit or absent value at `leak_1`"), "{wider}");
+    let other = "[[gap.companion.switch]]\ninput = \"leak\"\nprior = { half_normal = 0.1 }\n";
+    let named = said(&[first.clone(), other.to_owned()]);
+    assert!(named.contains("is also the name of an input"), "{named}");
+    let own = said(&[first.replace("gap.companion.switch", "gap.switch")]);
+    assert!(own.contains("places are known to `[[gap.companion.switch]]` alone"), "{own}");
+}

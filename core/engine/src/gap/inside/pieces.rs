@@ -20,7 +20,7 @@ use crate::gap::system::switched::InputEffect;
 use crate::stage::simulator::{Other, Simulator};
 use crate::study::Study;
 use crate::study::file::ModelKeys;
-use crate::study::gap::SwitchSection;
+use crate::study::gap::{SwitchPlace, SwitchSection};
 
 /// The pieces with the model that has all of them.
 pub struct Pieces {
@@ -51,6 +51,8 @@ pub struct Piece {
     pub places: Vec<usize>,
     /// The summand of the equations; `None` for an input that is set free.
     pub addition: Option<Addition>,
+    /// The place of an input that is one of several for the same physics.
+    pub at: Option<SwitchPlace>,
 }
 
 impl Pieces {
@@ -60,7 +62,8 @@ impl Pieces {
         for switch in &study.gap.inside.switches {
             let (freed, description) = freed(study, switch)?;
             let kind = own_kind(&switch.input);
-            all.push(Piece { kind, description, places: vec![inputs.len()], addition: None });
+            let (places, at) = (vec![inputs.len()], switch.place.clone());
+            all.push(Piece { kind, description, places, addition: None, at });
             inputs.push(freed);
         }
         terms::add(study, &mut all, &mut inputs)?;

@@ -70,6 +70,7 @@ fn put(
         description: description(&*section.built.plugin, &summand),
         places: (begin..inputs.len()).collect(),
         addition: Some(addition(name, &section.common.state, summand)),
+        at: None,
     });
 }
 

@@ -6,6 +6,7 @@ use lacuna::text::nearest::{nearest, one_of};
 use lacuna::text::{Complaints, Node, Problems};
 
 use crate::study::Study;
+use crate::study::gap::SwitchSection;
 use crate::study::gap::companion::Companion;
 
 /// Reports inputs without a value, constants that are no inputs, and responses that do not fit; `node` is the section.
@@ -35,6 +36,56 @@ pub(super) fn check(study: &Study, companion: &Companion, node: &Node, problems:
     added(companion, &mut complaints);
     problems.dedup();
     super::inside::check(&companion.study, node, problems);
+    places(companion, node, problems);
+}
+
+/// Inputs that are the same physics at several places have one law, in one unit, and places of their own.
+fn places(companion: &Companion, node: &Node, problems: &mut Problems) {
+    let nodes = node.get("switch").map(Node::elements).unwrap_or_default();
+    let switches = &companion.keys.switch;
+    for (i, (switch, node)) in switches.iter().zip(nodes).enumerate() {
+        let Some(place) = &switch.place else { continue };
+        let mut others =
+            switches[..i].iter().filter_map(|other| Some((other, other.place.as_ref()?)));
+        let same = others.clone().find(|(_, other)| other.of == place.of);
+        let twice = others.find(|(_, other)| other.of == place.of && other.at == place.at);
+        problems.within("switch", |problems| {
+            let mut complaints = Complaints::new(node, problems);
+            if !place.at.is_finite() {
+                complaints.at("place.at").say("the place is no finite number");
+            }
+            if let Some((other, _)) = twice {
+                let (at, input) = (place.at, &other.input);
+                complaints
+                    .at("place.at")
+                    .say(format!("`{input}` is `{}` at {at} too", place.of))
+                    .help("give each input a place of its own");
+            }
+            let law = |of: &SwitchSection| (of.prior.clone(), of.unit.clone(), of.absent);
+            if let Some((other, _)) = same.filter(|(other, _)| law(other) != law(switch)) {
+                complaints
+                    .at("prior")
+                    .say(format!(
+                        "`{}` has another law, unit or absent value at `{}`",
+                        place.of, other.input
+                    ))
+                    .help("the size is one unknown: state the same for all places");
+            }
+        });
+    }
+    for (switch, place) in switches.iter().filter_map(|own| Some((own, own.place.as_ref()?))) {
+        let is_other =
+            |other: &&SwitchSection| other.place.is_none() && other.input == place.of.as_str();
+        if switches.iter().any(|other| is_other(&other)) {
+            Complaints::new(node, problems)
+                .at("switch")
+                .say(format!(
+                    "`{}`, the physics of `{}`, is also the name of an input",
+                    place.of, switch.input
+                ))
+                .help("choose another name for `of`");
+        }
+    }
 }
 
 fn responds(layout: &Layout, signature: &Signature, complaints: &mut Complaints<'_>) {

@@ -23,6 +23,7 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
                 .help("add `[measurements]`, or take `[gap]` out");
         }
         super::inside::check(study, node, problems);
+        super::inside::no_places(study, node, problems);
         super::runs::check(study, node, problems);
         if let (Some(companion), Some(node)) = (&study.gap.companion, node.get("companion")) {
             problems.within("companion", |problems| {

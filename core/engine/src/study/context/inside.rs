@@ -43,6 +43,21 @@ pub(super) fn check(study: &Study, gap: &Node, problems: &mut Problems) {
     }
 }
 
+/// Reports places of inputs of the study's own model, which are not interpolated.
+pub(super) fn no_places(study: &Study, gap: &Node, problems: &mut Problems) {
+    let nodes = gap.get("switch").map(Node::elements).unwrap_or_default();
+    for (switch, node) in study.gap.inside.switches.iter().zip(nodes) {
+        if switch.place.is_some() {
+            problems.within("switch", |problems| {
+                Complaints::new(node, problems)
+                    .at("place")
+                    .say("places are known to `[[gap.companion.switch]]` alone")
+                    .help("take `place` out: each input is a candidate by itself");
+            });
+        }
+    }
+}
+
 /// Returns true if the study has a model and, with a surrogate, a design for further training runs; reports what is
 /// missing.
 fn makes_runs(study: &Study, gap: &Node, problems: &mut Problems) -> bool {

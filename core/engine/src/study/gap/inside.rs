@@ -34,6 +34,20 @@ pub struct SwitchSection {
     /// Name of the effect in words; the model's description of the input when left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub title: Option<String>,
+    /// The place at which the input acts, if other inputs are the same physics at other places: `{ of = "leak", at = 0.25 }`. They are
+    /// one candidate then, `of`, with its place as a further unknown. Only in `[[gap.companion.switch]]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub place: Option<SwitchPlace>,
+}
+
+/// The place of an input among those that are the same physics.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SwitchPlace {
+    /// Name of the physics, which is that of the candidate.
+    pub of: Name,
+    /// Coordinate of the place, in a unit of your own.
+    pub at: f64,
 }
 
 /// The engine's keys of `[[gap.term]]`: a term that may be missing in the model's equations.

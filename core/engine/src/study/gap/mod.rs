@@ -22,7 +22,7 @@ pub use added::AddedCandidate;
 pub use companion::Companion;
 pub use held::Held;
 pub(super) use held::{Loose, hold};
-pub use inside::{Inside, Swap, SwapKeys, SwitchSection, TermKeys};
+pub use inside::{Inside, Swap, SwapKeys, SwitchPlace, SwitchSection, TermKeys};
 pub use runs::RunsKeys;
 
 /// Settings of the search for missing effects (`lacuna gap STUDY`).

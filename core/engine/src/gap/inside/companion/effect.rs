@@ -4,16 +4,18 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use lacuna::math::random::Stream;
+use lacuna::plugin::effect::Description;
 use lacuna::plugin::{Effect, Forward};
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
 use toml::Table;
 
 use super::learned::{Basis, LearnedChange, Region};
+use super::line::Line;
 use super::reach::Reach;
 use crate::gap::candidates::{Candidate, Untried};
 use crate::gap::experiment::wider::FreeInput;
-use crate::gap::inside::change::ChangeEffect;
+use crate::gap::inside::change::{Change, ChangeEffect};
 use crate::gap::inside::pieces::{Piece, Pieces};
 use crate::gap::result::IN_COMPANION;
 use crate::gap::result::companion::IdentifiedCompanion;
@@ -58,6 +60,7 @@ impl Learning<'_> {
         let mut without = Matrix::zeros(0, study.layouts.len());
         let mut all = CompanionCandidates::default();
         let reach = Reach::new(self, &bare)?;
+        let mut lines: Vec<Line> = Vec::new();
         for (p, piece) in self.pieces.all.iter().enumerate() {
             let kind = self.kind(piece);
             if !wanted(&kind) {
@@ -83,9 +86,15 @@ impl Learning<'_> {
                 with.row(i).iter().zip(without.row(i)).map(|(a, b)| a - b).collect()
             };
             let differences: Vec<Vec<f64>> = (0..points.len()).map(difference).collect();
-            match LearnedChange::of(basis, &points, &differences) {
-                Some(change) => all.candidates.push(self.candidate(kind, piece, inputs, change)),
-                None => all.untried.push(Untried {
+            match (LearnedChange::of(basis, &points, &differences), &piece.at) {
+                (Some(change), Some(place)) => {
+                    Line::add(&mut lines, kind, place.at, piece, inputs, change);
+                }
+                (Some(change), None) => {
+                    let description = piece.description.clone();
+                    all.candidates.push(self.candidate(kind, description, inputs, change));
+                }
+                (None, _) => all.untried.push(Untried {
                     kind,
                     reason: format!(
                         "the companion has no answer for most of its values{}",
@@ -94,15 +103,20 @@ impl Learning<'_> {
                 }),
             }
         }
+        for line in lines {
+            let Line { kind, description, inputs, places } = line.sorted();
+            all.candidates.push(self.candidate(kind, description, inputs, places));
+        }
         Ok(all)
     }
 
     /// The type: an input has its own name, also where an effect on the response has the same, for both are the same
     /// physics.
     fn kind(&self, piece: &Piece) -> String {
-        match &piece.addition {
-            None => self.pieces.inputs[piece.places[0]].name.clone(),
-            Some(_) => piece.kind.clone(),
+        match (&piece.addition, &piece.at) {
+            (None, Some(place)) => place.of.as_str().to_owned(),
+            (None, None) => self.pieces.inputs[piece.places[0]].name.clone(),
+            (Some(_), _) => piece.kind.clone(),
         }
     }
 
@@ -123,13 +137,12 @@ impl Learning<'_> {
     fn candidate(
         &self,
         kind: String,
-        piece: &Piece,
+        description: Description,
         inputs: Vec<FreeInput>,
-        change: LearnedChange,
+        change: impl Change + 'static,
     ) -> Candidate {
         // The places are those of an extended map, which is not used.
-        let inner =
-            InputEffect { places: Vec::new(), inputs, description: piece.description.clone() };
+        let inner = InputEffect { places: Vec::new(), inputs, description };
         let effect: Arc<dyn Effect> = Arc::new(ChangeEffect {
             change,
             own: self.companion.own(),

@@ -10,6 +10,7 @@ mod effect;
 mod gate;
 mod identify;
 mod learned;
+mod line;
 mod reach;
 
 use std::sync::Arc;
