@@ -113,6 +113,7 @@ impl World for Vessel {
             let outcome = simulated(&target, &settings, &mercury, inside)?;
             Ok(strain(&settings, &outcome))
         };
+        // A size at which the model fails is too large: the search for a size turns back from curves that are no numbers.
         run().unwrap_or_else(|_| vec![vec![f64::NAN; FINE * SAMPLES]; GAUGES.len()])
     }
 

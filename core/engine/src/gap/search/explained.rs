@@ -157,6 +157,32 @@ mod tests {
         assert!(explained.closed.abs() < 8.0 && explained.share() <= 1.0, "{explained:?}");
     }
 
+    /// Without an effect all of the misfit is left: at the fit without the wave, the energy on all outputs is that of the
+    /// remainder, and the clear excess of a large wave is counted.
+    #[test]
+    fn what_no_effect_closes_is_left() {
+        let level = world(&["level"]);
+        let truth = world(&["level", "wave"]).response(&[0.4, 2.0]);
+        let experiment = level.experiment(&truth, 3, &Stream::root(5));
+        let means = experiment.means().1;
+        let whitener = Whitener::new(&experiment, &level.noise, &means);
+        let system = System::new(&experiment, Vec::new());
+        let found = fit(&system, &whitener, &means, &[0.0]);
+        let around = system.around(&found.at);
+        let white = Remainder::of(&experiment, &level.noise, &around).white(&whitener);
+        let best = white.evidences(&found).unwrap().best();
+        let all = vec![true; TIMES * SENSORS.len()];
+        let energy = white.energy(&found, best);
+        assert!((white.energy_on(&found, best, &all) - energy).abs() < 1e-9 * energy);
+        let explained = Explained::of(&white, [&found, &found], best, &all);
+        assert!(explained.closed == 0.0 && explained.share() == 0.0, "{explained:?}");
+        let excess = square(&found, &all) - all.len() as f64;
+        assert!(
+            explained.left >= energy && explained.left > 0.8 * excess,
+            "{explained:?} {excess}"
+        );
+    }
+
     /// The energies of the sensors add up to that of all.
     #[test]
     fn the_parts_add_up() {

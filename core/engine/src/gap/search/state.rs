@@ -102,12 +102,16 @@ impl<'a> SearchState<'a> {
         first: &Fit,
         setting: Option<Setting>,
     ) -> Explained {
+        let measured = shared.experiment.measured();
+        if self.chosen.is_empty() {
+            return Explained::of(&self.white, [&self.fit, &self.fit], setting, &measured);
+        }
         let bare = System::new(shared.experiment, Vec::new());
         let own = self.system.parameters(&self.fit.at.point).to_vec();
         let starts = [own, first.at.point.clone()];
         let fit = fit_from(&bare, &self.whitener, shared.means, &starts);
         let before = fit.as_ref().unwrap_or(&self.fit);
-        Explained::of(&self.white, [before, &self.fit], setting, &shared.experiment.measured())
+        Explained::of(&self.white, [before, &self.fit], setting, &measured)
     }
 
     /// The fitted values of the unknowns of effect `i`, in their units.

@@ -37,8 +37,8 @@ const REMAINS: f64 = 0.05;
 /// The share of the excess misfit that an effect must close to be named if an excess remains.
 const HALF: f64 = 0.5;
 
-/// The share of the gap that the effects of an approximate name close at least: of physics inside a simulator, candidates of the
-/// right type close more in other people's cases, and those of a wrong type less.
+/// The share of the gap that the effects of an approximate name close at least. In a prototype by others, single terms of the right
+/// type closed 92 to 94 % of the gap of physics inside a simulator, single effects of a wrong type up to 80 %.
 const MOST: f64 = 0.8;
 
 /// The log Bayes factor of a remainder above which it is significant: 20 to 1 (Kass and Raftery, Journal of the American
