@@ -71,9 +71,10 @@ fn number(asked: &Asked) -> Option<f64> {
     }
 }
 
-/// For a correctly named effect, true if its value is within two printed standard deviations of the truth.
+/// For a correctly named effect on the right sensors, true if its value is within two printed standard deviations of the truth:
+/// a gain of two sensors is the inverse gain of all others where the parameters scale the response.
 fn sized(asked: &Asked) -> Option<bool> {
-    let number = number(asked).filter(|_| right(asked))?;
+    let number = number(asked).filter(|_| right(asked) && placed(asked))?;
     let held = |e: &MissingEffect| (e.values[0] - number).abs() <= 2.0 * e.sd[0];
     Some(asked.answer.verdict.effects.iter().all(held))
 }

@@ -191,11 +191,14 @@ pub fn distorted(
         }
         Kind::Crosstalk => mapped(&|i| y[i] + a * other[i]),
         Kind::LowPass => {
-            let mut state = y[0];
-            let keep = (-h / a.max(1e-9)).exp();
+            // Exact for the straight line between neighbouring points of the fine grid.
+            let (mut state, mut before) = (y[0], y[0]);
+            let (tau, keep) = (a.max(1e-9), (-h / a.max(1e-9)).exp());
             y.iter()
                 .map(|x| {
-                    state = keep * state + (1.0 - keep) * x;
+                    let rise = (x - before) * (1.0 - tau / h * (1.0 - keep));
+                    state = keep * state + (1.0 - keep) * before + rise;
+                    before = *x;
                     state
                 })
                 .collect()
