@@ -94,8 +94,9 @@ fn states(
     faults
 }
 
-/// Returns the quotient of two units, written in the usual form if that parses.
+/// Returns the unit of a change per unit of time, written in the usual form if that parses.
 pub fn ratio(unit: &Unit, time: &Unit) -> Option<Unit> {
+    let unit = &unit.difference();
     let simple = |text: &str| text.chars().all(char::is_alphanumeric);
     let wrapped = |unit: &Unit| match unit.as_str() {
         "" => "1".to_owned(),

@@ -136,6 +136,14 @@ impl Unit {
         self.meaning.sixths == [0; BASES]
     }
 
+    /// Unit of a difference of two quantities in this unit: `K` for `degC`, otherwise the unit itself.
+    pub fn difference(&self) -> Self {
+        if self.meaning.offset == 0.0 {
+            return self.clone();
+        }
+        Self { text: "K".to_owned(), meaning: Meaning { offset: 0.0, ..self.meaning } }
+    }
+
     /// Product of two units; `None` if one of them has an offset (`degC`).
     pub fn times(&self, other: &Self) -> Option<Self> {
         if [self, other].iter().any(|unit| unit.meaning.offset != 0.0) {

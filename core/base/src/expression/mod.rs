@@ -45,6 +45,7 @@ mod forward;
 mod function;
 mod operator;
 mod parse;
+mod parts;
 mod program;
 mod reverse;
 mod scope;

@@ -162,6 +162,7 @@ fn binary(operator: Binary, a: &Part, b: &Part, span: &Range<usize>) -> Result<M
         Binary::Power => power(a, b, span),
         _ if operator.compares() => same([a, b].into_iter()).map(|_| plain()),
         _ if operator.joins_conditions() => Ok(plain()),
+        Binary::Add | Binary::Subtract => sum(operator, a, b),
         _ => same([a, b].into_iter()),
     }
 }
@@ -236,6 +237,21 @@ fn same<'a>(parts: impl Iterator<Item = &'a Part>) -> Result<Measure, Fault> {
         }
     }
     Ok(common.map_or(Measure::Any, |unit| Measure::Of(unit.clone())))
+}
+
+/// The unit of a sum or a difference: that of two temperatures in `degC` is a difference in `K`, which may be added to
+/// one of them.
+fn sum(operator: Binary, a: &Part, b: &Part) -> Result<Measure, Fault> {
+    let (Measure::Of(left), Measure::Of(right)) = (&a.measure, &b.measure) else {
+        return same([a, b].into_iter());
+    };
+    let step = left.difference();
+    match operator {
+        Binary::Subtract if left == right => Ok(Measure::Of(step)),
+        _ if *right == step => Ok(a.measure.clone()),
+        Binary::Add if *left == right.difference() => Ok(b.measure.clone()),
+        _ => same([a, b].into_iter()),
+    }
 }
 
 fn product(a: &Measure, b: &Measure, exponent: f64, span: &Range<usize>) -> Result<Measure, Fault> {

@@ -50,6 +50,10 @@ fn units_follow_the_expression() {
         ("gamma_log_density(x, n, y)", "1"),
         ("n^n", "1"),
         ("celsius + celsius", "degC"),
+        ("celsius - 20 {degC}", "K"),
+        ("celsius - 3 {K}", "degC"),
+        ("3 {K} + celsius", "degC"),
+        ("(celsius - 20 {degC}) / t", "K/s"),
         ("0", "1"),
     ] {
         assert_eq!(found(text), Ok(unit(expected)), "{text}");
