@@ -37,8 +37,9 @@ pub use moves::Moves;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct AffineInvariantEnsemble {
-    /// Number of walkers: even, and at least twice the number of unknowns plus two. More walkers cost more
-    /// evaluations per step and make it easier to cover a complicated density.
+    /// Number of walkers: even, and at least twice the number of parameters plus two. More walkers cost more
+    /// evaluations per step and make it easier to cover a complicated density. If the discrepancy and the effects have
+    /// unknowns of their own that need more, the number is raised to twice the number of all unknowns plus two.
     pub walkers: usize,
     /// Number of steps. A step moves every walker once and costs one evaluation per walker.
     pub steps: usize,
@@ -126,8 +127,9 @@ impl Sampler for AffineInvariantEnsemble {
         true
     }
 
-    fn plan(&self, _dimension: usize) -> Plan {
-        Plan { chains: self.walkers, steps: self.steps, warm_up: 0, ensemble: true }
+    fn plan(&self, dimension: usize) -> Plan {
+        let chains = self.walkers.max(self.least(dimension));
+        Plan { chains, steps: self.steps, warm_up: 0, ensemble: true }
     }
 
     fn start(&self, target: &dyn Target, points: Matrix) -> Result<State, Stop> {
