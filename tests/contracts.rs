@@ -137,23 +137,34 @@ fn designs() {
 #[test]
 fn terms() {
     let table: &Table = &[
+        ("ageing", &["", "of = \"x\""]),
+        ("bouc_wen", &["", "of = \"v - 1\"\nunit = \"m/s\""]),
         ("constant_rate", &[""]),
+        ("convection", &["ambient = \"293 {K}\"", "ambient = \"293 {K}\"\npower = 1.33"]),
         ("coulomb_friction", &["", "of = \"v - 1\"\nwidth = \"0.01\""]),
         ("cubic_stiffness", &["of = \"x\"", "of = \"x\"\nabout = \"2\""]),
+        ("dahl_friction", &["", "deflection = { uniform = [0.1, 1] }"]),
+        ("dead_zone", &["", "of = \"x\"\nunit = \"m\""]),
         ("delayed", &["", "of = \"2 * v\"\nstart = \"2\"\nlags = 1"]),
         ("evaporation", &["ambient = \"293 {K}\"\nscale = \"16 {K}\"", "ambient = \"293 {K}\""]),
         ("expression", &["shape = \"v * x\"", "shape = \"t\"\nsign = \"positive\""]),
         ("forcing", &["", "frequency = { uniform = [1, 2] }"]),
+        ("fractional_damping", &["", "order = { uniform = [0.4, 0.6] }"]),
+        ("limiter", &["", "of = \"x\"\nunit = \"m\""]),
         ("linear_friction", &["", "of = \"v - 1\""]),
+        ("maxwell_damping", &["", "time = { uniform = [1, 2] }"]),
         (
             "overflow",
             &["", "level = \"2\"", "of = \"x\"\nprior = { uniform = [0, 2] }\nunit = \"m\""],
         ),
+        ("power_friction", &["", "power = { uniform = [1, 2] }"]),
+        ("power_stiffness", &["of = \"x\"\nunit = \"m\""]),
         ("pull", &["of = \"x\"\ndistance = \"hypot(x, y)\"\nbeside = { w = \"y\" }"]),
         ("quadratic_friction", &[""]),
         ("quadratic_stiffness", &["of = \"x\""]),
         ("radiation", &["ambient = \"293 {K}\""]),
         ("relaxation", &["toward = \"1\""]),
+        ("stribeck_friction", &["", "width = \"0.01\"\nrise = { uniform = [0, 1] }"]),
     ];
     all::<dyn Term>(table, |case, term| lacuna_contract::term(&case.label, term));
 }

@@ -29,6 +29,7 @@ mod single;
 mod tally;
 mod target;
 mod term_forms;
+mod term_laws;
 mod terms;
 mod two_masses;
 mod workflow;

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{of, quantity};
+use super::common::{of, width};
 
 /// Coulomb friction: dry friction, opposed to the speed and independent of its magnitude.
 ///
@@ -46,19 +46,7 @@ impl Term for CoulombFriction {
 
     fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {
         let u = of(self.of.as_deref(), place);
-        let (width, fixed) = match (&self.width, &self.of, place.time) {
-            (Some(width), ..) => (width.clone(), None),
-            (None, None, Some(time)) => {
-                let width = (place.size)(&place.state.rate)? * time.step;
-                if !(width.is_finite() && width > 0.0) {
-                    return Err("the speed does not change: give `width`".into());
-                }
-                let width = quantity(width, &place.state.unit);
-                let fixed = format!("width = {width}, the change of the speed within one step");
-                (width, Some(fixed))
-            }
-            _ => return Err("the unit of the speed is not known: give `width`".into()),
-        };
+        let (width, fixed) = width(self.width.as_deref(), self.of.as_deref(), place)?;
         let shape = format!("-tanh(({u}) / ({width}))");
         Ok(Summand { shape, sign: Sign::Positive, fixed, ..Summand::default() })
     }

@@ -73,10 +73,9 @@ impl Term for Delayed {
             State {
                 name: name(i),
                 unit: place.state.unit.clone(),
-                rate_unit: None,
                 rate: format!("{count} * ({before} - {}) / {delay}", name(i)),
-                uses: Vec::new(),
                 start: start.clone(),
+                ..State::default()
             }
         };
         let longest = (0.25 * time.duration).max(2.0 * time.step);

@@ -3,12 +3,13 @@
 use lacuna::data::Unit;
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::effect::Description;
-use lacuna::plugin::term::{Index, Place, Sign, Summand};
+use lacuna::plugin::term::{Index, Place, Sign, Site, Summand};
 use lacuna::plugin::{Component, Term};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use toml::Table;
 
-use super::common::of;
+use super::common::{ambient, ambient_each, of};
 
 /// Evaporation: a heat loss in proportion to the excess vapour pressure, which grows exponentially with the
 /// temperature.
@@ -26,8 +27,10 @@ pub struct Evaporation {
     /// Temperature `u`, as an expression. Default: the state itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
-    /// Temperature of the surroundings, as an expression such as `"293 {K}"`.
-    pub ambient: String,
+    /// Temperature of the surroundings, as an expression such as `"293 {K}"`. Default: the only quantity that the rate
+    /// subtracts from the state.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ambient: Option<String>,
     /// Temperature difference over which the vapour pressure increases by a factor of e, as an expression such as
     /// `"16 {K}"`. Default: an unknown, log-uniform from 8 to 40 K.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -58,8 +61,13 @@ impl Term for Evaporation {
         }
     }
 
+    fn proposals(&self, site: &Site<'_>) -> Vec<Table> {
+        ambient_each(site)
+    }
+
     fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {
-        let (u, ambient) = (of(self.of.as_deref(), place), &self.ambient);
+        let u = of(self.of.as_deref(), place);
+        let ambient = ambient(self.ambient.as_deref(), place)?;
         let (scale, indices, size) = if let Some(scale) = &self.scale {
             (format!("({scale})"), Vec::new(), None)
         } else {

@@ -2,6 +2,7 @@
 
 use lacuna::data::Unit;
 use lacuna::math::distribution::Distribution;
+use lacuna::plugin::amend::State;
 use lacuna::plugin::effect::Description;
 use lacuna::plugin::term::{Index, Place, Sign, Site, Summand};
 use lacuna::plugin::{Component, Term};
@@ -9,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{of, quantity};
+use super::common::{of, of_quantity, quantity, unit_of};
 
 /// The range of unknown levels, relative to the root mean square of the quantity.
 const RANGE: [f64; 2] = [0.2, 4.0];
@@ -78,17 +79,20 @@ impl Term for Overflow {
     }
 
     fn proposals(&self, site: &Site<'_>) -> Vec<Table> {
-        // The stop of a velocity acts on a position, whose unit only a study knows.
-        if site.positions.is_empty() { vec![Table::new()] } else { Vec::new() }
+        // The stop of a velocity acts on a position, from either side.
+        let sides = |state: &&State| {
+            let below = format!("-{}", state.name);
+            [of_quantity(&state.name, &state.unit), of_quantity(&below, &state.unit)]
+        };
+        if site.positions.is_empty() {
+            return vec![Table::new()];
+        }
+        site.positions.iter().flat_map(sides).collect()
     }
 
     fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {
         let u = of(self.of.as_deref(), place);
-        let unit = match (&self.unit, &self.of) {
-            (Some(unit), _) => unit,
-            (None, None) => &place.state.unit,
-            (None, Some(_)) => return Err("the unit of `of` is not known: give `unit`".into()),
-        };
+        let unit = unit_of(self.unit.as_ref(), self.of.as_deref(), place)?;
         let size = (place.size)(u)?;
         let width = self.width.unwrap_or(WIDTH * size);
         if !(width.is_finite() && width > 0.0 && size > 0.0) {

@@ -1,12 +1,13 @@
 //! `radiation`: a heat loss with the fourth power of the temperature.
 
 use lacuna::plugin::effect::Description;
-use lacuna::plugin::term::{Place, Sign, Summand};
+use lacuna::plugin::term::{Place, Sign, Site, Summand};
 use lacuna::plugin::{Component, Term};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use toml::Table;
 
-use super::common::of;
+use super::common::{ambient, ambient_each, of};
 
 /// Radiation: a heat loss with the fourth power of the absolute temperature.
 ///
@@ -21,8 +22,10 @@ pub struct Radiation {
     /// Absolute temperature `u`, as an expression. Default: the state itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
-    /// Absolute temperature of the surroundings, as an expression such as `"293 {K}"`.
-    pub ambient: String,
+    /// Absolute temperature of the surroundings, as an expression such as `"293 {K}"`. Default: the only quantity that the rate
+    /// subtracts from the state.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ambient: Option<String>,
 }
 
 impl Component for Radiation {}
@@ -36,8 +39,15 @@ impl Term for Radiation {
         }
     }
 
+    fn proposals(&self, site: &Site<'_>) -> Vec<Table> {
+        // The fourth power is that of an absolute temperature.
+        let is_absolute = site.state.unit == site.state.unit.difference();
+        if is_absolute { ambient_each(site) } else { Vec::new() }
+    }
+
     fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {
-        let (u, ambient) = (of(self.of.as_deref(), place), &self.ambient);
+        let u = of(self.of.as_deref(), place);
+        let ambient = ambient(self.ambient.as_deref(), place)?;
         let shape = format!("({ambient})^4 - ({u})^4");
         Ok(Summand { shape, sign: Sign::Positive, ..Summand::default() })
     }

@@ -41,12 +41,12 @@ candidates = []
 
 "#;
 
-fn times() -> Vec<f64> {
+pub(super) fn times() -> Vec<f64> {
     (1..=40).map(|i| 0.1 * f64::from(i)).collect()
 }
 
 /// Response with the term at a point: the supply, the coefficient, the term's further unknowns.
-fn response(units: [&str; 2], body: &str, point: &[f64]) -> Vec<f64> {
+pub(super) fn response(units: [&str; 2], body: &str, point: &[f64]) -> Vec<f64> {
     let text = HEAD.replace("SUPPLY", units[0]).replace("OBSERVED", units[1]) + body;
     let folder = tempfile::tempdir().unwrap();
     let rows = times().into_iter().map(|t| format!("1,{t},1.0\n"));
@@ -80,7 +80,7 @@ fn response(units: [&str; 2], body: &str, point: &[f64]) -> Vec<f64> {
     response
 }
 
-fn near(found: &[f64], exact: impl Fn(f64) -> f64, tolerance: f64) {
+pub(super) fn near(found: &[f64], exact: impl Fn(f64) -> f64, tolerance: f64) {
     for (y, t) in found.iter().zip(times()) {
         assert!((y - exact(t)).abs() < tolerance, "at {t}: {y}, exact {}", exact(t));
     }
@@ -114,7 +114,7 @@ fn forcing_drives_as_in_the_textbook() {
     near(&found, exact, 1e-6);
 }
 
-const SINGLE: &str = r#"
+pub(super) const SINGLE: &str = r#"
 [model]
 use = "equations"
 state = { y = { start = START, unit = "K" } }

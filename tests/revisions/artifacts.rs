@@ -339,6 +339,7 @@ fn term(_: &str, term: &dyn Term, bits: &mut Bits) {
         rate: "-v".into(),
         uses: vec!["v".into()],
         start: "1".into(),
+        ..State::default()
     };
     let seconds = unit("s");
     let time = Time { name: "t", unit: &seconds, duration: 10.0, step: 0.1 };

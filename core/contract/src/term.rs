@@ -35,6 +35,7 @@ fn summand(term: &dyn Term) -> Result<Summand, String> {
         rate: "-v".into(),
         uses: vec!["v".into()],
         start: "1".into(),
+        ..State::default()
     };
     let seconds = unit("s")?;
     let time = Time { name: "t", unit: &seconds, duration: 10.0, step: 0.1 };

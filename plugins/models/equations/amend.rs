@@ -30,6 +30,28 @@ impl Equations {
         states.filter(|(i, _)| rate.depends_on(first + i)).map(|(_, name)| name.clone()).collect()
     }
 
+    /// Returns the differences of states to other quantities in a rate.
+    fn references(&self, scope: &Scope, rate: &str) -> Vec<[String; 2]> {
+        let is_state = |name: &str| self.state.contains_key(name);
+        let of = |name: &String| {
+            let found = scope.references(rate, name, &is_state).unwrap_or_default();
+            found.into_iter().map(|at| [name.clone(), at]).collect::<Vec<_>>()
+        };
+        self.state.keys().flat_map(of).collect()
+    }
+
+    /// Returns the parts of a rate that change with the time alone, with their units.
+    fn inputs(&self, scope: &Scope, context: &Context<'_>, rate: &str) -> Vec<(String, Unit)> {
+        let Some((time, ..)) = context.layout.abscissa() else { return Vec::new() };
+        let is_state = |name: &str| self.state.contains_key(name);
+        let found = scope.inputs(rate, time, &is_state).unwrap_or_default();
+        let unit = |part: String| {
+            let unit = self.unit(context, &part, &[]).ok()?.unwrap_or_default();
+            Some((part, unit))
+        };
+        found.into_iter().filter_map(unit).collect()
+    }
+
     /// Returns a copy with further states.
     fn with(&self, further: &[Given]) -> Self {
         let mut wider = self.clone();
@@ -51,11 +73,14 @@ impl Amend for Equations {
         let time = context.layout.abscissa().map(|(_, _, unit)| unit);
         let state = |(name, state): (&String, &State)| {
             let unit = known.get(name).cloned().unwrap_or_default();
+            let rate = self.rate.get(name).map_or("", String::as_str);
             Given {
+                references: self.references(&scope, rate),
+                inputs: self.inputs(&scope, context, rate),
                 name: name.clone(),
                 rate_unit: time.and_then(|time| units::ratio(&unit, time)),
                 unit,
-                rate: self.rate.get(name).cloned().unwrap_or_default(),
+                rate: rate.to_owned(),
                 uses: self.used(&scope, &names, name),
                 start: state.start().0.text(),
             }

@@ -4,60 +4,43 @@ use std::fmt::Write as _;
 
 use generator::single::{Kind, Record, Stated};
 
-/// The equations of a system, the unit of its response, and the terms whose constants only a study knows.
-fn equations(kind: Kind) -> (&'static str, &'static str, &'static str) {
+/// The equations of a system and the unit of its response.
+fn equations(kind: Kind) -> (&'static str, &'static str) {
     match kind {
         Kind::Pendulum => (
             r#"state = { x = "release", v = { start = 0.0, unit = "1/s" } }
 rate = { x = "v", v = "-stiffness * sin(x) - damping * v" }"#,
             "1",
-            "",
         ),
         Kind::Drive => (
             r#"state = { x = { start = 0.0, unit = "m" }, v = { start = 0.0, unit = "m/s" } }
 rate = { x = "v", v = "force * sin(2 * pi * 0.3 {1/s} * t) - damping * v" }"#,
             "m",
-            "",
         ),
         Kind::Cooling => (
             r#"state = { x = "begin" }
 rate = { x = "-loss * (x - 293 {K})" }"#,
             "K",
-            r#"
-[[gap.term]]
-use = "evaporation"
-state = "x"
-ambient = "293 {K}"
-
-[[gap.term]]
-use = "radiation"
-state = "x"
-ambient = "293 {K}"
-"#,
         ),
         Kind::Tanks => (
             r#"state = { x = "begin", y = { start = 0.8, unit = "1" } }
 rate = { x = "pump * (1 + 0.5 * sin(2 * pi * t / 13 {s})) - outlet * sqrt(x)", y = "outlet * (sqrt(x) - sqrt(y))" }"#,
             "1",
-            "",
         ),
         Kind::Fall => (
             r#"state = { x = "height", v = "velocity" }
 rate = { x = "v", v = "-gravity" }"#,
             "m",
-            "",
         ),
         Kind::Driven => (
             r#"state = { x = "begin", v = { start = 0.0, unit = "m/s" } }
 rate = { x = "v", v = "force * cos(2 * pi * 0.3 {1/s} * t) - damping * v - stiffness * x" }"#,
             "m",
-            "",
         ),
         Kind::Free => (
             r#"state = { x = "begin", v = { start = 0.0, unit = "m/s" } }
 rate = { x = "v", v = "-damping * v - stiffness * x" }"#,
             "m",
-            "",
         ),
     }
 }
@@ -72,7 +55,7 @@ fn noise(stated: &Stated) -> String {
 
 /// The study of a record, whose values are in `data.csv`; `stated` is what it says about its instrument.
 pub fn study(record: &Record, stated: Option<&Stated>) -> String {
-    let (model, unit, terms) = equations(record.system.kind);
+    let (model, unit) = equations(record.system.kind);
     let mut text = "[study]\ntitle = \"a record\"\nseed = 7\n".to_owned();
     for p in record.system.parameters() {
         let _ = write!(
@@ -111,7 +94,7 @@ variance = {{ half_normal = {:e} }}
 use = "no_u_turn"
 warm_up = 40
 steps = 60
-{terms}"#,
+"#,
         stated.map(noise).unwrap_or_default(),
         (0.1 * record.spread).powi(2),
     );

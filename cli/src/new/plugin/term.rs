@@ -1,6 +1,7 @@
 //! `skeleton`: a loss proportional to the state.
 
 use lacuna::expression;
+use lacuna::plugin::amend::State;
 use lacuna::plugin::effect::Description;
 use lacuna::plugin::term::{Place, Sign, Site, Summand};
 use lacuna::plugin::{Component, Context, Term};
@@ -47,7 +48,7 @@ impl Term for Skeleton {
     }
 
     fn proposals(&self, site: &Site<'_>) -> Vec<Table> {
-        let of = |state: &String| Table::from_iter([("of".to_owned(), state.as_str().into())]);
+        let of = |state: &&State| Table::from_iter([("of".to_owned(), state.name.as_str().into())]);
         std::iter::once(Table::new()).chain(site.others.iter().map(of)).collect()
     }
 
@@ -63,7 +64,6 @@ lacuna::register!(Term, "skeleton", Skeleton);
 mod tests {
     use super::*;
     use lacuna::data::Unit;
-    use lacuna::plugin::amend::State;
 
     #[test]
     fn it_keeps_the_contract() {
@@ -75,10 +75,9 @@ mod tests {
         let state = State {
             name: "n".into(),
             unit: Unit::dimensionless(),
-            rate_unit: None,
             rate: "0".into(),
-            uses: Vec::new(),
             start: "1".into(),
+            ..State::default()
         };
         let place = Place { state: &state, name: "loss", time: None, size: &|_| Ok(1.0) };
         let shape = |of: Option<&str>| {

@@ -32,7 +32,7 @@ pub trait Amend: Send + Sync {
 }
 
 /// A state variable of a model.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct State {
     /// Name of the state in expressions.
     pub name: String,
@@ -46,6 +46,11 @@ pub struct State {
     pub uses: Vec<String>,
     /// Initial value, as an expression of the model's inputs.
     pub start: String,
+    /// Quantities of which the rate has the difference to a state: the state, and the expression, such as `x` and
+    /// `ambient` in `loss * (ambient - x)`.
+    pub references: Vec<[String; 2]>,
+    /// Parts of the rate that depend on the time and on no state, such as `force(t)`, with their units.
+    pub inputs: Vec<(String, Unit)>,
 }
 
 /// Terms that are added to equations.

@@ -22,6 +22,12 @@ pub trait Term: Component {
         true
     }
 
+    /// Names of terms that it contains as special cases: a law with an unknown exponent contains those with a fixed one.
+    /// Where one of them is a candidate as well, the general form has a smaller prior mass.
+    fn contains(&self) -> &'static [&'static str] {
+        &[]
+    }
+
     /// Options with which a search may propose the term at a site without being told; empty if the term needs
     /// information that only a study has.
     fn proposals(&self, _site: &Site<'_>) -> Vec<Table> {
@@ -38,9 +44,23 @@ pub struct Site<'a> {
     pub state: &'a State,
     /// States that are integrals of another one (their rate is another state alone) and that are linked to this state:
     /// the rate depends on them, or this state is their rate. For a velocity these are the positions.
-    pub positions: &'a [String],
+    pub positions: &'a [&'a State],
     /// Other states on which the rate depends, besides the state itself.
-    pub others: &'a [String],
+    pub others: &'a [&'a State],
+}
+
+impl Site<'_> {
+    /// Positions on which the rate depends, such as those of springs.
+    pub fn springs(&self) -> Vec<&State> {
+        let uses = &self.state.uses;
+        self.positions.iter().copied().filter(|position| uses.contains(&position.name)).collect()
+    }
+
+    /// Expressions of which the rate has the difference to the state itself.
+    pub fn references(&self) -> impl Iterator<Item = &str> {
+        let own = &self.state.name;
+        self.state.references.iter().filter(move |[name, _]| name == own).map(|[_, at]| at.as_str())
+    }
 }
 
 /// Place at which a term is added.

@@ -26,6 +26,8 @@ pub struct Candidate {
     pub effect: Arc<dyn Effect>,
     /// The prior odds of its group, which are those of all physics inside the model or of all effects on the response.
     pub odds: f64,
+    /// Types that it contains as special cases.
+    pub contains: Vec<&'static str>,
 }
 
 /// A candidate with the labels on which it acts.
@@ -49,6 +51,7 @@ impl Candidate {
             options: options.clone(),
             effect,
             odds: 1.0,
+            contains: Vec::new(),
         })
     }
 
@@ -217,6 +220,7 @@ mod tests {
             options: Table::new(),
             effect: Arc::new(InputEffect { places, inputs, description }),
             odds,
+            contains: Vec::new(),
         }
     }
 

@@ -32,6 +32,12 @@ pub enum Law {
     Evaporation(f64),
     /// A loss in proportion to the excess above a level.
     Overflow,
+    /// A drag that tends to a constant at high speed.
+    Drooping,
+    /// A spring whose force grows exponentially.
+    Exponential,
+    /// A leak through a hole at a height, by Torricelli's law.
+    Hole,
 }
 
 impl Law {
@@ -51,6 +57,9 @@ impl Law {
             Self::Radiation(around) => around.powi(4) - (around + u).powi(4),
             Self::Evaporation(scale) => 1.0 - (u / scale).exp(),
             Self::Overflow => -(u - 1.05).max(0.0),
+            Self::Drooping => -u / (1.0 + u.abs()),
+            Self::Exponential => -(1.5 * x).sinh(),
+            Self::Hole => -(u - 0.6).max(0.0).sqrt(),
         }
     }
 

@@ -2,15 +2,23 @@
 
 use super::Missing;
 use super::law::Law::{
-    self, Cogging, Constant, DeadZone, Evaporation, Hysteresis, Loss, OneSided, Overflow,
-    Radiation, Stiffness, Stop, Stribeck,
+    self, Cogging, Constant, DeadZone, Drooping, Evaporation, Exponential, Hole, Hysteresis, Loss,
+    OneSided, Overflow, Radiation, Stiffness, Stop, Stribeck,
 };
 use super::system::{AROUND, EXCESS, Kind};
 
 type Types = &'static [&'static str];
 
-const DRAG: Types = &["linear_friction", "quadratic_friction", "coulomb_friction"];
-const SPRING: Types = &["cubic_stiffness", "quadratic_stiffness"];
+const DRAG: Types = &[
+    "linear_friction",
+    "quadratic_friction",
+    "coulomb_friction",
+    "power_friction",
+    "stribeck_friction",
+    "dahl_friction",
+];
+const SPRING: Types = &["cubic_stiffness", "quadratic_stiffness", "power_stiffness"];
+const POWER: Types = &["power_friction"];
 
 /// Missing physics of the form of these types of terms.
 fn form(name: &'static str, laws: &[(Law, f64)], exact: Types, near: Types) -> Missing {
@@ -49,8 +57,9 @@ fn pendulum() -> Vec<Missing> {
             &["coulomb_friction", "quadratic_friction"],
             DRAG,
         ),
-        outside("drag of power 1.5", Loss(1.5), 0.03, DRAG),
-        outside("drag of power 0.5", Loss(0.5), 0.02, DRAG),
+        form("drag of power 1.5", &[(Loss(1.5), 0.03)], POWER, DRAG),
+        form("drag of power 0.5", &[(Loss(0.5), 0.02)], POWER, DRAG),
+        outside("drooping drag", Drooping, 0.03, DRAG),
     ]
 }
 
@@ -60,30 +69,31 @@ fn drive() -> Vec<Missing> {
     vec![
         form("offset", &[(Constant, 0.05)], &["constant_rate"], &[]),
         form("dry friction and offset", both, BOTH, BOTH),
-        outside("falling friction", Stribeck, 0.15, DRAG),
+        form("falling friction", &[(Stribeck, 0.15)], &["stribeck_friction"], DRAG),
         outside("cogging", Cogging, 0.1, &[]),
     ]
 }
 
 fn cooling() -> Vec<Missing> {
-    const HEAT: Types = &["evaporation", "radiation"];
-    const MORE: Types = &["evaporation", "radiation", "cubic_stiffness", "quadratic_friction"];
+    const HEAT: Types = &["evaporation", "radiation", "convection"];
     const BOTH: Types = &["evaporation", "constant_rate"];
     let both: &[(Law, f64)] = &[(Evaporation(0.4), 0.05), (Constant, 0.1)];
     vec![
         form("evaporation", &[(Evaporation(0.4), 0.05)], &["evaporation"], HEAT),
         form("radiation", &[(Radiation(AROUND / EXCESS), 0.2)], &["radiation"], HEAT),
         form("evaporation and a heater", both, BOTH, BOTH),
-        outside("convection of power 1.25", Loss(1.25), 0.3, MORE),
+        form("convection of power 1.25", &[(Loss(1.25), 0.3)], &["convection"], HEAT),
+        outside("drooping loss", Drooping, 0.3, HEAT),
     ]
 }
 
 fn tanks() -> Vec<Missing> {
-    const LEAK: Types = &["linear_friction", "quadratic_friction", "overflow"];
+    const LEAK: Types = &["linear_friction", "quadratic_friction", "overflow", "power_friction"];
     vec![
         form("overflow", &[(Overflow, 1.5)], &["overflow"], &[]),
         form("a leak", &[(Loss(1.0), 0.2)], &["linear_friction"], LEAK),
-        outside("a leak of power 1.5", Loss(1.5), 0.2, LEAK),
+        form("a leak of power 1.5", &[(Loss(1.5), 0.2)], POWER, LEAK),
+        outside("a hole at a height", Hole, 0.3, LEAK),
     ]
 }
 
@@ -91,30 +101,31 @@ fn fall() -> Vec<Missing> {
     vec![
         form("square drag", &[(Loss(2.0), 0.15)], &["quadratic_friction"], DRAG),
         form("linear drag", &[(Loss(1.0), 0.15)], &["linear_friction"], DRAG),
-        outside("drag of power 1.5", Loss(1.5), 0.15, DRAG),
-        outside("drag of power 3", Loss(3.0), 0.1, DRAG),
+        form("drag of power 1.5", &[(Loss(1.5), 0.15)], POWER, DRAG),
+        outside("drooping drag", Drooping, 0.15, DRAG),
     ]
 }
 
 fn driven() -> Vec<Missing> {
-    const GAP: Types = &["cubic_stiffness", "coulomb_friction"];
-    const LOOP: Types = &["coulomb_friction", "cubic_stiffness", "delayed", "linear_friction"];
+    const GAP: Types = &["dead_zone", "cubic_stiffness", "power_stiffness"];
+    const LOOP: Types = &["bouc_wen", "dahl_friction", "coulomb_friction", "maxwell_damping"];
     vec![
         form("cubic stiffness", &[(Stiffness(3.0), 0.1)], &["cubic_stiffness"], SPRING),
         form("one-sided stiffness", &[(OneSided, 0.1)], &["quadratic_stiffness"], SPRING),
-        outside("stiffness of power 5", Stiffness(5.0), 0.05, SPRING),
-        outside("dead zone", DeadZone, 0.15, GAP),
+        form("stiffness of power 5", &[(Stiffness(5.0), 0.05)], &["power_stiffness"], SPRING),
+        form("dead zone", &[(DeadZone, 0.15)], &["dead_zone"], GAP),
+        outside("exponential stiffness", Exponential, 0.05, SPRING),
         outside("hysteresis", Hysteresis, 0.15, LOOP),
     ]
 }
 
 fn free() -> Vec<Missing> {
-    const STOP: Types = &["overflow", "quadratic_stiffness", "cubic_stiffness"];
+    const STOP: Types = &["overflow", "quadratic_stiffness", "limiter"];
     vec![
         form("square drag", &[(Loss(2.0), 0.05)], &["quadratic_friction"], DRAG),
         form("dry friction", &[(Loss(0.0), 0.02)], &["coulomb_friction"], DRAG),
-        outside("a stop", Stop, 0.3, STOP),
-        outside("drag of power 1.5", Loss(1.5), 0.05, DRAG),
-        outside("softening of power 2", Stiffness(2.0), -0.08, SPRING),
+        form("a stop", &[(Stop, 0.3)], &["overflow"], STOP),
+        form("drag of power 1.5", &[(Loss(1.5), 0.05)], POWER, DRAG),
+        form("softening of power 2", &[(Stiffness(2.0), -0.08)], &["power_stiffness"], SPRING),
     ]
 }

@@ -119,6 +119,7 @@ impl Pieces {
                 options: Table::new(),
                 effect,
                 odds: 1.0,
+                contains: terms::contained(&piece.kind),
             }
         };
         self.all.iter().map(candidate).collect()

@@ -48,7 +48,14 @@ pub fn candidates(
         let kind = section.common.name.as_str().to_owned();
         let (effect, _) = learned(study, section, problem, run, observer)?;
         let plugin = IN_RUNS.to_owned();
-        Ok(Candidate { kind, plugin, options: Table::new(), odds: 1.0, effect })
+        Ok(Candidate {
+            kind,
+            plugin,
+            options: Table::new(),
+            odds: 1.0,
+            effect,
+            contains: Vec::new(),
+        })
     };
     others.map(one).collect()
 }

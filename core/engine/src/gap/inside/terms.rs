@@ -5,7 +5,7 @@ use lacuna::math::distribution::Distribution;
 use lacuna::plugin::amend::{Addition, Amend, State};
 use lacuna::plugin::effect::Description;
 use lacuna::plugin::model::Call;
-use lacuna::plugin::registry::Section;
+use lacuna::plugin::registry::{self, Section};
 use lacuna::plugin::term::{Index, Place, Sign, Summand, Time};
 use lacuna::plugin::{Context, Given, Term};
 use lacuna::run::Stop;
@@ -72,6 +72,12 @@ fn put(
         addition: Some(addition(name, &section.common.state, summand)),
         at: None,
     });
+}
+
+/// The types that a term of the library contains as special cases; empty for other candidates.
+pub(super) fn contained(kind: &str) -> Vec<&'static str> {
+    let built = registry::from_text::<dyn Term>(kind, "");
+    built.map_or_else(|_| Vec::new(), |built| built.plugin.contains().to_vec())
 }
 
 /// The name of the library's term; for an expression of the study, the name of its coefficient.

@@ -67,8 +67,8 @@ pub(super) fn sections(
 /// A state with the quantities on which its rate depends.
 struct Sited<'a> {
     state: &'a State,
-    positions: Vec<String>,
-    others: Vec<String>,
+    positions: Vec<&'a State>,
+    others: Vec<&'a State>,
 }
 
 fn sites(states: &[State]) -> Vec<Sited<'_>> {
@@ -82,9 +82,11 @@ fn sites(states: &[State]) -> Vec<Sited<'_>> {
             leader(other) == Some(&state.name)
                 || state.uses.contains(&other.name) && leader(other).is_some()
         };
-        let positions = states.iter().filter(is_position).map(|other| other.name.clone());
-        let others = state.uses.iter().filter(|name| **name != state.name && !moves(name));
-        (positions.collect(), others.cloned().collect())
+        let positions: Vec<&State> = states.iter().filter(is_position).collect();
+        let is_other = |other: &&State| {
+            state.uses.contains(&other.name) && other.name != state.name && !moves(&other.name)
+        };
+        (positions, states.iter().filter(is_other).collect::<Vec<_>>())
     };
     let own = states.iter().filter(|state| leader(state).is_none());
     own.map(|state| {
@@ -111,8 +113,17 @@ fn called(name: &str, state: &str, options: &Table, places: usize) -> String {
     let of = options.get("of").and_then(toml::Value::as_str).filter(|of| *of != state);
     match of {
         _ if places < 2 => name.to_owned(),
-        Some(of) => format!("{name}_{state}_{of}"),
+        Some(of) => format!("{name}_{state}_{}", argument(of)),
         None => format!("{name}_{state}"),
+    }
+}
+
+/// The part of a name that stands for an argument: a state, the negative of one, or a function of the time.
+fn argument(of: &str) -> String {
+    match of.strip_prefix('-') {
+        _ if lacuna::expression::is_name(of) => of.to_owned(),
+        Some(state) if lacuna::expression::is_name(state) => format!("minus_{state}"),
+        _ => "input".to_owned(),
     }
 }
 

@@ -303,6 +303,10 @@ impl<'a> RefitSetting<'a, '_> {
     }
 }
 
+/// The prior odds of a law against a candidate that contains it as a special case: most missing physics has the exponent
+/// of a textbook.
+const GENERAL: f64 = 4.0;
+
 /// The log prior mass of a placement within its type, divided among the variants of the type, plus the log of the
 /// type's share by the [odds](log_group_share) of its group.
 pub fn placement_prior(candidates: &[Candidate], placement: &Placement, sensors: usize) -> f64 {
@@ -310,7 +314,9 @@ pub fn placement_prior(candidates: &[Candidate], placement: &Placement, sensors:
     let versions = candidates.iter().filter(|c| c.kind == candidate.kind).count();
     let chosen = (!placement.on.is_empty()).then(|| chosen(placement));
     let place = log_prior(candidate.effect.reach(), chosen, sensors) - (versions as f64).ln();
-    place + log_group_share(candidates, candidate)
+    let is_general = candidates.iter().any(|c| candidate.contains.contains(&c.kind.as_str()));
+    let form = if is_general { -GENERAL.ln() } else { 0.0 };
+    place + form + log_group_share(candidates, candidate)
 }
 
 /// The number of sensors that a placement acts on, by the labels of its place.

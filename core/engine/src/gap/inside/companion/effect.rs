@@ -17,6 +17,7 @@ use crate::gap::candidates::{Candidate, Untried};
 use crate::gap::experiment::wider::FreeInput;
 use crate::gap::inside::change::{Change, ChangeEffect};
 use crate::gap::inside::pieces::{Piece, Pieces};
+use crate::gap::inside::terms;
 use crate::gap::result::IN_COMPANION;
 use crate::gap::result::companion::IdentifiedCompanion;
 use crate::gap::system::switched::InputEffect;
@@ -151,6 +152,7 @@ impl Learning<'_> {
             relative_error: self.found.of_changes,
         });
         Candidate {
+            contains: terms::contained(&kind),
             kind,
             plugin: IN_COMPANION.to_owned(),
             options: Table::new(),
