@@ -109,8 +109,8 @@ pub(super) fn shares(candidates: &[Candidate], weighed: &[Weighed]) -> Vec<(Stri
 /// The number of types that are refitted.
 const TYPES: usize = 5;
 
-/// The share of replicates without which the type of largest weight stays the same, zero to one; evidences by Laplace's
-/// method, from the fits to all replicates.
+/// The share of replicates without which the type of largest weight stays the same or gives way to a form that contains it,
+/// zero to one; evidences by Laplace's method, from the fits to all replicates.
 pub fn stability(
     experiment: &Experiment<'_>,
     setting: &RefitSetting<'_, '_>,
@@ -118,8 +118,12 @@ pub fn stability(
 ) -> f64 {
     let mut best: Vec<&Weighed> = Vec::new();
     for j in weighed {
-        let kind = |j: &Weighed| &setting.candidates[j.placement.candidate].kind;
-        if best.len() < TYPES && !best.iter().any(|other| kind(other) == kind(j)) {
+        let candidate = |j: &Weighed| &setting.candidates[j.placement.candidate];
+        let kind = |j: &Weighed| candidate(j).kind.as_str();
+        // A form that contains the first type is no contradiction to it.
+        let is_general =
+            best.first().is_some_and(|first| candidate(j).contains.contains(&kind(first)));
+        if best.len() < TYPES && !is_general && !best.iter().any(|other| kind(other) == kind(j)) {
             best.push(j);
         }
     }
