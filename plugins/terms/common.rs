@@ -3,7 +3,7 @@
 use lacuna::data::Unit;
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::amend::State;
-use lacuna::plugin::term::{Index, Place, Site};
+use lacuna::plugin::term::{Index, Place, Site, Summand};
 use toml::Table;
 
 /// Returns the argument `u` of a term: the state itself unless an expression is given.
@@ -45,6 +45,31 @@ pub fn ambient_each(site: &Site<'_>) -> Vec<Table> {
 /// above zero if multiplied by `u`.
 pub fn magnitude(u: &str, scale: &str, power: &str) -> String {
     format!("((({u}) / ({scale}))^2 + 1e-6)^(0.5 * ({power}))")
+}
+
+/// Returns the law `-u (abs(u) / scale)^(power - 1)` of an argument `of` in `unit`, with the size of `u` along the run as scale and a
+/// power that is unknown: uniform between `bounds` unless a prior is given.
+///
+/// # Errors
+/// If the unit or the size of the argument is not known.
+pub fn power_law(
+    place: &Place<'_>,
+    (argument, unit): (Option<&str>, Option<&Unit>),
+    power: Option<&Distribution>,
+    bounds: [f64; 2],
+) -> Result<Summand, String> {
+    let u = of(argument, place);
+    let name = format!("{}_power", place.name);
+    let prior = power.cloned().unwrap_or(Distribution::Uniform(bounds));
+    let starts = [0.15, 0.5, 0.85].map(|p| prior.quantile(p)).to_vec();
+    let scale = scale(place, u, unit_of(unit, argument, place)?)?;
+    Ok(Summand {
+        shape: format!("-({u}) * {}", magnitude(u, &scale, &format!("{name} - 1"))),
+        indices: vec![Index { name, unit: Unit::dimensionless(), prior, starts }],
+        scale: Some(format!("({u})")),
+        fixed: Some(format!("scale = {scale}")),
+        ..Summand::default()
+    })
 }
 
 /// Returns the quantity limited to `limit` on both sides, with bends of a small width.
@@ -97,8 +122,11 @@ pub fn range(
     u: &str,
     bounds: [f64; 2],
 ) -> Result<Distribution, String> {
-    let size = size(place, u)?;
-    Ok(given.cloned().unwrap_or_else(|| Distribution::LogUniform(bounds.map(|share| share * size))))
+    Ok(between(given, size(place, u)?, bounds))
+}
+
+fn between(given: Option<&Distribution>, size: f64, bounds: [f64; 2]) -> Distribution {
+    given.cloned().unwrap_or_else(|| Distribution::LogUniform(bounds.map(|share| share * size)))
 }
 
 /// Returns the size of the deflection of which `u` is the speed, from the speed and the rate of the state: that of a
@@ -118,6 +146,15 @@ pub fn deflection_of(place: &Place<'_>, u: &str, unit: &Unit) -> Result<String, 
     Ok(quantity(travel(place, u)?, unit))
 }
 
+/// Returns the unit of the deflection of which a quantity in `unit` is the speed.
+///
+/// # Errors
+/// If the model has no time, or the product has no unit.
+pub fn deflection_unit(place: &Place<'_>, unit: &Unit) -> Result<Unit, String> {
+    let time = place.time.ok_or("the model has no time")?;
+    Ok(unit.times(time.unit).ok_or("the deflection has no unit")?.plain())
+}
+
 /// Returns an unknown deflection of which `u`, in `unit`, is the speed: log-uniform between two multiples of its size
 /// unless a prior is given.
 ///
@@ -130,12 +167,10 @@ pub fn deflection_index(
     unit: &Unit,
     bounds: [f64; 2],
 ) -> Result<Index, String> {
-    let time = place.time.ok_or("the model has no time")?;
     let size = travel(place, u)?;
-    let prior = given.cloned();
-    let prior = prior.unwrap_or_else(|| Distribution::LogUniform(bounds.map(|share| share * size)));
+    let prior = between(given, size, bounds);
     let starts = [0.15, 0.4, 0.65, 0.9].map(|p| prior.quantile(p)).to_vec();
-    let unit = unit.times(time.unit).ok_or("the deflection has no unit")?.plain();
+    let unit = deflection_unit(place, unit)?;
     Ok(Index { name: format!("{}_deflection", place.name), unit, prior, starts })
 }
 

@@ -22,7 +22,8 @@ use super::common::{clamped, of, of_inputs, of_quantities, quantity, share, size
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DeadZone {
-    /// Quantity `u` that has free play, such as the deflection `"x"` in the rate of a velocity, as an expression. Default: the state itself.
+    /// Quantity `u` that has free play, such as the deflection `"x"` in the rate of a velocity, as an
+    /// expression. Default: the state itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
     /// Unit of `u`. Required with `of`.

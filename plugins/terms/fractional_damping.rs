@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{deflection_of, of, quantity, unit_of};
+use super::common::{deflection_of, deflection_unit, of, quantity, unit_of};
 
 /// Number of rates of the diffusive representation: about two in a decade for a response of some hundred points.
 const RATES: usize = 10;
@@ -60,7 +60,7 @@ impl Term for FractionalDamping {
         let time = place.time.ok_or("the model has no time")?;
         let u = of(self.of.as_deref(), place);
         let unit = unit_of(self.unit.as_ref(), self.of.as_deref(), place)?;
-        let unit = unit.times(time.unit).ok_or("the deflection has no unit")?.plain();
+        let unit = deflection_unit(place, unit)?;
         let per_time = time.unit.power(-1.0).ok_or("the time has no unit that can be inverted")?;
         let order = format!("{}_order", place.name);
         let (low, high) = (1.0 / (30.0 * time.duration), 3.0 / time.step);

@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{deflection_of, of, unit_of};
+use super::common::{deflection_of, deflection_unit, of, unit_of};
 
 /// Maxwell element: a spring and a damper in series, a force that relaxes.
 ///
@@ -59,7 +59,7 @@ impl Term for MaxwellDamping {
         let longest = time.duration.max(2.0 * time.step);
         let prior = self.time.clone().unwrap_or(Distribution::LogUniform([time.step, longest]));
         let starts = [0.15, 0.4, 0.65, 0.9].map(|p| prior.quantile(p)).to_vec();
-        let unit = unit.times(time.unit).ok_or("the deflection has no unit")?.plain();
+        let unit = deflection_unit(place, unit)?;
         let rate = format!("({u}) - {z} / {relaxation}");
         Ok(Summand {
             shape: format!("-{z}"),

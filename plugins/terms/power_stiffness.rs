@@ -3,13 +3,13 @@
 use lacuna::data::Unit;
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::effect::Description;
-use lacuna::plugin::term::{Index, Place, Sign, Site, Summand};
+use lacuna::plugin::term::{Place, Sign, Site, Summand};
 use lacuna::plugin::{Component, Term};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{magnitude, of, of_quantities, scale, unit_of};
+use super::common::{of_quantities, power_law};
 
 /// Power-law stiffness: a spring that hardens (coefficient above zero) or softens with a power that is inferred.
 ///
@@ -53,20 +53,9 @@ impl Term for PowerStiffness {
     }
 
     fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {
-        let u = of(self.of.as_deref(), place);
-        let power = format!("{}_power", place.name);
-        let prior = self.power.clone().unwrap_or(Distribution::Uniform([1.2, 7.0]));
-        let starts = [0.15, 0.5, 0.85].map(|p| prior.quantile(p)).to_vec();
-        let scale = scale(place, u, unit_of(self.unit.as_ref(), self.of.as_deref(), place)?)?;
-        let magnitude = magnitude(u, &scale, &format!("{power} - 1"));
-        Ok(Summand {
-            shape: format!("-({u}) * {magnitude}"),
-            sign: Sign::Either,
-            indices: vec![Index { name: power, unit: Unit::dimensionless(), prior, starts }],
-            scale: Some(format!("({u})")),
-            fixed: Some(format!("scale = {scale}")),
-            ..Summand::default()
-        })
+        let argument = (self.of.as_deref(), self.unit.as_ref());
+        let law = power_law(place, argument, self.power.as_ref(), [1.2, 7.0])?;
+        Ok(Summand { sign: Sign::Either, ..law })
     }
 }
 

@@ -336,3 +336,10 @@ fn options_have_the_defaults_of_the_documentation() {
     assert_eq!(serde_json::from_str::<AffineInvariantEnsemble>(&written).unwrap(), read);
     assert!(serde_json::from_str::<AffineInvariantEnsemble>(r#"{"walker": 3}"#).is_err());
 }
+
+/// Unknowns of discrepancies and effects count too: ten unknowns need 22 walkers, three are content with the 16 stated.
+#[test]
+fn too_few_walkers_for_all_unknowns_are_raised() {
+    let sampler = AffineInvariantEnsemble { walkers: 16, ..AffineInvariantEnsemble::default() };
+    assert_eq!([3, 10].map(|dimension| sampler.plan(dimension).chains), [16, 22]);
+}

@@ -5,6 +5,7 @@ mod densities;
 mod derivatives;
 mod faults;
 mod language;
+mod parts;
 mod tables;
 mod units;
 
