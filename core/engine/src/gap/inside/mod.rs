@@ -7,6 +7,7 @@ pub mod advice;
 mod change;
 pub mod companion;
 mod emulated;
+mod lazy_map;
 mod narrow;
 mod pieces;
 pub mod runs;

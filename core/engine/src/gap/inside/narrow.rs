@@ -1,40 +1,18 @@
 //! The extended forward map of a model without a surrogate: each evaluation runs the model with the present inputs
 //! only, so that its cost does not grow with the number of candidates.
 
-use std::sync::OnceLock;
-
 use lacuna::plugin::Forward;
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
 
+use super::lazy_map::LazyMap;
 use super::pieces::{ExtendedModel, Pieces};
 use crate::gap::experiment::wider::FreeInput;
 use crate::stage::direct::ModelMap;
 use crate::study::Study;
 
-/// The models with no piece, with one, and with two, each made at its first use.
-pub struct RestrictedModels {
-    slots: Vec<OnceLock<Option<ExtendedModel>>>,
-}
-
-impl RestrictedModels {
-    /// The models of `n` pieces, none of them made yet.
-    pub fn new(n: usize) -> Self {
-        let count = 1 + n + n * n.saturating_sub(1) / 2;
-        Self { slots: (0..count).map(|_| OnceLock::new()).collect() }
-    }
-
-    /// The index of the model with these pieces; `None` for more than two pieces.
-    fn slot(pieces: &[usize], of: usize) -> Option<usize> {
-        match *pieces {
-            [] => Some(0),
-            [a] => Some(1 + a),
-            // Pairs are ordered by their first piece, then by their second.
-            [a, b] => Some(1 + of + a * (2 * of - a - 1) / 2 + b - a - 1),
-            _ => None,
-        }
-    }
-}
+/// The models with some of the pieces; `None` for one that cannot be made.
+pub type RestrictedModels = LazyMap<Option<ExtendedModel>>;
 
 /// The forward map.
 pub struct RestrictedMap<'a> {
@@ -42,7 +20,7 @@ pub struct RestrictedMap<'a> {
     pieces: &'a Pieces,
     narrower: &'a RestrictedModels,
     whole: ModelMap<'a>,
-    parts: Vec<OnceLock<Option<ModelMap<'a>>>>,
+    parts: LazyMap<Option<ModelMap<'a>>>,
 }
 
 /// A model with the inputs that are free in it.
@@ -56,20 +34,16 @@ impl<'a> RestrictedMap<'a> {
         narrower: &'a RestrictedModels,
     ) -> Result<Self, Stop> {
         let whole = direct(study, pieces, pieces.whole())?;
-        let parts = narrower.slots.iter().map(|_| OnceLock::new()).collect();
-        Ok(Self { study, pieces, narrower, whole, parts })
+        Ok(Self { study, pieces, narrower, whole, parts: LazyMap::new() })
     }
 
     fn part(&self, present: &[usize]) -> Part<'_, 'a> {
         let whole = (&self.whole, &self.pieces.whole().inputs[..]);
-        let Some(slot) = RestrictedModels::slot(present, self.pieces.all.len()) else {
-            return whole;
-        };
         // If the model with a part of the pieces cannot be made, the model with all of them is used.
         let made = || self.pieces.wider(self.study, present).ok().flatten();
-        let Some(wider) = self.narrower.slots[slot].get_or_init(made) else { return whole };
+        let Some(wider) = self.narrower.get_or_make(present, made) else { return whole };
         let made = || direct(self.study, self.pieces, wider).ok();
-        match self.parts[slot].get_or_init(made) {
+        match self.parts.get_or_make(present, made) {
             Some(part) => (part, &wider.inputs),
             None => whole,
         }
@@ -156,25 +130,7 @@ impl Forward for RestrictedMap<'_> {
     }
 
     fn failure(&self) -> Option<String> {
-        let parts = self.parts.iter().filter_map(|part| part.get()?.as_ref());
+        let parts = self.parts.values().flatten();
         std::iter::once(&self.whole).chain(parts).find_map(ModelMap::failure)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_pair_has_a_slot_of_its_own() {
-        let of = 5;
-        let mut slots: Vec<Option<usize>> = vec![RestrictedModels::slot(&[], of)];
-        slots.extend((0..of).map(|a| RestrictedModels::slot(&[a], of)));
-        for a in 0..of {
-            slots.extend((a + 1..of).map(|b| RestrictedModels::slot(&[a, b], of)));
-        }
-        let expected: Vec<Option<usize>> = (0..1 + of + of * (of - 1) / 2).map(Some).collect();
-        assert_eq!(slots, expected);
-        assert_eq!(RestrictedModels::slot(&[0, 1, 2], of), None);
     }
 }

@@ -69,7 +69,7 @@ impl Pieces {
         terms::add(study, &mut all, &mut inputs)?;
         let every: Vec<usize> = (0..all.len()).collect();
         let whole = ExtendedModel::of(study, &all, &inputs, &every)?;
-        let narrower = RestrictedModels::new(all.len());
+        let narrower = RestrictedModels::new();
         let whole = whole.filter(|_| !all.is_empty());
         Ok(whole.map(|whole| Self { all, inputs, whole, narrower }))
     }
@@ -79,7 +79,7 @@ impl Pieces {
         &self.whole
     }
 
-    /// The models with few of the pieces.
+    /// The models with some of the pieces.
     pub(super) fn narrower(&self) -> &RestrictedModels {
         &self.narrower
     }
