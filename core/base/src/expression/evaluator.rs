@@ -2,6 +2,7 @@
 
 use super::operator::Lanes;
 use super::program::Program;
+use super::tape::Tape;
 use super::{forward, tangent};
 
 /// Number of directions that [`Evaluator::slopes_together`] takes.
@@ -30,21 +31,29 @@ pub const DIRECTIONS: usize = 4;
 #[derive(Debug)]
 pub struct Evaluator<'p> {
     program: &'p Program,
+    /// The steps of a program without vectors.
+    tape: Option<Tape>,
     registers: Vec<Lanes<1>>,
     tangents: Vec<Lanes<1>>,
     wide: Vec<Lanes<DIRECTIONS>>,
-    /// True if the registers hold the values at the first entries of the point.
+    /// True if there has been a point.
     filled: bool,
 }
 
 impl<'p> Evaluator<'p> {
     /// An evaluator that is at no point yet.
     pub fn new(program: &'p Program) -> Self {
+        let tape = Tape::of(program);
+        let (registers, tangents) = match &tape {
+            Some(tape) => (0, tape.length()),
+            None => (program.registers, program.registers),
+        };
         Self {
             program,
-            registers: vec![[0.0]; program.registers],
-            tangents: vec![[0.0]; program.registers],
-            wide: vec![[0.0; DIRECTIONS]; program.registers],
+            tape,
+            registers: vec![[0.0]; registers],
+            tangents: vec![[0.0]; tangents],
+            wide: vec![[0.0; DIRECTIONS]; tangents],
             filled: false,
         }
     }
@@ -56,17 +65,23 @@ impl<'p> Evaluator<'p> {
     /// If the point does not have [`Program::unknowns`] coordinates.
     pub fn at(&mut self, point: &[f64]) {
         assert_eq!(point.len(), self.program.unknowns, "the coordinates of a point");
-        let same = |(lane, x): (&Lanes<1>, &f64)| lane[0].to_bits() == x.to_bits();
-        if self.filled && self.registers.iter().zip(point).all(same) {
+        let first = !std::mem::replace(&mut self.filled, true);
+        if let Some(tape) = &mut self.tape {
+            tape.at(self.program, point, first);
             return;
         }
-        self.registers.iter_mut().zip(point).for_each(|(lane, x)| lane[0] = *x);
-        forward::run(self.program, &self.program.constants, &mut self.registers);
-        self.filled = true;
+        let same = |(lane, x): (&Lanes<1>, &f64)| lane[0].to_bits() == x.to_bits();
+        if first || !self.registers.iter().zip(point).all(same) {
+            self.registers.iter_mut().zip(point).for_each(|(lane, x)| lane[0] = *x);
+            forward::run(self.program, &self.program.constants, &mut self.registers);
+        }
     }
 
     /// Writes the values at the point, the outputs concatenated.
     pub fn values(&self, out: &mut [f64]) {
+        if let Some(tape) = &self.tape {
+            return tape.values(out);
+        }
         let mut out = out.iter_mut();
         for place in &self.program.outputs {
             let from = if place.constant { &self.program.constants } else { &self.registers };
@@ -76,10 +91,10 @@ impl<'p> Evaluator<'p> {
 
     /// Writes the derivatives of the values along a direction.
     pub fn slopes(&mut self, direction: &[f64], out: &mut [f64]) {
-        self.tangents.fill([0.0]);
-        self.tangents.iter_mut().zip(direction).for_each(|(tangent, x)| *tangent = [*x]);
-        tangent::run(self.program, &self.registers, &mut self.tangents);
-        self.slopes_of(&self.tangents, out.iter_mut(), |out, tangent| *out = tangent[0]);
+        let Self { program, tape, registers, tangents, .. } = self;
+        let lanes = direction.iter().map(|x| [*x]);
+        let out = out.iter_mut();
+        along(program, tape, registers, tangents, lanes, out, |out, [slope]| *out = slope);
     }
 
     /// Writes the derivatives of the values along several directions at once: `directions` holds the component of each
@@ -89,22 +104,36 @@ impl<'p> Evaluator<'p> {
         directions: &[[f64; DIRECTIONS]],
         out: &mut [[f64; DIRECTIONS]],
     ) {
-        self.wide.fill([0.0; DIRECTIONS]);
-        self.wide[..self.program.unknowns].copy_from_slice(directions);
-        tangent::run(self.program, &self.registers, &mut self.wide);
-        self.slopes_of(&self.wide, out.iter_mut(), |out, tangent| *out = tangent);
+        let Self { program, tape, registers, wide, .. } = self;
+        let (lanes, out) = (directions.iter().copied(), out.iter_mut());
+        along(program, tape, registers, wide, lanes, out, |out, slopes| *out = slopes);
     }
+}
 
-    fn slopes_of<const L: usize, T>(
-        &self,
-        tangents: &[Lanes<L>],
-        mut out: impl Iterator<Item = T>,
-        put: impl Fn(T, Lanes<L>),
-    ) {
-        for place in &self.program.outputs {
-            for (i, out) in place.range().zip(out.by_ref()) {
-                put(out, if place.constant { [0.0; L] } else { tangents[i] });
-            }
+/// Computes the slopes of all values along directions, whose components by each unknown are `lanes`, and puts those of
+/// the outputs into `out`.
+fn along<const L: usize, T>(
+    program: &Program,
+    tape: &mut Option<Tape>,
+    registers: &[Lanes<1>],
+    tangents: &mut [Lanes<L>],
+    lanes: impl Iterator<Item = Lanes<L>>,
+    mut out: impl Iterator<Item = T>,
+    put: impl Fn(T, Lanes<L>),
+) {
+    if let Some(tape) = tape {
+        let first = tape.constants();
+        tangents[first..].iter_mut().zip(lanes).for_each(|(tangent, lane)| *tangent = lane);
+        tape.push(tangents);
+        tape.outputs().iter().zip(out).for_each(|(&i, out)| put(out, tangents[i]));
+        return;
+    }
+    tangents.fill([0.0; L]);
+    tangents.iter_mut().zip(lanes).for_each(|(tangent, lane)| *tangent = lane);
+    tangent::run(program, registers, tangents);
+    for place in &program.outputs {
+        for (i, out) in place.range().zip(out.by_ref()) {
+            put(out, if place.constant { [0.0; L] } else { tangents[i] });
         }
     }
 }

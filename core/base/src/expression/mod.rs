@@ -50,6 +50,7 @@ mod program;
 mod reverse;
 mod scope;
 mod tangent;
+mod tape;
 mod token;
 mod tree;
 mod units;

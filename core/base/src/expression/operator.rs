@@ -38,6 +38,22 @@ macro_rules! unary {
                     $slope
                 }),)* }
             }
+
+            /// The value at one number.
+            pub fn value(self, at: f64) -> f64 {
+                match self { $(Self::$name => {
+                    let f = |$x: f64| -> f64 { $value };
+                    f(at)
+                })* }
+            }
+
+            /// The derivative at one number, where the value is `value`.
+            pub fn slope_at(self, at: f64, value: f64) -> f64 {
+                match self { $(Self::$name => {
+                    let f = |$x: f64, $z: f64| -> f64 { let _ = ($x, $z); $slope };
+                    f(at, value)
+                })* }
+            }
         }
     };
 }
@@ -74,6 +90,25 @@ macro_rules! binary {
                     let _ = ($x, $y, $z);
                     $right
                 }),)* }
+            }
+
+            /// The value at two numbers.
+            pub fn value(self, left: f64, right: f64) -> f64 {
+                match self { $(Self::$name => {
+                    let f = |$x: f64, $y: f64| -> f64 { $value };
+                    f(left, right)
+                })* }
+            }
+
+            /// The derivatives by both numbers, where the value is `value`.
+            pub fn slopes_at(self, left: f64, right: f64, value: f64) -> [f64; 2] {
+                match self { $(Self::$name => {
+                    let f = |$x: f64, $y: f64, $z: f64| -> [f64; 2] {
+                        let _ = ($x, $y, $z);
+                        [$left, $right]
+                    };
+                    f(left, right, value)
+                })* }
             }
         }
     };

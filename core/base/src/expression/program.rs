@@ -258,21 +258,50 @@ impl Program {
     }
 }
 
+/// A straight piece of a curve: its value at `node` and its slope, where `from <= x < to`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Segment {
+    pub from: f64,
+    pub to: f64,
+    pub node: f64,
+    pub value: f64,
+    pub slope: f64,
+}
+
+impl Segment {
+    /// A segment that contains no number.
+    pub const NONE: Self = Self { from: 0.0, to: 0.0, node: 0.0, value: 0.0, slope: 0.0 };
+
+    pub fn contains(&self, x: f64) -> bool {
+        self.from <= x && x < self.to
+    }
+
+    pub fn height(&self, x: f64) -> f64 {
+        if x.is_nan() {
+            return x;
+        }
+        // Beyond the nodes the distance may be infinite, and infinity times a zero slope is NaN.
+        if self.slope == 0.0 { self.value } else { self.value + (x - self.node) * self.slope }
+    }
+}
+
 impl Curve {
-    /// The segment that contains `x`, as (first node, value there, slope); beyond the nodes, the value at the last node
-    /// and slope zero.
-    pub fn segment(&self, x: f64) -> (f64, f64, f64) {
-        let last = self.nodes.len() - 1;
+    /// The segment that contains `x`; beyond the nodes, it has the value at the last node and slope zero.
+    pub fn segment(&self, x: f64) -> Segment {
+        let (nodes, values, last) = (&self.nodes, &self.values, self.nodes.len() - 1);
         let after = self.after(x);
         if after == 0 {
-            return (self.nodes[0], self.values[0], 0.0);
+            let (from, to) = (f64::NEG_INFINITY, nodes[0]);
+            return Segment { from, to, node: nodes[0], value: values[0], slope: 0.0 };
         }
         if after > last {
-            return (self.nodes[last], self.values[last], 0.0);
+            let (from, to) = (nodes[last], f64::INFINITY);
+            return Segment { from, to, node: nodes[last], value: values[last], slope: 0.0 };
         }
         let i = after - 1;
-        let slope = (self.values[after] - self.values[i]) / (self.nodes[after] - self.nodes[i]);
-        (self.nodes[i], self.values[i], slope)
+        let (from, to) = (nodes[i], nodes[after]);
+        let slope = (values[after] - values[i]) / (to - from);
+        Segment { from, to, node: from, value: values[i], slope }
     }
 
     /// Number of nodes at or below `x`; for equally spaced nodes it is computed without a search.
@@ -288,11 +317,6 @@ impl Curve {
     }
 
     pub fn height(&self, x: f64) -> f64 {
-        if x.is_nan() {
-            return x;
-        }
-        let (node, value, slope) = self.segment(x);
-        // Beyond the nodes the distance may be infinite, and infinity times a zero slope is NaN.
-        if slope == 0.0 { value } else { value + (x - node) * slope }
+        if x.is_nan() { x } else { self.segment(x).height(x) }
     }
 }

@@ -131,3 +131,50 @@ fn both_modes_agree_with_each_other_and_with_differences() {
         }
     }
 }
+
+/// An evaluator does again only what depends on a changed unknown; its numbers are those of the program.
+#[test]
+fn an_evaluator_that_moves_repeats_the_program_bit_by_bit() {
+    use crate::expression::{DIRECTIONS, Evaluator};
+    use crate::math::random::{Stream, uniform};
+    let mut scope = scope(&["t", "k", "c", "x", "v"]);
+    scope.define("force", "interpolate(t, [0, 1, 2, 3], [0, 2, -1, 1])").unwrap();
+    scope.define("spring", "(2 * pi * k)^2 * sign(x) * abs(x)^1.5").unwrap();
+    scope.define("up", "v").unwrap();
+    scope
+        .define("on", "force - spring - if(v > 0, c * v^2, c * log1p(abs(v))) + max(x, 3 * t) / v")
+        .unwrap();
+    scope.define("constant", "2").unwrap();
+    let program = scope.compile(&["up", "on", "constant"]).unwrap();
+    let mut evaluator = Evaluator::new(&program);
+    let mut rng = Stream::root(5).generator();
+    let mut point = [0.5, 1.5, 0.3, 0.0, 0.0];
+    for step in 0..200 {
+        // Zero among the values: at x = 0 and v = 0 slopes are infinite or undefined.
+        for (i, x) in point.iter_mut().enumerate() {
+            if step % (i + 1) == 0 {
+                *x = if step % 7 == i { 0.0 } else { 4.0 * uniform(&mut rng) - 1.0 };
+            }
+        }
+        evaluator.at(&point);
+        let mut values = [0.0; 3];
+        evaluator.values(&mut values);
+        let lanes = std::array::from_fn(|_| 2.0 * uniform(&mut rng) - 1.0);
+        let mut directions = [lanes; 5];
+        directions[step % 5] = [0.0; DIRECTIONS];
+        directions[(step + 1) % 5][0] = 0.0;
+        let mut slopes = [[0.0; DIRECTIONS]; 3];
+        evaluator.slopes_together(&directions, &mut slopes);
+        for l in 0..DIRECTIONS {
+            let direction: Vec<f64> = directions.iter().map(|lanes| lanes[l]).collect();
+            let (expected, pushed) = program.push_forward(&point, &direction);
+            let mut own = [0.0; 3];
+            evaluator.slopes(&direction, &mut own);
+            for i in 0..3 {
+                assert_eq!(values[i].to_bits(), expected[i].to_bits(), "{i} at {point:?}");
+                assert_eq!(slopes[i][l].to_bits(), pushed[i].to_bits(), "{i} at {point:?}");
+                assert_eq!(own[i].to_bits(), pushed[i].to_bits(), "{i} at {point:?}");
+            }
+        }
+    }
+}
