@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use lacuna::data::{Axis, Function, Layout, Scenario, Unit};
+use lacuna::data::{Axis, Function, Interpolation, Layout, Scenario, Unit};
 use lacuna::plugin::model::Call;
 use lacuna::plugin::{Model, registry};
 use lacuna_plugins as _;
@@ -92,7 +92,14 @@ fn derive(
         let at: Vec<f64> = std::iter::once(0.0).chain(grid(table, last)).collect();
         let values = at.iter().map(|t| (0.7 * t).sin() + 0.3 * (5.3 * t).sin()).collect();
         let (at_unit, unit) = (unit(), unit());
-        let force = Function { name: "force".to_owned(), at, at_unit, values, unit };
+        let force = Function {
+            name: "force".to_owned(),
+            at,
+            at_unit,
+            values,
+            unit,
+            interpolation: Interpolation::Linear,
+        };
         scenario.functions.push(Arc::new(force));
     }
     let names = ["a", "b", "c"].map(str::to_owned);

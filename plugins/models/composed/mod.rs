@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use lacuna::data::{Condition, Coordinates, Function, Layout, Scenario, Unit};
+use lacuna::data::{Condition, Coordinates, Function, Interpolation, Layout, Scenario, Unit};
 use lacuna::plugin::model::{Call, EvalError, Input, Response, Signature};
 use lacuna::plugin::{Component, Context, Fact, Given, Library, Model};
 use lacuna::run::Fault;
@@ -91,6 +91,7 @@ impl Handed {
             at_unit: at_unit.clone(),
             values: values.to_vec(),
             unit: self.unit.clone(),
+            interpolation: Interpolation::Linear,
         })
     }
 }

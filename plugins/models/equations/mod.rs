@@ -72,8 +72,8 @@ pub use options::{Formula, Method, Observe, Solver, State, StateTable};
 ///
 /// Expressions use the parameters of the study, `fixed` values and the values of scenarios by their names, the
 /// states, the definitions of `where`, and the response's numeric axes: the axis is the time, here `t`. Tables of a
-/// scenario, such as a measured force, are called as functions: `force(t)`, with linear interpolation between their
-/// points and constant values beyond the first and the last. An axis of labels names the observed quantities:
+/// scenario, such as a measured force, are called as functions: `force(t)`, interpolated between their points as
+/// the scenario states, with constant values beyond the first and the last. An axis of labels names the observed quantities:
 /// `observe = { position = "x", speed = "abs(v)" }`. Without states the response is the expression at each point of
 /// its axes.
 ///

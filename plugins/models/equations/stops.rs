@@ -35,6 +35,11 @@ pub fn depends_on_states(broken: &Break, flow: &Flow<'_>) -> bool {
     (coordinates - flow.system.states.len()..coordinates).any(|i| broken.quantity.depends_on(i))
 }
 
+/// Distance on either side of a jump: wide enough that rounding of a step's end cannot reach across it.
+fn gap((first, last): (f64, f64)) -> f64 {
+    1e-13 * (last - first).max(first.abs()).max(last.abs())
+}
+
 /// Search for the times at which the quantity of a break takes its values.
 struct Crossings<'a> {
     broken: &'a Break,
@@ -59,10 +64,18 @@ impl<'a> Crossings<'a> {
         let middle = self.at(0.5 * (first + last));
         let straight =
             (middle - 0.5 * (low + high)).abs() <= 1e-12 * low.abs().max(high.abs()) && low != high;
-        if straight && !self.broken.jumps {
+        let jumps = self.broken.jumps;
+        if straight && (!jumps || self.broken.at.len() > 1) {
             let time = |value: &f64| first + (value - low) / (high - low) * (last - first);
             let inside = self.broken.at.iter().map(time).filter(|t| first < *t && *t < last);
-            stops.extend(inside.map(|before| Stop { before, jump: None }));
+            let gap = gap((first, last));
+            stops.extend(inside.map(|time| {
+                if jumps {
+                    Stop { before: time - gap, jump: Some((time + gap, index)) }
+                } else {
+                    Stop { before: time, jump: None }
+                }
+            }));
         } else if self.broken.at.len() == 1 {
             self.search(index, span, if straight { &[] } else { samples }, stops);
         }
@@ -77,8 +90,7 @@ impl<'a> Crossings<'a> {
         stops: &mut Vec<Stop>,
     ) {
         let value = self.broken.at[0];
-        // Wide enough that rounding of a step's end cannot reach across the jump.
-        let gap = 1e-13 * (last - first).max(first.abs()).max(last.abs());
+        let gap = gap((first, last));
         let inside = samples.iter().copied().filter(|t| first < *t && *t < last);
         let mut left = (first, self.at(first) > value);
         for right in inside.chain([last]) {

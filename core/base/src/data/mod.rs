@@ -17,7 +17,7 @@ pub use layout::{Axis, Coordinates, Layout};
 pub use layouts::Layouts;
 pub use measurements::{Measurements, Observations, Replicate};
 pub use parameter::Parameter;
-pub use scenario::{Condition, Function, Scenario};
+pub use scenario::{Condition, Function, Interpolation, Scenario};
 pub use statistics::{Statistic, Statistics};
 pub use table::Table;
 pub use unit::{Unit, UnitError};

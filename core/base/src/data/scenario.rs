@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Unit;
@@ -30,7 +31,7 @@ pub struct Condition {
     pub unit: Option<Unit>,
 }
 
-/// A function of one variable given by a table, linearly interpolated.
+/// A function of one variable given by a table; beyond its nodes it has the value of the nearest one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Function {
     /// Name, such as `force`.
@@ -43,6 +44,30 @@ pub struct Function {
     pub values: Vec<f64>,
     /// Unit of the function's values.
     pub unit: Unit,
+    /// The function between two nodes.
+    #[serde(default, skip_serializing_if = "Interpolation::is_linear")]
+    pub interpolation: Interpolation,
+}
+
+/// A function between the nodes of its table.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Interpolation {
+    /// A straight line from node to node.
+    #[default]
+    Linear,
+    /// The value of the last node, as of a converter that holds its output until the next sample.
+    Hold,
+    /// A cubic spline through the nodes with continuous curvature: for samples of a smooth signal.
+    Spline,
+}
+
+impl Interpolation {
+    /// True for a straight line.
+    #[allow(clippy::trivially_copy_pass_by_ref)] // Serde passes a reference.
+    pub fn is_linear(&self) -> bool {
+        *self == Self::Linear
+    }
 }
 
 impl Scenario {

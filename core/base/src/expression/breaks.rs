@@ -18,7 +18,7 @@ pub struct Break {
 
 impl Program {
     /// The breakpoints: comparisons (where both sides are equal), `sign`, `abs`, `min` and `max` of two numbers, and
-    /// the nodes of tables. Breakpoints of vectors, and of `floor` and `ceil`, are not included.
+    /// the nodes of tables: those of a spline are the ends only. Breakpoints of vectors, and of `floor` and `ceil`, are not included.
     pub fn breaks(&self) -> Vec<Break> {
         self.instructions.iter().filter_map(|instruction| self.break_of(instruction)).collect()
     }
@@ -37,7 +37,8 @@ impl Program {
                 breaks.then(|| found(self.difference(*a, *b), vec![0.0], jumps))
             }
             Action::Interpolate(curve, a) => {
-                Some(found(self.giving(*a), self.tables.curves[*curve].nodes.clone(), false))
+                let (nodes, jumps) = self.tables.curves[*curve].breaks();
+                Some(found(self.giving(*a), nodes, jumps))
             }
             _ => None,
         }

@@ -39,6 +39,7 @@
 
 mod breaks;
 mod compile;
+mod curve;
 mod evaluator;
 mod fault;
 mod forward;

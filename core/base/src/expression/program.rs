@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::curve::Curve;
 use super::function::Reduction;
 use super::operator::{Binary, Lanes, Unary};
 use super::{forward, reverse, tangent};
@@ -71,13 +72,6 @@ pub(super) struct Tables {
     pub matrices: Vec<Matrix>,
     /// Shared, because tables may be long and the programs of one scope use the same ones.
     pub curves: Vec<Arc<Curve>>,
-}
-
-/// Piecewise linear function.
-#[derive(Clone, Debug)]
-pub(super) struct Curve {
-    pub nodes: Vec<f64>,
-    pub values: Vec<f64>,
 }
 
 impl Place {
@@ -255,68 +249,5 @@ impl Program {
             let from = if place.constant { constants } else { registers };
             &from[place.range()]
         })
-    }
-}
-
-/// A straight piece of a curve: its value at `node` and its slope, where `from <= x < to`.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Segment {
-    pub from: f64,
-    pub to: f64,
-    pub node: f64,
-    pub value: f64,
-    pub slope: f64,
-}
-
-impl Segment {
-    /// A segment that contains no number.
-    pub const NONE: Self = Self { from: 0.0, to: 0.0, node: 0.0, value: 0.0, slope: 0.0 };
-
-    pub fn contains(&self, x: f64) -> bool {
-        self.from <= x && x < self.to
-    }
-
-    pub fn height(&self, x: f64) -> f64 {
-        if x.is_nan() {
-            return x;
-        }
-        // Beyond the nodes the distance may be infinite, and infinity times a zero slope is NaN.
-        if self.slope == 0.0 { self.value } else { self.value + (x - self.node) * self.slope }
-    }
-}
-
-impl Curve {
-    /// The segment that contains `x`; beyond the nodes, it has the value at the last node and slope zero.
-    pub fn segment(&self, x: f64) -> Segment {
-        let (nodes, values, last) = (&self.nodes, &self.values, self.nodes.len() - 1);
-        let after = self.after(x);
-        if after == 0 {
-            let (from, to) = (f64::NEG_INFINITY, nodes[0]);
-            return Segment { from, to, node: nodes[0], value: values[0], slope: 0.0 };
-        }
-        if after > last {
-            let (from, to) = (nodes[last], f64::INFINITY);
-            return Segment { from, to, node: nodes[last], value: values[last], slope: 0.0 };
-        }
-        let i = after - 1;
-        let (from, to) = (nodes[i], nodes[after]);
-        let slope = (values[after] - values[i]) / (to - from);
-        Segment { from, to, node: from, value: values[i], slope }
-    }
-
-    /// Number of nodes at or below `x`; for equally spaced nodes it is computed without a search.
-    fn after(&self, x: f64) -> usize {
-        let (nodes, last) = (&self.nodes, self.nodes.len() - 1);
-        let guess = ((x - nodes[0]) / (nodes[last] - nodes[0]) * last as f64) as usize;
-        for near in [guess, guess.saturating_sub(1), guess + 1] {
-            if near < last && nodes[near] <= x && x < nodes[near + 1] {
-                return near + 1;
-            }
-        }
-        nodes.partition_point(|node| *node <= x)
-    }
-
-    pub fn height(&self, x: f64) -> f64 {
-        if x.is_nan() { x } else { self.segment(x).height(x) }
     }
 }

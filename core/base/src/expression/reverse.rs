@@ -124,7 +124,7 @@ impl<'a> Step<'a> {
             Action::Interpolate(curve, a) => {
                 let curve = &self.program.tables.curves[*curve];
                 for ((i, x), w) in a.range().zip(self.get(*a)).zip(self.weights) {
-                    adjoints[i] += w * curve.segment(x[0]).slope;
+                    adjoints[i] += w * curve.segment(x[0]).slope(x[0]);
                 }
             }
         }

@@ -87,12 +87,12 @@ impl Scope {
         Ok(())
     }
 
-    /// Declares a function that is given by a table: linear between its points, constant beyond the first and the last.
+    /// Declares a function that is given by a table: constant beyond the first and the last point.
     /// Expressions defined afterwards call it as `name(x)`.
     ///
     /// ```
     /// # use lacuna_base as lacuna;
-    /// use lacuna::data::{Function, Unit};
+    /// use lacuna::data::{Function, Interpolation, Unit};
     /// use lacuna::expression::Scope;
     ///
     /// let unit = |text: &str| Unit::parse(text).expect("a unit");
@@ -102,6 +102,7 @@ impl Scope {
     ///     at_unit: unit("s"),
     ///     values: vec![0.0, 4.0, 2.0],
     ///     unit: unit("N"),
+    ///     interpolation: Interpolation::Linear,
     /// };
     /// let mut scope = Scope::new();
     /// scope.unknown("t")?;

@@ -123,7 +123,7 @@ impl<'a, const L: usize> Step<'a, L> {
                 for (i, (out, x)) in out.iter_mut().zip(self.get(*a)).enumerate() {
                     let tangent = self.tangent(*a, i);
                     if tangent != [0.0; L] {
-                        *out = times(curve.segment(x[0]).slope, tangent);
+                        *out = times(curve.segment(x[0]).slope(x[0]), tangent);
                     }
                 }
             }

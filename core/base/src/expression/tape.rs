@@ -5,8 +5,9 @@
 //! which it depends has changed. Values and derivatives are those of [`forward`](super::forward) and
 //! [`tangent`](super::tangent), bit by bit.
 
+use super::curve::Segment;
 use super::operator::{Binary, Lanes, Unary, select};
-use super::program::{Action, Place, Program, Segment};
+use super::program::{Action, Place, Program};
 
 /// A program without vectors, and its state at a point.
 #[derive(Debug)]
@@ -150,7 +151,7 @@ impl Tape {
                 Scalar::Binary(operation) => operation.slopes_at(a, b, value),
                 // The argument that was chosen.
                 Scalar::Select => [f64::from(u8::from(a != 0.0)), 0.0],
-                Scalar::Interpolate(_, place) => [self.segments[place].slope, 0.0],
+                Scalar::Interpolate(_, place) => [self.segments[place].slope(a), 0.0],
             };
         }
         self.stale = 0;

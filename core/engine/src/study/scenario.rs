@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use lacuna::data::{Condition, Function, Scenario, Unit};
+use lacuna::data::{Condition, Function, Interpolation, Scenario, Unit};
 use lacuna::text::response::Axes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -44,6 +44,10 @@ pub struct FunctionSection {
     pub at: String,
     /// Name of the column of the function's values.
     pub value: String,
+    /// The function between two rows: `"linear"`, `"hold"` (the value of the row before, as of a digital output) or
+    /// `"spline"` (smooth, for samples of a continuous signal).
+    #[serde(default, skip_serializing_if = "Interpolation::is_linear")]
+    pub interpolation: Interpolation,
 }
 
 impl ScenarioSection {
@@ -103,8 +107,14 @@ impl FunctionSection {
         };
         let (at, at_unit) = column(&self.at)?;
         let (value, unit) = column(&self.value)?;
-        let mut function =
-            Function { name: name.to_owned(), at: Vec::new(), at_unit, values: Vec::new(), unit };
+        let mut function = Function {
+            name: name.to_owned(),
+            at: Vec::new(),
+            at_unit,
+            values: Vec::new(),
+            unit,
+            interpolation: self.interpolation,
+        };
         for record in table.records() {
             let record = record.map_err(|error| wrong(error.to_string()))?;
             let line = record.position().map_or(0, csv::Position::line);

@@ -31,9 +31,12 @@ impl<'r, 'f> Jumps<'r, 'f> {
         // Without sensitivities no correction is needed: the step size control resolves the jump.
         let breaks = flow.system.breaks.iter().enumerate().filter(|_| flow.channels() > 0);
         for (index, broken) in breaks.filter(|(_, b)| b.jumps && depends_on_states(b, flow)) {
-            let (mut quantity, value) = (Quantity::new(&broken.quantity), broken.at[0]);
-            let above = quantity.value(&flow.point(start.time, &start.states)) > value;
-            by_states.push(Watched { index, quantity, value, above });
+            let mut quantity = Quantity::new(&broken.quantity);
+            let now = quantity.value(&flow.point(start.time, &start.states));
+            by_states.extend(broken.at.iter().map(|&value| {
+                let quantity = Quantity::new(&broken.quantity);
+                Watched { index, quantity, value, above: now > value }
+            }));
         }
         Self { flow, by_states, before: (start.time, start.states.clone()) }
     }

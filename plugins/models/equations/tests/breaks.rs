@@ -128,3 +128,81 @@ fn a_square_wave() {
     let slopes: Vec<f64> = times.iter().map(slope).collect();
     close(&case.jacobian(&[period]).column(0), &slopes, 1e-6, "the slopes");
 }
+
+/// `y' = -c y + u(t)` with a held input: between two nodes `y = u/c + (y0 - u/c) exp(-c t)`.
+#[test]
+fn a_held_input_jumps_at_its_nodes() {
+    let options = r#"
+        state = { y = "y0" }
+        rate = { y = "force(t) - c * y" }
+        observe = "y"
+    "#;
+    let at: Vec<f64> = (0..200).map(|i| 0.05 * f64::from(i)).collect();
+    let force: Vec<f64> = (0..200).map(|i| f64::from(i * 37 % 11) - 5.0).collect();
+    let times: Vec<f64> = (0..77).map(|i| 0.13 * f64::from(i)).collect();
+    let case = case(options, &["c", "y0"], &[], &times);
+    let case = case.with_curve("force", at.clone(), force.clone(), Interpolation::Hold);
+    let form = |p: &[f64]| -> Vec<f64> {
+        let [c, mut y] = [p[0], p[1]];
+        let mut starts = vec![y];
+        for (i, u) in force.iter().enumerate().take(force.len() - 1) {
+            let decay = (-c * (at[i + 1] - at[i])).exp();
+            y = u / c + (y - u / c) * decay;
+            starts.push(y);
+        }
+        let value = |t: &f64| {
+            let i = at.partition_point(|node| node <= t) - 1;
+            force[i] / c + (starts[i] - force[i] / c) * (-c * (t - at[i])).exp()
+        };
+        times.iter().map(value).collect()
+    };
+    case.is(&[1.7, 0.2], form, 1e-7, 1e-5);
+}
+
+/// A smooth input through samples of a sine: `y' = cos(t)` integrates to `sin(t)`, within the error of the spline,
+/// `5/384 h^4` times the fourth derivative (Hall and Meyer, Journal of Approximation Theory 16 (1976) 105), integrated.
+#[test]
+fn a_smooth_input_needs_no_stops() {
+    let options = r#"
+        state = { y = 0.0 }
+        rate = { y = "gain * force(t)" }
+        observe = "y"
+    "#;
+    let step = 0.05;
+    let at: Vec<f64> = (0..=200).map(|i| step * f64::from(i)).collect();
+    let force: Vec<f64> = at.iter().map(|t| t.cos()).collect();
+    let times: Vec<f64> = (0..50).map(|i| 0.2 * f64::from(i)).collect();
+    let case = case(options, &["gain"], &[], &times);
+    let case = case.with_curve("force", at, force, Interpolation::Spline);
+    let form = |p: &[f64]| times.iter().map(|t| p[0] * t.sin()).collect::<Vec<f64>>();
+    // Near the ends the condition there adds to the error of the middle.
+    let error = 10.0 * 10.0 * 5.0 / 384.0 * step.powi(4);
+    case.is(&[1.5], form, error, error);
+    let answer = case.model.predict(&case.call(&[1.5])).unwrap();
+    let steps = answer.facts.iter().find(|fact| fact.name == "steps").unwrap();
+    let steps: usize = steps.value.parse().unwrap();
+    assert!(steps < 100, "{steps} steps");
+}
+
+/// `x' = speed`, `y' = table(x)`: the table is held, and `x` passes its nodes at `t = node / speed`, so that
+/// `y = (sum of value times width) / speed`.
+#[test]
+fn a_held_table_of_a_state_moves_its_jumps() {
+    let options = r#"
+        state = { x = 0.0, y = 0.0 }
+        rate = { x = "speed", y = "force(x)" }
+        observe = "y"
+    "#;
+    let (at, force) = ([0.0, 1.0, 2.5, 3.5, 9.0], [1.0, -2.0, 4.0, 0.5, 0.0]);
+    let times = times(4.0, 9);
+    let case = case(options, &["speed"], &[], &times);
+    let case = case.with_curve("force", at.to_vec(), force.to_vec(), Interpolation::Hold);
+    let form = |p: &[f64]| {
+        let until = |x: f64| -> f64 {
+            let pieces = at.windows(2).zip(force);
+            pieces.map(|(ends, value)| value * (x.min(ends[1]) - ends[0]).max(0.0)).sum()
+        };
+        times.iter().map(|t| until(p[0] * t) / p[0]).collect()
+    };
+    case.is(&[1.3], form, 1e-6, 1e-5);
+}

@@ -8,7 +8,7 @@ mod stiff;
 
 use std::sync::Arc;
 
-use lacuna::data::{Axis, Function, Layout, Scenario, Unit};
+use lacuna::data::{Axis, Function, Interpolation, Layout, Scenario, Unit};
 use lacuna::plugin::Model;
 use lacuna::plugin::model::{Call, EvalError};
 use lacuna::plugin::registry::from_text;
@@ -43,9 +43,20 @@ fn case(options: &str, inputs: &[&str], labels: &[&str], times: &[f64]) -> Case 
 
 impl Case {
     /// Returns the case with a table over time.
-    fn with_table(mut self, name: &str, at: Vec<f64>, values: Vec<f64>) -> Self {
+    fn with_table(self, name: &str, at: Vec<f64>, values: Vec<f64>) -> Self {
+        self.with_curve(name, at, values, Interpolation::Linear)
+    }
+
+    /// Returns the case with a table over time and this interpolation between its points.
+    fn with_curve(
+        mut self,
+        name: &str,
+        at: Vec<f64>,
+        values: Vec<f64>,
+        interpolation: Interpolation,
+    ) -> Self {
         let (at_unit, unit) = (unit("s"), unit("N"));
-        let function = Function { name: name.into(), at, at_unit, values, unit };
+        let function = Function { name: name.into(), at, at_unit, values, unit, interpolation };
         self.scenario.functions.push(Arc::new(function));
         self
     }

@@ -5,9 +5,11 @@ use std::sync::Arc;
 
 use super::value::{Argument, Kind, Value, fit};
 use super::{Compiler, Fault};
+use crate::data::Interpolation;
+use crate::expression::curve::Curve;
 use crate::expression::function::{Action as Does, Function, Reduction};
 use crate::expression::operator::Binary;
-use crate::expression::program::{Action, Curve};
+use crate::expression::program::Action;
 
 impl Compiler {
     pub(super) fn call(
@@ -124,9 +126,9 @@ impl Compiler {
                     .expected("a vector of data")
             })
         };
-        let curve = Curve { nodes: table(nodes)?, values: table(values)? };
-        if curve.nodes.len() != curve.values.len() {
-            let (nodes, found) = (curve.nodes.len(), curve.values.len());
+        let (at_nodes, heights) = (table(nodes)?, table(values)?);
+        if at_nodes.len() != heights.len() {
+            let (nodes, found) = (at_nodes.len(), heights.len());
             return Err(Fault::new(
                 values.span.clone(),
                 "the table has another length than its nodes",
@@ -134,12 +136,13 @@ impl Compiler {
             .expected(format!("{nodes} values"))
             .found(format!("{found}")));
         }
-        let falling = curve.nodes.windows(2).find(|pair| pair[0] >= pair[1]);
+        let falling = at_nodes.windows(2).find(|pair| pair[0] >= pair[1]);
         if let Some(&[before, after]) = falling {
             return Err(Fault::new(nodes.span.clone(), "the nodes do not ascend")
                 .expected("each node above the one before")
                 .found(format!("{after} after {before}")));
         }
+        let curve = Curve::new(at_nodes, heights, Interpolation::Linear);
         self.tables.curves.push(Arc::new(curve));
         let action = Action::Interpolate(self.tables.curves.len() - 1, at.place);
         Ok(Value { place: self.emit(action, at.place.length), ..at })
@@ -152,7 +155,8 @@ impl Compiler {
             *curve
         } else {
             let function = &self.functions[name];
-            let curve = Curve { nodes: function.at.clone(), values: function.values.clone() };
+            let (nodes, values) = (function.at.clone(), function.values.clone());
+            let curve = Curve::new(nodes, values, function.interpolation);
             self.tables.curves.push(Arc::new(curve));
             self.curves.insert(name.to_owned(), self.tables.curves.len() - 1);
             self.tables.curves.len() - 1

@@ -4,14 +4,21 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::*;
-use crate::data::{Function, Unit};
+use crate::data::{Function, Interpolation, Unit};
 use crate::expression::Evaluator;
 
 fn force(at: &[f64], values: &[f64]) -> Arc<Function> {
     let unit = |text: &str| Unit::parse(text).unwrap();
     let (at, values) = (at.to_vec(), values.to_vec());
     let (at_unit, unit) = (unit("s"), unit("N"));
-    Arc::new(Function { name: "force".into(), at, at_unit, values, unit })
+    Arc::new(Function {
+        name: "force".into(),
+        at,
+        at_unit,
+        values,
+        unit,
+        interpolation: Interpolation::Linear,
+    })
 }
 
 /// The unknowns `t`, `m`, `k` and the table `force`: 0 N at 1 s, 4 N at 2 s, 2 N at 4 s.
@@ -154,4 +161,79 @@ fn breaks_are_where_values_kink_or_jump() {
     assert_eq!(found, expected);
     let delayed = &program.breaks()[4].quantity;
     assert_eq!((delayed.instructions(), delayed.depends_on(1)), (1, false));
+}
+
+/// Source of the spline: `scipy.interpolate.CubicSpline(x, y, bc_type="not-a-knot")` of `SciPy` 1.17.1, values and first
+/// derivatives printed to 12 decimals.
+#[test]
+fn a_table_may_be_held_or_smooth() {
+    let nodes = [0.0, 1.0, 2.5, 3.0, 4.5, 6.0];
+    let values = [1.0, -1.0, 2.0, 2.5, 0.0, 0.5];
+    let program = |interpolation: Interpolation, count: usize| {
+        let function = (*force(&nodes[..count], &values[..count])).clone();
+        let mut scope = scope(&["t"]);
+        scope.function(Arc::new(Function { interpolation, ..function })).unwrap();
+        scope.define("f", "force(t)").unwrap();
+        scope.compile(&["f"]).unwrap()
+    };
+    let held = program(Interpolation::Hold, 6);
+    for (t, expected) in
+        [(-1.0, 1.0), (0.0, 1.0), (0.999, 1.0), (1.0, -1.0), (2.6, 2.0), (9.0, 0.5)]
+    {
+        assert_eq!(held.gradient(&[t]), (expected, vec![0.0]), "{t}");
+    }
+    let breaks = held.breaks();
+    assert!(breaks[0].jumps && breaks[0].at == nodes[1..]);
+    let splines: [(usize, &[[f64; 3]]); 4] = [
+        (
+            2,
+            &[
+                [0.2, 0.6, -2.0],
+                [0.375, 0.25, -2.0],
+                [0.55, -0.1, -2.0],
+                [0.725, -0.45, -2.0],
+                [0.9, -0.8, -2.0],
+            ],
+        ),
+        (
+            3,
+            &[
+                [0.2, 0.344, -2.96],
+                [0.75, -0.8, -1.2],
+                [1.3, -0.976, 0.56],
+                [1.85, -0.184, 2.32],
+                [2.4, 1.576, 4.08],
+            ],
+        ),
+        (
+            4,
+            &[
+                [0.2, 0.0864, -3.814],
+                [0.875, -1.049_414_062_5, 0.129_687_5],
+                [1.55, -0.169_087_5, 2.159_75],
+                [2.225, 1.435_682_812_5, 2.276_187_5],
+                [2.9, 2.4732, 0.479],
+            ],
+        ),
+        (
+            6,
+            &[
+                [0.2, 0.084_56, -3.8201],
+                [1.15, -0.859_823_125, 1.195_662_5],
+                [2.1, 1.147_42, 2.393_85],
+                [3.05, 2.499_708_032_407, -0.107_643_055_556],
+                [4.0, 1.114_259_259_259, -2.254_722_222_222],
+                [4.95, -0.730_963_125, -1.075_587_5],
+                [5.9, 0.123_944_074_074, 3.429_761_111_111],
+            ],
+        ),
+    ];
+    for (count, table) in splines {
+        let smooth = program(Interpolation::Spline, count);
+        assert_eq!(smooth.breaks()[0].at, [nodes[0], nodes[count - 1]]);
+        for &[t, value, slope] in table {
+            let (found, gradient) = smooth.gradient(&[t]);
+            assert!((found - value).abs() < 1e-12 && (gradient[0] - slope).abs() < 1e-12, "{t}");
+        }
+    }
 }
