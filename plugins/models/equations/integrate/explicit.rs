@@ -133,8 +133,10 @@ impl<'r, 'f> Explicit<'r, 'f> {
     fn stages(&mut self, length: f64) {
         for stage in 1..STAGES {
             let (done, rest) = self.rates.split_at_mut(stage);
-            let shares = SHARES[stage].map(|share| length * share);
-            sum(&self.now, &shares[..stage], done, &mut self.trial);
+            self.trial.copy_from_slice(&self.now);
+            for (share, rates) in SHARES[stage].iter().zip(&*done) {
+                add(length * share, rates, &mut self.trial);
+            }
             self.flow.all(self.time + PLACES[stage] * length, &self.trial, &mut rest[0]);
         }
     }
@@ -144,7 +146,9 @@ impl<'r, 'f> Explicit<'r, 'f> {
     fn error(&mut self, length: f64) -> f64 {
         let count = self.count();
         self.scratch.fill(0.0);
-        sum_onto(ERRORS.map(|share| length * share), &self.rates, &mut self.scratch);
+        for (share, rates) in ERRORS.iter().zip(&self.rates) {
+            add(length * share, rates, &mut self.scratch);
+        }
         let mut largest = 0.0_f64;
         for first in (0..self.now.len()).step_by(count) {
             let size = if first == 0 { 1.0 } else { self.sizes[first / count - 1] };
@@ -171,29 +175,9 @@ impl<'r, 'f> Explicit<'r, 'f> {
     }
 }
 
-/// Writes `start + sum_k factors[k] rates[k]`, element by element and in this order.
-fn sum(start: &[f64], factors: &[f64], rates: &[Vec<f64>], out: &mut [f64]) {
-    out.copy_from_slice(start);
-    // Up to four terms at a time, so that a sum stays in its register.
-    for (factors, rates) in factors.chunks(4).zip(rates.chunks(4)) {
-        match (factors, rates) {
-            (&[a, b, c, d], [i, j, k, l]) => sum_onto([a, b, c, d], &[i, j, k, l], out),
-            (&[a, b, c], [i, j, k]) => sum_onto([a, b, c], &[i, j, k], out),
-            (&[a, b], [i, j]) => sum_onto([a, b], &[i, j], out),
-            (&[a], [i]) => sum_onto([a], &[i], out),
-            _ => unreachable!("a chunk has one to four terms"),
-        }
-    }
-}
-
-/// Adds `sum_k factors[k] rates[k]`, element by element and in this order.
-fn sum_onto<const N: usize>(factors: [f64; N], rates: &[impl AsRef<[f64]>; N], out: &mut [f64]) {
-    let count = out.len();
-    let rates: [&[f64]; N] = std::array::from_fn(|k| &rates[k].as_ref()[..count]);
-    for (i, out) in out.iter_mut().enumerate() {
-        *out =
-            factors.iter().zip(&rates).fold(*out, |sum, (factor, rates)| sum + factor * rates[i]);
-    }
+/// Adds `factor * numbers` to `to`, element by element.
+fn add(factor: f64, numbers: &[f64], to: &mut [f64]) {
+    to.iter_mut().zip(numbers).for_each(|(to, number)| *to += factor * number);
 }
 
 /// Returns the ratio of the next step to the last for this error, in units of the tolerance.
@@ -279,7 +263,9 @@ impl Stepper for Explicit<'_, '_> {
             |[a, b, c, d]: [f64; 4]| length * place * (a + place * (b + place * (c + place * d)));
         let shares = BETWEEN.map(share);
         self.scratch.copy_from_slice(&self.before);
-        sum_onto(shares, &self.rates, &mut self.scratch);
+        for (share, rates) in shares.iter().zip(&self.rates) {
+            add(*share, rates, &mut self.scratch);
+        }
         values.zip(&self.scratch).for_each(|(value, found)| *value = *found);
         Ok(())
     }
