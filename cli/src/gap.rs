@@ -1,4 +1,4 @@
-//! Commands `gap` and `power`: where data and model disagree, which physics is missing, and the study that includes it.
+//! Commands `gap`, `power` and `next`: where data and model disagree, which physics is missing, and the study that includes it.
 
 use std::io::{BufRead as _, IsTerminal as _, Write as _};
 use std::path::Path;
@@ -9,7 +9,7 @@ use lacuna_engine::gap::power::PowerDesign;
 use lacuna_engine::gap::result::{AddedEffect, GapResult};
 use lacuna_engine::pipeline;
 use lacuna_engine::report::findings::{Findings, GapFindings};
-use lacuna_engine::report::{gap_text, power_text};
+use lacuna_engine::report::{gap_text, next_text, power_text};
 use lacuna_run::RunDirectory;
 
 use crate::progress::Terminal;
@@ -88,6 +88,18 @@ pub fn power(
     let rates = pipeline::power(&study, &design, simulations, &mut run, &Terminal::new())?;
     print("");
     print(power_text(&rates).trim_end());
+    Ok(())
+}
+
+/// Runs `lacuna next STUDY`.
+pub fn next(path: &Path, settings: &Settings, out: Option<&Path>) -> anyhow::Result<()> {
+    let study = load(path, settings)?;
+    let mut run = RunDirectory::open(&folder(&study, out))?;
+    let findings = pipeline::find_gap(&study, &mut run, &Terminal::new())?;
+    found(&findings)?;
+    let stop = || Stop::new("the information of further measurements has no finite value");
+    print("");
+    print(next_text(&findings).ok_or_else(stop)?.trim_end());
     Ok(())
 }
 

@@ -85,6 +85,17 @@ enum Verb {
         #[arg(long)]
         quick: bool,
     },
+    /// Rank further measurements by the bits they are expected to give on the name of what is missing and on the
+    /// parameters
+    Next {
+        /// Study file
+        study: PathBuf,
+        #[command(flatten)]
+        settings: study::Settings,
+        /// Run directory (default: `runs/<study name>`)
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
     /// Count how often a study's intervals contain the truth, by calibrating data generated at truths from the prior
     Coverage {
         /// Study file
@@ -198,6 +209,7 @@ fn main() -> ExitCode {
         Verb::Power { study, settings, out, quick } => {
             gap::power(&study, &settings, out.as_deref(), quick)
         }
+        Verb::Next { study, settings, out } => gap::next(&study, &settings, out.as_deref()),
         Verb::Coverage { study, settings, out, manner } => {
             coverage::coverage(&study, &settings, out.as_deref(), &manner)
         }

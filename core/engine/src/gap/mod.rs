@@ -12,6 +12,7 @@
 //! | [`mod@test`] | three tests of the residual, with null distributions by parametric bootstrap; regions of disagreement |
 //! | [`search`] | forward selection by Bayes factors; cross-validation and discrimination; the verdict |
 //! | [`unlisted`] | describes what no candidate explains: regions in words, a symbolic form, a smoother |
+//! | [`next`] | the bits that further measurements are expected to give on the name and on the parameters |
 //! | [`drift`] | recalibrates the parameters by condition and window: is the model wrong, or a sensor? |
 //! | [`prove`] | measures on held-out data whether the gap shrank |
 //! | [`result`] | all of this as plain data |
@@ -46,6 +47,7 @@
 //! | [`NameProof`](result::names::NameProof) | comparison with a nonparametric alternative on left-out groups | Bürkner, Gabry and Vehtari 2021 |
 //! | averages over a class | Bayesian model averaging | Hoeting et al., Statistical Science 14 (1999) 382 |
 //! | [`discriminate`](search::discriminate) | design of experiments for model discrimination | |
+//! | [`next`](next::next) | expected information gain: Bayesian design of experiments | Lindley, Annals of Mathematical Statistics 27 (1956) 986; Box and Hill, Technometrics 9 (1967) 57 |
 //! | [`drift`](mod@drift) | parameters that vary between conditions as a sign of a wrong model; tests of equality in seemingly unrelated regressions | Zellner, Journal of the American Statistical Association 57 (1962) 348 |
 //! | [`Symbolic`](unlisted::Symbolic) | sparse regression over a dictionary with group sparsity | de Silva et al., Frontiers in Artificial Intelligence 3 (2020) 25 |
 //! | [`Smoother`](unlisted::Smoother) | Gaussian process orthogonal to the sensitivities | Plumlee, Journal of the American Statistical Association 112 (2017) 1274 |
@@ -58,6 +60,7 @@ pub mod drift;
 pub mod edit;
 pub mod experiment;
 pub mod inside;
+pub mod next;
 pub mod noise;
 pub mod power;
 pub mod prove;

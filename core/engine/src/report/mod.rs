@@ -17,7 +17,7 @@ pub use crate::page::table::Table;
 pub use coverage::{coverage_page, coverage_text};
 pub use page::render;
 pub use summary::{ByName, Key, Quantity, SCHEMA, Summary, keys, schema, schema_of, summary};
-pub use terminal::{gap_text, summary_text};
+pub use terminal::{gap_text, next_text, summary_text};
 
 #[cfg(test)]
 mod tests;

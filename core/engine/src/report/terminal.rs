@@ -39,3 +39,9 @@ pub fn summary_text(findings: &Findings) -> String {
 pub fn gap_text(findings: &Findings) -> String {
     findings.gap.as_ref().map_or_else(String::new, |gap| report::text(&view(findings), gap))
 }
+
+/// Information that further measurements are expected to give, as a table; `None` if it could not be computed.
+pub fn next_text(findings: &Findings) -> Option<String> {
+    let next = findings.gap.as_ref()?.result.insight.next.as_ref()?;
+    Some(report::next::text(next))
+}

@@ -2,6 +2,7 @@
 
 mod figures;
 mod insight;
+pub mod next;
 pub mod power;
 mod proof;
 pub mod reliability;

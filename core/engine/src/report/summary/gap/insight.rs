@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::gap::drift::{DriftLevel, DriftMap};
+use crate::gap::next::NextData;
 use crate::gap::result::insight::Insight as Found;
 use crate::gap::search::{CrossValidation, Discrimination};
 use crate::report::summary::value::{ByName, Quantity};
@@ -21,6 +22,9 @@ pub struct Insight {
     /// Further measurements that would discriminate between the members of a class.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub separations: Option<Discrimination>,
+    /// Bits that further replicates are expected to give on the name and on the parameters (`lacuna next STUDY`).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub next: Option<NextData>,
     /// Places in words at which an unlisted effect acts.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub places: Vec<String>,
@@ -73,6 +77,7 @@ impl Insight {
             against: found.against.clone(),
             drift: found.drift.as_ref().map(Drift::of),
             separations: found.discrimination.clone(),
+            next: found.next.clone(),
             places: found.places.iter().map(|place| place.words.clone()).collect(),
             symbolic: found.symbolic.as_ref().map(|symbolic| Symbolic {
                 form: symbolic.form.clone(),
