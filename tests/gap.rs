@@ -20,6 +20,7 @@ mod further_runs;
 mod inside;
 mod models;
 mod names;
+mod next;
 mod places;
 mod power;
 mod proofs;

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use lacuna::run::Stop;
 use lacuna_engine::augment::{Begun, add};
+use lacuna_engine::gap::next::Wanted;
 use lacuna_engine::gap::power::PowerDesign;
 use lacuna_engine::gap::result::{AddedEffect, GapResult};
 use lacuna_engine::pipeline;
@@ -91,15 +92,42 @@ pub fn power(
     Ok(())
 }
 
+/// What the next data should tell.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+pub enum By {
+    /// The name of what is missing
+    Name,
+    /// The parameters of the model
+    Parameters,
+    /// The quantity of `[gap.quantity]`
+    Quantity,
+}
+
+impl By {
+    fn wanted(self) -> Wanted {
+        match self {
+            Self::Name => Wanted::Name,
+            Self::Parameters => Wanted::Parameters,
+            Self::Quantity => Wanted::Quantity,
+        }
+    }
+}
+
 /// Runs `lacuna next STUDY`.
-pub fn next(path: &Path, settings: &Settings, out: Option<&Path>) -> anyhow::Result<()> {
+pub fn next(
+    path: &Path,
+    settings: &Settings,
+    out: Option<&Path>,
+    by: Option<By>,
+) -> anyhow::Result<()> {
     let study = load(path, settings)?;
     let mut run = RunDirectory::open(&folder(&study, out))?;
     let findings = pipeline::find_gap(&study, &mut run, &Terminal::new())?;
     found(&findings)?;
-    let stop = || Stop::new("the information of further measurements has no finite value");
+    let stop = || Stop::new("the information of further data has no finite value");
+    let text = next_text(&findings, by.map(By::wanted)).ok_or_else(stop)??;
     print("");
-    print(next_text(&findings).ok_or_else(stop)?.trim_end());
+    print(text.trim_end());
     Ok(())
 }
 

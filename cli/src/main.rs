@@ -85,8 +85,8 @@ enum Verb {
         #[arg(long)]
         quick: bool,
     },
-    /// Rank further measurements by the bits they are expected to give on the name of what is missing and on the
-    /// parameters
+    /// Rank further measurements and runs by the bits per cost that they are expected to give on the name of what is
+    /// missing, on the parameters, or on a quantity
     Next {
         /// Study file
         study: PathBuf,
@@ -95,6 +95,9 @@ enum Verb {
         /// Run directory (default: `runs/<study name>`)
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
+        /// What to rank by (default: the name if there is a choice, or else the quantity, or else the parameters)
+        #[arg(long, value_enum)]
+        by: Option<gap::By>,
     },
     /// Count how often a study's intervals contain the truth, by calibrating data generated at truths from the prior
     Coverage {
@@ -209,7 +212,7 @@ fn main() -> ExitCode {
         Verb::Power { study, settings, out, quick } => {
             gap::power(&study, &settings, out.as_deref(), quick)
         }
-        Verb::Next { study, settings, out } => gap::next(&study, &settings, out.as_deref()),
+        Verb::Next { study, settings, out, by } => gap::next(&study, &settings, out.as_deref(), by),
         Verb::Coverage { study, settings, out, manner } => {
             coverage::coverage(&study, &settings, out.as_deref(), &manner)
         }

@@ -22,11 +22,11 @@ const COURANT: f64 = 0.8;
 const GAUGES: [f64; 6] = [0.15, 0.35, 0.5, 0.7, 0.875, 1.0];
 
 /// Places between gauges at which something may be, as shares of the length.
-const BETWEEN: [f64; 4] = [0.25, 0.425, 0.6, 0.79];
+pub const BETWEEN: [f64; 8] = [0.1, 0.22, 0.3, 0.43, 0.55, 0.64, 0.78, 0.94];
 
 /// The inputs: names, the values without which the companion has no answer, and what they are. The first four are those of
 /// the pipe.
-pub const INPUTS: [(&str, f64, &str); 23] = [
+pub const INPUTS: [(&str, f64, &str); 35] = [
     ("wave_speed", f64::NAN, "speed of waves, m/s"),
     ("friction", f64::NAN, "friction factor of Darcy and Weisbach"),
     ("velocity", f64::NAN, "initial velocity, m/s"),
@@ -38,18 +38,30 @@ pub const INPUTS: [(&str, f64, &str); 23] = [
     ("creep", 0.0, "creeping share of the compliance of the wall, over 0.5 s"),
     ("friction_power", 0.0, "two less the power of the flow in the friction"),
     ("valve_leak", 0.0, "opening that the closed valve keeps"),
-    ("leak_1", 0.0, "area of a leak at 0.25 of the length, as a share of the pipe's"),
-    ("leak_2", 0.0, "area of a leak at 0.425 of the length, as a share of the pipe's"),
-    ("leak_3", 0.0, "area of a leak at 0.6 of the length, as a share of the pipe's"),
-    ("leak_4", 0.0, "area of a leak at 0.79 of the length, as a share of the pipe's"),
-    ("throttle_1", 0.0, "loss at 0.25 of the length, in velocity heads"),
-    ("throttle_2", 0.0, "loss at 0.425 of the length, in velocity heads"),
-    ("throttle_3", 0.0, "loss at 0.6 of the length, in velocity heads"),
-    ("throttle_4", 0.0, "loss at 0.79 of the length, in velocity heads"),
-    ("air_1", 0.0, "air at 0.25 of the length, m3"),
-    ("air_2", 0.0, "air at 0.425 of the length, m3"),
-    ("air_3", 0.0, "air at 0.6 of the length, m3"),
-    ("air_4", 0.0, "air at 0.79 of the length, m3"),
+    ("leak_1", 0.0, "area of a leak at 0.1 of the length, as a share of the pipe's"),
+    ("leak_2", 0.0, "area of a leak at 0.22 of the length, as a share of the pipe's"),
+    ("leak_3", 0.0, "area of a leak at 0.3 of the length, as a share of the pipe's"),
+    ("leak_4", 0.0, "area of a leak at 0.43 of the length, as a share of the pipe's"),
+    ("leak_5", 0.0, "area of a leak at 0.55 of the length, as a share of the pipe's"),
+    ("leak_6", 0.0, "area of a leak at 0.64 of the length, as a share of the pipe's"),
+    ("leak_7", 0.0, "area of a leak at 0.78 of the length, as a share of the pipe's"),
+    ("leak_8", 0.0, "area of a leak at 0.94 of the length, as a share of the pipe's"),
+    ("throttle_1", 0.0, "loss at 0.1 of the length, in velocity heads"),
+    ("throttle_2", 0.0, "loss at 0.22 of the length, in velocity heads"),
+    ("throttle_3", 0.0, "loss at 0.3 of the length, in velocity heads"),
+    ("throttle_4", 0.0, "loss at 0.43 of the length, in velocity heads"),
+    ("throttle_5", 0.0, "loss at 0.55 of the length, in velocity heads"),
+    ("throttle_6", 0.0, "loss at 0.64 of the length, in velocity heads"),
+    ("throttle_7", 0.0, "loss at 0.78 of the length, in velocity heads"),
+    ("throttle_8", 0.0, "loss at 0.94 of the length, in velocity heads"),
+    ("air_1", 0.0, "air at 0.1 of the length, m3"),
+    ("air_2", 0.0, "air at 0.22 of the length, m3"),
+    ("air_3", 0.0, "air at 0.3 of the length, m3"),
+    ("air_4", 0.0, "air at 0.43 of the length, m3"),
+    ("air_5", 0.0, "air at 0.55 of the length, m3"),
+    ("air_6", 0.0, "air at 0.64 of the length, m3"),
+    ("air_7", 0.0, "air at 0.78 of the length, m3"),
+    ("air_8", 0.0, "air at 0.94 of the length, m3"),
 ];
 
 /// The samples of all gauges in turn, m, for the values of [`INPUTS`]; the first condition closes the valve, the second

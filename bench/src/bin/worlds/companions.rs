@@ -122,25 +122,30 @@ impl Accompanied for Pipe {
             ("creep", 0.1),
             ("friction_power", 0.5),
             ("valve_leak", 0.02),
-            ("leak_1", 1e-3),
-            ("leak_2", 1e-3),
-            ("leak_3", 1e-3),
-            ("leak_4", 1e-3),
-            ("throttle_1", 50.0),
-            ("throttle_2", 50.0),
-            ("throttle_3", 50.0),
-            ("throttle_4", 50.0),
-            ("air_1", 0.01),
-            ("air_2", 0.01),
-            ("air_3", 0.01),
-            ("air_4", 0.01),
         ];
-        section("companion_pipe", &constants, &switches)
+        let along = [("leak", 1e-3), ("throttle", 50.0), ("air", 0.01)];
+        section("companion_pipe", &constants, &switches) + &lines(&along, &companion_pipe::BETWEEN)
     }
 
     fn degree(&self) -> usize {
         8
     }
+}
+
+/// Inputs that are the same physics at several places, with the widths of their priors.
+fn lines(physics: &[(&str, f64)], places: &[f64]) -> String {
+    let mut text = String::new();
+    for (name, width) in physics {
+        for (k, at) in places.iter().enumerate() {
+            let _ = write!(
+                text,
+                "\n[[gap.companion.switch]]\ninput = \"{name}_{}\"\nprior = {{ half_normal = {width:?} }}\n\
+                 place = {{ of = \"{name}\", at = {at:?} }}\n",
+                k + 1
+            );
+        }
+    }
+    text
 }
 
 /// `[gap.companion]` with constants and their priors, and inputs with the widths of theirs.

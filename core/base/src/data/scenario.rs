@@ -17,6 +17,9 @@ pub struct Scenario {
     /// Named functions of one variable, such as a measured force over time.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub functions: Vec<Arc<Function>>,
+    /// True if nothing was measured under these conditions.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub unmeasured: bool,
 }
 
 /// A known constant.

@@ -170,30 +170,40 @@ impl Unit {
         Some(Self { text, meaning })
     }
 
-    /// The shortest form of a coherent unit, such as `m/s2` for `(m/s) (s^-1)`; other units are returned unchanged.
+    /// The shortest form of a coherent unit, such as `m/s2` for `(m/s) (s^-1)` or `1/(V2 s2)`; other units are returned
+    /// unchanged. Units with a current in them may have one electrical symbol.
     #[must_use]
     pub fn plain(self) -> Self {
-        const SYMBOLS: [&str; BASES] = ["m", "kg", "s", "A", "K", "mol", "cd"];
-        let power = |(symbol, sixths): (&&str, i16)| match (sixths / 6, sixths % 6) {
-            (1, 0) => (*symbol).to_owned(),
-            (whole, 0) => format!("{symbol}{whole}"),
-            _ => format!("{symbol}^{}", exponent_text(sixths)),
-        };
-        let factors = |sign: i16| -> Vec<String> {
-            let all = SYMBOLS.iter().zip(self.meaning.sixths.map(|sixths| sign * sixths));
-            // Mass comes first, as in kg/m3.
-            let (mass, rest): (Vec<_>, Vec<_>) =
-                all.filter(|(_, sixths)| *sixths > 0).partition(|(symbol, _)| **symbol == "kg");
-            mass.into_iter().chain(rest).map(power).collect()
-        };
-        let (above, below) = (factors(1), factors(-1));
-        let above = if above.is_empty() { "1".to_owned() } else { above.join(" ") };
-        let text = match &below[..] {
-            [] => above,
-            [one] => format!("{above}/{one}"),
-            several => format!("{above}/({})", several.join(" ")),
-        };
+        let size = |factors: &[(&str, i16)]| factors.iter().map(|(_, n)| n.abs()).sum::<i16>();
+        let best = self.decompositions().into_iter().min_by_key(|factors| size(factors));
+        let text = best.map(|factors| product_text(&factors)).unwrap_or_default();
         Self::parse(&text).ok().filter(|plain| *plain == self).unwrap_or(self)
+    }
+
+    /// The unit as products of powers, in sixths: of base units, then of an electrical unit beside them.
+    fn decompositions(&self) -> Vec<Vec<(&'static str, i16)>> {
+        const SYMBOLS: [&str; BASES] = ["m", "kg", "s", "A", "K", "mol", "cd"];
+        const CURRENT: usize = 3;
+        let bases = |sixths: [i16; BASES]| -> Vec<(&'static str, i16)> {
+            // Mass comes first, as in kg/m3.
+            let order = [1, 0, 2, 3, 4, 5, 6].map(|k: usize| (SYMBOLS[k], sixths[k]));
+            order.into_iter().filter(|(_, n)| *n != 0).collect()
+        };
+        let mut all = vec![bases(self.meaning.sixths)];
+        if self.meaning.sixths[CURRENT] == 0 {
+            return all;
+        }
+        for symbol in ["V", "C", "ohm", "F", "H", "T", "Wb", "S"] {
+            let Ok(unit) = Self::parse(symbol) else { continue };
+            for sixths in (-24..=24).filter(|sixths| *sixths != 0) {
+                let rest = unit.meaning.power(-sixths).map(|inverse| inverse.times(self.meaning));
+                if let Some(rest) = rest {
+                    let factors = [(symbol, sixths)].into_iter().chain(bases(rest.sixths));
+                    all.push(factors.collect());
+                }
+            }
+        }
+        all
     }
 
     /// Factor that converts a number in this unit to the other unit.
@@ -221,6 +231,26 @@ impl Unit {
         let si = |unit: &Self| unit.meaning.factor * 10f64.powi(unit.meaning.decimals);
         self.same_dimension(other)
             .then(|| (x * si(self) + self.meaning.offset - other.meaning.offset) / si(other))
+    }
+}
+
+/// Text of a product of powers, given in sixths: `kg/m3`, `1/(V2 s2)`.
+fn product_text(factors: &[(&str, i16)]) -> String {
+    let power = |(symbol, sixths): (&str, i16)| match (sixths / 6, sixths % 6) {
+        (1, 0) => symbol.to_owned(),
+        (whole, 0) => format!("{symbol}{whole}"),
+        _ => format!("{symbol}^{}", exponent_text(sixths)),
+    };
+    let side = |sign: i16| -> Vec<String> {
+        let all = factors.iter().map(|(symbol, n)| (*symbol, sign * n));
+        all.filter(|(_, n)| *n > 0).map(power).collect()
+    };
+    let (above, below) = (side(1), side(-1));
+    let above = if above.is_empty() { "1".to_owned() } else { above.join(" ") };
+    match &below[..] {
+        [] => above,
+        [one] => format!("{above}/{one}"),
+        several => format!("{above}/({})", several.join(" ")),
     }
 }
 

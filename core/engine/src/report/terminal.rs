@@ -1,9 +1,12 @@
 //! The summary that a terminal shows at the end of a run.
 
+use lacuna::run::Stop;
+
 use super::findings::Findings;
 use super::section::{
     accuracy_table, banner, evidence, group_word, headline, posterior_table, view,
 };
+use crate::gap::next::Wanted;
 use crate::gap::report;
 
 /// Result of a run in plain text: the verdict in the first line, its findings, warnings, main results, posterior,
@@ -40,8 +43,22 @@ pub fn gap_text(findings: &Findings) -> String {
     findings.gap.as_ref().map_or_else(String::new, |gap| report::text(&view(findings), gap))
 }
 
-/// Information that further measurements are expected to give, as a table; `None` if it could not be computed.
-pub fn next_text(findings: &Findings) -> Option<String> {
-    let next = findings.gap.as_ref()?.result.insight.next.as_ref()?;
-    Some(report::next::text(next))
+/// Information that further data are expected to give, as a table ranked by what is wanted, or by the name, if there is a
+/// choice; `None` if it could not be computed.
+pub fn next_text(findings: &Findings, by: Option<Wanted>) -> Option<Result<String, Stop>> {
+    let next = findings.gap.as_ref()?.result.insight.next.clone()?;
+    let by = by.unwrap_or(next.ranked_by);
+    Some(if next.has(by) { Ok(report::next::text(&next.ranked(by))) } else { Err(nothing_on(by)) })
+}
+
+/// Why options cannot be ranked.
+fn nothing_on(wanted: Wanted) -> Stop {
+    match wanted {
+        Wanted::Quantity => {
+            Stop::new("the study states no quantity that the next data should tell")
+                .help("state it: `[gap.quantity]`")
+        }
+        _ => Stop::new("there is no choice of a name that further data could decide")
+            .help("leave `--by name` out: the options are then ranked by the parameters"),
+    }
 }

@@ -213,7 +213,7 @@ fn observations(study: &Study, reader: &dyn Reader) -> Result<Observations, Vec<
         .map(|layout| Measurements::new(layout.clone(), Vec::new()))
         .collect();
     let ranges: Vec<Range<usize>> = study.layouts.ranges().collect();
-    for scenario in &study.scenarios {
+    for scenario in study.scenarios.iter().filter(|scenario| !scenario.unmeasured) {
         let (layout, outputs) = study
             .layouts
             .of_scenario(&scenario.name)

@@ -5,6 +5,7 @@ mod effects;
 mod gap;
 mod inputs;
 mod inside;
+mod next;
 mod noise;
 mod outputs;
 mod runs;

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use lacuna::data::Layout;
+use lacuna::data::{Layout, Scenario};
 use lacuna::plugin::Context;
 use lacuna::plugin::registry::loaded::declaring;
 use lacuna::text::decode::decode;
@@ -249,12 +249,16 @@ fn environment(study: &Study, purpose: Use, root: &Node, problems: &mut Problems
     if purpose != Use::Look {
         sizes::environment(study, root, problems);
     }
+    let measured: Vec<Scenario> =
+        study.scenarios.iter().filter(|scenario| !scenario.unmeasured).cloned().collect();
     context::each_plugin(study, root, problems, |section, component, context, complaints| {
+        let scenarios =
+            if section == "measurements" { measured.as_slice() } else { context.scenarios };
         if purpose != Use::Look
             || !["model", "numerical_error", "low_fidelity", "executor"].contains(&section)
         {
             let starts_programs = purpose != Use::Check;
-            component.environment(&Context { starts_programs, ..*context }, complaints);
+            component.environment(&Context { starts_programs, scenarios, ..*context }, complaints);
         }
     });
 }

@@ -24,10 +24,23 @@ pub struct ScenarioSection {
     /// `{ force = { path = "force.csv", at = "time", value = "force" } }`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub functions: BTreeMap<String, FunctionSection>,
+    /// `false` for conditions under which nothing was measured so far: the response there is only predicted, and
+    /// `lacuna next` weighs measurements there against others.
+    #[serde(default = "yes", skip_serializing_if = "is_yes")]
+    pub measured: bool,
     /// Axes of the response in this scenario, in place of those of the same name in `[response]`: another time grid, or
     /// some of the sensors.
     #[serde(default, skip_serializing_if = "is_empty")]
     pub axes: Axes,
+}
+
+fn yes() -> bool {
+    true
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // Serde passes a reference.
+fn is_yes(measured: &bool) -> bool {
+    *measured
 }
 
 fn is_empty(axes: &Axes) -> bool {
@@ -71,7 +84,12 @@ impl ScenarioSection {
         }
         let whole = functions.len() == self.functions.len();
         let values = self.values.iter().map(condition).collect();
-        whole.then(|| Scenario { name: self.name.clone(), values, functions })
+        whole.then(|| Scenario {
+            name: self.name.clone(),
+            values,
+            functions,
+            unmeasured: !self.measured,
+        })
     }
 }
 

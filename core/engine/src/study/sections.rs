@@ -147,7 +147,7 @@ pub(super) fn layouts(
         axes,
     };
     if scenarios.is_empty() {
-        let grids = Grids { reader, directory, scenario: None };
+        let grids = Grids { reader, directory, scenario: None, measured: true };
         let axes = problems.within("response", |problems| grids.axes(own, node, problems))?;
         let before = problems.len();
         problems.within("response", |problems| {
@@ -168,7 +168,8 @@ pub(super) fn layouts(
                 None => axes.0.push((name.clone(), axis.clone())),
             }
         }
-        let grids = Grids { reader, directory, scenario: Some(&scenario.name) };
+        let name = Some(scenario.name.as_str());
+        let grids = Grids { reader, directory, scenario: name, measured: scenario.measured };
         let overridden =
             |path: &str| scenario.axes.0.iter().any(|(n, _)| path.ends_with(n.as_str()));
         let found = problems.within(&format!("scenario.{}", scenario.name), |problems| {
@@ -192,6 +193,7 @@ struct Grids<'a> {
     reader: Option<&'a dyn Reader>,
     directory: &'a Path,
     scenario: Option<&'a str>,
+    measured: bool,
 }
 
 impl Grids<'_> {
@@ -220,6 +222,10 @@ impl Grids<'_> {
     }
 
     fn measured(&self, name: &str, unit: &Unit) -> Result<Vec<f64>, String> {
+        if !self.measured {
+            let text = "the scenario has no measurements that could give its numbers: state them in its `axes`";
+            return Err(text.to_owned());
+        }
         let reader =
             self.reader.ok_or("the study has no measurements that could give its numbers")?;
         let source =

@@ -62,7 +62,7 @@ impl Case {
             scenario: Scenario {
                 name: "full".to_owned(),
                 values: vec![power],
-                functions: Vec::new(),
+                ..Scenario::default()
             },
         })
     }

@@ -140,6 +140,21 @@ fn products_are_written_plainly() {
 
 /// A rate of 1/s from `v * diameter / sqrt(mass)`, among others.
 #[test]
+fn electrical_units_have_their_symbols() {
+    let unit = |text: &str| Unit::parse(text).unwrap();
+    let rate = unit("V/s2").times(&unit("V").power(-3.0).unwrap()).unwrap();
+    assert_eq!(rate.plain().as_str(), "1/(V2 s2)");
+    assert_eq!(
+        unit("V/s").times(&unit("A").power(-1.0).unwrap()).unwrap().plain().as_str(),
+        "ohm/s"
+    );
+    assert_eq!(unit("A").times(&unit("m")).unwrap().plain().as_str(), "m A");
+    assert_eq!(unit("V").times(&unit("m").power(-1.0).unwrap()).unwrap().plain().as_str(), "V/m");
+    let root = unit("V").power(0.5).unwrap().times(&unit("s").power(-1.0).unwrap()).unwrap();
+    assert_eq!(root.plain().as_str(), "V^(1/2)/s");
+}
+
+#[test]
 fn roots_are_written_in_the_lowest_terms_and_read_again() {
     let unit = |text: &str| Unit::parse(text).unwrap();
     let shape = unit("m/s").times(&unit("m")).unwrap();

@@ -33,6 +33,8 @@ pub struct Experiment<'a> {
     /// The covariance of the emulator's error and of other model errors, as factors `outputs x errors` in the
     /// response's unit: the same error for all replicates.
     pub common: Vec<CommonError>,
+    /// The origins of these errors, one entry a column of their factors; empty if they are not known.
+    pub origins: Vec<ErrorShares>,
     /// The part of that covariance outside the span of its factors (see
     /// [`emulator_error`](super::system::emulator_error)): the variance of innovations with the autocorrelation of the
     /// noise, one per output; empty for none.
@@ -48,6 +50,15 @@ pub struct Experiment<'a> {
     pub conditions: Vec<Condition>,
     /// All curves, in the order of their outputs.
     pub curves: Vec<MeasuredCurve>,
+}
+
+/// The origins of a known error, as shares of its variance.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct ErrorShares {
+    /// The share of the emulator.
+    pub emulator: f64,
+    /// The share of the numerical error.
+    pub numerics: f64,
 }
 
 /// The replicates under one set of conditions. Those of different conditions are independent.
@@ -149,6 +160,7 @@ impl<'a> Experiment<'a> {
             forward,
             wide: None,
             common: Vec::new(),
+            origins: Vec::new(),
             independent: Vec::new(),
             forms: Matrix::default(),
             stated: None,

@@ -1,73 +1,113 @@
-//! The next measurement: how many bits further replicates are expected to give on the name of what is missing, and on the
-//! parameters.
+//! The next data: how many bits further measurements, or runs of the simulator, are expected to give on the name of what is
+//! missing, on the parameters, and on a quantity of the response.
 //!
-//! Each hypothesis is a type of effect at its best fit, with a normal posterior of its unknowns and of the errors of
-//! emulator and numerics, which are the same in old data and new. Under it the new data are normal. The bits on the
-//! name are the mutual information of hypothesis and new data; those on the parameters are the expected decrease of
-//! the entropy of the model's parameters, averaged over the hypotheses (Lindley, Annals of Mathematical Statistics 27
-//! (1956) 986; Chaloner and Verdinelli, Statistical Science 10 (1995) 273).
+//! Each hypothesis is a type of effect at its best fit, with a normal posterior of its unknowns, of the errors of
+//! emulator and numerics, and of its remainder; these are the same in old data and new. Under it the new data are normal.
+//! The bits on the name are the mutual information of hypothesis and new data; those on the parameters are the expected
+//! decrease of their entropy, averaged over the hypotheses; those on a quantity are its mutual information with the data
+//! (Lindley, Annals of Mathematical Statistics 27 (1956) 986; Chaloner and Verdinelli, Statistical Science 10 (1995) 273).
 
+mod choice;
 mod hypothesis;
 mod information;
 mod options;
+mod planned;
+mod possible;
+mod quantity;
+mod rank;
 #[cfg(test)]
 mod tests;
 
 use lacuna::math::random::Stream;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::experiment::Experiment;
 use super::noise::Noise;
-use super::search::{Explanation, FurtherData};
+use super::search::{Explanation, SearchResult};
+use crate::gap::candidates::Candidate;
+use crate::gap::experiment::Experiment;
+use crate::study::gap::next::{NextKeys, QuantityKeys};
 
+use choice::Choice;
 use hypothesis::Hypothesis;
-use information::name_bits;
-use options::options;
+use information::Predicted;
+use possible::possible;
+use quantity::Functional;
 
-/// Information that further measurements are expected to give.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub use rank::Wanted;
+
+/// What a study says about the next data.
+#[derive(Debug, Clone, Copy)]
+pub struct Wish<'a> {
+    /// The options; the usual ones if there are none.
+    pub options: &'a [NextKeys],
+    /// The quantity.
+    pub quantity: Option<&'a QuantityKeys>,
+    /// The number of runs with which the surrogate was trained; zero without a surrogate.
+    pub runs: usize,
+}
+
+/// Information that further data are expected to give.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NextData {
     /// Types that the name may be, with their posterior probabilities among these; empty if there is no choice.
     pub hypotheses: Vec<WeightedName>,
-    /// Options, best first: by the bits on the name, or by those on the parameters if there is no choice of a name.
+    /// What the options are ranked by, per cost: the name if there is a choice, or else the quantity if the study states one,
+    /// or else the parameters.
+    pub ranked_by: Wanted,
+    /// Options, best first.
     pub options: Vec<NextOption>,
 }
 
 /// A type of effect with its probability.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WeightedName {
     /// Type.
     pub kind: String,
-    /// Posterior probability among the types listed.
+    /// Posterior probability among the types listed, as the search computed it.
     pub weight: f64,
 }
 
-/// Further replicates, with the information expected from them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// Data that could be taken, with the information expected from them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NextOption {
-    /// Measurements; `null` for all that were measured.
-    pub what: Option<FurtherData>,
-    /// Number of further replicates.
-    pub replicates: usize,
+    /// Name of the option: as the study states it, or what is taken, in words.
+    pub name: String,
+    /// Cost.
+    pub cost: f64,
     /// Expected bits on the name.
-    pub name: f64,
-    /// Monte Carlo standard error of `name`.
+    pub name_bits: f64,
+    /// Monte Carlo standard error of `name_bits`.
     pub name_error: f64,
     /// Expected bits on the parameters of the model, averaged over the hypotheses.
-    pub parameters: f64,
+    pub parameter_bits: f64,
+    /// Expected bits on the quantity; `null` without a quantity.
+    pub quantity_bits: Option<f64>,
+    /// Monte Carlo standard error of `quantity_bits`.
+    pub quantity_error: Option<f64>,
     /// True if the difference to the first option is at most two Monte Carlo standard errors.
     pub equal_to_best: bool,
 }
 
-/// Number of standard errors within which two options count as equal.
-const EQUAL: f64 = 2.0;
+/// The information expected from the options of a study after a search; `None` if a response is not finite or a posterior
+/// has no density.
+pub fn after<'a>(
+    found: &SearchResult<'a>,
+    candidates: &'a [Candidate],
+    wish: Wish<'_>,
+    stream: &Stream,
+) -> Option<NextData> {
+    let all = possible(found, candidates);
+    let weighted: Vec<(String, f64, Explanation<'_, '_>)> =
+        all.iter().map(|own| (own.kind.clone(), own.weight, own.explanation())).collect();
+    next(&weighted, &found.noise, wish, stream)
+}
 
 /// The options with the information expected from each; `None` if a response is not finite or a posterior has no
 /// density. `explanations` are the hypotheses, with name and weight, fitted to the data of one experiment.
 pub fn next(
     explanations: &[(String, f64, Explanation<'_, '_>)],
     noise: &Noise,
+    wish: Wish<'_>,
     stream: &Stream,
 ) -> Option<NextData> {
     let (_, _, first) = explanations.first()?;
@@ -78,43 +118,59 @@ pub fn next(
         .iter()
         .map(|(_, _, own)| Hypothesis::of(own, &first.fit.at.response, noise))
         .collect::<Option<_>>()?;
-    let mut all = Vec::new();
-    for (i, option) in options(experiment, noise).into_iter().enumerate() {
-        let fields = hypotheses.iter().map(|own| option.predicted(own, &hypotheses[0]));
-        let fields: Vec<_> = fields.collect();
-        let bits = name_bits(&weights, &fields, &stream.at(i as u64))?;
-        let each = hypotheses.iter().zip(&fields).map(|(own, field)| own.parameter_bits(field));
-        let each: Vec<f64> = each.collect::<Option<_>>()?;
-        all.push(NextOption {
-            what: option.what,
-            replicates: option.replicates,
-            name: bits.value,
-            name_error: bits.error,
-            parameters: weights.iter().zip(each).map(|(w, bits)| w * bits).sum(),
-            equal_to_best: false,
-        });
-    }
-    let named = explanations.iter().zip(&weights);
-    let named = named.map(|((kind, _, _), &weight)| WeightedName { kind: kind.clone(), weight });
+    let quantity = wish.quantity.map(|keys| Functional::of(keys, experiment));
+    let setting = Setting { hypotheses: &hypotheses, weights: &weights, quantity };
+    let all = options::options(experiment, noise, wish);
+    let each =
+        all.iter().enumerate().map(|(i, option)| setting.weigh(option, &stream.at(i as u64)));
+    let options: Vec<NextOption> = each.collect::<Option<_>>()?;
     let has_choice = explanations.len() > 1;
-    Some(NextData {
-        hypotheses: if has_choice { named.collect() } else { Vec::new() },
-        options: ranked(all, has_choice),
-    })
+    let named = explanations
+        .iter()
+        .zip(&weights)
+        .map(|((kind, _, _), &weight)| WeightedName { kind: kind.clone(), weight });
+    let ranked_by = if has_choice {
+        Wanted::Name
+    } else if wish.quantity.is_some() {
+        Wanted::Quantity
+    } else {
+        Wanted::Parameters
+    };
+    let hypotheses = if has_choice { named.collect() } else { Vec::new() };
+    Some(NextData { hypotheses, ranked_by, options }.ranked(ranked_by))
 }
 
-/// The options in decreasing order of what is wanted.
-fn ranked(mut all: Vec<NextOption>, by_name: bool) -> Vec<NextOption> {
-    let wanted = |own: &NextOption| if by_name { own.name } else { own.parameters };
-    all.sort_by(|a, b| wanted(b).total_cmp(&wanted(a)).then(b.parameters.total_cmp(&a.parameters)));
-    let Some((best, error)) = all.first().map(|first| (wanted(first), first.name_error)) else {
-        return all;
-    };
-    for own in &mut all {
-        let error = if by_name { error.hypot(own.name_error) } else { 0.0 };
-        own.equal_to_best = best - wanted(own) <= EQUAL * error;
+/// What all options are weighed with.
+struct Setting<'a> {
+    hypotheses: &'a [Hypothesis],
+    weights: &'a [f64],
+    quantity: Option<Functional>,
+}
+
+impl Setting<'_> {
+    /// The information expected from an option; `None` if a posterior has no density.
+    fn weigh(&self, option: &Choice<'_>, stream: &Stream) -> Option<NextOption> {
+        let reference = &self.hypotheses[0];
+        let predicted: Vec<Predicted> =
+            self.hypotheses.iter().map(|own| option.predicted(own, reference)).collect();
+        let known = self.quantity.as_ref();
+        let quantities: Option<Vec<_>> =
+            known.map(|own| self.hypotheses.iter().map(|h| own.under(h)).collect());
+        let bits = information::bits(self.weights, &predicted, quantities.as_deref(), stream)?;
+        let each = self.hypotheses.iter().zip(&predicted).map(|(own, new)| own.parameter_bits(new));
+        let each: Vec<f64> = each.collect::<Option<_>>()?;
+        let mean = self.weights.iter().zip(each).map(|(w, bits)| w * bits).sum::<f64>();
+        Some(NextOption {
+            name: option.name.clone(),
+            cost: option.cost,
+            name_bits: bits.name.value,
+            name_error: bits.name.error,
+            parameter_bits: mean,
+            quantity_bits: bits.quantity.map(|own| own.value),
+            quantity_error: bits.quantity.map(|own| own.error),
+            equal_to_best: false,
+        })
     }
-    all
 }
 
 /// An experiment whose known errors are left out: they are unknowns of the hypotheses.

@@ -1,106 +1,113 @@
-//! The options: further replicates of all that was measured, of one condition, or by one sensor.
+//! The options of a study: those that it lists, or further replicates of everything, of each condition and by each sensor.
 
-use super::hypothesis::Hypothesis;
-use super::information::Predicted;
-use super::without_errors;
-use crate::gap::candidates::{place, sensors};
-use crate::gap::experiment::{Experiment, MeasuredCurve};
+use lacuna::plugin::effect::On;
+use lacuna::text::values::Count;
+
+use super::Wish;
+use super::choice::{Choice, Taken};
+use super::planned::{chosen, planned};
+use crate::gap::candidates::place;
+use crate::gap::experiment::Experiment;
 use crate::gap::noise::Noise;
-use crate::gap::search::FurtherData;
-use crate::gap::system::whitener::Whitener;
+use crate::gap::report::sentences::on as in_words;
+use crate::study::gap::next::NextKeys;
 
-use lacuna_linalg::Matrix;
-
-/// Numbers of further replicates.
+/// Numbers of further replicates that are tried unless the study lists options.
 const REPLICATES: [usize; 2] = [1, 4];
 
-/// Further replicates of some of the curves.
-pub(super) struct Choice<'a> {
-    /// The measurements; `None` for all.
-    pub what: Option<FurtherData>,
-    /// The number of replicates.
-    pub replicates: usize,
-    experiment: Experiment<'a>,
-    noise: Noise,
-}
-
-impl Choice<'_> {
-    /// The new data under a hypothesis, whitened by their noise around the response of a reference.
-    pub fn predicted(&self, own: &Hypothesis, reference: &Hypothesis) -> Predicted {
-        let counts = vec![self.replicates as f64; self.experiment.outputs()];
-        let around = &reference.response;
-        let whitener = Whitener::of_counts(&self.experiment, &self.noise, around, &counts);
-        let difference = own.response.iter().zip(around).map(|(a, b)| a - b);
-        let rows = Matrix::from_rows(around.len(), [difference.collect::<Vec<f64>>()]);
-        Predicted {
-            mean: whitener.whiten_rows(&rows).into_vec(),
-            slopes: whitener.whiten_rows(&own.tangents),
-            precision: own.precision.clone(),
-        }
-    }
-}
-
 /// The options of an experiment with this noise.
-pub(super) fn options<'a>(experiment: &Experiment<'a>, noise: &Noise) -> Vec<Choice<'a>> {
-    let mut wanted: Vec<(Option<FurtherData>, Vec<bool>)> = Vec::new();
-    let curves = &experiment.curves;
-    wanted.push((None, vec![true; curves.len()]));
-    if experiment.conditions.len() > 1 {
-        for condition in &experiment.conditions {
-            let own = (0..curves.len()).map(|s| condition.curves.contains(&s)).collect();
-            let scenario = condition.scenario.clone();
-            wanted.push((Some(FurtherData::Condition { scenario }), own));
-        }
-    }
-    let sensors = sensors(experiment);
-    if sensors.len() > 1 {
-        for on in sensors {
-            let own = curves.iter().map(|curve| place(curve) == on).collect();
-            wanted.push((Some(FurtherData::Sensor { on }), own));
-        }
-    }
-    let each = wanted.into_iter().filter_map(|(what, chosen)| {
-        let (experiment, noise) = restricted(experiment, noise, &chosen)?;
-        Some((what, experiment, noise))
-    });
-    each.flat_map(|(what, experiment, noise)| {
-        REPLICATES.map(|replicates| Choice {
-            what: what.clone(),
-            replicates,
-            experiment: experiment.clone(),
-            noise: noise.clone(),
-        })
-    })
-    .collect()
-}
-
-/// The experiment and the noise of some of the curves; `None` if the noise is correlated between several that are chosen
-/// and others, or if nothing is measured.
-fn restricted<'a>(
+pub(super) fn options<'a>(
     experiment: &Experiment<'a>,
     noise: &Noise,
-    chosen: &[bool],
-) -> Option<(Experiment<'a>, Noise)> {
-    let (mut experiment, mut noise) = (without_errors(experiment), noise.clone());
-    for (condition, across) in experiment.conditions.iter().zip(&mut noise.across) {
-        let count = chosen[condition.curves.clone()].iter().filter(|own| **own).count();
-        match count {
-            // A curve alone has the variance that its own noise states.
-            0 | 1 => *across = None,
-            _ if count < condition.curves.len() && across.is_some() => return None,
-            _ => {}
+    wish: Wish<'_>,
+) -> Vec<Choice<'a>> {
+    let usual = if wish.options.is_empty() { usual(experiment) } else { Vec::new() };
+    let all = wish.options.iter().chain(&usual);
+    all.filter_map(|keys| choice(keys, experiment, noise, wish.runs)).collect()
+}
+
+/// One and four replicates of all that was measured, of each condition, and by each sensor.
+fn usual(experiment: &Experiment<'_>) -> Vec<NextKeys> {
+    let mut places = vec![NextKeys::default()];
+    if experiment.conditions.len() > 1 {
+        let names = experiment.conditions.iter().filter_map(|own| own.scenario.clone());
+        places.extend(names.map(|name| NextKeys { scenarios: vec![name], ..NextKeys::default() }));
+    }
+    let mut sensors: Vec<On> = Vec::new();
+    for on in experiment.curves.iter().map(place).filter(|on| !on.is_empty()) {
+        if !sensors.contains(&on) {
+            sensors.push(on);
         }
     }
-    let left_out = |curve: &mut MeasuredCurve| {
-        curve.measured.clear();
-        curve.at.clear();
+    if sensors.len() > 1 {
+        places.extend(sensors.into_iter().map(|on| NextKeys { on, ..NextKeys::default() }));
+    }
+    let counts = REPLICATES.map(|n| Count::new(n).ok());
+    let each = |keys: NextKeys| {
+        counts.into_iter().flatten().map(move |replicates| NextKeys { replicates, ..keys.clone() })
     };
-    experiment
-        .curves
-        .iter_mut()
-        .zip(chosen)
-        .filter(|(_, own)| !**own)
-        .for_each(|(c, _)| left_out(c));
-    let is_measured = experiment.curves.iter().any(|curve| !curve.measured.is_empty());
-    is_measured.then_some((experiment, noise))
+    places.into_iter().flat_map(each).collect()
+}
+
+/// An option as the study states it; `None` if it measures nothing.
+fn choice<'a>(
+    keys: &NextKeys,
+    experiment: &Experiment<'a>,
+    noise: &Noise,
+    runs: usize,
+) -> Option<Choice<'a>> {
+    let name = keys.name.as_ref().map(|name| name.as_str().to_owned());
+    if keys.is_computed() {
+        let emulator = keys.emulator_error.map(|factor| factor.get());
+        let more = keys.runs.map(|more| (runs as f64 / (runs + more.get()) as f64).sqrt());
+        let taken = Taken::Errors {
+            emulator: emulator.or(more).unwrap_or(1.0),
+            numerics: keys.numerical_error.map_or(1.0, |factor| factor.get()),
+            origins: experiment.origins.clone(),
+        };
+        let cost = keys.cost.map_or(1.0, |cost| cost.get());
+        return Some(Choice { name: name.unwrap_or_else(|| computed(keys)), cost, taken });
+    }
+    let outputs = chosen(experiment, keys);
+    let (own, noise) = planned(experiment, noise, &outputs, keys.noise.map(|sd| sd.get()));
+    let scenarios = own.conditions.iter().filter(|c| !c.curves.is_empty()).count();
+    let count = keys.replicates.get();
+    let usual = (scenarios * count) as f64;
+    let taken = Taken::Replicates { count, experiment: own, noise };
+    let cost = keys.cost.map_or(usual, |cost| cost.get());
+    let choice = Choice { name: name.unwrap_or_else(|| measured(keys)), cost, taken };
+    (scenarios > 0).then_some(choice)
+}
+
+/// What an option measures, in words.
+fn measured(keys: &NextKeys) -> String {
+    let mut words = match keys.replicates.get() {
+        1 => "1 replicate".to_owned(),
+        n => format!("{n} replicates"),
+    };
+    if keys.scenarios.is_empty() && keys.on.is_empty() && keys.along.is_empty() {
+        words += " of everything";
+    }
+    if !keys.scenarios.is_empty() {
+        let names: Vec<String> = keys.scenarios.iter().map(|name| format!("`{name}`")).collect();
+        words += &format!(" under {}", names.join(", "));
+    }
+    if !keys.on.is_empty() {
+        words += &in_words(&keys.on);
+    }
+    for interval in &keys.along {
+        words += &format!(" from {} to {}", interval.low(), interval.high());
+    }
+    words
+}
+
+/// What an option computes, in words.
+fn computed(keys: &NextKeys) -> String {
+    let runs = keys.runs.map(|runs| format!("{} runs of the simulator", runs.get()));
+    let emulator = keys.emulator_error.filter(|_| keys.runs.is_none());
+    let emulator = emulator.map(|factor| format!("error of the surrogate times {}", factor.get()));
+    let numerics = keys.numerical_error;
+    let numerics = numerics.map(|factor| format!("error of the mesh times {}", factor.get()));
+    let all: Vec<String> = runs.into_iter().chain(emulator).chain(numerics).collect();
+    all.join(", ")
 }

@@ -6,7 +6,7 @@ pub mod next;
 pub mod power;
 mod proof;
 pub mod reliability;
-mod sentences;
+pub(super) mod sentences;
 mod tables;
 
 use lacuna::data::{Layouts, Parameter};

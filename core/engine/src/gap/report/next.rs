@@ -1,44 +1,71 @@
-//! The information that further measurements are expected to give, as a text for the terminal.
+//! The information that further data are expected to give, as a text for the terminal.
 
-use super::sentences::on;
-use crate::gap::next::{NextData, NextOption};
-use crate::gap::search::FurtherData;
-use crate::page::number::{fixed, percent};
+use crate::gap::next::{NextData, NextOption, Wanted};
+use crate::page::number::{fixed, percent, significant};
 use crate::page::table::Table;
 
 /// The options as a table, the best first.
 pub fn text(next: &NextData) -> String {
-    let mut table =
-        Table::new(&["measured further"], &["bits on the name", "error", "on the parameters", ""]);
+    let columns = Columns { name: next.has(Wanted::Name), quantity: next.has(Wanted::Quantity) };
+    let mut table = Table::new(&["next"], &columns.heads());
     for option in &next.options {
-        table.row([
-            words(option),
-            fixed(option.name, 3),
-            fixed(option.name_error, 3),
-            fixed(option.parameters, 3),
-            if option.equal_to_best { "=".to_owned() } else { String::new() },
-        ]);
+        table.row(columns.cells(option, next.ranked_by));
     }
-    let names = next.hypotheses.iter().map(|own| format!("{} {}", own.kind, percent(own.weight)));
-    let names: Vec<String> = names.collect();
-    let head = if names.is_empty() {
-        "No choice of a name: ranked by the bits on the parameters.\n".to_owned()
+    let equal = if columns.name || columns.quantity {
+        "`=`: equal to the best within two standard errors (±) of the Monte Carlo estimate."
     } else {
-        format!("Possible names: {}. Ranked by the bits on the name.\n", names.join(", "))
+        "`=`: equal to the best."
     };
-    let foot = "`=`: equal to the best within two standard errors of the Monte Carlo estimate.\n";
-    format!("{head}\n{}\n{foot}", table.text())
+    format!("{}\n\n{}\n{equal}\n", head(next), table.text())
 }
 
-fn words(option: &NextOption) -> String {
-    let count = match option.replicates {
-        1 => "1 replicate".to_owned(),
-        n => format!("{n} replicates"),
+fn head(next: &NextData) -> String {
+    let on = match next.ranked_by {
+        Wanted::Name => "on the name",
+        Wanted::Parameters => "on the parameters",
+        Wanted::Quantity => "on the quantity",
     };
-    match &option.what {
-        None => format!("{count} of everything"),
-        Some(FurtherData::Condition { scenario: Some(name) }) => format!("{count} under `{name}`"),
-        Some(FurtherData::Sensor { on: place }) => format!("{count}{}", on(place)),
-        Some(_) => count,
+    let names = next.hypotheses.iter().map(|own| format!("{} {}", own.kind, percent(own.weight)));
+    let names: Vec<String> = names.collect();
+    let known = match names.len() {
+        0 => "There is no choice of a name.".to_owned(),
+        _ => format!("Possible names: {}.", names.join(", ")),
+    };
+    format!("{known} Ranked by the bits {on} per cost.")
+}
+
+/// The columns that a table has beside those of every table.
+struct Columns {
+    name: bool,
+    quantity: bool,
+}
+
+impl Columns {
+    fn heads(&self) -> Vec<&'static str> {
+        let mut heads = vec!["cost"];
+        if self.name {
+            heads.extend(["bits on the name", "±"]);
+        }
+        heads.push("on the parameters");
+        if self.quantity {
+            heads.extend(["on the quantity", "±"]);
+        }
+        heads.extend(["bits per cost", ""]);
+        heads
+    }
+
+    fn cells(&self, option: &NextOption, by: Wanted) -> Vec<String> {
+        let mut cells = vec![option.name.clone(), significant(option.cost, 3)];
+        if self.name {
+            cells.extend([fixed(option.name_bits, 3), fixed(option.name_error, 3)]);
+        }
+        cells.push(fixed(option.parameter_bits, 3));
+        if self.quantity {
+            let cell = |value: Option<f64>| value.map_or_else(String::new, |x| fixed(x, 3));
+            cells.extend([cell(option.quantity_bits), cell(option.quantity_error)]);
+        }
+        cells.push(fixed(option.bits(by).0 / option.cost, 3));
+        cells.push(if option.equal_to_best { "=".to_owned() } else { String::new() });
+        cells
     }
 }

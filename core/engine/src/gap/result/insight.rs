@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::gap::candidates::Candidate;
 use crate::gap::drift;
 use crate::gap::drift::drift;
-use crate::gap::next::{NextData, next};
+use crate::gap::next::NextData;
 use crate::gap::search::{
     CrossValidation, Discrimination, Explanation, LeftOut, MissingEffect, SearchResult, Verdict,
     VerdictKind, Weighed, cross_validate, discriminate,
@@ -44,7 +44,7 @@ pub struct Insight {
     /// The data that would discriminate between the members of a class.
     #[serde(rename = "separations")]
     pub discrimination: Option<Discrimination>,
-    /// The bits that further replicates are expected to give on the name and on the parameters.
+    /// The bits that further data are expected to give.
     #[serde(default)]
     pub next: Option<NextData>,
     /// A smoother in place of an unlisted effect.
@@ -82,8 +82,7 @@ pub fn insight<'a>(
     verdict: &Verdict,
     stream: &Stream,
 ) -> Insight {
-    let mut insight =
-        Insight { next: further(found, candidates, &stream.named("next")), ..Insight::default() };
+    let mut insight = Insight::default();
     if matches!(verdict.word, VerdictKind::None | VerdictKind::NotVisible) {
         return insight;
     }
@@ -135,31 +134,6 @@ fn alone<'a>(found: &SearchResult<'a>, candidates: &'a [Candidate]) -> Vec<Singl
         }
     }
     all
-}
-
-/// The smallest share of the posterior probability with which a type is a hypothesis of what is missing.
-const POSSIBLE: f64 = 1e-3;
-
-/// The bits that further replicates are expected to give. The hypotheses are the types that were weighed if the search
-/// ended with one effect, otherwise what it found.
-fn further<'a>(
-    found: &SearchResult<'a>,
-    candidates: &'a [Candidate],
-    stream: &Stream,
-) -> Option<NextData> {
-    let alone = alone(found, candidates);
-    let shares = found.types.first().map(Vec::as_slice).unwrap_or_default();
-    let weight = |kind: &str| shares.iter().find(|(k, _)| k == kind).map_or(0.0, |(_, w)| *w);
-    let mut all: Vec<(String, f64, Explanation<'_, '_>)> = alone
-        .iter()
-        .map(|single| (single.kind.clone(), weight(&single.kind), single.explanation()))
-        .filter(|(_, weight, _)| *weight >= POSSIBLE)
-        .collect();
-    if all.len() < 2 {
-        let explanation = Explanation::exact(&found.system, &found.last.fit);
-        all = vec![(NOTHING.to_owned(), 1.0, explanation)];
-    }
-    next(&all, &found.noise, stream)
 }
 
 fn discrimination(

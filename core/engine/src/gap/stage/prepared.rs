@@ -18,6 +18,7 @@ use crate::gap::experiment::wider::ExtendedMap;
 use crate::gap::experiment::with_effects::WithEffects;
 use crate::gap::inside::InsideCandidates;
 use crate::gap::inside::advice::what_would_tell;
+use crate::gap::next::{Wish, after};
 use crate::gap::noise::{Noise, ResponseTangents};
 use crate::gap::prove::{freedoms, prove};
 use crate::gap::result::{GapResult, HeldOut};
@@ -167,6 +168,8 @@ impl<'a> PreparedSearch<'a> {
         all: &Observations,
     ) -> Result<GapResult, Stop> {
         let mut result = GapResult::of(found, self.candidates, self.options, &self.random);
+        result.insight.next =
+            after(found, self.candidates, self.wish(), &self.random.named("next"));
         result.untried = self.untried.to_vec();
         result.verdict.reasons.extend(self.transients.iter().map(Transient::words));
         if let (Some(companion), Some(own)) =
@@ -185,6 +188,16 @@ impl<'a> PreparedSearch<'a> {
             result.held_out.extend(self.base.proof(part, all, before, &fitted)?);
         }
         Ok(result)
+    }
+}
+
+impl PreparedSearch<'_> {
+    /// What the study says about the next data.
+    fn wish(&self) -> Wish<'_> {
+        let (study, problem) = (self.base.study, self.base.problem);
+        let runs = problem.fitted().map_or(0, |fitted| fitted.value.errors.training);
+        let keys = &study.gap.keys;
+        Wish { options: &keys.next, quantity: keys.quantity.as_ref(), runs }
     }
 }
 
@@ -332,7 +345,8 @@ impl<'a> BaseModel<'a> {
         experiment.stated = self.stated(data, response)?;
         let noise = Noise::of(&experiment, &around, None);
         let all = error_covariance(&experiment, &noise, response, &self.samples(data)?);
-        (experiment.common, experiment.independent) = (all.common, all.independent);
+        (experiment.common, experiment.origins) = (all.common, all.origins);
+        experiment.independent = all.independent;
         if let Some(companion) = &self.beginning.inside.companion {
             experiment.forms = companion.forms();
         }

@@ -11,7 +11,7 @@ use lacuna_linalg::vector::dot;
 use lacuna_linalg::{Cholesky, Matrix, multiply_transposed, symmetric_eigen, transposed_multiply};
 
 use super::whitener::Whitener;
-use crate::gap::experiment::Experiment;
+use crate::gap::experiment::{ErrorShares, Experiment};
 use crate::gap::noise::Noise;
 
 /// The weights `w` that are tried, relative to the number of samples.
@@ -28,6 +28,8 @@ const MATTERS: f64 = 0.1;
 pub struct ErrorCovariance {
     /// The part in the span of the samples: factors `outputs x errors`, in the response's unit.
     pub common: Vec<CommonError>,
+    /// The origins of the errors, one entry a column of the factors.
+    pub origins: Vec<ErrorShares>,
     /// The part outside that span: see [`Experiment::independent`].
     pub independent: Vec<f64>,
 }
@@ -43,8 +45,8 @@ pub fn error_covariance(
     let alone = Experiment { common: Vec::new(), independent: Vec::new(), ..experiment.clone() };
     let whitener = Whitener::new(&alone, noise, response);
     let scale = whitener.scale();
-    let mut all =
-        ErrorCovariance { common: Vec::new(), independent: vec![0.0; experiment.outputs()] };
+    let independent = vec![0.0; experiment.outputs()];
+    let mut all = ErrorCovariance { independent, ..ErrorCovariance::default() };
     for error in samples {
         let count = error.factor.columns();
         if count < 2 {
@@ -100,7 +102,9 @@ impl ErrorCovariance {
         }
         let names: Vec<&str> = self.common.iter().map(|error| error.origin.as_str()).collect();
         let (origin, factor) = (names.join(", "), transposed_multiply(&rows, &vectors));
+        let origins = origins(&self.common, &vectors);
         Self {
+            origins,
             common: vec![CommonError {
                 origin: ErrorOrigin::from(origin),
                 factor,
@@ -109,6 +113,27 @@ impl ErrorCovariance {
             independent,
         }
     }
+}
+
+/// The shares of the emulator and of the numerical error in errors that are these combinations, one a column, of the
+/// columns of all factors.
+fn origins(all: &[CommonError], vectors: &Matrix) -> Vec<ErrorShares> {
+    let of = |wanted: &ErrorOrigin, k: usize| {
+        let (mut row, mut share) = (0, 0.0);
+        for error in all {
+            let own = row..row + error.factor.columns();
+            row = own.end;
+            if error.origin == *wanted {
+                share += own.map(|i| vectors[(i, k)].powi(2)).sum::<f64>();
+            }
+        }
+        share
+    };
+    let shares = |k: usize| ErrorShares {
+        emulator: of(&ErrorOrigin::Emulator, k),
+        numerics: of(&ErrorOrigin::Numerics, k),
+    };
+    (0..vectors.columns()).map(shares).collect()
 }
 
 /// The mean square of the samples at each output, averaged over the neighbouring values of its curve.

@@ -3,6 +3,7 @@
 use lacuna::data::{Axis, Coordinates};
 use lacuna::plugin::{Effect, Term, registry};
 use lacuna::text::nearest::{nearest, one_of};
+use lacuna::text::values::Interval;
 use lacuna::text::{Complaints, Node, Problems};
 
 use crate::study::resolve::Study;
@@ -25,6 +26,7 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
         super::inside::check(study, node, problems);
         super::inside::no_places(study, node, problems);
         super::runs::check(study, node, problems);
+        super::next::check(study, node, problems);
         if let (Some(companion), Some(node)) = (&study.gap.companion, node.get("companion")) {
             problems.within("companion", |problems| {
                 super::companion::check(study, companion, node, problems);
@@ -74,19 +76,9 @@ fn needs_options(term: &str) -> bool {
 }
 
 fn scenarios(study: &Study, complaints: &mut Complaints<'_>) {
-    let names: Vec<&str> = study.scenarios.iter().filter_map(|s| s.label()).collect();
     let held = &study.gap.keys.hold_out.scenarios;
-    for name in held.iter().filter(|name| !names.contains(&name.as_str())) {
-        let spot = complaints.at("hold_out.scenarios");
-        let problem = spot.say(format!("the study has no scenario `{name}`"));
-        if names.is_empty() {
-            problem.help(
-                "a study without `[[scenario]]` can hold out replicates, curves and intervals",
-            );
-        } else {
-            problem.expected(one_of(names.iter().copied()));
-        }
-    }
+    known_scenarios(study, "hold_out.scenarios", held, complaints);
+    let names: Vec<&str> = study.scenarios.iter().filter_map(|s| s.label()).collect();
     if !held.is_empty() && names.iter().all(|name| held.iter().any(|held| held == name)) {
         complaints
             .at("hold_out.scenarios")
@@ -95,7 +87,37 @@ fn scenarios(study: &Study, complaints: &mut Complaints<'_>) {
     }
 }
 
+/// Reports scenarios, written under the key `path`, that the study does not have.
+pub(super) fn known_scenarios(
+    study: &Study,
+    path: &str,
+    wanted: &[String],
+    complaints: &mut Complaints<'_>,
+) {
+    let names: Vec<&str> = study.scenarios.iter().filter_map(|s| s.label()).collect();
+    for name in wanted.iter().filter(|name| !names.contains(&name.as_str())) {
+        let spot = complaints.at(path);
+        let problem = spot.say(format!("the study has no scenario `{name}`"));
+        if names.is_empty() {
+            problem
+                .help("a study without `[[scenario]]` can choose replicates, curves and intervals");
+        } else {
+            problem.expected(one_of(names.iter().copied()));
+        }
+    }
+}
+
 fn along(study: &Study, complaints: &mut Complaints<'_>) {
+    known_intervals(study, "hold_out.along", &study.gap.keys.hold_out.along, complaints);
+}
+
+/// Reports intervals of the last axis, written under the key `path`, in which the response has no value.
+pub(super) fn known_intervals(
+    study: &Study,
+    path: &str,
+    wanted: &[Interval],
+    complaints: &mut Complaints<'_>,
+) {
     let of_axis = |axis: &Axis| match &axis.coordinates {
         Coordinates::Grid { values, .. } => Some((values[0], values[values.len() - 1])),
         Coordinates::Labels(_) => None,
@@ -103,12 +125,12 @@ fn along(study: &Study, complaints: &mut Complaints<'_>) {
     let blocks = study.layouts.blocks.iter();
     let spans: Vec<(f64, f64)> =
         blocks.filter_map(|block| block.axes.last().and_then(of_axis)).collect();
-    for interval in &study.gap.keys.hold_out.along {
+    for interval in wanted {
         let (low, high) = (interval.low(), interval.high());
         if spans.iter().any(|(first, last)| low <= *last && high >= *first) {
             continue;
         }
-        let spot = complaints.at("hold_out.along");
+        let spot = complaints.at(path);
         let problem = spot.say(format!("no value of the response lies from {low} to {high}"));
         match spans.first() {
             Some((first, last)) => {

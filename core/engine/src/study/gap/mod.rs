@@ -4,6 +4,7 @@ pub mod added;
 pub mod companion;
 mod held;
 mod inside;
+pub mod next;
 mod runs;
 
 use std::collections::BTreeMap;
@@ -23,6 +24,7 @@ pub use companion::Companion;
 pub use held::Held;
 pub(super) use held::{Loose, hold};
 pub use inside::{Inside, Swap, SwapKeys, SwitchPlace, SwitchSection, TermKeys};
+use next::{NextKeys, QuantityKeys};
 pub use runs::RunsKeys;
 
 /// Settings of the search for missing effects (`lacuna gap STUDY`).
@@ -55,6 +57,13 @@ pub struct GapSection {
     /// is calibrated. Default: none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub add: Vec<Name>,
+    /// Data that could be taken next. Default: one and four further replicates of everything, of each scenario and of each
+    /// sensor, measured so far or not.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub next: Vec<NextKeys>,
+    /// Quantity of the response that the next data should tell. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quantity: Option<QuantityKeys>,
 }
 
 impl Default for GapSection {
@@ -70,6 +79,8 @@ impl Default for GapSection {
             prior_odds: PriorOdds::default(),
             hold_out: HoldOut::default(),
             add: Vec::new(),
+            next: Vec::new(),
+            quantity: None,
         }
     }
 }

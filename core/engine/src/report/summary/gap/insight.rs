@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::gap::drift::{DriftLevel, DriftMap};
-use crate::gap::next::NextData;
+use crate::gap::next::{NextData, NextOption as FoundOption, Wanted};
 use crate::gap::result::insight::Insight as Found;
 use crate::gap::search::{CrossValidation, Discrimination};
 use crate::report::summary::value::{ByName, Quantity};
@@ -22,9 +22,9 @@ pub struct Insight {
     /// Further measurements that would discriminate between the members of a class.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub separations: Option<Discrimination>,
-    /// Bits that further replicates are expected to give on the name and on the parameters (`lacuna next STUDY`).
+    /// Bits that further data are expected to give (`lacuna next STUDY`).
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub next: Option<NextData>,
+    pub next: Option<Next>,
     /// Places in words at which an unlisted effect acts.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub places: Vec<String>,
@@ -34,6 +34,42 @@ pub struct Insight {
     /// Smoother (a Gaussian process) in place of an unlisted effect.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stopgap: Option<Process>,
+}
+
+/// Information that further data are expected to give.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Next {
+    /// Types that the name may be, with their posterior probabilities among these; empty if there is no choice.
+    #[schemars(extend("propertyNames" = { "title": "type" }))]
+    pub names: ByName<Quantity>,
+    /// What the options are ranked by, per cost: the name if there is a choice, or else the quantity if the study states
+    /// one, or else the parameters.
+    pub ranked_by: Wanted,
+    /// Options, best first.
+    pub options: Vec<NextOption>,
+}
+
+/// Data that could be taken, with the information expected from them.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct NextOption {
+    /// Name of the option, as the study states it, or what is taken, in words.
+    pub name: String,
+    /// Cost.
+    pub cost: Quantity,
+    /// Expected bits on the name of what is missing.
+    pub name_bits: Quantity,
+    /// Monte Carlo standard error of `name_bits`.
+    pub name_error: f64,
+    /// Expected bits on the parameters of the model.
+    pub parameter_bits: Quantity,
+    /// Expected bits on the quantity of `[gap.quantity]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quantity_bits: Option<Quantity>,
+    /// Monte Carlo standard error of `quantity_bits`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quantity_error: Option<f64>,
+    /// True if the difference to the first option is at most two Monte Carlo standard errors.
+    pub equal_to_best: bool,
 }
 
 /// Comparison of the parameters between conditions and windows, each calibrated alone and without effects.
@@ -77,7 +113,7 @@ impl Insight {
             against: found.against.clone(),
             drift: found.drift.as_ref().map(Drift::of),
             separations: found.discrimination.clone(),
-            next: found.next.clone(),
+            next: found.next.as_ref().map(Next::of),
             places: found.places.iter().map(|place| place.words.clone()).collect(),
             symbolic: found.symbolic.as_ref().map(|symbolic| Symbolic {
                 form: symbolic.form.clone(),
@@ -87,6 +123,27 @@ impl Insight {
                 explained: smoother.explained.into(),
                 length: smoother.length.into(),
             }),
+        }
+    }
+}
+
+impl Next {
+    fn of(found: &NextData) -> Self {
+        let option = |own: &FoundOption| NextOption {
+            name: own.name.clone(),
+            cost: own.cost.into(),
+            name_bits: own.name_bits.into(),
+            name_error: own.name_error,
+            parameter_bits: own.parameter_bits.into(),
+            quantity_bits: own.quantity_bits.map(Quantity::from),
+            quantity_error: own.quantity_error,
+            equal_to_best: own.equal_to_best,
+        };
+        let names = found.hypotheses.iter().map(|own| (own.kind.clone(), own.weight.into()));
+        Self {
+            names: names.collect(),
+            ranked_by: found.ranked_by,
+            options: found.options.iter().map(option).collect(),
         }
     }
 }
