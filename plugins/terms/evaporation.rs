@@ -9,13 +9,20 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::common::{ambient, ambient_each, of};
+use super::common::{ambient, ambient_each, of, scale};
 
 /// Evaporation: a heat loss in proportion to the excess vapour pressure, which grows exponentially with the
 /// temperature.
 ///
 /// ```text
 /// rate = … - coefficient (exp((u - ambient) / scale) - 1),   coefficient ≥ 0
+/// ```
+///
+/// If the scale is unknown, the coefficient is the loss at a temperature difference `D`, the size of `u - ambient` along the run:
+/// data determine it whatever the scale is.
+///
+/// ```text
+/// rate = … - coefficient (exp((u - ambient) / scale) - 1) / (exp(D / scale) - 1)
 /// ```
 ///
 /// Dalton's law with the vapour pressure of Clausius and Clapeyron, linearised in its exponent about the temperature
@@ -68,16 +75,21 @@ impl Term for Evaporation {
     fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {
         let u = of(self.of.as_deref(), place);
         let ambient = ambient(self.ambient.as_deref(), place)?;
-        let (scale, indices, size) = if let Some(scale) = &self.scale {
-            (format!("({scale})"), Vec::new(), None)
-        } else {
-            let index = unknown(place.name)?;
-            // The size of the shape is that for water at room temperature.
-            let size = format!("exp((({u}) - ({ambient})) / 16 {{K}}) - 1");
-            (index.name.clone(), vec![index], Some(size))
-        };
-        let shape = format!("1 - exp((({u}) - ({ambient})) / {scale})");
-        Ok(Summand { shape, sign: Sign::Positive, indices, scale: size, ..Summand::default() })
+        let difference = format!("({u}) - ({ambient})");
+        if let Some(scale) = &self.scale {
+            let shape = format!("1 - exp(({difference}) / ({scale}))");
+            return Ok(Summand { shape, sign: Sign::Positive, ..Summand::default() });
+        }
+        let index = unknown(place.name)?;
+        let reference = scale(place, &difference, &place.state.unit.difference())?;
+        let excess = |of: &str| format!("(exp(({of}) / {}) - 1)", index.name);
+        Ok(Summand {
+            shape: format!("-{} / {}", excess(&difference), excess(&reference)),
+            sign: Sign::Positive,
+            indices: vec![index],
+            fixed: Some(format!("D = {reference}")),
+            ..Summand::default()
+        })
     }
 }
 

@@ -10,7 +10,7 @@ use lacuna::run::Silent;
 use lacuna_engine::gap::next::Wanted;
 use lacuna_engine::gap::result::GapResult;
 use lacuna_engine::gap::search::VerdictKind;
-use lacuna_engine::study::load_text;
+use lacuna_engine::study::resolve::load_text;
 use lacuna_run::RunDirectory;
 
 const STUDY: &str = r#"

@@ -10,6 +10,7 @@ use lacuna_linalg::Matrix;
 use lacuna_run::RunDirectory;
 
 use super::inside::loaded;
+use super::term_laws::size;
 
 const HEAD: &str = r#"
 [study]
@@ -156,12 +157,13 @@ fn evaporation_cools_by_the_vapour_pressure() {
     assert!(found[39] < 320.0);
 }
 
-/// With an unknown scale the truth is that of the stated one.
+/// With an unknown scale the coefficient is the loss at the size of the difference along the run.
 #[test]
 fn evaporation_has_a_scale_of_its_own() {
     let (start, ambient, scale, c) = (350.0, 293.0, 22.0, 0.8);
     let body = SINGLE.replace("START", "350.0") + "use = \"evaporation\"\nambient = \"293 {K}\"\n";
-    let found = response(["K/s", "K"], &body, &[0.0, c, scale]);
+    let loss = c * (size(start, ambient) / scale).exp_m1();
+    let found = response(["K/s", "K"], &body, &[0.0, loss, scale]);
     let first = f64::exp(-(start - ambient) / scale);
     let exact = |t: f64| ambient - scale * f64::ln_1p((first - 1.0) * (-c * t / scale).exp());
     near(&found, exact, 1e-4);

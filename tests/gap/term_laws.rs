@@ -10,7 +10,7 @@ fn alone(start: f64, options: &str, values: &[f64]) -> Vec<f64> {
 }
 
 /// Root mean square of the state at the middle of the priors, where the supply is one: a line of slope one less `from`.
-fn size(start: f64, from: f64) -> f64 {
+pub fn size(start: f64, from: f64) -> f64 {
     let all = times().into_iter().map(|t| (start + t - from).powi(2));
     (all.sum::<f64>() / 40.0).sqrt()
 }

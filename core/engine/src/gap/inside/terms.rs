@@ -2,6 +2,7 @@
 
 use lacuna::data::Unit;
 use lacuna::math::distribution::Distribution;
+use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::amend::{Addition, Amend, State};
 use lacuna::plugin::effect::Description;
 use lacuna::plugin::model::Call;
@@ -19,6 +20,9 @@ use crate::study::gap::TermKeys;
 
 /// The share of the rate that a term contributes at one standard deviation of its coefficient.
 const SHARE: f64 = 0.5;
+
+/// The number of points of the priors at which sizes are sought that the middle of the priors does not have.
+const POINTS: u64 = 16;
 
 /// Adds the terms of a study to its pieces and inputs: those that it names, and those of the library that are tried
 /// without being named.
@@ -206,13 +210,30 @@ impl TermSetting<'_> {
         })
     }
 
-    /// The root mean square of an expression over all scenarios, at the medians of the priors.
+    /// The root mean square of an expression over all scenarios: at the medians of the priors, or where it has no size there, as
+    /// for a body that starts at rest, the median over other points of the priors.
     fn size(&self, expression: &str) -> Result<f64, String> {
-        let middle: Vec<f64> =
-            self.study.parameters.iter().map(|p| p.prior.quantile(0.5)).collect();
+        let has_size = |size: &f64| size.is_finite() && *size > 0.0;
+        let middle = self.size_at(expression, |_| 0.5)?;
+        if has_size(&middle) {
+            return Ok(middle);
+        }
+        let stream = Stream::root(self.study.about.seed).named("sizes of terms");
+        let level = |i: u64, j: usize| uniform(&mut stream.at(i).at(j as u64).generator());
+        let sizes = (0..POINTS).map(|i| self.size_at(expression, |j| level(i, j)));
+        let mut sizes: Vec<f64> = sizes.filter_map(Result::ok).filter(has_size).collect();
+        sizes.sort_by(f64::total_cmp);
+        Ok(sizes.get(sizes.len() / 2).copied().unwrap_or(middle))
+    }
+
+    /// The root mean square of an expression over all scenarios at a point of the priors: `level` of each parameter is its
+    /// quantile.
+    fn size_at(&self, expression: &str, level: impl Fn(usize) -> f64) -> Result<f64, String> {
+        let parameters = self.study.parameters.iter().enumerate();
+        let point: Vec<f64> = parameters.map(|(j, p)| p.prior.quantile(level(j))).collect();
         let (mut sum, mut count) = (0.0, 0.0);
         for setting in &self.simulator.settings {
-            let mut inputs = setting.inputs(&middle);
+            let mut inputs = setting.inputs(&point);
             let (mut names, mut units) =
                 (self.simulator.names.clone(), self.simulator.units.clone());
             for (name, unit, value) in self.idle(setting) {
