@@ -28,6 +28,8 @@ pub struct Candidate {
     pub odds: f64,
     /// Types that it contains as special cases.
     pub contains: Vec<&'static str>,
+    /// The number of forms among which it was chosen by the data; 1 for a candidate that was stated beforehand.
+    pub tried: usize,
 }
 
 /// A candidate with the labels on which it acts.
@@ -52,6 +54,7 @@ impl Candidate {
             effect,
             odds: 1.0,
             contains: Vec::new(),
+            tried: 1,
         })
     }
 
@@ -221,6 +224,7 @@ mod tests {
             effect: Arc::new(InputEffect { places, inputs, description }),
             odds,
             contains: Vec::new(),
+            tried: 1,
         }
     }
 

@@ -55,6 +55,7 @@ pub fn candidates(
             odds: 1.0,
             effect,
             contains: Vec::new(),
+            tried: 1,
         })
     };
     others.map(one).collect()

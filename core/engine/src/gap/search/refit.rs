@@ -307,8 +307,8 @@ impl<'a> RefitSetting<'a, '_> {
 /// of a textbook.
 const GENERAL: f64 = 4.0;
 
-/// The log prior mass of a placement within its type, divided among the variants of the type, plus the log of the
-/// type's share by the [odds](log_group_share) of its group.
+/// The log prior mass of a placement within its type, divided among the variants of the type and among the forms from
+/// which the data chose it, plus the log of the type's share by the [odds](log_group_share) of its group.
 pub fn placement_prior(candidates: &[Candidate], placement: &Placement, sensors: usize) -> f64 {
     let candidate = &candidates[placement.candidate];
     let versions = candidates.iter().filter(|c| c.kind == candidate.kind).count();
@@ -316,7 +316,7 @@ pub fn placement_prior(candidates: &[Candidate], placement: &Placement, sensors:
     let place = log_prior(candidate.effect.reach(), chosen, sensors) - (versions as f64).ln();
     let is_general = candidates.iter().any(|c| candidate.contains.contains(&c.kind.as_str()));
     let form = if is_general { -GENERAL.ln() } else { 0.0 };
-    place + form + log_group_share(candidates, candidate)
+    place + form - (candidate.tried as f64).ln() + log_group_share(candidates, candidate)
 }
 
 /// The number of sensors that a placement acts on, by the labels of its place.

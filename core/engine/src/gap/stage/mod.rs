@@ -2,6 +2,7 @@
 //!
 //! Data are held out before the search, so that the stage calibrates again with the other data only.
 
+mod laws;
 mod models;
 pub mod prepared;
 pub mod show;

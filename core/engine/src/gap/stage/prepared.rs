@@ -18,8 +18,11 @@ use crate::gap::experiment::wider::ExtendedMap;
 use crate::gap::experiment::with_effects::WithEffects;
 use crate::gap::inside::InsideCandidates;
 use crate::gap::inside::advice::what_would_tell;
+use crate::gap::law::Described;
+use crate::gap::law::apart::compared;
 use crate::gap::noise::{Noise, ResponseTangents};
 use crate::gap::prove::{freedoms, prove};
+use crate::gap::result::law::LawProof;
 use crate::gap::result::{GapResult, HeldOut};
 use crate::gap::search::{SearchOptions, SearchResult, VerdictKind, search};
 use crate::gap::system::System;
@@ -50,6 +53,8 @@ pub struct SearchModel<'a> {
     pub inside: &'a InsideCandidates<'a>,
     /// The covariance of the emulator's error of another model than the study's.
     pub other: Option<&'a [CommonError]>,
+    /// The types of the candidates, if only some are tried.
+    pub only: Option<&'a [String]>,
 }
 
 impl<'a> SearchModel<'a> {
@@ -60,7 +65,8 @@ impl<'a> SearchModel<'a> {
         inside: &'a InsideCandidates<'a>,
     ) -> Self {
         let (forward, region) = (problem.forward(), problem.region());
-        Self { forward, parameters: &study.parameters, region, inside, other: None }
+        let parameters = &study.parameters;
+        Self { forward, parameters, region, inside, other: None, only: None }
     }
 }
 
@@ -119,6 +125,9 @@ pub fn prepared<T>(
         let learned = companion.candidates(study, &starts[0], misfit(&experiment, &response))?;
         candidates.extend(learned.candidates);
         untried.extend(learned.untried);
+    }
+    if let Some(only) = beginning.only {
+        candidates.retain(|candidate| only.contains(&candidate.kind));
     }
     let odds = &study.gap.keys.prior_odds;
     let inside = odds.of_inside(experiment.most_replicates() > 1);
@@ -185,6 +194,31 @@ impl<'a> PreparedSearch<'a> {
             result.held_out.extend(self.base.proof(part, all, before, &fitted)?);
         }
         Ok(result)
+    }
+}
+
+impl PreparedSearch<'_> {
+    /// The starts of the calibration: its local maxima without any effect.
+    pub(super) fn starts(&self) -> &[Vec<f64>] {
+        &self.starts
+    }
+
+    /// The held-out data of other conditions, curves or places than those of the search.
+    pub(super) fn elsewhere(&self) -> Option<&HeldOutData> {
+        self.split.held_out.iter().find(|part| part.kind != HeldOutKind::Replicates)
+    }
+
+    /// The proof of a law on held-out data; `all` are all measurements.
+    pub(super) fn proof_of_law(
+        &self,
+        part: &HeldOutData,
+        all: &Observations,
+        described: &Described,
+    ) -> Result<Option<LawProof>, Stop> {
+        let all = &without(all, &self.transients);
+        let held_out = self.base.experiment(&part.data, &described.parameters)?;
+        let whole = self.base.experiment(all, &described.parameters)?;
+        Ok(compared(&held_out, &whole, described, (part.kind, &part.names)))
     }
 }
 

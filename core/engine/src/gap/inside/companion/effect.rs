@@ -153,6 +153,7 @@ impl Learning<'_> {
         });
         Candidate {
             contains: terms::contained(&kind),
+            tried: 1,
             kind,
             plugin: IN_COMPANION.to_owned(),
             options: Table::new(),
