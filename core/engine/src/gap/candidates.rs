@@ -30,6 +30,8 @@ pub struct Candidate {
     pub contains: Vec<&'static str>,
     /// The number of forms among which it was chosen by the data; 1 for a candidate that was stated beforehand.
     pub tried: usize,
+    /// Values of the calibrated parameters beside it, from which fits with it start as well; empty for none.
+    pub beside: Vec<f64>,
 }
 
 /// A candidate with the labels on which it acts.
@@ -55,6 +57,7 @@ impl Candidate {
             odds: 1.0,
             contains: Vec::new(),
             tried: 1,
+            beside: Vec::new(),
         })
     }
 
@@ -225,6 +228,7 @@ mod tests {
             odds,
             contains: Vec::new(),
             tried: 1,
+            beside: Vec::new(),
         }
     }
 

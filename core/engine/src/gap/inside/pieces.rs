@@ -149,6 +149,7 @@ impl Pieces {
                 odds: 1.0,
                 contains: terms::contained(&piece.kind),
                 tried: piece.tried,
+                beside: Vec::new(),
             }
         };
         self.all.iter().map(candidate).collect()

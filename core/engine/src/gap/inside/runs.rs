@@ -56,6 +56,7 @@ pub fn candidates(
             effect,
             contains: Vec::new(),
             tried: 1,
+            beside: Vec::new(),
         })
     };
     others.map(one).collect()

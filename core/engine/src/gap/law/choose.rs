@@ -26,8 +26,8 @@ const FINALISTS: usize = 8;
 /// A form whose gain is less than this share of the best one's is not refitted.
 const NEAR: f64 = 0.5;
 
-/// The number of starts of a refit, from exponents or thresholds of the dictionary.
-const STARTS: usize = 3;
+/// The number of starts of a refit on either side of a linear law, from exponents or thresholds of the dictionary.
+const STARTS: usize = 2;
 
 /// The number of random halves of the data.
 const HALVES: usize = 50;
@@ -61,6 +61,15 @@ pub(super) struct Screen<'e> {
 /// A form that is worth a refit: the entries of one kind, the best first, with the coefficients that they have alone.
 pub(super) struct Finalist {
     pub starts: Vec<(Entry, f64)>,
+}
+
+impl Finalist {
+    /// True while there are few starts on the side of an entry: a fit does not cross the exponent one, where a power
+    /// becomes what the parameters make up for.
+    fn has_room_for(&self, entry: &Entry) -> bool {
+        let there = self.starts.iter().filter(|(own, _)| own.is_steep() == entry.is_steep());
+        there.count() < STARTS
+    }
 }
 
 impl<'e> Screen<'e> {
@@ -101,12 +110,15 @@ impl<'e> Screen<'e> {
             return Vec::new();
         }
         let mut finalists: Vec<Finalist> = Vec::new();
-        for chosen in all.iter().filter(|one| one.gain >= NEAR * best.gain) {
+        for chosen in &all {
             let entry = &self.entries[chosen.block];
             let own = (entry.clone(), self.coefficient(chosen.block));
             let known = finalists.iter().position(|one| one.starts[0].0.is_kin(entry));
+            if known.is_none() && chosen.gain < NEAR * best.gain {
+                continue;
+            }
             match known {
-                Some(k) if finalists[k].starts.len() < STARTS => finalists[k].starts.push(own),
+                Some(k) if finalists[k].has_room_for(entry) => finalists[k].starts.push(own),
                 None if finalists.len() < FINALISTS => {
                     finalists.push(Finalist { starts: vec![own] });
                 }

@@ -13,11 +13,11 @@ use lacuna::plugin::amend::Addition;
 use lacuna::plugin::effect::Description;
 use lacuna_linalg::vector::dot;
 use lacuna_linalg::{
-    Cholesky, Matrix, gram, multiply_transposed, multiply_vector, symmetric_eigen,
-    transposed_multiply_vector,
+    Cholesky, Matrix, gram, multiply_transposed, multiply_vector, transposed_multiply_vector,
 };
 
 use super::model::{Answer, Widened};
+use super::posterior::{Linear, Posterior, with_widths};
 use super::quantity::quantity;
 use super::sites::Site;
 use crate::gap::experiment::Experiment;
@@ -44,8 +44,7 @@ const HALVINGS: usize = 6;
 /// The relative gain of the penalised misfit at which the steps end.
 const GAIN: f64 = 1e-4;
 
-/// Numbers of sizes and of correlation times that are tried.
-const SIZES: usize = 31;
+/// The correlation times that are tried, by the number of cosines below which the density is flat.
 const CORNERS: [f64; 7] = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
 
 /// The data and the model for which a force is inferred.
@@ -113,26 +112,6 @@ pub(super) fn cosines(experiment: &Experiment<'_>) -> usize {
     let conditions =
         experiment.conditions.iter().filter(|c| !c.replicates.is_empty()).count().max(1);
     (longest / 2).min(COSINES).min(ALL / conditions).max(FEWEST)
-}
-
-/// The linearised problem at a point, whitened.
-struct Linear {
-    /// The residual to which the force that is there is added back, and the slopes of the unknowns, `unknowns x
-    /// outputs`.
-    residual: Vec<f64>,
-    slopes: Matrix,
-    /// The responses to all weights, `weights x outputs`, and their products in the metric.
-    directions: Matrix,
-    information: Matrix,
-    score: Vec<f64>,
-}
-
-/// The posterior of the weights.
-struct Posterior {
-    mean: Vec<f64>,
-    root: Matrix,
-    variances: Vec<f64>,
-    log_evidence: f64,
 }
 
 impl ForceSetting<'_, '_> {
@@ -380,38 +359,4 @@ fn inside(to: f64, from: f64, low: f64, high: f64) -> f64 {
     } else {
         to
     }
-}
-
-/// The posterior with these widths of the prior at size one and the size of largest evidence, around `unit`.
-fn with_widths(linear: &Linear, width: &[f64], unit: f64) -> Option<Posterior> {
-    let n = width.len();
-    let scaled = Matrix::from_fn(n, n, |i, j| width[i] * linear.information[(i, j)] * width[j]);
-    let eigen = symmetric_eigen(&scaled).ok()?;
-    let score: Vec<f64> = linear.score.iter().zip(width).map(|(b, w)| b * w).collect();
-    let along = transposed_multiply_vector(&eigen.vectors, &score);
-    let evidence = |square: f64| -> f64 {
-        let each = eigen.values.iter().zip(&along).map(|(l, b)| {
-            let grown = square * l.max(0.0);
-            0.5 * (square * b * b / (1.0 + grown) - grown.ln_1p())
-        });
-        each.sum()
-    };
-    let sizes = (0..SIZES).map(|k| {
-        let size = unit * 10f64.powf(-3.0 + 5.0 * k as f64 / (SIZES - 1) as f64);
-        (size * size, evidence(size * size))
-    });
-    let best = sizes.fold(None, |best: Option<(f64, f64)>, next| match best {
-        Some(best) if best.1 >= next.1 => Some(best),
-        _ => Some(next),
-    });
-    let (square, log_evidence) = best?;
-    let spread: Vec<f64> =
-        eigen.values.iter().map(|l| square / (1.0 + square * l.max(0.0))).collect();
-    let inner: Vec<f64> = spread.iter().zip(&along).map(|(s, b)| s * b).collect();
-    let mean = multiply_vector(&eigen.vectors, &inner);
-    let mean = mean.iter().zip(width).map(|(m, w)| m * w).collect();
-    let root =
-        Matrix::from_fn(n, n, |i, a| width[i] * eigen.vectors[(i, a)] * spread[a].max(0.0).sqrt());
-    let variances = width.iter().map(|w| square * w * w).collect();
-    Some(Posterior { mean, root, variances, log_evidence })
 }

@@ -1,6 +1,7 @@
 //! The dictionary: forms that the law of a missing rate may have, with their units.
 
 use lacuna::data::Unit;
+use lacuna::expression::is_name;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::moments::quantile;
 
@@ -58,8 +59,9 @@ pub(super) struct Entry {
     /// Its argument, as an expression, with its unit.
     pub of: String,
     pub unit: Unit,
-    /// The second factor of a product, as an expression.
+    /// The second factor of a product, as an expression, and as a reader would write it.
     pub by: String,
+    pub by_words: String,
     /// The exponent or the threshold, in the unit of the argument.
     pub value: f64,
     /// The root mean square of the argument along the run, and its largest and smallest value.
@@ -88,6 +90,7 @@ pub(super) fn entries(index: usize, site: &Site, seen: &[Seen<'_>]) -> Vec<Entry
         of: site.state.name.clone(),
         unit: site.state.unit.clone(),
         by: String::new(),
+        by_words: String::new(),
         value: 0.0,
         scale: 1.0,
         range: [0.0, 0.0],
@@ -118,6 +121,7 @@ fn of_one(index: usize, seen: &Seen<'_>) -> Vec<Entry> {
         of,
         unit: seen.argument.unit.clone(),
         by: String::new(),
+        by_words: String::new(),
         value,
         scale,
         range,
@@ -147,6 +151,11 @@ fn of_one(index: usize, seen: &Seen<'_>) -> Vec<Entry> {
     all
 }
 
+/// An expression as a factor.
+fn bare(text: &str) -> String {
+    if is_name(text) { text.to_owned() } else { format!("({text})") }
+}
+
 fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut all: Vec<f64> = values.collect();
     all.sort_by(f64::total_cmp);
@@ -162,16 +171,20 @@ fn products(index: usize, seen: &[&Seen<'_>]) -> Vec<Entry> {
             }
             let second = &b.argument.text;
             let width = quantity(rounded(BEND * b.scale()), &b.argument.unit);
-            let mut factors = vec![format!("({second})^2"), format!("hypot({second}, {width})")];
+            let mut factors = vec![
+                (format!("({second})^2"), format!("{}^2", bare(second))),
+                (format!("hypot({second}, {width})"), format!("abs({second})")),
+            ];
             if i < j {
-                factors.push(format!("({second})"));
+                factors.push((format!("({second})"), bare(second)));
             }
-            all.extend(factors.into_iter().map(|by| Entry {
+            all.extend(factors.into_iter().map(|(by, by_words)| Entry {
                 site: index,
                 form: Form::Product,
                 of: a.argument.text.clone(),
                 unit: a.argument.unit.clone(),
                 by,
+                by_words,
                 value: 0.0,
                 scale: a.scale(),
                 range: [0.0, 0.0],
@@ -233,23 +246,23 @@ impl Entry {
 
     /// The formula as a reader would write it, with these names of the coefficient and of the exponent or threshold.
     pub fn formula(&self, name: &str, index: &str) -> String {
-        let u = &self.of;
+        let u = &bare(&self.of);
         let scale = words(self.scale, &self.unit);
         let bend = words(BEND * self.scale, &self.unit);
         match self.form {
-            Form::Odd => format!("{name} * ({u}) * abs(({u}) / ({scale}))^({index} - 1)"),
-            Form::Even => format!("{name} * abs(({u}) / ({scale}))^{index}"),
+            Form::Odd => format!("{name} * {u} * abs({u} / ({scale}))^({index} - 1)"),
+            Form::Even => format!("{name} * abs({u} / ({scale}))^{index}"),
             Form::Sign => format!("{name} * sign({u})"),
             Form::Above => {
-                format!("{name} * max({u} - {index}, 0), with a bend of {bend} at the level")
+                format!("{name} * max({u} - {index}, 0) [bend {bend}]")
             }
             Form::Within => {
-                format!("{name} * clamp({u}, -{index}, {index}), with bends of {bend}")
+                format!("{name} * clamp({u}, -{index}, {index}) [bend {bend}]")
             }
             Form::Beyond => {
-                format!("{name} * ({u} - clamp({u}, -{index}, {index})), with bends of {bend}")
+                format!("{name} * ({u} - clamp({u}, -{index}, {index})) [bend {bend}]")
             }
-            Form::Product => format!("{name} * ({u}) * {}", self.by),
+            Form::Product => format!("{name} * {u} * {}", self.by_words),
             Form::Constant => name.to_owned(),
         }
     }
@@ -265,10 +278,15 @@ impl Entry {
             Form::Within => format!("a law found in the data: `{u}` within a gap"),
             Form::Beyond => format!("a law found in the data: the excess of `{u}` over a gap"),
             Form::Product => {
-                format!("a law found in the data: the product of `{u}` and `{}`", self.by)
+                format!("a law found in the data: the product of `{u}` and `{}`", self.by_words)
             }
             Form::Constant => "a law found in the data: a constant rate".to_owned(),
         }
+    }
+
+    /// True for a power above one.
+    pub fn is_steep(&self) -> bool {
+        self.form == Form::Odd && self.value > 1.0
     }
 
     /// True for an entry of the same form and arguments, whatever its exponent or threshold.

@@ -16,16 +16,22 @@
 //!
 //! A law is a law only if it predicts a condition or blocks that were used neither to choose nor to fit it ([`apart`]).
 
+mod along;
 pub mod apart;
 mod choose;
 mod find;
+mod finder;
 mod force;
 mod forms;
+mod grow;
 mod model;
+mod posterior;
 mod quantity;
+mod shown;
 mod sites;
 mod term;
 mod trial;
 
-pub use find::{Described, LawSetting, find};
+pub use find::{Described, find};
+pub use finder::LawSetting;
 pub use term::pieces;

@@ -24,6 +24,12 @@ pub struct Law {
     pub force: Force,
     /// The terms of the law; empty if no form of the dictionary describes the force.
     pub terms: Vec<LawTerm>,
+    /// Other forms in place of the only term, whose evidence is less by at most 20 to 1.
+    #[serde(default)]
+    pub rivals: Vec<LawTerm>,
+    /// The calibrated parameters of the study beside it.
+    #[serde(default)]
+    pub parameters: Vec<f64>,
     /// The proof on a condition or on blocks that were held out; `None` if there are none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub proof: Option<LawProof>,
@@ -136,8 +142,6 @@ impl Law {
             all.push(format!("It has no law: {reason}."));
             return all;
         }
-        let formulas: Vec<String> =
-            self.terms.iter().map(|term| format!("{}' = {}", term.state, term.formula)).collect();
         let values: Vec<String> = self.terms.iter().flat_map(LawTerm::values).collect();
         let stability: Vec<String> =
             self.terms.iter().map(|term| format!("{:.0} %", 100.0 * term.stability)).collect();
@@ -148,20 +152,73 @@ impl Law {
             ("It looks like".to_owned(), format!(" This is a description and no law: {reason}."))
         };
         all.push(format!(
-            "{begins} … + {}, with {}: {:.0} % of what the free force explains; forms of this kind are chosen in {} of \
+            "{begins} {}, with {}: {:.0} % of what the free force explains; forms of this kind are chosen in {} of \
              random halves of the data, among {} forms.{ends}",
-            formulas.join(" and … + "),
+            self.formula(),
             values.join(", "),
             100.0 * self.explained,
             stability.join(" and "),
             self.tried
         ));
         all.extend(self.proof.as_ref().map(LawProof::words));
+        if !self.rivals.is_empty() {
+            let rivals: Vec<String> = self
+                .rivals
+                .iter()
+                .map(|term| format!("{}' = … + {}", term.state, term.formula))
+                .collect();
+            all.push(format!(
+                "Other forms describe these data about as well: {}.",
+                rivals.join("; ")
+            ));
+        }
         all
     }
 }
 
+impl Law {
+    /// The terms and the rivals: all that a search has among its candidates.
+    pub fn candidates(&self) -> Vec<LawTerm> {
+        self.terms.iter().chain(&self.rivals).cloned().collect()
+    }
+
+    /// True if a search kept all terms.
+    pub fn is_kept_in(&self, kinds: &[&str]) -> bool {
+        self.terms.iter().all(|term| kinds.contains(&term.name.as_str()))
+    }
+
+    /// The rates with the terms, as a reader would write them.
+    fn formula(&self) -> String {
+        let mut states: Vec<&str> = Vec::new();
+        for term in &self.terms {
+            if !states.contains(&term.state.as_str()) {
+                states.push(&term.state);
+            }
+        }
+        let rate = |state: &&str| {
+            let own = self.terms.iter().filter(|term| term.state == **state);
+            let own: Vec<&str> = own.map(|term| term.formula.as_str()).collect();
+            format!("{state}' = … + {}", own.join(" + "))
+        };
+        states.iter().map(rate).collect::<Vec<_>>().join(" and ")
+    }
+}
+
 impl LawTerm {
+    /// The term under another name.
+    #[must_use]
+    pub fn renamed(mut self, name: &str) -> Self {
+        if let Some(index) = &mut self.index {
+            let new = index.name.replace(&self.name, name);
+            self.shape = self.shape.replace(&index.name, &new);
+            index.name = new;
+        }
+        self.formula = self.formula.replace(&self.name, name);
+        name.clone_into(&mut self.coefficient.name);
+        name.clone_into(&mut self.name);
+        self
+    }
+
     /// The unknowns with their values, in words.
     fn values(&self) -> Vec<String> {
         let all = std::iter::once(&self.coefficient).chain(&self.index);

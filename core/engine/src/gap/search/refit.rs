@@ -235,12 +235,25 @@ impl<'a> RefitSetting<'a, '_> {
             own.iter().zip(&bounds[begin..]).map(|(x, (lo, hi))| x.clamp(*lo, *hi)).collect()
         });
         let starts = self.nearest(base, &scored.placement, clamped.collect());
-        let starts: Vec<Vec<f64>> =
-            starts.iter().map(|own| base.at.point.iter().chain(own).copied().collect()).collect();
+        let starts: Vec<Vec<f64>> = starts
+            .iter()
+            .flat_map(|own| self.joint(&base.at.point, &scored.placement, own))
+            .collect();
         let fit = fit_from(&system, self.whitener, self.means, &starts)?;
         let grid = self.white.evidences(&fit)?;
         let log_weight = grid.sum() + self.log_prior(&scored.placement);
         Some(Refitted { scored: scored.clone(), system, fit, grid, log_weight })
+    }
+
+    /// The starts of a fit with a further placement: the calibrated unknowns as they are, and with the parameters that
+    /// its candidate states, followed by its own unknowns.
+    pub fn joint(&self, point: &[f64], placement: &Placement, own: &[f64]) -> Vec<Vec<f64>> {
+        let beside = &self.candidates[placement.candidate].beside;
+        let moved = (!beside.is_empty()).then(|| [&beside[..], &point[beside.len()..]].concat());
+        std::iter::once(point.to_vec())
+            .chain(moved)
+            .map(|point| [&point[..], own].concat())
+            .collect()
     }
 
     fn weighed(&self, one: Refitted<'_>) -> Weighed {

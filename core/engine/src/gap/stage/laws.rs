@@ -1,12 +1,16 @@
 //! The law of a missing rate: sought where no candidate has a name, proven on data that were held out, and searched for
 //! again among the candidates.
 
+use lacuna::data::Observations;
 use lacuna::run::Stop;
 
 use super::models::{ModelSearch, own_pieces};
-use super::prepared::{PreparedSearch, SearchModel, prepared};
+use super::prepared::{PreparedSearch, prepared};
+use super::search_model::SearchModel;
+use crate::gap::experiment::hold_out::{HeldOutData, HeldOutKind};
+use crate::gap::experiment::transient::without;
 use crate::gap::inside::{InsideCandidates, Pieces, extended};
-use crate::gap::law::apart::{Apart, apart};
+use crate::gap::law::apart::{Apart, apart, compared};
 use crate::gap::law::{Described, LawSetting, find, pieces};
 use crate::gap::result::GapResult;
 use crate::gap::result::law::{Law, LawProof, LawTerm};
@@ -51,6 +55,26 @@ fn is_open(result: &GapResult) -> bool {
     }
 }
 
+impl PreparedSearch<'_> {
+    /// The held-out data of other conditions, curves or places than those of the search.
+    fn elsewhere(&self) -> Option<&HeldOutData> {
+        self.split.held_out.iter().find(|part| part.kind != HeldOutKind::Replicates)
+    }
+
+    /// The proof of a law on held-out data; `all` are all measurements.
+    fn proof_of_law(
+        &self,
+        part: &HeldOutData,
+        all: &Observations,
+        described: &Described,
+    ) -> Result<Option<LawProof>, Stop> {
+        let all = &without(all, &self.transients);
+        let held_out = self.base.experiment(&part.data, &described.parameters)?;
+        let whole = self.base.experiment(all, &described.parameters)?;
+        Ok(compared(&held_out, &whole, described, (part.kind, &part.names)))
+    }
+}
+
 impl ModelSearch<'_> {
     /// The law of what a search left without a name; `None` if it is not sought or no rate lacks a force.
     pub(super) fn law(
@@ -72,7 +96,7 @@ impl ModelSearch<'_> {
         let experiment = parts.as_ref().map_or(own.experiment, |parts| &parts.training);
         let noise = found.noise.restricted(own.experiment, experiment);
         let setting =
-            LawSetting { study, experiment, noise: &noise, starts: own.starts(), stream: &stream };
+            LawSetting { study, experiment, noise: &noise, starts: &own.starts, stream: &stream };
         let Some(described) = find(&setting) else { return Ok(None) };
         let proof = match (elsewhere, &parts) {
             (Some(part), _) => own.proof_of_law(part, &measured.used, &described)?,
@@ -97,18 +121,20 @@ impl ModelSearch<'_> {
         mut law: Law,
     ) -> Result<Sought, Stop> {
         let Self { study, problem, measured, .. } = self;
-        let names: Vec<String> = law.terms.iter().map(|term| term.name.clone()).collect();
+        let all = law.candidates();
+        let names: Vec<String> = all.iter().map(|term| term.name.clone()).collect();
         let kept = result.additions.iter().flat_map(|a| a.class.iter().chain([&a.kind]).cloned());
         let only: Vec<String> = names.iter().cloned().chain(kept).collect();
-        let Some(pieces) = Pieces::with(study, pieces(&law.terms))? else {
+        let Some(pieces) = Pieces::with(study, pieces(&all))? else {
             law.reason = Some("the model with it cannot be made".to_owned());
             return Ok(Sought::Described(law));
         };
-        let inside = InsideCandidates {
-            candidates: pieces.candidates(),
-            wide: Some(extended(study, &pieces)?),
-            companion: None,
-        };
+        let mut candidates = pieces.candidates();
+        for candidate in candidates.iter_mut().filter(|own| names.contains(&own.kind)) {
+            candidate.beside.clone_from(&law.parameters);
+        }
+        let inside =
+            InsideCandidates { candidates, wide: Some(extended(study, &pieces)?), companion: None };
         let beginning =
             SearchModel { only: Some(&only), ..SearchModel::own(study, problem, &inside) };
         let random = own.random.named("law").named("search");
@@ -117,8 +143,9 @@ impl ModelSearch<'_> {
             let before = &found.first().fit.at.response;
             let mut all = with.result(&again, before, &measured.used)?;
             let added = all.worth_adding();
-            let is_named = |name: &String| added.iter().any(|a| a.kind == *name);
-            if !names.iter().all(is_named) {
+            let kinds: Vec<&str> = added.iter().map(|addition| addition.kind.as_str()).collect();
+            let exact = matches!(all.verdict.word, VerdictKind::Named | VerdictKind::Class);
+            if !exact || !law.is_kept_in(&kinds) {
                 law.reason = Some(not_kept(&all));
                 return Ok(Sought::Described(law));
             }

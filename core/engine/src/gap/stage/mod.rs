@@ -5,6 +5,7 @@
 mod laws;
 mod models;
 pub mod prepared;
+pub mod search_model;
 pub mod show;
 pub mod study_file;
 

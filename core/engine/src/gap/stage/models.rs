@@ -4,7 +4,8 @@ use lacuna::plugin::effect::On;
 use lacuna::run::{Observer, Stop};
 
 use super::laws::Sought;
-use super::prepared::{PreparedSearch, SearchModel, prepared};
+use super::prepared::{PreparedSearch, prepared};
+use super::search_model::SearchModel;
 use crate::gap::candidates::{Candidate, sensors};
 use crate::gap::inside::InsideCandidates;
 use crate::gap::inside::{AlternativeModel, ModelFits};

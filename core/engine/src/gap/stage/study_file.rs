@@ -170,7 +170,7 @@ fn divided<'a>(study: &Study, result: &'a GapResult) -> Result<Divided<'a>, Stop
     }
     let places: Vec<&[usize]> = inside.iter().map(|addition| &addition.switches[..]).collect();
     let law = result.law.iter().filter(|law| law.accepted);
-    let law: Vec<_> = law.flat_map(|law| law::pieces(&law.terms)).collect();
+    let law: Vec<_> = law.flat_map(|law| law::pieces(&law.candidates())).collect();
     if let Some(pieces) = Pieces::with(study, law)?.filter(|_| !edit.is_swap()) {
         edit = pieces.edit(study, &places);
     }
