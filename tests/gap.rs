@@ -18,6 +18,7 @@ mod companion;
 mod falling_balls;
 mod further_runs;
 mod inside;
+mod laws;
 mod models;
 mod names;
 mod next;

@@ -16,8 +16,8 @@ use super::{Equations, units};
 /// Option name of an expression whose unit is requested.
 const ASKED: &str = "asked";
 
-/// Name of the axis of expressions whose sizes are requested.
-const SIZES: &str = "size";
+/// Name of the axis of expressions whose values along a run are requested.
+const ALONG: &str = "along";
 
 impl Equations {
     /// Returns the states on which the rate of a state depends.
@@ -110,7 +110,7 @@ impl Amend for Equations {
         }
     }
 
-    fn sizes(&self, call: &Call<'_>, expressions: &[String]) -> Result<Vec<f64>, EvalError> {
+    fn along(&self, call: &Call<'_>, expressions: &[String]) -> Result<Vec<Vec<f64>>, EvalError> {
         let label = |i: usize| format!("{i:04}");
         let labels: Vec<String> = (0..expressions.len()).map(label).collect();
         let observe: BTreeMap<String, String> =
@@ -118,12 +118,11 @@ impl Amend for Equations {
         let shown = Self { observe: Observe::Each(observe), ..self.clone() };
         let is_grid = |axis: &&Axis| matches!(axis.coordinates, Coordinates::Grid { .. });
         let grids = call.layout.axes.iter().filter(is_grid).cloned();
-        let axes = std::iter::once(Axis::labels(SIZES, labels)).chain(grids).collect();
+        let axes = std::iter::once(Axis::labels(ALONG, labels)).chain(grids).collect();
         let layout = Layout { axes, ..call.layout.clone() };
         let values = shown.answer(&Call { layout: &layout, ..*call }, false)?.values;
         let length = (values.len() / expressions.len().max(1)).max(1);
-        let square = |part: &[f64]| part.iter().map(|x| x * x).sum::<f64>() / part.len() as f64;
-        Ok(values.chunks(length).map(|part| square(part).sqrt()).collect())
+        Ok(values.chunks(length).map(<[f64]>::to_vec).collect())
     }
 
     fn factors(&self, context: &Context<'_>) -> Vec<String> {

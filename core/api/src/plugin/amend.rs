@@ -21,8 +21,15 @@ pub trait Amend: Send + Sync {
         further: &[State],
     ) -> Result<Option<Unit>, Fault>;
 
+    /// Values of each expression along a run, at the places of the response's numeric axes.
+    fn along(&self, call: &Call<'_>, expressions: &[String]) -> Result<Vec<Vec<f64>>, EvalError>;
+
     /// Root mean square of each expression along a run.
-    fn sizes(&self, call: &Call<'_>, expressions: &[String]) -> Result<Vec<f64>, EvalError>;
+    fn sizes(&self, call: &Call<'_>, expressions: &[String]) -> Result<Vec<f64>, EvalError> {
+        let square = |part: &Vec<f64>| part.iter().map(|x| x * x).sum::<f64>() / part.len() as f64;
+        let values = self.along(call, expressions)?;
+        Ok(values.iter().map(|part| square(part).sqrt()).collect())
+    }
 
     /// Inputs that are coefficients of summands of rates and nothing else: at zero the summand is absent.
     fn factors(&self, context: &Context<'_>) -> Vec<String>;

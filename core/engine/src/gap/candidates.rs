@@ -28,6 +28,10 @@ pub struct Candidate {
     pub odds: f64,
     /// Types that it contains as special cases.
     pub contains: Vec<&'static str>,
+    /// The number of forms among which it was chosen by the data; 1 for a candidate that was stated beforehand.
+    pub tried: usize,
+    /// Values of the calibrated parameters beside it, from which fits with it start as well; empty for none.
+    pub beside: Vec<f64>,
 }
 
 /// A candidate with the labels on which it acts.
@@ -52,6 +56,8 @@ impl Candidate {
             effect,
             odds: 1.0,
             contains: Vec::new(),
+            tried: 1,
+            beside: Vec::new(),
         })
     }
 
@@ -221,6 +227,8 @@ mod tests {
             effect: Arc::new(InputEffect { places, inputs, description }),
             odds,
             contains: Vec::new(),
+            tried: 1,
+            beside: Vec::new(),
         }
     }
 

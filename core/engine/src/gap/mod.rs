@@ -18,6 +18,7 @@
 //! | [`result`] | all of this as plain data |
 //! | [`edit`] | changes of a study as text |
 //! | [`inside`] | candidates inside the model: inputs set free, terms of equations, other models |
+//! | [`law`] | where no candidate has a name: the rate that equations lack over time, and its law |
 //! | [`stage`] | the stage of the program: from a study to its result, and to the study with the effects |
 //! | [`power`] | injects effects and counts how often the workflow finds them |
 //! | [`report`] | the section of the report, and the text for the terminal |
@@ -60,6 +61,7 @@ pub mod drift;
 pub mod edit;
 pub mod experiment;
 pub mod inside;
+pub mod law;
 pub mod next;
 pub mod noise;
 pub mod power;

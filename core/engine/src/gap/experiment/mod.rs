@@ -1,6 +1,6 @@
 //! The data of a search: measurements by condition and curve, a forward map, and its errors.
 
-mod blocks;
+pub(in crate::gap) mod blocks;
 pub mod hold_out;
 pub mod stated;
 pub mod transient;

@@ -27,6 +27,8 @@ use crate::study::Study;
 
 pub use pieces::{Piece, Pieces};
 pub use swap::{AlternativeModel, BayesFactor, ModelFits, alternatives, swapped};
+pub(in crate::gap) use terms::coefficient_unit;
+pub(in crate::gap) use unasked::{Sited, free, sites};
 
 /// The candidates inside the model, with the forward map that has them as inputs; empty if the study names none.
 #[derive(Default)]
@@ -71,8 +73,16 @@ pub fn candidates<'a>(
     let wide = if problem.emulator().is_some() {
         emulated::wide(pieces, study, problem, run, observer)?
     } else {
-        let forward = Box::new(RestrictedMap::new(study, pieces, pieces.narrower())?);
-        ExtendedMap { forward, inputs: pieces.inputs.clone(), common: Vec::new() }
+        extended(study, pieces)?
     };
     Ok((pieces.candidates(), wide))
+}
+
+/// The extended forward map of a study without a surrogate.
+pub(in crate::gap) fn extended<'a>(
+    study: &'a Study,
+    pieces: &'a Pieces,
+) -> Result<ExtendedMap<'a>, Stop> {
+    let forward = Box::new(RestrictedMap::new(study, pieces, pieces.narrower())?);
+    Ok(ExtendedMap { forward, inputs: pieces.inputs.clone(), common: Vec::new() })
 }

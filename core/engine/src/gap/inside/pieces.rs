@@ -53,6 +53,8 @@ pub struct Piece {
     pub addition: Option<Addition>,
     /// The place of an input that is one of several for the same physics.
     pub at: Option<SwitchPlace>,
+    /// The number of forms among which it was chosen by the data; 1 for a piece that was stated beforehand.
+    pub tried: usize,
 }
 
 impl Pieces {
@@ -63,10 +65,36 @@ impl Pieces {
             let (freed, description) = freed(study, switch)?;
             let kind = own_kind(&switch.input);
             let (places, at) = (vec![inputs.len()], switch.place.clone());
-            all.push(Piece { kind, description, places, addition: None, at });
+            all.push(Piece { kind, description, places, addition: None, at, tried: 1 });
             inputs.push(freed);
         }
         terms::add(study, &mut all, &mut inputs)?;
+        Self::made(study, all, inputs)
+    }
+
+    /// The pieces of a study, followed by others, each with its inputs: the indices of its places are those of its own
+    /// inputs.
+    pub fn with(
+        study: &Study,
+        further: Vec<(Piece, Vec<FreeInput>)>,
+    ) -> Result<Option<Self>, Stop> {
+        let own = Self::of(study)?;
+        let (mut all, mut inputs) = own.map_or_else(Default::default, |own| (own.all, own.inputs));
+        append(&mut all, &mut inputs, further);
+        Self::made(study, all, inputs)
+    }
+
+    /// These pieces alone, as in [`Pieces::with`].
+    pub fn alone(
+        study: &Study,
+        pieces: Vec<(Piece, Vec<FreeInput>)>,
+    ) -> Result<Option<Self>, Stop> {
+        let (mut all, mut inputs) = (Vec::new(), Vec::new());
+        append(&mut all, &mut inputs, pieces);
+        Self::made(study, all, inputs)
+    }
+
+    fn made(study: &Study, all: Vec<Piece>, inputs: Vec<FreeInput>) -> Result<Option<Self>, Stop> {
         let every: Vec<usize> = (0..all.len()).collect();
         let whole = ExtendedModel::of(study, &all, &inputs, &every)?;
         let narrower = RestrictedModels::new();
@@ -120,6 +148,8 @@ impl Pieces {
                 effect,
                 odds: 1.0,
                 contains: terms::contained(&piece.kind),
+                tried: piece.tried,
+                beside: Vec::new(),
             }
         };
         self.all.iter().map(candidate).collect()
@@ -176,6 +206,19 @@ impl ExtendedModel {
             .map_err(|error| Stop::new(format!("the model with further terms: {error}")))?;
         let model = Section { common: section.common.clone(), built };
         Ok(Some(Self { inputs: free, model, given }))
+    }
+}
+
+/// Appends pieces with their inputs.
+fn append(
+    all: &mut Vec<Piece>,
+    inputs: &mut Vec<FreeInput>,
+    further: Vec<(Piece, Vec<FreeInput>)>,
+) {
+    for (mut piece, own) in further {
+        piece.places.iter_mut().for_each(|place| *place += inputs.len());
+        all.push(piece);
+        inputs.extend(own);
     }
 }
 

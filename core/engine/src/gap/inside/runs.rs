@@ -55,6 +55,8 @@ pub fn candidates(
             odds: 1.0,
             effect,
             contains: Vec::new(),
+            tried: 1,
+            beside: Vec::new(),
         })
     };
     others.map(one).collect()

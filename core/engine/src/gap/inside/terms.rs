@@ -75,6 +75,7 @@ fn put(
         places: (begin..inputs.len()).collect(),
         addition: Some(addition(name, &section.common.state, summand)),
         at: None,
+        tried: 1,
     });
 }
 
@@ -165,20 +166,7 @@ impl TermSetting<'_> {
         state: &State,
         summand: &Summand,
     ) -> Result<Unit, String> {
-        let indices = summand.indices.iter();
-        let indices = indices.map(|i| Given { name: i.name.clone(), unit: Some(i.unit.clone()) });
-        let given: Vec<Given> = context.given.iter().cloned().chain(indices).collect();
-        let context = Context { given: &given, ..*context };
-        let shape = self.amend.unit(&context, &summand.shape, &summand.states);
-        let shape = shape.map_err(|fault| format!("`{}`: {fault}", summand.shape))?;
-        let rate = state.rate_unit.as_ref();
-        let unit = rate.and_then(|rate| rate.times(&shape.unwrap_or_default().power(-1.0)?));
-        unit.map(Unit::plain).ok_or_else(|| {
-            format!(
-                "no unit is that of the rate of `{}` by that of `{}`",
-                state.name, summand.shape
-            )
-        })
+        coefficient_unit(self.amend, context, state, summand)
     }
 
     /// The prior of the coefficient: its width follows from the ratio of the size of the rate to that of the shape.
@@ -262,4 +250,24 @@ impl TermSetting<'_> {
         })
         .collect()
     }
+}
+
+/// The unit of the coefficient of a summand: that of the rate by that of the shape.
+pub(in crate::gap) fn coefficient_unit(
+    amend: &dyn Amend,
+    context: &Context<'_>,
+    state: &State,
+    summand: &Summand,
+) -> Result<Unit, String> {
+    let indices = summand.indices.iter();
+    let indices = indices.map(|i| Given { name: i.name.clone(), unit: Some(i.unit.clone()) });
+    let given: Vec<Given> = context.given.iter().cloned().chain(indices).collect();
+    let context = Context { given: &given, ..*context };
+    let shape = amend.unit(&context, &summand.shape, &summand.states);
+    let shape = shape.map_err(|fault| format!("`{}`: {fault}", summand.shape))?;
+    let rate = state.rate_unit.as_ref();
+    let unit = rate.and_then(|rate| rate.times(&shape.unwrap_or_default().power(-1.0)?));
+    unit.map(Unit::plain).ok_or_else(|| {
+        format!("no unit is that of the rate of `{}` by that of `{}`", state.name, summand.shape)
+    })
 }

@@ -65,13 +65,14 @@ pub(super) fn sections(
 }
 
 /// A state with the quantities on which its rate depends.
-struct Sited<'a> {
-    state: &'a State,
-    positions: Vec<&'a State>,
-    others: Vec<&'a State>,
+pub(in crate::gap) struct Sited<'a> {
+    pub state: &'a State,
+    pub positions: Vec<&'a State>,
+    pub others: Vec<&'a State>,
 }
 
-fn sites(states: &[State]) -> Vec<Sited<'_>> {
+/// All states whose rate is not simply another state.
+pub(in crate::gap) fn sites(states: &[State]) -> Vec<Sited<'_>> {
     let leader = |state: &State| {
         let rate = state.rate.trim();
         states.iter().find(|other| other.name == rate).map(|other| other.name.as_str())
@@ -127,7 +128,8 @@ fn argument(of: &str) -> String {
     }
 }
 
-fn free(name: String, taken: &[String]) -> String {
+/// The name, with a number if it is taken.
+pub(in crate::gap) fn free(name: String, taken: &[String]) -> String {
     let mut free = name.clone();
     let mut count = 1;
     while taken.contains(&free) {

@@ -2,6 +2,7 @@
 
 mod figures;
 mod insight;
+mod law;
 pub mod next;
 pub mod power;
 mod proof;
@@ -65,6 +66,7 @@ pub fn section(view: &View<'_>, gap: &GapFindings, numbers: &mut Numbers) -> Sec
             (reliability::figure(&[("before the correction by this count", counted)], numbers))
         }
         (insight::all(view, result, numbers))
+        (law::figures(view, result, numbers))
         @if let Some(warning) = proof::warning(gap) { p { b { (paragraph(&warning)) } } }
         (tables::parameters(gap, numbers))
         @if let Some(averages) = proof::averages(gap, numbers) { (averages) }

@@ -4,6 +4,7 @@ use lacuna::plugin::effect::On;
 
 use super::{View, proof};
 use crate::gap::experiment::hold_out::HeldOutKind;
+use crate::gap::result::law::Law;
 use crate::gap::result::remains::Remains;
 use crate::gap::result::replaced::OtherModel;
 use crate::gap::result::{AddedEffect, GapFindings, GapResult, HeldOut, RegionResult};
@@ -39,6 +40,7 @@ pub fn sentences(view: &View<'_>, gap: &GapFindings) -> Vec<String> {
     sentences
         .extend(gap.held_out().iter().map(|part| held_out(part, !result.additions.is_empty())));
     sentences.extend(proof::sentences(gap));
+    sentences.extend(result.law.iter().flat_map(Law::words));
     sentences.extend(proof::members(gap));
     sentences.extend(result.needless.iter().map(Needless::words));
     sentences.extend(result.models.iter().map(other_model));

@@ -6,6 +6,7 @@ mod alike;
 pub mod companion;
 mod curve;
 pub mod insight;
+pub mod law;
 pub mod members;
 pub mod names;
 pub mod remains;
@@ -24,6 +25,7 @@ use crate::gap::experiment::hold_out::HeldOutKind;
 use crate::gap::prove::Proof;
 use crate::gap::result::companion::IdentifiedCompanion;
 use crate::gap::result::insight::{Insight, insight, withhold};
+use crate::gap::result::law::Law;
 use crate::gap::result::members::{Member, members};
 use crate::gap::result::names::NameProof;
 use crate::gap::result::remains::{Remains, remains};
@@ -116,6 +118,9 @@ pub struct GapResult {
     /// The companion with its constants; `None` if the study has none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub companion: Option<IdentifiedCompanion>,
+    /// The missing rate of the equations and its law; `None` if it was not sought or nothing was found.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub law: Option<Law>,
     /// The insight besides the verdict.
     pub insight: Insight,
     /// The proof on held-out data, by kind.
@@ -282,6 +287,7 @@ impl GapResult {
             left: both.map(|diagnostics| diagnostics.statistics.residual.clone()),
             remains: remains(found),
             companion: None,
+            law: None,
             insight,
             held_out: Vec::new(),
             models: Vec::new(),

@@ -235,12 +235,25 @@ impl<'a> RefitSetting<'a, '_> {
             own.iter().zip(&bounds[begin..]).map(|(x, (lo, hi))| x.clamp(*lo, *hi)).collect()
         });
         let starts = self.nearest(base, &scored.placement, clamped.collect());
-        let starts: Vec<Vec<f64>> =
-            starts.iter().map(|own| base.at.point.iter().chain(own).copied().collect()).collect();
+        let starts: Vec<Vec<f64>> = starts
+            .iter()
+            .flat_map(|own| self.joint(&base.at.point, &scored.placement, own))
+            .collect();
         let fit = fit_from(&system, self.whitener, self.means, &starts)?;
         let grid = self.white.evidences(&fit)?;
         let log_weight = grid.sum() + self.log_prior(&scored.placement);
         Some(Refitted { scored: scored.clone(), system, fit, grid, log_weight })
+    }
+
+    /// The starts of a fit with a further placement: the calibrated unknowns as they are, and with the parameters that
+    /// its candidate states, followed by its own unknowns.
+    pub fn joint(&self, point: &[f64], placement: &Placement, own: &[f64]) -> Vec<Vec<f64>> {
+        let beside = &self.candidates[placement.candidate].beside;
+        let moved = (!beside.is_empty()).then(|| [&beside[..], &point[beside.len()..]].concat());
+        std::iter::once(point.to_vec())
+            .chain(moved)
+            .map(|point| [&point[..], own].concat())
+            .collect()
     }
 
     fn weighed(&self, one: Refitted<'_>) -> Weighed {
@@ -307,8 +320,8 @@ impl<'a> RefitSetting<'a, '_> {
 /// of a textbook.
 const GENERAL: f64 = 4.0;
 
-/// The log prior mass of a placement within its type, divided among the variants of the type, plus the log of the
-/// type's share by the [odds](log_group_share) of its group.
+/// The log prior mass of a placement within its type, divided among the variants of the type and among the forms from
+/// which the data chose it, plus the log of the type's share by the [odds](log_group_share) of its group.
 pub fn placement_prior(candidates: &[Candidate], placement: &Placement, sensors: usize) -> f64 {
     let candidate = &candidates[placement.candidate];
     let versions = candidates.iter().filter(|c| c.kind == candidate.kind).count();
@@ -316,7 +329,7 @@ pub fn placement_prior(candidates: &[Candidate], placement: &Placement, sensors:
     let place = log_prior(candidate.effect.reach(), chosen, sensors) - (versions as f64).ln();
     let is_general = candidates.iter().any(|c| candidate.contains.contains(&c.kind.as_str()));
     let form = if is_general { -GENERAL.ln() } else { 0.0 };
-    place + form + log_group_share(candidates, candidate)
+    place + form - (candidate.tried as f64).ln() + log_group_share(candidates, candidate)
 }
 
 /// The number of sensors that a placement acts on, by the labels of its place.

@@ -59,17 +59,24 @@ impl<'a> SearchState<'a> {
 
     /// The state with a further placement, refitted from these values of its unknowns.
     pub fn with(&self, shared: &SearchSetting<'a, '_>, placement: &Placement, own: &[f64]) -> Self {
-        let system = self.refit_setting(shared).with(placement);
-        let start: Vec<f64> = self.fit.at.point.iter().chain(own).copied().collect();
+        let setting = self.refit_setting(shared);
+        let system = setting.with(placement);
+        let starts = setting.joint(&self.fit.at.point, placement, own);
         let mut next = self.clone();
         next.chosen.push(placement.clone());
-        next.refit(shared, system, &start);
+        next.refit(shared, system, &starts);
         next
     }
 
     /// Fits the system, estimates the noise around its response again, and fits once more.
-    fn refit(&mut self, shared: &SearchSetting<'a, '_>, system: System<'a>, start: &[f64]) {
-        let first = fit(&system, &self.whitener, shared.means, start);
+    fn refit(&mut self, shared: &SearchSetting<'a, '_>, system: System<'a>, starts: &[Vec<f64>]) {
+        let several = if starts.len() > 1 {
+            fit_from(&system, &self.whitener, shared.means, starts)
+        } else {
+            None
+        };
+        let first =
+            several.unwrap_or_else(|| fit(&system, &self.whitener, shared.means, &starts[0]));
         let around = system.around(&first.at);
         self.noise = Noise::of(shared.experiment, &around, Some(&self.noise));
         self.whitener = Whitener::new(shared.experiment, &self.noise, &around.response);

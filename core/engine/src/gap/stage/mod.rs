@@ -2,8 +2,10 @@
 //!
 //! Data are held out before the search, so that the stage calibrates again with the other data only.
 
+mod laws;
 mod models;
 pub mod prepared;
+pub mod search_model;
 pub mod show;
 pub mod study_file;
 

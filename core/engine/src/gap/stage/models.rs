@@ -3,7 +3,9 @@
 use lacuna::plugin::effect::On;
 use lacuna::run::{Observer, Stop};
 
-use super::prepared::{PreparedSearch, SearchModel, prepared};
+use super::laws::Sought;
+use super::prepared::{PreparedSearch, prepared};
+use super::search_model::SearchModel;
 use crate::gap::candidates::{Candidate, sensors};
 use crate::gap::inside::InsideCandidates;
 use crate::gap::inside::{AlternativeModel, ModelFits};
@@ -53,6 +55,12 @@ impl ModelSearch<'_> {
             if !found.alarmed(own.options) {
                 return Ok(result);
             }
+            if let Some(law) = self.law(own, &found, &result)? {
+                match law {
+                    Sought::Accepted(with) => return Ok(*with),
+                    Sought::Described(law) => result.law = Some(law),
+                }
+            }
             let explains_more = |alternative: &&AlternativeModel<'_>| {
                 result.models.iter().any(|m| m.name == alternative.name && m.log_odds > 0.0)
             };
@@ -68,7 +76,11 @@ impl ModelSearch<'_> {
 
     /// The comparison of other models with the study's, none with effects that were found; those that explain most
     /// first.
-    fn compared(&self, own: &PreparedSearch<'_>, found: &SearchResult<'_>) -> Vec<OtherModel> {
+    pub(super) fn compared(
+        &self,
+        own: &PreparedSearch<'_>,
+        found: &SearchResult<'_>,
+    ) -> Vec<OtherModel> {
         let compare = |alternative: &AlternativeModel<'_>| {
             let stream = own.random.named("models").named(&alternative.name);
             let effects = self.study.placed_effects();
@@ -91,7 +103,8 @@ impl ModelSearch<'_> {
         let inside = InsideCandidates::default();
         let (forward, parameters) = (&*alternative.forward, &alternative.parameters[..]);
         let other = Some(&alternative.common[..]);
-        let beginning = SearchModel { forward, parameters, region: None, inside: &inside, other };
+        let beginning =
+            SearchModel { forward, parameters, region: None, inside: &inside, other, only: None };
         prepared(study, problem, &beginning, &random, |with| {
             let found_with = with.search()?;
             let side = |of: &SearchResult<'_>| vec![of.last.fit.at.point.clone()];

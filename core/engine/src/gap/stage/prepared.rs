@@ -9,6 +9,7 @@ use lacuna::plugin::effect::Situation;
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
 
+use super::search_model::SearchModel;
 use crate::gap::candidates::{Candidate, Proposed, Untried, proposed};
 use crate::gap::experiment::Experiment;
 use crate::gap::experiment::hold_out::{HeldOutData, HeldOutKind, HoldOutSplit, split};
@@ -16,7 +17,6 @@ use crate::gap::experiment::stated::Statement;
 use crate::gap::experiment::transient::{Transient, joined, transients, without};
 use crate::gap::experiment::wider::ExtendedMap;
 use crate::gap::experiment::with_effects::WithEffects;
-use crate::gap::inside::InsideCandidates;
 use crate::gap::inside::advice::what_would_tell;
 use crate::gap::next::{Wish, after};
 use crate::gap::noise::{Noise, ResponseTangents};
@@ -38,39 +38,12 @@ const STARTS: usize = 4;
 /// The share of `false_alarm` for the scores; the rest is for scan and energy.
 const NAMES: f64 = 0.6;
 
-/// A model with which a search begins: the study's, or another in its place.
-#[derive(Clone, Copy)]
-pub struct SearchModel<'a> {
-    /// The forward map: from parameters to responses.
-    pub forward: &'a dyn Forward,
-    /// The parameters.
-    pub parameters: &'a [Parameter],
-    /// The bounds within which the forward map is valid, if they are narrower than the priors.
-    pub region: Option<&'a [(f64, f64)]>,
-    /// The candidates inside it.
-    pub inside: &'a InsideCandidates<'a>,
-    /// The covariance of the emulator's error of another model than the study's.
-    pub other: Option<&'a [CommonError]>,
-}
-
-impl<'a> SearchModel<'a> {
-    /// The study's model.
-    pub fn own(
-        study: &'a Study,
-        problem: &InverseProblem<'a>,
-        inside: &'a InsideCandidates<'a>,
-    ) -> Self {
-        let (forward, region) = (problem.forward(), problem.region());
-        Self { forward, parameters: &study.parameters, region, inside, other: None }
-    }
-}
-
 /// The data, candidates and starts of a search.
 pub struct PreparedSearch<'a> {
-    base: &'a BaseModel<'a>,
-    split: &'a HoldOutSplit,
-    transients: Vec<Transient>,
-    starts: Vec<Vec<f64>>,
+    pub(super) base: &'a BaseModel<'a>,
+    pub(super) split: &'a HoldOutSplit,
+    pub(super) transients: Vec<Transient>,
+    pub(super) starts: Vec<Vec<f64>>,
     /// The data that are not held out.
     pub experiment: &'a Experiment<'a>,
     /// The candidates.
@@ -121,6 +94,8 @@ pub fn prepared<T>(
         candidates.extend(learned.candidates);
         untried.extend(learned.untried);
     }
+    let is_tried = |kind: &String| beginning.only.is_none_or(|only| only.contains(kind));
+    candidates.retain(|candidate| is_tried(&candidate.kind));
     let odds = &study.gap.keys.prior_odds;
     let inside = odds.of_inside(experiment.most_replicates() > 1);
     for candidate in &mut candidates {

@@ -11,7 +11,8 @@ use lacuna_run::{Artifact, Kept, RunDirectory, Stage};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::prepared::{BaseModel, FittedSystem, SearchModel, apart};
+use super::prepared::{BaseModel, FittedSystem, apart};
+use super::search_model::SearchModel;
 use crate::gap::experiment::with_effects::WithEffects;
 use crate::gap::inside::InsideCandidates;
 use crate::gap::noise::Noise;

@@ -13,6 +13,7 @@ use crate::gap::edit::{Edit, with_keys};
 use crate::gap::inside;
 use crate::gap::inside::Pieces;
 use crate::gap::inside::companion::edit::with_added;
+use crate::gap::law;
 use crate::gap::result::{AddedEffect, Estimate, GapResult};
 use crate::gap::search::needless::Needless;
 use crate::gap::test::is_at_floor;
@@ -168,7 +169,9 @@ fn divided<'a>(study: &Study, result: &'a GapResult) -> Result<Divided<'a>, Stop
         edit = inside::swapped(study, &other.name)?.unwrap_or_default();
     }
     let places: Vec<&[usize]> = inside.iter().map(|addition| &addition.switches[..]).collect();
-    if let Some(pieces) = Pieces::of(study)?.filter(|_| !edit.is_swap()) {
+    let law = result.law.iter().filter(|law| law.accepted);
+    let law: Vec<_> = law.flat_map(|law| law::pieces(&law.candidates())).collect();
+    if let Some(pieces) = Pieces::with(study, law)?.filter(|_| !edit.is_swap()) {
         edit = pieces.edit(study, &places);
     }
     Ok((Some((edit, why)), on_top))

@@ -4,7 +4,7 @@
 mod dictionary;
 mod features;
 mod process;
-mod selection;
+pub(in crate::gap) mod selection;
 mod smoother;
 mod symbolic;
 #[cfg(test)]

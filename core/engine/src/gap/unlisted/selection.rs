@@ -15,18 +15,23 @@ const OWN: f64 = 1e-4;
 
 /// The metric `I - Q Q'` of whitened outputs, where `Q` is the part in the outputs of an orthonormal basis of the
 /// slopes with their priors: it is the covariance of white noise after a calibration.
-pub(super) struct Metric {
+pub(in crate::gap) struct Metric {
     q: Matrix,
     outputs: usize,
 }
 
 impl Metric {
     pub fn new(system: &System<'_>, fit: &Fit) -> Option<Self> {
-        let (unknowns, outputs) = (fit.slopes.rows(), fit.slopes.columns());
-        let width: Vec<f64> = system.priors().iter().map(|p| 1.0 / precision(p).sqrt()).collect();
+        Self::off(&fit.slopes, &system.priors().iter().map(precision).collect::<Vec<_>>())
+    }
+
+    /// The metric off whitened slopes, `unknowns x outputs`, with the precisions of the priors.
+    pub fn off(slopes: &Matrix, precisions: &[f64]) -> Option<Self> {
+        let (unknowns, outputs) = (slopes.rows(), slopes.columns());
+        let width: Vec<f64> = precisions.iter().map(|p| 1.0 / p.sqrt()).collect();
         let augmented = Matrix::from_fn(outputs + unknowns, unknowns, |i, j| {
             if i < outputs {
-                fit.slopes[(j, i)] * width[j]
+                slopes[(j, i)] * width[j]
             } else {
                 f64::from(u8::from(i - outputs == j))
             }
@@ -58,7 +63,7 @@ impl Metric {
 }
 
 /// Blocks of whitened directions, with the products that a selection needs.
-pub(super) struct Blocks<'a> {
+pub(in crate::gap) struct Blocks<'a> {
     pub metric: &'a Metric,
     /// The directions, one per row, and their squared lengths in the metric.
     pub rows: &'a Matrix,
@@ -74,7 +79,7 @@ pub(super) struct Blocks<'a> {
 
 /// A block that was chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Chosen {
+pub(in crate::gap) struct Chosen {
     pub block: usize,
     /// The gain in log-likelihood, and the same minus the price.
     pub gain: f64,
@@ -83,7 +88,7 @@ pub(super) struct Chosen {
 
 /// State of a selection: all blocks, orthogonal to those that were chosen.
 #[derive(Clone)]
-pub(super) struct Left {
+pub(in crate::gap) struct Left {
     /// Orthonormal directions of the chosen blocks, with their products in the metric.
     taken: Vec<(Vec<f64>, Vec<f64>)>,
     within: Vec<Matrix>,
@@ -133,32 +138,39 @@ impl<'a> Blocks<'a> {
 
     /// The block of best criterion in addition to those that were chosen, by the scores of a residual.
     pub fn best(&self, left: &Left, scores: &[f64], residual: &[f64]) -> Option<Chosen> {
+        self.each(left, scores, residual).fold(None, |best: Option<Chosen>, next| match best {
+            Some(best) if best.criterion >= next.criterion => Some(best),
+            _ => Some(next),
+        })
+    }
+
+    /// The gain of each block in addition to those that were chosen, without those that depend linearly on them.
+    pub fn each(
+        &self,
+        left: &Left,
+        scores: &[f64],
+        residual: &[f64],
+    ) -> impl Iterator<Item = Chosen> {
         let onto: Vec<f64> = left.taken.iter().map(|(u, _)| dot(u, residual)).collect();
-        let mut best: Option<Chosen> = None;
-        for (block, own) in self.members.iter().enumerate() {
+        let gain = move |(block, own): (usize, &Vec<usize>)| {
             let gram = &left.within[block];
             let says = |(k, &a): (usize, &usize)| {
                 self.squares[a] > 0.0 && gram[(k, k)] > OWN * self.squares[a]
             };
             if !own.iter().enumerate().all(says) {
-                continue;
+                return None;
             }
-            let Ok(factor) = Cholesky::new(gram) else { continue };
-            let mut score: Vec<f64> = own
-                .iter()
-                .map(|&a| {
-                    let taken = left.along.iter().zip(&onto).map(|(along, o)| along[a] * o);
-                    scores[a] - taken.sum::<f64>()
-                })
-                .collect();
+            let factor = Cholesky::new(gram).ok()?;
+            let rest = |&a: &usize| {
+                let taken = left.along.iter().zip(&onto).map(|(along, o)| along[a] * o);
+                scores[a] - taken.sum::<f64>()
+            };
+            let mut score: Vec<f64> = own.iter().map(rest).collect();
             factor.whiten(&mut score);
             let gain = 0.5 * dot(&score, &score);
-            let criterion = gain - self.price * own.len() as f64;
-            if best.is_none_or(|best| criterion > best.criterion) {
-                best = Some(Chosen { block, gain, criterion });
-            }
-        }
-        best
+            Some(Chosen { block, gain, criterion: gain - self.price * own.len() as f64 })
+        };
+        self.members.iter().enumerate().filter_map(gain)
     }
 
     /// Adds a block to those that were chosen, and makes all others orthogonal to it.

@@ -48,6 +48,10 @@ pub struct GapSection {
     /// `true` also tries the library's terms that the study does not name, if the study has no surrogate and its model
     /// is written as equations; `false` restricts terms to those of `[[gap.term]]`.
     pub terms: bool,
+    /// `true` seeks the law of what the equations lack where no candidate has a name, if the study has no surrogate and its
+    /// model is written as equations: a further force in each rate is inferred over time, and described as a function of
+    /// the states. `false` does not.
+    pub laws: bool,
     /// Prior odds of physics inside the model (`[[gap.switch]]`, terms, `[gap.companion]`, `[[gap.runs]]`) against effects on
     /// the response, such as `{ inside = 1, response = 1 }`, the default. The types of each share its probability equally.
     pub prior_odds: PriorOdds,
@@ -76,6 +80,7 @@ impl Default for GapSection {
             simulations: count(399),
             candidates: None,
             terms: true,
+            laws: true,
             prior_odds: PriorOdds::default(),
             hold_out: HoldOut::default(),
             add: Vec::new(),

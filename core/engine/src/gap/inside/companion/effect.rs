@@ -153,6 +153,8 @@ impl Learning<'_> {
         });
         Candidate {
             contains: terms::contained(&kind),
+            tried: 1,
+            beside: Vec::new(),
             kind,
             plugin: IN_COMPANION.to_owned(),
             options: Table::new(),

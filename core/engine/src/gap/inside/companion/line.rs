@@ -113,7 +113,8 @@ mod tests {
                 source: String::new(),
             };
             let (places, addition) = (vec![0], None);
-            let piece = Piece { kind: "leak".into(), description, places, addition, at: None };
+            let piece =
+                Piece { kind: "leak".into(), description, places, addition, at: None, tried: 1 };
             let change = learned(factor, &input);
             Line::add(&mut lines, "leak".into(), at, &piece, vec![input], change);
         }

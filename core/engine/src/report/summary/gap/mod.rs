@@ -4,6 +4,7 @@ mod companion;
 mod effect;
 mod held_out;
 mod insight;
+mod law;
 mod proof;
 
 use schemars::JsonSchema;
@@ -13,6 +14,7 @@ use self::companion::Companion;
 use self::effect::Effect;
 use self::held_out::HeldOut;
 use self::insight::Insight;
+use self::law::Law;
 use self::proof::{Averaged, Member, Proof};
 use super::value::{ByName, Quantity};
 use crate::gap::candidates::Untried;
@@ -81,6 +83,9 @@ pub struct Gap {
     #[serde(skip_serializing_if = "ByName::is_empty")]
     #[schemars(extend("propertyNames" = { "title": "piece" }))]
     pub needless: ByName<Odds>,
+    /// What a rate of the model's equations lacks, and its law; only if it was sought and found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub law: Option<Law>,
     /// Further results of the search.
     pub insight: Insight,
     /// The keys that a run of the study with the effects adds.
@@ -200,6 +205,7 @@ impl Gap {
             held_out_further,
             models: models.map(|m| (m.name.clone(), Odds::of(m.log_odds, m.error))).collect(),
             needless: needless.map(|n| (n.name.clone(), Odds::of(n.log_odds, n.error))).collect(),
+            law: result.law.as_ref().map(Law::of),
             insight: Insight::of(&result.insight),
             added: added.map(Added::of),
         }
