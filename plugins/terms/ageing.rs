@@ -40,7 +40,7 @@ impl Term for Ageing {
     fn proposals(&self, site: &Site<'_>) -> Vec<Table> {
         let own =
             std::iter::once(Table::new()).filter(|_| site.state.uses.contains(&site.state.name));
-        own.chain(of_each(site.positions)).chain(of_each(site.others)).collect()
+        own.chain(of_each(&site.springs())).chain(of_each(site.others)).collect()
     }
 
     fn summand(&self, place: &Place<'_>) -> Result<Summand, String> {

@@ -18,8 +18,12 @@ use crate::stage::simulator::{Setting, Simulator};
 use crate::study::Study;
 use crate::study::gap::TermKeys;
 
-/// The share of the rate that a term contributes at one standard deviation of its coefficient.
+/// The share of the rate that a term contributes at the scale of the prior of its coefficient.
 const SHARE: f64 = 0.5;
+
+/// The degrees of freedom of the prior of a coefficient of either sign. Its tails are heavy, as are those of the exponential
+/// prior of a positive one: what is missing may be several times as large as the rate in the middle of the priors.
+const FREEDOM: f64 = 3.0;
 
 /// The number of points of the priors at which sizes are sought that the middle of the priors does not have.
 const POINTS: u64 = 16;
@@ -193,8 +197,8 @@ impl TermSetting<'_> {
             ));
         }
         Ok(match summand.sign {
-            Sign::Either => Distribution::Normal([0.0, sd]),
-            Sign::Positive => Distribution::HalfNormal(sd),
+            Sign::Either => Distribution::StudentT([FREEDOM, 0.0, sd]),
+            Sign::Positive => Distribution::Exponential(sd),
         })
     }
 

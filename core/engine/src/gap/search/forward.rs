@@ -38,6 +38,9 @@ const MOST: f64 = 0.7;
 /// The number of standard deviations of the sum of squares of noise from which the misfit of some sensors is significant.
 const CLEAR: f64 = 4.0;
 
+/// The mean square of a misfit on all sensors, in units of the noise, that is far above it: three standard deviations.
+const LARGE: f64 = 9.0;
+
 /// The data, candidates and options of a search, which do not change on its path.
 pub(super) struct Search<'a> {
     pub(super) experiment: &'a Experiment<'a>,
@@ -280,16 +283,16 @@ impl<'a> Search<'a> {
     }
 
     /// True when a placement on some sensors closes most of the misfit there: what is small beside the whole gap may be
-    /// all that one sensor shows.
+    /// all that one sensor shows. On all sensors the misfit has to be far above the noise: beside an effect that
+    /// dominates the gap, that is more than an error of its form.
     fn is_local(&self, state: &SearchState<'_>, weighed: &Weighed) -> bool {
         let placement = &weighed.placement;
-        if placement.on.is_empty() {
-            return false;
-        }
         let acts = placement.placed(self.experiment, self.candidates, "").acts;
         let [before, after] = [&state.fit, &weighed.fit].map(|fit| misfit(fit, &acts));
         let values = acts.iter().filter(|acts| **acts).count() as f64;
-        before > CLEAR * (2.0 * values).sqrt() && before - after >= MOST * before
+        let everywhere = placement.on.is_empty();
+        let least = if everywhere { LARGE * values } else { CLEAR * (2.0 * values).sqrt() };
+        before > least && before - after >= MOST * before
     }
 
     /// The outputs of a sensor.

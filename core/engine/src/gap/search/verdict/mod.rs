@@ -148,7 +148,7 @@ pub fn verdict(
     let (word, mut reasons) = if effects.is_empty() {
         without_effects(found, options, &grounds)
     } else {
-        with_effects(found, &grounds, &mut effects)
+        with_effects(found, candidates, &grounds, &mut effects)
     };
     if grounds.disagree && !grounds.gap {
         reasons.push(
@@ -205,6 +205,7 @@ fn without_effects(
 
 fn with_effects(
     found: &SearchResult<'_>,
+    candidates: &[Candidate],
     grounds: &Grounds,
     effects: &mut [MissingEffect],
 ) -> (VerdictKind, Vec<String>) {
@@ -223,7 +224,9 @@ fn with_effects(
         found.last.tolerant.inexact
     );
     let free = grounds::unproven(effects);
-    let is_like = grounds.closed >= MOST && sure && free.is_none();
+    let is_alone = effects.iter().all(|effect| is_alone(candidates, effect));
+    let is_like =
+        grounds.closed >= MOST && is_alone && found.stability >= STABLE && free.is_none();
     let inexact = found.last.tolerant.inexact > SIGNIFICANT;
     if inexact || grounds.gap && grounds.closed < NEARLY {
         reasons.push(left);
@@ -246,6 +249,15 @@ fn with_effects(
         return (if kind { VerdictKind::Class } else { VerdictKind::Unlisted }, reasons);
     }
     (if sure { VerdictKind::Named } else { VerdictKind::Class }, reasons)
+}
+
+/// True if all other types of the class of an effect contain its type as a special case: what is missing acts like it then,
+/// whichever of them it is.
+fn is_alone(candidates: &[Candidate], effect: &MissingEffect) -> bool {
+    let contains = |other: &String| {
+        candidates.iter().any(|own| own.kind == *other && own.contains.contains(&&*effect.kind))
+    };
+    effect.class[1..].iter().all(contains)
 }
 
 /// Adds the next type to those that are alone in their class; returns true if every class then has several types.
