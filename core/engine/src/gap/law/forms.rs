@@ -128,8 +128,8 @@ fn of_one(index: usize, seen: &Seen<'_>) -> Vec<Entry> {
     };
     let plain = |form: Form, value: f64| entry(form, of.clone(), [low, high], value);
     let mut all: Vec<Entry> = ODD.iter().map(|p| plain(Form::Odd, *p)).collect();
-    all.extend(EVEN.iter().map(|p| plain(Form::Even, *p)));
     if low < 0.0 && high > 0.0 {
+        all.extend(EVEN.iter().map(|p| plain(Form::Even, *p)));
         all.push(plain(Form::Sign, 0.0));
         let magnitudes = sorted(seen.values.iter().map(|x| x.abs()));
         for form in [Form::Within, Form::Beyond] {

@@ -58,7 +58,7 @@ impl ModelSearch<'_> {
             if let Some(law) = self.law(own, &found, &result)? {
                 match law {
                     Sought::Accepted(with) => return Ok(*with),
-                    Sought::Described(law) => result.law = Some(law),
+                    Sought::Described(law) => result.law = Some(*law),
                 }
             }
             let explains_more = |alternative: &&AlternativeModel<'_>| {
