@@ -42,7 +42,7 @@ pub(super) enum Form {
     Above,
     /// `u` limited to a gap on both sides, with small bends.
     Within,
-    /// What of `u` exceeds a gap on both sides, with small bends.
+    /// The excess of `u` over a gap on both sides, with small bends.
     Beyond,
     /// A product of two quantities.
     Product,
@@ -56,7 +56,7 @@ pub(super) struct Entry {
     /// The index of the rate to which it may be added.
     pub site: usize,
     pub form: Form,
-    /// Its argument, as an expression, with its unit.
+    /// The argument, as an expression, with its unit.
     pub of: String,
     pub unit: Unit,
     /// The second factor of a product, as an expression, and as a reader would write it.
@@ -229,7 +229,7 @@ impl Entry {
         }
     }
 
-    /// What its exponent or threshold is called, with unit and prior; `None` if it has none.
+    /// The name of its exponent or threshold, with unit and prior; `None` if it has none.
     pub fn index(&self) -> Option<(&'static str, Unit, Distribution)> {
         let threshold = |name| {
             let [low, high] = self.range;

@@ -203,7 +203,7 @@ impl<'a> Finder<'a, '_, '_> {
     }
 }
 
-/// What a law leaves.
+/// The misfit that a law leaves.
 fn left(trial: &Trial<'_, '_>, law: &Fitted) -> Option<Misfit> {
     let fit = &law.fit;
     let pull = |system: &System<'_>| Pull::of(system.priors(), &fit.at.point);

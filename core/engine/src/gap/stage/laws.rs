@@ -33,7 +33,7 @@ const WORSE: f64 = 3.0;
 pub enum Sought {
     /// The result with the law among its effects.
     Accepted(Box<GapResult>),
-    /// What the missing rate looks like.
+    /// A description of the missing rate.
     Described(Box<Law>),
 }
 
