@@ -142,7 +142,7 @@ fn deflection(force: impl Fn(f64, f64) -> f64) -> Vec<f64> {
 }
 
 /// The unknowns of the only term of an accepted law, whose form depends on this quantity.
-fn only<'a>(law: &'a Law, of: &str) -> [(f64, f64); 2] {
+fn only(law: &Law, of: &str) -> [(f64, f64); 2] {
     assert!(law.accepted, "{:?}", law.words());
     assert_eq!(law.terms.len(), 1, "{:?}", law.words());
     let term = &law.terms[0];
@@ -186,7 +186,7 @@ fn a_dead_zone_is_a_law() {
     assert!((gap - 0.02).abs() < 4.0 * sd, "{gap} {sd}");
 }
 
-/// Where nothing is missing no law is sought or found.
+/// No law is sought or found where nothing is missing.
 #[test]
 fn where_nothing_is_missing_there_is_no_law() {
     let curve = deflection(|_, _| 0.0);

@@ -30,7 +30,7 @@ impl Finder<'_, '_, '_> {
             for (index, site) in self.sites.iter().enumerate() {
                 let own = &site.arguments[..arguments.min(site.arguments.len())];
                 let texts: Vec<String> = own.iter().map(|a| a.text.clone()).collect();
-                let values = self.along(model, run, &texts)?;
+                let values = along(model, run, &texts)?;
                 let seen = own.iter().zip(values);
                 let seen: Vec<Seen<'_>> =
                     seen.map(|(argument, values)| Seen { argument, values }).collect();
@@ -42,21 +42,6 @@ impl Finder<'_, '_, '_> {
             }
         }
         None
-    }
-
-    /// The values of expressions along a run, over all conditions.
-    pub(super) fn along(
-        &self,
-        model: &Widened<'_>,
-        run: &Run,
-        texts: &[String],
-    ) -> Option<Vec<Vec<f64>>> {
-        let mut all = vec![Vec::new(); texts.len()];
-        for c in 0..model.conditions() {
-            let own = model.along(c, &run.parameters, &run.inputs, texts)?;
-            all.iter_mut().zip(own).for_each(|(all, own)| all.extend(own));
-        }
-        Some(all)
     }
 
     /// The unit of the coefficient of a form.
@@ -109,7 +94,8 @@ impl Finder<'_, '_, '_> {
             .iter()
             .map(|own| [&own[..], &vec![0.0; part.len()]].concat())
             .collect::<Vec<_>>();
-        let answer = model.answer(&run.parameters, &longer)?;
+        let answer =
+            model.answer(&run.parameters, &longer, &model.measured(self.setting.experiment))?;
         let rows: Vec<usize> = (begin..begin + part.len()).collect();
         Some(answer.by_inputs.select_rows(&rows))
     }
@@ -135,4 +121,14 @@ impl Finder<'_, '_, '_> {
         };
         Some((piece, vec![input]))
     }
+}
+
+/// The values of expressions along a run, over all conditions.
+pub(super) fn along(model: &Widened<'_>, run: &Run, texts: &[String]) -> Option<Vec<Vec<f64>>> {
+    let mut all = vec![Vec::new(); texts.len()];
+    for c in 0..model.conditions() {
+        let own = model.along(c, &run.parameters, &run.inputs, texts)?;
+        all.iter_mut().zip(own).for_each(|(all, own)| all.extend(own));
+    }
+    Some(all)
 }

@@ -24,7 +24,7 @@ pub struct Apart<'a> {
     pub training: Experiment<'a>,
     /// The data that it has to predict.
     pub held_out: Experiment<'a>,
-    /// What is held out.
+    /// The kind of the data that are held out.
     pub kind: HeldOutKind,
     /// The names of its parts.
     pub names: Vec<String>,

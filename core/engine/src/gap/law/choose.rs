@@ -21,7 +21,7 @@ const LEVEL: f64 = 0.05;
 const SIMULATIONS: usize = 99;
 
 /// The number of forms that are refitted, each of another kind.
-const FINALISTS: usize = 8;
+const FINALISTS: usize = 6;
 
 /// A form whose gain is less than this share of the best one's is not refitted.
 const NEAR: f64 = 0.5;

@@ -1,4 +1,4 @@
-//! What is fixed while a law is sought, and the force of each rate.
+//! The fixed part of a search for a law, and the force of each rate.
 
 use lacuna::data::Unit;
 use lacuna::math::random::Stream;
@@ -34,7 +34,7 @@ pub struct LawSetting<'a, 'b> {
     pub stream: &'b Stream,
 }
 
-/// What is fixed while a law is sought.
+/// The fixed part of a search for a law.
 pub(super) struct Finder<'a, 'b, 's> {
     pub(super) setting: &'s LawSetting<'a, 'b>,
     pub(super) amend: &'s dyn Amend,
@@ -73,7 +73,7 @@ impl<'a> Finder<'a, '_, '_> {
         })?
     }
 
-    /// What `use_it` makes of the model with a force in a rate.
+    /// The result of `use_it` with the model that has a force in a rate.
     pub(super) fn with_force<T>(
         &self,
         site: usize,

@@ -12,18 +12,17 @@ use lacuna::math::distribution::Distribution;
 use lacuna::plugin::amend::Addition;
 use lacuna::plugin::effect::Description;
 use lacuna_linalg::vector::dot;
-use lacuna_linalg::{
-    Cholesky, Matrix, gram, multiply_transposed, multiply_vector, transposed_multiply_vector,
-};
+use lacuna_linalg::{Matrix, multiply_transposed, multiply_vector};
 
 use super::model::{Answer, Widened};
-use super::posterior::{Linear, Posterior, with_widths};
+use super::posterior::{Linear, Posterior, Pull, with_widths};
 use super::quantity::quantity;
 use super::sites::Site;
 use crate::gap::experiment::Experiment;
 use crate::gap::experiment::wider::FreeInput;
 use crate::gap::inside::Piece;
 use crate::gap::noise::{Noise, ResponseTangents};
+use crate::gap::system::coordinate::log_slope;
 use crate::gap::system::fit::precision;
 use crate::gap::system::whitener::Whitener;
 use crate::gap::test::Projection;
@@ -118,18 +117,24 @@ impl ForceSetting<'_, '_> {
     /// The force of largest posterior density, from a calibration with the noise around it; `None` if the model has no answer.
     pub fn infer(&self, start: &[f64], noise: &Noise) -> Option<Inferred> {
         let (_, means) = self.experiment.means();
-        let conditions = self.model.conditions();
+        let (measured, conditions) = (self.measured(), self.model.conditions());
         let mut parameters = start.to_vec();
         let mut weights = vec![vec![0.0; self.cosines]; conditions];
-        let mut answer = self.model.answer(&parameters, &weights)?;
+        let mut answer = self.model.answer(&parameters, &weights, &measured)?;
         let mut noise = noise.clone();
         let mut whitener = Whitener::new(self.experiment, &noise, &answer.response);
         let mut posterior = None;
         for step in 0..STEPS {
-            let linear = self.linear(&answer, &weights, &means, &whitener);
+            let linear = self.linear(&answer, (&parameters, &weights), &means, &whitener);
             let next = self.posterior(&linear)?;
-            let shift = self.shift(&linear, &next.mean);
-            let now = self.merit(&answer.response, &weights, &means, &whitener, &next.variances);
+            let shift = linear.shift(&next.mean);
+            let now = self.merit(
+                &answer.response,
+                (&parameters, &weights),
+                &means,
+                &whitener,
+                &next.variances,
+            );
             let moved = self.moved(
                 (&parameters, &weights),
                 (&shift, &next.mean),
@@ -139,7 +144,7 @@ impl ForceSetting<'_, '_> {
             posterior = Some(next);
             let Some((there, own, merit)) = moved else { break };
             (parameters, weights) = (there, own);
-            answer = self.model.answer(&parameters, &weights)?;
+            answer = self.model.answer(&parameters, &weights, &measured)?;
             if step == 0 && self.experiment.has_records() {
                 let variances = posterior.as_ref().map(|p| &p.variances[..])?;
                 noise = Noise::of(self.experiment, &self.around(&answer, variances), Some(&noise));
@@ -148,27 +153,24 @@ impl ForceSetting<'_, '_> {
                 break;
             }
         }
-        let last = self.posterior(&self.linear(&answer, &weights, &means, &whitener));
+        let last =
+            self.posterior(&self.linear(&answer, (&parameters, &weights), &means, &whitener));
         let Posterior { root, log_evidence, .. } = last.or(posterior)?;
-        let response = answer.response;
+        // Under conditions without data there is no force, and the parameters alone tell the response.
+        let all: Vec<usize> = (0..conditions).collect();
+        let response = self.model.response(&parameters, &weights, &all).unwrap_or(answer.response);
         Some(Inferred { parameters, weights, response, whitener, log_evidence, root })
     }
 
     /// The conditions that are measured.
     pub fn measured(&self) -> Vec<usize> {
-        let settings = &self.model.simulator.settings;
-        let has = |c: &usize| {
-            let own = &settings[*c].outputs;
-            let conditions = self.experiment.conditions.iter();
-            conditions.filter(|k| k.outputs == *own).any(|k| !k.replicates.is_empty())
-        };
-        (0..settings.len()).filter(has).collect()
+        self.model.measured(self.experiment)
     }
 
     fn linear(
         &self,
         answer: &Answer,
-        weights: &[Vec<f64>],
+        (parameters, weights): (&[f64], &[Vec<f64>]),
         means: &[f64],
         whitener: &Whitener,
     ) -> Linear {
@@ -177,25 +179,26 @@ impl ForceSetting<'_, '_> {
         let mut back: Vec<f64> = means.iter().zip(&answer.response).map(|(y, m)| y - m).collect();
         for c in self.measured() {
             let own = self.model.simulator.settings[c].outputs.clone();
-            for k in 0..self.cosines {
+            for (k, weight) in weights[c].iter().enumerate() {
                 let mut row = vec![0.0; outputs];
                 row[own.clone()].copy_from_slice(&answer.by_inputs.row(k)[own.clone()]);
-                own.clone().for_each(|i| back[i] += weights[c][k] * row[i]);
+                own.clone().for_each(|i| back[i] += weight * row[i]);
                 rows.push_row(&row);
             }
         }
         let directions = whitener.whiten_rows(&rows);
         let slopes = whitener.whiten_rows(&answer.by_parameters);
-        let residual = whitener.whiten(&back);
-        let projection = Projection::off(&slopes, &self.precisions());
+        let pull = Pull::of(&self.priors(), parameters);
+        let residual = pull.centred(&whitener.whiten(&back), &slopes);
+        let projection = Projection::off(&slopes, &pull.precisions);
         let (free, _) = projection.rest_of_rows(directions.clone());
         let information = multiply_transposed(&free, &directions);
         let score = multiply_vector(&free, &residual);
-        Linear { residual, slopes, directions, information, score }
+        Linear { residual, slopes, pull, directions, information, score }
     }
 
-    fn precisions(&self) -> Vec<f64> {
-        self.experiment.parameters.iter().map(|p| precision(&p.prior)).collect()
+    fn priors(&self) -> Vec<Distribution> {
+        self.experiment.parameters.iter().map(|p| p.prior.clone()).collect()
     }
 
     /// The posterior of the weights with the hyperparameters of largest evidence.
@@ -216,32 +219,11 @@ impl ForceSetting<'_, '_> {
         best
     }
 
-    /// The shift of the unknowns beside these weights.
-    fn shift(&self, linear: &Linear, mean: &[f64]) -> Vec<f64> {
-        let force = transposed_multiply_vector(&linear.directions, mean);
-        let left: Vec<f64> = linear.residual.iter().zip(force).map(|(z, f)| z - f).collect();
-        let mut shift = multiply_vector(&linear.slopes, &left);
-        let mut inner = gram(&linear.slopes.transposed());
-        let precisions = self.precisions();
-        let scale: Vec<f64> = precisions.iter().map(|p| 1.0 / p.sqrt()).collect();
-        let scaled = Matrix::from_fn(inner.rows(), inner.rows(), |i, j| {
-            scale[i] * inner[(i, j)] * scale[j] + f64::from(u8::from(i == j))
-        });
-        inner = scaled;
-        shift.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s);
-        match Cholesky::new(&inner) {
-            Ok(factor) => factor.solve(&mut shift),
-            Err(_) => shift.fill(0.0),
-        }
-        shift.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s);
-        shift
-    }
-
-    /// Minus the log posterior density up to a constant, without the priors of the unknowns.
+    /// Minus the log posterior density up to a constant.
     fn merit(
         &self,
         response: &[f64],
-        weights: &[Vec<f64>],
+        (parameters, weights): (&[f64], &[Vec<f64>]),
         means: &[f64],
         whitener: &Whitener,
         variances: &[f64],
@@ -250,7 +232,9 @@ impl ForceSetting<'_, '_> {
         let white = whitener.whiten(&misfit);
         let all = self.measured().into_iter().flat_map(|c| &weights[c]);
         let penalty: f64 = all.zip(variances).map(|(w, v)| w * w / v).sum();
-        0.5 * (dot(&white, &white) + penalty)
+        let priors = self.priors();
+        let density: f64 = priors.iter().zip(parameters).map(|(p, x)| p.log_density(*x)).sum();
+        0.5 * (dot(&white, &white) + penalty) - density - log_slope(&priors, parameters)
     }
 
     /// The point after the longest step that improves the fit, with its merit.
@@ -278,8 +262,8 @@ impl ForceSetting<'_, '_> {
                     *w += share * (mean[m * self.cosines + k] - *w);
                 }
             }
-            if let Some(response) = self.model.response(&there, &own) {
-                let merit = self.merit(&response, &own, means, whitener, variances);
+            if let Some(response) = self.model.response(&there, &own, &measured) {
+                let merit = self.merit(&response, (&there, &own), means, whitener, variances);
                 if merit < now {
                     return Some((there, own, merit));
                 }
@@ -293,8 +277,9 @@ impl ForceSetting<'_, '_> {
     fn around(&self, answer: &Answer, variances: &[f64]) -> ResponseTangents {
         let outputs = answer.response.len();
         let mut slopes = Matrix::zeros(0, outputs);
-        for (row, precision) in answer.by_parameters.iter_rows().zip(self.precisions()) {
-            slopes.push_row(&row.iter().map(|x| x / precision.sqrt()).collect::<Vec<_>>());
+        for (row, prior) in answer.by_parameters.iter_rows().zip(self.priors()) {
+            let width = 1.0 / precision(&prior).sqrt();
+            slopes.push_row(&row.iter().map(|x| x * width).collect::<Vec<_>>());
         }
         for (m, c) in self.measured().into_iter().enumerate() {
             let own = self.model.simulator.settings[c].outputs.clone();
@@ -333,10 +318,11 @@ impl ForceSetting<'_, '_> {
     /// The misfit at the inferred trajectory without the force.
     pub fn residual(&self, found: &Inferred) -> Option<Misfit> {
         let (_, means) = self.experiment.means();
-        let answer = self.model.answer(&found.parameters, &found.weights)?;
-        let Linear { residual, slopes, .. } =
-            self.linear(&answer, &found.weights, &means, &found.whitener);
-        Some(Misfit { residual, slopes, precisions: self.precisions() })
+        let answer = self.model.answer(&found.parameters, &found.weights, &self.measured())?;
+        let point = (&found.parameters[..], &found.weights[..]);
+        let Linear { residual, slopes, pull, .. } =
+            self.linear(&answer, point, &means, &found.whitener);
+        Some(Misfit { residual, slopes, precisions: pull.precisions })
     }
 }
 

@@ -42,7 +42,7 @@ pub(super) enum Form {
     Above,
     /// `u` limited to a gap on both sides, with small bends.
     Within,
-    /// What of `u` exceeds a gap on both sides, with small bends.
+    /// The excess of `u` over a gap on both sides, with small bends.
     Beyond,
     /// A product of two quantities.
     Product,
@@ -56,7 +56,7 @@ pub(super) struct Entry {
     /// The index of the rate to which it may be added.
     pub site: usize,
     pub form: Form,
-    /// Its argument, as an expression, with its unit.
+    /// The argument, as an expression, with its unit.
     pub of: String,
     pub unit: Unit,
     /// The second factor of a product, as an expression, and as a reader would write it.
@@ -128,8 +128,8 @@ fn of_one(index: usize, seen: &Seen<'_>) -> Vec<Entry> {
     };
     let plain = |form: Form, value: f64| entry(form, of.clone(), [low, high], value);
     let mut all: Vec<Entry> = ODD.iter().map(|p| plain(Form::Odd, *p)).collect();
-    all.extend(EVEN.iter().map(|p| plain(Form::Even, *p)));
     if low < 0.0 && high > 0.0 {
+        all.extend(EVEN.iter().map(|p| plain(Form::Even, *p)));
         all.push(plain(Form::Sign, 0.0));
         let magnitudes = sorted(seen.values.iter().map(|x| x.abs()));
         for form in [Form::Within, Form::Beyond] {
@@ -229,7 +229,7 @@ impl Entry {
         }
     }
 
-    /// What its exponent or threshold is called, with unit and prior; `None` if it has none.
+    /// The name of its exponent or threshold, with unit and prior; `None` if it has none.
     pub fn index(&self) -> Option<(&'static str, Unit, Distribution)> {
         let threshold = |name| {
             let [low, high] = self.range;

@@ -5,18 +5,19 @@ use lacuna::math::random::Stream;
 use lacuna::plugin::term::Index;
 use lacuna_linalg::vector::dot;
 
+use super::along::along;
 use super::choose::{Finalist, Screen};
 use super::finder::{Finder, Run, WORTH};
 use super::force::{Inferred, Misfit};
 use super::forms::Entry;
 use super::model::Widened;
+use super::posterior::Pull;
 use super::quantity::rounded;
 use super::term::pieces;
 use super::trial::{Fitted, Trial};
 use crate::gap::inside::{Pieces, free};
 use crate::gap::result::law::{LawTerm, LawUnknown};
 use crate::gap::system::System;
-use crate::gap::system::fit::precision;
 
 /// The largest number of terms of a law.
 const TERMS: usize = 3;
@@ -64,7 +65,7 @@ impl<'a> Finder<'a, '_, '_> {
             // In the place of one of several terms others may stand that the further terms correct.
             rivals = if step == 0 { next.rivals } else { Vec::new() };
             run = self.run_of(&best, run.inputs.len());
-            misfit = self.left(trial, &best);
+            misfit = left(trial, &best);
         }
         ((!best.terms.is_empty()).then_some((best, rivals)), tried)
     }
@@ -77,16 +78,6 @@ impl<'a> Finder<'a, '_, '_> {
             parameters: own.0.to_vec(),
             inputs: vec![own.1.to_vec(); conditions],
         }
-    }
-
-    /// What a law leaves.
-    fn left(&self, trial: &Trial<'a, '_>, law: &Fitted) -> Option<Misfit> {
-        let priors = |system: &System<'_>| system.priors().iter().map(precision).collect();
-        Some(Misfit {
-            residual: law.fit.residual.clone(),
-            slopes: law.fit.slopes.clone(),
-            precisions: trial.with(&law.terms, priors)?,
-        })
     }
 
     /// The law with the best further term.
@@ -138,15 +129,13 @@ impl<'a> Finder<'a, '_, '_> {
     ) -> Option<Fitted> {
         let (entry, coefficient) = &finalist.starts[0];
         let term = self.term(model, run, entry, *coefficient, (known.terms.len(), tried))?;
-        let starts = finalist.starts.iter().flat_map(|(entry, coefficient)| {
+        let starts = finalist.starts.iter().map(|(entry, coefficient)| {
             let own = term.index.as_ref().map(|_| entry.value);
-            [&known.fit.at.point[..], &run.parameters[..]].map(|point| {
-                let mut start = known.fit.at.point.clone();
-                start[..run.parameters.len()].copy_from_slice(&point[..run.parameters.len()]);
-                start.push(*coefficient);
-                start.extend(own);
-                start
-            })
+            let mut start = known.fit.at.point.clone();
+            start[..run.parameters.len()].copy_from_slice(&run.parameters);
+            start.push(*coefficient);
+            start.extend(own);
+            start
         });
         let starts: Vec<Vec<f64>> = starts.collect();
         let mut terms = known.terms.clone();
@@ -188,7 +177,7 @@ impl<'a> Finder<'a, '_, '_> {
             })
             .collect();
         let unit = self.unit(entry, &shape, &indices).ok()?;
-        let sizes = self.along(model, run, &[state.rate.clone(), entry.shape()])?;
+        let sizes = along(model, run, &[state.rate.clone(), entry.shape()])?;
         let [rate, size] = [0, 1]
             .map(|k: usize| (dot(&sizes[k], &sizes[k]) / sizes[k].len().max(1) as f64).sqrt());
         let sd = rounded((SHARE * rate / size).max(coefficient.abs()));
@@ -212,4 +201,13 @@ impl<'a> Finder<'a, '_, '_> {
             stability: 0.0,
         })
     }
+}
+
+/// The misfit that a law leaves.
+fn left(trial: &Trial<'_, '_>, law: &Fitted) -> Option<Misfit> {
+    let fit = &law.fit;
+    let pull = |system: &System<'_>| Pull::of(system.priors(), &fit.at.point);
+    let pull = trial.with(&law.terms, pull)?;
+    let residual = pull.centred(&fit.residual, &fit.slopes);
+    Some(Misfit { residual, slopes: fit.slopes.clone(), precisions: pull.precisions })
 }

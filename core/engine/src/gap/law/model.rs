@@ -4,6 +4,7 @@ use lacuna::plugin::model::EvalError;
 use lacuna_linalg::Matrix;
 use rayon::prelude::*;
 
+use crate::gap::experiment::Experiment;
 use crate::gap::inside::Pieces;
 use crate::stage::simulator::{Setting, Simulator};
 use crate::study::Study;
@@ -39,22 +40,28 @@ impl<'a> Widened<'a> {
         self.simulator.settings.len()
     }
 
-    /// The response with its derivatives at values of the study's parameters and, for each condition, of the inputs;
-    /// `None` if the model has no answer there.
-    pub fn answer(&self, parameters: &[f64], inputs: &[Vec<f64>]) -> Option<Answer> {
+    /// The response with its derivatives at values of the study's parameters and, for each condition, of the inputs, under
+    /// these conditions alone; `None` if the model has no answer there.
+    pub fn answer(
+        &self,
+        parameters: &[f64],
+        inputs: &[Vec<f64>],
+        conditions: &[usize],
+    ) -> Option<Answer> {
         let gradient = self.simulator.model.gradient()?;
-        let of = |(setting, own): (&Setting<'a>, &Vec<f64>)| {
-            let point = [parameters, own].concat();
+        let of = |&c: &usize| {
+            let (setting, point) = (&self.simulator.settings[c], [parameters, &inputs[c]].concat());
             self.simulator.with_derivatives(setting, gradient, &point)
         };
-        let settings = &self.simulator.settings;
-        let each: Result<Vec<_>, EvalError> = settings.par_iter().zip(inputs).map(of).collect();
+        let settings: Vec<&Setting<'a>> =
+            conditions.iter().map(|&c| &self.simulator.settings[c]).collect();
+        let each: Result<Vec<_>, EvalError> = conditions.par_iter().map(of).collect();
         let mut all = Answer {
             response: vec![0.0; self.outputs],
             by_parameters: Matrix::zeros(self.parameters, self.outputs),
             by_inputs: Matrix::zeros(self.inputs, self.outputs),
         };
-        for (setting, (response, jacobian)) in settings.iter().zip(each.ok()?) {
+        for (setting, (response, jacobian)) in settings.into_iter().zip(each.ok()?) {
             for (k, i) in setting.outputs.clone().enumerate() {
                 all.response[i] = response.values[k];
                 for j in 0..self.parameters {
@@ -69,11 +76,27 @@ impl<'a> Widened<'a> {
         (is_finite(&all.by_parameters) && is_finite(&all.by_inputs)).then_some(all)
     }
 
-    /// The response alone.
-    pub fn response(&self, parameters: &[f64], inputs: &[Vec<f64>]) -> Option<Vec<f64>> {
+    /// The conditions of which an experiment has measurements.
+    pub fn measured(&self, experiment: &Experiment<'_>) -> Vec<usize> {
+        let settings = &self.simulator.settings;
+        let has = |c: &usize| {
+            let own = experiment.conditions.iter().filter(|k| k.outputs == settings[*c].outputs);
+            own.into_iter().any(|k| !k.replicates.is_empty())
+        };
+        (0..settings.len()).filter(has).collect()
+    }
+
+    /// The response alone, under these conditions.
+    pub fn response(
+        &self,
+        parameters: &[f64],
+        inputs: &[Vec<f64>],
+        conditions: &[usize],
+    ) -> Option<Vec<f64>> {
         let mut all = vec![0.0; self.outputs];
-        for (setting, own) in self.simulator.settings.iter().zip(inputs) {
-            let response = self.simulator.respond_to(setting, &[parameters, own].concat()).ok()?;
+        for &c in conditions {
+            let (setting, point) = (&self.simulator.settings[c], [parameters, &inputs[c]].concat());
+            let response = self.simulator.respond_to(setting, &point).ok()?;
             all[setting.outputs.clone()].copy_from_slice(&response.values);
         }
         Some(all)

@@ -1,6 +1,11 @@
 //! The posterior of the weights of a force in a linearised problem.
 
-use lacuna_linalg::{Matrix, multiply_vector, symmetric_eigen, transposed_multiply_vector};
+use lacuna::math::distribution::Distribution;
+use lacuna_linalg::{
+    Cholesky, Matrix, gram, multiply_vector, symmetric_eigen, transposed_multiply_vector,
+};
+
+use crate::gap::system::coordinate::{slope, unit};
 
 /// The number of sizes that are tried, from a thousandth to a hundred times a unit.
 const SIZES: usize = 31;
@@ -11,10 +16,61 @@ pub(super) struct Linear {
     /// outputs`.
     pub residual: Vec<f64>,
     pub slopes: Matrix,
+    /// The priors of the unknowns about the point; the residual is that at their centres.
+    pub pull: Pull,
     /// The responses to all weights, `weights x outputs`, and their products in the metric.
     pub directions: Matrix,
     pub information: Matrix,
     pub score: Vec<f64>,
+}
+
+impl Linear {
+    /// The shift of the unknowns beside these weights.
+    pub fn shift(&self, mean: &[f64]) -> Vec<f64> {
+        let force = transposed_multiply_vector(&self.directions, mean);
+        let left: Vec<f64> = self.residual.iter().zip(force).map(|(z, f)| z - f).collect();
+        let mut shift = multiply_vector(&self.slopes, &left);
+        let mut inner = gram(&self.slopes.transposed());
+        let scale: Vec<f64> = self.pull.precisions.iter().map(|p| 1.0 / p.sqrt()).collect();
+        let scaled = Matrix::from_fn(inner.rows(), inner.rows(), |i, j| {
+            scale[i] * inner[(i, j)] * scale[j] + f64::from(u8::from(i == j))
+        });
+        inner = scaled;
+        shift.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s);
+        match Cholesky::new(&inner) {
+            Ok(factor) => factor.solve(&mut shift),
+            Err(_) => shift.fill(0.0),
+        }
+        shift.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s);
+        shift.iter_mut().zip(&self.pull.shifts).for_each(|(x, s)| *x += s);
+        shift
+    }
+}
+
+/// The priors of unknowns about a point, as normal distributions.
+pub(super) struct Pull {
+    /// The precisions.
+    pub precisions: Vec<f64>,
+    /// The shifts from the point to the centres.
+    pub shifts: Vec<f64>,
+}
+
+impl Pull {
+    /// The priors about a point, with the slopes and widths of the coordinates in which a fit searches.
+    pub fn of(priors: &[Distribution], point: &[f64]) -> Self {
+        let each = priors.iter().zip(point).map(|(prior, &x)| {
+            let precision = unit(prior, x).powi(-2);
+            (precision, slope(prior, x) / precision)
+        });
+        let (precisions, shifts) = each.unzip();
+        Self { precisions, shifts }
+    }
+
+    /// A whitened residual at the point as one at the centres, by linearisation.
+    pub fn centred(&self, residual: &[f64], slopes: &Matrix) -> Vec<f64> {
+        let moved = transposed_multiply_vector(slopes, &self.shifts);
+        residual.iter().zip(moved).map(|(z, m)| z - m).collect()
+    }
 }
 
 /// The posterior of the weights.

@@ -55,7 +55,7 @@ impl Trial<'_, '_> {
         evidence.is_finite().then_some(Fitted { terms, fit, evidence })
     }
 
-    /// What `use_it` makes of the system with these terms; `None` if the model with them cannot be made.
+    /// The result of `use_it` with the system that has these terms; `None` if the model with them cannot be made.
     pub fn with<T>(&self, terms: &[LawTerm], use_it: impl FnOnce(&System<'_>) -> T) -> Option<T> {
         if terms.is_empty() {
             return Some(use_it(&System::new(self.experiment, Vec::new())));

@@ -40,7 +40,7 @@ pub struct Law {
 pub struct Force {
     /// The state to whose rate it is added.
     pub state: String,
-    /// Its unit: that of the rate.
+    /// The unit of the force: that of the rate.
     pub unit: Unit,
     /// The log Bayes factor against no force, with the hyperparameters of largest evidence.
     pub log_evidence: f64,
@@ -106,7 +106,7 @@ pub struct LawUnknown {
     pub unit: Unit,
     /// The value of largest posterior density.
     pub value: f64,
-    /// Its standard deviation, by the normal approximation.
+    /// The standard deviation, by the normal approximation.
     pub sd: f64,
     /// The prior.
     pub prior: Distribution,
@@ -115,7 +115,7 @@ pub struct LawUnknown {
 /// The comparison of a law with data that were used neither to choose nor to fit it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LawProof {
-    /// What was held out.
+    /// The kind of the data that were held out.
     pub kind: HeldOutKind,
     /// The names of the parts.
     pub names: Vec<String>,

@@ -33,8 +33,8 @@ const WORSE: f64 = 3.0;
 pub enum Sought {
     /// The result with the law among its effects.
     Accepted(Box<GapResult>),
-    /// What the missing rate looks like.
-    Described(Law),
+    /// A description of the missing rate.
+    Described(Box<Law>),
 }
 
 /// True if a study has equations to which a law could be added: no surrogate in their place, no effect on their response.
@@ -107,7 +107,7 @@ impl ModelSearch<'_> {
         law.reason = doubt(&law, proof.as_ref());
         law.proof = proof;
         if law.reason.is_some() {
-            return Ok(Some(Sought::Described(law)));
+            return Ok(Some(Sought::Described(Box::new(law))));
         }
         self.searched(own, found, result, law).map(Some)
     }
@@ -127,7 +127,7 @@ impl ModelSearch<'_> {
         let only: Vec<String> = names.iter().cloned().chain(kept).collect();
         let Some(pieces) = Pieces::with(study, pieces(&all))? else {
             law.reason = Some("the model with it cannot be made".to_owned());
-            return Ok(Sought::Described(law));
+            return Ok(Sought::Described(Box::new(law)));
         };
         let mut candidates = pieces.candidates();
         for candidate in candidates.iter_mut().filter(|own| names.contains(&own.kind)) {
@@ -147,14 +147,16 @@ impl ModelSearch<'_> {
             let exact = matches!(all.verdict.word, VerdictKind::Named | VerdictKind::Class);
             if !exact || !law.is_kept_in(&kinds) {
                 law.reason = Some(not_kept(&all));
-                return Ok(Sought::Described(law));
+                return Ok(Sought::Described(Box::new(law)));
             }
             all.models = self.compared(with, &again);
             all.needless = needless(&again, &own_pieces(study), &with.random);
             all.untried.clone_from(&result.untried);
             for addition in &all.additions {
                 let own = law.terms.iter_mut().find(|term| term.name == addition.kind);
-                own.into_iter().for_each(|term| calibrated(term, addition));
+                if let Some(term) = own {
+                    calibrated(term, addition);
+                }
             }
             law.accepted = true;
             all.law = Some(law);

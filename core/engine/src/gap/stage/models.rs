@@ -55,17 +55,19 @@ impl ModelSearch<'_> {
             if !found.alarmed(own.options) {
                 return Ok(result);
             }
-            if let Some(law) = self.law(own, &found, &result)? {
-                match law {
-                    Sought::Accepted(with) => return Ok(*with),
-                    Sought::Described(law) => result.law = Some(law),
-                }
-            }
             let explains_more = |alternative: &&AlternativeModel<'_>| {
                 result.models.iter().any(|m| m.name == alternative.name && m.log_odds > 0.0)
             };
-            let others = alternatives.iter().filter(explains_more);
+            let others: Vec<_> = alternatives.iter().filter(explains_more).collect();
+            // Another model that explains more may have what the study's equations lack.
+            let law = if others.is_empty() { self.law(own, &found, &result)? } else { None };
+            match law {
+                Some(Sought::Accepted(with)) => return Ok(*with),
+                Some(Sought::Described(law)) => result.law = Some(*law),
+                None => {}
+            }
             let others: Result<Vec<AlternativeSearch>, Stop> = others
+                .into_iter()
                 .filter_map(|alternative| self.contest(alternative, own, &found).transpose())
                 .collect();
             let mut result = settled(result, others?);

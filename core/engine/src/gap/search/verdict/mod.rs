@@ -225,8 +225,7 @@ fn with_effects(
     );
     let free = grounds::unproven(effects);
     let is_alone = effects.iter().all(|effect| is_alone(candidates, effect));
-    let is_like =
-        grounds.closed >= MOST && is_alone && found.stability >= STABLE && free.is_none();
+    let is_like = grounds.closed >= MOST && is_alone && found.stability >= STABLE && free.is_none();
     let inexact = found.last.tolerant.inexact > SIGNIFICANT;
     if inexact || grounds.gap && grounds.closed < NEARLY {
         reasons.push(left);

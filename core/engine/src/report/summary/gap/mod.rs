@@ -83,7 +83,7 @@ pub struct Gap {
     #[serde(skip_serializing_if = "ByName::is_empty")]
     #[schemars(extend("propertyNames" = { "title": "piece" }))]
     pub needless: ByName<Odds>,
-    /// What a rate of the model's equations lacks, and its law; only if it was sought and found.
+    /// Missing rate of the model's equations, and its law; only if it was sought and found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub law: Option<Law>,
     /// Further results of the search.
