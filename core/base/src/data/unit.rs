@@ -171,7 +171,7 @@ impl Unit {
     }
 
     /// The shortest form of a coherent unit, such as `m/s2` for `(m/s) (s^-1)` or `1/(V2 s2)`; other units are returned
-    /// unchanged. Units with a current in them may have one electrical symbol.
+    /// unchanged. Units with a current in them may have volts or ohms.
     #[must_use]
     pub fn plain(self) -> Self {
         let size = |factors: &[(&str, i16)]| factors.iter().map(|(_, n)| n.abs()).sum::<i16>();
@@ -180,7 +180,7 @@ impl Unit {
         Self::parse(&text).ok().filter(|plain| *plain == self).unwrap_or(self)
     }
 
-    /// The unit as products of powers, in sixths: of base units, then of an electrical unit beside them.
+    /// The unit as products of powers, in sixths: of base units, then of a volt or an ohm beside them.
     fn decompositions(&self) -> Vec<Vec<(&'static str, i16)>> {
         const SYMBOLS: [&str; BASES] = ["m", "kg", "s", "A", "K", "mol", "cd"];
         const CURRENT: usize = 3;
@@ -193,7 +193,7 @@ impl Unit {
         if self.meaning.sixths[CURRENT] == 0 {
             return all;
         }
-        for symbol in ["V", "C", "ohm", "F", "H", "T", "Wb", "S"] {
+        for symbol in ["V", "ohm"] {
             let Ok(unit) = Self::parse(symbol) else { continue };
             for sixths in (-24..=24).filter(|sixths| *sixths != 0) {
                 let rest = unit.meaning.power(-sixths).map(|inverse| inverse.times(self.meaning));
