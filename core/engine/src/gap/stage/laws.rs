@@ -203,7 +203,12 @@ fn doubt(law: &Law, proof: Option<&LawProof>) -> Option<String> {
 
 /// The reason for which a search did not keep a law, in words.
 fn not_kept(result: &GapResult) -> String {
-    let reason = result.verdict.reasons.first().cloned().or_else(|| result.not_added());
-    let reason = reason.map(|reason| format!(": {reason}")).unwrap_or_default();
-    format!("the search with it among the candidates does not name it{reason}")
+    let reason = match result.verdict.word {
+        VerdictKind::Approximate => "a remainder is significant beside it".to_owned(),
+        VerdictKind::Named | VerdictKind::Class => {
+            "another candidate explains the data better, or only a part of it is needed".to_owned()
+        }
+        _ => result.verdict.reasons.first().cloned().unwrap_or_default(),
+    };
+    format!("the search with it among the candidates does not name it: {reason}")
 }
