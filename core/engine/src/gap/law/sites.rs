@@ -33,7 +33,7 @@ pub(super) fn all(amend: &dyn Amend, context: &Context<'_>) -> Vec<Site> {
     let states = amend.states(context);
     let found = sites(&states);
     let site = |sited: &Sited<'_>| {
-        let unit = sited.state.rate_unit.clone()?;
+        let unit = sited.state.rate_unit.clone()?.plain();
         let arguments = arguments(amend, context, sited);
         Some(Site { state: sited.state.clone(), unit, arguments })
     };
