@@ -24,10 +24,8 @@ pub(super) enum Taken<'a> {
     Replicates {
         /// The number of replicates.
         count: usize,
-        /// The curves.
-        experiment: Experiment<'a>,
-        /// The noise of one replicate.
-        noise: Noise,
+        /// The curves, and the noise of one replicate.
+        planned: Box<(Experiment<'a>, Noise)>,
     },
     /// Runs that make the errors of emulator and numerics smaller by these factors.
     Errors {
@@ -45,9 +43,7 @@ impl Choice<'_> {
     /// independent with variance one.
     pub fn predicted(&self, own: &Hypothesis, reference: &Hypothesis) -> Predicted {
         match &self.taken {
-            Taken::Replicates { count, experiment, noise } => {
-                replicates(*count, experiment, noise, own, reference)
-            }
+            Taken::Replicates { count, planned } => replicates(*count, planned, own, reference),
             Taken::Errors { emulator, numerics, origins } => {
                 let known = |shares: &ErrorShares| {
                     shares.emulator * (1.0 - emulator * emulator)
@@ -61,8 +57,7 @@ impl Choice<'_> {
 
 fn replicates(
     count: usize,
-    experiment: &Experiment<'_>,
-    noise: &Noise,
+    (experiment, noise): &(Experiment<'_>, Noise),
     own: &Hypothesis,
     reference: &Hypothesis,
 ) -> Predicted {

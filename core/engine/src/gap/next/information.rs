@@ -63,6 +63,11 @@ impl Density {
 }
 
 impl Joint {
+    /// The mutual information of quantity and data in closed form.
+    fn bits(&self) -> Bits {
+        Bits { value: 0.5 * (self.variance / self.rest).log2(), error: 0.0 }
+    }
+
     /// The mean given data that are off their own mean by these differences.
     fn given(&self, data: &[f64], mean: &[f64]) -> f64 {
         let off = data.iter().zip(mean).map(|(x, m)| x - m);
@@ -71,9 +76,9 @@ impl Joint {
 }
 
 /// The mutual information of data with the hypothesis, `sum_k w_k E_k log2(p_k / sum_j w_j p_j)`, and with a quantity `g`,
-/// `E log2(p(g | data) / p(g))`. The expectations are over data, and quantities, simulated under each hypothesis. The
-/// densities have closed forms, so that one average is left (Box and Hill, Technometrics 9 (1967) 57; Rainforth et al.,
-/// Statistical Science 39 (2024) 100). `None` if a density does not exist.
+/// `E log2(p(g | data) / p(g))`. The expectations are over data, and quantities, simulated under each hypothesis; a single
+/// hypothesis needs none. The densities have closed forms, so that one average is left (Box and Hill, Technometrics 9
+/// (1967) 57; Rainforth et al., Statistical Science 39 (2024) 100). `None` if a density does not exist.
 pub(super) fn bits(
     weights: &[f64],
     all: &[Predicted],
@@ -81,6 +86,13 @@ pub(super) fn bits(
     stream: &Stream,
 ) -> Option<Information> {
     let mixture = Mixture { weights, densities: reduced(all, quantities)? };
+    if let [only] = &mixture.densities[..] {
+        let nothing = Bits { value: 0.0, error: 0.0 };
+        return Some(Information {
+            name: nothing,
+            quantity: only.quantity.as_ref().map(Joint::bits),
+        });
+    }
     let mut sums = [Moments::default(), Moments::default()];
     for (k, weight) in weights.iter().enumerate() {
         let draws: Vec<[f64; 2]> = (0..DRAWS)

@@ -1,7 +1,7 @@
 //! The options of a study: those that it lists, or further replicates of everything, of each condition and by each sensor.
 
 use lacuna::plugin::effect::On;
-use lacuna::text::values::Count;
+use lacuna::text::values::{Count, Fraction, Positive};
 
 use super::Wish;
 use super::choice::{Choice, Taken};
@@ -58,23 +58,23 @@ fn choice<'a>(
 ) -> Option<Choice<'a>> {
     let name = keys.name.as_ref().map(|name| name.as_str().to_owned());
     if keys.is_computed() {
-        let emulator = keys.emulator_error.map(|factor| factor.get());
+        let emulator = keys.emulator_error.map(Fraction::get);
         let more = keys.runs.map(|more| (runs as f64 / (runs + more.get()) as f64).sqrt());
         let taken = Taken::Errors {
             emulator: emulator.or(more).unwrap_or(1.0),
-            numerics: keys.numerical_error.map_or(1.0, |factor| factor.get()),
+            numerics: keys.numerical_error.map_or(1.0, Fraction::get),
             origins: experiment.origins.clone(),
         };
-        let cost = keys.cost.map_or(1.0, |cost| cost.get());
+        let cost = keys.cost.map_or(1.0, Positive::get);
         return Some(Choice { name: name.unwrap_or_else(|| computed(keys)), cost, taken });
     }
     let outputs = chosen(experiment, keys);
-    let (own, noise) = planned(experiment, noise, &outputs, keys.noise.map(|sd| sd.get()));
+    let (own, noise) = planned(experiment, noise, &outputs, keys.noise.map(Positive::get));
     let scenarios = own.conditions.iter().filter(|c| !c.curves.is_empty()).count();
     let count = keys.replicates.get();
     let usual = (scenarios * count) as f64;
-    let taken = Taken::Replicates { count, experiment: own, noise };
-    let cost = keys.cost.map_or(usual, |cost| cost.get());
+    let taken = Taken::Replicates { count, planned: Box::new((own, noise)) };
+    let cost = keys.cost.map_or(usual, Positive::get);
     let choice = Choice { name: name.unwrap_or_else(|| measured(keys)), cost, taken };
     (scenarios > 0).then_some(choice)
 }

@@ -11,7 +11,7 @@ pub fn text(next: &NextData) -> String {
     for option in &next.options {
         table.row(columns.cells(option, next.ranked_by));
     }
-    let equal = if columns.name || columns.quantity {
+    let equal = if columns.name {
         "`=`: equal to the best within two standard errors (±) of the Monte Carlo estimate."
     } else {
         "`=`: equal to the best."
@@ -48,7 +48,8 @@ impl Columns {
         }
         heads.push("on the parameters");
         if self.quantity {
-            heads.extend(["on the quantity", "±"]);
+            heads.push("on the quantity");
+            heads.extend(self.name.then_some("±"));
         }
         heads.extend(["bits per cost", ""]);
         heads
@@ -62,7 +63,8 @@ impl Columns {
         cells.push(fixed(option.parameter_bits, 3));
         if self.quantity {
             let cell = |value: Option<f64>| value.map_or_else(String::new, |x| fixed(x, 3));
-            cells.extend([cell(option.quantity_bits), cell(option.quantity_error)]);
+            cells.push(cell(option.quantity_bits));
+            cells.extend(self.name.then(|| cell(option.quantity_error)));
         }
         cells.push(fixed(option.bits(by).0 / option.cost, 3));
         cells.push(if option.equal_to_best { "=".to_owned() } else { String::new() });
