@@ -92,7 +92,7 @@ pub fn power(
     Ok(())
 }
 
-/// What the next data should tell.
+/// Purpose of the next data.
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 pub enum By {
     /// The name of what is missing

@@ -95,7 +95,7 @@ enum Verb {
         /// Run directory (default: `runs/<study name>`)
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
-        /// What to rank by (default: the name if there is a choice, or else the quantity, or else the parameters)
+        /// Purpose to rank by (default: the name if there is a choice, or else the quantity, or else the parameters)
         #[arg(long, value_enum)]
         by: Option<gap::By>,
     },

@@ -189,6 +189,13 @@ pub fn place(curve: &MeasuredCurve) -> On {
     curve.labels.iter().map(|(axis, label)| (axis.clone(), vec![label.clone()])).collect()
 }
 
+/// Labels on which an effect acts, as ` on sensor R, V`; empty if it acts everywhere.
+pub fn on_words(on: &On) -> String {
+    let each: Vec<String> =
+        on.iter().map(|(axis, labels)| format!("{axis} {}", labels.join(", "))).collect();
+    if each.is_empty() { String::new() } else { format!(" on {}", each.join(" and ")) }
+}
+
 impl Placement {
     /// True for the same candidate in the same place.
     pub fn is(&self, other: &Self) -> bool {

@@ -18,7 +18,7 @@ pub(super) struct Choice<'a> {
     pub taken: Taken<'a>,
 }
 
-/// What is taken.
+/// Data of an option.
 pub(super) enum Taken<'a> {
     /// Further replicates of the curves of an experiment.
     Replicates {

@@ -35,7 +35,7 @@ use quantity::Functional;
 
 pub use rank::Wanted;
 
-/// What a study says about the next data.
+/// The statements of a study about the next data.
 #[derive(Debug, Clone, Copy)]
 pub struct Wish<'a> {
     /// The options; the usual ones if there are none.
@@ -51,7 +51,7 @@ pub struct Wish<'a> {
 pub struct NextData {
     /// Types that the name may be, with their posterior probabilities among these; empty if there is no choice.
     pub hypotheses: Vec<WeightedName>,
-    /// What the options are ranked by, per cost: the name if there is a choice, or else the quantity if the study states one,
+    /// The purpose by which the options are ranked, per cost: the name if there is a choice, or else the quantity if the study states one,
     /// or else the parameters.
     pub ranked_by: Wanted,
     /// Options, best first.
@@ -140,7 +140,7 @@ pub fn next(
     Some(NextData { hypotheses, ranked_by, options }.ranked(ranked_by))
 }
 
-/// What all options are weighed with.
+/// The hypotheses and the quantity with which all options are weighed.
 struct Setting<'a> {
     hypotheses: &'a [Hypothesis],
     weights: &'a [f64],

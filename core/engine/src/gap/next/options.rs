@@ -6,10 +6,9 @@ use lacuna::text::values::{Count, Fraction, Positive};
 use super::Wish;
 use super::choice::{Choice, Taken};
 use super::planned::{chosen, planned};
-use crate::gap::candidates::place;
+use crate::gap::candidates::{on_words, place};
 use crate::gap::experiment::Experiment;
 use crate::gap::noise::Noise;
-use crate::gap::report::sentences::on as in_words;
 use crate::study::gap::next::NextKeys;
 
 /// Numbers of further replicates that are tried unless the study lists options.
@@ -79,7 +78,7 @@ fn choice<'a>(
     (scenarios > 0).then_some(choice)
 }
 
-/// What an option measures, in words.
+/// The measurements of an option in words.
 fn measured(keys: &NextKeys) -> String {
     let mut words = match keys.replicates.get() {
         1 => "1 replicate".to_owned(),
@@ -93,7 +92,7 @@ fn measured(keys: &NextKeys) -> String {
         words += &format!(" under {}", names.join(", "));
     }
     if !keys.on.is_empty() {
-        words += &in_words(&keys.on);
+        words += &on_words(&keys.on);
     }
     for interval in &keys.along {
         words += &format!(" from {} to {}", interval.low(), interval.high());
@@ -101,7 +100,7 @@ fn measured(keys: &NextKeys) -> String {
     words
 }
 
-/// What an option computes, in words.
+/// The computations of an option in words.
 fn computed(keys: &NextKeys) -> String {
     let runs = keys.runs.map(|runs| format!("{} runs of the simulator", runs.get()));
     let emulator = keys.emulator_error.filter(|_| keys.runs.is_none());

@@ -17,7 +17,7 @@ const NOTHING: &str = "nothing";
 pub(super) struct Possible<'a> {
     /// The type of the effect that is in question.
     pub kind: String,
-    /// Its posterior probability.
+    /// The posterior probability of the type.
     pub weight: f64,
     system: System<'a>,
     fit: Fit,

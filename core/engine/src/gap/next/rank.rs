@@ -8,7 +8,7 @@ use super::{NextData, NextOption};
 /// Number of standard errors within which two options count as equal.
 const EQUAL: f64 = 2.0;
 
-/// What the next data should tell.
+/// Purpose of the next data: what they should tell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Wanted {

@@ -7,7 +7,7 @@ pub mod next;
 pub mod power;
 mod proof;
 pub mod reliability;
-pub(super) mod sentences;
+mod sentences;
 mod tables;
 
 use lacuna::data::{Layouts, Parameter};

@@ -1,8 +1,7 @@
 //! The result of the gap workflow in sentences: for the terminal and the page.
 
-use lacuna::plugin::effect::On;
-
 use super::{View, proof};
+pub use crate::gap::candidates::on_words as on;
 use crate::gap::experiment::hold_out::HeldOutKind;
 use crate::gap::result::law::Law;
 use crate::gap::result::remains::Remains;
@@ -116,13 +115,6 @@ fn unlisted(result: &GapResult) -> String {
         ),
         None => format!("Something is missing that has no sure name; nearest to it: {all}."),
     }
-}
-
-/// Labels on which an effect acts, as ` on sensor R, V`; empty if it acts everywhere.
-pub fn on(on: &On) -> String {
-    let each: Vec<String> =
-        on.iter().map(|(axis, labels)| format!("{axis} {}", labels.join(", "))).collect();
-    if each.is_empty() { String::new() } else { format!(" on {}", each.join(" and ")) }
 }
 
 /// A region of disagreement in words.

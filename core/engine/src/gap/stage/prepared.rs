@@ -167,7 +167,7 @@ impl<'a> PreparedSearch<'a> {
 }
 
 impl PreparedSearch<'_> {
-    /// What the study says about the next data.
+    /// The statements of the study about the next data.
     fn wish(&self) -> Wish<'_> {
         let (study, problem) = (self.base.study, self.base.problem);
         let runs = problem.fitted().map_or(0, |fitted| fitted.value.errors.training);

@@ -42,7 +42,7 @@ pub struct Next {
     /// Types that the name may be, with their posterior probabilities among these; empty if there is no choice.
     #[schemars(extend("propertyNames" = { "title": "type" }))]
     pub names: ByName<Quantity>,
-    /// What the options are ranked by, per cost: the name if there is a choice, or else the quantity if the study states
+    /// Purpose by which the options are ranked, per cost: the name if there is a choice, or else the quantity if the study states
     /// one, or else the parameters.
     pub ranked_by: Wanted,
     /// Options, best first.
