@@ -1,5 +1,9 @@
 //! Consistency of `[[gap.next]]` and `[gap.quantity]` with the rest of the study.
 
+use lacuna::data::layouts::SCENARIO;
+use lacuna::data::{Coordinates, Layout};
+use lacuna::plugin::effect::{On, acts};
+use lacuna::text::values::Interval;
 use lacuna::text::{Complaints, Node, Problems};
 
 use super::effects::places;
@@ -12,22 +16,61 @@ pub(super) fn check(study: &Study, gap: &Node, problems: &mut Problems) {
     let nodes = gap.get("next").map(Node::elements).unwrap_or_default();
     for (keys, node) in study.gap.keys.next.iter().zip(nodes) {
         problems.within("next", |problems| {
-            let mut complaints = Complaints::new(node, problems);
-            known_scenarios(study, "scenarios", &keys.scenarios, &mut complaints);
-            places(study, "on", &keys.on, &mut complaints);
-            known_intervals(study, "along", &keys.along, &mut complaints);
+            Chosen { scenarios: &keys.scenarios, on: &keys.on, along: &keys.along }
+                .check(study, node, problems);
             if keys.is_computed() {
-                computed(study, keys, &mut complaints);
+                computed(study, keys, &mut Complaints::new(node, problems));
             }
         });
     }
     if let (Some(keys), Some(node)) = (&study.gap.keys.quantity, gap.get("quantity")) {
         problems.within("quantity", |problems| {
-            let mut complaints = Complaints::new(node, problems);
-            known_scenarios(study, "scenarios", &keys.scenarios, &mut complaints);
-            places(study, "on", &keys.on, &mut complaints);
-            known_intervals(study, "along", &keys.along, &mut complaints);
+            Chosen { scenarios: &keys.scenarios, on: &keys.on, along: &keys.along }
+                .check(study, node, problems);
         });
+    }
+}
+
+/// Values of the response that a section chooses.
+struct Chosen<'a> {
+    scenarios: &'a [String],
+    on: &'a On,
+    along: &'a [Interval],
+}
+
+impl Chosen<'_> {
+    /// Reports names and intervals that the response does not have, or a choice that is empty although it has each of them.
+    fn check(&self, study: &Study, node: &Node, problems: &mut Problems) {
+        let before = problems.len();
+        let mut complaints = Complaints::new(node, problems);
+        known_scenarios(study, "scenarios", self.scenarios, &mut complaints);
+        places(study, "on", self.on, &mut complaints);
+        known_intervals(study, "along", self.along, &mut complaints);
+        if problems.len() == before && !study.layouts.blocks.iter().any(|layout| self.is_in(layout))
+        {
+            Complaints::new(node, problems)
+                .at("")
+                .say("no value of the response has all of these: scenarios, labels and places on the last axis")
+                .help("the scenarios may have other sensors or other times: choose what they have");
+        }
+    }
+
+    /// Returns true if some value of a layout is chosen.
+    fn is_in(&self, layout: &Layout) -> bool {
+        let mut on = self.on.clone();
+        if !self.scenarios.is_empty() {
+            on.insert(SCENARIO.to_owned(), self.scenarios.to_vec());
+        }
+        let acts = if on.is_empty() { vec![true; layout.len()] } else { acts(layout, &on) };
+        let grid = match layout.axes.last().map(|axis| &axis.coordinates) {
+            Some(Coordinates::Grid { values, .. }) => values.as_slice(),
+            _ => &[],
+        };
+        let inside = |i: usize| {
+            let x = grid.get(i % grid.len().max(1));
+            x.is_some_and(|x| self.along.iter().any(|interval| interval.contains(*x)))
+        };
+        acts.iter().enumerate().any(|(i, acts)| *acts && (self.along.is_empty() || inside(i)))
     }
 }
 
