@@ -25,7 +25,7 @@ pub struct ScenarioSection {
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub functions: BTreeMap<String, FunctionSection>,
     /// `false` for conditions under which nothing was measured so far: the response there is only predicted, and
-    /// `lacuna next` weighs measurements there against others.
+    /// `lacuna next STUDY` weighs measurements there against others.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub measured: bool,
     /// Axes of the response in this scenario, in place of those of the same name in `[response]`: another time grid, or
