@@ -58,7 +58,7 @@ impl Change {
 pub fn largest_degree(law: &Distribution) -> Option<usize> {
     let below = |moments: f64| Some((0.5 * (moments - NEAR_INFINITE)).max(0.0).floor() as usize);
     match *law {
-        Distribution::StudentT([dof, ..]) => below(dof),
+        Distribution::StudentT([dof, ..]) | Distribution::HalfStudentT([dof, _]) => below(dof),
         Distribution::InverseGamma([shape, _]) => below(shape),
         // The squares of the recurrence's entries grow like exp(4 n sigma^2).
         Distribution::LogNormal([_, sigma]) => Some((150.0 / (sigma * sigma)).floor() as usize),
@@ -114,6 +114,10 @@ fn pieces(law: &Distribution, degree: usize) -> Vec<Piece> {
         }
         Distribution::StudentT([_, location, scale]) => {
             vec![piece(Change::Sine { origin: location, unit: scale }, 0.0, ALL, 0.25)]
+        }
+        Distribution::HalfStudentT([_, scale]) => {
+            let change = Change::Sine { origin: 0.0, unit: scale };
+            vec![piece(change, 0.0, (0.0, f64::INFINITY), 0.25)]
         }
         Distribution::Normal([mean, sd]) => {
             vec![piece(Change::Affine { origin: mean, unit: sd }, 0.0, ALL, 0.5)]

@@ -10,6 +10,12 @@ fn ln_standard_normal(z: f64) -> f64 {
     -0.5 * z * z - HALF_LN_TWO_PI
 }
 
+fn ln_student(dof: f64, z: f64) -> f64 {
+    ln_gamma_half_step(0.5 * dof)
+        - 0.5 * (dof * std::f64::consts::PI).ln()
+        - 0.5 * (dof + 1.0) * (z * z / dof).ln_1p()
+}
+
 impl Distribution {
     /// Logarithm of the density at `x`, per unit of `x`; minus infinity outside the support.
     ///
@@ -39,11 +45,10 @@ impl Distribution {
             }
             Self::Beta([a, b, lo, hi]) => log_density_of_beta([a, b, lo, hi], x),
             Self::StudentT([dof, location, scale]) => {
-                let z = (x - location) / scale;
-                ln_gamma_half_step(0.5 * dof)
-                    - 0.5 * (dof * std::f64::consts::PI).ln()
-                    - scale.ln()
-                    - 0.5 * (dof + 1.0) * (z * z / dof).ln_1p()
+                ln_student(dof, (x - location) / scale) - scale.ln()
+            }
+            Self::HalfStudentT([dof, scale]) => {
+                ln_student(dof, x / scale) - scale.ln() + std::f64::consts::LN_2
             }
             Self::TruncatedNormal([mean, sd, lo, hi]) => {
                 ln_standard_normal((x - mean) / sd)
@@ -88,6 +93,10 @@ impl Distribution {
             }
             Self::StudentT([dof, location, scale]) => {
                 let z = (x - location) / scale;
+                -(dof + 1.0) * z / (dof + z * z) / scale
+            }
+            Self::HalfStudentT([dof, scale]) => {
+                let z = x / scale;
                 -(dof + 1.0) * z / (dof + z * z) / scale
             }
             Self::Triangular([lo, mode, hi]) => {

@@ -39,6 +39,9 @@ pub enum Distribution {
     Exponential(f64),
     /// Student's t: `[degrees of freedom, location, scale]`.
     StudentT([f64; 3]),
+    /// The absolute value of a variable with Student's t distribution about zero: `[degrees of freedom, scale]`. With one
+    /// degree of freedom it is the half-Cauchy distribution.
+    HalfStudentT([f64; 2]),
     /// Normal truncated to bounds, which may be infinite: `[mean, standard deviation, lower bound, upper bound]`, the
     /// first two before truncation.
     TruncatedNormal([f64; 4]),
@@ -60,6 +63,7 @@ impl Distribution {
             Self::Beta(_) => "beta",
             Self::Exponential(_) => "exponential",
             Self::StudentT(_) => "student_t",
+            Self::HalfStudentT(_) => "half_student_t",
             Self::TruncatedNormal(_) => "truncated_normal",
             Self::Triangular(_) => "triangular",
         }
@@ -73,7 +77,8 @@ impl Distribution {
             | Self::LogNormal(n)
             | Self::LogUniform(n)
             | Self::Gamma(n)
-            | Self::InverseGamma(n) => n,
+            | Self::InverseGamma(n)
+            | Self::HalfStudentT(n) => n,
             Self::HalfNormal(n) | Self::Exponential(n) => std::slice::from_ref(n),
             Self::Beta(n) | Self::TruncatedNormal(n) => n,
             Self::StudentT(n) | Self::Triangular(n) => n,
@@ -114,7 +119,9 @@ impl Distribution {
             Self::Beta([a, b, _, _]) if a <= 0.0 || b <= 0.0 => complain("a and b above zero"),
             Self::Beta([_, _, lo, hi]) if lo >= hi => complain("the lower bound below the upper"),
             Self::Exponential(mean) if mean <= 0.0 => complain("a mean above zero"),
-            Self::StudentT([dof, _, scale]) if dof <= 0.0 || scale <= 0.0 => {
+            Self::StudentT([dof, _, scale]) | Self::HalfStudentT([dof, scale])
+                if dof <= 0.0 || scale <= 0.0 =>
+            {
                 complain("degrees of freedom and a scale above zero")
             }
             Self::TruncatedNormal([_, sd, _, _]) if sd <= 0.0 => {
@@ -167,6 +174,9 @@ impl fmt::Display for Distribution {
                 n(location),
                 n(scale)
             ),
+            Self::HalfStudentT([dof, scale]) => {
+                write!(f, "half Student t with {} degrees of freedom, scale {}", n(dof), n(scale))
+            }
             Self::TruncatedNormal([mean, sd, lo, hi]) => {
                 write!(f, "normal, mean {}, sd {}, kept in [{}, {}]", n(mean), n(sd), n(lo), n(hi))
             }

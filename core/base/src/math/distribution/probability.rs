@@ -36,6 +36,7 @@ impl Distribution {
             }
             Self::Exponential(mean) => -(-x / mean).exp_m1(),
             Self::StudentT([dof, location, scale]) => student_cdf(dof, (x - location) / scale),
+            Self::HalfStudentT([dof, scale]) => student_tails(dof, x / scale).1.exp(),
             Self::TruncatedNormal([mean, sd, lo, hi]) => {
                 // Near the lower bound the distance from it is known to more digits than `x` itself.
                 let (a, z, width) = ((lo - mean) / sd, (x - mean) / sd, (x - lo) / sd);
@@ -80,6 +81,7 @@ impl Distribution {
             }
             Self::Exponential(mean) => -mean * (-p).ln_1p(),
             Self::StudentT([dof, location, scale]) => location + scale * student_quantile(dof, p),
+            Self::HalfStudentT([dof, scale]) => scale * student_quantile_of_size(dof, q, p),
             Self::TruncatedNormal([mean, sd, lo, hi]) => {
                 let (a, b) = ((lo - mean) / sd, (hi - mean) / sd);
                 let z = truncated_quantile(a, b, p, q);
@@ -116,7 +118,8 @@ fn log_uniform_quantile(lo: f64, hi: f64, p: f64) -> f64 {
     if factor.is_finite() { lo * factor } else { ((1.0 - p) * lo.ln() + p * hi.ln()).exp() }
 }
 
-fn student_cdf(dof: f64, t: f64) -> f64 {
+/// The logarithms of the probabilities of a size of Student's t above and below that of `t`.
+fn student_tails(dof: f64, t: f64) -> (f64, f64) {
     // For large t, dividing keeps the degrees of freedom from being lost beside t^2.
     let r = t / dof.sqrt();
     let (x, y) = if r.abs() > 1.0 {
@@ -125,16 +128,24 @@ fn student_cdf(dof: f64, t: f64) -> f64 {
     } else {
         (1.0 / (1.0 + r * r), r * r / (1.0 + r * r))
     };
-    let (outside, _) = beta_tails(0.5 * dof, 0.5, x, y);
-    let tail = 0.5 * outside.exp();
+    beta_tails(0.5 * dof, 0.5, x, y)
+}
+
+fn student_cdf(dof: f64, t: f64) -> f64 {
+    let tail = 0.5 * student_tails(dof, t).0.exp();
     if t < 0.0 { tail } else { 1.0 - tail }
 }
 
 fn student_quantile(dof: f64, p: f64) -> f64 {
     let tail = p.min(1.0 - p);
-    let (x, y) = inverse_beta(0.5 * dof, 0.5, 2.0 * tail, (1.0 - 2.0 * p).abs());
-    let t = dof.sqrt() * (y / x).sqrt();
+    let t = student_quantile_of_size(dof, 2.0 * tail, (1.0 - 2.0 * p).abs());
     if p < 0.5 { -t } else { t }
+}
+
+/// The size of Student's t with these probabilities of larger and of smaller ones.
+fn student_quantile_of_size(dof: f64, larger: f64, smaller: f64) -> f64 {
+    let (x, y) = inverse_beta(0.5 * dof, 0.5, larger, smaller);
+    dof.sqrt() * (y / x).sqrt()
 }
 
 /// Quantile of a standard normal variable truncated to `a` and `b`, computed with logarithms in the tail that contains

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_2_PI;
 
 use super::Distribution;
 use super::probability::ln_ratio;
-use crate::math::special::five_point_rule;
+use crate::math::special::{five_point_rule, ln_gamma_half_step};
 
 impl Distribution {
     /// Closed interval outside which the density is zero; infinite where it is unbounded.
@@ -20,12 +20,13 @@ impl Distribution {
             | Self::LogNormal(_)
             | Self::Gamma(_)
             | Self::InverseGamma(_)
-            | Self::Exponential(_) => (0.0, f64::INFINITY),
+            | Self::Exponential(_)
+            | Self::HalfStudentT(_) => (0.0, f64::INFINITY),
         }
     }
 
     /// Mean; infinite or NaN if it does not exist (an inverse gamma distribution of shape one or less, Student's t with
-    /// one degree of freedom or less).
+    /// one degree of freedom or less, also of its size).
     pub fn mean(&self) -> f64 {
         match *self {
             Self::Uniform([lo, hi]) => lo + 0.5 * (hi - lo),
@@ -39,6 +40,8 @@ impl Distribution {
             Self::Beta([a, b, lo, hi]) => lo + (hi - lo) * a / (a + b),
             Self::StudentT([dof, location, _]) if dof > 1.0 => location,
             Self::StudentT(_) => f64::NAN,
+            Self::HalfStudentT([dof, scale]) if dof > 1.0 => scale * mean_size_of_student(dof),
+            Self::HalfStudentT(_) => f64::INFINITY,
             Self::TruncatedNormal([mean, sd, lo, hi]) => {
                 mean + sd * truncated_moments((lo - mean) / sd, (hi - mean) / sd).0
             }
@@ -71,6 +74,10 @@ impl Distribution {
             Self::StudentT([dof, _, scale]) if dof > 2.0 => scale * scale * dof / (dof - 2.0),
             Self::StudentT([dof, _, _]) if dof > 1.0 => f64::INFINITY,
             Self::StudentT(_) => f64::NAN,
+            Self::HalfStudentT([dof, scale]) if dof > 2.0 => {
+                scale * scale * (dof / (dof - 2.0) - mean_size_of_student(dof).powi(2))
+            }
+            Self::HalfStudentT(_) => f64::INFINITY,
             Self::TruncatedNormal([mean, sd, lo, hi]) => {
                 sd * sd * truncated_moments((lo - mean) / sd, (hi - mean) / sd).1
             }
@@ -92,7 +99,7 @@ impl Distribution {
             Self::Normal([mode, _])
             | Self::StudentT([_, mode, _])
             | Self::Triangular([_, mode, _]) => mode,
-            Self::HalfNormal(_) | Self::Exponential(_) => 0.0,
+            Self::HalfNormal(_) | Self::Exponential(_) | Self::HalfStudentT(_) => 0.0,
             Self::LogNormal([mu, sigma]) => (mu - sigma * sigma).exp(),
             Self::LogUniform([lo, _]) => lo,
             Self::Gamma([shape, scale]) => (shape - 1.0).max(0.0) * scale,
@@ -110,6 +117,11 @@ impl Distribution {
             Self::TruncatedNormal([mean, _, lo, hi]) => mean.clamp(lo, hi),
         }
     }
+}
+
+/// Mean of the size of a variable with Student's t distribution: `2 sqrt(nu / pi) Gamma((nu + 1) / 2) / (Gamma(nu / 2) (nu - 1))`.
+fn mean_size_of_student(dof: f64) -> f64 {
+    2.0 * (dof / std::f64::consts::PI).sqrt() * ln_gamma_half_step(0.5 * dof).exp() / (dof - 1.0)
 }
 
 /// Mean and variance of a standard normal variable truncated to `a` and `b`.

@@ -33,6 +33,9 @@
 //!     lambda x: tail(v, (x - m) / f(s)) if x < m else 1 - tail(v, (x - m) / f(s)),
 //!     lambda x: tail(v, (x - m) / f(s)) if x > m else 1 - tail(v, (x - m) / f(s)),
 //!     lambda x: mp.loggamma(f(v + 1) / 2) - mp.loggamma(f(v) / 2) - mp.log(f(v) * mp.pi) / 2 - mp.log(f(s)) - f(v + 1) / 2 * mp.log(1 + ((x - m) / f(s)) ** 2 / v))
+//! def hst(v, s): return (st.halfcauchy(0, s),
+//!     lambda x: 1 - 2 * tail(v, x / f(s)), lambda x: 2 * tail(v, x / f(s)),
+//!     lambda x: stu(v, 0, s)[3](x) + mp.log(2))
 //! def tru(m, s, lo, hi):
 //!     a, b = (f(lo) - m) / s, (f(hi) - m) / s
 //!     Z = phi(-a) - phi(-b) if a > 0 else phi(b) - phi(a)
@@ -58,7 +61,7 @@
 //!  ("gamma", gam, (4.5, 1)), ("gamma", gam, (30, 0.1)), ("gamma", gam, (1000, 1e6)), ("inverse_gamma", igam, (0.1, 1)), ("inverse_gamma", igam, (3, 2e-4)),
 //!  ("inverse_gamma", igam, (40, 10)), ("beta", beta, (0.1, 0.3, 0, 1)), ("beta", beta, (2, 5, 0, 1)), ("beta", beta, (5, 0.2, 0, 1)), ("beta", beta, (1, 3, 0, 2)),
 //!  ("beta", beta, (500, 700, 0, 1)), ("beta", beta, (2, 3, 1500, 2000)), ("exponential", expo, (2.5,)), ("student_t", stu, (0.5, 0, 1)), ("student_t", stu, (1, 0, 2)),
-//!  ("student_t", stu, (4, 1, 0.5)), ("student_t", stu, (200, 0, 1)), ("truncated_normal", tru, (0, 1, -1, 2)), ("truncated_normal", tru, (1, 2, 0, inf)),
+//!  ("student_t", stu, (4, 1, 0.5)), ("student_t", stu, (200, 0, 1)), ("half_student_t", hst, (1, 2)), ("half_student_t", hst, (3, 0.5)), ("truncated_normal", tru, (0, 1, -1, 2)), ("truncated_normal", tru, (1, 2, 0, inf)),
 //!  ("truncated_normal", tru, (0, 1, 30, inf)), ("truncated_normal", tru, (0, 1, 45, 46)), ("truncated_normal", tru, (0, 1, -inf, -8)), ("triangular", tri, (0, 0.25, 1)), ("triangular", tri, (-1, 3, 3.5))]
 //! ps = [1e-10, 1e-6, 1e-3, 0.01, 0.25, 0.5, 0.75, 0.99, 0.999, 1 - 1e-6, 1 - 1e-10]
 //! num = lambda x: repr(float(x))
@@ -178,8 +181,9 @@ fn derivatives_are_the_slopes_of_the_log_density() {
     }
 }
 
-/// Source: mean and variance from scipy 1.17.1, `law.mean()` and `law.var()`.
-const MOMENTS: [(&str, f64, f64); 13] = [
+/// Source: mean and variance from scipy 1.17.1, `law.mean()` and `law.var()`; of `half_student_t` from mpmath 1.4.1, by quadrature of its
+/// density with 40 digits.
+const MOMENTS: [(&str, f64, f64); 14] = [
     ("uniform = [-2, 3]", 0.5, 2.083333333333333),
     ("normal = [3, 2]", 3.0, 4.0),
     ("half_normal = 2", 1.5957691216057308, 1.4535209105296745),
@@ -193,10 +197,11 @@ const MOMENTS: [(&str, f64, f64); 13] = [
     ("truncated_normal = [1, 2, 0, 4]", 1.7125457683541194, 1.1209926006049002),
     ("truncated_normal = [0, 1, 3, inf]", 3.28309865493044, 0.07055918678525586),
     ("triangular = [-1, 3, 3.5]", 1.8333333333333335, 1.0138888888888888),
+    ("half_student_t = [5, 2]", 1.8980334491124722, 3.0641356927168792),
 ];
 
 #[test]
-fn means_and_variances_are_those_of_scipy() {
+fn means_and_variances_are_those_of_scipy_and_mpmath() {
     for (text, mean, variance) in MOMENTS {
         let law = read(text);
         assert!(near(law.mean(), mean, 1e-12), "{law}: {}", law.mean());
@@ -245,7 +250,8 @@ fn any_law(kind: u32, size: &mut impl FnMut() -> f64) -> Distribution {
         7 => Distribution::Beta([a, b, -1.0, 1.0]),
         8 => Distribution::Exponential(a),
         9 => Distribution::StudentT([a, 0.0, b]),
-        10 => Distribution::TruncatedNormal([(b - c).clamp(-b - 99.0 * a, c + 99.0 * a), a, -b, c]),
+        10 => Distribution::HalfStudentT([a, b]),
+        11 => Distribution::TruncatedNormal([(b - c).clamp(-b - 99.0 * a, c + 99.0 * a), a, -b, c]),
         _ => Distribution::Triangular([0.0, a, a + b]),
     }
 }
@@ -255,7 +261,7 @@ fn quantiles_grow_inside_the_support_whatever_the_numbers() {
     let mut rng = Stream::root(11).generator();
     let mut size = || Distribution::LogUniform([1e-4, 1e4]).sample(&mut rng);
     for round in 0..50 {
-        for kind in 0..12 {
+        for kind in 0..13 {
             let law = any_law(kind, &mut size);
             assert_eq!(law.check(), Ok(()), "{law}");
             let (lo, hi) = law.support();
@@ -353,6 +359,6 @@ fn a_person_reads_it_in_words() {
 fn the_schema_describes_each_distribution() {
     let schema = serde_json::to_value(schemars::schema_for!(Distribution)).unwrap();
     let forms = schema["oneOf"].as_array().unwrap();
-    assert_eq!(forms.len(), 12);
+    assert_eq!(forms.len(), 13);
     assert!(forms.iter().all(|form| form["description"].is_string()));
 }

@@ -7,7 +7,7 @@ use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor}
 use super::Distribution;
 
 /// Names that a study may use and the meaning of their parameters.
-const FORMS: [(&str, &str); 12] = [
+const FORMS: [(&str, &str); 13] = [
     ("uniform", "[lower bound, upper bound]"),
     ("normal", "[mean, standard deviation]"),
     ("half_normal", "a scale"),
@@ -18,6 +18,7 @@ const FORMS: [(&str, &str); 12] = [
     ("beta", "[a, b, lower bound, upper bound] or [a, b]"),
     ("exponential", "a mean"),
     ("student_t", "[degrees of freedom, location, scale]"),
+    ("half_student_t", "[degrees of freedom, scale]"),
     ("truncated_normal", "[mean, standard deviation, lower bound, upper bound]"),
     ("triangular", "[lower bound, mode, upper bound]"),
 ];
@@ -137,6 +138,7 @@ fn build(name: &str, numbers: &Numbers) -> Result<Distribution, String> {
             ("student_t", &[dof, location, scale]) => {
                 Distribution::StudentT([dof, location, scale])
             }
+            ("half_student_t", &[dof, scale]) => Distribution::HalfStudentT([dof, scale]),
             ("truncated_normal", &[mean, sd, lo, hi]) => {
                 let lo = if lo.is_nan() { f64::NEG_INFINITY } else { lo };
                 let hi = if hi.is_nan() { f64::INFINITY } else { hi };
