@@ -101,6 +101,16 @@ pub fn hash(bytes: &[u8]) -> String {
     in_hexadecimal(Sha256::digest(bytes).as_slice())
 }
 
+/// SHA-256 of a text and of arrays of numbers, in hexadecimal; the text states the sizes of the arrays.
+pub fn hash_numbers(text: &str, arrays: &[&[f64]]) -> String {
+    let mut hasher = Sha256::new();
+    hasher.update(text.as_bytes());
+    for number in arrays.iter().copied().flatten() {
+        hasher.update(number.to_le_bytes());
+    }
+    in_hexadecimal(hasher.finalize().as_slice())
+}
+
 /// SHA-256 of a file, in hexadecimal.
 pub fn hash_file(path: &Path) -> Result<String, Stop> {
     let digest = || -> io::Result<String> {

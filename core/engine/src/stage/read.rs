@@ -110,6 +110,17 @@ impl Data {
     pub fn runs(&self) -> Result<&Ensemble, Stop> {
         self.ensemble.as_ref().ok_or_else(|| Stop::new("the study has no simulation runs"))
     }
+
+    /// Hash of all simulation runs, on which a surrogate depends; the measurements are not in it.
+    pub fn runs_hash(&self) -> String {
+        let hash = |e: &Ensemble| {
+            let labels = (&e.parameters, &e.units, &e.runs, &e.layouts, &e.valid, &e.failed);
+            let text = json!([labels, e.points.columns()]).to_string();
+            files::hash_numbers(&text, &[e.points.as_slice(), e.responses.as_slice()])
+        };
+        let all: Vec<String> = self.ensemble.iter().chain(&self.cheaper).map(hash).collect();
+        files::hash(all.join(" ").as_bytes())
+    }
 }
 
 /// Reads the simulation runs and the measurements.

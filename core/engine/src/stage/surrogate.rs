@@ -115,7 +115,7 @@ pub fn stage(
     let parameters = used.parameters(fitting.parameters);
     let laws: Vec<_> = parameters.iter().map(|p| (&p.name, &p.design)).collect();
     let inputs = json!([
-        data.hash,
+        data.value.runs_hash(),
         section.built.identity(),
         (&fitting.training, &fitting.validation),
         laws,

@@ -134,7 +134,7 @@ pub fn build_added(study: &Study) -> Result<(), Stop> {
 /// The inputs on which the identification depends.
 fn inputs(companion: &Companion, problem: &InverseProblem<'_>) -> serde_json::Value {
     let laws: Vec<_> = companion.study.parameters.iter().map(|p| (&p.name, &p.prior)).collect();
-    json!([problem.data.hash, companion.identity(), laws])
+    json!([problem.data.value.runs_hash(), companion.identity(), laws])
 }
 
 /// The companion with its constants: as the study states them, or as the runs identify them; kept in the run directory.
