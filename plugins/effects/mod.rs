@@ -1,5 +1,6 @@
 //! Effects: named pieces of missing physics that act on the model's response.
 
+pub mod clock_rate;
 pub mod common;
 pub mod crosstalk;
 pub mod damping;

@@ -9,6 +9,10 @@ use super::{Table, all};
 
 /// Options for responses of magnitude 1e-4 over about 1e-4 seconds, as used by the suite.
 const OPTIONS: &Table = &[
+    (
+        "clock_rate",
+        &["rate = { normal = [0, 0.01] }", "rate = { uniform = [-0.1, 0.1] }\nzero = 1e-4"],
+    ),
     ("crosstalk", &["from = \"B\"", "from = \"C\"\nshare = { uniform = [0, 0.5] }"]),
     ("damping", &["rate = { half_normal = 2000 }"]),
     ("delay", &["time = { normal = [0, 3e-5] }", "time = { uniform = [0, 2e-4] }"]),

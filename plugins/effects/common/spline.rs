@@ -73,19 +73,31 @@ fn end_slope(at: &[f64], values: &[f64], place: impl Fn(usize) -> usize) -> f64 
 }
 
 /// Calls `each` for every point of a curve with the spline's value and slope at an earlier time: at the point's
-/// time less `by`. Before its first point and after its last a curve is at rest.
+/// time less `by`, as [`shifted_by`] does.
 pub fn shifted(
     knots: &Knots<'_>,
     values: &[f64],
     slopes: &[f64],
     by: f64,
+    each: impl FnMut(usize, f64, f64),
+) {
+    shifted_by(knots, values, slopes, |_| by, each);
+}
+
+/// Calls `each` for every point of a curve with the spline's value and slope at another time: at the point's time less
+/// `by` of it, which leaves the order of the points as it is. Before its first point and after its last a curve is at rest.
+pub fn shifted_by(
+    knots: &Knots<'_>,
+    values: &[f64],
+    slopes: &[f64],
+    by: impl Fn(f64) -> f64,
     mut each: impl FnMut(usize, f64, f64),
 ) {
     let at = knots.at;
     let last = at.len() - 1;
     let mut k = 0;
     for i in 0..at.len() {
-        let t = at[i] - by;
+        let t = at[i] - by(at[i]);
         if last == 0 || t < at[0] {
             each(i, values[0], 0.0);
             continue;
