@@ -174,6 +174,11 @@ pub fn deflection_index(
     Ok(Index { name: format!("{}_deflection", place.name), unit, prior, starts })
 }
 
+/// The width over which the sign of a dry friction is smoothed, relative to the change of the speed within one step of the
+/// response: so narrow that the response does not show it. One step is not: the friction is then overestimated by a third
+/// where the speed often reverses.
+const NARROW: f64 = 0.05;
+
 /// Returns the speed over which the sign of a dry friction is smoothed, and the words that say so if the term chose it.
 ///
 /// # Errors
@@ -186,12 +191,13 @@ pub fn width(
     match (given, of, place.time) {
         (Some(width), ..) => Ok((width.to_owned(), None)),
         (None, None, Some(time)) => {
-            let width = (place.size)(&place.state.rate)? * time.step;
+            let width = NARROW * (place.size)(&place.state.rate)? * time.step;
             if !(width.is_finite() && width > 0.0) {
                 return Err("the speed does not change: give `width`".into());
             }
             let width = quantity(width, &place.state.unit);
-            let fixed = format!("width = {width}, the change of the speed within one step");
+            let fixed =
+                format!("width = {width}, a twentieth of the change of the speed within one step");
             Ok((width, Some(fixed)))
         }
         _ => Err("the unit of the speed is not known: give `width`".into()),

@@ -16,8 +16,8 @@ use super::common::{of, width};
 /// ```
 ///
 /// The sign of the speed is smoothed over `width`, which governs how the speed passes through zero and which data
-/// rarely determine. Without `width` it is the change of the speed within one step of the response, and the
-/// candidate's formula says so. The term is easily confused with `linear_friction` if the amplitude varies little.
+/// rarely determine. Without `width` it is a twentieth of the change of the speed within one step of the response, and
+/// the candidate's formula says so. The term is easily confused with `linear_friction` if the amplitude varies little.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CoulombFriction {
