@@ -20,7 +20,7 @@ use lacuna::run::{Observer, Stop};
 use lacuna_run::RunDirectory;
 use narrow::RestrictedMap;
 
-use crate::gap::candidates::Candidate;
+use crate::gap::candidates::{Candidate, Untried};
 use crate::gap::experiment::wider::ExtendedMap;
 use crate::stage::inverse_problem::InverseProblem;
 use crate::study::Study;
@@ -39,6 +39,8 @@ pub struct InsideCandidates<'a> {
     pub wide: Option<ExtendedMap<'a>>,
     /// The companion with its constants, if the study has one.
     pub companion: Option<AdmittedCompanion>,
+    /// The terms of the library that are not tried in the equations.
+    pub untried: Vec<Untried>,
 }
 
 impl<'a> InsideCandidates<'a> {
@@ -53,11 +55,12 @@ impl<'a> InsideCandidates<'a> {
         let companion = companion::prepared(study, problem, run, observer)?;
         let mut candidates = runs::candidates(study, problem, run, observer)?;
         let Some(pieces) = pieces else {
-            return Ok(Self { candidates, wide: None, companion });
+            return Ok(Self { candidates, wide: None, companion, untried: Vec::new() });
         };
         let (own, wide) = self::candidates(pieces, study, problem, run, observer)?;
         candidates.extend(own);
-        Ok(Self { candidates, wide: Some(wide), companion })
+        let untried = pieces.untried.clone();
+        Ok(Self { candidates, wide: Some(wide), companion, untried })
     }
 }
 

@@ -13,7 +13,7 @@ use toml::Table;
 
 use super::narrow::RestrictedModels;
 use super::terms;
-use crate::gap::candidates::Candidate;
+use crate::gap::candidates::{Candidate, Untried};
 use crate::gap::edit::{Edit, NewParameter};
 use crate::gap::experiment::wider::FreeInput;
 use crate::gap::system::switched::InputEffect;
@@ -28,6 +28,8 @@ pub struct Pieces {
     pub all: Vec<Piece>,
     /// The inputs of the wider model that are free in some piece.
     pub inputs: Vec<FreeInput>,
+    /// The terms of the library that fit some equation and could be made for none.
+    pub untried: Vec<Untried>,
     whole: ExtendedModel,
     narrower: RestrictedModels,
 }
@@ -68,8 +70,8 @@ impl Pieces {
             all.push(Piece { kind, description, places, addition: None, at, tried: 1 });
             inputs.push(freed);
         }
-        terms::add(study, &mut all, &mut inputs)?;
-        Self::made(study, all, inputs)
+        let untried = terms::add(study, &mut all, &mut inputs)?;
+        Self::made(study, all, inputs, untried)
     }
 
     /// The pieces of a study, followed by others, each with its inputs: the indices of its places are those of its own
@@ -79,9 +81,10 @@ impl Pieces {
         further: Vec<(Piece, Vec<FreeInput>)>,
     ) -> Result<Option<Self>, Stop> {
         let own = Self::of(study)?;
-        let (mut all, mut inputs) = own.map_or_else(Default::default, |own| (own.all, own.inputs));
+        let (mut all, mut inputs, untried) =
+            own.map_or_else(Default::default, |own| (own.all, own.inputs, own.untried));
         append(&mut all, &mut inputs, further);
-        Self::made(study, all, inputs)
+        Self::made(study, all, inputs, untried)
     }
 
     /// These pieces alone, as in [`Pieces::with`].
@@ -91,15 +94,20 @@ impl Pieces {
     ) -> Result<Option<Self>, Stop> {
         let (mut all, mut inputs) = (Vec::new(), Vec::new());
         append(&mut all, &mut inputs, pieces);
-        Self::made(study, all, inputs)
+        Self::made(study, all, inputs, Vec::new())
     }
 
-    fn made(study: &Study, all: Vec<Piece>, inputs: Vec<FreeInput>) -> Result<Option<Self>, Stop> {
+    fn made(
+        study: &Study,
+        all: Vec<Piece>,
+        inputs: Vec<FreeInput>,
+        untried: Vec<Untried>,
+    ) -> Result<Option<Self>, Stop> {
         let every: Vec<usize> = (0..all.len()).collect();
         let whole = ExtendedModel::of(study, &all, &inputs, &every)?;
         let narrower = RestrictedModels::new();
         let whole = whole.filter(|_| !all.is_empty());
-        Ok(whole.map(|whole| Self { all, inputs, whole, narrower }))
+        Ok(whole.map(|whole| Self { all, inputs, untried, whole, narrower }))
     }
 
     /// The model with all pieces.

@@ -13,6 +13,7 @@ use lacuna::run::Stop;
 
 use super::pieces::Piece;
 use super::unasked;
+use crate::gap::candidates::Untried;
 use crate::gap::experiment::wider::FreeInput;
 use crate::stage::simulator::{Setting, Simulator};
 use crate::study::Study;
@@ -21,24 +22,24 @@ use crate::study::gap::TermKeys;
 /// The share of the rate that a term contributes at the scale of the prior of its coefficient.
 const SHARE: f64 = 0.5;
 
-/// The degrees of freedom of the prior of a coefficient of either sign. Its tails are heavy, as are those of the exponential
-/// prior of a positive one: what is missing may be several times as large as the rate in the middle of the priors.
+/// The degrees of freedom of the prior of a coefficient, of either sign or positive. Its tails are heavy: what is missing may
+/// be many times as large as the rate in the middle of the priors, from which its scale is taken.
 const FREEDOM: f64 = 3.0;
 
 /// The number of points of the priors at which sizes are sought that the middle of the priors does not have.
 const POINTS: u64 = 16;
 
 /// Adds the terms of a study to its pieces and inputs: those that it names, and those of the library that are tried
-/// without being named.
+/// without being named. Returns the types of the library that fit some equation and could be made for none.
 pub(super) fn add(
     study: &Study,
     all: &mut Vec<Piece>,
     inputs: &mut Vec<FreeInput>,
-) -> Result<(), Stop> {
+) -> Result<Vec<Untried>, Stop> {
     let terms = &study.gap.inside.terms;
     let library = unasked::library(study);
     if terms.is_empty() && library.is_empty() {
-        return Ok(());
+        return Ok(Vec::new());
     }
     let simulator = Simulator::of(study)?.ok_or_else(|| Stop::new("the study has no model"))?;
     let amend = simulator.model.amend().ok_or_else(|| {
@@ -52,14 +53,17 @@ pub(super) fn add(
         let found = found.map_err(|e| Stop::new(format!("the term `{name}`: {e}")))?;
         put(section, name, found, all, inputs);
     }
+    let mut untried = Vec::new();
     for section in unasked::sections(study, &library, &terms_of.states()) {
         let name = section.common.name(&section.built);
-        // A term whose units or size fit none of the equations is skipped.
-        if let Ok(found) = terms_of.summand(&section, name) {
-            put(&section, name, found, all, inputs);
+        match terms_of.summand(&section, name) {
+            Ok(found) => put(&section, name, found, all, inputs),
+            Err(reason) => untried.push(Untried { kind: kind(&section, name), reason }),
         }
     }
-    Ok(())
+    untried.retain(|one: &Untried| all.iter().all(|piece| piece.kind != one.kind));
+    untried.dedup_by(|later, first| later.kind == first.kind);
+    Ok(untried)
 }
 
 /// Adds a term and its coefficient to the pieces.
@@ -198,7 +202,7 @@ impl TermSetting<'_> {
         }
         Ok(match summand.sign {
             Sign::Either => Distribution::StudentT([FREEDOM, 0.0, sd]),
-            Sign::Positive => Distribution::Exponential(sd),
+            Sign::Positive => Distribution::HalfStudentT([FREEDOM, sd]),
         })
     }
 
