@@ -51,7 +51,12 @@ impl Terminal {
 
 impl Observer for Terminal {
     fn begin(&self, stage: &str, unit: &str, total: u64) {
-        let bar = (self.interactive && total > 0).then(|| bar(stage, unit, total));
+        let bar = match total {
+            _ if !self.interactive || unit.is_empty() => None,
+            // The end of a search is not known beforehand.
+            0 => Some(counter(stage, unit)),
+            _ => Some(bar(stage, unit, total)),
+        };
         let now = Instant::now();
         let current = Current {
             stage: stage.to_owned(),
@@ -104,6 +109,15 @@ fn bar(stage: &str, unit: &str, total: u64) -> ProgressBar {
         .unwrap_or_else(|_| ProgressStyle::default_bar())
         .progress_chars("=> ");
     let bar = ProgressBar::new(total).with_style(style);
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
+}
+
+fn counter(stage: &str, unit: &str) -> ProgressBar {
+    let template = format!("{stage:<10} {{spinner}} {{pos}} {unit}s, {{per_sec}}, {{elapsed}}");
+    let style = ProgressStyle::with_template(&template)
+        .unwrap_or_else(|_| ProgressStyle::default_spinner());
+    let bar = ProgressBar::no_length().with_style(style);
     bar.enable_steady_tick(Duration::from_millis(200));
     bar
 }

@@ -44,12 +44,17 @@ fn has_equations(study: &Study, problem: &InverseProblem<'_>) -> bool {
     amends && alone && study.surrogate.is_none() && study.gap.companion.is_none()
 }
 
+/// The share of the gap that names close if they need no law beside them: what they leave may be an error of their own form.
+const ENOUGH: f64 = 0.95;
+
 /// True if a result leaves something without a name.
 fn is_open(result: &GapResult) -> bool {
-    match result.verdict.word {
+    let verdict = &result.verdict;
+    match verdict.word {
         VerdictKind::Unlisted => true,
-        VerdictKind::Approximate | VerdictKind::Class | VerdictKind::None => {
-            result.remains.is_some()
+        VerdictKind::None => result.remains.is_some(),
+        VerdictKind::Approximate | VerdictKind::Class => {
+            result.remains.is_some() && verdict.closed < ENOUGH
         }
         VerdictKind::Named | VerdictKind::NotVisible => false,
     }
@@ -83,7 +88,7 @@ impl ModelSearch<'_> {
         found: &SearchResult<'_>,
         result: &GapResult,
     ) -> Result<Option<Sought>, Stop> {
-        let Self { study, problem, measured, .. } = self;
+        let Self { study, problem, measured, .. } = *self;
         if !study.gap.keys.laws || !is_open(result) || !has_equations(study, problem) {
             return Ok(None);
         }
@@ -133,10 +138,16 @@ impl ModelSearch<'_> {
         for candidate in candidates.iter_mut().filter(|own| names.contains(&own.kind)) {
             candidate.beside.clone_from(&law.parameters);
         }
-        let inside =
-            InsideCandidates { candidates, wide: Some(extended(study, &pieces)?), companion: None };
-        let beginning =
-            SearchModel { only: Some(&only), ..SearchModel::own(study, problem, &inside) };
+        let inside = InsideCandidates {
+            candidates,
+            wide: Some(self.counter.over(extended(study, &pieces)?)),
+            ..InsideCandidates::default()
+        };
+        let beginning = SearchModel {
+            forward: self.forward,
+            only: Some(&only),
+            ..SearchModel::own(study, problem, &inside)
+        };
         let random = own.random.named("law").named("search");
         prepared(study, problem, &beginning, &random, |with| {
             let again = with.search()?;

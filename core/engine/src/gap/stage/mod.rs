@@ -2,6 +2,7 @@
 //!
 //! Data are held out before the search, so that the stage calibrates again with the other data only.
 
+mod counted;
 mod laws;
 mod models;
 pub mod prepared;
@@ -11,6 +12,7 @@ pub mod study_file;
 
 use std::path::Path;
 
+use counted::{Counted, Counter};
 use lacuna::run::{Observer, Stop, files};
 use lacuna_run::{Artifact, Kept, RunDirectory, Stage};
 use models::ModelSearch;
@@ -46,12 +48,24 @@ pub fn stage(
 ) -> Result<Option<Kept<GapResult>>, Stop> {
     let Some(measured) = &problem.data.value.measured else { return Ok(None) };
     let pieces = Pieces::of(study)?;
-    let inside = InsideCandidates::of(pieces.as_ref(), study, problem, run, observer)?;
+    let counter = Counter::new(observer);
+    let forward = Counted::new(problem.forward(), &counter);
+    let mut inside = InsideCandidates::of(pieces.as_ref(), study, problem, run, observer)?;
+    inside.wide = inside.wide.map(|wide| counter.over(wide));
     let alternatives = inside::alternatives(study, problem, run, observer)?;
-    observer.begin(Stage::Gap.label(), "", 0);
+    observer.begin(Stage::Gap.label(), "evaluation", 0);
     let kept = run.keep(&Stage::Gap.folder(), &inputs(study, problem), observer, |_| {
-        ModelSearch { study, problem, inside: &inside, alternatives: &alternatives, measured }
-            .result(observer)
+        let (inside, alternatives) = (&inside, &alternatives);
+        ModelSearch {
+            study,
+            problem,
+            forward: &forward,
+            inside,
+            alternatives,
+            measured,
+            counter: &counter,
+        }
+        .result(observer)
     })?;
     observer.end(Stage::Gap.label(), &summary(&kept.value));
     Ok(Some(kept))

@@ -1,8 +1,10 @@
 //! The study's model and other models in its place: a search with each, and the one that explains most.
 
+use lacuna::plugin::Forward;
 use lacuna::plugin::effect::On;
 use lacuna::run::{Observer, Stop};
 
+use super::counted::Counter;
 use super::laws::Sought;
 use super::prepared::{PreparedSearch, prepared};
 use super::search_model::SearchModel;
@@ -29,20 +31,24 @@ pub struct ModelSearch<'a> {
     pub study: &'a Study,
     /// The data, the forward map and its errors.
     pub problem: &'a InverseProblem<'a>,
+    /// The forward map of its model, whose evaluations are counted.
+    pub forward: &'a dyn Forward,
     /// The candidates inside its model.
     pub inside: &'a InsideCandidates<'a>,
     /// Other models in place of its own.
     pub alternatives: &'a [AlternativeModel<'a>],
     /// The measurements.
     pub measured: &'a Measured,
+    /// The counter of evaluations.
+    pub counter: &'a Counter<'a>,
 }
 
 impl ModelSearch<'_> {
     /// Searches and proves with the study's model; if data and model disagree, also with the other models that are more
     /// probable.
     pub fn result(&self, observer: &dyn Observer) -> Result<GapResult, Stop> {
-        let Self { study, problem, inside, alternatives, measured } = self;
-        let beginning = SearchModel::own(study, problem, inside);
+        let Self { study, problem, forward, inside, alternatives, measured, .. } = *self;
+        let beginning = SearchModel { forward, ..SearchModel::own(study, problem, inside) };
         let random = stream(study, "gap");
         prepared(study, problem, &beginning, &random, |own| {
             if own.candidates.is_empty() {

@@ -89,6 +89,7 @@ pub fn prepared<T>(
     let situation = Situation { layouts: &study.layouts, response: &response, noise: &noise };
     let Proposed { mut candidates, mut untried } = candidates(study, &situation)?;
     candidates.extend(beginning.inside.candidates.iter().cloned());
+    untried.extend(beginning.inside.untried.iter().cloned());
     if let Some(companion) = &beginning.inside.companion {
         let learned = companion.candidates(study, &starts[0], misfit(&experiment, &response))?;
         candidates.extend(learned.candidates);
