@@ -16,7 +16,7 @@ impl<'a> Search<'a> {
         path: Vec<SearchStep>,
         last: Diagnostics,
     ) -> SearchResult<'a> {
-        let (slots, compared) = self.slots(state, &path);
+        let (slots, compared) = self.slots(state, &path, &self.stream.named("types"));
         let visited = path.iter().flat_map(|step| step.visited.clone()).chain(compared);
         let average = ModelAverage::of(&visited.collect::<Vec<_>>());
         let stability = match slots.last() {

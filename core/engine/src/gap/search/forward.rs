@@ -77,7 +77,7 @@ pub fn search<'a>(
         stream: stream.named("search"),
     };
     let mut path: Vec<SearchStep> = Vec::new();
-    let last = loop {
+    let mut last = loop {
         let round = path.len() as u64;
         let (diagnostics, design, projection) = search.diagnose(&state, round);
         let first = path.first().map_or(&diagnostics, |step| &step.before).clone();
@@ -87,6 +87,9 @@ pub fn search<'a>(
         };
         path.push(step);
     };
+    if search.simplify(&mut state, &path, &search.stream.named("simpler")) {
+        last = search.diagnose(&state, path.len() as u64).0;
+    }
     let whole = search.finished(&state, path, last);
     Some(search.certain_part(whole, &state))
 }

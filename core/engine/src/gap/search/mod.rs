@@ -16,6 +16,7 @@ pub mod needless;
 mod pairs;
 mod places;
 mod refit;
+mod simpler;
 mod slots;
 mod state;
 mod subsets;

@@ -45,13 +45,14 @@ impl<'a> Search<'a> {
         &self,
         state: &SearchState<'a>,
         path: &[SearchStep],
+        stream: &Stream,
     ) -> (Vec<Vec<Weighed>>, Vec<VisitedModel>) {
         if let ([step], 1) = (path, state.chosen.len())
             && step.added.len() == 1
+            && step.added[0].is(&state.chosen[0])
         {
             return (vec![step.weighed.clone()], Vec::new());
         }
-        let stream = self.stream.named("types");
         let slot = |i: usize| self.slot(state, i, &stream.at(i as u64));
         // The last round of exchanges, in which none was made, has weighed the slots of this state.
         let known = state.slots.as_ref().map(|slots| slots.to_vec());

@@ -1,6 +1,7 @@
 //! The verdict: no gap, a named effect, a class of effects, an unlisted effect, or no effect that this experiment could
 //! show.
 
+mod class;
 mod grounds;
 mod probability;
 mod reliability;
@@ -12,8 +13,10 @@ use serde::{Deserialize, Serialize};
 use super::diagnostics::{SearchOptions, SearchResult};
 use crate::gap::candidates::Candidate;
 use crate::gap::test::is_at_floor;
+use class::{alike, widened};
 use grounds::Grounds;
 
+pub use class::class;
 pub use grounds::explains;
 pub use probability::{CEILING, Traits};
 pub use reliability::{Bin, Brier, Reliability, Told};
@@ -40,6 +43,9 @@ const HALF: f64 = 0.5;
 /// The share of the gap that the effects of an approximate name close at least. In a prototype by others, single terms of the right
 /// type closed 92 to 94 % of the gap of physics inside a simulator, single effects of a wrong type up to 80 %.
 const MOST: f64 = 0.8;
+
+/// The largest number of types that explain as much, none of them exact, that still are a name.
+const FEW: usize = 3;
 
 /// The log Bayes factor of a remainder above which it is significant: 20 to 1 (Kass and Raftery, Journal of the American
 /// Statistical Association 90 (1995) 773).
@@ -230,8 +236,7 @@ fn with_effects(
     if inexact || grounds.gap && grounds.closed < NEARLY {
         reasons.push(left);
         reasons.extend(free);
-        let word = if is_like { VerdictKind::Approximate } else { VerdictKind::Unlisted };
-        return (word, reasons);
+        return (inexact_word(grounds, found, effects, is_like), reasons);
     }
     if grounds.gap {
         reasons.push(left);
@@ -250,6 +255,27 @@ fn with_effects(
     (if sure { VerdictKind::Named } else { VerdictKind::Class }, reasons)
 }
 
+/// The verdict on effects that leave a significant remainder.
+fn inexact_word(
+    grounds: &Grounds,
+    found: &SearchResult<'_>,
+    effects: &[MissingEffect],
+    is_like: bool,
+) -> VerdictKind {
+    if is_like {
+        return VerdictKind::Approximate;
+    }
+    let most = effects.iter().map(|effect| effect.class.len()).max().unwrap_or(0);
+    let proven = grounds::unproven(effects).is_none();
+    // Which of a few types it is, the remainder hides; that it is one of them is as sure as an approximate name.
+    let is_one = (2..=FEW).contains(&most) && proven;
+    if is_one && grounds.closed >= MOST && found.stability >= STABLE {
+        VerdictKind::Class
+    } else {
+        VerdictKind::Unlisted
+    }
+}
+
 /// True if all other types of the class of an effect contain its type as a special case: what is missing acts like it then,
 /// whichever of them it is.
 fn is_alone(candidates: &[Candidate], effect: &MissingEffect) -> bool {
@@ -257,18 +283,6 @@ fn is_alone(candidates: &[Candidate], effect: &MissingEffect) -> bool {
         candidates.iter().any(|own| own.kind == *other && own.contains.contains(&&*effect.kind))
     };
     effect.class[1..].iter().all(contains)
-}
-
-/// Adds the next type to those that are alone in their class; returns true if every class then has several types.
-fn widened(effects: &mut [MissingEffect], types: &[Vec<(String, f64)>]) -> bool {
-    for (effect, types) in effects.iter_mut().zip(types) {
-        if effect.class.len() == 1
-            && let Some((other, _)) = types.iter().find(|(other, _)| *other != effect.kind)
-        {
-            effect.class.push(other.clone());
-        }
-    }
-    effects.iter().all(|effect| effect.class.len() > 1)
 }
 
 fn named(found: &SearchResult<'_>, candidates: &[Candidate]) -> Vec<MissingEffect> {
@@ -280,7 +294,10 @@ fn named(found: &SearchResult<'_>, candidates: &[Candidate]) -> Vec<MissingEffec
         let end = begin + effect.absent().len();
         let kind = &candidates[placement.candidate].kind;
         let own = types.iter().find(|(name, _)| name == kind).map_or(0.0, |(_, p)| *p);
-        let class = class(kind, own, types);
+        let alike = alike(found, candidates, all.len());
+        let shares = if alike.is_empty() { types } else { &alike };
+        let share = shares.iter().find(|(name, _)| name == kind).map_or(0.0, |(_, p)| *p);
+        let class = class(kind, share, shares);
         let supported = support.local >= HALF && support.transfers(PROVEN);
         let traits = Traits::of(found, support, &class, types);
         all.push(MissingEffect {
@@ -289,7 +306,7 @@ fn named(found: &SearchResult<'_>, candidates: &[Candidate]) -> Vec<MissingEffec
             on: placement.on.clone(),
             values: found.last.fit.at.point[begin..end].to_vec(),
             sd: widened_size(effect, &found.last.fit.at.point[begin..end], &sd[begin..end]),
-            probability: traits.of_type(own, &class, types),
+            probability: traits.of_type(share, &class, shares),
             posterior_probability: own,
             traits: Some(traits),
             share: support.share,
@@ -331,21 +348,4 @@ fn with_untried(
         }
     }
     reasons
-}
-
-/// The most probable types that together reach 95 %; the chosen type alone if it does by itself.
-pub fn class(kind: &str, own: f64, types: &[(String, f64)]) -> Vec<String> {
-    let mut class = vec![kind.to_owned()];
-    let mut sum = own;
-    if own >= SURE {
-        return class;
-    }
-    for (other, p) in types.iter().filter(|(other, _)| other != kind) {
-        if sum >= SURE {
-            break;
-        }
-        class.push(other.clone());
-        sum += p;
-    }
-    class
 }

@@ -26,7 +26,8 @@ pub struct Traits {
     /// The share of the misfit on its own sensors that it closes, from 0 to 1.
     pub local: f64,
     /// The number of standard errors by which it predicts left-out data better than a free form in its place, for the
-    /// kind of data where that is smallest; 0 without data that could be left out.
+    /// kind of data where that is smallest; 0 without data that could be left out. Where two parts give no standard
+    /// error, that of a normal likelihood ratio as large.
     pub transfer: f64,
     /// The share of the gap that all effects together close, from 0 to 1.
     pub closed: f64,
@@ -59,9 +60,14 @@ impl Traits {
             let own = types.iter().filter(|(kind, _)| class.contains(kind) == inside);
             own.map(|(_, p)| p).sum()
         };
-        let standard = |c: &CrossValidation| Some(c.difference / c.error.filter(|e| *e > 0.0)?);
+        let standard = |c: &CrossValidation| match c.error.filter(|e| *e > 0.0) {
+            Some(error) => c.difference / error,
+            // If the free form were right, a log score in favour of the effect of at least `d` had a probability of at
+            // most exp(-d): Markov's inequality.
+            None => c.difference.signum() * (2.0 * c.difference.abs()).sqrt(),
+        };
         let all = &support.against_free_form;
-        let each = all.iter().filter(|one| decides(one, all)).filter_map(standard);
+        let each = all.iter().filter(|one| decides(one, all)).map(standard);
         let least = f64::MIN_POSITIVE;
         Self {
             log_odds: sum(true).max(least).ln() - sum(false).max(least).ln(),
