@@ -17,6 +17,7 @@ mod classes;
 mod companion;
 mod falling_balls;
 mod further_runs;
+mod inexact;
 mod inside;
 mod laws;
 mod models;

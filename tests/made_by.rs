@@ -76,3 +76,16 @@ fn an_unfinished_chain_of_another_version_is_begun_anew() {
     quick::run_as("0.0.9", &study, &[], &out).unwrap_or_else(|stop| panic!("{stop}"));
     assert_eq!(quick::results(&out), whole);
 }
+
+/// Other measurements of the same response repeat what depends on them; the surrogate depends on the runs only.
+#[test]
+fn a_surrogate_is_reused_with_other_measurements() {
+    let folder = quick::tables();
+    let (study, out) = (folder.path().join("study.toml"), folder.path().join("run"));
+    quick::run(&study, &[], &out).unwrap();
+    quick::replace(&folder.path().join("measured.csv"), "1,0.05,0.77548", "1,0.05,0.77551");
+    let again = quick::run(&study, &[], &out).unwrap();
+    let is_made = |stage: &str| again.made.iter().any(|made| made == stage);
+    assert!(is_made("3-read") && is_made("5-calibrate"), "{:?}", again.made);
+    assert!(!is_made("4-surrogate"), "{:?}", again.made);
+}

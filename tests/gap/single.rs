@@ -13,7 +13,7 @@ use lacuna_run::RunDirectory;
 
 use super::inside::loaded;
 
-const STUDY: &str = r#"
+pub(super) const STUDY: &str = r#"
 [study]
 title = "a drive"
 seed = 7
