@@ -36,12 +36,11 @@ impl Distribution {
             Self::LogUniform([lo, hi]) => (hi - lo) / ln_ratio(lo, hi),
             Self::Gamma([shape, scale]) => shape * scale,
             Self::InverseGamma([shape, scale]) if shape > 1.0 => scale / (shape - 1.0),
-            Self::InverseGamma(_) => f64::INFINITY,
             Self::Beta([a, b, lo, hi]) => lo + (hi - lo) * a / (a + b),
             Self::StudentT([dof, location, _]) if dof > 1.0 => location,
             Self::StudentT(_) => f64::NAN,
             Self::HalfStudentT([dof, scale]) if dof > 1.0 => scale * mean_size_of_student(dof),
-            Self::HalfStudentT(_) => f64::INFINITY,
+            Self::InverseGamma(_) | Self::HalfStudentT(_) => f64::INFINITY,
             Self::TruncatedNormal([mean, sd, lo, hi]) => {
                 mean + sd * truncated_moments((lo - mean) / sd, (hi - mean) / sd).0
             }
@@ -66,7 +65,6 @@ impl Distribution {
             Self::InverseGamma([shape, scale]) if shape > 2.0 => {
                 (scale / (shape - 1.0)).powi(2) / (shape - 2.0)
             }
-            Self::InverseGamma(_) => f64::INFINITY,
             Self::Beta([a, b, lo, hi]) => {
                 (hi - lo).powi(2) * a * b / ((a + b).powi(2) * (a + b + 1.0))
             }
@@ -77,7 +75,7 @@ impl Distribution {
             Self::HalfStudentT([dof, scale]) if dof > 2.0 => {
                 scale * scale * (dof / (dof - 2.0) - mean_size_of_student(dof).powi(2))
             }
-            Self::HalfStudentT(_) => f64::INFINITY,
+            Self::InverseGamma(_) | Self::HalfStudentT(_) => f64::INFINITY,
             Self::TruncatedNormal([mean, sd, lo, hi]) => {
                 sd * sd * truncated_moments((lo - mean) / sd, (hi - mean) / sd).1
             }

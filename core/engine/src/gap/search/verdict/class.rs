@@ -29,7 +29,9 @@ pub(super) fn alike(
         }
     }
     let sum: f64 = all.iter().map(|(_, share)| share).sum();
-    all.iter_mut().for_each(|(_, share)| *share /= sum);
+    for (_, share) in &mut all {
+        *share /= sum;
+    }
     all
 }
 
