@@ -58,8 +58,9 @@ pub struct TermKeys {
     /// Name of the coefficient; the name of the term when left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<Name>,
-    /// Prior of the coefficient. When left out, a normal law: at one standard deviation of the coefficient, the term is
-    /// half as large as the rate it is added to, both as root mean squares along the run at the medians of the priors.
+    /// Prior of the coefficient. When left out, a t distribution of three degrees of freedom about zero, folded there for a
+    /// coefficient of one sign: at its scale the term is half as large as the rate it is added to, both as root mean
+    /// squares along the run at the medians of the priors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prior: Option<Distribution>,
 }
