@@ -88,7 +88,7 @@ variance = { half_normal = 0.1 }
 [sampler]
 use = "no_u_turn"
 warm_up = 20
-steps = 20
+steps = 40
 
 [gap]
 laws = false
