@@ -34,11 +34,15 @@ pub(super) fn as_good<'b>(
     slot: &'b [Weighed],
     most: f64,
 ) -> impl Iterator<Item = &'b Weighed> {
-    let left = misfit(fit, acts);
-    let values = acts.iter().filter(|acts| **acts).count() as f64;
-    let is_clear = left > CLEAR * (2.0 * values).sqrt();
+    let (left, is_clear) = (misfit(fit, acts), leaves_misfit(fit, acts));
     let leaves_as_little = move |other: &&Weighed| misfit(&other.fit, acts) <= most * left;
     slot.iter().filter(move |_| is_clear).filter(leaves_as_little)
+}
+
+/// True if a fit leaves more than noise on some outputs.
+fn leaves_misfit(fit: &Fit, acts: &[bool]) -> bool {
+    let values = acts.iter().filter(|acts| **acts).count() as f64;
+    misfit(fit, acts) > CLEAR * (2.0 * values).sqrt()
 }
 
 impl<'a> Search<'a> {
@@ -51,6 +55,9 @@ impl<'a> Search<'a> {
     ) -> bool {
         let mut simplified = false;
         for round in 0..state.chosen.len() {
+            if !state.system.effects.iter().any(|e| leaves_misfit(&state.fit, &e.acts)) {
+                break;
+            }
             let slots = self.slots(state, path, &stream.at(round as u64)).0;
             let simpler = (0..state.chosen.len()).find_map(|i| self.simpler(state, i, &slots[i]));
             let Some(next) = simpler else { break };

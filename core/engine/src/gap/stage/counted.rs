@@ -1,49 +1,27 @@
 //! Forward maps that count their evaluations: the progress of a search, whose end is not known beforehand.
 
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use lacuna::plugin::Forward;
 use lacuna::plugin::forward::Linear;
-use lacuna::run::Observer;
+use lacuna::run::Progress;
 use lacuna_linalg::Matrix;
 
 use crate::gap::experiment::wider::ExtendedMap;
 
-/// The number of evaluations so far, and the observer that is told.
-pub struct Counter<'a> {
-    observer: &'a dyn Observer,
-    count: AtomicU64,
-}
-
-impl<'a> Counter<'a> {
-    /// A counter of no evaluation.
-    pub fn new(observer: &'a dyn Observer) -> Self {
-        Self { observer, count: AtomicU64::new(0) }
-    }
-
-    fn add(&self, evaluations: usize) {
-        let further = evaluations as u64;
-        let done = self.count.fetch_add(further, Ordering::Relaxed) + further;
-        self.observer.advance(done);
-    }
-
-    /// The extended map, whose evaluations are counted.
-    pub fn over<'b>(&'b self, map: ExtendedMap<'b>) -> ExtendedMap<'b> {
-        let forward = Box::new(Counted { forward: map.forward, counter: self });
-        ExtendedMap { forward, ..map }
-    }
+/// The extended map, whose evaluations are counted.
+pub fn counted<'a>(map: ExtendedMap<'a>, progress: &'a Progress<'a>) -> ExtendedMap<'a> {
+    ExtendedMap { forward: Box::new(Counted { forward: map.forward, progress }), ..map }
 }
 
 /// A forward map whose evaluations are counted; with the derivatives an evaluation counts once.
 pub struct Counted<'a, F> {
     forward: F,
-    counter: &'a Counter<'a>,
+    progress: &'a Progress<'a>,
 }
 
 impl<'a, F> Counted<'a, F> {
-    /// A forward map with the counter of its evaluations.
-    pub fn new(forward: F, counter: &'a Counter<'a>) -> Self {
-        Self { forward, counter }
+    /// A forward map whose evaluations are added to `progress`.
+    pub fn new(forward: F, progress: &'a Progress<'a>) -> Self {
+        Self { forward, progress }
     }
 }
 
@@ -57,7 +35,7 @@ impl<F: std::ops::Deref<Target: Forward> + Send + Sync> Forward for Counted<'_, 
     }
 
     fn mean(&self, points: &Matrix) -> Matrix {
-        self.counter.add(points.rows());
+        self.progress.add(points.rows() as u64);
         self.forward.mean(points)
     }
 
@@ -66,17 +44,17 @@ impl<F: std::ops::Deref<Target: Forward> + Send + Sync> Forward for Counted<'_, 
     }
 
     fn jacobian(&self, point: &[f64]) -> Matrix {
-        self.counter.add(1);
+        self.progress.add(1);
         self.forward.jacobian(point)
     }
 
     fn mean_and_jacobian(&self, point: &[f64]) -> (Vec<f64>, Matrix) {
-        self.counter.add(1);
+        self.progress.add(1);
         self.forward.mean_and_jacobian(point)
     }
 
     fn mean_and_jacobian_by(&self, point: &[f64], parameters: &[usize]) -> (Vec<f64>, Matrix) {
-        self.counter.add(1);
+        self.progress.add(1);
         self.forward.mean_and_jacobian_by(point, parameters)
     }
 

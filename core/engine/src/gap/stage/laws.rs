@@ -4,6 +4,7 @@
 use lacuna::data::Observations;
 use lacuna::run::Stop;
 
+use super::counted::counted;
 use super::models::{ModelSearch, own_pieces};
 use super::prepared::{PreparedSearch, prepared};
 use super::search_model::SearchModel;
@@ -140,7 +141,7 @@ impl ModelSearch<'_> {
         }
         let inside = InsideCandidates {
             candidates,
-            wide: Some(self.counter.over(extended(study, &pieces)?)),
+            wide: Some(counted(extended(study, &pieces)?, self.progress)),
             ..InsideCandidates::default()
         };
         let beginning = SearchModel {

@@ -12,8 +12,8 @@ pub mod study_file;
 
 use std::path::Path;
 
-use counted::{Counted, Counter};
-use lacuna::run::{Observer, Stop, files};
+use counted::{Counted, counted};
+use lacuna::run::{Observer, Progress, Stop, files};
 use lacuna_run::{Artifact, Kept, RunDirectory, Stage};
 use models::ModelSearch;
 use serde_json::{Value, json};
@@ -48,10 +48,10 @@ pub fn stage(
 ) -> Result<Option<Kept<GapResult>>, Stop> {
     let Some(measured) = &problem.data.value.measured else { return Ok(None) };
     let pieces = Pieces::of(study)?;
-    let counter = Counter::new(observer);
-    let forward = Counted::new(problem.forward(), &counter);
+    let progress = Progress::new(observer);
+    let forward = Counted::new(problem.forward(), &progress);
     let mut inside = InsideCandidates::of(pieces.as_ref(), study, problem, run, observer)?;
-    inside.wide = inside.wide.map(|wide| counter.over(wide));
+    inside.wide = inside.wide.map(|wide| counted(wide, &progress));
     let alternatives = inside::alternatives(study, problem, run, observer)?;
     observer.begin(Stage::Gap.label(), "evaluation", 0);
     let kept = run.keep(&Stage::Gap.folder(), &inputs(study, problem), observer, |_| {
@@ -63,7 +63,7 @@ pub fn stage(
             inside,
             alternatives,
             measured,
-            counter: &counter,
+            progress: &progress,
         }
         .result(observer)
     })?;

@@ -2,9 +2,8 @@
 
 use lacuna::plugin::Forward;
 use lacuna::plugin::effect::On;
-use lacuna::run::{Observer, Stop};
+use lacuna::run::{Observer, Progress, Stop};
 
-use super::counted::Counter;
 use super::laws::Sought;
 use super::prepared::{PreparedSearch, prepared};
 use super::search_model::SearchModel;
@@ -39,8 +38,8 @@ pub struct ModelSearch<'a> {
     pub alternatives: &'a [AlternativeModel<'a>],
     /// The measurements.
     pub measured: &'a Measured,
-    /// The counter of evaluations.
-    pub counter: &'a Counter<'a>,
+    /// The evaluations so far.
+    pub progress: &'a Progress<'a>,
 }
 
 impl ModelSearch<'_> {
