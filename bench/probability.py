@@ -1,12 +1,13 @@
 """Fit of the probability that a name of the gap workflow is right, to counts in worlds that share no code with the engine.
 
-    python bench/probability.py [--worlds COMMAND] [--cases 60] [--seed 1] [--out FOLDER] [--check SEED] [--write]
+    python bench/probability.py [--worlds COMMAND] [--single COMMAND] [--cases 60] [--records 164] [--seed 1] [--out FOLDER]
+                                [--check SEED] [--write]
 
 Draws up to CASES random cases in each of two worlds of `bench/src/bin/worlds` (a box of liquid, a pipe), without a companion and with one,
-runs the search on them, and fits a logistic regression of *the class of an effect holds the type that is hidden* on the quantities of `Traits` in
+and RECORDS single records of `bench/src/bin/records`, runs the search on them, and fits a logistic regression of *the class of an effect holds the type that is hidden* on the quantities of `Traits` in
 `core/engine/src/gap/search/verdict/probability.rs`; `--write` puts the coefficients there. Lines of finished cases in FOLDER are
-reused, also those of an interrupted run. Cases whose cause is a fault of the measuring chain, which the library has, have half of the
-weight, cases with physics inside the simulator the other half. No slope may be negative: what would be is left out.
+reused, also those of an interrupted run. Cases whose cause the library has (a fault of the measuring chain, a term of the equations) have half of the
+weight, cases with physics of another form the other half. No slope may be negative: what would be is left out.
 
 Prints the shares that were right by told probability, for the posterior probability and for the fitted one, within the cases of the fit by
 ten-fold cross-validation, and with `--check SEED` in further cases that the fit has not seen. Needs only Python.
@@ -81,37 +82,67 @@ def logistic(x):
     return 1 / (1 + math.exp(-x)) if x > -700 else 0.0
 
 
+def finished(path, columns):
+    """The lines of finished cases in a file."""
+    if not os.path.exists(path):
+        return []
+    with open(path) as file:
+        return [line for line in file.read().split("\n")[:-1] if line.count("\t") >= columns]
+
+
+def made(path, have, command, is_case):
+    """The lines of finished cases and those that a command prints, which are added to the file as they come."""
+    with open(path, "w") as file:
+        file.writelines(line + "\n" for line in have)
+        file.flush()
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            for line in filter(is_case, process.stdout):
+                have.append(line.rstrip("\n"))
+                file.write(line)
+                file.flush()
+    return have
+
+
 def collected(options, seed):
-    """The lines of the cases of a seed, made where they are missing."""
+    """The lines of the cases of a seed in the worlds, made where they are missing."""
     lines = []
     for world, count in WORLDS:
         count = min(count, options.cases)
         path = os.path.join(options.out, f"{world.replace(' --', '-')}-{seed}.tsv")
-        have = []
-        if os.path.exists(path):
-            with open(path) as file:
-                have = [line for line in file.read().split("\n")[:-1] if line.count("\t") >= 8]
+        have = finished(path, 8)
         done = {int(line.split("\t")[1]) % 10000 for line in have}
         missing = [i for i in range(count) if i not in done]
         if missing and not options.reuse:
             command = options.worlds.split() + world.split() + ["--random", str(count), "--seed", str(seed), "--only",
                                                                 ",".join(map(str, missing))]
-            with open(path, "w") as file:
-                file.writelines(line + "\n" for line in have)
-                file.flush()
-                with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-                    for line in process.stdout:
-                        if line.startswith(world.split()[0] + "\t"):
-                            have.append(line.rstrip("\n"))
-                            file.write(line)
-                            file.flush()
+            have = made(path, have, command, lambda line: line.startswith(world.split()[0] + "\t"))
         lines += have
     return lines
 
 
-def read(lines):
-    """The effects of all cases, and the numbers of cases inside and outside the library."""
+def collected_records(options, seed):
+    """The lines of the single records of a seed, made where they are missing."""
+    path = os.path.join(options.out, f"records-{seed}.tsv")
+    have = [line for line in finished(path, 17) if line[0].isdigit()]
+    done = {int(line.split("\t")[0]) for line in have}
+    missing = [i for i in range(options.records) if i not in done]
+    if missing and not options.reuse:
+        command = options.single.split() + ["--seed", str(seed), "--only", ",".join(map(str, missing))]
+        have = made(path, have, command, lambda line: line[0].isdigit())
+    return have
+
+
+def read(lines, records):
+    """The effects of all cases, and the numbers of cases whose cause has a form of the library, and another one."""
     effects, counts = [], [0, 0]
+    for line in records:
+        values = line.split("\t")
+        if values[3] == "nothing" and not values[17]:
+            continue
+        outside = values[3] == "outside"
+        counts[outside] += 1
+        for right, *traits in (text.split() for text in values[17].split(" & ") if text):
+            effects.append(Effect(tuple(map(float, traits)), right == "1", ("record", values[0]), outside))
     for line in lines:
         world, seed, _, hidden, _, word, _, _, _, *found = line.split("\t")
         causes = hidden.split(" & ")
@@ -223,9 +254,10 @@ def table(title, effects, probabilities):
 def written(fit, effects, counts, options):
     """The constant in the source."""
     intercept, slopes = fit
-    part = "" if sum(counts) == sum(min(count, options.cases) for _, count in WORLDS) else "the first of "
-    doc = (f"/// The fit to {len(effects)} names of {sum(counts)} cases of the worlds in `tests/generator`, {counts[1]} of them with\n"
-           f"/// physics inside the simulator: {part}those of `python bench/probability.py --cases {options.cases} --seed {options.seed} --write`.\n")
+    part = "" if not options.reuse else "the first of "
+    doc = (f"/// The fit to {len(effects)} names of {sum(counts)} cases of the worlds and the single records in `tests/generator`, {counts[1]} of them\n"
+           f"/// with physics that no candidate has exactly: {part}those of\n"
+           f"/// `python bench/probability.py --cases {options.cases} --records {options.records} --seed {options.seed} --write`.\n")
     values = ", ".join(f"{slope:.3f}" for slope in slopes)
     constant = f"const FITTED: Regression =\n    Regression {{ intercept: {intercept:.3f}, slopes: [{values}] }};\n"
     with open(TARGET) as file:
@@ -240,7 +272,9 @@ def written(fit, effects, counts, options):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--worlds", default="cargo run --release -p lacuna-bench --bin worlds --")
+    parser.add_argument("--single", default="cargo run --release -p lacuna-bench --bin records --")
     parser.add_argument("--cases", type=int, default=60)
+    parser.add_argument("--records", type=int, default=164)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--check", type=int)
     parser.add_argument("--out", default="target/probability")
@@ -248,8 +282,8 @@ def main():
     parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
     os.makedirs(options.out, exist_ok=True)
-    effects, counts = read(collected(options, options.seed))
-    print(f"{sum(counts)} cases, {counts[1]} with physics inside the simulator, {len(effects)} names")
+    effects, counts = read(collected(options, options.seed), collected_records(options, options.seed))
+    print(f"{sum(counts)} cases, {counts[1]} with physics of another form, {len(effects)} names")
     table("posterior", effects, [e.posterior() for e in effects])
     fit = fitted(effects)
     print("intercept %.3f, slopes %s" % (fit[0], ", ".join(f"{n} {s:.3f}" for n, s in zip(NAMES, fit[1]))))
@@ -258,8 +292,8 @@ def main():
     if options.write:
         written(fit, effects, counts, options)
     if options.check is not None:
-        further, counts = read(collected(options, options.check))
-        print(f"further cases: {sum(counts)}, {counts[1]} with physics inside the simulator")
+        further, counts = read(collected(options, options.check), collected_records(options, options.check))
+        print(f"further cases: {sum(counts)}, {counts[1]} with physics of another form")
         table("posterior", further, [e.posterior() for e in further])
         table("fitted before", further, [told(fit, e) for e in further])
 

@@ -157,6 +157,7 @@ fn terms() {
             "overflow",
             &["", "level = \"2\"", "of = \"x\"\nprior = { uniform = [0, 2] }\nunit = \"m\""],
         ),
+        ("carreau_friction", &["", "power = { uniform = [0, 1] }"]),
         ("power_friction", &["", "power = { uniform = [1, 2] }"]),
         ("power_stiffness", &["of = \"x\"\nunit = \"m\""]),
         ("pull", &["of = \"x\"\ndistance = \"hypot(x, y)\"\nbeside = { w = \"y\" }"]),

@@ -2,6 +2,7 @@
 
 pub mod ageing;
 pub mod bouc_wen;
+pub mod carreau_friction;
 pub mod common;
 pub mod constant_rate;
 pub mod convection;

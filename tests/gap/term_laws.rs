@@ -107,24 +107,43 @@ fn friction_builds_up_over_a_distance() {
     }
 }
 
-/// At speeds far above the width, `dy/dt = -c (1 + r exp(-(y/s)²))` reaches `y` after the integral of its slowness, by
-/// Simpson's rule.
+/// The time after which a state that changes with a rate of its own alone has fallen from `start` to `end`: the integral of
+/// its slowness, by Simpson's rule.
+fn time_to(start: f64, end: f64, slowness: impl Fn(f64) -> f64) -> f64 {
+    let count = 2000;
+    let step = (start - end) / f64::from(count);
+    let value = |k: i32| slowness(end + step * f64::from(k));
+    let odd: f64 = (1..count).step_by(2).map(value).sum();
+    let even: f64 = (2..count).step_by(2).map(value).sum();
+    step / 3.0 * (value(0) + 4.0 * odd + 2.0 * even + value(count))
+}
+
+/// `dy/dt = -c y ((1 + (y/b)²) / (1 + (s/b)²))^((p - 1) / 2)`, where the size `s` is that of a line of slope one from two.
+#[test]
+fn a_drag_bends() {
+    for power in [0.1, 0.7, 2.0] {
+        let (c, bend) = (0.4, 0.6);
+        let found = alone(2.0, "use = \"carreau_friction\"\n", &[c, power, bend]);
+        let bent = |y: f64| 1.0 + (y / bend).powi(2);
+        let scale = size(2.0, 0.0);
+        let slowness = |y: f64| (bent(y) / bent(scale)).powf(0.5 * (1.0 - power)) / (c * y);
+        for (y, t) in found.iter().zip(times()).filter(|(y, _)| **y > 0.05) {
+            let exact = time_to(2.0, *y, slowness);
+            assert!((exact - t).abs() < 1e-4, "at {t}: {y} is reached at {exact}");
+        }
+    }
+}
+
+/// At speeds far above the width, `dy/dt = -c (1 + r exp(-(y/s)²))` reaches `y` after the integral of its slowness.
 #[test]
 fn dry_friction_rises_near_rest() {
     let (c, rise, speed) = (0.4, 1.5, 1.1);
     let found =
         alone(3.0, "use = \"stribeck_friction\"\nwidth = \"0.001 {K}\"\n", &[c, rise, speed]);
     let slowness = |y: f64| 1.0 / (c * (1.0 + rise * (-(y / speed).powi(2)).exp()));
-    let time = |end: f64| {
-        let count = 2000;
-        let step = (3.0 - end) / f64::from(count);
-        let value = |k: i32| slowness(end + step * f64::from(k));
-        let odd: f64 = (1..count).step_by(2).map(value).sum();
-        let even: f64 = (2..count).step_by(2).map(value).sum();
-        step / 3.0 * (value(0) + 4.0 * odd + 2.0 * even + value(count))
-    };
     for (y, t) in found.iter().zip(times()).filter(|(y, _)| **y > 0.05) {
-        assert!((time(*y) - t).abs() < 1e-5, "at {t}: {y} is reached at {}", time(*y));
+        let exact = time_to(3.0, *y, slowness);
+        assert!((exact - t).abs() < 1e-5, "at {t}: {y} is reached at {exact}");
     }
 }
 

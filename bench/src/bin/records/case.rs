@@ -8,14 +8,14 @@ use generator::single::{Record, record};
 use lacuna::run::Silent;
 use lacuna_bench::clock::timed;
 use lacuna_engine::gap::result::{GapResult, StepResult};
-use lacuna_engine::gap::search::VerdictKind;
+use lacuna_engine::gap::search::{MissingEffect, VerdictKind};
 use lacuna_engine::study::resolve::load_text;
 use lacuna_run::RunDirectory;
 
 use crate::studies::{study, table};
 
 /// The names of the columns.
-pub const HEADER: &str = "case\tsystem\thidden\tform\tinstrument\tstated\tvalues\tratio\tjudged\tverdict\teffects\tprobability\tclosed\tinterval\tnoise_said\tseconds\tprocessor";
+pub const HEADER: &str = "case\tsystem\thidden\tform\tinstrument\tstated\tvalues\tratio\tjudged\tverdict\teffects\tprobability\tclosed\tinterval\tnoise_said\tseconds\tprocessor\ttraits";
 
 /// The judgement of a verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,7 +43,7 @@ pub struct Answer {
     pub reasons: Vec<String>,
     /// The candidates of largest weight of each step, with the logarithm of their weight.
     pub leaders: Vec<String>,
-    effects: Vec<(String, f64)>,
+    effects: Vec<MissingEffect>,
     closed: Option<(f64, [f64; 2])>,
     /// True when the verdict says what was taken for noise.
     pub noise_said: bool,
@@ -85,7 +85,6 @@ impl Answer {
         seconds: [f64; 2],
     ) -> Self {
         let verdict = &result.verdict;
-        let effects = verdict.effects.iter();
         let proof = result.held_out.first().map(|held| &held.proof.all);
         Self {
             index,
@@ -94,7 +93,7 @@ impl Answer {
             verdict: verdict.word,
             reasons: verdict.reasons.clone(),
             leaders: result.path.iter().map(leaders).collect(),
-            effects: effects.map(|e| (e.class.join("/"), e.probability)).collect(),
+            effects: verdict.effects.clone(),
             closed: proof.map(|all| (all.closed, [all.lower, all.upper])),
             noise_said: verdict.reasons.iter().any(|reason| reason.contains("taken for noise")),
             seconds,
@@ -105,8 +104,7 @@ impl Answer {
     /// what it says.
     pub fn judged(&self) -> Judgement {
         let missing = &self.record.missing;
-        let said: Vec<&str> =
-            self.effects.iter().filter_map(|(class, _)| class.split('/').next()).collect();
+        let said: Vec<&str> = self.effects.iter().map(|effect| effect.class[0].as_str()).collect();
         let names = matches!(
             self.verdict,
             VerdictKind::Named | VerdictKind::Class | VerdictKind::Approximate
@@ -151,14 +149,14 @@ impl Answer {
             (_, true) => "outside",
             (_, false) => "inside",
         };
-        let names: Vec<&str> = self.effects.iter().map(|(class, _)| class.as_str()).collect();
+        let names: Vec<String> = self.effects.iter().map(|e| e.class.join("/")).collect();
         let probabilities: Vec<String> =
-            self.effects.iter().map(|(_, p)| format!("{p:.2}")).collect();
+            self.effects.iter().map(|e| format!("{:.2}", e.probability)).collect();
         let closed = self.closed.map_or("-\t-".to_owned(), |(closed, [low, high])| {
             format!("{:.0} %\t{:.0} to {:.0} %", 100.0 * closed, 100.0 * low, 100.0 * high)
         });
         format!(
-            "{}\t{:?}\t{}\t{form}\t{}\t{}\t{}\t{ratio:.1}\t{:?}\t{:?}\t{}\t{}\t{closed}\t{}\t{:.1}\t{:.1}",
+            "{}\t{:?}\t{}\t{form}\t{}\t{}\t{}\t{ratio:.1}\t{:?}\t{:?}\t{}\t{}\t{closed}\t{}\t{:.1}\t{:.1}\t{}",
             self.index,
             system.kind,
             missing.name,
@@ -171,8 +169,22 @@ impl Answer {
             probabilities.join(" "),
             self.noise_said,
             self.seconds[0],
-            self.seconds[1]
+            self.seconds[1],
+            self.effects.iter().map(|e| self.traits(e)).collect::<Vec<_>>().join(" & ")
         )
+    }
+
+    /// Whether the class of an effect has the type that is hidden, or one near to it that is named as such, and the
+    /// quantities from which its probability follows.
+    fn traits(&self, effect: &MissingEffect) -> String {
+        let missing = &self.record.missing;
+        let holds = |types: &[&str]| effect.class.iter().any(|kind| types.contains(&&**kind));
+        let near = self.verdict != VerdictKind::Named && holds(missing.near);
+        let right = u8::from(holds(missing.exact) || near);
+        let t = effect.traits.unwrap_or_default();
+        let each = [t.log_odds, t.local, t.transfer, t.closed, t.inexact];
+        let each: Vec<String> = each.iter().map(|x| format!("{x:.3}")).collect();
+        format!("{right} {}", each.join(" "))
     }
 }
 

@@ -16,6 +16,7 @@ const DRAG: Types = &[
     "power_friction",
     "stribeck_friction",
     "dahl_friction",
+    "carreau_friction",
 ];
 const SPRING: Types = &["cubic_stiffness", "quadratic_stiffness", "power_stiffness"];
 const POWER: Types = &["power_friction"];
@@ -75,7 +76,7 @@ fn drive() -> Vec<Missing> {
 }
 
 fn cooling() -> Vec<Missing> {
-    const HEAT: Types = &["evaporation", "radiation", "convection"];
+    const HEAT: Types = &["evaporation", "radiation", "convection", "carreau_friction"];
     const BOTH: Types = &["evaporation", "constant_rate"];
     let both: &[(Law, f64)] = &[(Evaporation(0.4), 0.05), (Constant, 0.1)];
     vec![

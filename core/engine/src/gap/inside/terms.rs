@@ -184,7 +184,10 @@ impl TermSetting<'_> {
             summand.indices.iter().any(|i| i.name == name)
                 || summand.states.iter().any(|s| s.name == name)
         };
-        let names = lacuna::expression::names(&summand.shape, &[]).unwrap_or_default();
+        let tables = self.study.scenarios.iter().flat_map(|scenario| &scenario.functions);
+        let tables: Vec<&str> = tables.map(|function| function.name.as_str()).collect();
+        let names =
+            lacuna::expression::names(&summand.shape, &tables).map_err(|e| e.to_string())?;
         let shape = if names.iter().any(|name| brought(name)) {
             summand.scale.clone()
         } else {

@@ -316,8 +316,8 @@ impl<'a> RefitSetting<'a, '_> {
     }
 }
 
-/// The prior odds of a law against a candidate that contains it as a special case: most missing physics has the exponent
-/// of a textbook.
+/// The prior odds of a law against a candidate that contains it as a special case, once more for each further candidate
+/// that contains that one: most missing physics has the exponent of a textbook.
 const GENERAL: f64 = 4.0;
 
 /// The log prior mass of a placement within its type, divided among the variants of the type and among the forms from
@@ -327,9 +327,14 @@ pub fn placement_prior(candidates: &[Candidate], placement: &Placement, sensors:
     let versions = candidates.iter().filter(|c| c.kind == candidate.kind).count();
     let chosen = (!placement.on.is_empty()).then(|| chosen(placement));
     let place = log_prior(candidate.effect.reach(), chosen, sensors) - (versions as f64).ln();
-    let is_general = candidates.iter().any(|c| candidate.contains.contains(&c.kind.as_str()));
-    let form = if is_general { -GENERAL.ln() } else { 0.0 };
+    let form = -f64::from(generality(candidates, candidate)) * GENERAL.ln();
     place + form - (candidate.tried as f64).ln() + log_group_share(candidates, candidate)
+}
+
+/// The number of candidates in the longest chain of special cases of a candidate, each contained in the one before.
+fn generality(candidates: &[Candidate], candidate: &Candidate) -> u32 {
+    let special = candidates.iter().filter(|c| candidate.contains.contains(&c.kind.as_str()));
+    special.map(|c| 1 + generality(candidates, c)).max().unwrap_or(0)
 }
 
 /// The number of sensors that a placement acts on, by the labels of its place.
