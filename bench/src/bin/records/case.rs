@@ -174,7 +174,7 @@ impl Answer {
         )
     }
 
-    /// Whether the class of an effect has the type that is hidden, or one near to it that is named as such, and the
+    /// Marks whether the class of an effect has the type that is hidden, or one near to it that is named as such, and the
     /// quantities from which its probability follows.
     fn traits(&self, effect: &MissingEffect) -> String {
         let missing = &self.record.missing;

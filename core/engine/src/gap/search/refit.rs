@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::evidence::log_evidence;
 use crate::gap::candidates::{Candidate, Placement, log_group_share};
 use crate::gap::system::System;
-use crate::gap::system::fit::{Fit, fit_from};
+use crate::gap::system::fit::{Begun, Fit};
 use crate::gap::system::remainder::{Evidences, Setting, WhiteRemainder};
 use crate::gap::system::whitener::Whitener;
 use crate::gap::test::{DesignMatrix, Projection, Scores};
@@ -171,8 +171,9 @@ pub fn refit_all(
     scored: &[Scored],
     stream: &Stream,
 ) -> Vec<Weighed> {
-    let mut fitted: Vec<Refitted<'_>> =
-        scored.par_iter().filter_map(|scored| setting.refitted(base, scored)).collect();
+    let systems: Vec<System<'_>> =
+        scored.iter().map(|scored| setting.with(&scored.placement)).collect();
+    let mut fitted = setting.refitted(base, scored, &systems);
     let best = |fitted: &[Refitted<'_>]| {
         fitted.iter().map(|one| one.log_weight).fold(f64::NEG_INFINITY, f64::max)
     };
@@ -225,24 +226,46 @@ impl<'a> RefitSetting<'a, '_> {
         }
     }
 
-    /// Refits one placement from its starts, with the calibrated unknowns from the fit `base`; `None` if the forward map
-    /// has no response, or if the fit is singular.
-    fn refitted(&self, base: &Fit, scored: &Scored) -> Option<Refitted<'a>> {
-        let system = self.with(&scored.placement);
+    /// Refits placements from their starts, with the calibrated unknowns from the fit `base`; `systems` have a placement
+    /// each. Without those for which the forward map has no response, or whose fit is singular. Fits that are far below the
+    /// best one are not accurate.
+    fn refitted(&self, base: &Fit, scored: &[Scored], systems: &[System<'a>]) -> Vec<Refitted<'a>> {
+        let begin = |(i, one): (usize, &Scored)| {
+            let starts = self.starts(base, one, &systems[i]);
+            Some((i, Begun::from(&systems[i], self.whitener, self.means, &starts)?))
+        };
+        let mut begun: Vec<(usize, Begun<'_, '_>)> =
+            scored.par_iter().enumerate().filter_map(begin).collect();
+        let leader = (0..begun.len())
+            .max_by(|&a, &b| begun[a].1.height().total_cmp(&begun[b].1.height()).then(b.cmp(&a)));
+        let Some(leader) = leader else { return Vec::new() };
+        let (first, ahead) = begun.remove(leader);
+        let ahead = ahead.finished(f64::NEG_INFINITY);
+        let of_interest = ahead.as_ref().map_or(f64::NEG_INFINITY, |fit| fit.log_density - FAR);
+        let mut fits: Vec<(usize, Fit)> = begun
+            .into_par_iter()
+            .filter_map(|(i, begun)| Some((i, begun.finished(of_interest)?)))
+            .collect();
+        fits.extend(ahead.map(|fit| (first, fit)));
+        fits.sort_by_key(|(i, _)| *i);
+        let refitted = |(i, fit): (usize, Fit)| {
+            let grid = self.white.evidences(&fit)?;
+            let (scored, system) = (scored[i].clone(), systems[i].clone());
+            let log_weight = grid.sum() + self.log_prior(&scored.placement);
+            Some(Refitted { scored, system, fit, grid, log_weight })
+        };
+        fits.into_par_iter().filter_map(refitted).collect()
+    }
+
+    /// The starts of a placement with the calibrated unknowns from the fit `base`.
+    fn starts(&self, base: &Fit, scored: &Scored, system: &System<'_>) -> Vec<Vec<f64>> {
         let bounds = system.bounds();
         let begin = base.at.point.len();
         let clamped = scored.starts.iter().map(|own| -> Vec<f64> {
             own.iter().zip(&bounds[begin..]).map(|(x, (lo, hi))| x.clamp(*lo, *hi)).collect()
         });
         let starts = self.nearest(base, &scored.placement, clamped.collect());
-        let starts: Vec<Vec<f64>> = starts
-            .iter()
-            .flat_map(|own| self.joint(&base.at.point, &scored.placement, own))
-            .collect();
-        let fit = fit_from(&system, self.whitener, self.means, &starts)?;
-        let grid = self.white.evidences(&fit)?;
-        let log_weight = grid.sum() + self.log_prior(&scored.placement);
-        Some(Refitted { scored: scored.clone(), system, fit, grid, log_weight })
+        starts.iter().flat_map(|own| self.joint(&base.at.point, &scored.placement, own)).collect()
     }
 
     /// The starts of a fit with a further placement: the calibrated unknowns as they are, and with the parameters that

@@ -38,6 +38,14 @@ const SHORT: f64 = 1e-2;
 /// Smallest gain in log density at which the fit continues.
 const GAIN: f64 = 1e-5;
 
+/// The share of its distance from what is of interest that a step of a fit has to gain. Far from a good fit Gauss-Newton
+/// steps gain little each, and many of them would improve a fit of which nothing depends.
+const SLOW: f64 = 0.01;
+
+/// The shares of the promised gain above which the damping falls, and below which it rises after a step (Nocedal and
+/// Wright, algorithm 4.1).
+const KEPT: [f64; 2] = [0.25, 0.75];
+
 /// The best fit from one start.
 #[derive(Debug, Clone)]
 pub struct Fit {
@@ -164,21 +172,53 @@ pub fn fit_from(
     means: &[f64],
     starts: &[Vec<f64>],
 ) -> Option<Fit> {
-    let begun = starts.iter().map(|start| {
-        let mut ascent = Ascent::from(system, whitener, means, start);
-        ascent.climb(if starts.len() > 1 { FIRST } else { STEPS });
-        ascent
-    });
-    let mut begun: Vec<Ascent<'_, '_>> = begun.collect();
-    begun.retain(|ascent| ascent.best.log_density.is_finite());
-    let ahead = begun.iter().map(Ascent::height).fold(f64::NEG_INFINITY, f64::max);
-    begun.retain(|ascent| ascent.height() + HOPE * ascent.promised + GAIN >= ahead);
-    let merit = |fit: &Fit| fit.log_density + log_slope(system.priors(), &fit.at.point);
-    let fits = begun.into_iter().map(|mut ascent| {
-        ascent.climb(STEPS);
-        ascent.best
-    });
-    fits.reduce(|best, next| if merit(&next) > merit(&best) + GAIN { next } else { best })
+    Begun::from(system, whitener, means, starts)?.finished(f64::NEG_INFINITY)
+}
+
+/// A fit from several starts after some steps, with the starts that may still be best.
+pub struct Begun<'a, 'b> {
+    ascents: Vec<Ascent<'a, 'b>>,
+}
+
+impl<'a, 'b> Begun<'a, 'b> {
+    /// The first steps from several starts; `None` if the forward map has no response at any of them.
+    pub fn from(
+        system: &'b System<'a>,
+        whitener: &'b Whitener,
+        means: &'b [f64],
+        starts: &[Vec<f64>],
+    ) -> Option<Self> {
+        let begun = starts.iter().map(|start| {
+            let mut ascent = Ascent::from(system, whitener, means, start);
+            ascent.climb(FIRST);
+            ascent
+        });
+        let mut ascents: Vec<Ascent<'_, '_>> = begun.collect();
+        ascents.retain(|ascent| ascent.best.log_density.is_finite());
+        let ahead = ascents.iter().map(Ascent::height).fold(f64::NEG_INFINITY, f64::max);
+        ascents.retain(|ascent| ascent.height() + HOPE * ascent.promised + GAIN >= ahead);
+        (!ascents.is_empty()).then_some(Self { ascents })
+    }
+
+    /// The largest log density so far, in the searched coordinates.
+    pub fn height(&self) -> f64 {
+        self.ascents.iter().map(Ascent::height).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// The best fit; one that stays below the log density `of_interest` need not be accurate.
+    pub fn finished(self, of_interest: f64) -> Option<Fit> {
+        let ends = self.ascents.into_iter().map(|mut ascent| {
+            ascent.of_interest = of_interest;
+            ascent.climb(STEPS);
+            ascent
+        });
+        let best = ends.reduce(
+            |best, next| {
+                if next.height() > best.height() + GAIN { next } else { best }
+            },
+        );
+        best.map(|ascent| ascent.best)
+    }
 }
 
 /// A search for the largest density, on its way.
@@ -189,6 +229,8 @@ struct Ascent<'a, 'b> {
     bounds: Vec<(f64, f64)>,
     best: Fit,
     damping: f64,
+    /// The log density below which the fit need not be accurate.
+    of_interest: f64,
     /// The gain in log density that the next step promises; zero at the end of the search.
     promised: f64,
 }
@@ -205,7 +247,16 @@ impl<'a, 'b> Ascent<'a, 'b> {
         let start: Vec<f64> =
             start.iter().zip(&bounds).map(|(x, (low, high))| x.clamp(*low, *high)).collect();
         let best = at(system, whitener, means, &start);
-        Self { system, whitener, means, bounds, best, damping: 1e-3, promised: f64::INFINITY }
+        Self {
+            system,
+            whitener,
+            means,
+            bounds,
+            best,
+            damping: 1e-3,
+            of_interest: f64::NEG_INFINITY,
+            promised: f64::INFINITY,
+        }
     }
 
     /// The log density in the searched coordinates.
@@ -223,15 +274,17 @@ impl<'a, 'b> Ascent<'a, 'b> {
             if self.promised == 0.0 {
                 break;
             }
-            let Some(point) = self.improved() else {
+            let Some((point, promised)) = self.improved() else {
                 self.promised = 0.0;
                 break;
             };
             let short = self.damping > SHORT;
-            self.damping = (self.damping * 0.1).max(1e-12);
             let before = self.height();
             self.best = at(self.system, self.whitener, self.means, &point);
-            if self.height() - before < GAIN && !short {
+            let gain = self.height() - before;
+            self.damp(gain / promised);
+            let is_slow = gain < SLOW * (self.of_interest - self.height());
+            if is_slow || gain < GAIN && !short {
                 self.promised = 0.0;
             }
         }
@@ -240,9 +293,19 @@ impl<'a, 'b> Ascent<'a, 'b> {
         }
     }
 
-    /// A point of larger density. A step that does not improve is repeated with more damping: shorter, and closer to
-    /// the gradient.
-    fn improved(&mut self) -> Option<Vec<f64>> {
+    /// The damping after a step that kept this share of the promised gain.
+    fn damp(&mut self, kept: f64) {
+        let [few, most] = KEPT;
+        if kept > most {
+            self.damping = (self.damping * 0.1).max(1e-12);
+        } else if kept < few {
+            self.damping = (self.damping * 2.0).max(LEAST);
+        }
+    }
+
+    /// A point of larger density, with the gain that was promised. A step that does not improve is repeated with more
+    /// damping: shorter, and closer to the gradient.
+    fn improved(&mut self) -> Option<(Vec<f64>, f64)> {
         for _ in 0..TRIES {
             let (point, promised) = step(self.system, &self.best, self.damping, &self.bounds);
             if promised < PROMISED {
@@ -250,7 +313,7 @@ impl<'a, 'b> Ascent<'a, 'b> {
             }
             let density = log_density(self.system, self.whitener, self.means, &point);
             if self.merit(density, &point) > self.height() {
-                return Some(point);
+                return Some((point, promised));
             }
             self.damping = (self.damping * 8.0).max(LEAST);
         }
