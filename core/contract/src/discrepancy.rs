@@ -3,7 +3,7 @@
 use lacuna::data::{Measurements, Replicate};
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::Discrepancy;
-use lacuna::plugin::discrepancy::{CommonError, Known, Likelihood};
+use lacuna::plugin::discrepancy::{CommonError, ErrorPath, Known, Likelihood, VariancePart};
 use lacuna::plugin::forward::Linear;
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
@@ -22,6 +22,8 @@ use crate::judge::{Check, agree, calm, judge, layout, refused, slope, twice};
 /// - Reduced to a linear emulator it is the same function, with the same derivatives.
 /// - Simulated data have the missing values of the measurements, and the variance predicted for a new replicate, within
 ///   five Monte Carlo errors.
+/// - The errors of a new replicate are those of its predicted variance: one path for each origin, with that variance within
+///   five Monte Carlo errors, and the same from the same stream.
 /// - Slopes of the model that are not available do not cause a panic.
 /// - Data without values, with non-finite values or of another layout are rejected.
 pub fn discrepancy(name: &str, discrepancy: &dyn Discrepancy) -> Result<(), Vec<String>> {
@@ -37,7 +39,7 @@ pub fn discrepancy(name: &str, discrepancy: &dyn Discrepancy) -> Result<(), Vec<
     };
     // An error of the data's mean concerns existing data, not a new replicate.
     let (of_data, of_model) = (|| common("replicates", false), || common("numerics", true));
-    let checks: [Check<'_>; 8] = [
+    let checks: [Check<'_>; 9] = [
         ("has sound hyperparameters", Box::new(over(has_sound_hyperparameters, of_data()))),
         ("judges responses", Box::new(over(judges_responses, of_data()))),
         ("knows its derivatives", Box::new(over(knows_its_derivatives, of_data()))),
@@ -45,6 +47,7 @@ pub fn discrepancy(name: &str, discrepancy: &dyn Discrepancy) -> Result<(), Vec<
         ("stands for parts", Box::new(|| stands_for_parts(discrepancy))),
         ("compresses exactly", Box::new(over(compresses_exactly, of_data()))),
         ("simulates what it predicts", Box::new(over(simulates_what_it_predicts, of_model()))),
+        ("draws the errors it predicts", Box::new(over(draws_the_errors_it_predicts, of_model()))),
         ("refuses bad data", Box::new(|| refuses_bad_data(discrepancy))),
     ];
     judge("discrepancy", name, &checks)
@@ -304,6 +307,41 @@ fn simulates_what_it_predicts(likelihood: &dyn Likelihood) -> Result<(), String>
         let spread = squares.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / n;
         if (mean - predicted).abs() > 5.0 * (spread / n).sqrt() {
             return Err(format!("output {}: predicted {predicted}, simulated {mean}", i + 1));
+        }
+    }
+    Ok(())
+}
+
+fn draws_the_errors_it_predicts(likelihood: &dyn Likelihood) -> Result<(), String> {
+    const COUNT: u64 = 2000;
+    let (truth, start) = (truth(), start(likelihood));
+    let parts = likelihood.predictive(&truth, &start);
+    let stream = Stream::root(12);
+    let mut squares = vec![Vec::new(); parts.len() * OUTPUTS];
+    for k in 0..COUNT {
+        let paths = likelihood.errors(&truth, &start, &stream.at(k));
+        if k == 0 && paths != likelihood.errors(&truth, &start, &stream.at(0)) {
+            return Err("the same stream gives other errors".into());
+        }
+        let same = |(path, part): (&ErrorPath, &VariancePart)| {
+            path.origin == part.origin && path.values.len() == OUTPUTS
+        };
+        if paths.len() != parts.len() || !paths.iter().zip(&parts).all(same) {
+            return Err("the errors are not those of the predicted variance, one for each".into());
+        }
+        let values = paths.iter().flat_map(|path| &path.values);
+        squares.iter_mut().zip(values).for_each(|(all, e)| all.push(e * e));
+    }
+    let predicted = parts.iter().flat_map(|part| &part.variance);
+    for (i, (squares, predicted)) in squares.iter().zip(predicted).enumerate() {
+        let n = COUNT as f64;
+        let mean = squares.iter().sum::<f64>() / n;
+        let spread = squares.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / n;
+        if (mean - predicted).abs() > 5.0 * (spread / n).sqrt() + 1e-12 * predicted {
+            let (origin, output) = (&parts[i / OUTPUTS].origin, i % OUTPUTS + 1);
+            return Err(format!(
+                "`{origin}`, output {output}: predicted {predicted}, drawn {mean}"
+            ));
         }
     }
     Ok(())

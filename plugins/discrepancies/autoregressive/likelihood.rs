@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 use lacuna::data::Measurements;
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::Fact;
-use lacuna::plugin::discrepancy::{Hyperparameter, Known, Likelihood, VariancePart};
+use lacuna::plugin::discrepancy::{ErrorPath, Hyperparameter, Known, Likelihood, VariancePart};
 use lacuna::run::Stop;
 use lacuna_linalg::vector::{add_scaled, dot};
 use lacuna_linalg::{Cholesky, Matrix};
@@ -304,6 +304,17 @@ impl Likelihood for AutoregressiveLikelihood {
         let groups = self.noise.variance.values(hyper);
         let variance = groups.map(|g| self.noise.by_output(g));
         self.noise.setting.parts(&variance.unwrap_or_else(|| vec![f64::NAN; response.len()]))
+    }
+
+    /// Each part of the noise is a process with the correlation times of the whole, so that their sum is one as well.
+    fn errors(&self, _: &[f64], hyper: &[f64], stream: &Stream) -> Vec<ErrorPath> {
+        let groups = self.noise.variance.values(hyper).unwrap_or_default();
+        let times = self.times.spread(self.time.values(hyper).unwrap_or_default());
+        self.noise.setting.errors_by(&self.noise.by_output(groups), stream, |part, stream| {
+            let sds: Vec<f64> = part.variance.iter().map(|v| v.sqrt()).collect();
+            let values = self.noise_of(&sds, &times, stream);
+            ErrorPath { origin: part.origin.clone(), values }
+        })
     }
 
     fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements> {

@@ -2,7 +2,7 @@
 
 use lacuna::data::{Measurements, Unit};
 use lacuna::math::random::{Stream, normal};
-use lacuna::plugin::discrepancy::{CommonError, Hyperparameter, Known, VariancePart};
+use lacuna::plugin::discrepancy::{CommonError, ErrorPath, Hyperparameter, Known, VariancePart};
 use lacuna::run::Stop;
 
 use super::{By, Groups, PerGroup, Replicates, Unknown, Variance, squared};
@@ -126,6 +126,40 @@ impl Setting {
     /// Returns the parts that are common errors of a new replicate.
     pub fn common_parts(&self) -> Vec<VariancePart> {
         self.common.iter().filter(|error| error.predictive).map(CommonError::part).collect()
+    }
+
+    /// Returns one draw of the errors of a new replicate whose noise is independent and normal with these variances.
+    pub fn errors(&self, variance: &[f64], stream: &Stream) -> Vec<ErrorPath> {
+        self.errors_by(variance, stream, VariancePart::independent)
+    }
+
+    /// Like [`Setting::errors`], with the noise of each part drawn by `draw`.
+    pub fn errors_by(
+        &self,
+        variance: &[f64],
+        stream: &Stream,
+        draw: impl Fn(&VariancePart, &Stream) -> ErrorPath,
+    ) -> Vec<ErrorPath> {
+        let own = self.own_errors(variance, stream, draw);
+        own.into_iter().chain(self.drawn_common_errors(stream)).collect()
+    }
+
+    /// Returns one draw of the noise, part by part.
+    pub fn own_errors(
+        &self,
+        variance: &[f64],
+        stream: &Stream,
+        draw: impl Fn(&VariancePart, &Stream) -> ErrorPath,
+    ) -> Vec<ErrorPath> {
+        let one = |(k, part): (usize, &VariancePart)| draw(part, &stream.at(k as u64));
+        self.own_parts(variance).iter().enumerate().map(one).collect()
+    }
+
+    /// Returns one draw of each common error of a new replicate.
+    pub fn drawn_common_errors(&self, stream: &Stream) -> impl Iterator<Item = ErrorPath> {
+        let stream = stream.named("common");
+        let all = self.common.iter().filter(|error| error.predictive).enumerate();
+        all.map(move |(k, error)| error.draw(&stream.at(k as u64)))
     }
 
     /// Adds randomly drawn common errors to a response.

@@ -3,7 +3,9 @@
 use lacuna::data::Measurements;
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::Fact;
-use lacuna::plugin::discrepancy::{Compressed, Hyperparameter, Known, Likelihood, VariancePart};
+use lacuna::plugin::discrepancy::{
+    Compressed, ErrorPath, Hyperparameter, Known, Likelihood, VariancePart,
+};
 use lacuna::plugin::forward::Linear;
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
@@ -87,6 +89,13 @@ impl GaussianLikelihood {
     fn variances(&self, response: &[f64], hyper: &[f64]) -> Option<Vec<Vec<(f64, f64)>>> {
         let split = self.split(response);
         self.law.variances(&self.spreads(), hyper, &residuals(&split))
+    }
+
+    /// Returns the mean of the variance of each output.
+    fn mean_variance(&self, response: &[f64], hyper: &[f64]) -> Vec<f64> {
+        let mean = |nodes: &Vec<(f64, f64)>| nodes.iter().map(|(v, p)| v * p).sum::<f64>();
+        let groups = self.variances(response, hyper).unwrap_or_default();
+        self.noise.by_output(&groups.iter().map(mean).collect::<Vec<f64>>())
     }
 
     /// Returns the contribution of the common errors to the density of a value given all others, for each variance
@@ -202,10 +211,12 @@ impl Likelihood for GaussianLikelihood {
     }
 
     fn predictive(&self, response: &[f64], hyper: &[f64]) -> Vec<VariancePart> {
-        let mean = |nodes: &Vec<(f64, f64)>| nodes.iter().map(|(v, p)| v * p).sum::<f64>();
-        let groups = self.variances(response, hyper).unwrap_or_default();
-        let variance: Vec<f64> = groups.iter().map(mean).collect();
-        self.noise.setting.parts(&self.noise.by_output(&variance))
+        self.noise.setting.parts(&self.mean_variance(response, hyper))
+    }
+
+    /// Variances that are integrated out have their posterior mean.
+    fn errors(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<ErrorPath> {
+        self.noise.setting.errors(&self.mean_variance(response, hyper), stream)
     }
 
     /// Variances that are integrated out are drawn from their posterior given the data and this response.

@@ -10,7 +10,9 @@ use std::collections::BTreeMap;
 
 use lacuna::data::{Measurements, Replicate};
 use lacuna::math::random::{Stream, normal};
-use lacuna::plugin::discrepancy::{CommonError, Hyperparameter, Known, Likelihood, VariancePart};
+use lacuna::plugin::discrepancy::{
+    CommonError, ErrorPath, Hyperparameter, Known, Likelihood, VariancePart,
+};
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
 
@@ -303,6 +305,24 @@ impl Likelihood for StatedLikelihood {
 
     fn predictive(&self, _: &[f64], hyper: &[f64]) -> Vec<VariancePart> {
         self.setting.parts(&self.by_output(hyper))
+    }
+
+    /// A stated covariance holds for a curve in which every output was measured; without one the noise is independent.
+    fn errors(&self, _: &[f64], hyper: &[f64], stream: &Stream) -> Vec<ErrorPath> {
+        let whole = self.by_output(hyper);
+        let complete = |set: &&Set| set.rotation.is_some() && set.outputs.len() == whole.len();
+        let set = self.sets.iter().find(complete).zip(self.variances(hyper));
+        self.setting.errors_by(&whole, stream, |part, stream| {
+            let Some((set, variance)) = &set else { return part.independent(stream) };
+            let own = &variance[set.begin..set.begin + set.outputs.len()];
+            let mut rng = stream.generator();
+            let components: Vec<f64> = own.iter().map(|v| v.sqrt() * normal(&mut rng)).collect();
+            let mut values = vec![0.0; whole.len()];
+            for (&i, e) in set.outputs.iter().zip(set.values(&components)) {
+                values[i] = e * (part.variance[i] / whole[i]).sqrt();
+            }
+            ErrorPath { origin: part.origin.clone(), values }
+        })
     }
 
     fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements> {

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use lacuna::data::Measurements;
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::Fact;
-use lacuna::plugin::discrepancy::{Hyperparameter, Known, Likelihood, VariancePart};
+use lacuna::plugin::discrepancy::{ErrorPath, Hyperparameter, Known, Likelihood, VariancePart};
 use lacuna::run::Stop;
 use lacuna_linalg::vector::dot;
 use lacuna_linalg::{Matrix, symmetric_eigen};
@@ -213,6 +213,16 @@ impl Likelihood for BiasedLikelihood {
         ];
         parts.extend(self.noise.setting.common_parts());
         parts
+    }
+
+    /// The bias is drawn from its prior: that of other conditions than those measured.
+    fn errors(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<ErrorPath> {
+        let noise = self.noise.by_output(self.noise.variance.values(hyper).unwrap_or_default());
+        let noise = part("measurement", noise).independent(&stream.at(0));
+        let bias = self.draw(hyper, &stream.at(1));
+        let values = bias.unwrap_or_else(|| vec![f64::NAN; response.len()]);
+        let own = [noise, ErrorPath { origin: "model_form".into(), values }];
+        own.into_iter().chain(self.noise.setting.drawn_common_errors(stream)).collect()
     }
 
     fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements> {

@@ -7,7 +7,7 @@ use lacuna::data::{Layout, Measurements, Unit};
 use lacuna::math::random::Stream;
 use lacuna::plugin::component::{Component, Context};
 use lacuna::plugin::discrepancy::{
-    Discrepancy, Hyperparameter, Known, Likelihood, StatedNoise, VariancePart,
+    Discrepancy, ErrorPath, Hyperparameter, Known, Likelihood, StatedNoise, VariancePart,
 };
 use lacuna::run::Stop;
 use lacuna::text::problem::Complaints;
@@ -180,6 +180,10 @@ impl Likelihood for Proportional {
 
     fn predictive(&self, response: &[f64], hyper: &[f64]) -> Vec<VariancePart> {
         self.setting.parts(&self.variance(response, hyper).unwrap_or_default())
+    }
+
+    fn errors(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<ErrorPath> {
+        self.setting.errors(&self.variance(response, hyper).unwrap_or_default(), stream)
     }
 
     fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements> {

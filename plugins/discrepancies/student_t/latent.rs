@@ -1,9 +1,13 @@
 //! Common errors represented by the weights of a few directions.
 
+use std::ops::Range;
+
 use lacuna::data::Unit;
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal};
-use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin, Hyperparameter, Known, VariancePart};
+use lacuna::plugin::discrepancy::{
+    CommonError, ErrorOrigin, ErrorPath, Hyperparameter, Known, VariancePart,
+};
 use lacuna::run::Stop;
 use lacuna_linalg::vector::dot;
 use lacuna_linalg::{Cholesky, Matrix};
@@ -51,6 +55,8 @@ struct Part {
     along: Matrix,
     /// Variance outside the directions.
     rest: Vec<f64>,
+    /// Columns of the factor of all errors that belong to it.
+    columns: Range<usize>,
 }
 
 /// Noise for which the directions are chosen.
@@ -116,10 +122,14 @@ impl Latent {
     pub fn rest(&self, stream: &Stream) -> Vec<f64> {
         let mut rng = stream.generator();
         let all: Vec<f64> = (0..self.factor.columns()).map(|_| normal(&mut rng)).collect();
-        let along = lacuna_linalg::transposed_multiply_vector(&self.kept, &all);
+        lacuna_linalg::multiply_vector(&self.factor, &self.beside(&all))
+    }
+
+    /// Returns `(1 - Q Q') zeta`.
+    fn beside(&self, zeta: &[f64]) -> Vec<f64> {
+        let along = lacuna_linalg::transposed_multiply_vector(&self.kept, zeta);
         let along = lacuna_linalg::multiply_vector(&self.kept, &along);
-        let beside: Vec<f64> = all.iter().zip(along).map(|(z, a)| z - a).collect();
-        lacuna_linalg::multiply_vector(&self.factor, &beside)
+        zeta.iter().zip(along).map(|(z, a)| z - a).collect()
     }
 
     /// Iterates over the errors of a new replicate, with the mean square of each at each output given the weights.
@@ -130,6 +140,23 @@ impl Latent {
             let square = error.iter().zip(&part.rest).map(|(e, rest)| e * e + rest);
             VariancePart { origin: part.origin.clone(), variance: square.collect() }
         })
+    }
+
+    /// Draws the errors of a new replicate given the weights, in the order of [`Latent::predictive`].
+    pub fn errors(&self, hyper: &[f64], stream: &Stream) -> Vec<ErrorPath> {
+        let mut rng = stream.generator();
+        let all: Vec<f64> = (0..self.factor.columns()).map(|_| normal(&mut rng)).collect();
+        let beside = self.beside(&all);
+        let weights = &hyper[self.range()];
+        let one = |part: &Part| {
+            let own = part.columns.clone();
+            let sampled = lacuna_linalg::multiply_vector(&part.along, weights);
+            let rows = self.factor.iter_rows().zip(sampled);
+            let values =
+                rows.map(|(row, e)| e + dot(&row[own.clone()], &beside[own.clone()])).collect();
+            ErrorPath { origin: part.origin.clone(), values }
+        };
+        self.parts.iter().map(one).collect()
     }
 
     /// Adds the derivatives with respect to the weights, given those with respect to the outputs.
@@ -159,10 +186,11 @@ fn parts(common: &[CommonError], kept: &Matrix) -> Vec<Part> {
         let rows: Vec<usize> = (first..first + error.factor.columns()).collect();
         first += rows.len();
         if error.predictive && !rows.is_empty() {
+            let columns = first - rows.len()..first;
             let along = lacuna_linalg::multiply(&error.factor, &kept.select_rows(&rows));
             let rest = error.factor.iter_rows().zip(along.iter_rows());
             let rest = rest.map(|(whole, along)| (dot(whole, whole) - dot(along, along)).max(0.0));
-            found.push(Part { origin: error.origin.clone(), rest: rest.collect(), along });
+            found.push(Part { origin: error.origin.clone(), rest: rest.collect(), along, columns });
         }
     }
     found

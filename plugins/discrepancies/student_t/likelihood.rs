@@ -7,7 +7,9 @@ use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal};
 use lacuna::math::special::ln_gamma;
 use lacuna::plugin::Fact;
-use lacuna::plugin::discrepancy::{Hyperparameter, Known, Likelihood, SampledErrors, VariancePart};
+use lacuna::plugin::discrepancy::{
+    ErrorPath, Hyperparameter, Known, Likelihood, SampledErrors, VariancePart,
+};
 use lacuna::run::Stop;
 
 use super::StudentT;
@@ -229,6 +231,27 @@ impl Likelihood for StudentLikelihood {
             parts.extend(latent.predictive(hyper));
         }
         parts
+    }
+
+    /// The parts of the noise share the divisor of Student's t distribution, so that their sum has that distribution.
+    fn errors(&self, _: &[f64], hyper: &[f64], stream: &Stream) -> Vec<ErrorPath> {
+        let freedom = self.freedom.values(hyper).map_or(f64::NAN, |f| f[0]);
+        let law = Distribution::Gamma([0.5 * freedom, 2.0 / freedom]);
+        let mut rng = stream.named("divisor").generator();
+        // The variance of such a number is larger by `freedom / (freedom - 2)` than the square of its scale.
+        let factor = ((freedom - 2.0) / freedom).sqrt();
+        let divided: Vec<f64> = (0..self.setting.data.layout.len())
+            .map(|_| factor / law.sample(&mut rng).sqrt())
+            .collect();
+        let draw = |part: &VariancePart, stream: &Stream| {
+            let mut path = part.independent(stream);
+            path.values.iter_mut().zip(&divided).for_each(|(z, d)| *z *= d);
+            path
+        };
+        let variance = self.variance(hyper).unwrap_or_default();
+        let own = self.setting.own_errors(&variance, stream, draw);
+        let common = self.latent.iter().flat_map(|l| l.errors(hyper, &stream.named("common")));
+        own.into_iter().chain(common).collect()
     }
 
     /// A Student's t number is a normal number divided by the root of a chi-squared number over its degrees of

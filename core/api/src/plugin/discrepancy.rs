@@ -159,14 +159,20 @@ impl CommonError {
         VariancePart { origin: self.origin.clone(), variance }
     }
 
+    /// One draw of the error.
+    pub fn draw(&self, stream: &Stream) -> ErrorPath {
+        let mut rng = stream.generator();
+        let weights: Vec<f64> = (0..self.factor.columns()).map(|_| normal(&mut rng)).collect();
+        let values = self.factor.iter_rows().map(|row| dot(row, &weights)).collect();
+        ErrorPath { origin: self.origin.clone(), values }
+    }
+
     /// A response with one draw of each error added.
     pub fn added(errors: &[Self], response: &[f64], stream: &Stream) -> Vec<f64> {
         let mut mean = response.to_vec();
         for (k, error) in errors.iter().enumerate() {
-            let mut rng = stream.named("common").at(k as u64).generator();
-            let weights: Vec<f64> = (0..error.factor.columns()).map(|_| normal(&mut rng)).collect();
-            let rows = error.factor.iter_rows();
-            mean.iter_mut().zip(rows).for_each(|(m, row)| *m += dot(row, &weights));
+            let drawn = error.draw(&stream.named("common").at(k as u64));
+            mean.iter_mut().zip(drawn.values).for_each(|(m, e)| *m += e);
         }
         mean
     }
@@ -206,6 +212,16 @@ pub trait Likelihood: Send + Sync {
 
     /// Variance of each output of a new replicate around the model's response, split by origin.
     fn predictive(&self, response: &[f64], hyper: &[f64]) -> Vec<VariancePart>;
+
+    /// One draw of the errors of a new replicate around the model's response: one path for each part of
+    /// [`Likelihood::predictive`], in its order, whose values have that variance (their mean square about the response).
+    /// By default all values are independent and normal; a discrepancy that knows how they are correlated, or
+    /// distributed, draws them so. The paths of one origin are the same whatever is done with the others.
+    fn errors(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<ErrorPath> {
+        let parts = self.predictive(response, hyper);
+        let draw = |(k, part): (usize, &VariancePart)| part.independent(&stream.at(k as u64));
+        parts.iter().enumerate().map(draw).collect()
+    }
 
     /// Data simulated from this discrepancy: replicates and missing values as in the measurements, new values; one set
     /// per block of scenarios.
@@ -248,6 +264,24 @@ pub struct VariancePart {
     pub origin: ErrorOrigin,
     /// Variance of each output, in the squared unit of the response.
     pub variance: Vec<f64>,
+}
+
+impl VariancePart {
+    /// One draw of an error with these variances whose values are independent and normal.
+    pub fn independent(&self, stream: &Stream) -> ErrorPath {
+        let mut rng = stream.generator();
+        let values = self.variance.iter().map(|v| v.sqrt() * normal(&mut rng)).collect();
+        ErrorPath { origin: self.origin.clone(), values }
+    }
+}
+
+/// One draw of an error of a new replicate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ErrorPath {
+    /// Origin of the error, as in [`VariancePart`].
+    pub origin: ErrorOrigin,
+    /// Error of each output, in the unit of the response.
+    pub values: Vec<f64>,
 }
 
 /// A likelihood expressed in the basis functions of a linear emulator.

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use lacuna::data::{Layouts, Measurements};
 use lacuna::math::random::Stream;
-use lacuna::plugin::discrepancy::{Compressed, SampledErrors, VariancePart};
+use lacuna::plugin::discrepancy::{Compressed, ErrorPath, SampledErrors, VariancePart};
 use lacuna::plugin::forward::Linear;
 use lacuna::plugin::{Fact, Hyperparameter, Likelihood};
 use lacuna_linalg::Matrix;
@@ -138,6 +138,24 @@ impl Likelihood for Joint {
                     all.len() - 1
                 });
                 all[place].variance[block.outputs.clone()].copy_from_slice(&own.variance);
+            }
+        }
+        all
+    }
+
+    /// The errors of the blocks are independent of each other.
+    fn errors(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<ErrorPath> {
+        let outputs = self.blocks.last().map_or(0, |block| block.outputs.end);
+        let mut all: Vec<ErrorPath> = Vec::new();
+        for (i, block) in self.blocks.iter().enumerate() {
+            let part = &response[block.outputs.clone()];
+            for own in block.likelihood.errors(part, &block.own(hyper), &stream.at(i as u64)) {
+                let place = all.iter().position(|other| other.origin == own.origin);
+                let place = place.unwrap_or_else(|| {
+                    all.push(ErrorPath { origin: own.origin.clone(), values: vec![0.0; outputs] });
+                    all.len() - 1
+                });
+                all[place].values[block.outputs.clone()].copy_from_slice(&own.values);
             }
         }
         all

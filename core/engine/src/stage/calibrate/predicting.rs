@@ -2,7 +2,7 @@
 
 use lacuna::data::Measurements;
 use lacuna::math::random::Stream;
-use lacuna::plugin::discrepancy::{CommonError, Hyperparameter, VariancePart};
+use lacuna::plugin::discrepancy::{CommonError, ErrorPath, Hyperparameter, VariancePart};
 use lacuna::plugin::{Fact, Likelihood};
 use lacuna::run::Stop;
 
@@ -62,6 +62,14 @@ impl Likelihood for Added {
         let mut parts = self.alone.predictive(response, &self.own(hyper));
         parts.extend(self.errors.iter().filter(|error| error.predictive).map(CommonError::part));
         parts
+    }
+
+    fn errors(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<ErrorPath> {
+        let mut paths = self.alone.errors(response, &self.own(hyper), stream);
+        let stream = stream.named("common");
+        let common = self.errors.iter().filter(|error| error.predictive).enumerate();
+        paths.extend(common.map(|(k, error)| error.draw(&stream.at(k as u64))));
+        paths
     }
 
     fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements> {
