@@ -5,6 +5,7 @@ pub mod discrepancies;
 pub mod effects;
 pub mod executors;
 pub mod models;
+pub mod quantities;
 pub mod readers;
 pub mod samplers;
 pub mod surrogates;
