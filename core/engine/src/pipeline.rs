@@ -5,8 +5,8 @@
 //!
 //! ```text
 //! emulated  design  simulate  read  surrogate  calibrate (repeated to refine) ┐
-//! direct                      read             calibrate                      ┴ evidence validate assess gap report
-//! target                                       calibrate                        evidence          assess     report
+//! direct                      read             calibrate                      ┴ evidence validate quantities assess gap report
+//! target                                       calibrate                        evidence          quantities assess     report
 //! ```
 
 use lacuna::plugin::Density;
@@ -31,7 +31,7 @@ use crate::stage::predictions::Predicting;
 use crate::stage::surrogate::Fitting;
 use crate::stage::{
     assess, calibrate, contents, design, evidence, inference_data, low_fidelity, manifest,
-    numerical_error, read, refine, simulate, surrogate, target, validate,
+    numerical_error, quantities, read, refine, simulate, surrogate, target, validate,
 };
 use crate::study::Study;
 
@@ -189,11 +189,13 @@ fn conclude(
 ) -> Result<Findings, Stop> {
     let weighed = weigh(study, problem, calibrated, run, observer)?;
     let validated = validate::stage(study, problem, calibrated, run, observer)?;
+    let quantified = quantities::stage(study, problem, calibrated, run, observer)?;
     let made = Artifacts {
         problem: Some(problem),
         calibrated,
         weighed: weighed.as_ref(),
         validated: validated.as_ref(),
+        quantities: quantified.as_ref(),
     };
     let assessed = assess::stage(study, &made, run, observer)?;
     let gap = match goal {
@@ -212,7 +214,8 @@ fn conclude(
     }
     if let Some(calibrated) = calibrated {
         let (weighed, validated) = (weighed.as_ref(), validated.as_ref());
-        let finished = inference_data::Finished { calibrated, weighed, validated };
+        let quantities = quantified.as_ref();
+        let finished = inference_data::Finished { calibrated, weighed, validated, quantities };
         inference_data::stage(study, problem, &finished, run)?;
     }
     let results = report::Results { artifacts: made, assessed: &assessed, gap: gap.as_ref() };
@@ -257,10 +260,12 @@ fn sample_target(
     let posterior = Posterior::new(&study.parameters, likelihood);
     let calibrated = target::stage(study, target, &posterior, run, observer)?;
     let weighed = evidence::stage(study, &posterior, &calibrated, None, run, observer)?;
+    let quantified = quantities::of_target(study, &calibrated, run, observer)?;
     let finished = inference_data::Finished {
         calibrated: &calibrated,
         weighed: Some(&weighed),
         validated: None,
+        quantities: quantified.as_ref(),
     };
     inference_data::of_target(study, &posterior, &finished, run)?;
     let made = Artifacts {
@@ -268,6 +273,7 @@ fn sample_target(
         calibrated: Some(&calibrated),
         weighed: Some(&weighed),
         validated: None,
+        quantities: quantified.as_ref(),
     };
     let assessed = assess::stage(study, &made, run, observer)?;
     let results = report::Results { artifacts: made, assessed: &assessed, gap: None };

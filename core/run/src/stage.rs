@@ -25,6 +25,8 @@ pub enum Stage {
     Evidence,
     /// Compares the response of the calibrated model with the data.
     Validate,
+    /// Predicts the quantities of interest.
+    Quantities,
     /// Checks whether the result can be trusted.
     Assess,
     /// Searches for physics that is missing in the model.
@@ -53,7 +55,7 @@ pub enum Depends {
 
 impl Stage {
     /// All stages, in order.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Design,
         Self::Simulate,
         Self::Read,
@@ -62,6 +64,7 @@ impl Stage {
         Self::Calibrate,
         Self::Evidence,
         Self::Validate,
+        Self::Quantities,
         Self::Assess,
         Self::Gap,
         Self::Show,
@@ -82,6 +85,7 @@ impl Stage {
             Self::Calibrate => (5, "calibrate", OnVersion(6)),
             Self::Evidence => (6, "evidence", OnVersion(2)),
             Self::Validate => (6, "validate", OnVersion(4)),
+            Self::Quantities => (6, "quantities", OnVersion(1)),
             Self::Assess => (6, "assess", OnVersion(6)),
             Self::Gap => (7, "gap", OnVersion(3)),
             Self::Show => (7, "show", OnVersion(1)),
@@ -174,6 +178,7 @@ mod tests {
                 "5-calibrate",
                 "6-evidence",
                 "6-validate",
+                "6-quantities",
                 "6-assess",
                 "7-gap",
                 "7-show",

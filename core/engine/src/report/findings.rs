@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::assess::Assessment;
 
 pub use crate::gap::result::GapFindings;
+pub use crate::stage::quantities::QuantityFindings;
 use crate::stage::screen::FlaggedCurve;
 use crate::stage::validate::ValidationFindings;
 
@@ -41,6 +42,8 @@ pub struct Findings {
     pub calibration: Option<CalibrationFindings>,
     /// Validation.
     pub validation: Option<ValidationFindings>,
+    /// Predicted quantities of interest.
+    pub quantities: Vec<QuantityFindings>,
     /// Result of the gap search.
     pub gap: Option<GapFindings>,
     /// Version of Lacuna that computed the result of each stage.

@@ -93,6 +93,7 @@ fn findings(
         assessment: results.assessed.value.clone(),
         calibration,
         validation,
+        quantities: all.quantities.map(|kept| kept.value.findings()).unwrap_or_default(),
         gap: results.gap.map(|kept| GapFindings {
             result: kept.value.clone(),
             hash: kept.hash.clone(),

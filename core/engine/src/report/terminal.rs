@@ -4,7 +4,8 @@ use lacuna::run::Stop;
 
 use super::findings::Findings;
 use super::section::{
-    accuracy_table, banner, evidence, group_word, headline, posterior_table, view,
+    accuracy_table, banner, evidence, group_word, headline, posterior_table, quantity_table, view,
+    without_table,
 };
 use crate::gap::next::Wanted;
 use crate::gap::report;
@@ -34,6 +35,13 @@ pub fn summary_text(findings: &Findings) -> String {
             "{title}\n{}",
             accuracy_table(group_word(&findings.layouts), &validation.cases).text()
         ));
+    }
+    if !findings.quantities.is_empty() {
+        let table = quantity_table(&findings.quantities).text();
+        parts.push(format!("predicted quantities\n{table}"));
+        if let Some(table) = without_table(&findings.quantities) {
+            parts.push(format!("their standard deviation without one source\n{}", table.text()));
+        }
     }
     parts.join("\n")
 }

@@ -5,6 +5,7 @@ use lacuna_run::Kept;
 use super::calibrate::Calibrated;
 use super::evidence::Weighed;
 use super::inverse_problem::InverseProblem;
+use super::quantities::Quantified;
 use super::read::Measured;
 use super::validate::Validated;
 
@@ -19,6 +20,8 @@ pub struct Artifacts<'a> {
     pub weighed: Option<&'a Kept<Weighed>>,
     /// The calibrated model against the data.
     pub validated: Option<&'a Kept<Validated>>,
+    /// The predicted quantities.
+    pub quantities: Option<&'a Kept<Quantified>>,
 }
 
 impl<'a> Artifacts<'a> {

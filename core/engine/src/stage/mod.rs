@@ -23,6 +23,7 @@ pub mod manifest;
 pub mod numerical_error;
 pub mod predict;
 pub mod predictions;
+pub mod quantities;
 pub mod read;
 pub mod refine;
 pub mod results;

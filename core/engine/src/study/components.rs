@@ -40,10 +40,13 @@ impl Study {
         }
     }
 
-    /// The plugins of all sections in the order in which a study is written; every `[[effect]]` is one.
+    /// The plugins of all sections in the order in which a study is written; every `[[effect]]` and
+    /// every `[[quantity]]` is one.
     pub fn components(&self) -> Vec<Chosen<'_>> {
         let mut all = self.plugins.chosen();
         all.extend(self.effects.iter().map(|e| Chosen::of("effect", &e.built, &*e.built.plugin)));
+        let asked = self.quantities.iter();
+        all.extend(asked.map(|q| Chosen::of("quantity", &q.built, &*q.built.plugin)));
         all
     }
 
@@ -91,6 +94,7 @@ impl Study {
             all.push(("model", &model.built.options));
         }
         all.extend(self.effects.iter().map(|effect| ("effect", &effect.built.options)));
+        all.extend(self.quantities.iter().map(|q| ("quantity", &q.built.options)));
         all.extend(self.tried().map(of));
         all
     }

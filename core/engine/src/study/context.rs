@@ -8,6 +8,7 @@ mod inside;
 mod next;
 mod noise;
 mod outputs;
+mod quantities;
 mod runs;
 
 use lacuna::data::{Layout, Parameter, Scenario};
@@ -52,6 +53,9 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     gap::check(study, root, problems);
     super::inputs::check(study, root, problems);
     super::derived::check(study, root, problems);
+    if problems.len() == before {
+        quantities::check(study, root, problems);
+    }
     each_plugin(study, root, problems, |_, component, context, complaints| {
         component.check(context, complaints);
     });
@@ -59,7 +63,8 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
 
 /// Reports sections that have no use beside `[target]`, which replaces everything that makes up a likelihood.
 fn beside_a_target(study: &Study, root: &Node, complaints: &mut Complaints<'_>) {
-    const ALONE: [&str; 6] = ["study", "parameter", "derived", "target", "executor", "sampler"];
+    const ALONE: [&str; 7] =
+        ["study", "parameter", "derived", "target", "executor", "sampler", "quantity"];
     for (key, _) in root.entries().iter().filter(|(key, _)| !ALONE.contains(&key.name.as_str())) {
         complaints
             .at(&key.name)
@@ -275,10 +280,12 @@ pub(super) fn each_plugin(
     let unwritten = Node::table(root.place.clone());
     let elements = |list: &str| root.find(list).map(Node::elements).unwrap_or_default().iter();
     let (mut effects, mut candidates) = (elements("effect"), elements("gap.candidate"));
+    let mut quantities = elements("quantity");
     let all = study.components().into_iter().chain(study.of_other_cost()).chain(study.tried());
     for Chosen { section, plugin, .. } in all {
         let node = match section {
             "effect" => effects.next(),
+            "quantity" => quantities.next(),
             "gap.candidate" => candidates.next(),
             _ => root.find(section),
         };

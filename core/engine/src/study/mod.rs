@@ -14,6 +14,7 @@ pub mod noise;
 pub mod overrides;
 mod plain;
 pub mod positions;
+pub mod quantity;
 pub mod resolve;
 mod resolved;
 pub mod scenario;

@@ -14,6 +14,7 @@ use super::file::{DerivedSection, EffectKeys, StudySection, ValidateSection};
 use super::gap::Gap;
 use super::libraries::Libraries;
 use super::positions::Positions;
+use super::quantity::QuantitySection;
 use super::table::PluginSections;
 use super::unknowns::Unknown;
 
@@ -56,6 +57,8 @@ pub struct Study {
     pub derived_sections: Vec<DerivedSection>,
     /// `[[effect]]`.
     pub effects: Vec<Section<dyn Effect, EffectKeys>>,
+    /// `[[quantity]]`.
+    pub quantities: Vec<QuantitySection>,
     /// `[validate]`.
     pub validate: ValidateSection,
     /// `[gap]`.
@@ -93,6 +96,7 @@ impl Study {
             low_fidelity: None,
             derived_sections: Vec::new(),
             effects: Vec::new(),
+            quantities: Vec::new(),
             validate: ValidateSection::default(),
             gap,
             resolved: Table::new(),

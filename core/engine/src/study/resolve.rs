@@ -21,7 +21,7 @@ use super::libraries::{Libraries, Seen, libraries};
 pub use super::plain::Study;
 use super::positions::positions;
 use super::sections::{
-    derived, effects, layouts, name, parameters, scenarios, table, unknown_sections,
+    derived, effects, layouts, name, parameters, quantities, scenarios, table, unknown_sections,
 };
 use super::table::{self, PluginSections, SECTIONS};
 use super::unknowns::unknowns;
@@ -176,6 +176,7 @@ fn structure(
     let low_fidelity = low_fidelity(root, problems);
     let derived_sections = derived(root, problems);
     let effects = effects(root, problems);
+    let quantities = quantities(root, problems);
     let validate = match root.get("validate") {
         Some(node) => problems.within("validate", |problems| decode(node, problems)),
         None => Some(ValidateSection::default()),
@@ -223,6 +224,7 @@ fn structure(
         low_fidelity,
         derived_sections: derived_sections?,
         effects: effects?,
+        quantities: quantities?,
         validate: validate?,
         gap: gap?,
         resolved: Table::new(),

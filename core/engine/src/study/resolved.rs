@@ -68,6 +68,10 @@ pub(super) fn table(
         let effects: Result<Vec<Table>, _> = study.effects.iter().map(written).collect();
         later.insert("effect", effects?.into());
     }
+    if !study.quantities.is_empty() {
+        let quantities: Result<Vec<Table>, _> = study.quantities.iter().map(written).collect();
+        later.insert("quantity", quantities?.into());
+    }
     later.insert("validate", to_table(&study.validate)?.into());
     later.insert("gap", gap(&study.gap)?.into());
     for name in SECTIONS {

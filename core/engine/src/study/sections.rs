@@ -15,6 +15,7 @@ use super::file::{
     Axes, DerivedSection, EffectKeys, ParameterSection, ResponseSection, ScenarioSection,
     StudySection,
 };
+use super::quantity::QuantitySection;
 use super::sizes;
 use super::table::SECTIONS;
 
@@ -70,6 +71,19 @@ pub(super) fn effects(
     let decoded: Vec<Option<_>> = list
         .iter()
         .map(|node| problems.within("effect", |problems| section(node, None, problems)))
+        .collect();
+    decoded.into_iter().collect()
+}
+
+/// `[[quantity]]`.
+pub(super) fn quantities(root: &Node, problems: &mut Problems) -> Option<Vec<QuantitySection>> {
+    let list = root.get("quantity").map(Node::elements).unwrap_or_default();
+    let decoded: Vec<Option<_>> = list
+        .iter()
+        .map(|node| {
+            let path = format!("quantity.{}", node.name().unwrap_or("?"));
+            problems.within(&path, |problems| section(node, None, problems))
+        })
         .collect();
     decoded.into_iter().collect()
 }

@@ -8,7 +8,8 @@
 use lacuna::plugin::manual::Manual;
 use lacuna::plugin::registry::{Built, Kind, NoKeys, Section, section};
 use lacuna::plugin::{
-    Component, Density, Design, Discrepancy, Effect, Executor, Model, Reader, Sampler, Surrogate,
+    Component, Density, Design, Discrepancy, Effect, Executor, Model, Quantity, Reader, Sampler,
+    Surrogate,
 };
 use lacuna::text::decode::fields;
 use lacuna::text::emit::{Unwritable, to_table};
@@ -24,6 +25,7 @@ use super::file::{
 };
 use super::gap::GapSection;
 use super::libraries::PluginsSection;
+use super::quantity::QuantityKeys;
 use super::schema::{Language, page};
 
 /// Writes what follows from the rows. Of the five forms of a row each part of the macro uses those it concerns.
@@ -137,6 +139,7 @@ sections! {
     low_fidelity: table(LowFidelitySection);
     effect: plugins(Effect, EffectKeys);
     sampler: plugin(Sampler, SamplerKeys);
+    quantity: plugins(Quantity, QuantityKeys);
     validate: table(ValidateSection);
     gap: table(GapSection);
 }

@@ -7,6 +7,7 @@ pub mod headline;
 mod measurements;
 mod overview;
 mod posterior;
+mod quantities;
 mod sampling;
 mod surrogate;
 mod timing;
@@ -22,6 +23,7 @@ use crate::page::scale::ShownUnit;
 use crate::page::{Numbers, Section};
 
 pub use posterior::posterior_table;
+pub use quantities::{quantity_table, without_table};
 pub use validation::accuracy_table;
 
 /// All sections with content, in order.
@@ -35,6 +37,7 @@ pub fn all(findings: &Findings, numbers: &mut Numbers) -> Vec<Section> {
         posterior::section(findings, numbers),
         evidence::section(findings),
         validation::section(findings, numbers),
+        quantities::section(findings, numbers),
         findings.gap.as_ref().map(|gap| report::section(&view(findings), gap, numbers)),
         timing::section(findings, numbers),
     ];

@@ -9,6 +9,7 @@ mod gap;
 mod inputs;
 mod keys;
 mod posterior;
+mod quantities;
 mod schema;
 mod surrogate;
 mod validation;
@@ -20,6 +21,7 @@ use serde::Serialize;
 use self::gap::Gap;
 use self::inputs::{Data, Runs};
 use self::posterior::Calibration;
+use self::quantities::PredictedQuantity;
 use self::surrogate::Surrogate;
 use self::validation::Validation;
 use super::findings::Findings;
@@ -72,6 +74,10 @@ pub struct Summary {
     /// The keys that a validation adds.
     #[serde(flatten)]
     pub validation: Option<Validation>,
+    /// Predicted quantities of interest (`[[quantity]]`).
+    #[serde(skip_serializing_if = "ByName::is_empty")]
+    #[schemars(extend("propertyNames" = { "title": "name" }))]
+    pub quantities: ByName<PredictedQuantity>,
     /// Result of the gap search (`lacuna gap STUDY`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gap: Option<Gap>,
@@ -99,6 +105,7 @@ pub fn summary(findings: &Findings) -> Summary {
         surrogate: findings.surrogate.as_ref().map(|found| Surrogate::of(findings, found)),
         calibration: findings.calibration.as_ref().map(|found| Calibration::of(findings, found)),
         validation: findings.validation.as_ref().map(Validation::of),
+        quantities: quantities::by_name(&findings.quantities),
         gap: findings.gap.as_ref().map(Gap::of),
         seconds: quantities(&findings.seconds),
         made_by: findings.made_by.iter().cloned().collect(),

@@ -48,6 +48,7 @@ pub fn findings() -> Findings {
         calibration: Some(calibration()),
         validation: Some(validation(&layout)),
         layouts: layout.into(),
+        quantities: Vec::new(),
         gap: None,
         made_by: vec![("calibrate".to_owned(), "0.0.9".to_owned())],
         assessment: crate::assess::Assessment::default(),

@@ -84,6 +84,11 @@ impl<'a> Law<'a> {
         })
     }
 
+    /// Common errors of all blocks together, without that of the replicates' mean.
+    pub fn common(&self) -> &[CommonError] {
+        &self.common
+    }
+
     /// Likelihood of a block of scenarios.
     pub fn block(&self, i: usize) -> Result<Box<dyn Likelihood>, Stop> {
         self.with_known(i, |problem| self.plugin.likelihood(problem))

@@ -11,6 +11,7 @@ use super::suffix;
 use crate::stage::calibrate::Calibrated;
 use crate::stage::curves::Curves;
 use crate::stage::evidence::Weighed;
+use crate::stage::quantities::{Quantified, Variant};
 use crate::stage::validate::Validated;
 use crate::study::Study;
 
@@ -21,6 +22,7 @@ pub struct Given<'a> {
     pub calibrated: &'a Calibrated,
     pub weighed: Option<&'a Weighed>,
     pub validated: Option<&'a Validated>,
+    pub quantities: Option<&'a Quantified>,
     /// Data of the likelihood.
     pub data: Option<&'a Observations>,
     pub from_posterior: Option<FromPosterior>,
@@ -46,8 +48,12 @@ impl Given<'_> {
         let mut file = File::new(&attributes)?;
         self.posterior(&mut file)?;
         self.prior(&mut file)?;
+        let draws = match self.data {
+            Some(data) => self.of_data(&mut file, &Cells::of(data))?,
+            None => None,
+        };
+        self.quantities(&mut file, draws)?;
         if let Some(data) = self.data {
-            self.of_data(&mut file, &Cells::of(data))?;
             self.by_curve(&mut file, data)?;
         }
         self.constants(&mut file)?;
@@ -109,8 +115,30 @@ impl Given<'_> {
         Ok(())
     }
 
-    /// Writes the groups that are arranged like the data.
-    fn of_data(&self, file: &mut File, cells: &Cells<'_>) -> Result<(), Error> {
+    /// Writes the predicted quantities; `draws` are the dimensions of the predictions of data, which are at the same
+    /// draws.
+    fn quantities(&self, file: &mut File, draws: Option<[DimensionId; 2]>) -> Result<(), Error> {
+        let Some(found) = self.quantities else { return Ok(()) };
+        let about = &found.about;
+        let dimensions = match draws {
+            Some(draws) => draws,
+            None => chosen_of(file, PREDICTIVE, &about.chains, &about.steps)?,
+        };
+        for (i, quantity) in about.quantities.iter().enumerate() {
+            let values = found.draws_of(i, &Variant::Total).unwrap_or_default();
+            let path = format!("{PREDICTIVE}/{}", quantity.name);
+            file.numbers(&path, &dimensions, values, Some(&quantity.unit))?;
+        }
+        Ok(())
+    }
+
+    /// Writes the groups that are arranged like the data; returns the dimensions of the predictions, if there are any.
+    fn of_data(
+        &self,
+        file: &mut File,
+        cells: &Cells<'_>,
+    ) -> Result<Option<[DimensionId; 2]>, Error> {
+        let mut dimensions = None;
         let layouts = &self.study.layouts;
         let (name, unit) = (layouts.name(), layouts.unit().to_string());
         let unit = Some(unit.as_str());
@@ -119,6 +147,7 @@ impl Given<'_> {
         if let Some(from) = &self.from_posterior {
             let place = cells.place(file, PREDICTIVE)?;
             let draws = chosen(file, PREDICTIVE, from)?;
+            dimensions = Some(draws);
             let path = format!("{PREDICTIVE}/{name}");
             place.variable(file, &path, &draws, from.data.as_slice(), unit)?;
             self.band(file, &place)?;
@@ -146,7 +175,7 @@ impl Given<'_> {
             let path = format!("{group}/{name}");
             place.variable(file, &path, &[chain, draw], data.as_slice(), unit)?;
         }
-        Ok(())
+        Ok(dimensions)
     }
 
     /// Writes the band of a new replicate.
@@ -242,8 +271,17 @@ fn all_draws(
 
 /// Adds the dimensions of the selected chains and draws to a group.
 fn chosen(file: &mut File, group: &str, from: &FromPosterior) -> Result<[DimensionId; 2], Error> {
-    let chain = file.counted(group, "chain", &from.chosen.chains)?.0;
-    Ok([chain, file.counted(group, "draw", &from.chosen.steps)?.0])
+    chosen_of(file, group, &from.chosen.chains, &from.chosen.steps)
+}
+
+fn chosen_of(
+    file: &mut File,
+    group: &str,
+    chains: &[usize],
+    steps: &[usize],
+) -> Result<[DimensionId; 2], Error> {
+    let chain = file.counted(group, "chain", chains)?.0;
+    Ok([chain, file.counted(group, "draw", steps)?.0])
 }
 
 /// Describes a group of log-likelihoods, with the efficiency of its draws.

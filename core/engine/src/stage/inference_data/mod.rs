@@ -17,6 +17,7 @@ use super::calibrate::{Calibrated, Law, Parts};
 use super::derived;
 use super::evidence::Weighed;
 use super::predictions::Predicting;
+use super::quantities::Quantified;
 use super::validate::Validated;
 use crate::posterior::Posterior;
 use crate::stage::inverse_problem::InverseProblem;
@@ -50,6 +51,8 @@ pub struct Finished<'a> {
     pub weighed: Option<&'a Kept<Weighed>>,
     /// Comparison of the calibrated model with the data.
     pub validated: Option<&'a Kept<Validated>>,
+    /// Predicted quantities.
+    pub quantities: Option<&'a Kept<Quantified>>,
 }
 
 /// Writes the file of a study with data.
@@ -91,7 +94,7 @@ fn write(
     run: &RunDirectory,
     make: impl FnOnce() -> Result<Vec<u8>, Stop>,
 ) -> Result<(), Stop> {
-    let inputs = json!([
+    let mut inputs = json!([
         REVISION,
         env!("CARGO_PKG_VERSION"),
         all.calibrated.hash,
@@ -102,6 +105,9 @@ fn write(
         study.scenarios,
         study.parameters.iter().map(|p| p.reference).collect::<Vec<_>>(),
     ]);
+    if let (Some(quantities), Some(all)) = (all.quantities, inputs.as_array_mut()) {
+        all.push(json!(quantities.hash));
+    }
     let path = run.root().join(NAME);
     let marker = run.stage_folder(&Stage::Report.folder()).join(MARKER);
     let inputs = files::hash(inputs.to_string().as_bytes());
@@ -130,6 +136,7 @@ fn encode(
         calibrated: &derived::extended(study, calibrated),
         weighed: all.weighed.map(|kept| &kept.value),
         validated: all.validated.map(|kept| &kept.value),
+        quantities: all.quantities.map(|kept| &kept.value),
         data: predictor.map(|p| p.densities.data),
         from_posterior: match predictor {
             Some(p) => predicted::from_posterior(study, p, calibrated)?,

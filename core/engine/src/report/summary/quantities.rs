@@ -1,0 +1,95 @@
+//! The keys of predicted quantities.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::value::{ByName, Quantity};
+use crate::report::findings::QuantityFindings;
+
+/// Prediction of one quantity of interest. Mean, standard deviation and quantiles contain the posterior of the parameters
+/// and the errors in `includes`.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct PredictedQuantity {
+    /// Mean of the prediction.
+    pub mean: Quantity,
+    /// Standard deviation of the prediction.
+    pub sd: f64,
+    /// 2.5 % quantile of the prediction.
+    pub q025: f64,
+    /// Median of the prediction.
+    pub median: f64,
+    /// 97.5 % quantile of the prediction.
+    pub q975: f64,
+    /// Value at the maximum of the posterior density, without errors.
+    pub map: Quantity,
+    /// Monte Carlo standard error of the mean.
+    pub mcse_mean: f64,
+    /// Prediction with the posterior of the parameters alone, without any error.
+    pub parameters: OfParameters,
+    /// Standard deviation of the prediction with all sources of uncertainty but one; a source that the quantity does not
+    /// depend on is absent.
+    #[schemars(extend("propertyNames" = { "title": "source" }))]
+    pub without: ByName<f64>,
+    /// Origins of the errors in the prediction.
+    pub includes: Vec<String>,
+    /// Origins of errors that a new replicate has and the prediction does not contain.
+    pub leaves_out: Vec<String>,
+    /// Number of posterior draws of the prediction.
+    pub draws: usize,
+    /// Number of those draws at which the quantity is undefined; all numbers are those of the others.
+    pub undefined: usize,
+    /// Unit of all numbers.
+    pub unit: String,
+    /// Reference value, if the study gives one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reference: Option<Quantity>,
+}
+
+/// Prediction with the posterior of the parameters alone.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct OfParameters {
+    /// Mean.
+    pub mean: Quantity,
+    /// Standard deviation.
+    pub sd: f64,
+    /// 2.5 % quantile.
+    pub q025: f64,
+    /// Median.
+    pub median: f64,
+    /// 97.5 % quantile.
+    pub q975: f64,
+}
+
+/// Predicted quantities by their names.
+pub fn by_name(found: &[QuantityFindings]) -> ByName<PredictedQuantity> {
+    found.iter().map(|found| (found.name.clone(), PredictedQuantity::of(found))).collect()
+}
+
+impl PredictedQuantity {
+    fn of(found: &QuantityFindings) -> Self {
+        let (total, parameters) = (found.total, found.parameters);
+        Self {
+            mean: total.mean.into(),
+            sd: total.sd,
+            q025: total.q025,
+            median: total.median,
+            q975: total.q975,
+            map: found.map.into(),
+            mcse_mean: found.mcse_mean,
+            parameters: OfParameters {
+                mean: parameters.mean.into(),
+                sd: parameters.sd,
+                q025: parameters.q025,
+                median: parameters.median,
+                q975: parameters.q975,
+            },
+            without: found.without.iter().cloned().collect(),
+            includes: found.includes.clone(),
+            leaves_out: found.leaves_out.clone(),
+            draws: found.draws,
+            undefined: found.undefined,
+            unit: found.unit.clone(),
+            reference: found.reference.map(Quantity),
+        }
+    }
+}

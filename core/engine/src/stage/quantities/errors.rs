@@ -1,0 +1,49 @@
+//! Draws of the errors of a new replicate, correlated over all outputs.
+
+use lacuna::math::random::Stream;
+use lacuna::plugin::Likelihood;
+use lacuna::plugin::discrepancy::{CommonError, ErrorPath};
+use lacuna::run::Stop;
+
+use crate::stage::calibrate::Law;
+use crate::stage::inverse_problem::InverseProblem;
+use crate::stage::read::Measured;
+use crate::study::Study;
+
+/// Errors of a new replicate: those of the discrepancy, and the common errors, which are drawn here for all blocks of
+/// scenarios together, because a discrepancy may not know their correlation.
+pub(super) struct Errors<'a> {
+    likelihood: Option<&'a dyn Likelihood>,
+    common: Vec<CommonError>,
+}
+
+impl<'a> Errors<'a> {
+    /// Errors under the likelihood of predictions.
+    pub fn of(
+        study: &'a Study,
+        measured: &'a Measured,
+        problem: &InverseProblem<'a>,
+        likelihood: &'a dyn Likelihood,
+    ) -> Result<Self, Stop> {
+        let law = Law::predicting(study, measured, problem)?;
+        let common = law.common().iter().filter(|error| error.predictive).cloned().collect();
+        Ok(Self { likelihood: Some(likelihood), common })
+    }
+
+    /// No errors.
+    pub fn none() -> Self {
+        Self { likelihood: None, common: Vec::new() }
+    }
+
+    /// One draw of all errors around the response at a point of the posterior.
+    pub fn draw(&self, response: &[f64], point: &[f64], stream: &Stream) -> Vec<ErrorPath> {
+        let Some(likelihood) = self.likelihood else { return Vec::new() };
+        let hyper = &point[point.len() - likelihood.hyperparameters().len()..];
+        let mut paths = likelihood.errors(response, hyper, &stream.named("discrepancy"));
+        paths.retain(|path| self.common.iter().all(|error| error.origin != path.origin));
+        let stream = stream.named("common");
+        let common = self.common.iter().enumerate();
+        paths.extend(common.map(|(k, error)| error.draw(&stream.at(k as u64))));
+        paths
+    }
+}
