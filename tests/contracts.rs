@@ -14,6 +14,8 @@ mod faults;
 mod gain;
 #[path = "contracts/models.rs"]
 mod models;
+#[path = "contracts/quantities.rs"]
+mod quantities;
 #[path = "contracts/served.rs"]
 mod served;
 #[path = "contracts/skeletons.rs"]
@@ -110,6 +112,7 @@ fn every_kind_has_a_suite() {
         "effect",
         "executor",
         "model",
+        "quantity",
         "reader",
         "sampler",
         "surrogate",

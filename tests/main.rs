@@ -22,6 +22,7 @@ mod left_out;
 mod made_by;
 mod problems;
 mod python;
+mod quantities;
 mod quick;
 mod readme;
 mod refused;

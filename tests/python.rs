@@ -74,6 +74,39 @@ fn arviz_reads_the_posterior() {
     }
 }
 
+/// Mean and standard deviation of each predicted quantity, and its unit.
+const PREDICTED: &str = r"
+import json, sys
+import arviz as az
+group = az.from_netcdf(sys.argv[1]).posterior_predictive
+names = ['peak_B', 'peak_C', 'sum']
+print(json.dumps({n: [float(group[n].mean()), float(group[n].std(ddof=1)), group[n].attrs['units'],
+    list(group[n].dims)] for n in names}))
+";
+
+#[test]
+fn arviz_reads_the_predicted_quantities() {
+    let folder = quick::simulated();
+    let out = folder.path().join("run");
+    let asked = "quantity=[{ name = 'peak', use = 'maximum', on = { sensor = ['B', 'C'] } }, \
+                 { name = 'sum', use = 'expression', formula = 'peak_B + peak_C' }]";
+    let ran = quick::run(&folder.path().join("study.toml"), &[asked], &out);
+    ran.unwrap_or_else(|stop| panic!("{stop}"));
+    let Some(found) = python(PREDICTED, &[&out.join("posterior.nc")]) else { return };
+    let summary = quick::summary(&out);
+    for (name, theirs) in found.as_object().unwrap() {
+        let ours = &summary["quantities"][name];
+        for (i, key) in ["mean", "sd"].into_iter().enumerate() {
+            let (theirs, ours) = (theirs[i].as_f64().unwrap(), ours[key].as_f64().unwrap());
+            assert!((theirs - ours).abs() <= 1e-9 * ours.abs(), "{name}.{key}: {theirs} {ours}");
+        }
+        assert_eq!(
+            (&theirs[2], &theirs[3]),
+            (&ours["unit"], &serde_json::json!(["chain", "draw"]))
+        );
+    }
+}
+
 /// Applies ArviZ to a run and to another one of the same data, including every function that needs more than draws.
 const WHOLE: &str = r"
 import json, sys, warnings

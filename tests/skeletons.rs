@@ -10,12 +10,13 @@ use tempfile::TempDir;
 use crate::quick::{command, root, said};
 
 /// Each kind with its folder.
-const KINDS: [(&str, &str); 10] = [
+const KINDS: [(&str, &str); 11] = [
     ("design", "designs"),
     ("discrepancy", "discrepancies"),
     ("effect", "effects"),
     ("executor", "executors"),
     ("model", "models"),
+    ("quantity", "quantities"),
     ("reader", "readers"),
     ("sampler", "samplers"),
     ("surrogate", "surrogates"),

@@ -126,7 +126,7 @@ mod tests {
         }
     }
 
-    /// NumPy 2: `y = np.arange(7.0)**2; Y = np.fft.rfft(y); np.sqrt(2*(abs(Y[1])**2 + abs(Y[2])**2))/7`.
+    /// `NumPy` 2: `y = np.arange(7.0)**2; Y = np.fft.rfft(y); np.sqrt(2*(abs(Y[1])**2 + abs(Y[2])**2))/7`.
     #[test]
     fn a_parabola_has_the_spectrum_that_numpy_finds() {
         let grid: Vec<f64> = (0..7).map(f64::from).collect();

@@ -36,7 +36,7 @@ pub fn maximum(values: impl Iterator<Item = f64> + Clone) -> f64 {
 }
 
 #[cfg(test)]
-pub mod testing {
+pub(super) mod testing {
     #![allow(clippy::unwrap_used)]
 
     use lacuna::data::Unit;

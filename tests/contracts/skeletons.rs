@@ -11,6 +11,8 @@ mod effect;
 mod executor;
 #[path = "../../cli/src/new/plugin/model.rs"]
 mod model;
+#[path = "../../cli/src/new/plugin/quantity.rs"]
+mod quantity;
 #[path = "../../cli/src/new/plugin/reader.rs"]
 mod reader;
 #[path = "../../cli/src/new/plugin/sampler.rs"]

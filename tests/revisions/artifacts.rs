@@ -10,12 +10,13 @@ use lacuna::plugin::amend::State;
 use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin, Known};
 use lacuna::plugin::effect::Situation;
 use lacuna::plugin::model::Call;
+use lacuna::plugin::quantity::{Arguments, Curve, Number};
 use lacuna::plugin::registry::{self, Kind};
 use lacuna::plugin::surrogate::Training;
 use lacuna::plugin::term::{Place, Time};
 use lacuna::plugin::{
-    Context, Density, Design, Discrepancy, Effect, Given, Model, Reader, Sampler, Surrogate,
-    Target, Term,
+    Context, Density, Design, Discrepancy, Effect, Given, Model, Quantity, Reader, Sampler,
+    Surrogate, Target, Term,
 };
 use lacuna::run::{Progress, Silent};
 use lacuna_linalg::Matrix;
@@ -26,7 +27,7 @@ use super::{Bits, Made};
 const OTHERS: [&str; 3] = ["model.external", "model.python", "model.um_bridge"];
 
 /// Options of plugins without complete defaults, and of those whose defaults take long.
-const OPTIONS: [(&str, &str); 46] = [
+const OPTIONS: [(&str, &str); 51] = [
     (
         "discrepancy.autoregressive",
         "variance = { half_normal = 1 }\ncorrelation_time = { known = 2 }",
@@ -77,6 +78,14 @@ const OPTIONS: [(&str, &str); 46] = [
     ("model.mercury_target", "numerics = { mesh = [6, 24] }"),
     ("model.mercury_target_bubbles", "numerics = { mesh = [6, 24] }"),
     ("model.mercury_target_equilibrium_gas", "numerics = { mesh = [6, 24] }"),
+    ("quantity.at", "place = 2.5"),
+    ("quantity.band", "frequency = [0.1, 0.4]"),
+    ("quantity.exceedance", "threshold = 2"),
+    ("quantity.expression", "formula = \"a / b\""),
+    (
+        "quantity.rainflow",
+        "fatigue_strength_coefficient = { value = 1e15, unit = \"Pa\" }\nfatigue_strength_exponent = -0.1\nmodulus = { value = 2e11, unit = \"Pa\" }",
+    ),
     ("reader.sierra", "variable = \"strain_{sensor}\""),
     ("sampler.affine_invariant_ensemble", "walkers = 20\nsteps = 40"),
     ("sampler.hamiltonian", "warm_up = 100\nsteps = 140"),
@@ -106,6 +115,7 @@ pub fn all() -> BTreeMap<String, Made> {
     add::<dyn Discrepancy>(&mut found, discrepancy);
     add::<dyn Effect>(&mut found, effect);
     add::<dyn Model>(&mut found, model);
+    add::<dyn Quantity>(&mut found, quantity);
     add::<dyn Reader>(&mut found, reader);
     add::<dyn Sampler>(&mut found, sampler);
     add::<dyn Surrogate>(&mut found, surrogate);
@@ -113,8 +123,8 @@ pub fn all() -> BTreeMap<String, Made> {
     add::<dyn Term>(&mut found, term);
     // An executor moves runs and computes nothing.
     let kinds: Vec<&str> = registry::kinds().iter().map(|kind| kind.name).collect();
-    let known = ["design", "discrepancy", "effect", "executor", "model", "reader", "sampler"];
-    assert_eq!(kinds, [&known[..], &["surrogate", "target", "term"]].concat());
+    let known = ["design", "discrepancy", "effect", "executor", "model", "quantity", "reader"];
+    assert_eq!(kinds, [&known[..], &["sampler", "surrogate", "target", "term"]].concat());
     found
 }
 
@@ -219,6 +229,20 @@ fn model(_: &str, model: &dyn Model, bits: &mut Bits) {
     let inputs: Vec<f64> = signature.inputs.iter().map(|i| i.default.unwrap_or(0.7)).collect();
     let call = Call { units: &units, ..Call::new(&inputs, &names, &signature.layout, &scenario) };
     bits.add(&model.predict(&call).unwrap().values);
+}
+
+fn quantity(_: &str, quantity: &dyn Quantity, bits: &mut Bits) {
+    let seconds = Unit::parse("s").unwrap();
+    let (grid, unit): (Vec<f64>, _) = ((1..=16).map(f64::from).collect(), Unit::dimensionless());
+    let curve = Curve { name: "y", unit: &unit, axis: "time", grid: &grid, grid_unit: &seconds };
+    let numbers = ["a", "b"].map(|name| Number { name, unit: Some(&unit) });
+    let of_curve = quantity.of_curve();
+    let arguments = if of_curve { Arguments::Curve(curve) } else { Arguments::Numbers(&numbers) };
+    let functional = quantity.bind(&arguments).unwrap();
+    let values = response(0.0);
+    let count = if of_curve { values.len() } else { 2 };
+    bits.add(&[functional.value(&values[..count])]);
+    bits.text(functional.unit().as_str());
 }
 
 fn reader(name: &str, reader: &dyn Reader, bits: &mut Bits) {

@@ -21,6 +21,7 @@ pub fn all() -> BTreeMap<String, Made> {
         "surrogate.degree=2",
         "sampler.steps=30",
         "validate.emulator_check=1",
+        "quantity=[{ name = 'peak', use = 'maximum' }, { name = 'largest', use = 'expression', formula = 'max(peak_B, peak_C)' }]",
         "numerical_error.runs=3",
         "numerical_error.model.numerics.mesh=[10, 40]",
     ];

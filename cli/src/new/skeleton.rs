@@ -28,12 +28,13 @@ macro_rules! skeletons {
 }
 
 /// All skeletons, by kind.
-pub const ALL: [Skeleton; 10] = skeletons![
+pub const ALL: [Skeleton; 11] = skeletons![
     "design" "Design" "designs" true,
     "discrepancy" "Discrepancy" "discrepancies" true,
     "effect" "Effect" "effects" true,
     "executor" "Executor" "executors" false,
     "model" "Model" "models" true,
+    "quantity" "Quantity" "quantities" false,
     "reader" "Reader" "readers" true,
     "sampler" "Sampler" "samplers" true,
     "surrogate" "Surrogate" "surrogates" true,

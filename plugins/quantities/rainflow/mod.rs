@@ -173,7 +173,8 @@ impl Rainflow {
                 None => Err(vec![missing_key(key, why)]),
                 Some(value) if value.unit.is_none() => {
                     let misfit = Misfit::new(key, format!("`{key}` needs a unit"));
-                    let expected = format!("{{ value = {}, unit = \"MPa\" }}", value.value);
+                    let expected =
+                        "a stress with its unit, such as `{ value = 193, unit = \"GPa\" }`";
                     Err(vec![misfit.expected(expected).found(value.value)])
                 }
                 Some(value) => in_unit(key, value, &pascal).and_then(|x| positive(key, x)),
@@ -234,10 +235,9 @@ impl Rainflow {
             missing.push(misfit.expected(others).found("`goodman`"));
         }
         let factor = match (is_strain_law, to_strain, to_stress) {
-            (true, Some(factor), _) => factor,
+            (true, Some(factor), _) | (false, None, Some(factor)) => factor,
             (true, None, Some(factor)) => factor / modulus,
             (false, Some(factor), _) => factor * modulus,
-            (false, None, Some(factor)) => factor,
             (_, None, None) => {
                 let message = "damage is that of a strain or of a stress";
                 let misfit =

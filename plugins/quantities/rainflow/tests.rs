@@ -30,7 +30,7 @@ fn the_example_of_the_standard_is_counted() {
     assert_eq!(cycles(&slower), cycles(&record));
 }
 
-/// `rainflow` 3.2.0 (PyPI, Janiszewski), `extract_cycles`, for
+/// `rainflow` 3.2.0 (`PyPI`, Janiszewski), `extract_cycles`, for
 /// `y = [round(3*sin(0.9*i) + 2*cos(2.3*i + 1) + 0.5*sin(7.1*i), 3) for i in range(40)]`.
 #[test]
 fn a_longer_record_is_counted_as_by_another_program() {
@@ -66,7 +66,7 @@ const STEEL: Material =
     Material { law: Law::Stress, strength: 1000e6, exponent: -0.114, mean: Mean::None };
 const MODULUS: f64 = 193e9;
 
-/// SciPy 1, `brentq` on the logarithm of both sides to 1e-15: strain amplitude, mean stress, `ln 2N` without correction and
+/// `SciPy` 1, `brentq` on the logarithm of both sides to 1e-15: strain amplitude, mean stress, `ln 2N` without correction and
 /// with those of Morrow and of Smith, Watson and Topper.
 #[test]
 fn the_strain_life_is_solved() {

@@ -44,7 +44,8 @@ fn number(found: &QuantityFindings, value: f64) -> String {
 
 /// Table of the predictions, with as many digits as the Monte Carlo error allows.
 pub fn quantity_table(all: &[QuantityFindings]) -> Table {
-    let heads = ["mean", "sd", "2.5 %", "median", "97.5 %", "MCSE", "parameters only", "sd", "MAP"];
+    let heads =
+        ["mean", "sd", "2.5 %", "median", "97.5 %", "MCSE", "mean, parameters only", "sd", "MAP"];
     let has_reference = all.iter().any(|found| found.reference.is_some());
     let heads: Vec<&str> = heads.into_iter().chain(has_reference.then_some("reference")).collect();
     let mut table = Table::new(&["quantity", "unit"], &heads);

@@ -56,9 +56,13 @@ impl Spread {
             return Self { mean: none, sd: none, q025: none, median: none, q975: none };
         }
         let sorted = sorted(draws);
+        // The mean of equal numbers is not always that number.
+        if sorted[0].to_bits() == sorted[sorted.len() - 1].to_bits() {
+            let all = sorted[0];
+            return Self { mean: all, sd: 0.0, q025: all, median: all, q975: all };
+        }
         let [q025, median, q975] = [0.025, 0.5, 0.975].map(|p| quantile(&sorted, p));
-        let sd = if draws.len() > 1 { variance(draws).sqrt() } else { 0.0 };
-        Self { mean: mean(draws), sd, q025, median, q975 }
+        Self { mean: mean(draws), sd: variance(draws).sqrt(), q025, median, q975 }
     }
 }
 

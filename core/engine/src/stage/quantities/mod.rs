@@ -261,7 +261,7 @@ impl<'a> Work<'a> {
     }
 
     /// Values of all quantities in all variants at a draw, variant by variant. Without the uncertainty of the parameters
-    /// the draw is replaced by the `centre`, with errors from the same random numbers.
+    /// the response is that of the `centre`; the errors keep the hyperparameters of the draw, and its random numbers.
     fn values(
         &self,
         variants: &[Variant],
@@ -274,7 +274,7 @@ impl<'a> Work<'a> {
             Variant::Total => self.evaluated(place, &paths, Asked::includes),
             Variant::Parameters => self.evaluated(place, &[], Asked::includes),
             Variant::Without(source) if source == PARAMETERS => {
-                let paths = self.errors.draw(centre.response, centre.point, random);
+                let paths = self.errors.draw(centre.response, place.point, random);
                 self.evaluated(centre, &paths, Asked::includes)
             }
             Variant::Without(source) => self.evaluated(place, &paths, |asked, origin| {
