@@ -269,6 +269,9 @@ const WORDS: [(&str, &str); 4] = [
     ("core/base/src/math/distribution/written.rs", "student_t"),
 ];
 
+/// Names of quantities that are words of statistics and of JSON Schema.
+const STATISTICS: [&str; 4] = ["mean", "minimum", "maximum", "band"];
+
 #[test]
 fn the_core_names_no_plugin() {
     let kinds = lacuna::plugin::registry::kinds();
@@ -280,7 +283,8 @@ fn the_core_names_no_plugin() {
         for (i, line) in source.program() {
             let quoted =
                 |name: &str| ["\"", "`"].iter().any(|q| line.contains(&format!("{q}{name}{q}")));
-            for name in names.iter().filter(|name| quoted(name)) {
+            let named = names.iter().filter(|name| quoted(name) && !STATISTICS.contains(name));
+            for name in named {
                 if !WORDS.contains(&(&source.name, name)) {
                     found.push(format!("{}:{i}: {}", source.name, line.trim()));
                 }
