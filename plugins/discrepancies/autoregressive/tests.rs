@@ -67,17 +67,14 @@ fn gradients_are_the_derivatives() {
     }
 }
 
-/// The sample covariance of simulated noise has the standard error `v sqrt((1 + rho^2) / n)`.
-#[test]
-fn simulated_noise_has_the_stationary_covariance() {
-    let data = data(1, 1);
-    let text = "variance = { known = 2.0 }\ncorrelation_time = { known = 1e-4 }";
-    let likelihood = build(text, &Known::without_slopes(&data, &[]));
+/// Noise at the outputs of the second series in 4000 draws has the stationary covariance of variance 2 and correlation time
+/// 1e-4. A sample covariance has the standard error `v sqrt((1 + rho^2) / n)`.
+fn has_the_stationary_covariance(draw: impl Fn(&Stream) -> Vec<f64>) {
     let count = 4000;
     let mut sums = [[0.0; TIMES]; TIMES];
     for k in 0..count {
-        let made = likelihood.simulate(&[0.0; OUTPUTS], &[], &Stream::root(3).at(k));
-        let y = |j: usize| made[0].replicates[0].values[TIMES + j].unwrap();
+        let noise = draw(&Stream::root(3).at(k));
+        let y = |j: usize| noise[TIMES + j];
         for (i, row) in sums.iter_mut().enumerate() {
             row.iter_mut().enumerate().for_each(|(j, s)| *s += y(i) * y(j));
         }
@@ -88,5 +85,32 @@ fn simulated_noise_has_the_stationary_covariance() {
             let bound = 4.5 * 2.0 * ((1.0 + rho * rho) / count as f64).sqrt();
             assert!((sum / count as f64 - 2.0 * rho).abs() < bound, "{i} {j}");
         }
+    }
+}
+
+const STATED: &str = "variance = { known = 2.0 }\ncorrelation_time = { known = 1e-4 }";
+
+#[test]
+fn simulated_noise_has_the_stationary_covariance() {
+    let data = data(1, 1);
+    let likelihood = build(STATED, &Known::without_slopes(&data, &[]));
+    has_the_stationary_covariance(|stream| {
+        let made = likelihood.simulate(&[0.0; OUTPUTS], &[], stream);
+        made[0].replicates[0].values.iter().map(|value| value.unwrap_or(f64::NAN)).collect()
+    });
+}
+
+/// With replicates the noise has two parts, whose sum is the process.
+#[test]
+fn drawn_errors_have_the_stationary_covariance() {
+    for replicates in [1, 4] {
+        let data = data(1, replicates);
+        let likelihood = build(STATED, &Known::without_slopes(&data, &[]));
+        let count = if replicates == 1 { 1 } else { 2 };
+        has_the_stationary_covariance(|stream| {
+            let paths = likelihood.errors(&[0.0; OUTPUTS], &[], stream);
+            assert_eq!(paths.len(), count);
+            (0..OUTPUTS).map(|i| paths.iter().map(|path| path.values[i]).sum()).collect()
+        });
     }
 }
