@@ -216,7 +216,9 @@ impl<'a> Flow<'a> {
                 let aim = creep * (head[0] - HEAD);
                 let moved = (aim - *crept) * (1.0 - (-self.step / 0.3).exp());
                 *crept += moved;
-                head.iter_mut().for_each(|side| *side -= moved);
+                for side in head {
+                    *side -= moved;
+                }
             }
         }
         self.older = old_flow.iter().map(|q| q[1]).collect();
