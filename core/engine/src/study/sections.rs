@@ -53,11 +53,22 @@ pub(super) fn parameters(root: &Node, problems: &mut Problems) -> Option<Vec<Par
             .expected("at least one `[[parameter]]` with `name` and `prior`");
         return None;
     }
-    let decoded: Vec<Option<ParameterSection>> = list
+    named(root, "parameter", problems, decode)
+}
+
+/// The tables of a list, each decoded under its name.
+fn named<T>(
+    root: &Node,
+    list: &str,
+    problems: &mut Problems,
+    decode: impl Fn(&Node, &mut Problems) -> Option<T>,
+) -> Option<Vec<T>> {
+    let elements = root.get(list).map(Node::elements).unwrap_or_default();
+    let decoded: Vec<Option<T>> = elements
         .iter()
         .map(|node| {
-            let name = format!("parameter.{}", node.name().unwrap_or("?"));
-            problems.within(&name, |problems| decode(node, problems))
+            let path = format!("{list}.{}", node.name().unwrap_or("?"));
+            problems.within(&path, |problems| decode(node, problems))
         })
         .collect();
     decoded.into_iter().collect()
@@ -77,28 +88,12 @@ pub(super) fn effects(
 
 /// `[[quantity]]`.
 pub(super) fn quantities(root: &Node, problems: &mut Problems) -> Option<Vec<QuantitySection>> {
-    let list = root.get("quantity").map(Node::elements).unwrap_or_default();
-    let decoded: Vec<Option<_>> = list
-        .iter()
-        .map(|node| {
-            let path = format!("quantity.{}", node.name().unwrap_or("?"));
-            problems.within(&path, |problems| section(node, None, problems))
-        })
-        .collect();
-    decoded.into_iter().collect()
+    named(root, "quantity", problems, |node, problems| section(node, None, problems))
 }
 
 /// `[[derived]]`.
 pub(super) fn derived(root: &Node, problems: &mut Problems) -> Option<Vec<DerivedSection>> {
-    let list = root.get("derived").map(Node::elements).unwrap_or_default();
-    let decoded: Vec<Option<DerivedSection>> = list
-        .iter()
-        .map(|node| {
-            let path = format!("derived.{}", node.name().unwrap_or("?"));
-            problems.within(&path, |problems| decode(node, problems))
-        })
-        .collect();
-    decoded.into_iter().collect()
+    named(root, "derived", problems, decode)
 }
 
 /// `[[scenario]]`: one without a name where there is none.

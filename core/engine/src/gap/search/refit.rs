@@ -236,8 +236,9 @@ impl<'a> RefitSetting<'a, '_> {
         };
         let mut begun: Vec<(usize, Begun<'_, '_>)> =
             scored.par_iter().enumerate().filter_map(begin).collect();
-        let leader = (0..begun.len())
-            .max_by(|&a, &b| begun[a].1.height().total_cmp(&begun[b].1.height()).then(b.cmp(&a)));
+        let leader = (0..begun.len()).max_by(|&a, &b| {
+            begun[a].1.log_density().total_cmp(&begun[b].1.log_density()).then(b.cmp(&a))
+        });
         let Some(leader) = leader else { return Vec::new() };
         let (first, ahead) = begun.remove(leader);
         let ahead = ahead.finished(f64::NEG_INFINITY);

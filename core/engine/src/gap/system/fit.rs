@@ -200,9 +200,10 @@ impl<'a, 'b> Begun<'a, 'b> {
         (!ascents.is_empty()).then_some(Self { ascents })
     }
 
-    /// The largest log density so far, in the searched coordinates.
-    pub fn height(&self) -> f64 {
-        self.ascents.iter().map(Ascent::height).fold(f64::NEG_INFINITY, f64::max)
+    /// The largest log density so far.
+    pub fn log_density(&self) -> f64 {
+        let each = self.ascents.iter().map(|ascent| ascent.best.log_density);
+        each.fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// The best fit; one that stays below the log density `of_interest` need not be accurate.
@@ -283,7 +284,7 @@ impl<'a, 'b> Ascent<'a, 'b> {
             self.best = at(self.system, self.whitener, self.means, &point);
             let gain = self.height() - before;
             self.damp(gain / promised);
-            let is_slow = gain < SLOW * (self.of_interest - self.height());
+            let is_slow = gain < SLOW * (self.of_interest - self.best.log_density);
             if is_slow || gain < GAIN && !short {
                 self.promised = 0.0;
             }
