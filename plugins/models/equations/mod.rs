@@ -226,4 +226,4 @@ impl Gradient for Equations {
     }
 }
 
-lacuna::register!(Model, "equations", Equations, aliases: ["ode", "odes"]);
+lacuna::register!(Model, "equations", Equations, aliases: ["ode", "odes"], revision = 2);
