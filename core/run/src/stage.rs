@@ -87,7 +87,7 @@ impl Stage {
             Self::Validate => (6, "validate", OnVersion(4)),
             Self::Quantities => (6, "quantities", OnVersion(1)),
             Self::Assess => (6, "assess", OnVersion(6)),
-            Self::Gap => (7, "gap", OnVersion(3)),
+            Self::Gap => (7, "gap", OnVersion(4)),
             Self::Show => (7, "show", OnVersion(1)),
             Self::Power => (7, "power", OnVersion(2)),
             Self::Coverage => (7, "coverage", OnVersion(2)),

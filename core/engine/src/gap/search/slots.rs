@@ -18,13 +18,13 @@ pub(super) struct Slot<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// The fitted values of the unknowns of a placement, in their units; the absent values if it was not fitted.
+    /// The fitted values of all unknowns of the system with a placement, in their units; the absent values of its own if
+    /// it was not fitted.
     pub(super) fn unknowns(&self, placement: &Placement, weighed: &[Weighed]) -> Vec<f64> {
-        let effect = &self.candidates[placement.candidate].effect;
-        let absent = effect.absent(&self.experiment.layouts.blocks[0]);
-        weighed.iter().find(|j| j.placement.is(placement)).map_or(absent.clone(), |j| {
-            let point = &j.fit.at.point;
-            point[point.len() - absent.len()..].to_vec()
+        let fitted = weighed.iter().find(|j| j.placement.is(placement));
+        fitted.map(|j| j.fit.at.point.clone()).unwrap_or_else(|| {
+            let effect = &self.candidates[placement.candidate].effect;
+            effect.absent(&self.experiment.layouts.blocks[0])
         })
     }
 

@@ -57,11 +57,21 @@ impl<'a> SearchState<'a> {
         }
     }
 
-    /// The state with a further placement, refitted from these values of its unknowns.
-    pub fn with(&self, shared: &SearchSetting<'a, '_>, placement: &Placement, own: &[f64]) -> Self {
+    /// The state with a further placement, refitted from these values of its unknowns, or of all unknowns of the system
+    /// with it.
+    pub fn with(
+        &self,
+        shared: &SearchSetting<'a, '_>,
+        placement: &Placement,
+        from: &[f64],
+    ) -> Self {
         let setting = self.refit_setting(shared);
         let system = setting.with(placement);
-        let starts = setting.joint(&self.fit.at.point, placement, own);
+        let starts = if from.len() == system.dimension() {
+            vec![from.to_vec()]
+        } else {
+            setting.joint(&self.fit.at.point, placement, from)
+        };
         let mut next = self.clone();
         next.chosen.push(placement.clone());
         next.refit(shared, system, &starts);

@@ -6,22 +6,17 @@
 
 use lacuna::math::distribution::Distribution;
 use lacuna_linalg::vector::dot;
-use lacuna_linalg::{Cholesky, Matrix, gram, multiply_vector};
+use lacuna_linalg::{Cholesky, Matrix, gram};
 
-use super::coordinate::{curvature, inner, log_slope, moved, room, slope, unit};
+use super::ascent::Ascent;
+use super::coordinate::{curvature, unit};
 use super::noise_scale::NoiseScale;
-use super::step::within;
 use super::whitener::Whitener;
+use super::window::Window;
 use super::{Linearised, System};
 
 /// Largest number of steps of a fit.
 const STEPS: usize = 100;
-
-/// Smallest gain in log density that a step has to promise to be tried.
-const PROMISED: f64 = 1e-9;
-
-/// Largest number of tries of a step, each with eight times the damping.
-const TRIES: usize = 10;
 
 /// Number of steps from each of several starts after which they are compared.
 const FIRST: usize = 6;
@@ -29,22 +24,17 @@ const FIRST: usize = 6;
 /// The multiple of the gain that the next step promises which a start may still gain.
 const HOPE: f64 = 4.0;
 
-/// Smallest damping after a failed try, relative to the curvature.
-const LEAST: f64 = 1e-4;
-
-/// Damping above which a small gain may be that of a short step, so that the fit continues.
-const SHORT: f64 = 1e-2;
-
 /// Smallest gain in log density at which the fit continues.
-const GAIN: f64 = 1e-5;
+pub(super) const GAIN: f64 = 1e-5;
 
-/// The share of its distance from what is of interest that a step of a fit has to gain. Far from a good fit Gauss-Newton
-/// steps gain little each, and many of them would improve a fit of which nothing depends.
-const SLOW: f64 = 0.01;
+/// The mean square of whitened residuals above which a start is also followed in a growing window.
+const POOR: f64 = 4.0;
 
-/// The shares of the promised gain above which the damping falls, and below which it rises after a step (Nocedal and
-/// Wright, algorithm 4.1).
-const KEPT: [f64; 2] = [0.25, 0.75];
+/// The shares of the record that a growing window covers.
+const WINDOWS: [f64; 4] = [0.0625, 0.125, 0.25, 0.5];
+
+/// The smallest number of values of a curve in the first window.
+const SHORTEST: usize = 8;
 
 /// The best fit from one start.
 #[derive(Debug, Clone)]
@@ -76,7 +66,7 @@ impl Fit {
     }
 
     /// The matrix of second derivatives of minus the log density, in the Gauss-Newton approximation.
-    fn hessian(&self) -> Matrix {
+    pub(super) fn hessian(&self) -> Matrix {
         let mut hessian = gram(&self.slopes.transposed());
         for (j, p) in self.prior_curvature.iter().enumerate() {
             hessian[(j, j)] += p;
@@ -194,10 +184,41 @@ impl<'a, 'b> Begun<'a, 'b> {
             ascent
         });
         let mut ascents: Vec<Ascent<'_, '_>> = begun.collect();
+        ascents.extend(Self::grown(system, whitener, means, &ascents));
         ascents.retain(|ascent| ascent.best.log_density.is_finite());
         let ahead = ascents.iter().map(Ascent::height).fold(f64::NEG_INFINITY, f64::max);
         ascents.retain(|ascent| ascent.height() + HOPE * ascent.promised + GAIN >= ahead);
         (!ascents.is_empty()).then_some(Self { ascents })
+    }
+
+    /// The first steps from where a fit to a window that grows to the whole record ends, if no start has led near the
+    /// data. Over many periods of an oscillation the misfit has a local minimum for each period by which the phase is
+    /// wrong at the end; over a few periods it has one (A. Ribeiro, K. Tiels, J. Umenberger, T. Schön and L. Aguirre,
+    /// Automatica 121 (2020) 109158).
+    fn grown(
+        system: &'b System<'a>,
+        whitener: &'b Whitener,
+        means: &'b [f64],
+        begun: &[Ascent<'a, 'b>],
+    ) -> Option<Ascent<'a, 'b>> {
+        let nearest = begun.iter().max_by(|a, b| a.height().total_cmp(&b.height()))?;
+        let curves = &system.experiment.curves;
+        let values: usize = curves.iter().map(|curve| curve.measured.len()).sum();
+        let is_poor = 2.0 * nearest.best.misfit() > POOR * values as f64;
+        let longest = curves.iter().map(|curve| curve.measured.len()).max()?;
+        if !is_poor || WINDOWS[0] * (longest as f64) < SHORTEST as f64 {
+            return None;
+        }
+        let mut point = nearest.start.clone();
+        for share in WINDOWS {
+            let window = Window::of(system, share);
+            let mut ascent = Ascent::inside(system, whitener, means, &point, Some(window));
+            ascent.climb(FIRST);
+            point.clone_from(&ascent.best.at.point);
+        }
+        let mut ascent = Ascent::from(system, whitener, means, &point);
+        ascent.climb(FIRST);
+        Some(ascent)
     }
 
     /// The largest log density so far.
@@ -222,117 +243,9 @@ impl<'a, 'b> Begun<'a, 'b> {
     }
 }
 
-/// A search for the largest density, on its way.
-struct Ascent<'a, 'b> {
-    system: &'b System<'a>,
-    whitener: &'b Whitener,
-    means: &'b [f64],
-    bounds: Vec<(f64, f64)>,
-    best: Fit,
-    damping: f64,
-    /// The log density below which the fit need not be accurate.
-    of_interest: f64,
-    /// The gain in log density that the next step promises; zero at the end of the search.
-    promised: f64,
-}
-
-impl<'a, 'b> Ascent<'a, 'b> {
-    fn from(
-        system: &'b System<'a>,
-        whitener: &'b Whitener,
-        means: &'b [f64],
-        start: &[f64],
-    ) -> Self {
-        let bounds = system.priors().iter().zip(system.bounds());
-        let bounds: Vec<(f64, f64)> = bounds.map(|(prior, own)| inner(prior, own)).collect();
-        let start: Vec<f64> =
-            start.iter().zip(&bounds).map(|(x, (low, high))| x.clamp(*low, *high)).collect();
-        let best = at(system, whitener, means, &start);
-        Self {
-            system,
-            whitener,
-            means,
-            bounds,
-            best,
-            damping: 1e-3,
-            of_interest: f64::NEG_INFINITY,
-            promised: f64::INFINITY,
-        }
-    }
-
-    /// The log density in the searched coordinates.
-    fn height(&self) -> f64 {
-        self.merit(self.best.log_density, &self.best.at.point)
-    }
-
-    fn merit(&self, log_density: f64, point: &[f64]) -> f64 {
-        log_density + log_slope(self.system.priors(), point)
-    }
-
-    /// Climbs by at most so many steps, or to the end.
-    fn climb(&mut self, steps: usize) {
-        for _ in 0..steps {
-            if self.promised == 0.0 {
-                break;
-            }
-            let Some((point, promised)) = self.improved() else {
-                self.promised = 0.0;
-                break;
-            };
-            let short = self.damping > SHORT;
-            let before = self.height();
-            self.best = at(self.system, self.whitener, self.means, &point);
-            let gain = self.height() - before;
-            self.damp(gain / promised);
-            let is_slow = gain < SLOW * (self.of_interest - self.best.log_density);
-            if is_slow || gain < GAIN && !short {
-                self.promised = 0.0;
-            }
-        }
-        if self.promised > 0.0 {
-            self.promised = step(self.system, &self.best, self.damping, &self.bounds).1;
-        }
-    }
-
-    /// The damping after a step that kept this share of the promised gain.
-    fn damp(&mut self, kept: f64) {
-        let [few, most] = KEPT;
-        if kept > most {
-            self.damping = (self.damping * 0.1).max(1e-12);
-        } else if kept < few {
-            self.damping = (self.damping * 2.0).max(LEAST);
-        }
-    }
-
-    /// A point of larger density, with the gain that was promised. A step that does not improve is repeated with more
-    /// damping: shorter, and closer to the gradient.
-    fn improved(&mut self) -> Option<(Vec<f64>, f64)> {
-        for _ in 0..TRIES {
-            let (point, promised) = step(self.system, &self.best, self.damping, &self.bounds);
-            if promised < PROMISED {
-                return None;
-            }
-            let density = log_density(self.system, self.whitener, self.means, &point);
-            if self.merit(density, &point) > self.height() {
-                return Some((point, promised));
-            }
-            self.damping = (self.damping * 8.0).max(LEAST);
-        }
-        None
-    }
-}
-
-fn residual(means: &[f64], response: &[f64]) -> Vec<f64> {
+/// Differences of the means from a response.
+pub(super) fn residual(means: &[f64], response: &[f64]) -> Vec<f64> {
     means.iter().zip(response).map(|(y, m)| y - m).collect()
-}
-
-fn log_density(system: &System<'_>, whitener: &Whitener, means: &[f64], point: &[f64]) -> f64 {
-    let response = system.response(point);
-    if response.iter().any(|y| !y.is_finite()) {
-        return f64::NEG_INFINITY;
-    }
-    let z = whitener.whiten(&residual(means, &response));
-    -0.5 * dot(&z, &z) + system.log_prior(point)
 }
 
 /// The quantities of a fit at a given point, without any step.
@@ -358,30 +271,4 @@ pub fn at(system: &System<'_>, whitener: &Whitener, means: &[f64], point: &[f64]
         log_prior,
         noise_scale,
     }
-}
-
-/// The next point, by a damped Gauss-Newton step in units of the priors' widths, inside the bounds; and the gain in log
-/// density that the damped quadratic promises.
-fn step(system: &System<'_>, here: &Fit, damping: f64, bounds: &[(f64, f64)]) -> (Vec<f64>, f64) {
-    let point = &here.at.point;
-    let priors = system.priors();
-    let unit: Vec<f64> = priors.iter().zip(point).map(|(prior, &x)| unit(prior, x)).collect();
-    let mut gradient = multiply_vector(&here.slopes, &here.residual);
-    for (j, g) in gradient.iter_mut().enumerate() {
-        *g = (*g + slope(&priors[j], point[j])) * unit[j];
-    }
-    let hessian = here.hessian();
-    let damped = Matrix::from_fn(point.len(), point.len(), |i, j| {
-        let value = unit[i] * hessian[(i, j)] * unit[j];
-        if i == j { value * (1.0 + damping) + 1e-12 + damping } else { value }
-    });
-    let room = (0..point.len()).map(|j| room(&priors[j], point[j], bounds[j]));
-    let (low, high): (Vec<f64>, Vec<f64>) = room.unzip();
-    // Without a Cholesky factor there is no step, and the fit ends at the present point.
-    let Some(shift) = within(&damped, &gradient, &low, &high) else {
-        return (point.clone(), 0.0);
-    };
-    let promised = dot(&gradient, &shift) - 0.5 * dot(&shift, &multiply_vector(&damped, &shift));
-    let next = |j: usize| moved(&priors[j], point[j], shift[j]).clamp(bounds[j].0, bounds[j].1);
-    ((0..point.len()).map(next).collect(), promised)
 }

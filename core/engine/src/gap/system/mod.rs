@@ -1,5 +1,6 @@
 //! A system: a forward map with effects, one vector of unknowns, the response and its derivatives.
 
+mod ascent;
 pub(in crate::gap) mod coordinate;
 pub mod emulator_error;
 pub mod fit;
@@ -8,6 +9,7 @@ pub mod remainder;
 pub(in crate::gap) mod step;
 pub mod switched;
 pub mod whitener;
+mod window;
 
 use std::ops::Range;
 
