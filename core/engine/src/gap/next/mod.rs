@@ -56,6 +56,8 @@ pub struct NextData {
     pub ranked_by: Wanted,
     /// Options, best first.
     pub options: Vec<NextOption>,
+    /// Names of the options that measure nothing: no curve of the response has their scenario, labels and interval.
+    pub without_data: Vec<String>,
 }
 
 /// A type of effect with its probability.
@@ -120,7 +122,7 @@ pub fn next(
         .collect::<Option<_>>()?;
     let quantity = wish.quantity.map(|keys| Functional::of(keys, experiment));
     let setting = Setting { hypotheses: &hypotheses, weights: &weights, quantity };
-    let all = options::options(experiment, noise, wish);
+    let (all, without_data) = options::options(experiment, noise, wish);
     let each =
         all.iter().enumerate().map(|(i, option)| setting.weigh(option, &stream.at(i as u64)));
     let options: Vec<NextOption> = each.collect::<Option<_>>()?;
@@ -137,7 +139,7 @@ pub fn next(
         Wanted::Parameters
     };
     let hypotheses = if has_choice { named.collect() } else { Vec::new() };
-    Some(NextData { hypotheses, ranked_by, options }.ranked(ranked_by))
+    Some(NextData { hypotheses, ranked_by, options, without_data }.ranked(ranked_by))
 }
 
 /// The hypotheses and the quantity with which all options are weighed.

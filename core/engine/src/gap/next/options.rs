@@ -14,15 +14,27 @@ use crate::study::gap::next::NextKeys;
 /// Numbers of further replicates that are tried unless the study lists options.
 const REPLICATES: [usize; 2] = [1, 4];
 
-/// The options of an experiment with this noise.
+/// The options of an experiment with this noise, and the names of those that measure nothing.
 pub(super) fn options<'a>(
     experiment: &Experiment<'a>,
     noise: &Noise,
     wish: Wish<'_>,
-) -> Vec<Choice<'a>> {
+) -> (Vec<Choice<'a>>, Vec<String>) {
     let usual = if wish.options.is_empty() { usual(experiment) } else { Vec::new() };
-    let all = wish.options.iter().chain(&usual);
-    all.filter_map(|keys| choice(keys, experiment, noise, wish.runs)).collect()
+    let (mut some, mut without_data) = (Vec::new(), Vec::new());
+    for keys in wish.options.iter().chain(&usual) {
+        match choice(keys, experiment, noise, wish.runs) {
+            Some(choice) => some.push(choice),
+            None => without_data.push(named(keys)),
+        }
+    }
+    (some, without_data)
+}
+
+/// The name of an option: as the study states it, or what is taken, in words.
+fn named(keys: &NextKeys) -> String {
+    let in_words = || if keys.is_computed() { computed(keys) } else { measured(keys) };
+    keys.name.as_ref().map_or_else(in_words, |name| name.as_str().to_owned())
 }
 
 /// One and four replicates of all that was measured, of each condition, and by each sensor.
@@ -55,7 +67,7 @@ fn choice<'a>(
     noise: &Noise,
     runs: usize,
 ) -> Option<Choice<'a>> {
-    let name = keys.name.as_ref().map(|name| name.as_str().to_owned());
+    let name = named(keys);
     if keys.is_computed() {
         let emulator = keys.emulator_error.map(Fraction::get);
         let more = keys.runs.map(|more| (runs as f64 / (runs + more.get()) as f64).sqrt());
@@ -65,7 +77,7 @@ fn choice<'a>(
             origins: experiment.origins.clone(),
         };
         let cost = keys.cost.map_or(1.0, Positive::get);
-        return Some(Choice { name: name.unwrap_or_else(|| computed(keys)), cost, taken });
+        return Some(Choice { name, cost, taken });
     }
     let outputs = chosen(experiment, keys);
     let (own, noise) = planned(experiment, noise, &outputs, keys.noise.map(Positive::get));
@@ -74,7 +86,7 @@ fn choice<'a>(
     let usual = (scenarios * count) as f64;
     let taken = Taken::Replicates { count, planned: Box::new((own, noise)) };
     let cost = keys.cost.map_or(usual, Positive::get);
-    let choice = Choice { name: name.unwrap_or_else(|| measured(keys)), cost, taken };
+    let choice = Choice { name, cost, taken };
     (scenarios > 0).then_some(choice)
 }
 

@@ -16,7 +16,10 @@ pub fn text(next: &NextData) -> String {
     } else {
         "`=`: equal to the best."
     };
-    format!("{}\n\n{}\n{equal}\n", head(next), table.text())
+    let nothing = next.without_data.iter().map(|name| {
+        format!("`{name}` measures nothing: no curve of the response has its scenario, labels and interval.\n")
+    });
+    format!("{}\n\n{}\n{equal}\n{}", head(next), table.text(), nothing.collect::<String>())
 }
 
 fn head(next: &NextData) -> String {

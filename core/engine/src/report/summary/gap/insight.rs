@@ -47,6 +47,9 @@ pub struct Next {
     pub ranked_by: Wanted,
     /// Options, best first.
     pub options: Vec<NextOption>,
+    /// Names of the options that measure nothing: no curve of the response has their scenario, labels and interval.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub without_data: Vec<String>,
 }
 
 /// Data that could be taken, with the information expected from them.
@@ -144,6 +147,7 @@ impl Next {
             names: names.collect(),
             ranked_by: found.ranked_by,
             options: found.options.iter().map(option).collect(),
+            without_data: found.without_data.clone(),
         }
     }
 }
