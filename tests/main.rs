@@ -30,6 +30,7 @@ mod revisions;
 mod schema;
 mod skeletons;
 mod slurm;
+mod starts;
 mod stated_noise;
 mod studies;
 mod tidy;

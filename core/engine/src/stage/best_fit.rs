@@ -16,7 +16,8 @@ use crate::study::Study;
 /// Parameters that maximise prior times `|y - m|^-N`: the normal likelihood of independent data with its unknown
 /// variance integrated out under the prior `1 / variance`.
 pub fn point(study: &Study, data: &Observations, forward: &dyn Forward) -> Result<Vec<f64>, Stop> {
-    Ok(points(&study.parameters, data, forward, &stream(study, "best-fit"))?.remove(0))
+    let stream = stream(study, "best-fit");
+    Ok(points_from(&study.parameters, &study.start(), data, forward, &stream)?.remove(0))
 }
 
 /// Like [`point`], but all local maxima, the best first.
@@ -26,9 +27,20 @@ pub fn points(
     forward: &dyn Forward,
     stream: &Stream,
 ) -> Result<Vec<Vec<f64>>, Stop> {
+    points_from(parameters, &[], data, forward, stream)
+}
+
+/// Like [`points`], with the starting values that are stated.
+fn points_from(
+    parameters: &[Parameter],
+    stated: &[Option<f64>],
+    data: &Observations,
+    forward: &dyn Forward,
+    stream: &Stream,
+) -> Result<Vec<Vec<f64>>, Stop> {
     let likelihood = LeastSquares::of(data)?;
     let posterior = Posterior::new(parameters, OfData::new(forward, Vec::new(), &likelihood));
-    Ok(maxima(&posterior, stream)?.into_iter().map(|maximum| maximum.point).collect())
+    Ok(maxima(&posterior, stated, stream)?.into_iter().map(|maximum| maximum.point).collect())
 }
 
 /// Derivative of each output by each parameter at [`point`], per prior standard deviation (`outputs x parameters`).

@@ -196,6 +196,7 @@ pub fn stage(
         (discrepancy.built.identity(), &discrepancy.common),
         effects,
         (section.built.identity(), &section.common),
+        &study.starts,
         study.about.seed
     ]);
     let parts = Parts::of(study, measured, problem)?;
@@ -238,7 +239,7 @@ fn calibrate(
 ) -> Result<Calibrated, Stop> {
     let section = study.sampler.as_ref().ok_or_else(|| Stop::new("the study has no sampler"))?;
     let random = Trial::stream(trial, study, "calibrate");
-    let maxima = maxima(posterior, &random.named("optimise"));
+    let maxima = maxima(posterior, &study.start(), &random.named("optimise"));
     sampling::broken(posterior)?;
     let maxima = maxima?;
     let best = &maxima[0];

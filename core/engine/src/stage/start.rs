@@ -17,14 +17,22 @@ const BEST: usize = 4;
 /// Largest number of starting points of the optimiser.
 const STARTS: usize = 16;
 
-/// Local maxima of the posterior density in natural units, best first.
+/// Local maxima of the posterior density in natural units, best first. The search begins at draws of the prior, and at
+/// the values that the study states for its parameters (`[[start]]`), the others being at the median of their priors.
 pub(super) fn maxima(
     posterior: &Posterior<'_>,
+    stated: &[Option<f64>],
     stream: &Stream,
 ) -> Result<Vec<lacuna_optimise::Optimum>, Stop> {
     let mode = posterior.mode();
     let d = posterior.parameters().len();
     let mut candidates = posterior.prior_draws(CANDIDATES, stream);
+    let is_stated = stated.iter().any(Option::is_some);
+    if is_stated {
+        let middle = posterior.parameters().iter().map(|p| p.prior.quantile(0.5));
+        let point: Vec<f64> = middle.zip(stated).map(|(x, own)| own.unwrap_or(x)).collect();
+        candidates.push_row(&[&point[..], &candidates.row(0)[d..]].concat());
+    }
     // A discrepancy supplies a sensible starting value for its own unknowns; a wide prior of a variance does not.
     let starts: Vec<f64> = posterior.hyperparameters().iter().map(|h| h.start).collect();
     let filled = [vec![1.0; d], starts].concat();
@@ -37,7 +45,10 @@ pub(super) fn maxima(
         return Err(Stop::new("the posterior density is zero at every point tried in the prior")
             .help("check the priors and the units of the measurements"));
     }
-    let chosen = peaks(&candidates, d, &density);
+    let mut chosen = peaks(&candidates, d, &density);
+    if is_stated && !chosen.contains(&CANDIDATES) {
+        chosen.push(CANDIDATES);
+    }
     let maxima = lacuna_optimise::maximise(&mode, &candidates.select_rows(&chosen));
     if maxima.is_empty() {
         return Err(Stop::new("no maximum of the posterior density was found"));

@@ -52,6 +52,7 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     noise::check(study, root, problems);
     gap::check(study, root, problems);
     super::inputs::check(study, root, problems);
+    super::start::check(study, root, problems);
     super::derived::check(study, root, problems);
     if problems.len() == before {
         quantities::check(study, root, problems);
@@ -63,8 +64,8 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
 
 /// Reports sections that have no use beside `[target]`, which replaces everything that makes up a likelihood.
 fn beside_a_target(study: &Study, root: &Node, complaints: &mut Complaints<'_>) {
-    const ALONE: [&str; 7] =
-        ["study", "parameter", "derived", "target", "executor", "sampler", "quantity"];
+    const ALONE: [&str; 8] =
+        ["study", "parameter", "start", "derived", "target", "executor", "sampler", "quantity"];
     for (key, _) in root.entries().iter().filter(|(key, _)| !ALONE.contains(&key.name.as_str())) {
         complaints
             .at(&key.name)

@@ -21,6 +21,7 @@ pub mod scenario;
 pub mod schema;
 mod sections;
 mod sizes;
+pub mod start;
 pub mod table;
 pub mod unknowns;
 

@@ -15,6 +15,7 @@ use super::gap::Gap;
 use super::libraries::Libraries;
 use super::positions::Positions;
 use super::quantity::QuantitySection;
+use super::start::StartSection;
 use super::table::PluginSections;
 use super::unknowns::Unknown;
 
@@ -53,6 +54,8 @@ pub struct Study {
     pub numerical_error: Option<NumericalError>,
     /// `[low_fidelity]`.
     pub low_fidelity: Option<LowFidelity>,
+    /// `[[start]]`.
+    pub starts: Vec<StartSection>,
     /// `[[derived]]`.
     pub derived_sections: Vec<DerivedSection>,
     /// `[[effect]]`.
@@ -94,6 +97,7 @@ impl Study {
             plugins,
             numerical_error: None,
             low_fidelity: None,
+            starts: Vec::new(),
             derived_sections: Vec::new(),
             effects: Vec::new(),
             quantities: Vec::new(),

@@ -21,7 +21,8 @@ use super::libraries::{Libraries, Seen, libraries};
 pub use super::plain::Study;
 use super::positions::positions;
 use super::sections::{
-    derived, effects, layouts, name, parameters, quantities, scenarios, table, unknown_sections,
+    derived, effects, layouts, name, parameters, quantities, scenarios, starts, table,
+    unknown_sections,
 };
 use super::table::{self, PluginSections, SECTIONS};
 use super::unknowns::unknowns;
@@ -174,6 +175,7 @@ fn structure(
     let plugins = PluginSections::read(root, problems);
     let numerical_error = numerical_error(root, problems);
     let low_fidelity = low_fidelity(root, problems);
+    let starts = starts(root, problems);
     let derived_sections = derived(root, problems);
     let effects = effects(root, problems);
     let quantities = quantities(root, problems);
@@ -222,6 +224,7 @@ fn structure(
         plugins,
         numerical_error,
         low_fidelity,
+        starts: starts?,
         derived_sections: derived_sections?,
         effects: effects?,
         quantities: quantities?,

@@ -45,6 +45,10 @@ pub(super) fn table(
         whole.insert("plugins".to_owned(), to_table(&study.libraries.section)?.into());
     }
     whole.insert("parameter".to_owned(), parameters?.into());
+    if !study.starts.is_empty() {
+        let starts: Result<Vec<Table>, _> = study.starts.iter().map(to_table).collect();
+        whole.insert("start".to_owned(), starts?.into());
+    }
     if !study.derived_sections.is_empty() {
         let derived: Result<Vec<Table>, _> = study.derived_sections.iter().map(to_table).collect();
         whole.insert("derived".to_owned(), derived?.into());

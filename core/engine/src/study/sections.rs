@@ -17,6 +17,7 @@ use super::file::{
 };
 use super::quantity::QuantitySection;
 use super::sizes;
+use super::start::StartSection;
 use super::table::SECTIONS;
 
 pub(super) fn unknown_sections(root: &Node, problems: &mut Problems) {
@@ -89,6 +90,11 @@ pub(super) fn effects(
 /// `[[quantity]]`.
 pub(super) fn quantities(root: &Node, problems: &mut Problems) -> Option<Vec<QuantitySection>> {
     named(root, "quantity", problems, |node, problems| section(node, None, problems))
+}
+
+/// `[[start]]`.
+pub(super) fn starts(root: &Node, problems: &mut Problems) -> Option<Vec<StartSection>> {
+    named(root, "start", problems, decode)
 }
 
 /// `[[derived]]`.

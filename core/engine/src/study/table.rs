@@ -27,6 +27,7 @@ use super::gap::GapSection;
 use super::libraries::PluginsSection;
 use super::quantity::QuantityKeys;
 use super::schema::{Language, page};
+use super::start::StartSection;
 
 /// Writes what follows from the rows. Of the five forms of a row each part of the macro uses those it concerns.
 macro_rules! sections {
@@ -124,6 +125,7 @@ sections! {
     study: table(StudySection);
     plugins: table(PluginsSection);
     parameter: list(ParameterSection);
+    start: list(StartSection);
     target: plugin(Density, NoKeys);
     derived: list(DerivedSection);
     scenario: list(ScenarioSection);

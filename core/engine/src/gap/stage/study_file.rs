@@ -151,6 +151,40 @@ fn text(study: &Study, path: &Path, result: &GapResult) -> Result<String, Stop> 
         text.push('\n');
         text.push_str(&block(study, addition)?);
     }
+    if inside_alone(&result.additions) {
+        text.push_str(&starts(study, result)?);
+    }
+    Ok(text)
+}
+
+/// Returns true if all effects act through parameters of the model, so that the fit is a point of the new study.
+fn inside_alone(additions: &[AddedEffect]) -> bool {
+    let is_inside = |added: &AddedEffect| {
+        !added.model
+            && !added.switches.is_empty()
+            && !added.is_in_companion()
+            && !added.is_in_runs()
+    };
+    !additions.is_empty() && additions.iter().all(is_inside)
+}
+
+/// The fit that was found, as the place where the search for the best fit begins: with missing physics in the model it is
+/// often far from where the prior is.
+fn starts(study: &Study, result: &GapResult) -> Result<String, Stop> {
+    let mut text =
+        "\n# The fit of the search, where the search for the best fit begins.\n".to_owned();
+    let calibrated = result.parameters.iter().map(|shift| (&shift.name, shift.value[1]));
+    let own = result.additions.iter().flat_map(|added| &added.unknowns);
+    let all = calibrated.chain(own.map(|unknown| (&unknown.name, unknown.value)));
+    for (name, value) in all.filter(|(_, value)| value.is_finite()) {
+        if !study.starts.iter().any(|start| start.name == *name) {
+            text.push_str(&format!(
+                "[[start]]\nname = {}\nvalue = {}\n",
+                string(name),
+                line(&value)?
+            ));
+        }
+    }
     Ok(text)
 }
 
