@@ -44,6 +44,39 @@ pub struct Indices {
     pub shapley_error: Matrix,
 }
 
+impl Indices {
+    /// Indices of no value.
+    pub fn none(inputs: usize) -> Self {
+        let empty = || Matrix::zeros(0, inputs);
+        Self {
+            first: empty(),
+            first_error: empty(),
+            total: empty(),
+            total_error: empty(),
+            shapley: empty(),
+            shapley_error: empty(),
+        }
+    }
+
+    /// All parts, in the order of the fields.
+    pub fn parts(&self) -> [&Matrix; 6] {
+        let Self { first, first_error, total, total_error, shapley, shapley_error } = self;
+        [first, first_error, total, total_error, shapley, shapley_error]
+    }
+
+    /// The indices of the first `count` values, and those of the others.
+    pub fn split(&self, count: usize) -> [Self; 2] {
+        let all = self.first.rows();
+        let rows = |range: std::ops::Range<usize>| {
+            let rows: Vec<usize> = range.collect();
+            let [first, first_error, total, total_error, shapley, shapley_error] =
+                self.parts().map(|part| part.select_rows(&rows));
+            Self { first, first_error, total, total_error, shapley, shapley_error }
+        };
+        [rows(0..count), rows(count..all)]
+    }
+}
+
 /// Number of samples evaluated together.
 const TOGETHER: usize = 50;
 

@@ -88,6 +88,7 @@ fn sections(study: &Study, complaints: &mut Complaints<'_>) {
         runs_to_learn_from(study, complaints);
     }
     calibration(study, complaints);
+    super::forward::check(study, complaints);
 }
 
 /// Reports what a study without a surrogate lacks: its calibration calls the model directly, and nothing is simulated
@@ -101,10 +102,12 @@ fn without_surrogate(study: &Study, complaints: &mut Complaints<'_>) {
             .help(format!("add `[surrogate]`, with `use` set to {}", one_of(names)))
             .help("or add `[model]`: a study whose model is cheap needs no surrogate");
     }
-    if study.measurements.is_none() {
-        complaints.at("").say("the study has neither a `[surrogate]` nor `[measurements]`").help(
-            "there is nothing to do: a surrogate learns from runs, a calibration from measurements",
-        );
+    if study.measurements.is_none() && study.propagated().is_none() {
+        complaints
+            .at("")
+            .say("the study has neither a `[surrogate]` nor `[measurements]`")
+            .help("there is nothing to do: a surrogate learns from runs, a calibration from measurements")
+            .help("or add `[[quantity]]` or `[forward]`: the priors are then propagated through the model");
     }
     let useless = [
         ("design", study.design.is_some()),

@@ -5,6 +5,7 @@ mod context;
 pub mod derived;
 pub mod fidelity;
 pub mod file;
+pub mod forward;
 pub mod gap;
 pub mod inherit;
 pub mod inputs;

@@ -11,6 +11,7 @@ use toml::Table;
 
 use super::fidelity::{LowFidelity, NumericalError};
 use super::file::{DerivedSection, EffectKeys, StudySection, ValidateSection};
+use super::forward::ForwardSection;
 use super::gap::Gap;
 use super::libraries::Libraries;
 use super::positions::Positions;
@@ -62,6 +63,8 @@ pub struct Study {
     pub effects: Vec<Section<dyn Effect, EffectKeys>>,
     /// `[[quantity]]`.
     pub quantities: Vec<QuantitySection>,
+    /// `[forward]`.
+    pub forward: Option<ForwardSection>,
     /// `[validate]`.
     pub validate: ValidateSection,
     /// `[gap]`.
@@ -101,6 +104,7 @@ impl Study {
             derived_sections: Vec::new(),
             effects: Vec::new(),
             quantities: Vec::new(),
+            forward: None,
             validate: ValidateSection::default(),
             gap,
             resolved: Table::new(),

@@ -14,6 +14,7 @@ use toml::Table;
 
 use super::fidelity::{low_fidelity, numerical_error};
 use super::file::{OPTIONAL, ResponseSection, StudySection, ValidateSection};
+use super::forward::forward;
 use super::gap::companion::companion;
 use super::gap::gap;
 pub use super::libraries::Use;
@@ -179,6 +180,7 @@ fn structure(
     let derived_sections = derived(root, problems);
     let effects = effects(root, problems);
     let quantities = quantities(root, problems);
+    let forward = forward(root, problems);
     let validate = match root.get("validate") {
         Some(node) => problems.within("validate", |problems| decode(node, problems)),
         None => Some(ValidateSection::default()),
@@ -228,6 +230,7 @@ fn structure(
         derived_sections: derived_sections?,
         effects: effects?,
         quantities: quantities?,
+        forward: forward?,
         validate: validate?,
         gap: gap?,
         resolved: Table::new(),

@@ -76,6 +76,9 @@ pub(super) fn table(
         let quantities: Result<Vec<Table>, _> = study.quantities.iter().map(written).collect();
         later.insert("quantity", quantities?.into());
     }
+    if let Some(forward) = &study.forward {
+        later.insert("forward", to_table(forward)?.into());
+    }
     later.insert("validate", to_table(&study.validate)?.into());
     later.insert("gap", gap(&study.gap)?.into());
     for name in SECTIONS {

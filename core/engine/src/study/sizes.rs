@@ -106,6 +106,11 @@ fn needs(study: &Study) -> Vec<Need> {
     if let Some(error) = &study.numerical_error {
         add("numerical_error.runs", "the finer runs", error.runs, run);
     }
+    if let Some(draws) = study.propagated() {
+        // The values of all quantities in a few variants, and the inputs.
+        let asked = study.quantities.len() as f64;
+        add("forward.draws", "the draws", draws, parameters + 10.0 * asked);
+    }
     add("validate.emulator_check", "the runs", study.validate.emulator_check, run);
     if let Some(section) = &study.sampler {
         let plan = section.built.plugin.plan(study.parameters.len());

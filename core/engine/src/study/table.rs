@@ -23,6 +23,7 @@ use super::file::{
     ModelKeys, NumericalErrorSection, ParameterSection, ResponseSection, SamplerKeys,
     ScenarioSection, SimulationKeys, StudySection, SurrogateKeys, ValidateSection,
 };
+use super::forward::ForwardSection;
 use super::gap::GapSection;
 use super::libraries::PluginsSection;
 use super::quantity::QuantityKeys;
@@ -142,6 +143,7 @@ sections! {
     effect: plugins(Effect, EffectKeys);
     sampler: plugin(Sampler, SamplerKeys);
     quantity: plugins(Quantity, QuantityKeys);
+    forward: table(ForwardSection);
     validate: table(ValidateSection);
     gap: table(GapSection);
 }

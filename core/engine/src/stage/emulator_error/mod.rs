@@ -24,7 +24,7 @@ mod tests;
 
 use lacuna::data::Observations;
 use lacuna::plugin::Forward;
-use lacuna::plugin::discrepancy::ErrorOrigin;
+use lacuna::plugin::discrepancy::{CommonError, ErrorOrigin};
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
 
@@ -48,6 +48,13 @@ pub fn allowance(
 ) -> Result<Allowance, Stop> {
     let curves = fitted.curves.near_prior(study);
     Ok(Allowance::new(ErrorOrigin::Emulator, factors(study, &curves, data, forward)?))
+}
+
+/// The error of a fitted emulator with its mean size over the prior, where there are no data.
+pub fn over_prior(study: &Study, fitted: &Fitted) -> Result<CommonError, Stop> {
+    let curves = fitted.curves.near_prior(study);
+    let factor = Places::of(&study.layouts).factor(&curves.errors, &[])?;
+    Ok(CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true })
 }
 
 /// Covariance of an error of which some curves are known, as two factors of low rank, `outputs x rank`: one enlarged by

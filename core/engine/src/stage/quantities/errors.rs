@@ -6,6 +6,7 @@ use lacuna::plugin::discrepancy::{CommonError, ErrorPath};
 use lacuna::run::Stop;
 
 use crate::stage::calibrate::Law;
+use crate::stage::emulator_error;
 use crate::stage::inverse_problem::InverseProblem;
 use crate::stage::read::Measured;
 use crate::study::Study;
@@ -30,6 +31,18 @@ impl<'a> Errors<'a> {
         Ok(Self { likelihood: Some(likelihood), common })
     }
 
+    /// Errors of emulator and numerics where nothing was measured, with their mean size over the prior.
+    pub fn of_priors(study: &'a Study, problem: &InverseProblem<'a>) -> Result<Self, Stop> {
+        let mut common = Vec::new();
+        if let Some(fitted) = problem.fitted() {
+            common.push(emulator_error::over_prior(study, &fitted.value)?);
+        }
+        if let (Some(kept), Some(section)) = (problem.numerics(), &study.numerical_error) {
+            common.push(kept.value.error_samples(&section.written));
+        }
+        Ok(Self { likelihood: None, common })
+    }
+
     /// No errors.
     pub fn none() -> Self {
         Self { likelihood: None, common: Vec::new() }
@@ -37,9 +50,11 @@ impl<'a> Errors<'a> {
 
     /// One draw of all errors around the response at a point of the posterior.
     pub fn draw(&self, response: &[f64], point: &[f64], stream: &Stream) -> Vec<ErrorPath> {
-        let Some(likelihood) = self.likelihood else { return Vec::new() };
-        let hyper = &point[point.len() - likelihood.hyperparameters().len()..];
-        let mut paths = likelihood.errors(response, hyper, &stream.named("discrepancy"));
+        let of_discrepancy = |likelihood: &dyn Likelihood| {
+            let hyper = &point[point.len() - likelihood.hyperparameters().len()..];
+            likelihood.errors(response, hyper, &stream.named("discrepancy"))
+        };
+        let mut paths = self.likelihood.map(of_discrepancy).unwrap_or_default();
         paths.retain(|path| self.common.iter().all(|error| error.origin != path.origin));
         let stream = stream.named("common");
         let common = self.common.iter().enumerate();

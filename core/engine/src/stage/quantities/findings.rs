@@ -2,6 +2,8 @@
 
 use lacuna::math::moments::{mean, quantile, sorted, variance};
 
+use lacuna_linalg::Matrix;
+
 use super::{Quantified, Variant};
 
 /// A predicted quantity. All figures are in its unit.
@@ -17,8 +19,14 @@ pub struct QuantityFindings {
     pub total: Spread,
     /// Prediction with the posterior of the parameters alone.
     pub parameters: Spread,
-    /// Value at the MAP, without errors.
+    /// Value at the MAP, without errors; in a study without data at the medians of the priors.
     pub map: f64,
+    /// True in a study without data: the parameters have their priors.
+    pub of_priors: bool,
+    /// Shares of the inputs in the variance, in a study without data.
+    pub shares: Vec<InputShare>,
+    /// Draws of the prediction at which it is defined.
+    pub values: Vec<f64>,
     /// Monte Carlo standard error of the mean of `total`.
     pub mcse_mean: f64,
     /// Standard deviation with all sources but one: `parameters`, or the origin of an error that it includes.
@@ -31,6 +39,20 @@ pub struct QuantityFindings {
     pub draws: usize,
     /// Number of draws at which the quantity is undefined; the figures are those of the others.
     pub undefined: usize,
+}
+
+/// Share of an uncertain input in the variance of a quantity without errors, each with its standard error. NaN if the
+/// quantity does not vary.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InputShare {
+    /// Name of the input.
+    pub name: String,
+    /// First-order Sobol index.
+    pub first: (f64, f64),
+    /// Total Sobol index.
+    pub total: (f64, f64),
+    /// Shapley effect.
+    pub shapley: (f64, f64),
 }
 
 /// Figures of a distribution.
@@ -108,13 +130,32 @@ impl Quantified {
             total,
             parameters,
             map: self.map[i],
+            of_priors: self.propagated.is_some(),
+            shares: self.shares(i),
             mcse_mean: error.sqrt(),
             without: without.collect(),
             includes: about.includes.clone(),
             leaves_out: about.leaves_out.clone(),
             draws: self.draws.columns(),
             undefined: self.draws.columns() - kept.len(),
+            values: kept,
         }
+    }
+
+    /// Shares of the inputs in the variance of a quantity.
+    fn shares(&self, quantity: usize) -> Vec<InputShare> {
+        let Some(found) = &self.propagated else { return Vec::new() };
+        let own = &found.quantities;
+        let share = |(i, name): (usize, &String)| {
+            let at = |value: &Matrix, error: &Matrix| (value[(quantity, i)], error[(quantity, i)]);
+            InputShare {
+                name: name.clone(),
+                first: at(&own.first, &own.first_error),
+                total: at(&own.total, &own.total_error),
+                shapley: at(&own.shapley, &own.shapley_error),
+            }
+        };
+        found.inputs.iter().enumerate().map(share).collect()
     }
 
     /// Returns true if a variant gives other draws than all sources together.

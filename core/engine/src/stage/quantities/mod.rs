@@ -1,4 +1,5 @@
-//! Stage 6: prediction of the quantities of interest.
+//! Stage 6: prediction of the quantities of interest. What follows is for a study with data; without data the priors take
+//! the place of the posterior (`forward`).
 //!
 //! At each of up to a thousand draws of the posterior the response is computed with the study's effects, and one draw of
 //! each error of the prediction is added: of the common errors, of the discrepancy's model form, of the scatter of a new
@@ -8,6 +9,7 @@
 
 mod errors;
 mod findings;
+mod forward;
 mod kept;
 
 use lacuna::data::Draws;
@@ -23,7 +25,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use self::errors::Errors;
-pub use self::findings::QuantityFindings;
+pub use self::findings::{InputShare, QuantityFindings};
+pub use self::forward::{Bands, Propagated, runs};
 use super::calibrate::{Calibrated, Parts};
 use super::predictions::Chosen;
 use super::{predict, stream};
@@ -40,8 +43,10 @@ pub struct Quantified {
     /// Value of each quantity in each variant, `(variants * quantities) x draws`, variant by variant. NaN where a quantity
     /// is undefined.
     pub draws: Matrix,
-    /// Value of each quantity at the MAP, without errors.
+    /// Value of each quantity at the MAP, without errors; in a study without data at the medians of the priors.
     pub map: Vec<f64>,
+    /// What the priors imply for the response and the parameters' shares, in a study without data.
+    pub propagated: Option<Propagated>,
 }
 
 /// Description of predicted quantities.
@@ -89,7 +94,8 @@ pub enum Variant {
 /// Source of uncertainty that is no error: the posterior of the parameters.
 const PARAMETERS: &str = "parameters";
 
-/// Predicts the quantities of a study with data; `None` if it asks for none or has no posterior.
+/// Predicts the quantities of a study with data from its posterior, and those of one without from its priors; `None` if
+/// it asks for none.
 pub fn stage(
     study: &Study,
     problem: &InverseProblem<'_>,
@@ -97,6 +103,9 @@ pub fn stage(
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Option<Kept<Quantified>>, Stop> {
+    if let Some(draws) = study.propagated() {
+        return of_priors(study, problem, draws, run, observer);
+    }
     let (Some(calibrated), Some(measured)) = (calibrated, &problem.data.value.measured) else {
         return Ok(None);
     };
@@ -113,7 +122,33 @@ pub fn stage(
         let errors = Errors::of(study, measured, problem, parts.likelihood())?;
         let chosen = Chosen::of(&calibrated.value, measured.likelihood.count());
         let forward = Some(problem.forward());
-        Work::new(study, forward, errors, progress).predict(&calibrated.value, chosen)
+        let basis = Basis::of(&calibrated.value, &chosen);
+        Work::new(study, forward, errors, progress).predict(&basis, chosen)
+    })
+}
+
+/// Propagates the priors of a study without data.
+fn of_priors(
+    study: &Study,
+    problem: &InverseProblem<'_>,
+    draws: usize,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Option<Kept<Quantified>>, Stop> {
+    let inputs = json!([
+        problem.origin(),
+        problem.numerics().map(|n| &n.hash),
+        study.numerical_error.as_ref().map(|section| section.written.scales()),
+        forward::priors(study),
+        study.effects_identity(),
+        draws,
+        asked_for(study),
+    ]);
+    if let Some(text) = forward::announcement(study, problem) {
+        observer.remark(&text);
+    }
+    predicted(study, &inputs, run, observer, |progress| {
+        forward::propagate(study, problem, draws, progress)
     })
 }
 
@@ -127,7 +162,8 @@ pub fn of_target(
     let inputs = json!([calibrated.hash, asked_for(study)]);
     predicted(study, &inputs, run, observer, |progress| {
         let chosen = Chosen::of(&calibrated.value, 0);
-        Work::new(study, None, Errors::none(), progress).predict(&calibrated.value, chosen)
+        let basis = Basis::of(&calibrated.value, &chosen);
+        Work::new(study, None, Errors::none(), progress).predict(&basis, chosen)
     })
 }
 
@@ -150,7 +186,7 @@ fn predicted(
     observer: &dyn Observer,
     make: impl FnOnce(&Progress<'_>) -> Result<Quantified, Stop>,
 ) -> Result<Option<Kept<Quantified>>, Stop> {
-    if study.quantities.is_empty() {
+    if study.quantities.is_empty() && study.propagated().is_none() {
         return Ok(None);
     }
     observer.begin(Stage::Quantities.label(), "draw", 0);
@@ -182,6 +218,23 @@ struct Work<'a> {
     progress: &'a Progress<'a>,
 }
 
+/// What draws of a posterior or a prior are compared with.
+struct Basis<'a> {
+    /// Point that represents all draws: the MAP, or the medians of the priors.
+    centre: Vec<f64>,
+    /// Ratio of independent to all draws.
+    efficiency: f64,
+    /// Responses at the draws, if they are known.
+    responses: Option<&'a [Vec<f64>]>,
+}
+
+impl Basis<'_> {
+    fn of(calibrated: &Calibrated, chosen: &Chosen) -> Self {
+        let efficiency = efficiency(calibrated, chosen);
+        Self { centre: calibrated.outcome.map.clone(), efficiency, responses: None }
+    }
+}
+
 /// A point of the posterior with its response.
 struct Place<'a> {
     point: &'a [f64],
@@ -201,22 +254,28 @@ impl<'a> Work<'a> {
         Self { study, forward, errors, asked, derived, random, progress }
     }
 
-    fn predict(&self, calibrated: &Calibrated, chosen: Chosen) -> Result<Quantified, Stop> {
-        let map = calibrated.outcome.map.clone();
-        let at_map = self.responses(&Matrix::from_vec(1, map.len(), map.clone()));
-        let centre = self.place(&map, &at_map[0]);
+    fn predict(&self, basis: &Basis<'_>, chosen: Chosen) -> Result<Quantified, Stop> {
+        let centre = &basis.centre;
+        let there = self.responses(&Matrix::from_vec(1, centre.len(), centre.clone()));
+        let centre = self.place(centre, &there[0]);
         let origins = self.origins(&centre);
         let variants = variants(&origins);
         let count = chosen.points.rows();
         let mut draws = Matrix::zeros(variants.len() * self.asked.len(), count);
         for first in (0..count).step_by(TOGETHER) {
             let rows: Vec<usize> = (first..count.min(first + TOGETHER)).collect();
-            let responses = self.responses(&chosen.points.select_rows(&rows));
+            let made;
+            let responses = if let Some(known) = basis.responses {
+                &known[first..first + rows.len()]
+            } else {
+                made = self.responses(&chosen.points.select_rows(&rows));
+                &made[..]
+            };
             let one = |(&i, response): (&usize, &Vec<f64>)| {
                 let place = self.place(chosen.points.row(i), response);
                 self.values(&variants, &place, &centre, &self.random.at(i as u64))
             };
-            let values: Vec<Vec<f64>> = rows.par_iter().zip(&responses).map(one).collect();
+            let values: Vec<Vec<f64>> = rows.par_iter().zip(responses).map(one).collect();
             for (&i, values) in rows.iter().zip(values) {
                 values.into_iter().enumerate().for_each(|(k, value)| draws[(k, i)] = value);
             }
@@ -229,11 +288,11 @@ impl<'a> Work<'a> {
         let about = About {
             quantities: self.asked.iter().map(|asked| described(asked, &origins)).collect(),
             variants,
-            efficiency: efficiency(calibrated, &chosen),
+            efficiency: basis.efficiency,
             chains: chosen.chains,
             steps: chosen.steps,
         };
-        Ok(Quantified { about, draws, map })
+        Ok(Quantified { about, draws, map, propagated: None })
     }
 
     fn responses(&self, points: &Matrix) -> Vec<Vec<f64>> {

@@ -9,13 +9,6 @@ use crate::study::resolve::Study;
 /// Reports places that the response does not have, and options that do not fit.
 pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     let nodes = root.get("quantity").map(Node::elements).unwrap_or_default();
-    if study.sampler.is_none() && !nodes.is_empty() {
-        Complaints::new(root, problems)
-            .at("quantity")
-            .say("quantities are predicted from a posterior, and the study has none")
-            .expected("`[measurements]`, `[discrepancy]` and `[sampler]`");
-        return;
-    }
     let mut wrong = vec![false; nodes.len()];
     for (i, (section, node)) in study.quantities.iter().zip(nodes).enumerate() {
         let before = problems.len();

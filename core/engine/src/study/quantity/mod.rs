@@ -81,6 +81,11 @@ impl Included {
     }
 }
 
+/// Returns true if predictions contain errors of this origin unless the study says otherwise.
+pub fn in_default(origin: &str) -> bool {
+    DEFAULT.contains(&Included::of(origin))
+}
+
 /// One value that a study asks for, ready to be computed.
 pub struct Asked {
     /// Name with the labels of its curve and its scenario.
