@@ -124,6 +124,11 @@ pub fn check(path: &Path, settings: &Settings) -> anyhow::Result<()> {
     };
     let parameters = study.parameters.len();
     print(&format!("{}: no problems; {parameters} parameters{response}", path.display()));
+    if let Some(runs) = stage::quantities::runs(&study) {
+        print(&format!(
+            "the priors are propagated with {runs} runs of the model (`forward.draws`)"
+        ));
+    }
     Ok(())
 }
 

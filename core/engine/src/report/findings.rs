@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::assess::Assessment;
 
 pub use crate::gap::result::GapFindings;
-pub use crate::stage::quantities::QuantityFindings;
+pub use crate::stage::quantities::{InputShare, Propagated, QuantityFindings};
 use crate::stage::screen::FlaggedCurve;
 use crate::stage::validate::ValidationFindings;
 
@@ -44,6 +44,8 @@ pub struct Findings {
     pub validation: Option<ValidationFindings>,
     /// Predicted quantities of interest.
     pub quantities: Vec<QuantityFindings>,
+    /// Propagated priors of a study without data.
+    pub propagated: Option<Propagated>,
     /// Result of the gap search.
     pub gap: Option<GapFindings>,
     /// Version of Lacuna that computed the result of each stage.

@@ -94,6 +94,7 @@ fn findings(
         calibration,
         validation,
         quantities: all.quantities.map(|kept| kept.value.findings()).unwrap_or_default(),
+        propagated: all.quantities.and_then(|kept| kept.value.propagated.clone()),
         gap: results.gap.map(|kept| GapFindings {
             result: kept.value.clone(),
             hash: kept.hash.clone(),

@@ -4,8 +4,8 @@ use lacuna::run::Stop;
 
 use super::findings::Findings;
 use super::section::{
-    accuracy_table, banner, evidence, group_word, headline, posterior_table, quantity_table, view,
-    without_table,
+    accuracy_table, banner, evidence, group_word, headline, posterior_table, quantity_table,
+    share_table, view, without_table,
 };
 use crate::gap::next::Wanted;
 use crate::gap::report;
@@ -41,6 +41,9 @@ pub fn summary_text(findings: &Findings) -> String {
         parts.push(format!("predicted quantities\n{table}"));
         if let Some(table) = without_table(&findings.quantities) {
             parts.push(format!("their standard deviation without one source\n{}", table.text()));
+        }
+        if let Some(table) = share_table(&findings.quantities) {
+            parts.push(format!("shares of the inputs in their variance\n{}", table.text()));
         }
     }
     parts.join("\n")

@@ -35,8 +35,9 @@ impl Study {
 /// Decodes `[forward]`: `None` inside if it is not written, outside if it is wrong.
 pub(super) fn forward(root: &Node, problems: &mut Problems) -> Option<Option<ForwardSection>> {
     let Some(node) = root.get("forward") else { return Some(None) };
-    let section = problems
-        .within("forward", |problems| lacuna::text::decode::decode::<ForwardSection>(node, problems));
+    let section = problems.within("forward", |problems| {
+        lacuna::text::decode::decode::<ForwardSection>(node, problems)
+    });
     section.map(Some)
 }
 

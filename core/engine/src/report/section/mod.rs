@@ -3,6 +3,7 @@
 pub mod banner;
 mod ensemble;
 pub mod evidence;
+mod forward;
 pub mod headline;
 mod measurements;
 mod overview;
@@ -22,6 +23,7 @@ use crate::gap::report::View;
 use crate::page::scale::ShownUnit;
 use crate::page::{Numbers, Section};
 
+pub use forward::share_table;
 pub use posterior::posterior_table;
 pub use quantities::{quantity_table, without_table};
 pub use validation::accuracy_table;
@@ -38,6 +40,7 @@ pub fn all(findings: &Findings, numbers: &mut Numbers) -> Vec<Section> {
         evidence::section(findings),
         validation::section(findings, numbers),
         quantities::section(findings, numbers),
+        forward::section(findings, numbers),
         findings.gap.as_ref().map(|gap| report::section(&view(findings), gap, numbers)),
         timing::section(findings, numbers),
     ];
@@ -102,6 +105,15 @@ pub fn first_of(all: usize, most: usize) -> String {
         return String::new();
     }
     format!(" Of {all} coordinates the first {most} are shown.")
+}
+
+/// A sentence which states that a figure shows the first `most` of `all` quantities; empty if it shows all.
+pub fn first_of_quantities(all: usize, most: usize) -> String {
+    if all <= most {
+        String::new()
+    } else {
+        format!(" Of {all} quantities the first {most} are shown.")
+    }
 }
 
 /// Facts as a definition list.

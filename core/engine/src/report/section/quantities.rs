@@ -3,6 +3,8 @@
 use lacuna::data::Unit;
 use maud::{Markup, html};
 
+use super::first_of_quantities;
+use crate::page::chart::{Key, Marginal, Mark, marginals};
 use crate::page::number::{decimals, fixed, significant};
 use crate::page::scale::ShownUnit;
 use crate::page::table::Table;
@@ -17,6 +19,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
     }
     let content = html! {
         (predictions(all, numbers))
+        (histograms(all, numbers))
         @if let Some(table) = without_table(all) { (sources(&table, numbers)) }
         @for sentence in left_out(all) { p { (paragraph(&sentence)) } }
     };
@@ -24,7 +27,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
 }
 
 /// Displayed unit of a quantity.
-fn unit(found: &QuantityFindings) -> ShownUnit {
+pub fn unit(found: &QuantityFindings) -> ShownUnit {
     let own = Unit::parse(&found.unit).unwrap_or_default();
     ShownUnit::for_values(&own, [found.total.mean, found.total.q025, found.total.q975])
 }
@@ -44,18 +47,19 @@ fn number(found: &QuantityFindings, value: f64) -> String {
 
 /// Table of the predictions, with as many digits as the Monte Carlo error allows.
 pub fn quantity_table(all: &[QuantityFindings]) -> Table {
-    let heads =
-        ["mean", "sd", "2.5 %", "median", "97.5 %", "MCSE", "mean, parameters only", "sd", "MAP"];
+    let of_priors = all.iter().any(|found| found.of_priors);
+    let centre = if of_priors { "at medians" } else { "MAP" };
+    let heads = ["mean", "sd", "2.5 %", "median", "97.5 %", "MCSE", centre];
     let has_reference = all.iter().any(|found| found.reference.is_some());
     let heads: Vec<&str> = heads.into_iter().chain(has_reference.then_some("reference")).collect();
     let mut table = Table::new(&["quantity", "unit"], &heads);
     for found in all {
-        let (total, alone) = (found.total, found.parameters);
+        let total = found.total;
         let cell = |value: f64| number(found, value);
         let mut cells = vec![found.name.clone(), unit(found).unit.clone()];
         cells.extend([total.mean, total.sd, total.q025, total.median, total.q975].map(cell));
         cells.push(significant(unit(found).show(found.mcse_mean), 2));
-        cells.extend([alone.mean, alone.sd, found.map].map(cell));
+        cells.push(cell(found.map));
         cells.extend(found.reference.map(cell));
         table.row(cells);
     }
@@ -75,7 +79,8 @@ pub fn without_table(all: &[QuantityFindings]) -> Option<Table> {
     }
     let heads: Vec<String> =
         sources.iter().map(|source| format!("without {}", worded(source))).collect();
-    let heads: Vec<&str> = std::iter::once("all").chain(heads.iter().map(String::as_str)).collect();
+    let both = ["all", "parameters only"];
+    let heads: Vec<&str> = both.into_iter().chain(heads.iter().map(String::as_str)).collect();
     let mut table = Table::new(&["quantity", "unit"], &heads);
     for found in all {
         let sd = |source: &&str| {
@@ -83,7 +88,9 @@ pub fn without_table(all: &[QuantityFindings]) -> Option<Table> {
             own.map_or_else(String::new, |(_, sd)| significant(unit(found).show(*sd), 3))
         };
         let mut cells = vec![found.name.clone(), unit(found).unit.clone()];
-        cells.push(significant(unit(found).show(found.total.sd), 3));
+        cells.extend(
+            [found.total.sd, found.parameters.sd].map(|sd| significant(unit(found).show(sd), 3)),
+        );
         cells.extend(sources.iter().map(sd));
         table.row(cells);
     }
@@ -96,21 +103,88 @@ fn worded(source: &str) -> String {
 }
 
 fn predictions(all: &[QuantityFindings], numbers: &mut Numbers) -> Markup {
+    let of_priors = all.iter().any(|found| found.of_priors);
+    let (whose, centre, given) = if of_priors {
+        (
+            "the priors",
+            "value at the medians of the priors, without errors",
+            "prior predictive: given this model.",
+        )
+    } else {
+        (
+            "the posterior of the parameters",
+            "value at the MAP, without errors",
+            "posterior predictive: given this model and this discrepancy.",
+        )
+    };
     let caption = Caption::new(
-        "Quantities of interest. Mean, sd and quantiles contain the posterior of the parameters and the errors that the \
-         study includes; the columns after them the posterior of the parameters alone, and the value at the MAP. \
-         Numbers end at the first digit of the Monte Carlo standard error (MCSE) of the mean.",
-        "posterior predictive: given this model and this discrepancy.",
-        "an sd far above that of the parameters: the errors of the prediction matter more than the calibration.",
+        format!(
+            "Quantities of interest. Mean, sd and quantiles contain {whose} and the errors that the study includes; the \
+             last column is the {centre}. Numbers end at the first digit of the Monte Carlo standard error (MCSE) of the \
+             mean."
+        ),
+        given,
+        "an interval wider than the decision allows: the next table says which source matters most.",
     );
     numbers.table(&quantity_table(all), &caption)
 }
 
+/// Largest number of quantities that are shown in histograms.
+const MOST_SHOWN: usize = 16;
+
+/// Histograms of the draws with their 95 % intervals.
+fn histograms(all: &[QuantityFindings], numbers: &mut Numbers) -> Markup {
+    let panel = |found: &QuantityFindings| {
+        let unit = unit(found);
+        let mark = |class, label: &str, value: f64| Mark {
+            class,
+            label: label.to_owned(),
+            value: unit.show(value),
+        };
+        let total = found.total;
+        let mut marks = vec![
+            mark("m-interval", "2.5 %", total.q025),
+            mark("m-map", "median", total.median),
+            mark("m-interval", "97.5 %", total.q975),
+        ];
+        marks.extend(found.reference.map(|value| mark("m-reference", "reference", value)));
+        Marginal {
+            title: found.name.clone(),
+            remark: String::new(),
+            label: unit.label(&found.name),
+            density_label: "density".to_owned(),
+            draws: found.values.iter().map(|&value| unit.show(value)).collect(),
+            curves: Vec::new(),
+            marks,
+            second: None,
+        }
+    };
+    let varies = |found: &&QuantityFindings| found.total.sd > 0.0;
+    let panels: Vec<Marginal> = all.iter().filter(varies).take(MOST_SHOWN).map(panel).collect();
+    if panels.is_empty() {
+        return html! {};
+    }
+    let caption = Caption::new(
+        format!(
+            "Draws of the quantities, scaled to area one.{}",
+            first_of_quantities(all.len(), MOST_SHOWN)
+        ),
+        "the numbers of the table above.",
+        "two modes or a long tail, which mean and sd do not show.",
+    );
+    let keys = [
+        Key::area("s-histogram", "draws"),
+        Key::line("m-map", "median"),
+        Key::line("m-interval", "95 % interval"),
+    ];
+    numbers.figure(&marginals(&panels, "draws of the quantities"), &keys, &caption)
+}
+
 fn sources(table: &Table, numbers: &mut Numbers) -> Markup {
     let caption = Caption::new(
-        "Standard deviation of each quantity with all sources of uncertainty, and with all but one. All columns use the same \
-         random numbers.",
-        "posterior predictive.",
+        "Standard deviation of each quantity with all sources of uncertainty, with that of the parameters only, and with \
+         all but one. All columns use the same random numbers.",
+        "as in the table above.",
         "the column with the smallest number: its source matters most. An empty cell is a source that the quantity does not depend on.",
     );
     numbers.table(table, &caption)

@@ -4,10 +4,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::value::{ByName, Quantity};
-use crate::report::findings::QuantityFindings;
+use crate::report::findings::{InputShare, QuantityFindings};
 
-/// Prediction of one quantity of interest. Mean, standard deviation and quantiles contain the posterior of the parameters
-/// and the errors in `includes`.
+/// Prediction of one quantity of interest. Mean, standard deviation and quantiles contain the posterior of the parameters,
+/// in a study without measurements their priors, and the errors in `includes`.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct PredictedQuantity {
     /// Mean of the prediction.
@@ -21,10 +21,18 @@ pub struct PredictedQuantity {
     /// 97.5 % quantile of the prediction.
     pub q975: f64,
     /// Value at the maximum of the posterior density, without errors.
-    pub map: Quantity,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub map: Option<Quantity>,
+    /// Value at the medians of the priors, without errors, in a study without measurements.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_medians: Option<Quantity>,
     /// Monte Carlo standard error of the mean.
     pub mcse_mean: f64,
-    /// Prediction with the posterior of the parameters alone, without any error.
+    /// Shares of the inputs in the variance without errors, in a study without measurements.
+    #[serde(skip_serializing_if = "ByName::is_empty")]
+    #[schemars(extend("propertyNames" = { "title": "input" }))]
+    pub sensitivity: ByName<Share>,
+    /// Prediction with the distribution of the parameters alone, without any error.
     pub parameters: OfParameters,
     /// Standard deviation of the prediction with all sources of uncertainty but one; a source that the quantity does not
     /// depend on is absent.
@@ -45,7 +53,24 @@ pub struct PredictedQuantity {
     pub reference: Option<Quantity>,
 }
 
-/// Prediction with the posterior of the parameters alone.
+/// Share of an input in the variance of a quantity; null if the quantity does not vary.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Share {
+    /// First-order Sobol index: the share that disappears when the input becomes known, on average.
+    pub first_order: Quantity,
+    /// Standard error of `first_order`.
+    pub first_order_error: f64,
+    /// Total Sobol index: the share that is left when all other inputs are known, on average.
+    pub total: Quantity,
+    /// Standard error of `total`.
+    pub total_error: f64,
+    /// Shapley effect: the share when interactions are divided equally; the effects of all inputs add up to one.
+    pub shapley: Quantity,
+    /// Standard error of `shapley`.
+    pub shapley_error: f64,
+}
+
+/// Prediction with the distribution of the parameters alone.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct OfParameters {
     /// Mean.
@@ -74,7 +99,9 @@ impl PredictedQuantity {
             q025: total.q025,
             median: total.median,
             q975: total.q975,
-            map: found.map.into(),
+            map: (!found.of_priors).then(|| found.map.into()),
+            at_medians: found.of_priors.then(|| found.map.into()),
+            sensitivity: found.shares.iter().map(|s| (s.name.clone(), Share::of(s))).collect(),
             mcse_mean: found.mcse_mean,
             parameters: OfParameters {
                 mean: parameters.mean.into(),
@@ -90,6 +117,19 @@ impl PredictedQuantity {
             undefined: found.undefined,
             unit: found.unit.clone(),
             reference: found.reference.map(Quantity),
+        }
+    }
+}
+
+impl Share {
+    fn of(found: &InputShare) -> Self {
+        Self {
+            first_order: found.first.0.into(),
+            first_order_error: found.first.1,
+            total: found.total.0.into(),
+            total_error: found.total.1,
+            shapley: found.shapley.0.into(),
+            shapley_error: found.shapley.1,
         }
     }
 }

@@ -49,6 +49,7 @@ pub fn findings() -> Findings {
         validation: Some(validation(&layout)),
         layouts: layout.into(),
         quantities: Vec::new(),
+        propagated: None,
         gap: None,
         made_by: vec![("calibrate".to_owned(), "0.0.9".to_owned())],
         assessment: crate::assess::Assessment::default(),

@@ -126,13 +126,8 @@ fn propagated(
         })
     };
     let band = |k: usize| arrays::read(path, BANDS[k]).map(|array| array.values);
-    let bands = Bands {
-        mean: band(0)?,
-        sd: band(1)?,
-        q025: band(2)?,
-        median: band(3)?,
-        q975: band(4)?,
-    };
+    let bands =
+        Bands { mean: band(0)?, sd: band(1)?, q025: band(2)?, median: band(3)?, q975: band(4)? };
     let quantities = if asked { read("")? } else { Indices::none(inputs.len()) };
     let response = read("response_")?;
     Ok(Propagated { inputs, samples, quantities, response, bands })
