@@ -15,6 +15,7 @@ mod falling_balls;
 mod faulty_tables;
 mod fidelity;
 mod forced_oscillator;
+mod forward;
 mod gap;
 mod gate;
 mod kill;

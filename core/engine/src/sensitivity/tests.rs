@@ -147,7 +147,7 @@ fn standard_errors_are_the_scatter() {
     let truths = [main, minor, main + both, main + 0.5 * both].map(|part| part / all);
     let mut squares = [0.0; 4];
     for seed in 0..COUNT {
-        let found = indices(&inputs, 1000, &Stream::root(seed), evaluate, |_, _| ());
+        let found = indices(&inputs, 1000, &Stream::root(7).at(seed), evaluate, |_, _| ());
         let estimates = [
             (found.first[(0, 0)], found.first_error[(0, 0)]),
             (found.first[(0, 1)], found.first_error[(0, 1)]),
@@ -172,4 +172,26 @@ fn one_input_has_everything_and_a_constant_nothing() {
     let constant = of(&inputs, 100, |_| 0.1);
     assert!(constant.first[(0, 0)].is_nan() && constant.shapley[(0, 0)].is_nan());
     assert_eq!([evaluations(1, true, 10), evaluations(3, true, 10)], [20, 60]);
+}
+
+#[test]
+fn scratch() {
+    let a = [0.0, 1.0, 4.5, 9.0, 99.0, 99.0];
+    let inputs = Independent(vec![Distribution::Uniform([0.0, 1.0]); 6]);
+    let g = |x: &[f64]| -> f64 {
+        x.iter().zip(a).map(|(x, a)| ((4.0 * x - 2.0).abs() + a) / (1.0 + a)).product()
+    };
+    let evaluate =
+        |points: &Matrix| Matrix::from_vec(points.rows(), 1, points.iter_rows().map(g).collect());
+    for i in [3, 4, 5] {
+        let mut z = Vec::new();
+        for seed in 0..200 {
+            let f = indices(&inputs, 2000, &Stream::root(9).at(seed), evaluate, |_, _| ());
+            z.push((f.shapley[(0, i)], f.shapley_error[(0, i)]));
+        }
+        let m = z.iter().map(|z| z.0).sum::<f64>() / 200.0;
+        let v = z.iter().map(|z| (z.0 - m).powi(2)).sum::<f64>() / 199.0;
+        let e = z.iter().map(|z| z.1 * z.1).sum::<f64>() / 200.0;
+        println!("{i}: mean {m} sd of mean {} sd {} stated {}", (v / 200.0).sqrt(), v.sqrt(), e.sqrt());
+    }
 }

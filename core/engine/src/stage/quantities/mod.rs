@@ -144,10 +144,10 @@ fn of_priors(
         draws,
         asked_for(study),
     ]);
-    if let Some(text) = forward::announcement(study, problem) {
-        observer.remark(&text);
-    }
     predicted(study, &inputs, run, observer, |progress| {
+        if let Some(text) = forward::announcement(study, problem) {
+            observer.remark(&text);
+        }
         forward::propagate(study, problem, draws, progress)
     })
 }
