@@ -179,7 +179,8 @@ fn ishigami_without_a_surrogate() {
         assert_eq!(found["includes"], serde_json::json!([]));
     }
     // 4000 samples of 6 points, and the medians.
-    let said = ran.warnings.iter().chain(&ran.notes).any(|text| text.contains("24001 runs of the model"));
+    let said =
+        ran.warnings.iter().chain(&ran.notes).any(|text| text.contains("24001 runs of the model"));
     assert!(said, "{:?} {:?}", ran.warnings, ran.notes);
 }
 

@@ -21,6 +21,7 @@ mod gate;
 mod kill;
 mod left_out;
 mod made_by;
+mod predict;
 mod problems;
 mod python;
 mod quantities;

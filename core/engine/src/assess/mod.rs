@@ -5,6 +5,7 @@
 
 pub mod bounds;
 pub mod chains;
+pub mod conditions;
 pub mod correlation;
 pub mod emulator;
 pub mod envelope;

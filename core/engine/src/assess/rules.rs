@@ -1,8 +1,8 @@
 //! Descriptions of all checks, for the documentation.
 
 use super::{
-    bounds, chains, correlation, emulator, envelope, fit, influence, modes, prior, replicates,
-    residuals, runs, suspicious,
+    bounds, chains, conditions, correlation, emulator, envelope, fit, influence, modes, prior,
+    replicates, residuals, runs, suspicious,
 };
 
 /// A type of finding.
@@ -36,6 +36,7 @@ pub fn rules() -> Vec<Rule> {
         fit::rules(),
         residuals::rules(),
         influence::rules(),
+        conditions::rules(),
     ]
     .concat()
 }

@@ -21,7 +21,7 @@ mod sums;
 #[cfg(test)]
 mod tests;
 
-use lacuna::math::random::{Stream, uniform};
+use lacuna::math::random::{Stream, permutation};
 use lacuna_linalg::Matrix;
 
 pub use self::inputs::{Independent, Inputs};
@@ -184,13 +184,7 @@ impl Plan {
     }
 }
 
-/// Random order of `d` inputs (Fisher and Yates).
+/// Random order of `d` inputs.
 fn order(d: usize, stream: &Stream) -> Vec<usize> {
-    let mut generator = stream.generator();
-    let mut order: Vec<usize> = (0..d).collect();
-    for last in (1..d).rev() {
-        let chosen = (uniform(&mut generator) * (last + 1) as f64) as usize;
-        order.swap(last, chosen.min(last));
-    }
-    order
+    permutation(&mut stream.generator(), d)
 }

@@ -21,7 +21,7 @@ use super::artifacts::Artifacts;
 use super::calibrate::{Calibrated, Parts};
 use super::predict;
 use super::read::Measured;
-use crate::assess::{Assessment, Finding, influence};
+use crate::assess::{Assessment, Finding, conditions, influence};
 use crate::stage::inverse_problem::InverseProblem;
 use crate::study::Study;
 
@@ -70,6 +70,12 @@ pub fn stage(
         laws,
         study.about.seed
     ]);
+    // Quantities matter to the checks only where they are predicted under conditions that were not measured.
+    let extrapolated = all.quantities.filter(|_| study.scenarios.iter().any(|s| s.unmeasured));
+    let inputs = match extrapolated {
+        Some(quantities) => json!([inputs, quantities.hash]),
+        None => inputs,
+    };
     observer.begin(Stage::Assess.label(), "check", 0);
     let kept = run.keep(&Stage::Assess.folder(), &inputs, observer, |_| assess(study, all))?;
     observer.end(Stage::Assess.label(), &kept.value.line());
@@ -98,6 +104,10 @@ fn assess(study: &Study, all: &Artifacts<'_>) -> Result<Assessment, Stop> {
         if let Some(measured) = &problem.data.value.measured {
             findings.extend(data::findings(study, problem, measured));
         }
+    }
+    if study.measurements.is_some() && all.quantities.is_some() {
+        let unmeasured = study.scenarios.iter().filter(|scenario| scenario.unmeasured);
+        findings.extend(unmeasured.filter_map(|s| conditions::beyond(s, &study.scenarios)));
     }
     if let Some(left) = all.weighed.and_then(|kept| kept.value.left_out.as_ref()) {
         findings.extend(influence::influential(left.unreliable, left.data.len()));
