@@ -181,9 +181,17 @@ fn summary(data: &Data) -> String {
 
 /// Hash of the user's own files.
 fn source_hash(study: &Study) -> Result<String, Stop> {
-    let runs = study.simulations.iter().map(|s| &*s.built.plugin);
-    let data = study.measurements.iter().map(|s| &*s.built.plugin);
-    files::hash_sources(&files_of(study, runs.chain(data)))
+    let mut paths = files_of(study, study.simulations.iter().map(|s| &*s.built.plugin));
+    if let Some(section) = &study.measurements {
+        // Nothing was measured in the others, so that they need no file.
+        let measured = study.scenarios.iter().filter(|scenario| !scenario.unmeasured);
+        let own =
+            |scenario| section.built.plugin.files(&study.directory, Scenario::label(scenario));
+        paths.extend(measured.flat_map(own));
+    }
+    paths.sort();
+    paths.dedup();
+    files::hash_sources(&paths)
 }
 
 /// The user's own files that some readers read, without repetition.

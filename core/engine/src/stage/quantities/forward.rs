@@ -17,7 +17,7 @@ use crate::stage::predictions::Chosen;
 use crate::study::Study;
 use crate::study::quantity::in_default;
 
-/// What the priors of a study imply besides the draws of its quantities.
+/// Consequences of the priors of a study besides the draws of its quantities.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Propagated {
     /// Names of the uncertain inputs: the parameters, then the unknowns of effects.

@@ -45,7 +45,7 @@ pub struct Quantified {
     pub draws: Matrix,
     /// Value of each quantity at the MAP, without errors; in a study without data at the medians of the priors.
     pub map: Vec<f64>,
-    /// What the priors imply for the response and the parameters' shares, in a study without data.
+    /// Response under the priors and shares of the parameters, in a study without data.
     pub propagated: Option<Propagated>,
 }
 
@@ -218,7 +218,7 @@ struct Work<'a> {
     progress: &'a Progress<'a>,
 }
 
-/// What draws of a posterior or a prior are compared with.
+/// Context of the draws of a posterior or a prior.
 struct Basis<'a> {
     /// Point that represents all draws: the MAP, or the medians of the priors.
     centre: Vec<f64>,
