@@ -3,7 +3,6 @@
 
 use maud::{Markup, html};
 
-use super::quantities::unit;
 use super::{response_label, response_unit};
 use crate::page::chart::{Axis, Band, BarChart, BarSeries, Curve, Key, Panel, small_multiples};
 use crate::page::curves::{CurvePanel, Curves};
@@ -190,7 +189,7 @@ fn bars(all: &[QuantityFindings], found: &Propagated, numbers: &mut Numbers) -> 
                 series("s-total", "total", &|share| share.total.0),
             ],
             levels: Vec::new(),
-            x_label: format!("input of {} [{}]", quantity.name, unit(quantity).unit),
+            x_label: format!("inputs of {}", quantity.name),
             y: Axis::new("share of variance", (0.0, 1.08 * top)),
             outstanding: Vec::new(),
             numbers: found.inputs.len() <= 8,

@@ -37,6 +37,13 @@ pub fn sentences(findings: &Findings) -> Vec<String> {
     }
     sentences.extend(findings.validation.as_ref().and_then(|v| agreement(findings, v)));
     sentences.extend(findings.gap.as_ref().map(|gap| verdict(&gap.result)));
+    if let Some(found) = &findings.propagated {
+        let (samples, inputs) = (found.samples, found.inputs.len());
+        let word = if inputs == 1 { "input" } else { "inputs" };
+        sentences.push(format!(
+            "The priors of {inputs} {word} were propagated through the model at {samples} draws; nothing was calibrated."
+        ));
+    }
     if sentences.is_empty() {
         sentences.push(String::from("This run has no calibration yet."));
     }

@@ -27,7 +27,7 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
 }
 
 /// Displayed unit of a quantity.
-pub fn unit(found: &QuantityFindings) -> ShownUnit {
+fn unit(found: &QuantityFindings) -> ShownUnit {
     let own = Unit::parse(&found.unit).unwrap_or_default();
     ShownUnit::for_values(&own, [found.total.mean, found.total.q025, found.total.q975])
 }
