@@ -1,5 +1,6 @@
 //! `[forward]`: propagation of the priors through the model, in a study without data.
 
+use lacuna::text::decode::decode;
 use lacuna::text::{Complaints, Node, Problems};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -32,13 +33,10 @@ impl Study {
     }
 }
 
-/// Decodes `[forward]`: `None` inside if it is not written, outside if it is wrong.
-pub(super) fn forward(root: &Node, problems: &mut Problems) -> Option<Option<ForwardSection>> {
-    let Some(node) = root.get("forward") else { return Some(None) };
-    let section = problems.within("forward", |problems| {
-        lacuna::text::decode::decode::<ForwardSection>(node, problems)
-    });
-    section.map(Some)
+/// Decodes `[forward]`; `None` if it is not written, or wrong, which is reported.
+pub(super) fn forward(root: &Node, problems: &mut Problems) -> Option<ForwardSection> {
+    let node = root.get("forward")?;
+    problems.within("forward", |problems| decode(node, problems))
 }
 
 /// Reports a section that has no use, or too few draws.

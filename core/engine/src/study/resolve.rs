@@ -230,7 +230,7 @@ fn structure(
         derived_sections: derived_sections?,
         effects: effects?,
         quantities: quantities?,
-        forward: forward?,
+        forward,
         validate: validate?,
         gap: gap?,
         resolved: Table::new(),
