@@ -7,6 +7,7 @@ pub mod executors;
 pub mod models;
 pub mod quantities;
 pub mod readers;
+pub mod reliability;
 pub mod samplers;
 pub mod surrogates;
 pub mod targets;

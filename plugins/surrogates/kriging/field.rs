@@ -112,6 +112,27 @@ impl Field {
         Matrix::from_fn(shares.len(), self.variances.len(), |i, c| self.variances[c] * shares[i])
     }
 
+    /// Returns the covariances of the errors of the first component among points (`points x points`), including the
+    /// uncertainty of the trend, without the nugget.
+    pub fn covariance(&self, points: &Matrix, regressors: &Matrix) -> Matrix {
+        let white = multiply_transposed(&self.correlations(points), &self.factor.lower_inverse);
+        let trend = regressors.select_columns(&self.choice.terms);
+        let mut unknown = multiply(&trend, &self.factor.r_inverse);
+        let shared = multiply(&white, &self.factor.q);
+        for (a, b) in unknown.as_mut_slice().iter_mut().zip(shared.as_slice()) {
+            *a -= b;
+        }
+        let place = measured(points, &self.choice.length_scales);
+        let mut all = self.kernel.between(&place, &place);
+        let known = multiply_transposed(&white, &white);
+        let unknown = multiply_transposed(&unknown, &unknown);
+        let terms = known.as_slice().iter().zip(unknown.as_slice());
+        for (c, (known, unknown)) in all.as_mut_slice().iter_mut().zip(terms) {
+            *c = self.variances[0] * (*c - known + unknown);
+        }
+        all
+    }
+
     /// Returns the derivatives of each component (rows) with respect to the standard variables at a point, and with
     /// respect to the regressors (`terms` of its choice).
     pub fn gradient(&self, point: &[f64]) -> (Matrix, &Matrix) {

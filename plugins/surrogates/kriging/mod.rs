@@ -1,4 +1,4 @@
-//! Gaussian processes with a trend, conditioned on runs; shared by `gaussian_process` and `polynomial_chaos_kriging`.
+//! Gaussian processes with a trend, conditioned on runs; shared by `gaussian_process`, `polynomial_chaos_kriging` and `active_kriging`.
 
 mod emulator;
 mod factor;
@@ -16,8 +16,11 @@ mod standard;
 mod tests;
 
 pub use emulator::Kriging;
+pub use field::{Choice, Field, Runs};
 pub use fit::{Settings, Trends};
 pub use kernel::Kernel;
+pub use likelihood::Restricted;
 pub use options::{Bounds, Estimated, LengthScales, Nugget};
 pub use regressors::Regressors;
+pub use search::search;
 pub use standard::Standard;

@@ -1,8 +1,8 @@
 //! Kinds of plugins and the sections of a study that choose one.
 
 use super::{
-    Density, Design, Discrepancy, Effect, Executor, Model, Quantity, Reader, Sampler, Surrogate,
-    Term,
+    Density, Design, Discrepancy, Effect, Executor, Model, Quantity, Reader, Reliability, Sampler,
+    Surrogate, Term,
 };
 
 crate::kind!(Reader, "reader", ["simulations", "measurements"]);
@@ -15,4 +15,5 @@ crate::kind!(Sampler, "sampler", ["sampler"]);
 crate::kind!(Effect, "effect", ["effect"]);
 crate::kind!(Term, "term", ["gap.term"]);
 crate::kind!(Quantity, "quantity", ["quantity"]);
+crate::kind!(Reliability, "reliability", ["reliability"]);
 crate::kind!(Density, "target", ["target"]);

@@ -1,0 +1,176 @@
+//! The loop of active learning.
+
+use lacuna::math::random::{Stream, permutation, uniform};
+use lacuna::math::special::normal_quantile;
+use lacuna::plugin::reliability::{Estimate, LimitState};
+use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
+
+use super::ActiveKriging;
+use super::choice::Predicted;
+use super::process::Process;
+use crate::reliability::common::{Counted, log_normal};
+use crate::reliability::subset_simulation::{Outcome, Settings, Simulated, simulate};
+
+/// Calls of the model and the processes fitted to them.
+pub struct Learning<'a> {
+    options: &'a ActiveKriging,
+    state: &'a dyn LimitState,
+    counted: &'a Counted<'a>,
+    stream: &'a Stream,
+    points: Matrix,
+    values: Vec<f64>,
+}
+
+/// Spread of the first calls, in standard deviations of the variables.
+const SPREAD: f64 = 1.5;
+/// Level probability and number of levels of the simulations: down to 1e-12.
+const SHARE: f64 = 0.1;
+const LEVELS: usize = 13;
+/// Two-sided 95 % of a normal distribution.
+const TWO_SIDED: f64 = 1.959_963_984_540_054;
+/// Rounds in a row that must meet the criteria.
+const ROUNDS: usize = 2;
+
+impl<'a> Learning<'a> {
+    /// Learning before the first call.
+    pub fn new(
+        options: &'a ActiveKriging,
+        state: &'a dyn LimitState,
+        counted: &'a Counted<'a>,
+        stream: &'a Stream,
+    ) -> Self {
+        let points = Matrix::zeros(0, state.dimension());
+        Self { options, state, counted, stream, points, values: Vec::new() }
+    }
+
+    /// Calls the model until the criteria are met.
+    pub fn run(mut self) -> Result<Estimate, Stop> {
+        let d = self.state.dimension();
+        let count = self.options.initial.unwrap_or((2 * d + 2).max(6)).min(self.options.calls);
+        self.call(&self.first(count))?;
+        let (mut met, mut before) = (0, f64::NAN);
+        let mut round = 0;
+        while self.counted.calls() < self.options.calls {
+            let random = self.stream.named("round").at(round);
+            let process = self.fitted(&random)?;
+            let predicted = self.predicted(&process, self.options.samples, &random)?.1;
+            let now = predicted.probability(0.0);
+            let doubt: f64 = predicted.doubts().iter().sum();
+            let steady = (now - before).abs() <= 3.0 * self.options.precision * now.max(before);
+            let sure = now > 0.0 && doubt <= self.options.precision * now;
+            met = if sure && steady { met + 1 } else { 0 };
+            before = now;
+            if met >= ROUNDS {
+                break;
+            }
+            let left = self.options.calls - self.counted.calls();
+            let batch = self.options.batch.min(left);
+            let next = predicted.choose(&process, batch, &random.named("choice"));
+            if next.rows() == 0 {
+                break;
+            }
+            self.call(&next)?;
+            round += 1;
+        }
+        self.estimate(met >= ROUNDS)
+    }
+
+    /// Latin hypercube of normal variables with a larger spread, and the origin.
+    fn first(&self, count: usize) -> Matrix {
+        if let Some(draws) = self.state.draws() {
+            let mut rows = permutation(&mut self.stream.named("first").generator(), draws.rows());
+            rows.truncate(count);
+            return draws.select_rows(&rows);
+        }
+        let mut rng = self.stream.named("first").generator();
+        let others = count - 1;
+        let mut points = Matrix::zeros(count, self.state.dimension());
+        for j in 0..points.columns() {
+            for (i, cell) in permutation(&mut rng, others).into_iter().enumerate() {
+                let p = (cell as f64 + uniform(&mut rng)) / others as f64;
+                points[(i + 1, j)] = SPREAD * normal_quantile(p);
+            }
+        }
+        points
+    }
+
+    fn call(&mut self, points: &Matrix) -> Result<(), Stop> {
+        let values = self.counted.values(points)?;
+        for (point, value) in points.iter_rows().zip(values) {
+            if value.is_finite() {
+                self.points.push_row(point);
+                self.values.push(value);
+            }
+        }
+        Ok(())
+    }
+
+    fn fitted(&self, random: &Stream) -> Result<Process, Stop> {
+        let stream = random.named("fit");
+        let found = Process::fit(self.options.kernel, &self.points, &self.values, &stream);
+        found.ok_or_else(|| {
+            let message =
+                "no Gaussian process fits the limit state: its values are all equal, or too few";
+            Stop::new(message)
+                .help("use `subset_simulation`, or a larger number of `initial` calls")
+        })
+    }
+
+    /// Subset simulation with the mean of the process, and the predictions at its samples.
+    fn predicted(
+        &self,
+        process: &Process,
+        samples: usize,
+        random: &Stream,
+    ) -> Result<(Outcome, Predicted), Stop> {
+        let values = |points: &Matrix| Ok(process.mean(points));
+        let log_weights = |points: &Matrix| self.state.log_weights(points);
+        let problem = Simulated {
+            dimension: self.state.dimension(),
+            values: &values,
+            log_weights: (!self.state.is_standard_normal()).then_some(&log_weights),
+            draws: self.state.draws(),
+        };
+        let settings = Settings { samples, share: SHARE, levels: LEVELS };
+        let outcome = simulate(&problem, settings, &random.named("subsets"))?;
+        let (points, weights) = outcome.weighted();
+        Ok((outcome, Predicted::new(process, points, weights)))
+    }
+
+    fn estimate(&self, converged: bool) -> Result<Estimate, Stop> {
+        let random = self.stream.named("final");
+        let process = self.fitted(&random)?;
+        let (outcome, predicted) = self.predicted(&process, self.options.final_samples, &random)?;
+        let probability = outcome.probability;
+        let doubt: f64 = predicted.doubts().iter().sum();
+        let mut warnings: Vec<String> = self.counted.warning().into_iter().collect();
+        if !outcome.reached {
+            warnings
+                .push("the Gaussian process has no failure region within its levels".to_owned());
+        } else if !converged {
+            let share = 100.0 * doubt / probability;
+            warnings.push(format!(
+                "the calls end before the sign of the process is sure: its expected error is {share:.1} % of the probability"
+            ));
+        }
+        let usable = outcome.reached && probability > 0.0;
+        let variation = outcome.variation.hypot(doubt / probability);
+        let interval = usable.then(|| {
+            let [low, high] = [TWO_SIDED, -TWO_SIDED].map(|s| predicted.probability(s));
+            let sampled = log_normal(1.0, outcome.variation);
+            [low.min(probability) * sampled[0], (high.max(probability) * sampled[1]).min(1.0)]
+        });
+        Ok(Estimate {
+            probability,
+            variation: usable.then_some(variation),
+            interval,
+            calls: self.counted.calls(),
+            undefined: self.counted.undefined(),
+            failures: Some(self.counted.failures()),
+            design_points: Vec::new(),
+            converged: converged && outcome.reached,
+            warnings,
+        })
+    }
+}
