@@ -5,8 +5,8 @@
 //!
 //! ```text
 //! emulated  design  simulate  read  surrogate  calibrate (repeated to refine) ┐
-//! direct                      read             calibrate                      ┴ evidence validate quantities assess gap report
-//! target                                       calibrate                        evidence          quantities assess     report
+//! direct                      read             calibrate                      ┴ evidence validate quantities reliability assess gap report
+//! target                                       calibrate                        evidence          quantities reliability assess     report
 //! ```
 
 use lacuna::plugin::Density;
@@ -31,7 +31,7 @@ use crate::stage::predictions::Predicting;
 use crate::stage::surrogate::Fitting;
 use crate::stage::{
     assess, calibrate, contents, design, evidence, inference_data, low_fidelity, manifest,
-    numerical_error, quantities, read, refine, simulate, surrogate, target, validate,
+    numerical_error, quantities, read, refine, reliability, simulate, surrogate, target, validate,
 };
 use crate::study::Study;
 
@@ -190,12 +190,14 @@ fn conclude(
     let weighed = weigh(study, problem, calibrated, run, observer)?;
     let validated = validate::stage(study, problem, calibrated, run, observer)?;
     let quantified = quantities::stage(study, problem, calibrated, run, observer)?;
+    let rare = reliability::stage(study, problem, calibrated, run, observer)?;
     let made = Artifacts {
         problem: Some(problem),
         calibrated,
         weighed: weighed.as_ref(),
         validated: validated.as_ref(),
         quantities: quantified.as_ref(),
+        reliability: rare.as_ref(),
     };
     let assessed = assess::stage(study, &made, run, observer)?;
     let gap = match goal {
@@ -261,6 +263,7 @@ fn sample_target(
     let calibrated = target::stage(study, target, &posterior, run, observer)?;
     let weighed = evidence::stage(study, &posterior, &calibrated, None, run, observer)?;
     let quantified = quantities::of_target(study, &calibrated, run, observer)?;
+    let rare = reliability::of_target(study, &posterior, &calibrated, run, observer)?;
     let finished = inference_data::Finished {
         calibrated: &calibrated,
         weighed: Some(&weighed),
@@ -274,6 +277,7 @@ fn sample_target(
         weighed: Some(&weighed),
         validated: None,
         quantities: quantified.as_ref(),
+        reliability: rare.as_ref(),
     };
     let assessed = assess::stage(study, &made, run, observer)?;
     let results = report::Results { artifacts: made, assessed: &assessed, gap: None };

@@ -27,6 +27,8 @@ pub enum Stage {
     Validate,
     /// Predicts the quantities of interest.
     Quantities,
+    /// Estimates the probabilities of rare events.
+    Reliability,
     /// Checks whether the result can be trusted.
     Assess,
     /// Searches for physics that is missing in the model.
@@ -55,7 +57,7 @@ pub enum Depends {
 
 impl Stage {
     /// All stages, in order.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::Design,
         Self::Simulate,
         Self::Read,
@@ -65,6 +67,7 @@ impl Stage {
         Self::Evidence,
         Self::Validate,
         Self::Quantities,
+        Self::Reliability,
         Self::Assess,
         Self::Gap,
         Self::Show,
@@ -86,6 +89,7 @@ impl Stage {
             Self::Evidence => (6, "evidence", OnVersion(2)),
             Self::Validate => (6, "validate", OnVersion(4)),
             Self::Quantities => (6, "quantities", OnVersion(1)),
+            Self::Reliability => (6, "reliability", OnVersion(1)),
             Self::Assess => (6, "assess", OnVersion(6)),
             Self::Gap => (7, "gap", OnVersion(4)),
             Self::Show => (7, "show", OnVersion(1)),
@@ -179,6 +183,7 @@ mod tests {
                 "6-evidence",
                 "6-validate",
                 "6-quantities",
+                "6-reliability",
                 "6-assess",
                 "7-gap",
                 "7-show",

@@ -5,11 +5,12 @@ use lacuna::math::special::normal_quantile;
 use lacuna::plugin::reliability::{Estimate, LimitState};
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
+use lacuna_linalg::vector::norm;
 
 use super::ActiveKriging;
 use super::choice::Predicted;
 use super::process::Process;
-use crate::reliability::common::{Counted, log_normal};
+use crate::reliability::common::{Counted, log_normal, normals};
 use crate::reliability::subset_simulation::{Outcome, Settings, Simulated, simulate};
 
 /// Calls of the model and the processes fitted to them.
@@ -29,8 +30,9 @@ const SHARE: f64 = 0.1;
 const LEVELS: usize = 13;
 /// Two-sided 95 % of a normal distribution.
 const TWO_SIDED: f64 = 1.959_963_984_540_054;
-/// Rounds in a row that must meet the criteria.
-const ROUNDS: usize = 2;
+/// Candidates for a check, and their distance beyond that of the probability.
+const REMOTE: usize = 500;
+const BEYOND: f64 = 0.5;
 
 impl<'a> Learning<'a> {
     /// Learning before the first call.
@@ -49,31 +51,66 @@ impl<'a> Learning<'a> {
         let d = self.state.dimension();
         let count = self.options.initial.unwrap_or((2 * d + 2).max(6)).min(self.options.calls);
         self.call(&self.first(count))?;
-        let (mut met, mut before) = (0, f64::NAN);
-        let mut round = 0;
-        while self.counted.calls() < self.options.calls {
+        let wanted = self.options.checks.unwrap_or((2 * d).clamp(4, 10));
+        let (mut passed, mut before, mut round) = (0, f64::NAN, 0);
+        while passed < wanted && self.counted.calls() < self.options.calls {
             let random = self.stream.named("round").at(round);
+            round += 1;
             let process = self.fitted(&random)?;
-            let predicted = self.predicted(&process, self.options.samples, &random)?.1;
+            let (outcome, predicted) = self.predicted(&process, self.options.samples, &random)?;
             let now = predicted.probability(0.0);
             let doubt: f64 = predicted.doubts().iter().sum();
-            let steady = (now - before).abs() <= 3.0 * self.options.precision * now.max(before);
-            let sure = now > 0.0 && doubt <= self.options.precision * now;
-            met = if sure && steady { met + 1 } else { 0 };
+            let steady = (now - before).abs() <= 0.5 * now.max(before) || passed > 0;
+            let sure = outcome.reached && doubt <= self.options.precision * now;
             before = now;
-            if met >= ROUNDS {
-                break;
-            }
             let left = self.options.calls - self.counted.calls();
             let batch = self.options.batch.min(left);
             let next = predicted.choose(&process, batch, &random.named("choice"));
-            if next.rows() == 0 {
-                break;
+            if (sure && steady) || next.rows() == 0 {
+                let check = self.remote(&predicted, now, &random.named("check"));
+                passed = if self.confirmed(&process, &check)? { passed + 1 } else { 0 };
+            } else {
+                passed = 0;
+                self.call(&next)?;
             }
-            self.call(&next)?;
-            round += 1;
         }
-        self.estimate(met >= ROUNDS)
+        self.estimate(passed >= wanted)
+    }
+
+    /// The point farthest from all calls among those that would matter if they failed: on the sphere just beyond the distance
+    /// that belongs to the probability; among the samples of a posterior.
+    fn remote(&self, predicted: &Predicted, probability: f64, random: &Stream) -> Vec<f64> {
+        let candidates = if self.state.draws().is_some() {
+            let count = predicted.points.rows();
+            let mut rows = permutation(&mut random.generator(), count);
+            rows.truncate(REMOTE);
+            predicted.points.select_rows(&rows)
+        } else {
+            let radius = (-normal_quantile(probability.clamp(1e-12, 0.3))).max(1.0) + BEYOND;
+            let mut points = normals(REMOTE, self.state.dimension(), &mut random.generator());
+            for i in 0..REMOTE {
+                let factor = radius / norm(points.row(i)).max(1e-12);
+                points.row_mut(i).iter_mut().for_each(|x| *x *= factor);
+            }
+            points
+        };
+        let nearest = |u: &[f64]| {
+            let square = |v: &[f64]| u.iter().zip(v).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+            self.points.iter_rows().map(square).fold(f64::INFINITY, f64::min)
+        };
+        let distances: Vec<f64> = candidates.iter_rows().map(nearest).collect();
+        let best = (0..distances.len()).max_by(|&a, &b| distances[a].total_cmp(&distances[b]));
+        candidates.row(best.unwrap_or(0)).to_vec()
+    }
+
+    /// Calls the model at a point; true if the process had the sign of the value.
+    fn confirmed(&mut self, process: &Process, point: &[f64]) -> Result<bool, Stop> {
+        let point = Matrix::from_vec(1, point.len(), point.to_vec());
+        let mean = process.mean(&point)[0];
+        let before = self.values.len();
+        self.call(&point)?;
+        let value = self.values.get(before).copied();
+        Ok(value.is_none_or(|value| (value <= 0.0) == (mean <= 0.0)))
     }
 
     /// Latin hypercube of normal variables with a larger spread, and the origin.
@@ -158,8 +195,8 @@ impl<'a> Learning<'a> {
         let variation = outcome.variation.hypot(doubt / probability);
         let interval = usable.then(|| {
             let [low, high] = [TWO_SIDED, -TWO_SIDED].map(|s| predicted.probability(s));
-            let sampled = log_normal(1.0, outcome.variation);
-            [low.min(probability) * sampled[0], (high.max(probability) * sampled[1]).min(1.0)]
+            let [low, high] = [low.min(probability), high.max(probability)];
+            [log_normal(low, outcome.variation)[0], log_normal(high, outcome.variation)[1]]
         });
         Ok(Estimate {
             probability,

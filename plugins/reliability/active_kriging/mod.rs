@@ -41,6 +41,11 @@ pub struct ActiveKriging {
     /// Doubt at which the refinement ends: the expected probability of a wrong sign, as a share of the probability of
     /// failure.
     pub precision: f64,
+    /// Number of calls in a row that must confirm the sign of the process when the doubt is small: each at the point farthest from
+    /// all others at the distance at which a failure region would matter, so that a part of the failure region far from
+    /// those already found is not missed. Default: twice the number of parameters, at least 4 and at most 10.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub checks: Option<usize>,
     /// Number of samples of each level while the process is refined. They cost no calls.
     pub samples: usize,
     /// Number of samples of each level for the final probability.
@@ -56,8 +61,9 @@ impl Default for ActiveKriging {
             calls: 200,
             batch: 1,
             precision: 0.05,
+            checks: None,
             samples: 2000,
-            final_samples: 50_000,
+            final_samples: 200_000,
             kernel: Kernel::default(),
         }
     }

@@ -105,10 +105,12 @@ impl Process {
         mean.as_slice().iter().map(|m| self.centre + self.scale * m).collect()
     }
 
-    /// Standard deviations at the rows of points.
+    /// Standard deviations at the rows of points, enlarged if the errors of the left-out runs are larger than the process
+    /// says.
     pub fn deviation(&self, points: &Matrix) -> Vec<f64> {
         let variance = self.field.variance(&points.transposed(), &self.trend.values(points));
-        variance.as_slice().iter().map(|v| self.scale * v.sqrt()).collect()
+        let factor = self.scale * self.field.left_out_ratio().max(1.0).sqrt();
+        variance.as_slice().iter().map(|v| factor * v.sqrt()).collect()
     }
 
     /// Covariances among the rows of points.

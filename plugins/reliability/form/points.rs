@@ -12,7 +12,11 @@ use crate::reliability::common::Counted;
 /// Share of the probability of the nearest point below which a further point ends the search.
 const NEGLIGIBLE: f64 = 0.01;
 /// Attempts at a search that has no slope at its start, or does not converge.
-const ATTEMPTS: usize = 3;
+const ATTEMPTS: usize = 2;
+/// Iterations of a search for a further point.
+const FURTHER: usize = 10;
+/// Distance of the first start from the origin, where a limit state may be symmetric and its slope lead to a saddle.
+const OFFSET: f64 = 0.2;
 
 /// Finds up to `most` design points, the nearest first; empty if no search converges.
 pub fn design_points(
@@ -26,18 +30,24 @@ pub fn design_points(
     let mut last: Option<Found> = None;
     for round in 0..most {
         let bulges: Vec<Bulge> = found.iter().map(Bulge::at).collect();
+        let further = Settings { iterations: settings.iterations.min(FURTHER), ..settings };
+        let settings = if round == 0 { settings } else { further };
         let mut next = None;
-        let attempts = if round == 0 { ATTEMPTS } else { 1 };
-        for attempt in 0..attempts {
+        for attempt in 0..ATTEMPTS {
             let mut start = opposite(&found, state.dimension());
-            if attempt > 0 || (round > 0 && norm(&start) < 0.1) {
-                let size = found.first().map_or(1.0, |f| 0.5 * f.design.distance.abs());
+            let size = found.first().map_or(OFFSET, |f| 0.5 * f.design.distance.abs());
+            if attempt > 0 || norm(&start) < 0.1 {
                 start = (0..state.dimension()).map(|_| normal(&mut rng)).collect();
-                let factor = size / norm(&start).max(1e-12);
+                let factor =
+                    if attempt > 0 { size.max(1.0) } else { size } / norm(&start).max(1e-12);
                 start.iter_mut().for_each(|x| *x *= factor);
             }
-            let ended = search(state, &start, &bulges, settings)?;
-            next = ended.clone().filter(|found| found.converged);
+            let mut ended = search(state, &start, &bulges, settings)?;
+            if let Some(inside) = ended.as_ref().filter(|f| !f.converged && f.settled) {
+                // A point inside a bulge may lie near another design point.
+                ended = search(state, &inside.design.point, &[], settings)?;
+            }
+            next = ended.clone().filter(|f| f.converged && !found.iter().any(|o| same(o, f)));
             last = last.or(ended);
             if next.is_some() {
                 break;
@@ -46,8 +56,7 @@ pub fn design_points(
         let Some(next) = next else { break };
         let share = normal_cdf(-next.design.distance);
         let most = found.iter().map(|f| normal_cdf(-f.design.distance)).fold(0.0, f64::max);
-        let known = found.iter().any(|other| same(other, &next));
-        if known || share < NEGLIGIBLE * most {
+        if share < NEGLIGIBLE * most {
             break;
         }
         found.push(next);

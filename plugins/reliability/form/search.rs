@@ -71,7 +71,9 @@ pub struct Found {
     pub slope: f64,
     /// Value there.
     pub value: f64,
-    /// True if the tolerances are met, outside all bulges.
+    /// True if the tolerances are met.
+    pub settled: bool,
+    /// True if they are met outside all bulges.
     pub converged: bool,
 }
 
@@ -97,7 +99,7 @@ pub fn search(
             break;
         }
         let found = reached(&u, value, &gradient, slope, bulges, settings, scale);
-        let done = found.converged;
+        let done = found.settled;
         best = Some(found);
         if done {
             break;
@@ -144,13 +146,15 @@ fn reached(
     let aside: f64 = u.iter().zip(&direction).map(|(u, a)| (u - along * a).powi(2)).sum();
     let near = value.abs() <= settings.tolerance * scale.max(slope);
     let aligned = aside.sqrt() <= settings.tolerance.sqrt() * 0.3 * norm(u).max(1.0);
-    let converged = near && aligned && !bulges.iter().any(|bulge| bulge.holds(u));
+    let settled = near && aligned;
+    let converged = settled && !bulges.iter().any(|bulge| bulge.holds(u));
     // The limit state is linear over the remaining value.
     let distance = along + value / slope;
     Found {
         design: DesignPoint { point: u.to_vec(), distance, direction },
         slope,
         value,
+        settled,
         converged,
     }
 }

@@ -158,6 +158,17 @@ impl Field {
         })
     }
 
+    /// Returns the mean square of the leave-one-out residuals of the first component in units of their own standard
+    /// deviations `s / sqrt(P_ii)`; above one for a process that is too sure of itself.
+    pub fn left_out_ratio(&self) -> f64 {
+        let precisions = self.factor.precisions();
+        let n = precisions.len() as f64;
+        let square = |(i, (p, k)): (usize, &(f64, f64))| {
+            self.alpha[(0, i)].powi(2) / (p.max(1e-13 * k) * self.variances[0])
+        };
+        precisions.iter().enumerate().map(square).sum::<f64>() / n
+    }
+
     fn correlations(&self, points: &Matrix) -> Matrix {
         self.kernel.between(&measured(points, &self.choice.length_scales), &self.points)
     }

@@ -12,6 +12,7 @@ use crate::assess::Assessment;
 
 pub use crate::gap::result::GapFindings;
 pub use crate::stage::quantities::{InputShare, Propagated, QuantityFindings};
+pub use crate::stage::reliability::RareEvent;
 use crate::stage::screen::FlaggedCurve;
 use crate::stage::validate::ValidationFindings;
 
@@ -46,6 +47,8 @@ pub struct Findings {
     pub quantities: Vec<QuantityFindings>,
     /// Propagated priors of a study without data.
     pub propagated: Option<Propagated>,
+    /// Probabilities of rare events.
+    pub reliability: Vec<RareEvent>,
     /// Result of the gap search.
     pub gap: Option<GapFindings>,
     /// Version of Lacuna that computed the result of each stage.

@@ -95,6 +95,7 @@ fn findings(
         validation,
         quantities: all.quantities.map(|kept| kept.value.findings()).unwrap_or_default(),
         propagated: all.quantities.and_then(|kept| kept.value.propagated.clone()),
+        reliability: all.reliability.map(|kept| kept.value.events.clone()).unwrap_or_default(),
         gap: results.gap.map(|kept| GapFindings {
             result: kept.value.clone(),
             hash: kept.hash.clone(),

@@ -5,7 +5,7 @@ use lacuna::run::Stop;
 use super::findings::Findings;
 use super::section::{
     accuracy_table, banner, evidence, group_word, headline, posterior_table, quantity_table,
-    share_table, view, without_table,
+    reliability_table, share_table, view, without_table,
 };
 use crate::gap::next::Wanted;
 use crate::gap::report;
@@ -35,6 +35,10 @@ pub fn summary_text(findings: &Findings) -> String {
             "{title}\n{}",
             accuracy_table(group_word(&findings.layouts), &validation.cases).text()
         ));
+    }
+    if !findings.reliability.is_empty() {
+        let table = reliability_table(&findings.reliability).text();
+        parts.push(format!("probabilities of rare events\n{table}"));
     }
     if !findings.quantities.is_empty() {
         let table = quantity_table(&findings.quantities).text();

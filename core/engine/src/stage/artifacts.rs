@@ -7,6 +7,7 @@ use super::evidence::Weighed;
 use super::inverse_problem::InverseProblem;
 use super::quantities::Quantified;
 use super::read::Measured;
+use super::reliability::RareEvents;
 use super::validate::Validated;
 
 /// The artifacts of these stages, as far as the study has them.
@@ -22,6 +23,8 @@ pub struct Artifacts<'a> {
     pub validated: Option<&'a Kept<Validated>>,
     /// The predicted quantities.
     pub quantities: Option<&'a Kept<Quantified>>,
+    /// The probabilities of rare events.
+    pub reliability: Option<&'a Kept<RareEvents>>,
 }
 
 impl<'a> Artifacts<'a> {

@@ -26,6 +26,7 @@ pub mod predictions;
 pub mod quantities;
 pub mod read;
 pub mod refine;
+pub mod reliability;
 pub mod results;
 pub mod sampling;
 pub mod screen;

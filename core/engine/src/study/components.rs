@@ -40,13 +40,15 @@ impl Study {
         }
     }
 
-    /// The plugins of all sections in the order in which a study is written; every `[[effect]]` and
-    /// every `[[quantity]]` is one.
+    /// The plugins of all sections in the order in which a study is written; every `[[effect]]`,
+    /// `[[quantity]]` and `[[reliability]]` is one.
     pub fn components(&self) -> Vec<Chosen<'_>> {
         let mut all = self.plugins.chosen();
         all.extend(self.effects.iter().map(|e| Chosen::of("effect", &e.built, &*e.built.plugin)));
         let asked = self.quantities.iter();
         all.extend(asked.map(|q| Chosen::of("quantity", &q.built, &*q.built.plugin)));
+        let rare = self.reliability.iter();
+        all.extend(rare.map(|r| Chosen::of("reliability", &r.built, &*r.built.plugin)));
         all
     }
 
@@ -95,6 +97,7 @@ impl Study {
         }
         all.extend(self.effects.iter().map(|effect| ("effect", &effect.built.options)));
         all.extend(self.quantities.iter().map(|q| ("quantity", &q.built.options)));
+        all.extend(self.reliability.iter().map(|r| ("reliability", &r.built.options)));
         all.extend(self.tried().map(of));
         all
     }

@@ -9,6 +9,7 @@ mod next;
 mod noise;
 mod outputs;
 mod quantities;
+mod reliability;
 mod runs;
 
 use lacuna::data::{Layout, Parameter, Scenario};
@@ -57,6 +58,9 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     if problems.len() == before {
         quantities::check(study, root, problems);
     }
+    if problems.len() == before {
+        reliability::check(study, root, problems);
+    }
     each_plugin(study, root, problems, |_, component, context, complaints| {
         component.check(context, complaints);
     });
@@ -64,8 +68,17 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
 
 /// Reports sections that have no use beside `[target]`, which replaces everything that makes up a likelihood.
 fn beside_a_target(study: &Study, root: &Node, complaints: &mut Complaints<'_>) {
-    const ALONE: [&str; 8] =
-        ["study", "parameter", "start", "derived", "target", "executor", "sampler", "quantity"];
+    const ALONE: [&str; 9] = [
+        "study",
+        "parameter",
+        "start",
+        "derived",
+        "target",
+        "executor",
+        "sampler",
+        "quantity",
+        "reliability",
+    ];
     for (key, _) in root.entries().iter().filter(|(key, _)| !ALONE.contains(&key.name.as_str())) {
         complaints
             .at(&key.name)
@@ -284,12 +297,13 @@ pub(super) fn each_plugin(
     let unwritten = Node::table(root.place.clone());
     let elements = |list: &str| root.find(list).map(Node::elements).unwrap_or_default().iter();
     let (mut effects, mut candidates) = (elements("effect"), elements("gap.candidate"));
-    let mut quantities = elements("quantity");
+    let (mut quantities, mut rare) = (elements("quantity"), elements("reliability"));
     let all = study.components().into_iter().chain(study.of_other_cost()).chain(study.tried());
     for Chosen { section, plugin, .. } in all {
         let node = match section {
             "effect" => effects.next(),
             "quantity" => quantities.next(),
+            "reliability" => rare.next(),
             "gap.candidate" => candidates.next(),
             _ => root.find(section),
         };

@@ -16,6 +16,7 @@ pub mod overrides;
 mod plain;
 pub mod positions;
 pub mod quantity;
+pub mod reliability;
 pub mod resolve;
 mod resolved;
 pub mod scenario;

@@ -17,6 +17,7 @@ use super::libraries::Libraries;
 use super::positions::Positions;
 use super::quantity::QuantitySection;
 use super::start::StartSection;
+use super::reliability::ReliabilitySection;
 use super::table::PluginSections;
 use super::unknowns::Unknown;
 
@@ -65,6 +66,8 @@ pub struct Study {
     pub quantities: Vec<QuantitySection>,
     /// `[forward]`.
     pub forward: Option<ForwardSection>,
+    /// `[[reliability]]`.
+    pub reliability: Vec<ReliabilitySection>,
     /// `[validate]`.
     pub validate: ValidateSection,
     /// `[gap]`.
@@ -105,6 +108,7 @@ impl Study {
             effects: Vec::new(),
             quantities: Vec::new(),
             forward: None,
+            reliability: Vec::new(),
             validate: ValidateSection::default(),
             gap,
             resolved: Table::new(),

@@ -22,7 +22,7 @@ use super::libraries::{Libraries, Seen, libraries};
 pub use super::plain::Study;
 use super::positions::positions;
 use super::sections::{
-    derived, effects, layouts, name, parameters, quantities, scenarios, starts, table,
+    derived, effects, layouts, name, parameters, quantities, reliability, scenarios, starts, table,
     unknown_sections,
 };
 use super::table::{self, PluginSections, SECTIONS};
@@ -181,6 +181,7 @@ fn structure(
     let effects = effects(root, problems);
     let quantities = quantities(root, problems);
     let forward = forward(root, problems);
+    let reliability = reliability(root, problems);
     let validate = match root.get("validate") {
         Some(node) => problems.within("validate", |problems| decode(node, problems)),
         None => Some(ValidateSection::default()),
@@ -231,6 +232,7 @@ fn structure(
         effects: effects?,
         quantities: quantities?,
         forward,
+        reliability: reliability?,
         validate: validate?,
         gap: gap?,
         resolved: Table::new(),

@@ -79,6 +79,10 @@ pub(super) fn table(
     if let Some(forward) = &study.forward {
         later.insert("forward", to_table(forward)?.into());
     }
+    if !study.reliability.is_empty() {
+        let rare: Result<Vec<Table>, _> = study.reliability.iter().map(written).collect();
+        later.insert("reliability", rare?.into());
+    }
     later.insert("validate", to_table(&study.validate)?.into());
     later.insert("gap", gap(&study.gap)?.into());
     for name in SECTIONS {

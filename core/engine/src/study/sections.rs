@@ -16,6 +16,7 @@ use super::file::{
     StudySection,
 };
 use super::quantity::QuantitySection;
+use super::reliability::ReliabilitySection;
 use super::sizes;
 use super::start::StartSection;
 use super::table::SECTIONS;
@@ -95,6 +96,11 @@ pub(super) fn quantities(root: &Node, problems: &mut Problems) -> Option<Vec<Qua
 /// `[[start]]`.
 pub(super) fn starts(root: &Node, problems: &mut Problems) -> Option<Vec<StartSection>> {
     named(root, "start", problems, decode)
+}
+
+/// `[[reliability]]`.
+pub(super) fn reliability(root: &Node, problems: &mut Problems) -> Option<Vec<ReliabilitySection>> {
+    named(root, "reliability", problems, |node, problems| section(node, None, problems))
 }
 
 /// `[[derived]]`.

@@ -8,8 +8,8 @@
 use lacuna::plugin::manual::Manual;
 use lacuna::plugin::registry::{Built, Kind, NoKeys, Section, section};
 use lacuna::plugin::{
-    Component, Density, Design, Discrepancy, Effect, Executor, Model, Quantity, Reader, Sampler,
-    Surrogate,
+    Component, Density, Design, Discrepancy, Effect, Executor, Model, Quantity, Reader,
+    Reliability, Sampler, Surrogate,
 };
 use lacuna::text::decode::fields;
 use lacuna::text::emit::{Unwritable, to_table};
@@ -27,6 +27,7 @@ use super::forward::ForwardSection;
 use super::gap::GapSection;
 use super::libraries::PluginsSection;
 use super::quantity::QuantityKeys;
+use super::reliability::ReliabilityKeys;
 use super::schema::{Language, page};
 use super::start::StartSection;
 
@@ -144,6 +145,7 @@ sections! {
     sampler: plugin(Sampler, SamplerKeys);
     quantity: plugins(Quantity, QuantityKeys);
     forward: table(ForwardSection);
+    reliability: plugins(Reliability, ReliabilityKeys);
     validate: table(ValidateSection);
     gap: table(GapSection);
 }

@@ -9,6 +9,7 @@ mod measurements;
 mod overview;
 mod posterior;
 mod quantities;
+mod reliability;
 mod sampling;
 mod surrogate;
 mod timing;
@@ -26,6 +27,7 @@ use crate::page::{Numbers, Section};
 pub use forward::share_table;
 pub use posterior::posterior_table;
 pub use quantities::{quantity_table, without_table};
+pub use reliability::reliability_table;
 pub use validation::accuracy_table;
 
 /// All sections with content, in order.
@@ -41,6 +43,7 @@ pub fn all(findings: &Findings, numbers: &mut Numbers) -> Vec<Section> {
         validation::section(findings, numbers),
         quantities::section(findings, numbers),
         forward::section(findings, numbers),
+        reliability::section(findings, numbers),
         findings.gap.as_ref().map(|gap| report::section(&view(findings), gap, numbers)),
         timing::section(findings, numbers),
     ];

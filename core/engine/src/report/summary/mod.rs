@@ -10,6 +10,7 @@ mod inputs;
 mod keys;
 mod posterior;
 mod quantities;
+mod reliability;
 mod schema;
 mod surrogate;
 mod validation;
@@ -22,6 +23,7 @@ use self::gap::Gap;
 use self::inputs::{Data, Runs};
 use self::posterior::Calibration;
 use self::quantities::PredictedQuantity;
+use self::reliability::Probability;
 use self::surrogate::Surrogate;
 use self::validation::Validation;
 use super::findings::Findings;
@@ -78,6 +80,10 @@ pub struct Summary {
     #[serde(skip_serializing_if = "ByName::is_empty")]
     #[schemars(extend("propertyNames" = { "title": "name" }))]
     pub quantities: ByName<PredictedQuantity>,
+    /// Probabilities of rare events (`[[reliability]]`).
+    #[serde(skip_serializing_if = "ByName::is_empty")]
+    #[schemars(extend("propertyNames" = { "title": "name" }))]
+    pub reliability: ByName<Probability>,
     /// Result of the gap search (`lacuna gap STUDY`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gap: Option<Gap>,
@@ -106,6 +112,7 @@ pub fn summary(findings: &Findings) -> Summary {
         calibration: findings.calibration.as_ref().map(|found| Calibration::of(findings, found)),
         validation: findings.validation.as_ref().map(Validation::of),
         quantities: quantities::by_name(&findings.quantities),
+        reliability: reliability::by_name(&findings.reliability),
         gap: findings.gap.as_ref().map(Gap::of),
         seconds: quantities(&findings.seconds),
         made_by: findings.made_by.iter().cloned().collect(),

@@ -50,6 +50,7 @@ pub fn findings() -> Findings {
         layouts: layout.into(),
         quantities: Vec::new(),
         propagated: None,
+        reliability: Vec::new(),
         gap: None,
         made_by: vec![("calibrate".to_owned(), "0.0.9".to_owned())],
         assessment: crate::assess::Assessment::default(),

@@ -1,0 +1,191 @@
+//! Stage 6: probabilities of rare events.
+//!
+//! The limit state is the difference between a limit and a quantity of interest of the response: that of the emulator if the
+//! study has one, otherwise that of the model. It contains the uncertainty of the parameters and none of the errors of the
+//! prediction.
+
+mod findings;
+mod state;
+
+use lacuna::plugin::reliability::{DesignPoint, Estimate, LimitState};
+use lacuna::plugin::{Density, Target};
+use lacuna::run::{Observer, Progress, Stop};
+use lacuna_linalg::Matrix;
+use lacuna_run::{Kept, RunDirectory, Stage};
+use serde_json::{Value, json};
+
+pub use self::findings::{FoundPoint, RareEvent, RareEvents};
+use self::state::{Evaluation, OfPosterior, OfPrior};
+use super::calibrate::{Calibrated, Parts};
+use super::stream;
+use crate::posterior::Posterior;
+use crate::stage::inverse_problem::InverseProblem;
+use crate::study::Study;
+use crate::study::reliability::{Event, ReliabilitySection, Source};
+
+/// Probabilities of a study with a model; `None` if it asks for none.
+pub fn stage(
+    study: &Study,
+    problem: &InverseProblem<'_>,
+    calibrated: Option<&Kept<Calibrated>>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Option<Kept<RareEvents>>, Stop> {
+    let inputs = json!([
+        problem.data.hash,
+        problem.origin(),
+        calibrated.map(|kept| &kept.hash),
+        asked_for(study),
+    ]);
+    estimated(study, &inputs, run, observer, |work| {
+        let evaluation = Evaluation::new(study, Some(problem.forward()));
+        let parts = match &problem.data.value.measured {
+            Some(measured) if calibrated.is_some() => Some(Parts::of(study, measured, problem)?),
+            _ => None,
+        };
+        let posterior = parts.as_ref().map(|parts| parts.posterior(study, problem));
+        work.all(&evaluation, posterior.as_ref().zip(calibrated.map(|kept| &kept.value)))
+    })
+}
+
+/// Probabilities of a study whose log density is given.
+pub fn of_target(
+    study: &Study,
+    posterior: &Posterior<'_>,
+    calibrated: &Kept<Calibrated>,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+) -> Result<Option<Kept<RareEvents>>, Stop> {
+    let inputs = json!([calibrated.hash, asked_for(study)]);
+    estimated(study, &inputs, run, observer, |work| {
+        let evaluation = Evaluation::new(study, None);
+        work.all(&evaluation, Some((posterior, &calibrated.value)))
+    })
+}
+
+/// Everything of the study that the probabilities depend on, besides its posterior.
+fn asked_for(study: &Study) -> Value {
+    let sections = study.reliability.iter().map(|r| json!((r.built.identity(), &r.common)));
+    let quantities = study.quantities.iter().map(|q| json!((q.built.identity(), &q.common)));
+    json!([
+        sections.collect::<Vec<_>>(),
+        quantities.collect::<Vec<_>>(),
+        study.parameters,
+        study.derived_sections,
+        study.scenarios,
+        study.model.as_ref().map(|model| &model.common.fixed),
+        study.about.seed,
+    ])
+}
+
+fn estimated(
+    study: &Study,
+    inputs: &Value,
+    run: &mut RunDirectory,
+    observer: &dyn Observer,
+    make: impl FnOnce(&Work<'_>) -> Result<RareEvents, Stop>,
+) -> Result<Option<Kept<RareEvents>>, Stop> {
+    if study.reliability.is_empty() {
+        return Ok(None);
+    }
+    observer.begin(Stage::Reliability.label(), "call", 0);
+    let kept = run.keep(&Stage::Reliability.folder(), inputs, observer, |_| {
+        make(&Work { study, progress: &Progress::new(observer) })
+    })?;
+    for event in &kept.value.events {
+        for warning in &event.warnings {
+            observer.warn(&format!("the probability `{}`: {warning}", event.name));
+        }
+    }
+    let count = kept.value.events.len();
+    let word = if count == 1 { "probability" } else { "probabilities" };
+    observer.end(Stage::Reliability.label(), &format!("{count} {word}"));
+    Ok(Some(kept))
+}
+
+struct Work<'a> {
+    study: &'a Study,
+    progress: &'a Progress<'a>,
+}
+
+impl Work<'_> {
+    fn all(
+        &self,
+        evaluation: &Evaluation<'_>,
+        posterior: Option<(&Posterior<'_>, &Calibrated)>,
+    ) -> Result<RareEvents, Stop> {
+        let sections = self.study.reliability.iter();
+        let events = sections.map(|section| self.one(section, evaluation, posterior));
+        Ok(RareEvents { events: events.collect::<Result<_, _>>()? })
+    }
+
+    fn one(
+        &self,
+        section: &ReliabilitySection,
+        evaluation: &Evaluation<'_>,
+        posterior: Option<(&Posterior<'_>, &Calibrated)>,
+    ) -> Result<RareEvent, Stop> {
+        let event = Event::of(self.study, section, &evaluation.asked).map_err(|misfits| {
+            let first = misfits.into_iter().next().map_or_else(String::new, |m| m.message);
+            Stop::new(format!("reliability `{}`: {first}", section.common.name.as_str()))
+        })?;
+        match (event.source, posterior) {
+            (Source::Prior, _) => {
+                let state = OfPrior { evaluation, event, parameters: &self.study.parameters };
+                let estimate = self.estimate(section, &state)?;
+                Ok(self.found(section, event, evaluation, estimate, |p| state.natural(&p.point)))
+            }
+            (Source::Posterior, Some((posterior, calibrated))) => {
+                let state = OfPosterior::new(evaluation, event, posterior, calibrated)?;
+                let estimate = self.estimate(section, &state)?;
+                Ok(self.found(section, event, evaluation, estimate, |p| state.natural(&p.point)))
+            }
+            (Source::Posterior, None) => Err(Stop::new("the study has no posterior")
+                .help("state `distribution = \"prior\"` in `[[reliability]]`")),
+        }
+    }
+
+    fn estimate(
+        &self,
+        section: &ReliabilitySection,
+        state: &dyn LimitState,
+    ) -> Result<Estimate, Stop> {
+        let random = stream(self.study, "reliability").named(section.common.name.as_str());
+        section.built.plugin.estimate(state, &random, self.progress)
+    }
+
+    fn found(
+        &self,
+        section: &ReliabilitySection,
+        event: Event,
+        evaluation: &Evaluation<'_>,
+        estimate: Estimate,
+        natural: impl Fn(&DesignPoint) -> Vec<f64>,
+    ) -> RareEvent {
+        let names: Vec<String> = self.study.parameters.iter().map(|p| p.name.clone()).collect();
+        let asked = &evaluation.asked[event.value];
+        let points = estimate.design_points.iter().map(|point| FoundPoint {
+            distance: point.distance,
+            values: names.iter().cloned().zip(natural(point)).collect(),
+            importance: names.iter().cloned().zip(point.importance()).collect(),
+        });
+        RareEvent {
+            name: section.common.name.as_str().to_owned(),
+            quantity: asked.name.clone(),
+            unit: asked.unit.to_string(),
+            limit: event.limit,
+            above: event.above,
+            method: section.built.name.to_string(),
+            distribution: event.source.word().to_owned(),
+            design_points: points.collect(),
+            probability: estimate.probability,
+            variation: estimate.variation,
+            interval: estimate.interval,
+            calls: estimate.calls,
+            undefined: estimate.undefined,
+            failures: estimate.failures,
+            converged: estimate.converged,
+            warnings: estimate.warnings,
+        }
+    }
+}

@@ -1,0 +1,177 @@
+//! Limit states of a study: of its priors, and of its posterior.
+
+use lacuna::data::Parameter;
+use lacuna::math::moments::mean;
+use lacuna::math::special::normal_cdf;
+use lacuna::plugin::reliability::LimitState;
+use lacuna::plugin::{Forward, Target};
+use lacuna::run::Stop;
+use lacuna_linalg::vector::dot;
+use lacuna_linalg::{Cholesky, Matrix};
+
+use crate::posterior::Posterior;
+use crate::stage::calibrate::Calibrated;
+use crate::stage::predict;
+use crate::study::Study;
+use crate::study::derived::Derived;
+use crate::study::quantity::Asked;
+use crate::study::reliability::Event;
+
+/// Evaluation of the quantities of a study at points of its unknowns.
+pub struct Evaluation<'a> {
+    study: &'a Study,
+    forward: Option<&'a dyn Forward>,
+    /// The values that the study asks for.
+    pub asked: Vec<Asked>,
+    derived: Vec<Derived>,
+}
+
+impl<'a> Evaluation<'a> {
+    /// The quantities of a study, with the forward map of its response if it has one.
+    pub fn new(study: &'a Study, forward: Option<&'a dyn Forward>) -> Self {
+        Self { study, forward, asked: study.asked(), derived: study.derived() }
+    }
+
+    /// Limit state of an event at natural points, one per row.
+    fn values(&self, event: &Event, points: &Matrix) -> Result<Vec<f64>, Stop> {
+        let responses = match self.forward {
+            Some(forward) => predict::responses(self.study, forward, points),
+            None => vec![Vec::new(); points.rows()],
+        };
+        if let Some(reason) = self.forward.and_then(Forward::failure) {
+            return Err(Stop::new(reason));
+        }
+        let one = |(point, response): (&[f64], &Vec<f64>)| {
+            let derived: Vec<f64> = self.derived.iter().map(|d| d.value(point)).collect();
+            let mut values: Vec<f64> = Vec::with_capacity(event.value + 1);
+            for asked in &self.asked[..=event.value] {
+                values.push(asked.value(|i| response[i], (point, &derived, &values)));
+            }
+            let value = values[event.value];
+            if event.above { event.limit - value } else { value - event.limit }
+        };
+        Ok(points.iter_rows().zip(&responses).map(one).collect())
+    }
+}
+
+/// Limit state of independent priors: each variable is mapped through the inverse distribution function of a prior.
+pub struct OfPrior<'a> {
+    pub evaluation: &'a Evaluation<'a>,
+    pub event: Event,
+    pub parameters: &'a [Parameter],
+}
+
+/// Largest variable that is mapped: beyond it the distribution function rounds to one.
+const FARTHEST: f64 = 8.0;
+
+impl OfPrior<'_> {
+    /// Parameters at a point of the variables.
+    pub fn natural(&self, point: &[f64]) -> Vec<f64> {
+        let pairs = self.parameters.iter().zip(point);
+        pairs.map(|(p, u)| p.prior.quantile(normal_cdf(u.clamp(-FARTHEST, FARTHEST)))).collect()
+    }
+}
+
+impl LimitState for OfPrior<'_> {
+    fn dimension(&self) -> usize {
+        self.parameters.len()
+    }
+
+    fn values(&self, points: &Matrix) -> Result<Vec<f64>, Stop> {
+        let rows = points.iter_rows().map(|u| self.natural(u));
+        self.evaluation.values(&self.event, &Matrix::from_rows(self.dimension(), rows))
+    }
+}
+
+/// Limit state of a posterior: an affine map with the mean and the covariance of the draws, and a weight that makes it exact.
+pub struct OfPosterior<'a> {
+    evaluation: &'a Evaluation<'a>,
+    event: Event,
+    posterior: &'a Posterior<'a>,
+    centre: Vec<f64>,
+    factor: Cholesky,
+    draws: Matrix,
+}
+
+/// Smallest and largest number of draws of the first level.
+const DRAWS: [usize; 2] = [500, 20_000];
+
+impl<'a> OfPosterior<'a> {
+    /// The limit state, with as many draws as are about independent.
+    pub fn new(
+        evaluation: &'a Evaluation<'a>,
+        event: Event,
+        posterior: &'a Posterior<'a>,
+        calibrated: &Calibrated,
+    ) -> Result<Self, Stop> {
+        let draws = calibrated.draws.from_step(calibrated.outcome.burn_in);
+        let judged = &calibrated.outcome.diagnosis.coordinates;
+        let size = mean(&judged.iter().map(|j| j.ess_bulk).collect::<Vec<_>>());
+        let size = if size.is_finite() { size as usize } else { DRAWS[0] };
+        let count = size.clamp(DRAWS[0], DRAWS[1]).min(draws.len());
+        let place = |i: usize| draws.point(i % draws.chains, i / draws.chains);
+        let rows: Vec<Vec<f64>> = predict::spaced(count, draws.len())
+            .into_iter()
+            .map(|i| posterior.coordinates(&place(i)))
+            .collect();
+        let points = Matrix::from_rows(draws.dimension(), &rows);
+        let (centre, covariance) = spread(&points);
+        let factor = Cholesky::new(&covariance).map_err(|_| {
+            Stop::new("the draws of the posterior have no covariance of full rank")
+                .help("draw more samples")
+        })?;
+        let mut draws = points;
+        for i in 0..draws.rows() {
+            let row = draws.row_mut(i);
+            row.iter_mut().zip(&centre).for_each(|(x, m)| *x -= m);
+            factor.whiten(row);
+        }
+        Ok(Self { evaluation, event, posterior, centre, factor, draws })
+    }
+
+    fn coordinates(&self, point: &[f64]) -> Vec<f64> {
+        self.factor.colour(point).iter().zip(&self.centre).map(|(x, m)| x + m).collect()
+    }
+
+    /// Unknowns at a point of the variables, in natural units.
+    pub fn natural(&self, point: &[f64]) -> Vec<f64> {
+        self.posterior.natural(&self.coordinates(point))
+    }
+}
+
+impl LimitState for OfPosterior<'_> {
+    fn dimension(&self) -> usize {
+        self.centre.len()
+    }
+
+    fn values(&self, points: &Matrix) -> Result<Vec<f64>, Stop> {
+        let rows = points.iter_rows().map(|u| self.natural(u));
+        self.evaluation.values(&self.event, &Matrix::from_rows(self.dimension(), rows))
+    }
+
+    fn is_standard_normal(&self) -> bool {
+        false
+    }
+
+    fn log_weights(&self, points: &Matrix) -> Vec<f64> {
+        let rows = points.iter_rows().map(|u| self.coordinates(u));
+        let density = self.posterior.log_density(&Matrix::from_rows(self.dimension(), rows));
+        density.iter().zip(points.iter_rows()).map(|(p, u)| p + 0.5 * dot(u, u)).collect()
+    }
+
+    fn draws(&self) -> Option<&Matrix> {
+        Some(&self.draws)
+    }
+}
+
+/// Mean and covariance of the rows.
+fn spread(points: &Matrix) -> (Vec<f64>, Matrix) {
+    let d = points.columns();
+    let centre: Vec<f64> = (0..d).map(|j| mean(&points.column(j))).collect();
+    let n = (points.rows().max(2) - 1) as f64;
+    let sum = |i: usize, j: usize| {
+        points.iter_rows().map(|x| (x[i] - centre[i]) * (x[j] - centre[j])).sum::<f64>() / n
+    };
+    let covariance = Matrix::from_fn(d, d, sum);
+    (centre, covariance)
+}
