@@ -16,6 +16,8 @@ mod gain;
 mod models;
 #[path = "contracts/quantities.rs"]
 mod quantities;
+#[path = "contracts/reliability.rs"]
+mod reliability;
 #[path = "contracts/served.rs"]
 mod served;
 #[path = "contracts/skeletons.rs"]
@@ -114,6 +116,7 @@ fn every_kind_has_a_suite() {
         "model",
         "quantity",
         "reader",
+        "reliability",
         "sampler",
         "surrogate",
         "target",

@@ -10,7 +10,7 @@ use tempfile::TempDir;
 use crate::quick::{command, root, said};
 
 /// Each kind with its folder.
-const KINDS: [(&str, &str); 11] = [
+const KINDS: [(&str, &str); 12] = [
     ("design", "designs"),
     ("discrepancy", "discrepancies"),
     ("effect", "effects"),
@@ -18,6 +18,7 @@ const KINDS: [(&str, &str); 11] = [
     ("model", "models"),
     ("quantity", "quantities"),
     ("reader", "readers"),
+    ("reliability", "reliability"),
     ("sampler", "samplers"),
     ("surrogate", "surrogates"),
     ("target", "targets"),

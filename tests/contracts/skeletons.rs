@@ -15,6 +15,8 @@ mod model;
 mod quantity;
 #[path = "../../cli/src/new/plugin/reader.rs"]
 mod reader;
+#[path = "../../cli/src/new/plugin/reliability.rs"]
+mod reliability;
 #[path = "../../cli/src/new/plugin/sampler.rs"]
 mod sampler;
 #[path = "../../cli/src/new/plugin/surrogate.rs"]

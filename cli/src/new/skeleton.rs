@@ -28,7 +28,7 @@ macro_rules! skeletons {
 }
 
 /// All skeletons, by kind.
-pub const ALL: [Skeleton; 11] = skeletons![
+pub const ALL: [Skeleton; 12] = skeletons![
     "design" "Design" "designs" true,
     "discrepancy" "Discrepancy" "discrepancies" true,
     "effect" "Effect" "effects" true,
@@ -36,6 +36,7 @@ pub const ALL: [Skeleton; 11] = skeletons![
     "model" "Model" "models" true,
     "quantity" "Quantity" "quantities" false,
     "reader" "Reader" "readers" true,
+    "reliability" "Reliability" "reliability" false,
     "sampler" "Sampler" "samplers" true,
     "surrogate" "Surrogate" "surrogates" true,
     "target" "Density" "targets" false,

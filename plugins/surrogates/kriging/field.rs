@@ -35,6 +35,7 @@ pub struct Runs<'a> {
 /// Independent Gaussian processes with a common covariance and trend, one for each of its components.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
+    /// The choices that define it.
     pub choice: Choice,
     kernel: Kernel,
     /// Nugget plus the jitter that the factorisation needed.

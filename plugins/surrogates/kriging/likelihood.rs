@@ -32,6 +32,7 @@ pub struct Hyperparameters {
 /// estimated.
 #[derive(Debug, Clone, Copy)]
 pub struct Restricted<'a> {
+    /// Correlation function.
     pub kernel: Kernel,
     /// Runs in standard variables, one per column.
     pub points: &'a Matrix,
@@ -39,7 +40,9 @@ pub struct Restricted<'a> {
     pub trend: &'a Matrix,
     /// `Y` (`N x C`).
     pub scores: &'a Matrix,
+    /// Bounds of the hyperparameters.
     pub bounds: Bounds,
+    /// Nugget, or that it is estimated.
     pub nugget: Nugget,
 }
 

@@ -8,9 +8,7 @@ mod findings;
 mod state;
 
 use lacuna::plugin::reliability::{DesignPoint, Estimate, LimitState};
-use lacuna::plugin::{Density, Target};
 use lacuna::run::{Observer, Progress, Stop};
-use lacuna_linalg::Matrix;
 use lacuna_run::{Kept, RunDirectory, Stage};
 use serde_json::{Value, json};
 
