@@ -28,6 +28,7 @@ mod quantities;
 mod quick;
 mod readme;
 mod refused;
+mod reliability;
 mod revisions;
 mod schema;
 mod skeletons;
