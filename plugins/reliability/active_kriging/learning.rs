@@ -28,6 +28,8 @@ const SPREAD: f64 = 1.5;
 /// Level probability and number of levels of the simulations: down to 1e-12.
 const SHARE: f64 = 0.1;
 const LEVELS: usize = 13;
+/// Repetitions of the final simulation.
+const REPEATS: u64 = 4;
 /// Two-sided 95 % of a normal distribution.
 const TWO_SIDED: f64 = 1.959_963_984_540_054;
 /// Candidates for a check, and their distance beyond that of the probability.
@@ -178,11 +180,24 @@ impl<'a> Learning<'a> {
     fn estimate(&self, converged: bool) -> Result<Estimate, Stop> {
         let random = self.stream.named("final");
         let process = self.fitted(&random)?;
-        let (outcome, predicted) = self.predicted(&process, self.options.final_samples, &random)?;
-        let probability = outcome.probability;
-        let doubt: f64 = predicted.doubts().iter().sum();
+        let repeats = (0..REPEATS).map(|i| {
+            let samples = self.options.final_samples / REPEATS as usize;
+            self.predicted(&process, samples, &random.at(i))
+        });
+        let all = repeats.collect::<Result<Vec<_>, _>>()?;
+        let over = |each: &dyn Fn(&(Outcome, Predicted)) -> f64| {
+            all.iter().map(each).sum::<f64>() / REPEATS as f64
+        };
+        let probability = over(&|(outcome, _)| outcome.probability);
+        let reached = all.iter().all(|(outcome, _)| outcome.reached);
+        // Repetitions know the correlation between levels, which that of one simulation does not contain.
+        let claimed = over(&|(outcome, _)| outcome.variation) / (REPEATS as f64).sqrt();
+        let scatter = over(&|(outcome, _)| (outcome.probability - probability).powi(2));
+        let observed = (scatter / (REPEATS as f64 - 1.0)).sqrt() / probability;
+        let sampling = claimed.max(observed);
+        let doubt = over(&|(_, predicted)| predicted.doubts().iter().sum());
         let mut warnings: Vec<String> = self.counted.warning().into_iter().collect();
-        if !outcome.reached {
+        if !reached {
             warnings
                 .push("the Gaussian process has no failure region within its levels".to_owned());
         } else if !converged {
@@ -191,12 +206,12 @@ impl<'a> Learning<'a> {
                 "the calls end before the sign of the process is sure: its expected error is {share:.1} % of the probability"
             ));
         }
-        let usable = outcome.reached && probability > 0.0;
-        let variation = outcome.variation.hypot(doubt / probability);
+        let usable = reached && probability > 0.0;
+        let variation = sampling.hypot(doubt / probability);
         let interval = usable.then(|| {
-            let [low, high] = [TWO_SIDED, -TWO_SIDED].map(|s| predicted.probability(s));
+            let [low, high] = [TWO_SIDED, -TWO_SIDED].map(|s| over(&|(_, p)| p.probability(s)));
             let [low, high] = [low.min(probability), high.max(probability)];
-            [log_normal(low, outcome.variation)[0], log_normal(high, outcome.variation)[1]]
+            [log_normal(low, sampling)[0], log_normal(high, sampling)[1]]
         });
         Ok(Estimate {
             probability,
@@ -206,7 +221,7 @@ impl<'a> Learning<'a> {
             undefined: self.counted.undefined(),
             failures: Some(self.counted.failures()),
             design_points: Vec::new(),
-            converged: converged && outcome.reached,
+            converged: converged && reached,
             warnings,
         })
     }

@@ -48,7 +48,7 @@ pub struct ActiveKriging {
     pub checks: Option<usize>,
     /// Number of samples of each level while the process is refined. They cost no calls.
     pub samples: usize,
-    /// Number of samples of each level for the final probability.
+    /// Number of samples of each level for the final probability, in four repetitions.
     pub final_samples: usize,
     /// Correlation function of the process.
     pub kernel: Kernel,
