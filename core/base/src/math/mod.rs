@@ -1,5 +1,6 @@
-//! Distributions, random streams, Sobol' sequences, sample moments, changes of coordinates, log densities.
+//! Distributions and their dependence, random streams, Sobol' sequences, sample moments, changes of coordinates, log densities.
 
+pub mod dependence;
 pub mod distribution;
 pub mod fit;
 pub mod log_density;

@@ -5,6 +5,7 @@
 
 mod density;
 mod probability;
+mod score;
 mod summary;
 mod written;
 
