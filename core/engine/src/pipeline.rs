@@ -67,7 +67,18 @@ pub fn find_gap(
     if study.measurements.is_none() {
         return Err(Stop::new("the study has no `[measurements]` to search for a gap"));
     }
+    independent(study)?;
     pursue(study, Goal::FindGap, run, observer)
+}
+
+/// Refuses dependent priors, whose curvature the Gauss-Newton fits of the search do not contain.
+fn independent(study: &Study) -> Result<(), Stop> {
+    if study.dependence.is_none() {
+        return Ok(());
+    }
+    Err(Stop::new("the search for missing physics needs priors that are independent of each other").help(
+        "search with a copy of the study without `[[dependence]]`, `[[constraint]]` and priors of an earlier run",
+    ))
 }
 
 /// Runs a study with added effects, and compares it on held-out data with the study without them: with its response
@@ -78,6 +89,7 @@ pub fn show(
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<Findings, Stop> {
+    independent(study)?;
     pursue(study, Goal::Show(before), run, observer)
 }
 
@@ -94,6 +106,7 @@ pub fn power(
             "a study with `[target]` has no data in which anything could be planted",
         ));
     }
+    independent(study)?;
     run.watch(study.faults());
     let kept = if study.surrogate.is_some() {
         let (emulated, _) = calibrate_emulated(study, run, observer)?;
@@ -255,11 +268,11 @@ fn sample_target(
 ) -> Result<Findings, Stop> {
     let density = target.built.plugin.bind(&study.parameters)?;
     let likelihood = if target.built.plugin.includes_prior() {
-        Given::posterior(&*density, &study.parameters)
+        Given::posterior(&*density, study.prior())
     } else {
         Given::likelihood(&*density)
     };
-    let posterior = Posterior::new(&study.parameters, likelihood);
+    let posterior = Posterior::new(study.prior(), likelihood);
     let calibrated = target::stage(study, target, &posterior, run, observer)?;
     let weighed = evidence::stage(study, &posterior, &calibrated, None, run, observer)?;
     let quantified = quantities::of_target(study, &calibrated, run, observer)?;

@@ -133,6 +133,7 @@ impl<'a> Ground<'a> {
         let study = self.study;
         let laws: Vec<_> =
             study.parameters.iter().map(|p| (&p.name, &p.prior, &p.design)).collect();
+        let laws = study.prior_identity(json!(laws));
         let effects = study.effects_identity();
         json!([
             self.hash,

@@ -35,7 +35,7 @@ fn runs_folder() -> Folder {
 fn draws(study: &Study, count: usize, stream: &Stream) -> Matrix {
     let point = |i: usize| {
         let mut rng = stream.at(i as u64).generator();
-        study.parameters.iter().map(|p| p.prior.sample(&mut rng)).collect::<Vec<_>>()
+        study.prior().sample(&mut rng)
     };
     Matrix::from_rows(study.parameters.len(), (0..count).map(point))
 }
@@ -159,7 +159,10 @@ fn of_prior(study: &Study, ensemble: &Ensemble, stream: &Stream) -> Vec<usize> {
     let weight = |run: usize| -> f64 {
         let point = ensemble.points.row(run);
         let each = study.parameters.iter().zip(point);
-        each.map(|(p, &x)| p.prior.log_density(x) - p.design.log_density(x)).sum()
+        let own: f64 =
+            each.map(|(p, &x)| p.prior.log_density(x) - p.design.log_density(x)).sum();
+        let prior = study.prior();
+        if prior.is_independent() || !own.is_finite() { own } else { own + prior.joint(point) }
     };
     let weights: Vec<f64> = (0..ensemble.runs.len()).map(weight).collect();
     // The distribution of a run outside its own design is unknown.

@@ -4,7 +4,7 @@
 //! discrepancy's hyperparameters. A hyperparameter that is declared `log` is represented by its logarithm, and the
 //! density includes the Jacobian, so that its prior keeps its meaning.
 
-use lacuna::data::Parameter;
+use lacuna::data::{JointPrior, Parameter};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, uniform};
 use lacuna::plugin::{Fact, Hyperparameter, Target};
@@ -47,15 +47,15 @@ pub trait LogLikelihood: Sync {
 
 /// The posterior of a study.
 pub struct Posterior<'a> {
-    parameters: &'a [Parameter],
+    prior: JointPrior<'a>,
     likelihood: Box<dyn LogLikelihood + 'a>,
     region: Option<Vec<(f64, f64)>>,
 }
 
 impl<'a> Posterior<'a> {
-    /// The posterior with the parameters' priors.
-    pub fn new(parameters: &'a [Parameter], likelihood: impl LogLikelihood + 'a) -> Self {
-        Self { parameters, likelihood: Box::new(likelihood), region: None }
+    /// The posterior with the prior of its parameters.
+    pub fn new(prior: impl Into<JointPrior<'a>>, likelihood: impl LogLikelihood + 'a) -> Self {
+        Self { prior: prior.into(), likelihood: Box::new(likelihood), region: None }
     }
 
     /// Restricts each parameter to its interval; the density is zero elsewhere.
@@ -70,7 +70,12 @@ impl<'a> Posterior<'a> {
 
     /// Parameters of the model.
     pub fn parameters(&self) -> &[Parameter] {
-        self.parameters
+        self.prior.parameters()
+    }
+
+    /// Joint prior of the parameters.
+    pub fn prior(&self) -> JointPrior<'_> {
+        self.prior
     }
 
     /// Facts about the likelihood, for the report.
@@ -94,7 +99,7 @@ impl<'a> Posterior<'a> {
     }
 
     fn map_logs(&self, point: &[f64], map: impl Fn(f64) -> f64) -> Vec<f64> {
-        let d = self.parameters.len();
+        let d = self.parameters().len();
         let is_log = |i: usize| i >= d && self.hyperparameters()[i - d].log;
         point.iter().enumerate().map(|(i, &x)| if is_log(i) { map(x) } else { x }).collect()
     }
@@ -105,9 +110,9 @@ impl<'a> Posterior<'a> {
         Mode(self)
     }
 
-    /// Prior of each coordinate's natural value.
+    /// Prior of each coordinate's natural value alone.
     pub fn priors(&self) -> impl Iterator<Item = &Distribution> {
-        let parameters = self.parameters.iter().map(|p| &p.prior);
+        let parameters = self.parameters().iter().map(|p| &p.prior);
         parameters.chain(self.hyperparameters().iter().map(|h| &h.prior))
     }
 
@@ -116,12 +121,16 @@ impl<'a> Posterior<'a> {
         if !self.is_inside(natural) {
             return f64::NEG_INFINITY;
         }
-        self.priors().zip(natural).map(|(prior, &x)| prior.log_density(x)).sum()
+        let own: f64 = self.priors().zip(natural).map(|(prior, &x)| prior.log_density(x)).sum();
+        if self.prior.is_independent() || own == f64::NEG_INFINITY {
+            return own;
+        }
+        own + self.prior.joint(&natural[..self.parameters().len()])
     }
 
     /// Log Jacobian of the logarithmic coordinates, which is the sum of these coordinates.
     fn log_jacobian(&self, point: &[f64]) -> f64 {
-        let d = self.parameters.len();
+        let d = self.parameters().len();
         self.hyperparameters().iter().zip(&point[d..]).filter(|(h, _)| h.log).map(|(_, &x)| x).sum()
     }
 
@@ -138,7 +147,7 @@ impl<'a> Posterior<'a> {
     }
 
     fn block(&self, points: &Matrix, jacobian: bool) -> Vec<f64> {
-        let d = self.parameters.len();
+        let d = self.parameters().len();
         let natural: Vec<Vec<f64>> = points.iter_rows().map(|p| self.natural(p)).collect();
         let mut density: Vec<f64> = natural
             .iter()
@@ -161,7 +170,7 @@ impl<'a> Posterior<'a> {
     }
 
     fn value_and_gradient(&self, point: &[f64], jacobian: bool) -> (f64, Vec<f64>) {
-        let d = self.parameters.len();
+        let d = self.parameters().len();
         let natural = self.natural(point);
         let nothing = || (f64::NEG_INFINITY, vec![0.0; point.len()]);
         let prior =
@@ -178,6 +187,7 @@ impl<'a> Posterior<'a> {
         for ((g, prior), &x) in gradient.iter_mut().zip(self.priors()).zip(&natural) {
             *g += prior.log_density_derivative(x);
         }
+        self.prior.add_joint_gradient(&natural[..d], &mut gradient);
         for (i, hyper) in self.hyperparameters().iter().enumerate().filter(|(_, h)| h.log) {
             debug_assert!(hyper.log);
             let g = &mut gradient[d + i];
@@ -187,7 +197,7 @@ impl<'a> Posterior<'a> {
     }
 
     fn coordinate_bounds(&self) -> Vec<(f64, f64)> {
-        let plain = self.parameters.iter().enumerate().map(|(i, p)| {
+        let plain = self.parameters().iter().enumerate().map(|(i, p)| {
             let (low, high) = p.prior.support();
             self.region.as_ref().map_or((low, high), |r| (low.max(r[i].0), high.min(r[i].1)))
         });
@@ -209,21 +219,32 @@ impl<'a> Posterior<'a> {
         }
     }
 
-    /// Logarithm of the prior probability of the region.
-    pub fn log_share(&self) -> f64 {
+    /// Logarithm of the prior probability of the region, and its standard error.
+    pub fn log_share(&self) -> (f64, f64) {
+        let d = self.parameters().len();
+        if self.region.is_some() && !self.prior.is_independent() {
+            let stream = Stream::root(0).named("region");
+            let share = self.prior.share_of(&stream, |point| self.is_inside(&point[..d]));
+            return (share.log(), share.log_error());
+        }
         let region = self.region.iter().flatten();
         let share = |(&(low, high), prior): (&(f64, f64), &Distribution)| {
             (prior.cdf(high) - prior.cdf(low)).ln()
         };
-        region.zip(self.priors()).map(share).sum()
+        (region.zip(self.priors()).map(share).sum(), 0.0)
     }
 
     fn draws(&self, count: usize, stream: &Stream) -> Matrix {
-        let d = self.parameters.len() + self.hyperparameters().len();
+        let d = self.parameters().len() + self.hyperparameters().len();
         let draw = |i: usize| {
             let mut rng = stream.at(i as u64).generator();
-            let natural: Vec<f64> =
-                self.priors().enumerate().map(|(j, p)| self.draw(j, p, &mut rng)).collect();
+            let mut natural = if self.prior.is_independent() {
+                Vec::new()
+            } else {
+                self.prior.sample_where(&mut rng, |point| self.is_inside(point))
+            };
+            let rest = self.priors().enumerate().skip(natural.len());
+            natural.extend(rest.map(|(j, p)| self.draw(j, p, &mut rng)));
             self.coordinates(&natural)
         };
         Matrix::from_rows(d, (0..count).map(draw))
@@ -236,7 +257,7 @@ impl Target for Posterior<'_> {
     }
 
     fn dimension(&self) -> usize {
-        self.parameters.len() + self.hyperparameters().len()
+        self.parameters().len() + self.hyperparameters().len()
     }
     fn log_density(&self, points: &Matrix) -> Vec<f64> {
         self.batch(points, true)

@@ -114,7 +114,7 @@ fn components(study: &Study) -> Vec<(String, String)> {
 
 fn ensemble(study: &Study, e: &Ensemble) -> EnsembleFindings {
     let inside = |point: &&[f64]| {
-        study.parameters.iter().zip(*point).all(|(p, &x)| p.prior.log_density(x).is_finite())
+        study.prior().allows(point)
     };
     EnsembleFindings {
         points: e.points.clone(),

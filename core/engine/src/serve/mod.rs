@@ -149,11 +149,11 @@ fn of_target<R>(
 ) -> Result<R, Stop> {
     let density = target.built.plugin.bind(&study.parameters)?;
     let likelihood = if target.built.plugin.includes_prior() {
-        Given::posterior(&*density, &study.parameters)
+        Given::posterior(&*density, study.prior())
     } else {
         Given::likelihood(&*density)
     };
-    let posterior = LogPosterior::of(Posterior::new(&study.parameters, likelihood));
+    let posterior = LogPosterior::of(Posterior::new(study.prior(), likelihood));
     Ok(act(&[&posterior]))
 }
 

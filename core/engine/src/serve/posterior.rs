@@ -25,7 +25,8 @@ impl<'a> LogPosterior<'a> {
     /// Log density at a point.
     fn value(&self, point: &[f64]) -> f64 {
         let allowed = |(prior, &x): (&Distribution, &f64)| prior.log_density(x).is_finite();
-        if !self.0.priors().zip(point).all(allowed) {
+        let d = self.0.parameters().len();
+        if !self.0.priors().zip(point).all(allowed) || !self.0.prior().allows(&point[..d]) {
             return NOTHING;
         }
         let row = Matrix::from_vec(1, point.len(), self.0.coordinates(point));

@@ -88,7 +88,7 @@ fn the_posterior_is_that_of_natural_values() {
         log: true,
         start: 1.0,
     };
-    let posterior = LogPosterior::of(Posterior::new(&parameters, OneDatum(vec![variance])));
+    let posterior = LogPosterior::of(Posterior::new(&parameters[..], OneDatum(vec![variance])));
     let names: Vec<String> = posterior.variables().into_iter().map(|v| v.name).collect();
     assert_eq!(names, ["a", "variance"]);
     // Uniform priors with densities 1/4 and 1/5.

@@ -1,6 +1,6 @@
 //! Least-squares best fit of the model, before any discrepancy is chosen, and the derivatives of the response there.
 
-use lacuna::data::{Measurements, Observations, Parameter};
+use lacuna::data::{JointPrior, Measurements, Observations};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
 use lacuna::plugin::Forward;
@@ -17,29 +17,29 @@ use crate::study::Study;
 /// variance integrated out under the prior `1 / variance`.
 pub fn point(study: &Study, data: &Observations, forward: &dyn Forward) -> Result<Vec<f64>, Stop> {
     let stream = stream(study, "best-fit");
-    Ok(points_from(&study.parameters, &study.start(), data, forward, &stream)?.remove(0))
+    Ok(points_from(study.prior(), &study.start(), data, forward, &stream)?.remove(0))
 }
 
 /// Like [`point`], but all local maxima, the best first.
 pub fn points(
-    parameters: &[Parameter],
+    prior: JointPrior<'_>,
     data: &Observations,
     forward: &dyn Forward,
     stream: &Stream,
 ) -> Result<Vec<Vec<f64>>, Stop> {
-    points_from(parameters, &[], data, forward, stream)
+    points_from(prior, &[], data, forward, stream)
 }
 
 /// Like [`points`], with the starting values that are stated.
 fn points_from(
-    parameters: &[Parameter],
+    prior: JointPrior<'_>,
     stated: &[Option<f64>],
     data: &Observations,
     forward: &dyn Forward,
     stream: &Stream,
 ) -> Result<Vec<Vec<f64>>, Stop> {
     let likelihood = LeastSquares::of(data)?;
-    let posterior = Posterior::new(parameters, OfData::new(forward, Vec::new(), &likelihood));
+    let posterior = Posterior::new(prior, OfData::new(forward, Vec::new(), &likelihood));
     Ok(maxima(&posterior, stated, stream)?.into_iter().map(|maximum| maximum.point).collect())
 }
 

@@ -152,7 +152,7 @@ impl Parts {
         problem: &InverseProblem<'a>,
     ) -> Posterior<'a> {
         let likelihood = OfData::new(problem.forward(), study.placed_effects(), self.likelihood());
-        Posterior::new(&study.parameters, likelihood).within(problem.region().map(<[_]>::to_vec))
+        Posterior::new(study.prior(), likelihood).within(problem.region().map(<[_]>::to_vec))
     }
 }
 
@@ -185,6 +185,7 @@ pub fn stage(
         return Ok(None);
     };
     let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.prior, p.reference)).collect();
+    let laws = study.prior_identity(json!(laws));
     let effects = study.effects_identity();
     let inputs = json!([
         problem.data.hash,
@@ -281,7 +282,9 @@ fn calibrate(
     let (harvested, mut evidence) =
         sampled.harvest.map_or_else(Default::default, |h| (h.facts, h.evidence));
     if let Some(evidence) = &mut evidence {
-        evidence.log += posterior.log_share();
+        let (log, error) = posterior.log_share();
+        evidence.log += log;
+        evidence.error = evidence.error.hypot(error);
     }
     let outcome = Outcome {
         coordinates,

@@ -350,8 +350,7 @@ fn chosen(
 ) -> Vec<usize> {
     let inside = |&i: &usize| {
         let point = ensemble.points.row(i);
-        let possible = |(p, &x): (&Parameter, &f64)| p.prior.log_density(x).is_finite();
-        study.parameters.iter().zip(point).all(possible)
+        study.prior().allows(point)
             && region.is_none_or(|r| r.iter().zip(point).all(|(&(a, b), &x)| a <= x && x <= b))
     };
     let first = study.design.as_ref().map_or(usize::MAX, |design| design.common.runs.get());

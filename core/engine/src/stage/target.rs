@@ -20,6 +20,7 @@ pub fn stage(
 ) -> Result<Kept<Calibrated>, Stop> {
     let section = study.sampler.as_ref().ok_or_else(|| Stop::new("the study has no sampler"))?;
     let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.prior, p.reference)).collect();
+    let laws = study.prior_identity(json!(laws));
     let inputs = json!([
         target.built.identity(),
         laws,

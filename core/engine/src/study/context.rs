@@ -72,6 +72,8 @@ fn beside_a_target(study: &Study, root: &Node, complaints: &mut Complaints<'_>) 
         "study",
         "parameter",
         "start",
+        "dependence",
+        "constraint",
         "derived",
         "target",
         "executor",

@@ -70,8 +70,9 @@ pub struct ParameterSection {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub design: Option<Distribution>,
     /// Prior distribution of the parameter in the calibration, in its unit. With a surrogate, the central 95 % of it
-    /// must lie inside `design`.
-    pub prior: Distribution,
+    /// must lie inside `design`. A share of a Dirichlet distribution in `[[dependence]]` needs none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prior: Option<Distribution>,
     /// Reference value from the literature or from practice, in the parameter's unit. It is compared with the posterior
     /// and does not enter the calibration.
     #[serde(default, skip_serializing_if = "Option::is_none")]

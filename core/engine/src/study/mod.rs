@@ -2,6 +2,7 @@
 
 mod components;
 mod context;
+pub mod dependence;
 pub mod derived;
 pub mod fidelity;
 pub mod file;

@@ -3,12 +3,13 @@
 use std::ops::Deref;
 use std::path::PathBuf;
 
-use lacuna::data::{Layouts, Parameter, Scenario};
+use lacuna::data::{Dependence, Layouts, Parameter, Scenario};
 use lacuna::plugin::registry::Section;
 use lacuna::plugin::{Effect, Given};
 use lacuna::text::quantity::Quantity;
 use toml::Table;
 
+use super::dependence::Sections;
 use super::fidelity::{LowFidelity, NumericalError};
 use super::file::{DerivedSection, EffectKeys, StudySection, ValidateSection};
 use super::forward::ForwardSection;
@@ -42,6 +43,10 @@ pub struct Study {
     pub parameters: Vec<Parameter>,
     /// The known conditions; one without a name where the study has no scenarios.
     pub scenarios: Vec<Scenario>,
+    /// What makes the priors of the parameters dependent.
+    pub dependence: Dependence,
+    /// `[[dependence]]` and `[[constraint]]`.
+    pub dependence_sections: Sections,
     /// Name and scenario behind each parameter, in the same order.
     pub unknowns: Vec<Unknown>,
     /// Model inputs that the study sets.
@@ -96,6 +101,8 @@ impl Study {
             libraries: self.libraries.clone(),
             parameters,
             scenarios: self.scenarios.clone(),
+            dependence: self.dependence.clone(),
+            dependence_sections: Sections::default(),
             unknowns,
             given: Vec::new(),
             layouts: self.layouts.clone(),

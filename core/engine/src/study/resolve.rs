@@ -12,6 +12,7 @@ use lacuna::text::decode::decode;
 use lacuna::text::{Node, Problems, Sources, Value};
 use toml::Table;
 
+use super::dependence::{Sections, dependence};
 use super::fidelity::{low_fidelity, numerical_error};
 use super::file::{OPTIONAL, ResponseSection, StudySection, ValidateSection};
 use super::forward::forward;
@@ -165,6 +166,7 @@ fn structure(
     unknown_sections(root, problems);
     let about = table::<StudySection>(root, "study", problems);
     let parameters = parameters(root, problems);
+    let dependence_sections = Sections::read(root, problems);
     let response = match root.get("response") {
         // A target has no response, so that nothing is said of its shape.
         None if root.get("target").is_some() => Some(None),
@@ -203,11 +205,15 @@ fn structure(
     };
     let (scenarios, sections) = scenarios?;
     let margin = plugins.design.as_ref().and_then(|design| design.common.margin);
-    let (parameters, unknowns) = unknowns(&parameters?, &scenarios, margin, root, problems);
+    let (parameters, dependence_sections) = (parameters?, dependence_sections?);
+    let share = |name: &str| dependence_sections.prior_of_share(name);
+    let (parameters, unknowns) = unknowns(&parameters, &scenarios, margin, share, root, problems);
     if problems.len() > before {
         return None;
     }
     let mut about = about?;
+    let own = (parameters.as_slice(), unknowns.as_slice());
+    let dependence = dependence(&dependence_sections, own, about.seed, root, problems)?;
     about.directory = None;
     let name = name(&mut about, path, root, problems)?;
     let mut study = Study {
@@ -220,6 +226,8 @@ fn structure(
         libraries,
         parameters,
         scenarios,
+        dependence,
+        dependence_sections,
         unknowns,
         given: Vec::new(),
         layouts: layouts?,

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use lacuna::text::emit::{Unwritable, to_table};
 use toml::{Table, Value};
 
+use super::dependence::Sections;
 use super::file::{ResponseSection, ScenarioSection};
 use super::gap::companion::Companion;
 use super::gap::{Gap, Swap};
@@ -48,6 +49,15 @@ pub(super) fn table(
     if !study.starts.is_empty() {
         let starts: Result<Vec<Table>, _> = study.starts.iter().map(to_table).collect();
         whole.insert("start".to_owned(), starts?.into());
+    }
+    let Sections { dependence, constraint } = &study.dependence_sections;
+    if !dependence.is_empty() {
+        let dependence: Result<Vec<Table>, _> = dependence.iter().map(to_table).collect();
+        whole.insert("dependence".to_owned(), dependence?.into());
+    }
+    if !constraint.is_empty() {
+        let constraint: Result<Vec<Table>, _> = constraint.iter().map(to_table).collect();
+        whole.insert("constraint".to_owned(), constraint?.into());
     }
     if !study.derived_sections.is_empty() {
         let derived: Result<Vec<Table>, _> = study.derived_sections.iter().map(to_table).collect();

@@ -18,6 +18,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use toml::Table;
 
+use super::dependence::{ConstraintSection, DependenceSection};
 use super::file::{
     DerivedSection, DesignKeys, DiscrepancyKeys, EffectKeys, LowFidelitySection, MeasurementKeys,
     ModelKeys, NumericalErrorSection, ParameterSection, ResponseSection, SamplerKeys,
@@ -128,6 +129,8 @@ sections! {
     plugins: table(PluginsSection);
     parameter: list(ParameterSection);
     start: list(StartSection);
+    dependence: list(DependenceSection);
+    constraint: list(ConstraintSection);
     target: plugin(Density, NoKeys);
     derived: list(DerivedSection);
     scenario: list(ScenarioSection);

@@ -29,11 +29,12 @@ pub(super) fn unknowns(
     sections: &[ParameterSection],
     scenarios: &[Scenario],
     margin: Option<Positive>,
+    prior_of_share: impl Fn(&str) -> Option<Distribution>,
     root: &Node,
     problems: &mut Problems,
 ) -> (Vec<Parameter>, Vec<Unknown>) {
     let (mut parameters, mut unknowns) = (Vec::new(), Vec::new());
-    let mut add = |section: &ParameterSection, scenario: Option<usize>| {
+    let mut add = |section: &ParameterSection, prior: &Distribution, scenario: Option<usize>| {
         let name = section.name.as_str().to_owned();
         let full = |base: &str| match scenario {
             Some(i) => format!("{base}[{}]", scenarios[i].name),
@@ -44,10 +45,10 @@ pub(super) fn unknowns(
             name: full(&name),
             unit: section.unit.clone(),
             design: section.design.clone().unwrap_or_else(|| match margin {
-                Some(margin) => widened(&section.prior, margin.get()),
-                None => section.prior.clone(),
+                Some(margin) => widened(prior, margin.get()),
+                None => prior.clone(),
             }),
-            prior: section.prior.clone(),
+            prior: prior.clone(),
             reference: section.reference,
         });
         unknowns.push(Unknown { name, scenario });
@@ -55,23 +56,29 @@ pub(super) fn unknowns(
     let named: Vec<&str> =
         scenarios.iter().map(|s| s.name.as_str()).filter(|name| !name.is_empty()).collect();
     for section in sections {
-        if margin.is_some() && section.design.is_none() && !reaches_out(&section.prior) {
+        let Some(prior) = section.prior.clone().or_else(|| prior_of_share(section.name.as_str()))
+        else {
             let mut complaints = Complaints::new(root, problems);
-            let (name, law) = (&section.name, section.prior.name());
+            complaints.at(&format!("parameter.{}", section.name)).say("missing key `prior`");
+            continue;
+        };
+        if margin.is_some() && section.design.is_none() && !reaches_out(&prior) {
+            let mut complaints = Complaints::new(root, problems);
+            let (name, law) = (&section.name, prior.name());
             complaints
                 .at(&format!("parameter.{name}.prior"))
                 .say(format!("`[design] margin` cannot widen the {law} prior of `{name}`"))
                 .expected("a uniform or log-uniform prior, or a `design` of the parameter's own");
         }
         let Some(scenario) = &section.scenario else {
-            add(section, None);
+            add(section, &prior, None);
             continue;
         };
         let place = scenarios.iter().position(|s| &s.name == scenario && !s.name.is_empty());
         match place {
-            Some(place) => add(section, Some(place)),
+            Some(place) => add(section, &prior, Some(place)),
             None if scenario == "each" && !named.is_empty() => {
-                (0..scenarios.len()).for_each(|i| add(section, Some(i)));
+                (0..scenarios.len()).for_each(|i| add(section, &prior, Some(i)));
             }
             None => {
                 let mut complaints = Complaints::new(root, problems);

@@ -230,7 +230,7 @@ pub(super) struct BaseModel<'a> {
 impl<'a> BaseModel<'a> {
     fn starts(&self, data: &Observations, random: &Stream) -> Result<Vec<Vec<f64>>, Stop> {
         let stream = random.named("best fit");
-        let mut maxima = best_fit::points(self.parameters, data, self.forward, &stream)?;
+        let mut maxima = best_fit::points(self.parameters.into(), data, self.forward, &stream)?;
         maxima.truncate(STARTS);
         Ok(maxima)
     }

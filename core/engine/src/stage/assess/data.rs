@@ -105,7 +105,7 @@ fn at_prior(study: &Study, problem: &InverseProblem<'_>) -> Matrix {
     let random = stream(study, "assess").named("prior");
     let point = |i: usize| -> Vec<f64> {
         let mut rng = random.at(i as u64).generator();
-        study.parameters.iter().map(|p| p.prior.sample(&mut rng)).collect()
+        study.prior().sample(&mut rng)
     };
     let points = Matrix::from_rows(study.parameters.len(), (0..PRIOR_DRAWS).map(point));
     problem.forward().mean(&points)

@@ -46,6 +46,7 @@ pub fn stage(
     observer: &dyn Observer,
 ) -> Result<Kept<Assessment>, Stop> {
     let laws: Vec<_> = study.parameters.iter().map(|p| (&p.name, &p.design, &p.prior)).collect();
+    let laws = study.prior_identity(json!(laws));
     let effects = study.effects_identity();
     let problem = all.problem.map(|problem| {
         let refined = problem.refinement().map(|r| (r.rounds, r.ratio, r.clear, r.reached));

@@ -174,7 +174,7 @@ fn of_design(study: &Study, ensemble: &Ensemble) -> Option<Finding> {
 fn invalid(study: &Study, ensemble: &Ensemble) -> Option<Finding> {
     let inside = |i: &usize| {
         let point = ensemble.points.row(*i);
-        study.parameters.iter().zip(point).all(|(p, &x)| p.prior.log_density(x).is_finite())
+        study.prior().allows(point)
     };
     let all: Vec<usize> = (0..ensemble.runs.len()).collect();
     let in_prior: Vec<usize> = all.iter().copied().filter(inside).collect();

@@ -115,10 +115,7 @@ impl Curves {
 
 /// Rows of the points inside the prior's support, or all rows if these are fewer than fifty.
 pub fn rows_near_prior(study: &Study, points: &Matrix) -> Vec<usize> {
-    let inside = |point: &[f64]| {
-        let prior = study.parameters.iter().zip(point);
-        prior.into_iter().all(|(p, &x)| p.prior.log_density(x).is_finite())
-    };
+    let inside = |point: &[f64]| study.prior().allows(point);
     let near: Vec<usize> = (0..points.rows()).filter(|&i| inside(points.row(i))).collect();
     if near.len() >= ENOUGH { near } else { (0..points.rows()).collect() }
 }

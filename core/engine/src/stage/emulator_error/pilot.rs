@@ -70,7 +70,7 @@ impl Pilot<'_> {
                     if p.prior.log_density(x).is_finite() { x } else { f64::NAN }
                 })
                 .collect();
-            if point.iter().all(|x| x.is_finite()) {
+            if point.iter().all(|x| x.is_finite()) && self.study.prior().allows(&point) {
                 points.push_row(&point);
             }
             if points.rows() == POINTS {

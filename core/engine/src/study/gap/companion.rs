@@ -133,7 +133,7 @@ fn with_constants(
     if problems.len() > before {
         return None;
     }
-    let (own, names) = unknowns(&keys.parameter, &[], None, node, problems);
+    let (own, names) = unknowns(&keys.parameter, &[], None, |_| None, node, problems);
     let mut parameters = study.parameters.clone();
     parameters.extend(own);
     let mut all = study.unknowns.clone();
