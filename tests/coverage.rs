@@ -1,3 +1,3 @@
 //! Coverage of printed uncertainties: `lacuna coverage`, and the gate.
 
-mod verb;
+pub mod verb;

@@ -22,6 +22,7 @@ mod kill;
 mod left_out;
 mod made_by;
 mod predict;
+mod priors;
 mod problems;
 mod python;
 mod quantities;

@@ -23,11 +23,16 @@ pub fn study(sd: f64) -> TempDir {
     folder
 }
 
-fn asked(count: usize, noise: Option<Noise>) -> Asked {
+pub fn asked(count: usize, noise: Option<Noise>) -> Asked {
     Asked { count, quick: false, noise, from_runs: false }
 }
 
-fn count(folder: &Path, out: &Path, settings: &[&str], asked: &Asked) -> Result<Coverage, Stop> {
+pub fn count(
+    folder: &Path,
+    out: &Path,
+    settings: &[&str],
+    asked: &Asked,
+) -> Result<Coverage, Stop> {
     let study = load(&folder.join("study.toml"), settings);
     coverage(&study, asked, &mut RunDirectory::open(out).unwrap(), &Silent)
 }

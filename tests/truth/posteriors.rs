@@ -35,7 +35,7 @@ fn disagreements(
     stream: &Stream,
 ) -> Vec<String> {
     let bound = posterior.density.bind(&posterior.parameters).unwrap();
-    let given = Given::posterior(&*bound, &posterior.parameters);
+    let given = Given::posterior(&*bound, (&posterior.parameters).into());
     let target = Posterior::new(&posterior.parameters, given);
     let run = runs::run(&*runs::sampler(sampler.0, sampler.1), &target, stream);
     if run.harvest.as_ref().is_some_and(|harvest| !harvest.doubts.is_empty()) {

@@ -159,8 +159,7 @@ fn of_prior(study: &Study, ensemble: &Ensemble, stream: &Stream) -> Vec<usize> {
     let weight = |run: usize| -> f64 {
         let point = ensemble.points.row(run);
         let each = study.parameters.iter().zip(point);
-        let own: f64 =
-            each.map(|(p, &x)| p.prior.log_density(x) - p.design.log_density(x)).sum();
+        let own: f64 = each.map(|(p, &x)| p.prior.log_density(x) - p.design.log_density(x)).sum();
         let prior = study.prior();
         if prior.is_independent() || !own.is_finite() { own } else { own + prior.joint(point) }
     };

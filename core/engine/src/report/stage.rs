@@ -113,9 +113,7 @@ fn components(study: &Study) -> Vec<(String, String)> {
 }
 
 fn ensemble(study: &Study, e: &Ensemble) -> EnsembleFindings {
-    let inside = |point: &&[f64]| {
-        study.prior().allows(point)
-    };
+    let inside = |point: &&[f64]| study.prior().allows(point);
     EnsembleFindings {
         points: e.points.clone(),
         valid: e.valid.clone(),

@@ -15,6 +15,7 @@ use lacuna::text::values::{Count, Fraction, Name, Positive};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use super::dependence::Prior;
 pub use super::derived::DerivedSection;
 pub use super::fidelity::{LowFidelitySection, NumericalErrorSection};
 pub use super::noise::{InstrumentNoise, NoiseSection};
@@ -70,9 +71,10 @@ pub struct ParameterSection {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub design: Option<Distribution>,
     /// Prior distribution of the parameter in the calibration, in its unit. With a surrogate, the central 95 % of it
-    /// must lie inside `design`. A share of a Dirichlet distribution in `[[dependence]]` needs none.
+    /// must lie inside `design`. `{ posterior = "runs/a" }` is the posterior of an earlier run, joint with all parameters that
+    /// name the same run. A share of a Dirichlet distribution in `[[dependence]]` needs none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub prior: Option<Distribution>,
+    pub prior: Option<Prior>,
     /// Reference value from the literature or from practice, in the parameter's unit. It is compared with the posterior
     /// and does not enter the calibration.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -14,8 +14,8 @@ use toml::Table;
 
 use super::dependence::{Sections, dependence};
 use super::fidelity::{low_fidelity, numerical_error};
-use super::file::{OPTIONAL, ResponseSection, StudySection, ValidateSection};
 use super::forward::forward;
+use super::file::{OPTIONAL, ParameterSection, ResponseSection, StudySection, ValidateSection};
 use super::gap::companion::companion;
 use super::gap::gap;
 pub use super::libraries::Use;
@@ -205,9 +205,10 @@ fn structure(
     };
     let (scenarios, sections) = scenarios?;
     let margin = plugins.design.as_ref().and_then(|design| design.common.margin);
-    let (parameters, dependence_sections) = (parameters?, dependence_sections?);
-    let share = |name: &str| dependence_sections.prior_of_share(name);
-    let (parameters, unknowns) = unknowns(&parameters, &scenarios, margin, share, root, problems);
+    let (parameters, mut dependence_sections) = (parameters?, dependence_sections?);
+    dependence_sections.read_runs(&parameters, &directory, root, problems);
+    let prior = |section: &ParameterSection| dependence_sections.prior(section);
+    let (parameters, unknowns) = unknowns(&parameters, &scenarios, margin, prior, root, problems);
     if problems.len() > before {
         return None;
     }

@@ -37,6 +37,10 @@ pub(super) fn table(
                 table.insert("symbol".to_owned(), symbol.into());
                 table.insert("scenario".to_owned(), name.into());
             }
+            if let Some(run) = study.dependence_sections.run_of(&parameter.name) {
+                let posterior = ("posterior".to_owned(), run.display().to_string().into());
+                table.insert("prior".to_owned(), Table::from_iter([posterior]).into());
+            }
             Ok(table)
         })
         .collect();
@@ -50,7 +54,7 @@ pub(super) fn table(
         let starts: Result<Vec<Table>, _> = study.starts.iter().map(to_table).collect();
         whole.insert("start".to_owned(), starts?.into());
     }
-    let Sections { dependence, constraint } = &study.dependence_sections;
+    let Sections { dependence, constraint, .. } = &study.dependence_sections;
     if !dependence.is_empty() {
         let dependence: Result<Vec<Table>, _> = dependence.iter().map(to_table).collect();
         whole.insert("dependence".to_owned(), dependence?.into());

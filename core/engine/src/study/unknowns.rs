@@ -29,7 +29,7 @@ pub(super) fn unknowns(
     sections: &[ParameterSection],
     scenarios: &[Scenario],
     margin: Option<Positive>,
-    prior_of_share: impl Fn(&str) -> Option<Distribution>,
+    prior: impl Fn(&ParameterSection) -> Option<Distribution>,
     root: &Node,
     problems: &mut Problems,
 ) -> (Vec<Parameter>, Vec<Unknown>) {
@@ -56,10 +56,11 @@ pub(super) fn unknowns(
     let named: Vec<&str> =
         scenarios.iter().map(|s| s.name.as_str()).filter(|name| !name.is_empty()).collect();
     for section in sections {
-        let Some(prior) = section.prior.clone().or_else(|| prior_of_share(section.name.as_str()))
-        else {
-            let mut complaints = Complaints::new(root, problems);
-            complaints.at(&format!("parameter.{}", section.name)).say("missing key `prior`");
+        let Some(prior) = prior(section) else {
+            if section.prior.is_none() {
+                let mut complaints = Complaints::new(root, problems);
+                complaints.at(&format!("parameter.{}", section.name)).say("missing key `prior`");
+            }
             continue;
         };
         if margin.is_some() && section.design.is_none() && !reaches_out(&prior) {

@@ -8,6 +8,7 @@
 mod archimedean;
 mod correlation;
 mod elliptical;
+mod mixture;
 mod simplex;
 
 use rand::Rng;
@@ -15,8 +16,10 @@ use serde::Serialize;
 
 pub use archimedean::Family;
 pub use correlation::Correlation;
+pub use mixture::Mixture;
 
 use crate::math::distribution::Distribution;
+use crate::math::special::HALF_LN_TWO_PI;
 
 /// How several numbers depend on each other.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -31,6 +34,8 @@ pub enum Copula {
     /// Dirichlet distribution of shares with these concentrations, one more than there are numbers: the last share is what
     /// the others leave of 1. The marginals are its beta distributions, see [`Copula::marginals_of_shares`].
     Dirichlet(Vec<f64>),
+    /// Mixture of normal distributions of the normal scores. The marginals are those of the mixture, about standard normal.
+    Mixture(Mixture),
 }
 
 impl Copula {
@@ -54,6 +59,11 @@ impl Copula {
                 family.log_density(*theta, [z[0], z[1]])
             }
             Self::Dirichlet(concentrations) => simplex::log_ratio(concentrations, x),
+            Self::Mixture(mixture) => {
+                let z = scores(marginals, x);
+                let normal: f64 = z.iter().map(|z| -0.5 * z * z - HALF_LN_TWO_PI).sum();
+                mixture.log_density(&z) - normal
+            }
         };
         if value.is_nan() || value == f64::INFINITY { f64::NEG_INFINITY } else { value }
     }
@@ -66,6 +76,9 @@ impl Copula {
             Self::StudentT(correlation, dof) => elliptical::student_slopes(correlation, *dof, &z),
             Self::Archimedean(family, theta) => family.slopes(*theta, [z[0], z[1]]).to_vec(),
             Self::Dirichlet(concentrations) => return simplex::slopes(concentrations, x),
+            Self::Mixture(mixture) => {
+                mixture.slopes(&z).iter().zip(&z).map(|(slope, z)| slope + z).collect()
+            }
         };
         let chained = by_score.iter().zip(marginals).zip(x.iter().zip(&z));
         chained
@@ -83,6 +96,7 @@ impl Copula {
             Self::StudentT(correlation, dof) => elliptical::draw_student(correlation, *dof, rng),
             Self::Archimedean(family, theta) => family.draw(*theta, rng).to_vec(),
             Self::Dirichlet(concentrations) => return simplex::draw(concentrations, rng),
+            Self::Mixture(mixture) => mixture.sample(rng),
         };
         marginals.iter().zip(z).map(|(law, z)| law.at_score(z)).collect()
     }

@@ -2,6 +2,7 @@
 
 use super::Distribution;
 use super::probability::ln_ratio;
+use super::quantiles::Quantiles;
 use crate::math::special::{
     HALF_LN_TWO_PI, ln_beta_density, ln_gamma_density, ln_gamma_half_step, ln_normal_between,
 };
@@ -55,6 +56,8 @@ impl Distribution {
                     - sd.ln()
                     - ln_normal_between((lo - mean) / sd, (hi - mean) / sd)
             }
+            Self::Quantiles(ref n) if x > n[0] && x < n[1] => Quantiles::of(n).log_density(x),
+            Self::Quantiles(_) => f64::NEG_INFINITY,
             Self::Triangular([lo, mode, hi]) => {
                 let height = 2.0 / (hi - lo);
                 let part = if x < mode {
@@ -99,6 +102,7 @@ impl Distribution {
                 let z = x / scale;
                 -(dof + 1.0) * z / (dof + z * z) / scale
             }
+            Self::Quantiles(ref n) => Quantiles::of(n).log_density_derivative(x),
             Self::Triangular([lo, mode, hi]) => {
                 if x < mode {
                     1.0 / (x - lo)

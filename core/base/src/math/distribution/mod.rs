@@ -4,13 +4,16 @@
 //! study has been checked; [`Distribution::check`] does the same for one made in code.
 
 mod density;
+mod fitted;
 mod probability;
+mod quantiles;
 mod score;
 mod summary;
 mod written;
 
 use std::fmt;
 
+use quantiles::Quantiles;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -48,6 +51,10 @@ pub enum Distribution {
     TruncatedNormal([f64; 4]),
     /// Triangular: `[lower bound, mode, upper bound]`.
     Triangular([f64; 3]),
+    /// Given by quantiles: `[lower bound, upper bound, s, x0, x1, …]`, bounds that may be infinite and the values of which the
+    /// normal scores are equally spaced from -s to s. Between them the value is a smooth monotone function of the score; beyond
+    /// them the tails are normal (log-normal or logit-normal towards a bound).
+    Quantiles(Vec<f64>),
 }
 
 impl Distribution {
@@ -67,6 +74,7 @@ impl Distribution {
             Self::HalfStudentT(_) => "half_student_t",
             Self::TruncatedNormal(_) => "truncated_normal",
             Self::Triangular(_) => "triangular",
+            Self::Quantiles(_) => "quantiles",
         }
     }
 
@@ -83,6 +91,7 @@ impl Distribution {
             Self::HalfNormal(n) | Self::Exponential(n) => std::slice::from_ref(n),
             Self::Beta(n) | Self::TruncatedNormal(n) => n,
             Self::StudentT(n) | Self::Triangular(n) => n,
+            Self::Quantiles(n) => n,
         }
     }
 
@@ -99,6 +108,9 @@ impl Distribution {
             };
             Err(format!("expected {expected}, found {found}"))
         };
+        if let Self::Quantiles(numbers) = self {
+            return Quantiles::wrong(numbers).map_or(Ok(()), complain);
+        }
         let bounds = if let Self::TruncatedNormal(n) = self { &n[2..] } else { &[][..] };
         let rest = &numbers[..numbers.len() - bounds.len()];
         if rest.iter().any(|x| !x.is_finite()) || bounds.iter().any(|x| x.is_nan()) {
@@ -183,6 +195,12 @@ impl fmt::Display for Distribution {
             }
             Self::Triangular([lo, mode, hi]) => {
                 write!(f, "triangular on [{}, {}], mode {}", n(lo), n(hi), n(mode))
+            }
+            Self::Quantiles(_) => {
+                let [low, middle, high] = [0.025, 0.5, 0.975].map(|p| self.quantile(p));
+                let rounded = |x: f64| format!("{x:.4}");
+                let (low, middle, high) = (rounded(low), rounded(middle), rounded(high));
+                write!(f, "by quantiles: 95 % in [{low}, {high}], median {middle}")
             }
         }
     }

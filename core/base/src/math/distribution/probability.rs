@@ -3,6 +3,7 @@
 use rand::Rng;
 
 use super::Distribution;
+use super::quantiles::Quantiles;
 use crate::math::random::uniform;
 use crate::math::special::{
     HALF_LN_TWO_PI, beta_tails, gamma_tails, inverse_beta, inverse_erf, inverse_gamma_tails,
@@ -44,6 +45,7 @@ impl Distribution {
                     if width < 1.0 { ln_normal_from(a, width) } else { ln_normal_between(a, z) };
                 (below - ln_normal_between((lo - mean) / sd, (hi - mean) / sd)).exp().min(1.0)
             }
+            Self::Quantiles(ref n) => normal_cdf(Quantiles::of(n).score(x)),
             Self::Triangular([lo, mode, hi]) if x <= mode => {
                 (x - lo) * (x - lo) / ((hi - lo) * (mode - lo))
             }
@@ -93,6 +95,7 @@ impl Distribution {
                     mean + sd * z
                 }
             }
+            Self::Quantiles(ref n) => Quantiles::of(n).at_score(normal_quantile(p)),
             Self::Triangular([lo, mode, hi]) if p * (hi - lo) <= mode - lo => {
                 lo + (p * (hi - lo) * (mode - lo)).sqrt()
             }

@@ -2,6 +2,7 @@
 
 use super::Distribution;
 use super::probability::ln_ratio;
+use super::quantiles::Quantiles;
 use crate::math::special::{
     HALF_LN_TWO_PI, ln_normal_cdf, normal_cdf, normal_quantile, normal_quantile_of_ln,
 };
@@ -17,6 +18,7 @@ impl Distribution {
         let z = match *self {
             Self::Normal([mean, sd]) => (x - mean) / sd,
             Self::LogNormal([mu, sigma]) if x > 0.0 => (x.ln() - mu) / sigma,
+            Self::Quantiles(ref n) if x > n[0] && x < n[1] => Quantiles::of(n).score(x),
             _ => {
                 let below = self.cdf(x);
                 if below <= 0.5 {
@@ -37,6 +39,7 @@ impl Distribution {
             Self::StudentT([dof, location, scale]) if z > 0.0 => {
                 location - Self::StudentT([dof, 0.0, scale]).at_score(-z)
             }
+            Self::Quantiles(ref n) => Quantiles::of(n).at_score(z),
             _ => self.quantile(normal_cdf(z)),
         }
     }

@@ -4,6 +4,7 @@ use std::f64::consts::FRAC_2_PI;
 
 use super::Distribution;
 use super::probability::ln_ratio;
+use super::quantiles::Quantiles;
 use crate::math::special::{five_point_rule, ln_gamma_half_step};
 
 impl Distribution {
@@ -15,6 +16,7 @@ impl Distribution {
             | Self::Beta([_, _, lo, hi])
             | Self::TruncatedNormal([_, _, lo, hi])
             | Self::Triangular([lo, _, hi]) => (lo, hi),
+            Self::Quantiles(ref n) => Quantiles::of(n).support(),
             Self::Normal(_) | Self::StudentT(_) => (f64::NEG_INFINITY, f64::INFINITY),
             Self::HalfNormal(_)
             | Self::LogNormal(_)
@@ -29,6 +31,7 @@ impl Distribution {
     /// one degree of freedom or less, also of its size).
     pub fn mean(&self) -> f64 {
         match *self {
+            Self::Quantiles(ref n) => Quantiles::of(n).mean(),
             Self::Uniform([lo, hi]) => lo + 0.5 * (hi - lo),
             Self::Normal([mean, _]) | Self::Exponential(mean) => mean,
             Self::HalfNormal(scale) => scale * FRAC_2_PI.sqrt(),
@@ -51,6 +54,7 @@ impl Distribution {
     /// Variance; infinite or NaN if it does not exist.
     pub fn variance(&self) -> f64 {
         match *self {
+            Self::Quantiles(ref n) => Quantiles::of(n).variance(),
             Self::Uniform([lo, hi]) => (hi - lo).powi(2) / 12.0,
             Self::Normal([_, sd]) => sd * sd,
             Self::HalfNormal(scale) => scale * scale * (1.0 - FRAC_2_PI),
@@ -93,6 +97,7 @@ impl Distribution {
     /// Mode: the middle if the density is flat, the lower bound if it diverges at both.
     pub fn mode(&self) -> f64 {
         match *self {
+            Self::Quantiles(ref n) => Quantiles::of(n).mode(),
             Self::Uniform([lo, hi]) | Self::Beta([1.0, 1.0, lo, hi]) => lo + 0.5 * (hi - lo),
             Self::Normal([mode, _])
             | Self::StudentT([_, mode, _])
@@ -144,4 +149,20 @@ fn truncated_moments(a: f64, b: f64) -> (f64, f64) {
     }
     let (first, second) = (sums[1] / sums[0], sums[2] / sums[0]);
     (mode + first, second - first * first)
+}
+
+/// Mean of a function of a standard normal variable, by quadrature on the central ±9.
+pub(super) fn over_scores(value: impl Fn(f64) -> f64) -> f64 {
+    const PANELS: u32 = 180;
+    let (low, width) = (-9.0, 18.0 / f64::from(PANELS));
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for panel in 0..PANELS {
+        for (node, weight) in five_point_rule() {
+            let z: f64 = low + width * (f64::from(panel) + 0.5 * (1.0 + node));
+            let weight = weight * (-0.5 * z * z).exp();
+            sum += weight * value(z);
+            weights += weight;
+        }
+    }
+    sum / weights
 }

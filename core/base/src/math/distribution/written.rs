@@ -7,7 +7,7 @@ use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor}
 use super::Distribution;
 
 /// Names that a study may use and the meaning of their parameters.
-const FORMS: [(&str, &str); 13] = [
+const FORMS: [(&str, &str); 14] = [
     ("uniform", "[lower bound, upper bound]"),
     ("normal", "[mean, standard deviation]"),
     ("half_normal", "a scale"),
@@ -21,6 +21,7 @@ const FORMS: [(&str, &str); 13] = [
     ("half_student_t", "[degrees of freedom, scale]"),
     ("truncated_normal", "[mean, standard deviation, lower bound, upper bound]"),
     ("triangular", "[lower bound, mode, upper bound]"),
+    ("quantiles", "[lower bound, upper bound, largest score, quantiles at equally spaced scores]"),
 ];
 
 impl<'de> Deserialize<'de> for Distribution {
@@ -44,8 +45,18 @@ impl<'de> Visitor<'de> for Table {
                 "expected a distribution such as { uniform = [0, 1] }, found an empty table",
             ));
         };
+        Distribution::named(&name, map)
+    }
+}
+
+impl Distribution {
+    /// Reads the rest of a table whose first key, the name of the distribution, was taken.
+    ///
+    /// # Errors
+    /// What is wrong with the name or the numbers.
+    pub fn named<'de, A: MapAccess<'de>>(name: &str, mut map: A) -> Result<Self, A::Error> {
         if !FORMS.iter().any(|form| form.0 == name) {
-            return Err(Error::custom(unknown(&name)));
+            return Err(Error::custom(unknown(name)));
         }
         let numbers = map.next_value::<Numbers>()?;
         if let Some(second) = map.next_key::<String>()? {
@@ -53,7 +64,7 @@ impl<'de> Visitor<'de> for Table {
                 "expected one distribution, found `{name}` and `{second}`"
             )));
         }
-        build(&name, &numbers).map_err(Error::custom)
+        build(name, &numbers).map_err(Error::custom)
     }
 }
 
@@ -143,6 +154,11 @@ fn build(name: &str, numbers: &Numbers) -> Result<Distribution, String> {
                 let lo = if lo.is_nan() { f64::NEG_INFINITY } else { lo };
                 let hi = if hi.is_nan() { f64::INFINITY } else { hi };
                 Distribution::TruncatedNormal([mean, sd, lo, hi])
+            }
+            ("quantiles", &[lo, hi, ref rest @ ..]) => {
+                let lo = if lo.is_nan() { f64::NEG_INFINITY } else { lo };
+                let hi = if hi.is_nan() { f64::INFINITY } else { hi };
+                Distribution::Quantiles([&[lo, hi], rest].concat())
             }
             ("triangular", &[lo, mode, hi]) => Distribution::Triangular([lo, mode, hi]),
             _ => return Err(form(name, &in_brackets(list))),

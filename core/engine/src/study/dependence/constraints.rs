@@ -82,7 +82,9 @@ pub(super) fn reachable(dependence: &Dependence, root: &Node, problems: &mut Pro
     let mut complaints = Complaints::new(root, problems);
     let message = match share.inside {
         0 => format!("none of {} draws of the priors fulfils the constraints", share.draws),
-        some => format!("only {some} of {} draws of the priors fulfil the constraints", share.draws),
+        some => {
+            format!("only {some} of {} draws of the priors fulfil the constraints", share.draws)
+        }
     };
     complaints
         .at("constraint")

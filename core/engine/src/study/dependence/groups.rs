@@ -6,6 +6,8 @@ use lacuna::math::distribution::Distribution;
 use lacuna::text::nearest::{nearest, one_of};
 use lacuna::text::{Complaints, Node, Problems};
 
+use super::Sections;
+use super::earlier::Earlier;
 use super::keys::{CopulaName, DependenceSection};
 use super::matrix::{Correlations, smallest_eigenvalue};
 
@@ -23,23 +25,33 @@ fn concentrations(section: &DependenceSection) -> Option<Vec<f64>> {
 
 /// The groups of all sections; what is wrong is left out and reported.
 pub(super) fn groups(
-    sections: &[DependenceSection],
+    sections: &Sections,
     parameters: &[Parameter],
     root: &Node,
     problems: &mut Problems,
 ) -> Vec<Group> {
-    let mut groups: Vec<Group> = Vec::new();
+    let mut groups: Vec<Group> =
+        sections.earlier.iter().filter_map(|run| of_run(run, parameters)).collect();
     let nodes = root.get("dependence").map(Node::elements).unwrap_or_default();
-    for (section, node) in sections.iter().zip(nodes) {
+    for (section, node) in sections.dependence.iter().zip(nodes) {
         problems.within("dependence", |problems| {
             let mut complaints = Complaints::new(node, problems);
-            let Some(members) = members(section, parameters, &groups, &mut complaints) else { return };
+            let Some(members) = members(section, parameters, &groups, &mut complaints) else {
+                return;
+            };
             if let Some(copula) = copula(section, &members, parameters, &mut complaints) {
                 groups.push(Group { members, copula });
             }
         });
     }
     groups
+}
+
+/// The joint prior of parameters of an earlier run.
+fn of_run(run: &Earlier, parameters: &[Parameter]) -> Option<Group> {
+    let place = |name: &String| parameters.iter().position(|p| p.name == *name);
+    let members = run.parameters.iter().map(place).collect::<Option<_>>()?;
+    Some(Group { members, copula: Copula::Mixture(run.mixture.clone()?) })
 }
 
 /// Places of the parameters of a section.
@@ -53,7 +65,8 @@ fn members(
     for name in &section.parameters {
         let names = || parameters.iter().map(|p| p.name.as_str());
         let Some(place) = names().position(|other| other == name) else {
-            let problem = complaints.at("parameters").say(format!("there is no parameter `{name}`"));
+            let problem =
+                complaints.at("parameters").say(format!("there is no parameter `{name}`"));
             problem.expected(one_of(names()));
             if let Some(near) = nearest(name, names()) {
                 problem.help(format!("did you mean `{near}`?"));
@@ -65,7 +78,10 @@ fn members(
         } else if groups.iter().any(|group| group.members.contains(&place)) {
             complaints
                 .at("parameters")
-                .say(format!("the parameter `{name}` is in two `[[dependence]]` sections"))
+                .say(format!("the parameter `{name}` depends on others in two ways"))
+                .expected(
+                    "each parameter in one `[[dependence]]`, or in the joint posterior of one run",
+                )
                 .help("write one section with all parameters that depend on each other");
         }
         members.push(place);
@@ -91,7 +107,10 @@ enum Strength<'a> {
     Dirichlet(Vec<f64>),
 }
 
-fn strength<'a>(section: &'a DependenceSection, complaints: &mut Complaints<'_>) -> Option<Strength<'a>> {
+fn strength<'a>(
+    section: &'a DependenceSection,
+    complaints: &mut Complaints<'_>,
+) -> Option<Strength<'a>> {
     let mut all = Vec::new();
     all.extend(section.correlation.as_ref().map(|r| ("correlation", Strength::Correlation(r))));
     all.extend(section.spearman.as_ref().map(|r| ("spearman", Strength::Spearman(r))));
@@ -216,7 +235,10 @@ fn archimedean(
         Strength::Correlation(_) | Strength::Spearman(_) | Strength::Dirichlet(_) => {
             complaints
                 .at("copula")
-                .say(format!("the copula `{}` is not described by this correlation", name.written()))
+                .say(format!(
+                    "the copula `{}` is not described by this correlation",
+                    name.written()
+                ))
                 .expected("`kendall` or `theta`");
             return None;
         }
@@ -266,7 +288,10 @@ fn shares(
             fits = false;
             complaints
                 .at("dirichlet")
-                .say(format!("the prior of the share `{}` is not that of the Dirichlet distribution", parameter.name))
+                .say(format!(
+                    "the prior of the share `{}` is not that of the Dirichlet distribution",
+                    parameter.name
+                ))
                 .expected(format!("no `prior`, or {law}"))
                 .found(&parameter.prior);
         }

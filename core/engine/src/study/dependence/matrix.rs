@@ -28,7 +28,11 @@ impl Correlations {
     ///
     /// # Errors
     /// What is wrong with the correlations.
-    pub(super) fn rows(&self, count: usize, map: impl Fn(f64) -> f64) -> Result<Vec<Vec<f64>>, Unfit> {
+    pub(super) fn rows(
+        &self,
+        count: usize,
+        map: impl Fn(f64) -> f64,
+    ) -> Result<Vec<Vec<f64>>, Unfit> {
         let unfit = |message: String, expected: String| Err(Unfit { message, expected });
         let rows = match self {
             Self::One(r) if count == 2 => vec![vec![1.0, *r], vec![*r, 1.0]],

@@ -1,9 +1,15 @@
 //! `[[dependence]]` and `[[constraint]]`: what the joint prior of the parameters has besides their own priors.
 
 mod constraints;
+mod earlier;
 mod groups;
 mod keys;
 mod matrix;
+mod prior;
+mod represent;
+mod run;
+
+use std::path::Path;
 
 use lacuna::data::{Dependence, JointPrior, Parameter};
 use lacuna::math::distribution::Distribution;
@@ -13,9 +19,12 @@ use lacuna::text::{Node, Problems};
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
+pub use earlier::Earlier;
 pub use keys::{ConstraintSection, CopulaName, DependenceSection};
 pub use matrix::Correlations;
+pub use prior::Prior;
 
+use super::file::ParameterSection;
 use super::plain::Study;
 use super::unknowns::Unknown;
 
@@ -26,6 +35,8 @@ pub struct Sections {
     pub dependence: Vec<DependenceSection>,
     /// `[[constraint]]`.
     pub constraint: Vec<ConstraintSection>,
+    /// Priors that are posteriors of earlier runs.
+    pub earlier: Vec<Earlier>,
 }
 
 impl Sections {
@@ -33,11 +44,45 @@ impl Sections {
     pub(super) fn read(root: &Node, problems: &mut Problems) -> Option<Self> {
         let dependence = tables(root, "dependence", problems);
         let constraint = tables(root, "constraint", problems);
-        Some(Self { dependence: dependence?, constraint: constraint? })
+        Some(Self { dependence: dependence?, constraint: constraint?, earlier: Vec::new() })
+    }
+
+    /// Reads the runs that parameters name as their priors.
+    pub(super) fn read_runs(
+        &mut self,
+        parameters: &[ParameterSection],
+        directory: &Path,
+        root: &Node,
+        problems: &mut Problems,
+    ) {
+        self.earlier = earlier::earlier(parameters, directory, root, problems);
+    }
+
+    /// Prior of a parameter by itself; `None` if the study gives none.
+    pub(super) fn prior(&self, section: &ParameterSection) -> Option<Distribution> {
+        let name = section.name.as_str();
+        match &section.prior {
+            Some(Prior::Own(law)) => Some(law.clone()),
+            Some(Prior::Earlier { .. }) => self.of_run(name),
+            None => self.prior_of_share(name),
+        }
+    }
+
+    fn of_run(&self, name: &str) -> Option<Distribution> {
+        self.earlier.iter().find_map(|run| {
+            let place = run.parameters.iter().position(|other| other == name)?;
+            Some(run.marginals[place].clone())
+        })
+    }
+
+    /// Run directory from which a parameter has its prior.
+    pub(super) fn run_of(&self, name: &str) -> Option<&Path> {
+        let run = self.earlier.iter().find(|run| run.parameters.iter().any(|other| other == name));
+        run.map(|run| run.run.as_path())
     }
 
     /// The prior of a parameter that is a share of a Dirichlet distribution: its beta distribution.
-    pub(super) fn prior_of_share(&self, name: &str) -> Option<Distribution> {
+    fn prior_of_share(&self, name: &str) -> Option<Distribution> {
         self.dependence.iter().find_map(|section| groups::prior_of_share(section, name))
     }
 }
@@ -60,7 +105,7 @@ pub(super) fn dependence(
     problems: &mut Problems,
 ) -> Option<Dependence> {
     let before = problems.len();
-    let groups = groups::groups(&sections.dependence, parameters, root, problems);
+    let groups = groups::groups(sections, parameters, root, problems);
     let constraints =
         constraints::constraints(&sections.constraint, (parameters, unknowns), root, problems);
     if problems.len() > before {

@@ -18,7 +18,7 @@ use super::added::{Added, AddedCandidate};
 use super::inside::{Inside, SwitchSection};
 use super::{Gap, GapSection};
 use crate::study::Study;
-use crate::study::file::{ModelKeys, ParameterSection};
+use crate::study::file::{ModelKeys, ParameterSection, Prior};
 use crate::study::table::PluginSections;
 use crate::study::unknowns::{Unknown, unknowns};
 
@@ -124,6 +124,17 @@ fn with_constants(
     problems: &mut Problems,
 ) -> Option<(Vec<Parameter>, Vec<Unknown>)> {
     let before = problems.len();
+    let own = |section: &ParameterSection| match &section.prior {
+        Some(Prior::Own(law)) => Some(law.clone()),
+        _ => None,
+    };
+    let of_run = |c: &&ParameterSection| matches!(c.prior, Some(Prior::Earlier { .. }));
+    for constant in keys.parameter.iter().filter(of_run) {
+        Complaints::new(node, problems)
+            .at(&format!("parameter.{}.prior", constant.name))
+            .say("a constant of the companion cannot take its prior from a run")
+            .expected("a distribution");
+    }
     for constant in keys.parameter.iter().filter(|constant| constant.scenario.is_some()) {
         Complaints::new(node, problems)
             .at(&format!("parameter.{}.scenario", constant.name))
@@ -133,7 +144,7 @@ fn with_constants(
     if problems.len() > before {
         return None;
     }
-    let (own, names) = unknowns(&keys.parameter, &[], None, |_| None, node, problems);
+    let (own, names) = unknowns(&keys.parameter, &[], None, own, node, problems);
     let mut parameters = study.parameters.clone();
     parameters.extend(own);
     let mut all = study.unknowns.clone();

@@ -1,0 +1,111 @@
+//! Draws as a density: quantiles of each number, and a mixture of normal distributions of their normal scores.
+
+use lacuna::diagnose::energy::{Energy, energy};
+use lacuna::math::dependence::{Copula, Mixture};
+use lacuna::math::distribution::Distribution;
+use lacuna::math::random::Stream;
+
+/// Draws of several numbers with what is known of them.
+pub(super) struct Sample {
+    /// Draws by chain.
+    pub(super) chains: Vec<Vec<Vec<f64>>>,
+    /// Support of each number.
+    pub(super) supports: Vec<(f64, f64)>,
+    /// Number of independent draws that the draws are worth.
+    pub(super) effective: f64,
+}
+
+/// A density that represents draws.
+pub(super) struct Density {
+    /// Distribution of each number.
+    pub(super) marginals: Vec<Distribution>,
+    /// Their dependence; `None` for one number.
+    pub(super) copula: Option<Mixture>,
+    /// Comparison of draws of the density with draws that it was not fitted to.
+    pub(super) check: Energy,
+}
+
+/// Shares of each chain that are fitted and that choose the number of components; the rest is compared.
+const FITTED: f64 = 0.6;
+const CHOSEN: f64 = 0.8;
+/// Largest number of draws that a mixture is fitted to, and that are compared.
+const DRAWS: usize = 4000;
+const COMPARED: usize = 400;
+
+impl Density {
+    /// The density of a sample; `None` if its draws are too few or too often equal.
+    pub(super) fn of(sample: &Sample) -> Option<Self> {
+        let parts = |from: f64, to: f64| -> Vec<Vec<f64>> {
+            let part = |chain: &Vec<Vec<f64>>| {
+                let at = |share: f64| (share * chain.len() as f64) as usize;
+                chain[at(from)..at(to)].to_vec()
+            };
+            sample.chains.iter().flat_map(part).collect()
+        };
+        let (first, second, third) =
+            (parts(0.0, FITTED), parts(FITTED, CHOSEN), parts(CHOSEN, 1.0));
+        let tried = fitted(sample, &first, &second, FITTED * sample.effective)?;
+        let independent = ((1.0 - CHOSEN) * sample.effective) as usize;
+        let held_out = thinned(&third, COMPARED.min(independent.max(20)));
+        let check = tried.compared(&held_out);
+        let rest = [first, third].concat();
+        let whole = fitted(sample, &rest, &second, sample.effective)?;
+        Some(Self { check, ..whole })
+    }
+
+    /// The energy distance of as many draws of the density from these, each number in units of its spread.
+    fn compared(&self, held_out: &[Vec<f64>]) -> Energy {
+        let stream = Stream::root(0).named("posterior as prior");
+        let mut rng = stream.named("draws").generator();
+        let laws: Vec<&Distribution> = self.marginals.iter().collect();
+        let draw = |_: &Vec<f64>| match &self.copula {
+            Some(mixture) => Copula::Mixture(mixture.clone()).sample(&laws, &mut rng),
+            None => vec![laws[0].sample(&mut rng)],
+        };
+        let drawn: Vec<Vec<f64>> = held_out.iter().map(draw).collect();
+        let spread: Vec<f64> =
+            laws.iter().map(|law| 0.25 * (law.quantile(0.975) - law.quantile(0.025))).collect();
+        let scaled = |points: &[Vec<f64>]| -> Vec<Vec<f64>> {
+            let one = |point: &Vec<f64>| point.iter().zip(&spread).map(|(x, s)| x / s).collect();
+            points.iter().map(one).collect()
+        };
+        energy(&scaled(held_out), &scaled(&drawn), &stream.named("permutations"))
+    }
+}
+
+fn fitted(
+    sample: &Sample,
+    draws: &[Vec<f64>],
+    others: &[Vec<f64>],
+    effective: f64,
+) -> Option<Density> {
+    let marginal = |(j, &support): (usize, &(f64, f64))| {
+        let values: Vec<f64> = draws.iter().map(|point| point[j]).collect();
+        Distribution::of_draws(&values, support, effective)
+    };
+    let marginals: Vec<Distribution> =
+        sample.supports.iter().enumerate().map(marginal).collect::<Option<_>>()?;
+    let scores = |points: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        let one = |point: &Vec<f64>| {
+            marginals.iter().zip(point).map(|(law, &x)| law.score(x).clamp(-6.0, 6.0)).collect()
+        };
+        thinned(points, DRAWS).iter().map(one).collect()
+    };
+    let copula = if marginals.len() > 1 {
+        let stream = Stream::root(0).named("posterior as prior").named("mixture");
+        Some(Mixture::fit(&scores(draws), &scores(others), &stream)?)
+    } else {
+        None
+    };
+    let check = Energy { coefficient: f64::NAN, probability: f64::NAN };
+    Some(Density { marginals, copula, check })
+}
+
+/// At most `count` draws at equal distances.
+fn thinned(draws: &[Vec<f64>], count: usize) -> Vec<Vec<f64>> {
+    let kept = count.min(draws.len());
+    (0..kept).map(|i| draws[i * draws.len() / kept].clone()).collect()
+}
+
+#[cfg(test)]
+mod tests;
