@@ -136,6 +136,18 @@ fn pieces(law: &Distribution, degree: usize) -> Vec<Piece> {
         Distribution::Uniform([low, high]) | Distribution::Beta([_, _, low, high]) => {
             vec![between(low, high)]
         }
+        Distribution::Quantiles(ref numbers) => {
+            let (values, last) = (&numbers[3..], numbers.len() - 4);
+            let tail = |from: f64, unit: f64, bound: f64| {
+                let end = (bound - from) / unit;
+                let bounds = (end.min(0.0), end.max(0.0));
+                piece(Change::Affine { origin: from, unit }, 0.0, bounds, 0.5)
+            };
+            let mut all = vec![tail(values[0], values[1] - values[0], numbers[0])];
+            all.extend(values.windows(2).map(|pair| between(pair[0], pair[1])));
+            all.push(tail(values[last], values[last] - values[last - 1], numbers[1]));
+            all
+        }
         Distribution::Triangular([low, mode, high]) => {
             let halves = [(low, mode), (mode, high)].into_iter();
             halves.filter(|(from, to)| from < to).map(|(from, to)| between(from, to)).collect()

@@ -138,6 +138,11 @@ impl<'a> JointPrior<'a> {
         self.dependence.is_none()
     }
 
+    /// Standard error of the log density, that of the probability of the constraints.
+    pub fn log_error(&self) -> f64 {
+        self.dependence.share.map_or(0.0, Share::log_error)
+    }
+
     /// Log density at a point of all parameters; minus infinity outside the support.
     pub fn log_density(&self, point: &[f64]) -> f64 {
         let own = self.parameters.iter().zip(point).map(|(p, &x)| p.prior.log_density(x)).sum();

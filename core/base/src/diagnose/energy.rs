@@ -37,3 +37,45 @@ pub fn energy(a: &[Vec<f64>], b: &[Vec<f64>], stream: &Stream) -> Energy {
     let probability = (larger + 1) as f64 / (PERMUTATIONS + 1) as f64;
     Energy { coefficient: own, probability }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::normal;
+
+    fn sample(count: usize, shift: f64, seed: u64) -> Vec<Vec<f64>> {
+        let mut rng = Stream::root(seed).generator();
+        (0..count).map(|_| vec![shift + normal(&mut rng), normal(&mut rng)]).collect()
+    }
+
+    /// For one number, `2 E|X - Y| - E|X - X'| - E|Y - Y'|` is `2 int (F - G)^2` (Székely and Rizzo, equation 2.5).
+    #[test]
+    fn the_coefficient_is_that_of_the_distribution_functions() {
+        let (a, b) = (vec![vec![0.0], vec![1.0]], vec![vec![0.5], vec![2.0]]);
+        // F - G is 0.5 on [0, 0.5) and on [1, 2), and 0 on [0.5, 1).
+        let squared: f64 = 2.0 * (0.25 * 0.5 + 0.25 * 1.0);
+        let between = 2.0 * (0.5 + 2.0 + 0.5 + 1.0) / 4.0;
+        let found = energy(&a, &b, &Stream::root(1)).coefficient;
+        assert!((found - (squared / between).sqrt()).abs() < 1e-14, "{found}");
+    }
+
+    #[test]
+    fn a_shift_is_found_and_equality_is_not_refuted() {
+        let equal = energy(&sample(200, 0.0, 1), &sample(200, 0.0, 2), &Stream::root(3));
+        let shifted = energy(&sample(200, 0.0, 1), &sample(200, 1.0, 2), &Stream::root(3));
+        assert!(equal.probability > 0.05 && equal.coefficient < 0.1, "{equal:?}");
+        assert!(shifted.probability <= 0.01 && shifted.coefficient > 0.2, "{shifted:?}");
+    }
+
+    /// The probability is uniform if both samples have one distribution: below 0.1 in a tenth of 200 cases.
+    #[test]
+    fn the_probability_holds_its_level() {
+        let below = |k: u64| {
+            energy(&sample(20, 0.0, 2 * k), &sample(20, 0.0, 2 * k + 1), &Stream::root(k))
+                .probability
+                <= 0.1
+        };
+        let share = (0..200).filter(|&k| below(k)).count() as f64 / 200.0;
+        assert!((share - 0.1).abs() < 4.0 * (0.09_f64 / 200.0).sqrt(), "{share}");
+    }
+}

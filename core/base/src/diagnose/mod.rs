@@ -13,6 +13,7 @@
 pub mod autocorrelation;
 pub mod chains;
 pub mod coverage;
+pub mod divergence;
 pub mod energy;
 pub mod leave_one_out;
 pub mod pareto;

@@ -14,7 +14,19 @@ const QUESTION: &str =
 
 /// Rules of this module; see [`super::rules`].
 pub fn rules() -> Vec<Rule> {
-    vec![Rule {
+    let of_run = Rule {
+        code: OF_RUN,
+        looks_at: "divergence of a prior that represents the posterior of an earlier run from held-out draws of that run, in \
+                   nats; their energy distance; convergence of that run"
+            .to_owned(),
+        threshold: "more than 0.1 above three standard errors, or p ≤ 0.01 of the energy distance, or not converged: \
+                    reservation"
+            .to_owned(),
+        why: "the posterior of the earlier run enters as a fitted density; where it differs from the draws, the present \
+              posterior uses another prior than the earlier study found",
+        action: BETTER,
+    };
+    let conflict = Rule {
         code: CODE,
         looks_at: "posterior mean minus prior mean, divided by sqrt(prior variance - posterior variance), for \
                    priors without bounds"
@@ -24,7 +36,40 @@ pub fn rules() -> Vec<Rule> {
               Moshonov 2006); with a large value data and prior contradict each other, and the posterior is a \
               compromise that neither supports",
         action: QUESTION,
-    }]
+    };
+    vec![conflict, of_run]
+}
+
+const OF_RUN: &str = "prior_of_run";
+
+const BETTER: &str =
+    "run the earlier study with more steps, or calibrate the data of both studies together";
+
+/// Finding about a prior that represents the posterior of a run: divergence in nats and its standard error, probability of
+/// the energy distance, convergence of the run.
+pub fn of_run(
+    run: &str,
+    divergence: (f64, f64),
+    probability: f64,
+    converged: bool,
+    poor: bool,
+) -> Option<Finding> {
+    if converged && !poor {
+        return None;
+    }
+    let message = if poor {
+        format!(
+            "the prior from `{run}` differs from held-out draws of that run: divergence {} ± {} nats, p {} of the energy \
+             distance",
+            short(divergence.0),
+            short(divergence.1),
+            short(probability)
+        )
+    } else {
+        format!("the prior is the posterior of `{run}`, whose chains did not converge")
+    };
+    let figure = (divergence.0, 0.1);
+    Some(Finding::new((OF_RUN, run), figure, Severity::Reservation, message, BETTER))
 }
 
 /// Finding about a parameter with this mean and standard deviation of prior and posterior.

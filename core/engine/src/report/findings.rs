@@ -31,6 +31,8 @@ pub struct Findings {
     pub components: Vec<(String, String)>,
     /// Parameters of the model.
     pub parameters: Vec<Parameter>,
+    /// What the joint prior has besides the priors of the parameters.
+    pub prior: Vec<Fact>,
     /// Shapes of the responses, scenario by scenario.
     pub layouts: Layouts,
     /// Simulation runs.

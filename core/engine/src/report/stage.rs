@@ -80,6 +80,7 @@ fn findings(
         version: env!("CARGO_PKG_VERSION").to_owned(),
         components: components(study),
         parameters: study.parameters.clone(),
+        prior: study.prior_facts(),
         layouts: study.layouts.clone(),
         ensemble: all
             .problem

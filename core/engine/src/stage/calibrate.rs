@@ -284,7 +284,7 @@ fn calibrate(
     if let Some(evidence) = &mut evidence {
         let (log, error) = posterior.log_share();
         evidence.log += log;
-        evidence.error = evidence.error.hypot(error);
+        evidence.error = evidence.error.hypot(error).hypot(posterior.prior().log_error());
     }
     let outcome = Outcome {
         coordinates,

@@ -62,6 +62,10 @@ pub fn stage(
                     &coordinates(posterior, &thinned(&draws)),
                     &stream(study, "evidence"),
                 )
+                .map(|found| Evidence {
+                    error: found.error.hypot(posterior.prior().log_error()),
+                    ..found
+                })
                 .map_err(|reason| missing.push(format!("no evidence: {reason}")))
                 .ok(),
             };

@@ -13,6 +13,8 @@ mod reliability;
 mod runs;
 
 use lacuna::data::{Layout, Parameter, Scenario};
+use lacuna::math::moments;
+use lacuna::math::random::Stream;
 use lacuna::plugin::{Component, Context, Surrogate, registry};
 use lacuna::text::nearest::one_of;
 use lacuna::text::{Complaints, Node, Problems};
@@ -184,6 +186,7 @@ fn calibration(study: &Study, complaints: &mut Complaints<'_>) {
 }
 
 fn parameters(study: &Study, complaints: &mut Complaints<'_>) {
+    let bulks = bulks(study);
     for (i, parameter) in study.parameters.iter().enumerate() {
         if study.parameters[..i].iter().any(|other| other.name == parameter.name) {
             complaints
@@ -192,7 +195,7 @@ fn parameters(study: &Study, complaints: &mut Complaints<'_>) {
                 .help("give each `[[parameter]]` its own name");
         }
         if study.surrogate.is_some() {
-            inside_design(parameter, complaints);
+            inside_design(parameter, bulks[i], complaints);
         }
         if let Some(value) = parameter.reference.filter(|value| !value.is_finite()) {
             complaints
@@ -204,11 +207,30 @@ fn parameters(study: &Study, complaints: &mut Complaints<'_>) {
     }
 }
 
+/// Draws of a prior with constraints from which the central 95 % of each parameter is taken.
+const DRAWS: u64 = 4000;
+
+/// Central 95 % of the prior of each parameter: by draws if constraints change it.
+fn bulks(study: &Study) -> Vec<[f64; 2]> {
+    let tails = [0.025, 0.975];
+    if study.dependence.constraints.is_empty() {
+        return study.parameters.iter().map(|p| tails.map(|t| p.prior.quantile(t))).collect();
+    }
+    let stream = Stream::root(study.about.seed).named("prior");
+    let draw = |i: u64| study.prior().sample(&mut stream.at(i).generator());
+    let draws: Vec<Vec<f64>> = (0..DRAWS).map(draw).collect();
+    let of = |j: usize| {
+        let values: Vec<f64> = draws.iter().map(|point| point[j]).collect();
+        let sorted = moments::sorted(&values);
+        tails.map(|t| moments::quantile(&sorted, t))
+    };
+    (0..study.parameters.len()).map(of).collect()
+}
+
 /// Reports a prior that extends beyond its design: an emulator is trained inside the design and would have to
 /// extrapolate.
-fn inside_design(parameter: &Parameter, complaints: &mut Complaints<'_>) {
+fn inside_design(parameter: &Parameter, bulk: [f64; 2], complaints: &mut Complaints<'_>) {
     let (low, high) = parameter.design.support();
-    let bulk = [0.025, 0.975].map(|p| parameter.prior.quantile(p));
     if bulk[0] < low || bulk[1] > high {
         complaints
             .at(&format!("parameter.{}.prior", parameter.name))

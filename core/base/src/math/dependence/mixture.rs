@@ -243,3 +243,6 @@ fn cholesky(rows: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
     }
     Some(factor)
 }
+
+#[cfg(test)]
+mod tests;

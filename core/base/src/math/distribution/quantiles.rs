@@ -191,3 +191,6 @@ impl<'a> Quantiles<'a> {
         inside.max_by(|&a, &b| density(a).total_cmp(&density(b))).unwrap_or(self.values[0])
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -37,6 +37,10 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Section {
             p { (paragraph(&response(findings))) }
             (fact_list(&facts(findings)))
             @if !parameters.is_empty() { (numbers.table(&parameters, &caption)) }
+            @if !findings.prior.is_empty() {
+                p { "The priors depend on each other. Figures and tables show the prior of each parameter alone." }
+                (fact_list(&findings.prior))
+            }
         },
     }
 }

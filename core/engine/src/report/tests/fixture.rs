@@ -89,6 +89,7 @@ pub fn bare() -> Findings {
         made_by: Vec::new(),
         seconds: Vec::new(),
         warnings: Vec::new(),
+        prior: Vec::new(),
         note: None,
         ..findings()
     }

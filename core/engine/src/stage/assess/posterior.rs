@@ -11,6 +11,7 @@ use crate::assess::chains::{self, Chains};
 use crate::assess::{Finding, correlation, modes, prior};
 use crate::stage::calibrate::{Calibrated, Outcome};
 use crate::study::Study;
+use crate::study::dependence::Earlier;
 
 pub(super) fn findings(
     study: &Study,
@@ -30,7 +31,19 @@ pub(super) fn findings(
     found.extend(at_bounds(study, &draws, region));
     found.extend(conflicts(study, &draws));
     found.extend(correlated(study, &draws));
+    found.extend(study.dependence_sections.earlier.iter().filter_map(of_run));
     found
+}
+
+fn of_run(run: &Earlier) -> Option<Finding> {
+    let check = run.check;
+    prior::of_run(
+        &run.run.display().to_string(),
+        (check.divergence.value, check.divergence.error),
+        check.energy.probability,
+        run.converged,
+        check.is_poor(),
+    )
 }
 
 fn convergence(draws: &Draws, outcome: &Outcome) -> Vec<Finding> {

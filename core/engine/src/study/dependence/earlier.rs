@@ -3,14 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use lacuna::data::Unit;
-use lacuna::diagnose::energy::Energy;
 use lacuna::math::dependence::Mixture;
 use lacuna::math::distribution::Distribution;
 use lacuna::text::nearest::{nearest, one_of};
 use lacuna::text::{Complaints, Node, Problems};
 
 use super::prior::Prior;
-use super::represent::{Density, Sample};
+use super::represent::{Check, Density, Sample};
 use super::run::Posterior;
 use crate::study::file::ParameterSection;
 
@@ -30,7 +29,7 @@ pub struct Earlier {
     /// True if the chains of the run converged.
     pub converged: bool,
     /// Comparison of the density with draws that it was not fitted to.
-    pub check: Energy,
+    pub check: Check,
 }
 
 /// Fewest independent draws of a run that make a prior.

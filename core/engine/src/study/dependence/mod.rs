@@ -2,6 +2,7 @@
 
 mod constraints;
 mod earlier;
+mod facts;
 mod groups;
 mod keys;
 mod matrix;
@@ -23,6 +24,7 @@ pub use earlier::Earlier;
 pub use keys::{ConstraintSection, CopulaName, DependenceSection};
 pub use matrix::Correlations;
 pub use prior::Prior;
+pub use represent::Check;
 
 use super::file::ParameterSection;
 use super::plain::Study;
