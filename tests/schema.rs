@@ -119,7 +119,6 @@ const WRONG: &[[&str; 4]] = &[
     ["half_normal", "half_norm", "discrepancy.variance", "'half_norm' was unexpected"],
     ["{ max = 12 }", "{ maks = 12 }", "surrogate.degree", "'maks' was unexpected"],
     ["validation = 16", "valdation = 16", "surrogate", "'valdation' was unexpected"],
-    ["prior = { uniform = [0.5, 3.0] }", "", "parameter.1", "'prior' is a required property"],
     ["unit = \"mm\"", "units = \"mm\"", "response", "'units' was unexpected"],
     ["count = 20, unit", "number = 20, unit", "response.axes.time", "'number' was unexpected"],
     ["\"reference\"", "\"referenz\"", "validate.against", "'referenz' is not one of"],
