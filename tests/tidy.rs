@@ -259,11 +259,15 @@ fn doc_comments_begin_with_their_subject() {
 }
 
 /// Words of the engine that are also names of plugins.
-const WORDS: [(&str, &str); 4] = [
+const WORDS: [(&str, &str); 7] = [
     // The default executor.
     ("core/engine/src/study/table.rs", "local"),
     // Offsets of replicates.
     ("core/engine/src/gap/report/tables.rs", "offset"),
+    // Copulas.
+    ("core/engine/src/study/dependence/groups.rs", "student_t"),
+    ("core/engine/src/study/dependence/keys.rs", "gaussian"),
+    ("core/engine/src/study/dependence/keys.rs", "student_t"),
     // Distribution.
     ("core/base/src/math/distribution/mod.rs", "student_t"),
     ("core/base/src/math/distribution/written.rs", "student_t"),

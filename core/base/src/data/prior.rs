@@ -74,7 +74,7 @@ impl Share {
     }
 }
 
-/// What the joint prior has besides the parameters' own distributions.
+/// Dependence and constraints: all that the joint prior has besides the parameters' own distributions.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Dependence {
     /// Groups of dependent parameters; no parameter is in two.

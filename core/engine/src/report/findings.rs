@@ -31,7 +31,7 @@ pub struct Findings {
     pub components: Vec<(String, String)>,
     /// Parameters of the model.
     pub parameters: Vec<Parameter>,
-    /// What the joint prior has besides the priors of the parameters.
+    /// Facts about the dependence of the priors; empty if they are independent.
     pub prior: Vec<Fact>,
     /// Shapes of the responses, scenario by scenario.
     pub layouts: Layouts,
