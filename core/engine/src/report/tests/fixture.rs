@@ -29,6 +29,7 @@ pub fn findings() -> Findings {
         title: "SNS first target station: mercury equation of state".into(),
         study: "sns".into(),
         seed: 20_220_415,
+        prior: Vec::new(),
         version: "0.1.0".into(),
         components: [
             ("model", "mercury_target"),
@@ -89,7 +90,6 @@ pub fn bare() -> Findings {
         made_by: Vec::new(),
         seconds: Vec::new(),
         warnings: Vec::new(),
-        prior: Vec::new(),
         note: None,
         ..findings()
     }
