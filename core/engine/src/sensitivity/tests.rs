@@ -90,7 +90,9 @@ fn g_function() {
     for subset in 1_u32..64 {
         let own: Vec<usize> = (0..6).filter(|i| subset >> i & 1 == 1).collect();
         let variance: f64 = own.iter().map(|&i| parts[i]).product();
-        own.iter().for_each(|&i| shapley[i] += variance / (own.len() as f64 * all));
+        for &i in &own {
+            shapley[i] += variance / (own.len() as f64 * all);
+        }
     }
     agree("Shapley", &found.shapley, &found.shapley_error, &shapley, 0.02);
 }
