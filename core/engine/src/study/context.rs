@@ -70,7 +70,7 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
 
 /// Reports sections that have no use beside `[target]`, which replaces everything that makes up a likelihood.
 fn beside_a_target(study: &Study, root: &Node, complaints: &mut Complaints<'_>) {
-    const ALONE: [&str; 9] = [
+    const ALONE: [&str; 11] = [
         "study",
         "parameter",
         "start",

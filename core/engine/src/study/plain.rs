@@ -17,8 +17,8 @@ use super::gap::Gap;
 use super::libraries::Libraries;
 use super::positions::Positions;
 use super::quantity::QuantitySection;
-use super::start::StartSection;
 use super::reliability::ReliabilitySection;
+use super::start::StartSection;
 use super::table::PluginSections;
 use super::unknowns::Unknown;
 

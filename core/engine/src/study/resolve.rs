@@ -14,8 +14,8 @@ use toml::Table;
 
 use super::dependence::{Sections, dependence};
 use super::fidelity::{low_fidelity, numerical_error};
-use super::forward::forward;
 use super::file::{OPTIONAL, ParameterSection, ResponseSection, StudySection, ValidateSection};
+use super::forward::forward;
 use super::gap::companion::companion;
 use super::gap::gap;
 pub use super::libraries::Use;
