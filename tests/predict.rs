@@ -155,3 +155,24 @@ fn another_condition_by_a_surrogate() {
     let (folder, exact) = written(more);
     check(folder.path(), &exact);
 }
+
+#[test]
+fn conditions_that_are_predicted_are_a_scenario_without_measurements() {
+    let summary = |text: &str, folder: &Path| {
+        fs::write(folder.join("study.toml"), text).unwrap();
+        let ran = quick::run(&folder.join("study.toml"), &[], &folder.join("out"));
+        ran.unwrap_or_else(|stop| panic!("{stop}"));
+        let summary = fs::read_to_string(folder.join("out/summary.json")).unwrap();
+        serde_json::from_str::<Value>(&summary).unwrap()["quantities"].clone()
+    };
+    let (first, _) = written("");
+    let scenario = fs::read_to_string(first.path().join("study.toml")).unwrap();
+    let long = "[[scenario]]\nname = \"steep\"\nvalues = { slope = 3.0 }\nmeasured = false\n";
+    let predict =
+        scenario.replace(long, "[[predict]]\nname = \"steep\"\nvalues = { slope = 3.0 }\n");
+    assert_ne!(predict, scenario);
+    let (second, _) = written("");
+    let (one, other) = (summary(&scenario, first.path()), summary(&predict, second.path()));
+    assert!(one.get("record[steep]").is_some(), "{one}");
+    assert_eq!(one, other);
+}

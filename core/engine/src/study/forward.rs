@@ -5,6 +5,7 @@ use lacuna::text::{Complaints, Node, Problems};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::dependence::Sections;
 use super::plain::Study;
 
 /// Propagation of the priors of a study without measurements: the distribution of the response and of every
@@ -39,8 +40,20 @@ pub(super) fn forward(root: &Node, problems: &mut Problems) -> Option<ForwardSec
     problems.within("forward", |problems| decode(node, problems))
 }
 
-/// Reports a section that has no use, or too few draws.
+/// Reports a section that has no use, too few draws, and priors whose shares are not defined by independent draws.
 pub(super) fn check(study: &Study, complaints: &mut Complaints<'_>) {
+    if study.propagated().is_some() && !study.prior().is_independent() {
+        let Sections { dependence, constraint, .. } = &study.dependence_sections;
+        let place = match (dependence.is_empty(), constraint.is_empty()) {
+            (false, _) => "dependence",
+            (true, false) => "constraint",
+            (true, true) => "parameter",
+        };
+        complaints
+            .at(place)
+            .say("priors that depend on each other are not propagated")
+            .expected("independent priors in a study without `[measurements]`");
+    }
     let Some(section) = &study.forward else { return };
     if study.measurements.is_some() {
         complaints

@@ -16,6 +16,7 @@ pub mod noise;
 pub mod overrides;
 mod plain;
 pub mod positions;
+mod predict;
 pub mod quantity;
 pub mod reliability;
 pub mod resolve;

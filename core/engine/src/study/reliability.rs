@@ -88,10 +88,14 @@ impl Event {
                 Misfit::new("distribution", "the parameters of effects have no prior without data");
             return Err(vec![misfit.expected("`posterior`, or a study without `[[effect]]`")]);
         }
+        if source == Source::Prior && !study.prior().is_independent() {
+            let misfit = Misfit::new("distribution", "the priors depend on each other");
+            return Err(vec![misfit.expected("`posterior`, or a study with independent priors")]);
+        }
         if source == Source::Posterior && section.built.plugin.needs_standard_normal() {
             let message = "the method needs independent priors, not a posterior";
             let misfit = Misfit::new("use", message);
-            let methods = "`subset_simulation`, `active_kriging` or `monte_carlo`";
+            let methods = "a method for any distribution: see `lacuna plugins reliability`";
             return Err(vec![misfit.expected(methods).help("or state `distribution = \"prior\"`")]);
         }
         let Some(value) = asked.iter().position(|asked| asked.name == keys.quantity) else {

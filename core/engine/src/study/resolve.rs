@@ -22,6 +22,7 @@ pub use super::libraries::Use;
 use super::libraries::{Libraries, Seen, libraries};
 pub use super::plain::Study;
 use super::positions::positions;
+use super::predict::as_scenarios;
 use super::sections::{
     derived, effects, layouts, name, parameters, quantities, reliability, scenarios, starts, table,
     unknown_sections,
@@ -94,6 +95,7 @@ fn finish(
     let study = root.and_then(|mut root| {
         overrides::apply(&mut root, arguments, &common_keys, &mut sources, &mut problems);
         take_out(&mut root);
+        as_scenarios(&mut root, &mut problems);
         let named = gives_its_name(path, &root, &sources);
         let libraries = libraries(&root, &directory(path, &root), purpose, &mut problems)?;
         seen.clone_from(&libraries.seen);

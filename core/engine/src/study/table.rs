@@ -27,6 +27,7 @@ use super::file::{
 use super::forward::ForwardSection;
 use super::gap::GapSection;
 use super::libraries::PluginsSection;
+use super::predict::PredictSection;
 use super::quantity::QuantityKeys;
 use super::reliability::ReliabilityKeys;
 use super::schema::{Language, page};
@@ -134,6 +135,7 @@ sections! {
     target: plugin(Density, NoKeys);
     derived: list(DerivedSection);
     scenario: list(ScenarioSection);
+    predict: list(PredictSection);
     response: table(ResponseSection);
     model: plugin(Model, ModelKeys);
     design: plugin(Design, DesignKeys);
