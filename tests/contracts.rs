@@ -16,8 +16,6 @@ mod gain;
 mod models;
 #[path = "contracts/quantities.rs"]
 mod quantities;
-#[path = "contracts/reliability.rs"]
-mod reliability;
 #[path = "contracts/served.rs"]
 mod served;
 #[path = "contracts/skeletons.rs"]
@@ -31,9 +29,8 @@ use std::path::{Path, PathBuf};
 
 use lacuna::data::{Axis, Layout, Parameter, Unit};
 use lacuna::math::distribution::Distribution;
-use lacuna::plugin::model::Response;
 use lacuna::plugin::registry::{self, Kind};
-use lacuna::plugin::{Density, Design, Discrepancy, Reader, Sampler, Surrogate, Term};
+use lacuna::plugin::{Density, Design, Discrepancy, Reader, Sampler, Surrogate, Term, model};
 use lacuna_contract::Sample;
 use lacuna_run::write_response;
 // Without this line the linker leaves the plugins out.
@@ -359,7 +356,7 @@ fn sound_files(name: &str, reader: &dyn Reader, folder: &Path) -> Vec<Sample> {
     };
     match name {
         "netcdf" => {
-            let response = Response { values: values.clone(), valid: true, facts: Vec::new() };
+            let response = model::Response { values: values.clone(), valid: true, facts: vec![] };
             let file = write_response(folder, "sound", &layout, &response).unwrap();
             vec![sample(folder.join(file), 0.0)]
         }

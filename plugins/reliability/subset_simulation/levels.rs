@@ -18,7 +18,7 @@ pub struct Settings {
     pub levels: usize,
 }
 
-/// What is simulated: a limit state, the weight of its variables, and draws of them.
+/// Simulated limit state, with the weight of its variables and draws of them.
 pub struct Simulated<'a> {
     /// Number of variables.
     pub dimension: usize,

@@ -128,7 +128,7 @@ impl<'a> JointPrior<'a> {
         self.parameters
     }
 
-    /// What the prior has besides the parameters' own distributions.
+    /// Copulas and constraints, which the prior has besides the parameters' own distributions.
     pub fn dependence(&self) -> &'a Dependence {
         self.dependence
     }

@@ -43,7 +43,7 @@ pub struct Study {
     pub parameters: Vec<Parameter>,
     /// The known conditions; one without a name where the study has no scenarios.
     pub scenarios: Vec<Scenario>,
-    /// What makes the priors of the parameters dependent.
+    /// Dependence of the priors of the parameters.
     pub dependence: Dependence,
     /// `[[dependence]]` and `[[constraint]]`.
     pub dependence_sections: Sections,

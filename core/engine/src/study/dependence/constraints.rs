@@ -58,7 +58,7 @@ fn compiled(
     Ok((program, places))
 }
 
-/// What makes a number of a condition.
+/// Rule by which a condition becomes a number.
 const BEFORE: &str = "if(";
 const AFTER: &str = ", 1, 0)";
 

@@ -9,7 +9,7 @@ use crate::page::number::significant;
 use crate::study::Study;
 
 impl Study {
-    /// What the joint prior has besides the priors of the parameters; empty if they are independent.
+    /// Facts of the joint prior besides the priors of the parameters; empty if they are independent.
     pub fn prior_facts(&self) -> Vec<Fact> {
         let dependence = &self.dependence;
         let written = dependence.groups.iter().filter(|g| !matches!(g.copula, Copula::Mixture(_)));

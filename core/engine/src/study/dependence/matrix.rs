@@ -17,7 +17,7 @@ pub enum Correlations {
     Matrix(Vec<Vec<f64>>),
 }
 
-/// What is wrong with correlations, and what would be right.
+/// Fault of correlations, and what would be right.
 pub(super) struct Unfit {
     pub(super) message: String,
     pub(super) expected: String,

@@ -126,7 +126,7 @@ impl Study {
         JointPrior::new(&self.parameters, &self.dependence)
     }
 
-    /// What identifies results that depend on the priors: `laws` alone where the parameters are independent.
+    /// Identity of results that depend on the priors: `laws` alone where the parameters are independent.
     pub fn prior_identity(&self, laws: Value) -> Value {
         if self.dependence.is_none() { laws } else { json!([laws, self.dependence]) }
     }

@@ -9,7 +9,7 @@ use lacuna::run::{Stop, files};
 use lacuna_run::{Stage, arrays};
 use serde::Deserialize;
 
-/// What is read of the results of a calibration.
+/// Part of the results of a calibration that is read.
 #[derive(Deserialize)]
 struct Outcome {
     coordinates: Vec<Coordinate>,
@@ -27,7 +27,7 @@ pub(super) struct Coordinate {
 
 /// The posterior of a run.
 pub(super) struct Posterior {
-    /// Its coordinates.
+    /// Coordinates of the posterior.
     pub(super) coordinates: Vec<Coordinate>,
     /// Draws after the burn-in by chain, each of all coordinates.
     pub(super) chains: Vec<Vec<Vec<f64>>>,
