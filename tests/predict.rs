@@ -125,6 +125,7 @@ fn check(folder: &Path, exact: &line::Posterior) {
     let error = (expected * (1.0 - expected) / 4000.0 + ends * ends).sqrt();
     assert!((share - expected).abs() < ERRORS * error, "{share} {expected} {error}");
     // The result says that it is an extrapolation.
+    assert!(summary["assessment"].to_string().contains("unmeasured_conditions"));
     let findings = summary["assessment"]["findings"].as_array().unwrap();
     let said = findings.iter().find(|f| f["code"] == "unmeasured_conditions").unwrap();
     assert_eq!((&said["where"], &said["severity"]), (&"steep".into(), &"note".into()));

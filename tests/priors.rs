@@ -290,6 +290,17 @@ fn two_halves_of_a_product_make_the_whole() {
     }
 }
 
+/// A thin ring, which a dozen normal distributions do not describe: the result says that its prior is not that posterior.
+#[test]
+fn a_posterior_that_is_represented_poorly_is_stated() {
+    let priors = [("a", "{ uniform = [-15, 15] }"), ("b", "{ uniform = [-15, 15] }")];
+    let ring = "-0.5 * ((sqrt(a^2 + b^2) - 10) / 0.05)^2";
+    let folder = target(&priors, "", ring, PARTICLES);
+    before(folder.path());
+    let found = after(folder.path(), "0 * a", "");
+    assert!(found["assessment"].to_string().contains("prior_of_run"), "{}", found["assessment"]);
+}
+
 /// Units are converted, and what is wrong with a run is said.
 #[test]
 fn a_run_that_cannot_be_a_prior_is_refused() {

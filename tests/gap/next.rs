@@ -75,10 +75,6 @@ along = [[1.5, 2.0]]
 replicates = 4
 cost = 1.0
 
-[[gap.next]]
-name = "after_the_end"
-along = [[3.0, 4.0]]
-
 [gap.quantity]
 scenarios = ["fast"]
 along = [[1.95, 2.0]]
@@ -125,7 +121,6 @@ fn the_recommended_measurement_makes_the_name_certain() {
     assert!(next.has(Wanted::Name), "{next:?}");
     assert_eq!(next.options[0].name, "faster", "{next:#?}");
     assert!(!next.options[1].equal_to_best, "{next:#?}");
-    assert_eq!(next.without_data, ["after_the_end"], "{next:#?}");
     let after = searched(folder.path(), &[("slow", 3.0), ("fast", 12.0)]);
     println!("{:#?}", after.verdict);
     assert_eq!(after.verdict.effects[0].kind, "quadratic_friction", "{:#?}", after.verdict);

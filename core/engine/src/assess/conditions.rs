@@ -6,7 +6,7 @@ use super::{Finding, Rule, Severity};
 
 const CODE: &str = "unmeasured_conditions";
 
-const LOOK: &str = "measure there, or read these predictions as those of the model: `lacuna next` ranks measurements";
+const LOOK: &str = "measure there, or read these predictions as those of the model: `lacuna next STUDY` ranks measurements";
 
 /// Rules of this module; see [`super::rules`].
 pub fn rules() -> Vec<Rule> {

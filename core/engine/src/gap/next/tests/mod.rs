@@ -247,6 +247,13 @@ fn options_reach_where_nothing_was_measured() {
     assert!((old.1 - new.1).abs() < 1e-9 && old.2 == 0.0, "{old:?} {new:?}");
     // More data tell more.
     assert!(bits("4 replicates under `y`").0 > new.0);
+    // A sensor that no scenario has is named, and the others are weighed.
+    let nowhere = [("sensor".to_owned(), vec!["elsewhere".to_owned()])].into();
+    let options = [NextKeys { on: nowhere, ..NextKeys::default() }, NextKeys::default()];
+    let wish = Wish { options: &options, quantity: None, runs: 0 };
+    let found = next(&one, &own.noise, wish, &Stream::root(6)).unwrap();
+    assert_eq!(found.without_data, ["1 replicate on sensor elsewhere"]);
+    assert_eq!(found.options.len(), 1);
 }
 
 /// An error that the surrogate has and further runs make smaller: without any such error, runs tell nothing.
