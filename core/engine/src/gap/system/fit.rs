@@ -33,6 +33,10 @@ const POOR: f64 = 4.0;
 /// The shares of the record that a growing window covers.
 const WINDOWS: [f64; 4] = [0.0625, 0.125, 0.25, 0.5];
 
+/// The largest mean square in a window, as a share of that of the whole record, with which the window grows: a law that does
+/// not hold over a few periods does not hold over many.
+const PROMISING: f64 = 0.1;
+
 /// The smallest number of values of a curve in the first window.
 const SHORTEST: usize = 8;
 
@@ -212,8 +216,12 @@ impl<'a, 'b> Begun<'a, 'b> {
         let mut point = nearest.start.clone();
         for share in WINDOWS {
             let window = Window::of(system, share);
+            let inside = (values - window.beyond()) as f64;
             let mut ascent = Ascent::inside(system, whitener, means, &point, Some(window));
             ascent.climb(FIRST);
+            if ascent.best.misfit() / inside > PROMISING * nearest.best.misfit() / values as f64 {
+                return None;
+            }
             point.clone_from(&ascent.best.at.point);
         }
         let mut ascent = Ascent::from(system, whitener, means, &point);

@@ -22,6 +22,11 @@ impl Window {
         Self { beyond: beyond.collect() }
     }
 
+    /// Number of values that do not count.
+    pub fn beyond(&self) -> usize {
+        self.beyond.len()
+    }
+
     /// Whitened values of which those beyond the window are zero. Whitening goes along the curves, so that the others
     /// have the density of the data in the window if the errors are those of the single curves.
     pub fn cut(&self, white: &mut [f64]) {
