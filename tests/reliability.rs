@@ -86,6 +86,8 @@ fn a_tail_of_the_prior_has_its_index_and_its_design_point() {
     assert!((number(event, "/probability") / normal_cdf(-index) - 1.0).abs() < 1e-3, "{event}");
     let point = &event["design_points"][0];
     assert!((number(point, "/importance/level0") - 1.0 / variance).abs() < 1e-3, "{event}");
+    // The point is at four standard deviations of the slope, beyond all of the 40 runs.
+    assert!(event["warnings"].to_string().contains("beyond the simulation runs"), "{event}");
     let rise = index * (1.0 - 1.0 / variance).sqrt() * 0.5;
     assert!((number(point, "/values/rise") - rise).abs() < 1e-2, "{event}");
 }

@@ -36,7 +36,7 @@ pub fn stage(
         asked_for(study),
     ]);
     estimated(study, &inputs, run, observer, |work| {
-        let evaluation = Evaluation::new(study, Some(problem.forward()));
+        let evaluation = Evaluation::new(study, problem);
         let parts = match &problem.data.value.measured {
             Some(measured) if calibrated.is_some() => Some(Parts::of(study, measured, problem)?),
             _ => None,
@@ -56,7 +56,7 @@ pub fn of_target(
 ) -> Result<Option<Kept<RareEvents>>, Stop> {
     let inputs = json!([calibrated.hash, asked_for(study)]);
     estimated(study, &inputs, run, observer, |work| {
-        let evaluation = Evaluation::new(study, None);
+        let evaluation = Evaluation::of_numbers(study);
         work.all(&evaluation, Some((posterior, &calibrated.value)))
     })
 }
@@ -162,6 +162,10 @@ impl Work<'_> {
     ) -> RareEvent {
         let names: Vec<String> = self.study.parameters.iter().map(|p| p.name.clone()).collect();
         let asked = &evaluation.asked[event.value];
+        let mut warnings = estimate.warnings;
+        let at = estimate.design_points.iter().map(&natural);
+        let far = at.filter(|point| evaluation.is_beyond(point)).count();
+        warnings.extend(extrapolated(evaluation.taken(), far));
         let points = estimate.design_points.iter().map(|point| FoundPoint {
             distance: point.distance,
             values: names.iter().cloned().zip(natural(point)).collect(),
@@ -183,7 +187,22 @@ impl Work<'_> {
             undefined: estimate.undefined,
             failures: estimate.failures,
             converged: estimate.converged,
-            warnings: estimate.warnings,
+            warnings,
         }
     }
+}
+
+/// Share of the calls at which the event occurs, beyond the runs of the emulator, above which a warning says so.
+const EXTRAPOLATED: f64 = 0.05;
+
+/// A warning if the event occurs, or has `points` design points, where the emulator extrapolates.
+fn extrapolated([occurred, beyond]: [usize; 2], points: usize) -> Option<String> {
+    let many = beyond as f64 > EXTRAPOLATED * occurred as f64;
+    (many || points > 0).then(|| {
+        let points = if points > 0 { format!(", and {points} design points") } else { String::new() };
+        format!(
+            "{beyond} of the {occurred} calls at which the event occurs{points} lie beyond the simulation runs, where the \
+             emulator extrapolates: the probability may be far off; widen `design`, or leave out `[surrogate]`"
+        )
+    })
 }

@@ -1,5 +1,7 @@
 //! Limit states of a study: of its priors, and of its posterior.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use lacuna::data::Parameter;
 use lacuna::math::moments::mean;
 use lacuna::math::special::normal_cdf;
@@ -11,6 +13,7 @@ use lacuna_linalg::{Cholesky, Matrix};
 
 use crate::posterior::Posterior;
 use crate::stage::calibrate::Calibrated;
+use crate::stage::inverse_problem::InverseProblem;
 use crate::stage::predict;
 use crate::study::Study;
 use crate::study::derived::Derived;
@@ -24,12 +27,37 @@ pub struct Evaluation<'a> {
     /// The values that the study asks for.
     pub asked: Vec<Asked>,
     derived: Vec<Derived>,
+    /// Range of the simulation runs of the emulator in each parameter; empty without an emulator.
+    ranges: Vec<(f64, f64)>,
+    /// Number of points evaluated so far at which the event occurs, and of those beyond the ranges.
+    occurred: [AtomicUsize; 2],
 }
 
 impl<'a> Evaluation<'a> {
-    /// The quantities of a study, with the forward map of its response if it has one.
-    pub fn new(study: &'a Study, forward: Option<&'a dyn Forward>) -> Self {
-        Self { study, forward, asked: study.asked(), derived: study.derived() }
+    /// The quantities of a study with a response.
+    pub fn new(study: &'a Study, problem: &'a InverseProblem<'_>) -> Self {
+        Self {
+            forward: Some(problem.forward()),
+            ranges: ranges(study, problem),
+            ..Self::of_numbers(study)
+        }
+    }
+
+    /// The quantities of a study without a response.
+    pub fn of_numbers(study: &'a Study) -> Self {
+        let (asked, derived) = (study.asked(), study.derived());
+        let occurred = [AtomicUsize::new(0), AtomicUsize::new(0)];
+        Self { study, forward: None, asked, derived, ranges: Vec::new(), occurred }
+    }
+
+    /// The number of points at which the event occurred since the last call, and of those beyond the runs of the emulator.
+    pub fn taken(&self) -> [usize; 2] {
+        [0, 1].map(|i| self.occurred[i].swap(0, Ordering::Relaxed))
+    }
+
+    /// Returns true if a point lies beyond the runs of the emulator.
+    pub fn is_beyond(&self, point: &[f64]) -> bool {
+        self.ranges.iter().zip(point).any(|((low, high), x)| x < low || x > high)
     }
 
     /// Limit state of an event at natural points, one per row.
@@ -48,10 +76,32 @@ impl<'a> Evaluation<'a> {
                 values.push(asked.value(|i| response[i], (point, &derived, &values)));
             }
             let value = values[event.value];
-            if event.above { event.limit - value } else { value - event.limit }
+            let state = if event.above { event.limit - value } else { value - event.limit };
+            if state <= 0.0 {
+                self.occurred[0].fetch_add(1, Ordering::Relaxed);
+                self.occurred[1].fetch_add(self.is_beyond(point).into(), Ordering::Relaxed);
+            }
+            state
         };
         Ok(points.iter_rows().zip(&responses).map(one).collect())
     }
+}
+
+/// The range of the simulation runs in each parameter; empty without an emulator.
+fn ranges(study: &Study, problem: &InverseProblem<'_>) -> Vec<(f64, f64)> {
+    let Some(runs) = problem.data.value.ensemble.as_ref().filter(|_| problem.emulator().is_some())
+    else {
+        return Vec::new();
+    };
+    let range = |name: &String| {
+        let column = runs.parameters.iter().position(|other| other == name);
+        column.map_or((f64::NEG_INFINITY, f64::INFINITY), |j| {
+            let values = runs.points.column(j);
+            let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+            (low, values.into_iter().fold(f64::NEG_INFINITY, f64::max))
+        })
+    };
+    study.parameters.iter().map(|parameter| range(&parameter.name)).collect()
 }
 
 /// Limit state of independent priors: each variable is mapped through the inverse distribution function of a prior.
