@@ -19,8 +19,8 @@ pub fn rules() -> Vec<Rule> {
         looks_at: "divergence of a prior that represents the posterior of an earlier run from held-out draws of that run, in \
                    nats; their energy distance; convergence of that run"
             .to_owned(),
-        threshold: "more than 0.1 above three standard errors, or p ≤ 0.01 of the energy distance, or not converged: \
-                    reservation"
+        threshold: "more than 0.1 plus three standard errors away from zero, or p ≤ 0.01 of the energy distance, or not \
+                    converged: reservation"
             .to_owned(),
         why: "the posterior of the earlier run enters as a fitted density; where it differs from the draws, the present \
               posterior uses another prior than the earlier study found",

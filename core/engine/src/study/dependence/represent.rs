@@ -47,10 +47,11 @@ impl Check {
         divergence: Divergence { value: f64::NAN, error: f64::NAN },
     };
 
-    /// True if the held-out draws contradict the density.
+    /// True if the held-out draws contradict the density, or are too few to show their shape: a divergence is not negative,
+    /// but its estimate is if the draws lie on something thinner than their distances.
     pub fn is_poor(&self) -> bool {
         let Divergence { value, error } = self.divergence;
-        value - 3.0 * error > DIVERGENCE || self.energy.probability <= PROBABILITY
+        value.abs() - 3.0 * error > DIVERGENCE || self.energy.probability <= PROBABILITY
     }
 }
 
