@@ -63,10 +63,10 @@ fn finds_the_probability(method: &dyn Reliability) -> Result<(), String> {
     if first.calls == 0 || first.undefined > 0 {
         return Err(format!("{} calls, {} without an answer", first.calls, first.undefined));
     }
-    if let Some([low, high]) = first.interval {
-        if !(low <= first.probability && first.probability <= high) {
-            return Err(format!("{} is outside its interval", first.probability));
-        }
+    if let Some([low, high]) = first.interval
+        && !(low <= first.probability && first.probability <= high)
+    {
+        return Err(format!("{} is outside its interval", first.probability));
     }
     let again = estimate(method, &state).map_err(|stop| stop.to_string())?;
     if again == first { Ok(()) } else { Err("the same stream gives another estimate".to_owned()) }

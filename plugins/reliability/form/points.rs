@@ -40,7 +40,9 @@ pub fn design_points(
                 start = (0..state.dimension()).map(|_| normal(&mut rng)).collect();
                 let factor =
                     if attempt > 0 { size.max(1.0) } else { size } / norm(&start).max(1e-12);
-                start.iter_mut().for_each(|x| *x *= factor);
+                for x in &mut start {
+                    *x *= factor;
+                }
             }
             let mut ended = search(state, &start, &bulges, settings)?;
             if let Some(inside) = ended.as_ref().filter(|f| !f.converged && f.settled) {

@@ -171,6 +171,8 @@ fn gradient(
     let base = value - bulges.iter().map(|b| b.value(u)).sum::<f64>();
     let mut gradient: Vec<f64> =
         state.values(&moved)?.into_iter().map(|there| (there - base) / step).collect();
-    bulges.iter().for_each(|bulge| bulge.add_gradient(u, &mut gradient));
+    for bulge in bulges {
+        bulge.add_gradient(u, &mut gradient);
+    }
     Ok(Some(gradient).filter(|g| g.iter().all(|slope| slope.is_finite())))
 }

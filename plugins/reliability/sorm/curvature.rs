@@ -29,7 +29,9 @@ pub fn principal(state: &Counted<'_>, found: &Found, step: f64) -> Result<Option
     (0..m).for_each(|i| [1.0, -1.0].into_iter().for_each(|s| add(&[(i, s)])));
     for i in 0..m {
         for j in 0..i {
-            [1.0, -1.0].into_iter().for_each(|s| add(&[(i, s), (j, s)]));
+            for s in [1.0, -1.0] {
+                add(&[(i, s), (j, s)]);
+            }
         }
     }
     let values = state.values(&points)?;
@@ -68,7 +70,9 @@ fn tangent(normal: &[f64]) -> Vec<Vec<f64>> {
             }
         }
         let size = dot(&vector, &vector).sqrt();
-        vector.iter_mut().for_each(|x| *x /= size);
+        for x in &mut vector {
+            *x /= size;
+        }
         all.push(vector);
     }
     all.split_off(1)

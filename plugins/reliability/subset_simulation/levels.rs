@@ -18,6 +18,9 @@ pub struct Settings {
     pub levels: usize,
 }
 
+/// Log weights of points, one per row.
+pub type LogWeights<'a> = &'a dyn Fn(&Matrix) -> Vec<f64>;
+
 /// Simulated limit state, with the weight of its variables and draws of them.
 pub struct Simulated<'a> {
     /// Number of variables.
@@ -25,7 +28,7 @@ pub struct Simulated<'a> {
     /// Values of the limit state at the rows of points; no failure above zero, never NaN.
     pub values: &'a dyn Fn(&Matrix) -> Result<Vec<f64>, Stop>,
     /// Logarithm of the weight at the rows of points; `None` for standard normal variables.
-    pub log_weights: Option<&'a dyn Fn(&Matrix) -> Vec<f64>>,
+    pub log_weights: Option<LogWeights<'a>>,
     /// Draws of weighted variables.
     pub draws: Option<&'a Matrix>,
 }

@@ -2,7 +2,7 @@
 //!
 //! RP problems: Rozsas and Slobbe, Repository and black-box reliability challenge 2019 (gitlab.com/rozsasarpi/rprepo), with the
 //! formulas as in Fekhari et al., otbenchmark 0.2.1 (openturns.github.io/otbenchmark). Where the probability is an integral over
-//! one variable it is that of a quadrature with NumPy to seven digits, which agrees with the published digits, except for
+//! one variable it is that of a quadrature with `NumPy` to seven digits, which agrees with the published digits, except for
 //! RP111: 8.035e-7, published 7.65e-7.
 
 use lacuna::math::random::Stream;

@@ -35,7 +35,7 @@ impl Family {
 
     /// Theta of the copula with this value of Kendall's tau; `None` if the family has none with it.
     pub fn theta(self, kendall: f64) -> Option<f64> {
-        if !(kendall.abs() < 1.0) || kendall == 0.0 {
+        if kendall.is_nan() || kendall.abs() >= 1.0 || kendall == 0.0 {
             return None;
         }
         match self {

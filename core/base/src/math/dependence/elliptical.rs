@@ -1,4 +1,4 @@
-//! The Gaussian copula and that of Student's t distribution (McNeil, Frey, Embrechts, Quantitative Risk Management (2015),
+//! The Gaussian copula and that of Student's t distribution (`McNeil`, Frey, Embrechts, Quantitative Risk Management (2015),
 //! section 7.3), as functions of normal scores.
 
 use rand::Rng;

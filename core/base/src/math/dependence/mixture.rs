@@ -194,7 +194,9 @@ impl Mixture {
         };
         let mut components: Vec<Component> = (0..shares[0].len()).filter_map(component).collect();
         let sum: f64 = components.iter().map(|c| c.weight).sum();
-        components.iter_mut().for_each(|c| c.weight /= sum);
+        for component in &mut components {
+            component.weight /= sum;
+        }
         (!components.is_empty()).then_some(Self { components })
     }
 }

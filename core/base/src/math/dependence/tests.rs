@@ -1,6 +1,8 @@
 //! Densities against scipy 1.17.1 (`multivariate_normal`, `multivariate_t`, `dirichlet`) and statsmodels 0.15.0 (Clayton,
 //! Gumbel, Frank); slopes against finite differences; draws against Kendall's tau and moments in closed form.
 
+#![allow(clippy::unreadable_literal, reason = "values as the reference prints them")]
+
 use super::*;
 use crate::math::random::Stream;
 
@@ -114,7 +116,7 @@ fn slopes_are_those_of_finite_differences() {
             let x = copula.sample(&laws, &mut rng);
             let slopes = copula.gradient(&laws, &x);
             for j in 0..x.len() {
-                let step = 1e-5 * x[j].abs().max(1e-3).min(1.0);
+                let step = 1e-5 * x[j].abs().clamp(1e-3, 1.0);
                 let at = |by: f64| {
                     let mut moved = x.clone();
                     moved[j] += by;
@@ -132,6 +134,9 @@ fn slopes_are_those_of_finite_differences() {
         }
     }
 }
+
+/// Number of draws.
+const PAIRS: usize = 40_000;
 
 /// The share of concordant pairs among independent pairs of draws is (1 + tau) / 2.
 #[test]
@@ -151,7 +156,6 @@ fn draws_have_the_kendall_tau_of_the_copula() {
     ];
     let laws = [Distribution::Exponential(2.0), Distribution::Normal([1.0, 3.0])];
     let laws: Vec<&Distribution> = laws.iter().collect();
-    const PAIRS: usize = 40_000;
     for (k, (copula, tau)) in cases.into_iter().enumerate() {
         let mut rng = Stream::root(k as u64).named("tau").generator();
         let mut concordant = 0;
@@ -192,13 +196,15 @@ fn kendalls_tau_follows_from_theta_and_back() {
     assert_eq!(Family::Gumbel.theta(-0.2), None);
 }
 
-/// Means a_i / A and covariances of shares (Gelman et al., appendix A).
+/// Number of draws.
+const COUNT: usize = 40_000;
+
+/// Means `a_i` / A and covariances of shares (Gelman et al., appendix A).
 #[test]
 fn shares_have_the_moments_of_a_dirichlet_distribution() {
     let a = [2.0, 1.0, 4.0];
     let (sum, copula) = (7.0, Copula::Dirichlet(a.to_vec()));
     let mut rng = Stream::root(5).generator();
-    const COUNT: usize = 40_000;
     let draws: Vec<Vec<f64>> = (0..COUNT).map(|_| copula.sample(&[], &mut rng)).collect();
     let mean = |f: &dyn Fn(&[f64]) -> f64| draws.iter().map(|x| f(x)).sum::<f64>() / COUNT as f64;
     for j in 0..2 {

@@ -146,9 +146,9 @@ impl<'a> Quantiles<'a> {
         for _ in 0..60 {
             let [value, slope, _] = self.cubic(k, t);
             if value < y {
-                low = t
+                low = t;
             } else {
-                high = t
+                high = t;
             }
             let newton = t - (value - y) / (slope * self.step());
             let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };

@@ -22,10 +22,11 @@ impl<'a> Search<'a> {
     /// it was not fitted.
     pub(super) fn unknowns(&self, placement: &Placement, weighed: &[Weighed]) -> Vec<f64> {
         let fitted = weighed.iter().find(|j| j.placement.is(placement));
-        fitted.map(|j| j.fit.at.point.clone()).unwrap_or_else(|| {
+        let absent = || {
             let effect = &self.candidates[placement.candidate].effect;
             effect.absent(&self.experiment.layouts.blocks[0])
-        })
+        };
+        fitted.map_or_else(absent, |j| j.fit.at.point.clone())
     }
 
     /// The slot of effect `i`.

@@ -8,6 +8,7 @@ use crate::report::findings::RareEvent;
 
 /// Probability that a quantity of interest exceeds a limit. It contains the distribution of the parameters, and none of the
 /// errors of the prediction.
+#[allow(clippy::struct_field_names, reason = "the keys of the summary")]
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Probability {
     /// Name of the quantity.

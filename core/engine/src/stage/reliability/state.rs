@@ -162,7 +162,7 @@ impl<'a> OfPosterior<'a> {
         let place = |i: usize| draws.point(i % draws.chains, i / draws.chains);
         let rows: Vec<Vec<f64>> = predict::spaced(count, draws.len())
             .into_iter()
-            .map(|i| posterior.coordinates(&place(i)))
+            .map(|i| posterior.coordinates(place(i)))
             .collect();
         let points = Matrix::from_rows(draws.dimension(), &rows);
         let (centre, covariance) = spread(&points);

@@ -19,7 +19,9 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
                 complaints.at("name").say(message).help("give each a name of its own");
             }
             if let Err(misfits) = Event::of(study, section, &asked) {
-                misfits.into_iter().for_each(|misfit| misfit.report(&mut complaints));
+                for misfit in misfits {
+                    misfit.report(&mut complaints);
+                }
             }
         });
     }

@@ -33,7 +33,9 @@ pub(super) fn constraints(
                 }));
             }
             Err(faults) => problems.within("constraint", |problems| {
-                faults.into_iter().for_each(|fault| report(fault, node, problems));
+                for fault in faults {
+                    report(fault, node, problems);
+                }
             }),
         }
     }

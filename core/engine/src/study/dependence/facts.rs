@@ -35,9 +35,10 @@ impl Study {
 }
 
 fn in_words(copula: &Copula) -> String {
-    let matrix = |rows: &[Vec<f64>]| match rows.len() {
-        2 => format!("correlation {}", significant(rows[0][1], 4)),
-        _ => {
+    let matrix = |rows: &[Vec<f64>]| {
+        if rows.len() == 2 {
+            format!("correlation {}", significant(rows[0][1], 4))
+        } else {
             let row = |row: &Vec<f64>| {
                 let numbers: Vec<String> = row.iter().map(|r| significant(*r, 4)).collect();
                 format!("[{}]", numbers.join(", "))

@@ -119,9 +119,10 @@ fn strength<'a>(
     all.extend(concentrations(section).map(|a| ("dirichlet", Strength::Dirichlet(a))));
     if all.len() != 1 {
         let found: Vec<String> = all.iter().map(|(key, _)| format!("`{key}`")).collect();
-        let message = match found.is_empty() {
-            true => "the dependence has no strength".to_owned(),
-            false => format!("the dependence has several strengths: {}", found.join(", ")),
+        let message = if found.is_empty() {
+            "the dependence has no strength".to_owned()
+        } else {
+            format!("the dependence has several strengths: {}", found.join(", "))
         };
         let expected = "one of `correlation`, `spearman`, `kendall`, `theta`, `dirichlet`";
         complaints.at("").say(message).expected(expected);
@@ -141,9 +142,10 @@ fn copula(
     let is_student = section.dirichlet.is_none() && name == CopulaName::StudentT;
     if section.degrees_of_freedom.is_some() != is_student {
         let spot = complaints.at("degrees_of_freedom");
-        let message = match is_student {
-            true => "the copula `student_t` needs its degrees of freedom",
-            false => "only the copula `student_t` has degrees of freedom",
+        let message = if is_student {
+            "the copula `student_t` needs its degrees of freedom"
+        } else {
+            "only the copula `student_t` has degrees of freedom"
         };
         spot.say(message).expected("`copula = \"student_t\"` with `degrees_of_freedom`");
         return None;

@@ -46,13 +46,13 @@ impl Correlations {
             let message = format!("the matrix does not fit {count} parameters");
             return unfit(message, format!("{count} rows and {count} columns"));
         }
-        for i in 0..count {
-            if rows[i][i] != 1.0 {
-                let message = format!("entry {} of the diagonal is {}", i + 1, rows[i][i]);
+        for (i, row) in rows.iter().enumerate() {
+            if row[i] != 1.0 {
+                let message = format!("entry {} of the diagonal is {}", i + 1, row[i]);
                 return unfit(message, "ones on the diagonal".to_owned());
             }
-            for j in 0..i {
-                let (a, b) = (rows[i][j], rows[j][i]);
+            for (j, other) in rows[..i].iter().enumerate() {
+                let (a, b) = (row[j], other[i]);
                 let (row, column) = (i + 1, j + 1);
                 if a != b {
                     let message = format!(

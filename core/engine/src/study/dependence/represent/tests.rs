@@ -65,10 +65,11 @@ fn two_modes_are_represented() {
     let mut rng = Stream::root(2).generator();
     let count = 4000;
     let drawn: Vec<Vec<f64>> = (0..count).map(|_| copula.sample(&laws, &mut rng)).collect();
-    let share =
-        |f: &dyn Fn(&[f64]) -> bool| drawn.iter().filter(|x| f(x)).count() as f64 / count as f64;
+    let share = |f: &dyn Fn(&[f64]) -> bool| {
+        drawn.iter().filter(|x| f(x)).count() as f64 / f64::from(count)
+    };
     let right = share(&|x| x[0] > 0.0);
-    assert!((right - 0.25).abs() < 4.0 * (2.0 * 0.1875_f64 / count as f64).sqrt(), "{right}");
+    assert!((right - 0.25).abs() < 4.0 * (2.0 * 0.1875_f64 / f64::from(count)).sqrt(), "{right}");
     let outside = share(&|x| x[0] * x[1] < 0.0);
     let allowed = (0.5 * (stated.value.max(0.0) + 3.0 * stated.error)).sqrt();
     println!("outside of both modes: {outside}, allowed {allowed}, {stated:?}");
