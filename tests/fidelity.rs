@@ -114,6 +114,9 @@ const SURROGATES: [(&str, &str); 3] = [
     ("polynomial_chaos_kriging", "use = \"polynomial_chaos_kriging\""),
 ];
 
+/// Functions of four and eight inputs, whose fits take as long as those of all others together.
+const LONG: [&str; 2] = ["park_a", "borehole"];
+
 /// Fine runs to which both ensembles are compared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Rival {
@@ -152,7 +155,7 @@ fn rival(case: &Case, surrogate: &str) -> Rival {
 }
 
 /// The table of docs/surrogates.md: `LACUNA_TABLES=1 cargo test --workspace --test all -- --nocapture fidelity::published`;
-/// without the variable only those fits are made that are compared.
+/// without the variable only those fits are made that are compared, and none of the functions that take longest.
 ///
 /// Two ensembles must beat fine runs of the same cost, with one fine run costing as much as ten cheap ones, for each
 /// function and surrogate; if cheap runs are useless the result must be as good as with their fine runs alone. The
@@ -168,7 +171,8 @@ fn published_functions_are_learned_from_cheap_runs() {
             table.smt
         );
     }
-    for case in &table.cases {
+    let cases = table.cases.iter().filter(|case| is_shown || !LONG.contains(&case.name.as_str()));
+    for case in cases {
         for (name, options) in SURROGATES {
             let against = rival(case, name);
             let all = [Rival::Alone, Rival::Same];

@@ -5,6 +5,8 @@
 //! its value there, `dt*/dp = -(q_y s⁻ + q_p) / (q_t + q_y f⁻)`. E. Rozenwasser and R. Yusupov, Sensitivity of
 //! Automatic Control Systems, CRC 2000, chapter 2.
 
+use lacuna::expression::Break;
+
 use super::stepper::Stepper;
 use crate::models::equations::flow::{Flow, Quantity, Start};
 use crate::models::equations::stops::depends_on_states;
@@ -16,6 +18,11 @@ pub struct Jumps<'r, 'f> {
     by_states: Vec<Watched<'f>>,
     /// Time and states before the last step.
     before: (f64, Vec<f64>),
+    /// For each break of the system: true if no input moves it, so that its jumps leave the sensitivities continuous.
+    fixed: Vec<bool>,
+    /// States and sensitivities after a fixed jump, and their rates.
+    values: Vec<f64>,
+    rates: Vec<f64>,
 }
 
 struct Watched<'f> {
@@ -38,7 +45,10 @@ impl<'r, 'f> Jumps<'r, 'f> {
                 Watched { index, quantity, value, above: now > value }
             }));
         }
-        Self { flow, by_states, before: (start.time, start.states.clone()) }
+        let fixed = flow.system.breaks.iter().map(|broken| is_fixed(broken, flow)).collect();
+        let before = (start.time, start.states.clone());
+        let values = [start.states.as_slice(), &start.sensitivities].concat();
+        Self { flow, by_states, before, fixed, rates: values.clone(), values }
     }
 
     /// Corrects the sensitivities if the last step has crossed a jump.
@@ -67,9 +77,23 @@ impl<'r, 'f> Jumps<'r, 'f> {
 
     /// Continues after a jump that the run has reached.
     pub fn cross(&mut self, stepper: &mut dyn Stepper, after: f64, index: usize) {
+        if self.fixed[index] {
+            return self.restart(stepper, after);
+        }
         let mut rates = vec![0.0; stepper.states().len()];
         self.flow.rates(stepper.time(), stepper.states(), &mut rates);
         self.correct(stepper, after, index, &rates);
+    }
+
+    /// Continues at `after` with the states and sensitivities that the run has.
+    fn restart(&mut self, stepper: &mut dyn Stepper, after: f64) {
+        let n = stepper.states().len();
+        self.values[..n].copy_from_slice(stepper.states());
+        stepper.sensitivities(&mut self.values[n..]);
+        self.flow.all(after, &self.values, &mut self.rates);
+        let ((_, sensitivities), (rates, their_rates)) =
+            (self.values.split_at(n), self.rates.split_at(n));
+        stepper.go_on(after, rates, sensitivities, their_rates);
     }
 
     /// Corrects the sensitivities for a jump from `old_rates`, and continues at `after`.
@@ -106,4 +130,10 @@ impl<'r, 'f> Jumps<'r, 'f> {
         }
         stepper.go_on(after, &rates, &sensitivities, &their_rates);
     }
+}
+
+/// Returns true if neither states nor inputs move the jumps of a break.
+fn is_fixed(broken: &Break, flow: &Flow<'_>) -> bool {
+    let by_input = |channel| broken.quantity.depends_on(flow.coordinate(channel));
+    !depends_on_states(broken, flow) && !(0..flow.channels()).any(by_input)
 }

@@ -30,6 +30,9 @@ const SLOW: f64 = 0.01;
 /// Wright, algorithm 4.1).
 const KEPT: [f64; 2] = [0.25, 0.75];
 
+/// The multiple of the gain that the next step promises which a search may still gain.
+pub(super) const HOPE: f64 = 4.0;
+
 /// A search for the largest density, on its way.
 pub(super) struct Ascent<'a, 'b> {
     system: &'b System<'a>,
@@ -118,6 +121,18 @@ impl<'a, 'b> Ascent<'a, 'b> {
         if self.promised > 0.0 {
             self.promised = step(self.system, &self.best, self.damping, &self.bounds).1;
         }
+    }
+
+    /// Climbs by at most so many steps; returns false if the misfit stays above `largest`. Ends as soon as the gain that
+    /// the next step promises is too small for that.
+    pub fn climb_below(&mut self, largest: f64, steps: usize) -> bool {
+        for _ in 0..steps {
+            self.climb(1);
+            if self.best.misfit() - HOPE * self.promised > largest {
+                return false;
+            }
+        }
+        self.best.misfit() <= largest
     }
 
     /// The log density at a point, of the values that count.

@@ -8,7 +8,7 @@ use lacuna::math::distribution::Distribution;
 use lacuna_linalg::vector::dot;
 use lacuna_linalg::{Cholesky, Matrix, gram};
 
-use super::ascent::Ascent;
+use super::ascent::{Ascent, HOPE};
 use super::coordinate::{curvature, unit};
 use super::noise_scale::NoiseScale;
 use super::whitener::Whitener;
@@ -20,9 +20,6 @@ const STEPS: usize = 100;
 
 /// Number of steps from each of several starts after which they are compared.
 const FIRST: usize = 6;
-
-/// The multiple of the gain that the next step promises which a start may still gain.
-const HOPE: f64 = 4.0;
 
 /// Smallest gain in log density at which the fit continues.
 pub(super) const GAIN: f64 = 1e-5;
@@ -218,8 +215,8 @@ impl<'a, 'b> Begun<'a, 'b> {
             let window = Window::of(system, share);
             let inside = (values - window.beyond()) as f64;
             let mut ascent = Ascent::inside(system, whitener, means, &point, Some(window));
-            ascent.climb(FIRST);
-            if ascent.best.misfit() / inside > PROMISING * nearest.best.misfit() / values as f64 {
+            let largest = PROMISING * nearest.best.misfit() * inside / values as f64;
+            if !ascent.climb_below(largest, FIRST) {
                 return None;
             }
             point.clone_from(&ascent.best.at.point);
