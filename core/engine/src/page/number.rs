@@ -1,5 +1,8 @@
 //! Formatting of numbers with as many digits as are known.
 
+/// Largest number of decimals: a number of double precision near one has no more.
+const DECIMALS: f64 = 15.0;
+
 /// A number with this many significant digits; in scientific notation if it would be very long or very small.
 pub fn significant(value: f64, digits: usize) -> String {
     if !value.is_finite() {
@@ -63,7 +66,7 @@ pub fn decimals(error: f64, spread: f64) -> usize {
         (false, true) => spread / 100.0,
         (false, false) => return 3,
     };
-    (-unit.log10().floor()).clamp(0.0, 9.0) as usize
+    (-unit.log10().floor()).clamp(0.0, DECIMALS) as usize
 }
 
 /// A share as a percentage.
@@ -152,6 +155,8 @@ mod tests {
         assert_eq!(fixed(12_111.8, decimals(3.0, 15.0)), "12112");
         assert_eq!(decimals(f64::NAN, 0.0), 3);
         assert_eq!(decimals(0.0, 1.0), 2);
+        // A clock of 1 GHz that is known to 0.05 Hz, in units of 1 GHz.
+        assert_eq!(fixed(1.000_000_000_31, decimals(5e-11, 5e-11)), "1.00000000031");
     }
 
     #[test]
