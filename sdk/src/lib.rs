@@ -59,7 +59,7 @@ macro_rules! export {
 #[macro_export]
 macro_rules! abi_version {
     () => {
-        "1.1"
+        "1.2"
     };
 }
 
@@ -90,6 +90,9 @@ macro_rules! kind_name {
     };
     (Model) => {
         "model"
+    };
+    (Quantity) => {
+        "quantity"
     };
     (Reader) => {
         "reader"

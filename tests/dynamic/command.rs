@@ -22,7 +22,7 @@ fn plugins_of_a_library_are_listed_with_their_origin() {
     let (done, all) = said(&["plugins", "sampler", "--plugin", path(&library)]);
     assert!(done, "{all}");
     let words = all.split_whitespace().collect::<Vec<_>>().join(" ");
-    let origin = format!("(lacuna-twin 0.1.0, abi 1.1, sha256 {sha256})");
+    let origin = format!("(lacuna-twin 0.1.0, abi 1.2, sha256 {sha256})");
     assert!(words.contains("twin_nested") && words.contains(&origin), "{all}");
 
     let (done, page) = said(&["plugins", "discrepancy.twin_gaussian", "--plugin", path(&library)]);

@@ -2,9 +2,11 @@
 
 use lacuna::data::{Axis, Layout, Parameter, Scenario, Unit};
 use lacuna::math::distribution::Distribution;
+use lacuna::plugin::quantity::{Arguments, Number};
 use lacuna::plugin::registry::{self, Kind};
 use lacuna::plugin::{
-    Component, Context, Design, Discrepancy, Effect, Given, Model, Reader, Sampler, Surrogate,
+    Component, Context, Design, Discrepancy, Effect, Given, Model, Quantity, Reader, Sampler,
+    Surrogate,
 };
 use lacuna_contract::Sample;
 
@@ -114,6 +116,32 @@ fn readers() {
     all::<dyn Reader>(&[("twin_csv", "")], |name, plugin| {
         sound(plugin, reader(name, plugin, "csv"))
     });
+}
+
+#[test]
+fn quantities() {
+    let steel = "fatigue_strength_coefficient = { value = 1000, unit = \"MPa\" }\n\
+                 fatigue_strength_exponent = -0.1\nmodulus = { value = 200, unit = \"GPa\" }";
+    let table =
+        [("twin_expression", "formula = \"sqrt(a * 1 {m}) + a\""), ("twin_rainflow", steel)];
+    all::<dyn Quantity>(&table, |name, plugin| {
+        sound(plugin, lacuna_contract::quantity(name, plugin))
+    });
+}
+
+/// What does not fit the arguments is told by the library with its key and the place inside the text.
+#[test]
+fn the_options_of_a_quantity_that_do_not_fit_are_told() {
+    let metre = Unit::parse("m").unwrap();
+    let numbers = [Number { name: "a", unit: Some(&metre) }];
+    let misfits = |name: &str| {
+        let built = registry::from_text::<dyn Quantity>(name, "formula = \"a + speed\"").unwrap();
+        built.plugin.bind(&Arguments::Numbers(&numbers)).err().unwrap()
+    };
+    twin();
+    let told = misfits("twin_expression");
+    assert_eq!(told, misfits("expression"));
+    assert_eq!(told[0].part, Some(4..9), "{told:?}");
 }
 
 #[test]

@@ -60,7 +60,7 @@ fn a_library_that_cannot_be_used_says_why() {
         (
             "wrong_major",
             "WRONG_MAJOR",
-            "it is made for version 9.1 of the boundary, and this program speaks 1.1",
+            "it is made for version 9.1 of the boundary, and this program speaks 1.2",
         ),
         ("newer_minor", "NEWER_MINOR", "it is made for version 1.99 of the boundary"),
         ("aborts", "ABORTS", "it is built with `panic = \"abort\"`"),

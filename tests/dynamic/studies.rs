@@ -112,7 +112,7 @@ fn a_run_keeps_what_it_loaded_and_goes_on_with_it() {
     let kept = &manifest["plugins"][0];
     assert_eq!(kept["sha256"], sha256.as_str());
     assert_eq!(kept["name"], "lacuna-twin");
-    assert_eq!(kept["abi"], "1.1");
+    assert_eq!(kept["abi"], "1.2");
     let named = kept["plugins"].as_array().unwrap();
     assert!(named.contains(&"discrepancy.twin_gaussian".into()), "{named:?}");
 

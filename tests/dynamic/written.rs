@@ -8,15 +8,15 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 use lacuna::plugin::registry::{self, Kind};
-use lacuna::plugin::{Design, Discrepancy, Effect, Model, Reader, Sampler, Surrogate};
+use lacuna::plugin::{Design, Discrepancy, Effect, Model, Quantity, Reader, Sampler, Surrogate};
 use lacuna_engine::host::library;
 
 use super::contracts::{model, reader, sound};
 use super::{quick, with_profile};
 
 /// Kinds that libraries can provide.
-const KINDS: [&str; 7] =
-    ["design", "discrepancy", "effect", "model", "reader", "sampler", "surrogate"];
+const KINDS: [&str; 8] =
+    ["design", "discrepancy", "effect", "model", "quantity", "reader", "sampler", "surrogate"];
 
 /// Folder of this test's profile, such as `target/debug`.
 fn profile() -> PathBuf {
@@ -39,8 +39,8 @@ fn cargo(verb: &str, folder: &Path) -> String {
 }
 
 /// The libraries, by kind. Each is a crate in its own folder that belongs to no workspace.
-fn written() -> &'static [PathBuf; 7] {
-    static BUILT: OnceLock<[PathBuf; 7]> = OnceLock::new();
+fn written() -> &'static [PathBuf; 8] {
+    static BUILT: OnceLock<[PathBuf; 8]> = OnceLock::new();
     BUILT.get_or_init(|| {
         let begun = Instant::now();
         // Always the same place, so that new build products replace the old ones.
@@ -87,6 +87,7 @@ fn a_library_of_each_kind_keeps_its_contract_and_serves_one_study() {
     });
     kept::<dyn Effect>(|name, plugin| sound(plugin, lacuna_contract::effect(name, plugin)));
     kept::<dyn Model>(|name, plugin| sound(plugin, model(name, plugin)));
+    kept::<dyn Quantity>(|name, plugin| sound(plugin, lacuna_contract::quantity(name, plugin)));
     kept::<dyn Reader>(|name, plugin| sound(plugin, reader(name, plugin, "columns")));
     kept::<dyn Sampler>(|name, plugin| sound(plugin, lacuna_contract::sampler(name, plugin)));
     kept::<dyn Surrogate>(|name, plugin| sound(plugin, lacuna_contract::surrogate(name, plugin)));

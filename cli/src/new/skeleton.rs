@@ -34,7 +34,7 @@ pub const ALL: [Skeleton; 12] = skeletons![
     "effect" "Effect" "effects" true,
     "executor" "Executor" "executors" false,
     "model" "Model" "models" true,
-    "quantity" "Quantity" "quantities" false,
+    "quantity" "Quantity" "quantities" true,
     "reader" "Reader" "readers" true,
     "reliability" "Reliability" "reliability" false,
     "sampler" "Sampler" "samplers" true,

@@ -1,7 +1,7 @@
 //! The plain text in which a library describes itself, so that it can be looked at without being loaded.
 //!
 //! ```text
-//! lacuna-plugin-record:1.1
+//! lacuna-plugin-record:1.2
 //! discrepancy=matern
 //! end
 //! ```

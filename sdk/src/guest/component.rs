@@ -48,6 +48,7 @@ exports! {
     Discrepancy as DiscrepancyFunctions,
     Effect as EffectFunctions,
     Model as ModelFunctions,
+    Quantity as QuantityFunctions,
     Reader as ReaderFunctions,
     Sampler as SamplerFunctions,
     Surrogate as SurrogateFunctions,

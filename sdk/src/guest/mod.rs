@@ -6,6 +6,7 @@ mod design;
 mod discrepancy;
 mod effect;
 mod model;
+mod quantity;
 mod reader;
 mod sampler;
 mod surrogate;

@@ -14,6 +14,8 @@ use lacuna_plugins::effects::delay::Delay;
 use lacuna_plugins::effects::gain::Gain;
 use lacuna_plugins::models::equations::Equations;
 use lacuna_plugins::models::mercury_target::MercuryTarget;
+use lacuna_plugins::quantities::expression::Expression;
+use lacuna_plugins::quantities::rainflow::Rainflow;
 use lacuna_plugins::readers::csv::Csv;
 use lacuna_plugins::samplers::adaptive_metropolis::AdaptiveMetropolis;
 use lacuna_plugins::samplers::affine_invariant_ensemble::AffineInvariantEnsemble;
@@ -37,6 +39,8 @@ lacuna_plugin::export! {
     Effect "twin_gain" Gain,
     Model "twin_equations" Equations,
     Model "twin_mercury_target" MercuryTarget,
+    Quantity "twin_expression" Expression,
+    Quantity "twin_rainflow" Rainflow,
     Reader "twin_csv" Csv,
     Sampler "twin_adaptive_metropolis" AdaptiveMetropolis,
     Sampler "twin_affine_invariant_ensemble" AffineInvariantEnsemble,

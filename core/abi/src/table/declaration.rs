@@ -9,7 +9,7 @@ pub const MAGIC: u64 = 0x6c61_6375_6e61_706c;
 /// The version of the boundary: another one cannot be loaded.
 pub const MAJOR: u32 = 1;
 /// The minor version, raised by what is appended: a library may be older than the program, not newer.
-pub const MINOR: u32 = 1;
+pub const MINOR: u32 = 2;
 
 record! {
     /// The program that loads a library.

@@ -18,6 +18,7 @@ mod discrepancy;
 mod effect;
 mod linear;
 mod model;
+mod quantity;
 mod reader;
 mod sampler;
 mod surrogate;
@@ -35,6 +36,9 @@ pub use discrepancy::{
 pub use effect::{EffectFunctions, ServeEffect};
 pub use linear::{Linear, LinearFunctions, ServeLinear, ServeSquares, Squares, SquaresFunctions};
 pub use model::{Calls, ModelFunctions, ServeModel};
+pub use quantity::{
+    Functional, FunctionalFunctions, QuantityFunctions, ServeFunctional, ServeQuantity,
+};
 pub use reader::{ReaderFunctions, ServeReader};
 pub use sampler::{
     Plan, SamplerFunctions, ServeSampler, ServeTarget, State, Target, TargetFunctions,
@@ -81,6 +85,9 @@ pub fn shapes() -> Vec<Shape> {
         Emulator::SHAPE,
         Summand::SHAPE,
         SurrogateFunctions::SHAPE,
+        FunctionalFunctions::SHAPE,
+        Functional::SHAPE,
+        QuantityFunctions::SHAPE,
         Host::SHAPE,
         Entry::SHAPE,
         Declaration::SHAPE,

@@ -9,6 +9,7 @@ use lacuna::math::random::Stream;
 use lacuna::plugin::discrepancy::Known;
 use lacuna::plugin::effect::{Description, Situation};
 use lacuna::plugin::model::{Call, EvalError, Response, Signature};
+use lacuna::plugin::quantity::{Arguments, Functional, Misfit};
 use lacuna::plugin::reader::{Contents, ReadError};
 use lacuna::plugin::registry::loaded::AnyEntry;
 use lacuna::plugin::registry::{Built, Entry, Kind, find};
@@ -16,7 +17,7 @@ use lacuna::plugin::sampler::{Plan, State};
 use lacuna::plugin::surrogate::Training;
 use lacuna::plugin::{
     Component, Context, Design, Discrepancy, Effect, Emulator, Hyperparameter, Likelihood, Model,
-    Reader, Sampler, Surrogate, Target,
+    Quantity, Reader, Sampler, Surrogate, Target,
 };
 use lacuna::run::{Progress, Stop};
 use lacuna::text::{Node, Problems};
@@ -42,6 +43,7 @@ fn of_kind(path: &Path, kind: &str, name: &str) -> Option<AnyEntry> {
         "discrepancy" => entry::<dyn Discrepancy>(path, name, || Box::new(Absent)),
         "effect" => entry::<dyn Effect>(path, name, || Box::new(Absent)),
         "model" => entry::<dyn Model>(path, name, || Box::new(Absent)),
+        "quantity" => entry::<dyn Quantity>(path, name, || Box::new(Absent)),
         "reader" => entry::<dyn Reader>(path, name, || Box::new(Absent)),
         "surrogate" => entry::<dyn Surrogate>(path, name, || Box::new(Absent)),
         "sampler" => entry::<dyn Sampler>(path, name, || Box::new(Absent)),
@@ -132,6 +134,13 @@ impl Model for Absent {
 
     fn predict(&self, _: &Call<'_>) -> Result<Response, EvalError> {
         Err(EvalError::Fatal(stop().message))
+    }
+}
+
+impl Quantity for Absent {
+    /// Neither a quantity nor a misfit: nothing is known of it.
+    fn bind(&self, _: &Arguments<'_>) -> Result<Box<dyn Functional>, Vec<Misfit>> {
+        Err(Vec::new())
     }
 }
 

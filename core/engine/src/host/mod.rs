@@ -16,6 +16,7 @@ mod model;
 mod offer;
 mod options;
 mod plugin;
+mod quantity;
 mod reader;
 mod sampler;
 mod surrogate;

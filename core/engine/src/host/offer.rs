@@ -4,13 +4,16 @@ use std::sync::Arc;
 
 use lacuna::plugin::registry::loaded::AnyEntry;
 use lacuna::plugin::registry::{Built, Entry, Kind, find};
-use lacuna::plugin::{Design, Discrepancy, Effect, Library, Model, Reader, Sampler, Surrogate};
+use lacuna::plugin::{
+    Design, Discrepancy, Effect, Library, Model, Quantity, Reader, Sampler, Surrogate,
+};
 use lacuna::run::Fault;
 use lacuna::text::{Complaints, Node, Problems};
 use lacuna_abi::record::is_word;
 use lacuna_abi::table::{
     ComponentFunctions, DesignFunctions, DiscrepancyFunctions, EffectFunctions, Entry as Raw,
-    ModelFunctions, ReaderFunctions, SamplerFunctions, SurrogateFunctions, Table, Text, copied,
+    ModelFunctions, QuantityFunctions, ReaderFunctions, SamplerFunctions, SurrogateFunctions,
+    Table, Text, copied,
 };
 use lacuna_abi::wire::{Complaint, json_of_node, table_of_json};
 use lacuna_abi::{Object, Refusal, Reply, status};
@@ -62,6 +65,9 @@ unsafe fn of_kind(
             }
             "effect" => offer::<dyn Effect, EffectFunctions>(name, raw, library, |p| Box::new(p)),
             "model" => offer::<dyn Model, ModelFunctions>(name, raw, library, |p| Box::new(p)),
+            "quantity" => {
+                offer::<dyn Quantity, QuantityFunctions>(name, raw, library, |p| Box::new(p))
+            }
             "reader" => offer::<dyn Reader, ReaderFunctions>(name, raw, library, |p| Box::new(p)),
             "sampler" => {
                 offer::<dyn Sampler, SamplerFunctions>(name, raw, library, |p| Box::new(p))

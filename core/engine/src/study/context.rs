@@ -57,10 +57,8 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     super::inputs::check(study, root, problems);
     super::start::check(study, root, problems);
     super::derived::check(study, root, problems);
-    if problems.len() == before {
-        quantities::check(study, root, problems);
-    }
-    if problems.len() == before {
+    let is_known = problems.len() == before && quantities::check(study, root, problems);
+    if problems.len() == before && is_known {
         reliability::check(study, root, problems);
     }
     each_plugin(study, root, problems, |_, component, context, complaints| {

@@ -6,8 +6,9 @@ use super::effects::places;
 use crate::study::quantity::asked;
 use crate::study::resolve::Study;
 
-/// Reports places that the response does not have, and options that do not fit.
-pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
+/// Reports places that the response does not have, and options that do not fit. Returns false if a quantity of a library that
+/// was not loaded could not be asked.
+pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) -> bool {
     let nodes = root.get("quantity").map(Node::elements).unwrap_or_default();
     let mut wrong = vec![false; nodes.len()];
     for (i, (section, node)) in study.quantities.iter().zip(nodes).enumerate() {
@@ -23,13 +24,14 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
         });
         wrong[i] = problems.len() > before;
     }
-    let misfits = asked(study).1;
+    let (_, misfits, is_known) = asked(study);
     for (i, misfit) in misfits {
         // A place that is wrong has been reported.
         if let Some(node) = nodes.get(i).filter(|_| !wrong[i]) {
             within(node, problems, |complaints| misfit.report(complaints));
         }
     }
+    is_known
 }
 
 fn within(node: &Node, problems: &mut Problems, look: impl FnOnce(&mut Complaints<'_>)) {

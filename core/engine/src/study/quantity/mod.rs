@@ -162,13 +162,15 @@ impl Study {
     }
 }
 
-/// The values that a study asks for, and the misfits of each section, by its index.
-pub(super) fn asked(study: &Study) -> (Vec<Asked>, Vec<(usize, Misfit)>) {
+/// The values that a study asks for, and the misfits of each section, by its index. A quantity of a library that was not
+/// loaded has neither, and then nothing is said of quantities of numbers, which may use it; the flag is true if there is none.
+pub(super) fn asked(study: &Study) -> (Vec<Asked>, Vec<(usize, Misfit)>, bool) {
     let (mut all, mut misfits): (Vec<Asked>, Vec<(usize, Misfit)>) = Default::default();
     let derived = study.derived();
+    let mut is_known = true;
     for of_curve in [true, false] {
         for (i, section) in study.quantities.iter().enumerate() {
-            if section.built.plugin.of_curve() != of_curve {
+            if section.built.plugin.of_curve() != of_curve || !(of_curve || is_known) {
                 continue;
             }
             let found = if of_curve {
@@ -191,11 +193,14 @@ pub(super) fn asked(study: &Study) -> (Vec<Asked>, Vec<(usize, Misfit)>) {
                         all.push(asked);
                     }
                 }
-                Err(found) => misfits.extend(found.into_iter().map(|misfit| (i, misfit))),
+                Err(found) => {
+                    is_known &= !found.is_empty();
+                    misfits.extend(found.into_iter().map(|misfit| (i, misfit)));
+                }
             }
         }
     }
-    (all, misfits)
+    (all, misfits, is_known)
 }
 
 /// Indices of the scenarios that a section selects.
