@@ -56,7 +56,7 @@ steps = 300
 
 [gap]
 candidates = []
-simulations = 199
+simulations = 99
 "#;
 
 /// The states at multiples of `step`, by the method of Runge and Kutta with `fine` steps in each.
@@ -240,7 +240,7 @@ steps = 300
 
 [gap]
 candidates = []
-simulations = 199
+simulations = 99
 "#;
 
 /// A tank runs over above 0.8 m.
