@@ -30,7 +30,7 @@ use crate::stage::inverse_problem::InverseProblem;
 use crate::stage::predictions::Predicting;
 use crate::stage::surrogate::Fitting;
 use crate::stage::{
-    assess, calibrate, contents, design, evidence, inference_data, low_fidelity, manifest,
+    assess, calibrate, contents, design, evidence, grouped, inference_data, low_fidelity, manifest,
     numerical_error, quantities, read, refine, reliability, simulate, surrogate, target, validate,
 };
 use crate::study::Study;
@@ -71,8 +71,14 @@ pub fn find_gap(
     pursue(study, Goal::FindGap, run, observer)
 }
 
-/// Refuses dependent priors, whose curvature the Gauss-Newton fits of the search do not contain.
+/// Refuses dependent priors, whose curvature the Gauss-Newton fits of the search do not contain, and parameters by group with a
+/// surrogate, of which the search trains others.
 fn independent(study: &Study) -> Result<(), Stop> {
+    if !study.dependence.populations.is_empty() || study.hierarchy.trained.is_some() {
+        let text = "the search for missing physics does not know populations, nor parameters by group with a surrogate";
+        return Err(Stop::new(text)
+            .help("search with a copy of the study whose parameters have neither `by` nor `population`"));
+    }
     if study.dependence.is_none() {
         return Ok(());
     }
@@ -152,12 +158,15 @@ pub fn emulate(
     observer: &dyn Observer,
 ) -> Result<Emulated, Stop> {
     companion::build_added(study)?;
-    let placed = design::stage(study, run, observer)?;
-    let simulated = simulate::stage(study, placed.as_ref(), run, observer)?;
+    // Runs and emulator know no groups.
+    let trained = study.trained();
+    let placed = design::stage(trained, run, observer)?;
+    let simulated = simulate::stage(trained, placed.as_ref(), run, observer)?;
     let data = read::stage(study, simulated.as_ref(), run, observer)?;
     let data = low_fidelity::stage(study, placed.as_ref(), data, run, observer)?;
-    let fitting = Fitting::of(study, data.value.runs()?)?;
-    let fitted = surrogate::stage(study, &data, &fitting, run, observer)?;
+    let fitting = Fitting::of(trained, data.value.runs()?)?;
+    let fitted = surrogate::stage(trained, &data, &fitting, run, observer)?;
+    let (data, fitted) = grouped::by_group(study, data, fitted);
     let folders = numerical_error::folders();
     let numerics = numerical_error::stage(study, &data, None, &folders, run, observer)?;
     let emulated = Emulated::new(study, data, fitted, numerics, None)?;
@@ -249,7 +258,8 @@ fn weigh(
         return Ok(None);
     };
     let parts = calibrate::Parts::of(study, measured, problem)?;
-    let posterior = parts.posterior(study, problem);
+    let centred: Vec<f64> = calibrated.value.outcome.centred().collect();
+    let posterior = parts.posterior(study, problem).with_centred(&centred);
     let predicting = Predicting {
         forward: problem.forward(),
         likelihood: parts.likelihood(),

@@ -8,7 +8,7 @@ use rand::rngs::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
-use super::Parameter;
+use super::{Parameter, Population};
 use crate::math::dependence::Copula;
 use crate::math::distribution::Distribution;
 use crate::math::random::Stream;
@@ -79,19 +79,31 @@ impl Share {
 pub struct Dependence {
     /// Groups of dependent parameters; no parameter is in two.
     pub groups: Vec<Group>,
+    /// Populations from which parameters of groups are drawn; no parameter is in two.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub populations: Vec<Population>,
     /// Conditions that all hold.
     pub constraints: Vec<Constraint>,
     /// Probability of the constraints; `None` without constraints.
     pub share: Option<Share>,
 }
 
-static INDEPENDENT: Dependence =
-    Dependence { groups: Vec::new(), constraints: Vec::new(), share: None };
+static INDEPENDENT: Dependence = Dependence {
+    groups: Vec::new(),
+    populations: Vec::new(),
+    constraints: Vec::new(),
+    share: None,
+};
 
 impl Dependence {
     /// True if the parameters are independent of each other.
     pub fn is_none(&self) -> bool {
-        self.groups.is_empty() && self.constraints.is_empty()
+        self.groups.is_empty() && self.constraints.is_empty() && self.populations.is_empty()
+    }
+
+    /// The population to which a parameter belongs as a member.
+    pub fn population_of(&self, place: usize) -> Option<&Population> {
+        self.populations.iter().find(|population| population.members.contains(&place))
     }
 }
 
@@ -111,6 +123,9 @@ const TRIES: usize = 1_000_000;
 /// ```text
 /// p(x) = prod_j p_j(x_j) · prod_groups c(x) · [constraints hold] / P(constraints hold)
 /// ```
+///
+/// For the members of a [`Population`], its density given its unknowns takes the place of `p_j`; their `prior` describes
+/// their distribution alone.
 #[derive(Debug, Clone, Copy)]
 pub struct JointPrior<'a> {
     parameters: &'a [Parameter],
@@ -145,7 +160,8 @@ impl<'a> JointPrior<'a> {
 
     /// Log density at a point of all parameters; minus infinity outside the support.
     pub fn log_density(&self, point: &[f64]) -> f64 {
-        let own = self.parameters.iter().zip(point).map(|(p, &x)| p.prior.log_density(x)).sum();
+        let each = self.parameters.iter().zip(point).enumerate().filter(|(j, _)| self.has_own(*j));
+        let own = each.map(|(_, (p, &x))| p.prior.log_density(x)).sum();
         if self.is_independent() || own == f64::NEG_INFINITY {
             own
         } else {
@@ -155,8 +171,15 @@ impl<'a> JointPrior<'a> {
 
     /// True if the density is above zero at a point.
     pub fn allows(&self, point: &[f64]) -> bool {
-        self.parameters.iter().zip(point).all(|(p, &x)| p.prior.log_density(x).is_finite())
+        let mut each =
+            self.parameters.iter().zip(point).enumerate().filter(|(j, _)| self.has_own(*j));
+        each.all(|(_, (p, &x))| p.prior.log_density(x).is_finite())
             && (self.is_independent() || self.joint(point).is_finite())
+    }
+
+    /// True if the prior of a parameter by itself is a factor of the joint density: unless it is a member of a population.
+    pub fn has_own(&self, place: usize) -> bool {
+        self.dependence.populations.is_empty() || self.dependence.population_of(place).is_none()
     }
 
     /// Log density at a point inside the support of every parameter, less the log densities of the parameters' own
@@ -170,7 +193,13 @@ impl<'a> JointPrior<'a> {
             group.copula.log_ratio(&marginals, &values)
         };
         let groups: f64 = self.dependence.groups.iter().map(of).sum();
-        groups - self.dependence.share.map_or(0.0, Share::log)
+        let in_population = |population: &Population| -> f64 {
+            let (location, scale) = (point[population.location], point[population.scale]);
+            let each = population.members.iter();
+            each.map(|&j| population.log_density(point[j], location, scale)).sum()
+        };
+        let members: f64 = self.dependence.populations.iter().map(in_population).sum();
+        groups + members - self.dependence.share.map_or(0.0, Share::log)
     }
 
     /// Adds the derivatives of [`Self::joint`] to those of the parameters' own distributions.
@@ -180,6 +209,16 @@ impl<'a> JointPrior<'a> {
             for (&j, slope) in group.members.iter().zip(group.copula.gradient(&marginals, &values))
             {
                 gradient[j] += slope;
+            }
+        }
+        for population in &self.dependence.populations {
+            let (location, scale) = (population.location, population.scale);
+            for &j in &population.members {
+                let [own, by_location, by_scale] =
+                    population.derivatives(point[j], point[location], point[scale]);
+                gradient[j] += own;
+                gradient[location] += by_location;
+                gradient[scale] += by_scale;
             }
         }
     }
@@ -224,13 +263,21 @@ impl<'a> JointPrior<'a> {
     }
 
     fn unconstrained(&self, rng: &mut impl Rng) -> Vec<f64> {
-        let grouped = |j: usize| self.dependence.groups.iter().any(|g| g.members.contains(&j));
+        let grouped = |j: usize| {
+            self.dependence.groups.iter().any(|g| g.members.contains(&j)) || !self.has_own(j)
+        };
         let own = |(j, p): (usize, &Parameter)| if grouped(j) { 0.0 } else { p.prior.sample(rng) };
         let mut point: Vec<f64> = self.parameters.iter().enumerate().map(own).collect();
         for group in &self.dependence.groups {
             let (marginals, _) = self.of_group(group, &point);
             for (&j, x) in group.members.iter().zip(group.copula.sample(&marginals, rng)) {
                 point[j] = x;
+            }
+        }
+        for population in &self.dependence.populations {
+            for &j in &population.members {
+                point[j] =
+                    population.sample(point[population.location], point[population.scale], rng);
             }
         }
         point

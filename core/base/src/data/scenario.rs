@@ -1,5 +1,6 @@
 //! Known conditions of a run.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use schemars::JsonSchema;
@@ -12,6 +13,9 @@ use super::Unit;
 pub struct Scenario {
     /// Name of the scenario; empty in a study with one set of conditions.
     pub name: String,
+    /// Groups to which it belongs, by label: `target`, `batch`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub labels: BTreeMap<String, String>,
     /// Named constants.
     pub values: Vec<Condition>,
     /// Named functions of one variable, such as a measured force over time.

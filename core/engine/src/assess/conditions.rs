@@ -76,7 +76,7 @@ mod tests {
     fn scenario(name: &str, value: f64, unit: &str, unmeasured: bool) -> Scenario {
         let unit = Some(Unit::parse(unit).unwrap());
         let values = vec![Condition { name: "power".to_owned(), value, unit }];
-        Scenario { name: name.to_owned(), values, functions: Vec::new(), unmeasured }
+        Scenario { name: name.to_owned(), values, unmeasured, ..Scenario::default() }
     }
 
     #[test]

@@ -13,6 +13,7 @@ mod finding;
 pub mod fit;
 pub mod influence;
 pub mod modes;
+pub mod population;
 pub mod prior;
 pub mod replicates;
 pub mod residuals;

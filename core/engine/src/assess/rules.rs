@@ -1,8 +1,8 @@
 //! Descriptions of all checks, for the documentation.
 
 use super::{
-    bounds, chains, conditions, correlation, emulator, envelope, fit, influence, modes, prior,
-    replicates, residuals, runs, suspicious,
+    bounds, chains, conditions, correlation, emulator, envelope, fit, influence, modes, population,
+    prior,    replicates, residuals, runs, suspicious,
 };
 
 /// A type of finding.
@@ -31,6 +31,7 @@ pub fn rules() -> Vec<Rule> {
         modes::rules(),
         bounds::rules(),
         prior::rules(),
+        population::rules(),
         correlation::rules(),
         emulator::rules(),
         fit::rules(),

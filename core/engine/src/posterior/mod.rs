@@ -2,7 +2,10 @@
 //!
 //! Coordinates, in this order: the model's parameters in physical units; the parameters of the study's effects; the
 //! discrepancy's hyperparameters. A hyperparameter that is declared `log` is represented by its logarithm, and the
-//! density includes the Jacobian, so that its prior keeps its meaning.
+//! density includes the Jacobian, so that its prior keeps its meaning. Members of populations have coordinates of their own
+//! (`members`).
+
+use std::sync::Arc;
 
 use lacuna::data::{JointPrior, Parameter};
 use lacuna::math::distribution::Distribution;
@@ -14,19 +17,24 @@ use rayon::prelude::*;
 
 pub mod bridge;
 mod given;
+mod information;
 mod joint;
+mod members;
 mod of_data;
 
 pub use given::Given;
+pub use information::Together;
 pub use joint::Joint;
 pub use of_data::OfData;
+
+use members::{Jacobian, Members};
 
 /// Number of points that are evaluated together. It is fixed because the rounding of a matrix product depends on the
 /// number of its rows, and results must not depend on the number of threads.
 const BATCH: usize = 30;
 
 /// Log-likelihood as a function of natural values of the parameters and of further unknowns.
-pub trait LogLikelihood: Sync {
+pub trait LogLikelihood: Send + Sync {
     /// Unknowns besides the parameters.
     fn hyperparameters(&self) -> &[Hyperparameter];
 
@@ -48,14 +56,32 @@ pub trait LogLikelihood: Sync {
 /// The posterior of a study.
 pub struct Posterior<'a> {
     prior: JointPrior<'a>,
-    likelihood: Box<dyn LogLikelihood + 'a>,
+    likelihood: Arc<dyn LogLikelihood + 'a>,
     region: Option<Vec<(f64, f64)>>,
+    members: Members<'a>,
 }
 
 impl<'a> Posterior<'a> {
     /// The posterior with the prior of its parameters.
     pub fn new(prior: impl Into<JointPrior<'a>>, likelihood: impl LogLikelihood + 'a) -> Self {
-        Self { prior: prior.into(), likelihood: Box::new(likelihood), region: None }
+        let prior = prior.into();
+        let members = Members::of(prior.dependence());
+        Self { prior, likelihood: Arc::new(likelihood), region: None, members }
+    }
+
+    /// The same density in coordinates whose members are centred to these degrees, from 0 to 1 and in the order of
+    /// [`Self::centred`], where the study leaves that to the data.
+    #[must_use]
+    pub fn with_centred(&self, centred: &[f64]) -> Self {
+        let mut members = self.members.clone();
+        members.set_centred(centred);
+        let (prior, likelihood) = (self.prior, self.likelihood.clone());
+        Self { prior, likelihood, region: self.region.clone(), members }
+    }
+
+    /// Degree to which the coordinate of each member of a population is centred: population after population.
+    pub fn centred(&self) -> Vec<f64> {
+        self.members.centred()
     }
 
     /// Restricts each parameter to its interval; the density is zero elsewhere.
@@ -90,12 +116,16 @@ impl<'a> Posterior<'a> {
 
     /// Natural values at a point of the coordinates.
     pub fn natural(&self, point: &[f64]) -> Vec<f64> {
-        self.map_logs(point, f64::exp)
+        let mut natural = self.map_logs(point, f64::exp);
+        self.members.natural(&mut natural);
+        natural
     }
 
     /// Coordinates of natural values.
     pub fn coordinates(&self, natural: &[f64]) -> Vec<f64> {
-        self.map_logs(natural, f64::ln)
+        let mut point = self.map_logs(natural, f64::ln);
+        self.members.coordinates(&mut point);
+        point
     }
 
     fn map_logs(&self, point: &[f64], map: impl Fn(f64) -> f64) -> Vec<f64> {
@@ -105,7 +135,8 @@ impl<'a> Posterior<'a> {
     }
 
     /// This density over the same coordinates without the Jacobian of the logarithms: its maximum is the mode of the
-    /// density in natural units.
+    /// density in natural units. With populations it is the density of locations, logarithms of scales and standardised
+    /// members: that of the members themselves is infinite where a scale is zero.
     pub fn mode(&'a self) -> Mode<'a> {
         Mode(self)
     }
@@ -121,17 +152,23 @@ impl<'a> Posterior<'a> {
         if !self.is_inside(natural) {
             return f64::NEG_INFINITY;
         }
-        let own: f64 = self.priors().zip(natural).map(|(prior, &x)| prior.log_density(x)).sum();
+        let each = self.priors().zip(natural).enumerate().filter(|(j, _)| self.prior.has_own(*j));
+        let own: f64 = each.map(|(_, (prior, &x))| prior.log_density(x)).sum();
         if self.prior.is_independent() || own == f64::NEG_INFINITY {
             return own;
         }
         own + self.prior.joint(&natural[..self.parameters().len()])
     }
 
-    /// Log Jacobian of the logarithmic coordinates, which is the sum of these coordinates.
-    fn log_jacobian(&self, point: &[f64]) -> f64 {
+    /// Log Jacobian of the coordinates: for logarithms the sum of these coordinates, unless only that of the members is asked.
+    fn log_jacobian(&self, point: &[f64], natural: &[f64], jacobian: bool) -> f64 {
         let d = self.parameters().len();
-        self.hyperparameters().iter().zip(&point[d..]).filter(|(h, _)| h.log).map(|(_, &x)| x).sum()
+        let logs = self.hyperparameters().iter().zip(&point[d..]).filter(|(h, _)| h.log && jacobian);
+        let logs: f64 = logs.map(|(_, &x)| x).sum();
+        if self.members.is_empty() {
+            return logs;
+        }
+        logs + self.members.log_jacobian(natural, of_members(jacobian))
     }
 
     fn batch(&self, points: &Matrix, jacobian: bool) -> Vec<f64> {
@@ -152,7 +189,7 @@ impl<'a> Posterior<'a> {
         let mut density: Vec<f64> = natural
             .iter()
             .zip(points.iter_rows())
-            .map(|(x, p)| self.log_prior(x) + if jacobian { self.log_jacobian(p) } else { 0.0 })
+            .map(|(x, p)| self.log_prior(x) + self.log_jacobian(p, x, jacobian))
             .collect();
         let inside: Vec<usize> = (0..points.rows()).filter(|&i| density[i].is_finite()).collect();
         if !inside.is_empty() {
@@ -173,8 +210,7 @@ impl<'a> Posterior<'a> {
         let d = self.parameters().len();
         let natural = self.natural(point);
         let nothing = || (f64::NEG_INFINITY, vec![0.0; point.len()]);
-        let prior =
-            self.log_prior(&natural) + if jacobian { self.log_jacobian(point) } else { 0.0 };
+        let prior = self.log_prior(&natural) + self.log_jacobian(point, &natural, jacobian);
         if !prior.is_finite() {
             return nothing();
         }
@@ -184,10 +220,15 @@ impl<'a> Posterior<'a> {
         if !value.is_finite() {
             return nothing();
         }
-        for ((g, prior), &x) in gradient.iter_mut().zip(self.priors()).zip(&natural) {
-            *g += prior.log_density_derivative(x);
+        for (j, ((g, prior), &x)) in
+            gradient.iter_mut().zip(self.priors()).zip(&natural).enumerate()
+        {
+            if self.prior.has_own(j) {
+                *g += prior.log_density_derivative(x);
+            }
         }
         self.prior.add_joint_gradient(&natural[..d], &mut gradient);
+        self.members.pull_back(&natural, of_members(jacobian), &mut gradient);
         for (i, hyper) in self.hyperparameters().iter().enumerate().filter(|(_, h)| h.log) {
             debug_assert!(hyper.log);
             let g = &mut gradient[d + i];
@@ -205,7 +246,9 @@ impl<'a> Posterior<'a> {
             let (low, high) = h.prior.support();
             if h.log { (low.max(0.0).ln(), high.ln()) } else { (low, high) }
         });
-        plain.chain(hyper).collect()
+        let mut bounds: Vec<(f64, f64)> = plain.chain(hyper).collect();
+        self.members.bounds(&mut bounds);
+        bounds
     }
 
     /// A draw from the prior of coordinate `j`, inside the region.
@@ -251,6 +294,11 @@ impl<'a> Posterior<'a> {
     }
 }
 
+/// Jacobian of the members' coordinates for that of logarithmic ones.
+fn of_members(jacobian: bool) -> Jacobian {
+    if jacobian { Jacobian::Whole } else { Jacobian::Standardised }
+}
+
 impl Target for Posterior<'_> {
     fn failure(&self) -> Option<String> {
         self.likelihood.failure()
@@ -265,7 +313,10 @@ impl Target for Posterior<'_> {
     fn log_prior(&self, points: &Matrix) -> Vec<f64> {
         points
             .iter_rows()
-            .map(|p| self.log_prior(&self.natural(p)) + self.log_jacobian(p))
+            .map(|p| {
+                let natural = self.natural(p);
+                self.log_prior(&natural) + self.log_jacobian(p, &natural, true)
+            })
             .collect()
     }
     fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
@@ -290,7 +341,11 @@ impl Target for Mode<'_> {
         self.0.batch(points, false)
     }
     fn log_prior(&self, points: &Matrix) -> Vec<f64> {
-        points.iter_rows().map(|p| self.0.log_prior(&self.0.natural(p))).collect()
+        let of = |p: &[f64]| {
+            let natural = self.0.natural(p);
+            self.0.log_prior(&natural) + self.0.log_jacobian(p, &natural, false)
+        };
+        points.iter_rows().map(of).collect()
     }
     fn gradient(&self, point: &[f64]) -> (f64, Vec<f64>) {
         self.0.value_and_gradient(point, false)

@@ -40,7 +40,8 @@ fn points_from(
 ) -> Result<Vec<Vec<f64>>, Stop> {
     let likelihood = LeastSquares::of(data)?;
     let posterior = Posterior::new(prior, OfData::new(forward, Vec::new(), &likelihood));
-    Ok(maxima(&posterior, stated, stream)?.into_iter().map(|maximum| maximum.point).collect())
+    let found = maxima(&posterior, stated, stream)?.into_iter();
+    Ok(found.map(|maximum| posterior.natural(&maximum.point)).collect())
 }
 
 /// Derivative of each output by each parameter at [`point`], per prior standard deviation (`outputs x parameters`).

@@ -2,6 +2,7 @@
 
 mod kept;
 mod law;
+mod population;
 mod predicting;
 
 use std::path::Path;
@@ -27,6 +28,7 @@ use crate::stage::inverse_problem::{InverseProblem, Trial};
 use crate::study::Study;
 
 pub use law::Law;
+pub use population::PopulationOutcome;
 
 /// The posterior as draws, with its maximum.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,6 +66,16 @@ pub struct Outcome {
     pub facts: Vec<Fact>,
     /// Evidence, if it is known.
     pub evidence: Option<Evidence>,
+    /// Populations, in the order of the study's parameters.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub populations: Vec<PopulationOutcome>,
+}
+
+impl Outcome {
+    /// Degree to which the coordinate of each member of a population was centred.
+    pub fn centred(&self) -> impl Iterator<Item = f64> {
+        self.populations.iter().flat_map(|population| &population.members).map(|m| m.centred)
+    }
 }
 
 /// A coordinate of the posterior.
@@ -242,7 +254,15 @@ fn calibrate(
     let random = Trial::stream(trial, study, "calibrate");
     let maxima = maxima(posterior, &study.start(), &random.named("optimise"));
     sampling::broken(posterior)?;
-    let maxima = maxima?;
+    let mut maxima = maxima?;
+    let first = population::look(study, posterior, &maxima[0].point);
+    let adapted = first.as_ref().map(|first| posterior.with_centred(&first.centred));
+    if let Some(adapted) = &adapted {
+        for maximum in &mut maxima {
+            maximum.point = adapted.coordinates(&posterior.natural(&maximum.point));
+        }
+    }
+    let posterior = adapted.as_ref().unwrap_or(posterior);
     let best = &maxima[0];
     let plan = section.built.plugin.plan(posterior.dimension());
     let sampler = &*section.built.plugin;
@@ -298,6 +318,7 @@ fn calibrate(
         evaluations: sampled.state.evaluations,
         facts: [posterior.facts(), section.built.plugin.facts(), harvested].concat(),
         evidence,
+        populations: population::outcomes(study, posterior, &kept),
     };
     Ok(Calibrated { draws, statistics: sampled.statistics, outcome })
 }

@@ -77,6 +77,7 @@ fn can_use_noise(study: &Study) -> Result<(), Stop> {
 }
 
 fn simulations(study: &Study) -> Vec<Stop> {
+    let study = study.trained();
     let Some(section) = study.simulations.as_ref() else { return Vec::new() };
     let plugin = &*section.built.plugin;
     if study.surrogate.is_none() || !is_there(section.built.name) || !plugin.names_files() {

@@ -142,13 +142,19 @@ pub fn stage(
         study.layouts,
         study.parameters.iter().map(|p| (&p.name, &p.unit)).collect::<Vec<_>>(),
     ]);
+    let inputs = match &study.hierarchy.trained {
+        Some(trained) => json!([inputs, { "trained": trained.study.layouts }]),
+        None => inputs,
+    };
     let kept = run.keep(&Stage::Read.folder(), &inputs, observer, |_| {
-        let ensemble = if study.surrogate.is_some() { Some(ensemble(study, made)?) } else { None };
+        let trained = study.trained();
+        let runs = || ensemble(trained, made);
+        let ensemble = study.surrogate.as_ref().map(|_| runs()).transpose()?;
         let measured = measured(study)?;
         Ok(Data { ensemble, measured, cheaper: None })
     })?;
     if let Some(ensemble) = &kept.value.ensemble {
-        refuse(study, ensemble)?;
+        refuse(study.trained(), ensemble)?;
     }
     let failed: Vec<_> = kept.value.ensemble.iter().flat_map(|e| &e.failed).collect();
     for failed in failed.iter().take(TOLD) {

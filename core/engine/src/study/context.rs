@@ -38,6 +38,7 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
         sections(study, &mut complaints);
     }
     parameters(study, &mut complaints);
+    super::hierarchy::check(study, &mut complaints);
     runs(study, &mut complaints);
     refinement(study, &mut complaints);
     validation(study, &mut complaints);
@@ -192,8 +193,16 @@ fn parameters(study: &Study, complaints: &mut Complaints<'_>) {
                 .say(format!("there are two parameters `{}`", parameter.name))
                 .help("give each `[[parameter]]` its own name");
         }
-        if study.surrogate.is_some() {
-            inside_design(parameter, bulks[i], complaints);
+        if study.surrogate.is_some() && !study.unknowns[i].of_population {
+            let population = study.dependence.population_of(i);
+            let path = match population {
+                Some(population) => format!("parameter.{}.population", population.name),
+                None => format!("parameter.{}.prior", parameter.name),
+            };
+            // Members differ by their group only.
+            if population.is_none_or(|population| population.members[0] == i) {
+                inside_design(parameter, bulks[i], &path, complaints);
+            }
         }
         if let Some(value) = parameter.reference.filter(|value| !value.is_finite()) {
             complaints
@@ -227,11 +236,16 @@ fn bulks(study: &Study) -> Vec<[f64; 2]> {
 
 /// Reports a prior that extends beyond its design: an emulator is trained inside the design and would have to
 /// extrapolate.
-fn inside_design(parameter: &Parameter, bulk: [f64; 2], complaints: &mut Complaints<'_>) {
+fn inside_design(
+    parameter: &Parameter,
+    bulk: [f64; 2],
+    path: &str,
+    complaints: &mut Complaints<'_>,
+) {
     let (low, high) = parameter.design.support();
     if bulk[0] < low || bulk[1] > high {
         complaints
-            .at(&format!("parameter.{}.prior", parameter.name))
+            .at(path)
             .say(format!("the prior of `{}` reaches beyond its design", parameter.name))
             .expected(format!("95 % of the prior inside [{low}, {high}]"))
             .found(format!("[{}, {}]", bulk[0], bulk[1]))
@@ -288,7 +302,9 @@ fn validation(study: &Study, complaints: &mut Complaints<'_>) {
             .expected("a `[model]` section, or `emulator_check = 0`");
     }
     if study.validate.against.is_some() {
-        for parameter in study.parameters.iter().filter(|p| p.reference.is_none()) {
+        let scale = |j: usize| study.dependence.populations.iter().any(|p| p.scale == j);
+        let without = study.parameters.iter().enumerate().filter(|(_, p)| p.reference.is_none());
+        for (_, parameter) in without.filter(|(j, _)| !scale(*j)) {
             complaints
                 .at("validate.against")
                 .say(format!("the parameter `{}` has no `reference`", parameter.name))
@@ -307,6 +323,9 @@ const OF_RECORDS: [&str; 6] = [
     "measurements",
 ];
 
+/// The sections whose plugins see the parameters and conditions of the runs.
+const OF_RUNS: [&str; 4] = ["design", "executor", "simulations", "surrogate"];
+
 /// Calls `look` for every plugin with complaints about its own section.
 pub(super) fn each_plugin(
     study: &Study,
@@ -314,8 +333,12 @@ pub(super) fn each_plugin(
     problems: &mut Problems,
     look: impl Fn(&str, &dyn Component, &Context<'_>, &mut Complaints<'_>),
 ) {
-    let of_scenario = |scenario: &Scenario| Some(study.layouts.of_scenario(&scenario.name)?.0);
-    let records: Vec<Layout> = study.scenarios.iter().filter_map(of_scenario).collect();
+    let whole = study;
+    let records_of = |study: &Study| -> Vec<Layout> {
+        let of_scenario = |scenario: &Scenario| Some(study.layouts.of_scenario(&scenario.name)?.0);
+        study.scenarios.iter().filter_map(of_scenario).collect()
+    };
+    let [records, of_runs] = [study, study.trained()].map(records_of);
     let unwritten = Node::table(root.place.clone());
     let elements = |list: &str| root.find(list).map(Node::elements).unwrap_or_default().iter();
     let (mut effects, mut candidates) = (elements("effect"), elements("gap.candidate"));
@@ -329,8 +352,13 @@ pub(super) fn each_plugin(
             "gap.candidate" => candidates.next(),
             _ => root.find(section),
         };
-        let of_records = OF_RECORDS.contains(&section);
-        let layouts = if of_records { &records } else { &study.layouts.blocks };
+        // Runs and emulator know no groups.
+        let study = if OF_RUNS.contains(&section) { whole.trained() } else { whole };
+        let layouts = match section {
+            "simulations" => &of_runs,
+            _ if OF_RECORDS.contains(&section) => &records,
+            _ => &study.layouts.blocks,
+        };
         for layout in layouts {
             let before = problems.len();
             problems.within(section, |problems| {

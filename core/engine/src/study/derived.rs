@@ -142,7 +142,7 @@ fn scope(study: &Study, name: &str, scenario: Option<usize>) -> Result<Known, Fa
     let mut scope = Scope::new();
     let (mut units, mut parameters) = (BTreeMap::new(), Vec::new());
     for (i, unknown) in study.unknowns.iter().enumerate() {
-        if unknown.scenario.is_none() || unknown.scenario == scenario {
+        if unknown.is_known_in(scenario) {
             scope.unknown(&unknown.name)?;
             units.insert(unknown.name.clone(), study.parameters[i].unit.clone());
             parameters.push(i);

@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 
 pub use super::dependence::Prior;
 pub use super::derived::DerivedSection;
+pub use super::hierarchy::{CoordinatesKey, PopulationKeys};
 pub use super::fidelity::{LowFidelitySection, NumericalErrorSection};
 pub use super::noise::{InstrumentNoise, NoiseSection};
 pub use super::scenario::{FunctionSection, ScenarioSection};
@@ -60,6 +61,19 @@ pub struct ParameterSection {
     /// scenario, called `name[scenario]`. Default: one parameter shared by all scenarios.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scenario: Option<String>,
+    /// Label of the scenarios by which the parameter has values of its own, such as `target`: one value, called
+    /// `name[T24]`, for each value of the label. `"scenario"` makes each scenario a group. With a surrogate the runs vary one
+    /// value for all groups, and scenarios with the same conditions share them. Default: no groups.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub by: Option<String>,
+    /// Distribution from which the values of the groups are drawn, in place of `prior`. Its own unknowns are estimated, so that
+    /// the groups inform each other as far as their data agree. Default: the groups are independent, each with `prior`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub population: Option<PopulationKeys>,
+    /// Coordinates in which the values of a population are sampled: `"auto"`, `"centred"` or `"non_centred"`. They affect how
+    /// well a sampler moves, and not the posterior.
+    #[serde(default, skip_serializing_if = "CoordinatesKey::is_auto")]
+    pub coordinates: CoordinatesKey,
     /// Symbol used in figures, such as `x1`. Default: the name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub symbol: Option<String>,

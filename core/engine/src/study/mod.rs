@@ -8,6 +8,7 @@ pub mod fidelity;
 pub mod file;
 pub mod forward;
 pub mod gap;
+pub mod hierarchy;
 pub mod inherit;
 pub mod inputs;
 pub mod language;

@@ -14,6 +14,7 @@ use super::fidelity::{LowFidelity, NumericalError};
 use super::file::{DerivedSection, EffectKeys, StudySection, ValidateSection};
 use super::forward::ForwardSection;
 use super::gap::Gap;
+use super::hierarchy::Hierarchy;
 use super::libraries::Libraries;
 use super::positions::Positions;
 use super::quantity::QuantitySection;
@@ -47,6 +48,8 @@ pub struct Study {
     pub dependence: Dependence,
     /// `[[dependence]]` and `[[constraint]]`.
     pub dependence_sections: Sections,
+    /// Parameters by group.
+    pub hierarchy: Hierarchy,
     /// Name and scenario behind each parameter, in the same order.
     pub unknowns: Vec<Unknown>,
     /// Model inputs that the study sets.
@@ -103,6 +106,7 @@ impl Study {
             scenarios: self.scenarios.clone(),
             dependence: self.dependence.clone(),
             dependence_sections: Sections::default(),
+            hierarchy: Hierarchy::default(),
             unknowns,
             given: Vec::new(),
             layouts: self.layouts.clone(),

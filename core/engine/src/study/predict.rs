@@ -17,6 +17,10 @@ use super::file::{FunctionSection, Quantity};
 pub struct PredictSection {
     /// Name of the conditions; the quantities predicted there are called `peak[name]`.
     pub name: String,
+    /// Groups to which the conditions belong, as in `[[scenario]]`. A group without measurements is a new member of the
+    /// populations: its parameters are drawn from them.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub labels: BTreeMap<String, String>,
     /// Known values. A value with the name of an input of the model sets this input; expressions may use all of them.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub values: BTreeMap<String, Quantity>,

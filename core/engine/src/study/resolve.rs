@@ -18,6 +18,7 @@ use super::file::{OPTIONAL, ParameterSection, ResponseSection, StudySection, Val
 use super::forward::forward;
 use super::gap::companion::companion;
 use super::gap::gap;
+use super::hierarchy::{Hierarchy, of_sections, trained};
 pub use super::libraries::Use;
 use super::libraries::{Libraries, Seen, libraries};
 pub use super::plain::Study;
@@ -210,13 +211,18 @@ fn structure(
     let (parameters, mut dependence_sections) = (parameters?, dependence_sections?);
     dependence_sections.read_runs(&parameters, &directory, root, problems);
     let prior = |section: &ParameterSection| dependence_sections.prior(section);
-    let (parameters, unknowns) = unknowns(&parameters, &scenarios, margin, prior, root, problems);
+    of_sections(&parameters, plugins.surrogate.is_some(), root, problems);
+    let mut sections_by_group = parameters;
+    let (parameters, unknowns, populations) =
+        unknowns(&sections_by_group, &scenarios, margin, prior, root, problems);
     if problems.len() > before {
         return None;
     }
+    sections_by_group.retain(|section| section.by.is_some());
     let mut about = about?;
     let own = (parameters.as_slice(), unknowns.as_slice());
-    let dependence = dependence(&dependence_sections, own, about.seed, root, problems)?;
+    let dependence =
+        dependence(&dependence_sections, populations, own, about.seed, root, problems)?;
     about.directory = None;
     let name = name(&mut about, path, root, problems)?;
     let mut study = Study {
@@ -231,6 +237,7 @@ fn structure(
         scenarios,
         dependence,
         dependence_sections,
+        hierarchy: Hierarchy { sections: sections_by_group, trained: None },
         unknowns,
         given: Vec::new(),
         layouts: layouts?,
@@ -249,6 +256,7 @@ fn structure(
         resolved: Table::new(),
     };
     study.given = inputs::all_given(&study);
+    study.hierarchy.trained = trained(&study, root);
     if let Some(node) = root.find("gap.companion") {
         let own = problems.within("gap", |problems| {
             problems.within("companion", |problems| companion(&study, node, problems))

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use lacuna::data::Parameter;
 use lacuna::text::emit::{Unwritable, to_table};
 use toml::{Table, Value};
 
@@ -11,6 +12,7 @@ use super::gap::companion::Companion;
 use super::gap::{Gap, Swap};
 use super::plain::Study;
 use super::table::{SECTIONS, written};
+use super::unknowns::Unknown;
 
 /// The study with every default filled in.
 pub(super) fn table(
@@ -22,11 +24,22 @@ pub(super) fn table(
     about.insert("name".to_owned(), study.name.clone().into());
     let directory = std::path::absolute(&study.directory).unwrap_or(study.directory.clone());
     about.insert("directory".to_owned(), directory.display().to_string().into());
+    let first = |(j, (_, unknown)): &(usize, (&Parameter, &Unknown))| {
+        let again = unknown.member.is_some()
+            && study.unknowns[..*j].iter().any(|other| other.name == unknown.name);
+        !again && !unknown.of_population
+    };
     let parameters: Result<Vec<Table>, _> = study
         .parameters
         .iter()
         .zip(&study.unknowns)
-        .map(|(parameter, unknown)| {
+        .enumerate()
+        .filter(first)
+        .map(|(_, (parameter, unknown))| {
+            let mut by_group = study.hierarchy.sections.iter();
+            if let Some(own) = by_group.find(|section| section.name.as_str() == unknown.name) {
+                return to_table(own);
+            }
             let mut table = to_table(parameter)?;
             table.insert("name".to_owned(), unknown.name.clone().into());
             if let Some(scenario) = unknown.scenario {

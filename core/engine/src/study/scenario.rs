@@ -17,6 +17,10 @@ use super::file::Quantity;
 pub struct ScenarioSection {
     /// Name of the scenario, as in the column `scenario` of measurements and runs.
     pub name: String,
+    /// Groups to which the scenario belongs, such as `{ target = "T24", batch = "A" }`. A parameter with `by = "target"` has a
+    /// value for each.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub labels: BTreeMap<String, String>,
     /// Known values. A value with the name of an input of the model sets this input; expressions may use all of them.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub values: BTreeMap<String, Quantity>,
@@ -86,6 +90,7 @@ impl ScenarioSection {
         let values = self.values.iter().map(condition).collect();
         whole.then(|| Scenario {
             name: self.name.clone(),
+            labels: self.labels.clone(),
             values,
             functions,
             unmeasured: !self.measured,

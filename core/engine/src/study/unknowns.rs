@@ -1,12 +1,13 @@
-//! The unknowns of a study: shared by all scenarios, or one per scenario.
+//! The unknowns of a study: shared by all scenarios, or one per scenario or group of scenarios.
 
-use lacuna::data::{Parameter, Scenario};
+use lacuna::data::{Parameter, Population, Scenario};
 use lacuna::math::distribution::Distribution;
 use lacuna::text::node::Node;
 use lacuna::text::values::Positive;
 use lacuna::text::{Complaints, Problems, nearest};
 
 use super::file::ParameterSection;
+use super::hierarchy::{Member, members};
 
 /// Unknown to which a parameter of a study belongs.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -15,16 +16,40 @@ pub struct Unknown {
     pub name: String,
     /// Scenario to which it belongs; `None` if it is shared by all.
     pub scenario: Option<usize>,
+    /// Group to which it belongs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub member: Option<Member>,
+    /// True for location and scale of a population, on which no response depends directly.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub of_population: bool,
 }
 
 impl Unknown {
+    /// An unknown that all scenarios share.
+    pub fn shared(name: &str) -> Self {
+        Self { name: name.to_owned(), scenario: None, member: None, of_population: false }
+    }
+
     /// Returns true if it acts in a scenario.
     pub fn acts_in(&self, scenario: usize) -> bool {
-        self.scenario.is_none_or(|own| own == scenario)
+        !self.of_population
+            && self.scenario.is_none_or(|own| own == scenario)
+            && self.member.as_ref().is_none_or(|own| own.scenarios.contains(&scenario))
+    }
+
+    /// Returns true if it has one value for all scenarios.
+    pub fn is_shared(&self) -> bool {
+        self.scenario.is_none() && self.member.is_none() && !self.of_population
+    }
+
+    /// Returns true if expressions of a scenario, or of none, may use it.
+    pub fn is_known_in(&self, scenario: Option<usize>) -> bool {
+        scenario.map_or_else(|| self.is_shared(), |scenario| self.acts_in(scenario))
     }
 }
 
-/// The parameters of a study and their unknowns: `"each"` makes one parameter per scenario.
+/// The parameters of a study, their unknowns and populations: `"each"` makes one parameter per scenario, and `by` one per
+/// group.
 pub(super) fn unknowns(
     sections: &[ParameterSection],
     scenarios: &[Scenario],
@@ -32,9 +57,14 @@ pub(super) fn unknowns(
     prior: impl Fn(&ParameterSection) -> Option<Distribution>,
     root: &Node,
     problems: &mut Problems,
-) -> (Vec<Parameter>, Vec<Unknown>) {
+) -> (Vec<Parameter>, Vec<Unknown>, Vec<Population>) {
     let (mut parameters, mut unknowns) = (Vec::new(), Vec::new());
-    let mut add = |section: &ParameterSection, prior: &Distribution, scenario: Option<usize>| {
+    let mut populations = Vec::new();
+    let mut all = (&mut parameters, &mut unknowns);
+    let add = |(parameters, unknowns): &mut (&mut Vec<Parameter>, &mut Vec<Unknown>),
+               section: &ParameterSection,
+               prior: &Distribution,
+               scenario: Option<usize>| {
         let name = section.name.as_str().to_owned();
         let full = |base: &str| match scenario {
             Some(i) => format!("{base}[{}]", scenarios[i].name),
@@ -51,12 +81,19 @@ pub(super) fn unknowns(
             prior: prior.clone(),
             reference: section.reference,
         });
-        unknowns.push(Unknown { name, scenario });
+        unknowns.push(Unknown { name, scenario, member: None, of_population: false });
     };
     let named: Vec<&str> =
         scenarios.iter().map(|s| s.name.as_str()).filter(|name| !name.is_empty()).collect();
     for section in sections {
-        let Some(prior) = prior(section) else {
+        let own = prior(section);
+        if section.by.is_some() && (own.is_some() || section.population.is_some()) {
+            let places = (&mut *all.0, &mut *all.1);
+            populations
+                .extend(members(section, own.as_ref(), scenarios, places, root, problems));
+            continue;
+        }
+        let Some(prior) = own else {
             if section.prior.is_none() {
                 let mut complaints = Complaints::new(root, problems);
                 complaints.at(&format!("parameter.{}", section.name)).say("missing key `prior`");
@@ -72,14 +109,14 @@ pub(super) fn unknowns(
                 .expected("a uniform or log-uniform prior, or a `design` of the parameter's own");
         }
         let Some(scenario) = &section.scenario else {
-            add(section, &prior, None);
+            add(&mut all, section, &prior, None);
             continue;
         };
         let place = scenarios.iter().position(|s| &s.name == scenario && !s.name.is_empty());
         match place {
-            Some(place) => add(section, &prior, Some(place)),
+            Some(place) => add(&mut all, section, &prior, Some(place)),
             None if scenario == "each" && !named.is_empty() => {
-                (0..scenarios.len()).for_each(|i| add(section, &prior, Some(i)));
+                (0..scenarios.len()).for_each(|i| add(&mut all, section, &prior, Some(i)));
             }
             None => {
                 let mut complaints = Complaints::new(root, problems);
@@ -97,7 +134,7 @@ pub(super) fn unknowns(
             }
         }
     }
-    (parameters, unknowns)
+    (parameters, unknowns, populations)
 }
 
 /// A bounded law over a wider range; any other law is returned unchanged, because its runs reach as far as its tails.

@@ -8,8 +8,8 @@ use lacuna_linalg::Matrix;
 use super::some;
 use crate::assess::bounds::{self, AtBound, NEAR};
 use crate::assess::chains::{self, Chains};
-use crate::assess::{Finding, correlation, modes, prior};
-use crate::stage::calibrate::{Calibrated, Outcome};
+use crate::assess::{Finding, correlation, modes, population, prior};
+use crate::stage::calibrate::{Calibrated, Outcome, PopulationOutcome};
 use crate::study::Study;
 use crate::study::dependence::Earlier;
 
@@ -32,6 +32,7 @@ pub(super) fn findings(
     found.extend(conflicts(study, &draws));
     found.extend(correlated(study, &draws));
     found.extend(study.dependence_sections.earlier.iter().filter_map(of_run));
+    found.extend(outcome.populations.iter().filter_map(of_population));
     found
 }
 
@@ -44,6 +45,11 @@ fn of_run(run: &Earlier) -> Option<Finding> {
         run.converged,
         check.is_poor(),
     )
+}
+
+fn of_population(found: &PopulationOutcome) -> Option<Finding> {
+    let measured = found.members.iter().filter(|member| member.measured).count();
+    population::few_groups(&found.parameter, measured, found.scale_range)
 }
 
 fn convergence(draws: &Draws, outcome: &Outcome) -> Vec<Finding> {
@@ -106,7 +112,9 @@ fn unvisited(draws: &Draws, outcome: &Outcome) -> Option<Finding> {
 
 fn at_bounds(study: &Study, draws: &Draws, region: Option<&[(f64, f64)]>) -> Vec<Finding> {
     let mut all = Vec::new();
-    for (j, parameter) in study.parameters.iter().enumerate() {
+    // A scale near zero is a result, and no sign of a prior that is too narrow.
+    let scale = |j: usize| study.dependence.populations.iter().any(|p| p.scale == j);
+    for (j, parameter) in study.parameters.iter().enumerate().filter(|(j, _)| !scale(*j)) {
         let values = draws.pooled(j);
         let support = parameter.prior.support();
         all.extend(of_law(&parameter.name, &parameter.prior, &values));

@@ -12,7 +12,7 @@ mod run;
 
 use std::path::Path;
 
-use lacuna::data::{Dependence, JointPrior, Parameter};
+use lacuna::data::{Dependence, JointPrior, Parameter, Population};
 use lacuna::math::distribution::Distribution;
 use lacuna::math::random::Stream;
 use lacuna::text::decode::decode;
@@ -101,6 +101,7 @@ fn tables<T: DeserializeOwned>(root: &Node, list: &str, problems: &mut Problems)
 /// The dependence of a study's parameters; `None` if something is wrong.
 pub(super) fn dependence(
     sections: &Sections,
+    populations: Vec<Population>,
     (parameters, unknowns): (&[Parameter], &[Unknown]),
     seed: u64,
     root: &Node,
@@ -113,7 +114,7 @@ pub(super) fn dependence(
     if problems.len() > before {
         return None;
     }
-    let mut dependence = Dependence { groups, constraints, share: None };
+    let mut dependence = Dependence { groups, populations, constraints, share: None };
     let stream = Stream::root(seed).named("constraints");
     dependence.share = JointPrior::new(parameters, &dependence).share(&stream);
     constraints::reachable(&dependence, root, problems);

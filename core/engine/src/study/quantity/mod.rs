@@ -304,7 +304,7 @@ fn numbers(
         }
     };
     for (i, unknown) in study.unknowns.iter().enumerate() {
-        if unknown.scenario.is_none() || unknown.scenario == scenario {
+        if unknown.is_known_in(scenario) {
             let unit = study.parameters[i].unit.clone();
             add(&unknown.name, Some(unit), Source::Parameter(i));
         }

@@ -1,0 +1,167 @@
+//! Coordinates of the members of populations.
+//!
+//! Few data about a member leave it where its population is, so that member and scale are strongly dependent (the funnel of
+//! Neal, Annals of Statistics 31 (2003) 705); many data make the standardised member and the location dependent instead. With
+//! `u` the value (or its logarithm), `m` the location on the same scale, `s` the scale and `s0` a typical one, the coordinate
+//! `v` of a member that is centred to the degree `c` is given by
+//!
+//! ```text
+//! u = m + (s / s0)^(1 - c) (v - c m)
+//! ```
+//!
+//! `c = 1` is centred (`v = u`), `c = 0` is not (`v = s0 z` with `z` standardised). For normal data of known precision the
+//! coordinates are independent at `c = 1 - B`, the share of the population's variance that the data take away
+//! (Papaspiliopoulos, Roberts and Sköld, Statistical Science 22 (2007) 59). The scale is represented by its logarithm.
+
+use lacuna::data::{Dependence, Form, Population};
+
+/// A member of a population, by its place among the coordinates.
+#[derive(Debug, Clone)]
+struct Member<'a> {
+    population: &'a Population,
+    place: usize,
+    centred: f64,
+}
+
+/// Jacobian of the coordinates that enters a density.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Jacobian {
+    /// That of the coordinates: the density of the coordinates.
+    Whole,
+    /// That of location, logarithm of the scale and standardised members, in which a mode exists: the density of the values
+    /// themselves is infinite where all members are equal and the scale is zero.
+    Standardised,
+}
+
+/// Coordinates of all members; see the module.
+#[derive(Debug, Clone)]
+pub(super) struct Members<'a> {
+    populations: &'a [Population],
+    members: Vec<Member<'a>>,
+}
+
+impl<'a> Members<'a> {
+    /// Coordinates that are centred as the study says, or not at all where it leaves that to the data.
+    pub(super) fn of(dependence: &'a Dependence) -> Self {
+        let populations = dependence.populations.as_slice();
+        let each = populations.iter().flat_map(|population| {
+            let centred = population.centred.unwrap_or(0.0);
+            population.members.iter().map(move |&place| Member { population, place, centred })
+        });
+        Self { populations, members: each.collect() }
+    }
+
+    /// True if there are no populations.
+    pub(super) fn is_empty(&self) -> bool {
+        self.members.is_empty()
+    }
+
+    /// Places of the members and their populations, in the order of [`Self::set_centred`].
+    pub(super) fn places(&self) -> impl Iterator<Item = (usize, &'a Population)> {
+        self.members.iter().map(|member| (member.place, member.population))
+    }
+
+    /// Degree to which each member is centred.
+    pub(super) fn centred(&self) -> Vec<f64> {
+        self.members.iter().map(|member| member.centred).collect()
+    }
+
+    /// Sets the degree to which each member is centred, where the study leaves it to the data.
+    pub(super) fn set_centred(&mut self, centred: &[f64]) {
+        for (member, &centred) in self.members.iter_mut().zip(centred) {
+            member.centred = member.population.centred.unwrap_or(centred);
+        }
+    }
+
+    /// Converts coordinates to natural values, in place.
+    pub(super) fn natural(&self, point: &mut [f64]) {
+        for population in self.populations {
+            point[population.scale] = point[population.scale].exp();
+        }
+        for member in &self.members {
+            let (m, ratio) = member.frame(point);
+            let u = m + ratio * (point[member.place] - member.centred * m);
+            point[member.place] = if member.is_log() { u.exp() } else { u };
+        }
+    }
+
+    /// Converts natural values to coordinates, in place.
+    pub(super) fn coordinates(&self, natural: &mut [f64]) {
+        for member in &self.members {
+            let (m, ratio) = member.frame(natural);
+            let u = member.population.linear(natural[member.place]);
+            natural[member.place] = (u - m) / ratio + member.centred * m;
+        }
+        for population in self.populations {
+            natural[population.scale] = natural[population.scale].ln();
+        }
+    }
+
+    /// Logarithm of the Jacobian at natural values.
+    pub(super) fn log_jacobian(&self, natural: &[f64], jacobian: Jacobian) -> f64 {
+        let scales: f64 = self.populations.iter().map(|p| natural[p.scale].ln()).sum();
+        let of = |member: &Member<'_>| {
+            let scale = (natural[member.population.scale] / member.population.typical).ln();
+            let own = if member.is_log() { natural[member.place].ln() } else { 0.0 };
+            member.degree(jacobian) * scale + own
+        };
+        scales + self.members.iter().map(of).sum::<f64>()
+    }
+
+    /// Converts derivatives by natural values into those by coordinates, and adds those of the Jacobian.
+    pub(super) fn pull_back(&self, natural: &[f64], jacobian: Jacobian, gradient: &mut [f64]) {
+        let mut by_log_scale = vec![0.0; self.populations.len()];
+        for member in &self.members {
+            let (m, ratio) = member.frame(natural);
+            let (value, c) = (natural[member.place], member.centred);
+            let (by_linear, by_median) = if member.is_log() {
+                (gradient[member.place] * value + 1.0, 1.0 / natural[member.population.location])
+            } else {
+                (gradient[member.place], 1.0)
+            };
+            gradient[member.place] = by_linear * ratio;
+            gradient[member.population.location] += by_linear * (1.0 - ratio * c) * by_median;
+            let u = member.population.linear(value);
+            let own = self.populations.iter().position(|p| std::ptr::eq(p, member.population));
+            if let Some(k) = own {
+                by_log_scale[k] += by_linear * (1.0 - c) * (u - m) + member.degree(jacobian);
+            }
+        }
+        for (population, own) in self.populations.iter().zip(by_log_scale) {
+            let slope = &mut gradient[population.scale];
+            *slope = *slope * natural[population.scale] + own + 1.0;
+        }
+    }
+
+    /// Bounds of the coordinates that belong to populations, from those of natural values, in place.
+    pub(super) fn bounds(&self, bounds: &mut [(f64, f64)]) {
+        for population in self.populations {
+            let (low, high) = bounds[population.scale];
+            bounds[population.scale] = (low.max(0.0).ln(), high.ln());
+        }
+        for member in &self.members {
+            bounds[member.place] = (f64::NEG_INFINITY, f64::INFINITY);
+        }
+    }
+}
+
+impl Member<'_> {
+    fn is_log(&self) -> bool {
+        self.population.form == Form::LogNormal
+    }
+
+    /// Location on the scale of the population, and the factor of the coordinate, from natural values.
+    fn frame(&self, natural: &[f64]) -> (f64, f64) {
+        let location = self.population.linear(natural[self.population.location]);
+        let scale = natural[self.population.scale] / self.population.typical;
+        (location, scale.powf(1.0 - self.centred))
+    }
+
+    /// Power of the scale in the Jacobian.
+    fn degree(&self, jacobian: Jacobian) -> f64 {
+        match jacobian {
+            Jacobian::Whole => 1.0 - self.centred,
+            Jacobian::Standardised => 1.0,
+        }
+    }
+}

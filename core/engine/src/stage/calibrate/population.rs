@@ -1,0 +1,164 @@
+//! Populations in a calibration: coordinates of the members from a first look at the data, and what the draws say of members and
+//! populations.
+
+use lacuna::data::{Draws, Form};
+use lacuna::math::moments;
+use serde::{Deserialize, Serialize};
+
+use crate::posterior::{Posterior, Together};
+use crate::stage::stream;
+use crate::study::Study;
+
+/// Result of a population.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PopulationOutcome {
+    /// Name of the parameter.
+    pub parameter: String,
+    /// Form of the distribution.
+    pub form: Form,
+    /// Name of the mean, median or location.
+    pub location: String,
+    /// Name of the standard deviation or scale.
+    pub scale: String,
+    /// Members, in the order of the scenarios.
+    pub members: Vec<MemberOutcome>,
+    /// Prediction for a further member, of which nothing was measured.
+    pub new_member: NewMember,
+    /// Central 95 % range of the posterior of the scale relative to that of its prior.
+    pub scale_range: f64,
+}
+
+/// Result of a member of a population.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MemberOutcome {
+    /// Name of the parameter of the group: `sound_speed[T24]`.
+    pub name: String,
+    /// Partial pooling: mean over the draws of the share of the population's variance that the data leave to the member given
+    /// location and scale. It is the weight of the location in the member's conditional mean: 0 if the data determine the
+    /// member, 1 if they say nothing of it.
+    pub pooling: f64,
+    /// Degree to which its coordinate was centred, from 0 to 1.
+    pub centred: f64,
+    /// True if a scenario of the group was measured.
+    pub measured: bool,
+}
+
+/// Distribution of the parameter of a further member, in the parameter's unit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct NewMember {
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub sd: f64,
+    /// 2.5 % quantile.
+    pub q025: f64,
+    /// Median.
+    pub median: f64,
+    /// 97.5 % quantile.
+    pub q975: f64,
+}
+
+/// A look at the data at one point.
+pub(super) struct Look {
+    /// Degree to which each member is centred, in the order of the posterior.
+    pub centred: Vec<f64>,
+}
+
+/// Largest number of draws over which the pooling is averaged.
+const DRAWS: usize = 2000;
+
+/// Coordinates for the members from the data at a point of the posterior's coordinates: centred to the degree to which the data
+/// determine them. `None` without populations.
+pub(super) fn look(study: &Study, posterior: &Posterior<'_>, point: &[f64]) -> Option<Look> {
+    if study.dependence.populations.is_empty() {
+        return None;
+    }
+    let natural = posterior.natural(point);
+    let together = posterior.information(&natural, &groups(study));
+    let members = study.dependence.populations.iter().flat_map(|p| p.members.iter().copied());
+    let degree = |place: usize| {
+        let pooling = pooling_of(&together, place, &natural).unwrap_or(1.0);
+        if pooling.is_finite() { (1.0 - pooling).clamp(0.0, 1.0) } else { 0.0 }
+    };
+    let centred = members.map(degree).collect();
+    Some(Look { centred })
+}
+
+/// Name of the group of each parameter.
+fn groups(study: &Study) -> Vec<Option<String>> {
+    let of = |member: &crate::study::hierarchy::Member| format!("{}={}", member.by, member.group);
+    study.unknowns.iter().map(|unknown| unknown.member.as_ref().map(of)).collect()
+}
+
+fn pooling_of(together: &[Together], place: usize, natural: &[f64]) -> Option<f64> {
+    together.iter().find_map(|group| {
+        let k = group.places.iter().position(|&other| other == place)?;
+        Some(group.pooling(natural)[k])
+    })
+}
+
+/// Results of all populations from the draws after the burn-in, in natural units.
+pub(super) fn outcomes(
+    study: &Study,
+    posterior: &Posterior<'_>,
+    draws: &Draws,
+) -> Vec<PopulationOutcome> {
+    if study.dependence.populations.is_empty() || draws.is_empty() {
+        return Vec::new();
+    }
+    let d = draws.dimension();
+    let mean: Vec<f64> = (0..d).map(|j| moments::mean(&draws.pooled(j))).collect();
+    let together = posterior.information(&mean, &groups(study));
+    let all: Vec<&[f64]> = draws.values.chunks_exact(d).collect();
+    let every = all.len().div_ceil(DRAWS);
+    let thinned: Vec<&[f64]> = all.iter().step_by(every).copied().collect();
+    let centred = posterior.centred();
+    let mut next = 0;
+    let random = stream(study, "new-member");
+    let mut outcomes = Vec::new();
+    for population in &study.dependence.populations {
+        let member = |(k, &place): (usize, &usize)| {
+            let each = thinned.iter().filter_map(|point| pooling_of(&together, place, point));
+            let member = study.unknowns[place].member.as_ref();
+            let mut own = member.into_iter().flat_map(|m| &m.scenarios);
+            MemberOutcome {
+                name: study.parameters[place].name.clone(),
+                pooling: moments::mean(&each.collect::<Vec<_>>()),
+                centred: centred[next + k],
+                measured: own.any(|&s| !study.scenarios[s].unmeasured),
+            }
+        };
+        let members: Vec<MemberOutcome> = population.members.iter().enumerate().map(member).collect();
+        next += members.len();
+        let prior = &study.parameters[population.scale].prior;
+        let scale = moments::sorted(&draws.pooled(population.scale));
+        let range = moments::quantile(&scale, 0.975) - moments::quantile(&scale, 0.025);
+        let stream = random.named(&population.name);
+        let further = |(i, point): (usize, &&[f64])| {
+            let (location, scale) = (point[population.location], point[population.scale]);
+            population.sample(location, scale, &mut stream.at(i as u64).generator())
+        };
+        outcomes.push(PopulationOutcome {
+            parameter: population.name.clone(),
+            form: population.form,
+            location: study.parameters[population.location].name.clone(),
+            scale: study.parameters[population.scale].name.clone(),
+            members,
+            new_member: summary(&all.iter().enumerate().map(further).collect::<Vec<_>>()),
+            scale_range: range / (prior.quantile(0.975) - prior.quantile(0.025)),
+        });
+    }
+    outcomes
+}
+
+fn summary(values: &[f64]) -> NewMember {
+    let sorted = moments::sorted(values);
+    let quantile = |p: f64| moments::quantile(&sorted, p);
+    NewMember {
+        mean: moments::mean(values),
+        sd: moments::variance(values).sqrt(),
+        q025: quantile(0.025),
+        median: quantile(0.5),
+        q975: quantile(0.975),
+    }
+}

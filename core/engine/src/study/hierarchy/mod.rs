@@ -1,0 +1,41 @@
+//! Parameters that have a value for each group, such as each target or each batch, and the populations of these values.
+//!
+//! ```text
+//! keys     the keys of [[parameter]] as written
+//! members  the parameters and unknowns that they stand for, and the distribution of a member by itself
+//! trained  the study whose runs train the emulator: one value of each parameter, conditions that differ once
+//! check    combinations that are refused
+//! ```
+
+mod check;
+mod keys;
+mod members;
+mod trained;
+
+use super::file::ParameterSection;
+
+pub(super) use check::{check, of_sections};
+pub use keys::{CoordinatesKey, PopulationKeys};
+pub(super) use members::members;
+pub use trained::{Part, Trained};
+pub(super) use trained::trained;
+
+/// Parameters by group of a study.
+#[derive(Default)]
+pub struct Hierarchy {
+    /// The parameters with `by`, as written.
+    pub sections: Vec<ParameterSection>,
+    /// The study whose runs train the emulator, if it is another than the study itself.
+    pub trained: Option<Trained>,
+}
+
+/// Group to which a member belongs.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Member {
+    /// Label by which the groups are made, such as `target`; `scenario` for the scenarios themselves.
+    pub by: String,
+    /// Name of the group, such as `T24`.
+    pub group: String,
+    /// Indices of its scenarios.
+    pub scenarios: Vec<usize>,
+}
