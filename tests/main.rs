@@ -18,6 +18,7 @@ mod forced_oscillator;
 mod forward;
 mod gap;
 mod gate;
+mod hierarchy;
 mod kill;
 mod left_out;
 mod made_by;

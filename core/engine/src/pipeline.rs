@@ -76,8 +76,9 @@ pub fn find_gap(
 fn independent(study: &Study) -> Result<(), Stop> {
     if !study.dependence.populations.is_empty() || study.hierarchy.trained.is_some() {
         let text = "the search for missing physics does not know populations, nor parameters by group with a surrogate";
-        return Err(Stop::new(text)
-            .help("search with a copy of the study whose parameters have neither `by` nor `population`"));
+        return Err(Stop::new(text).help(
+            "search with a copy of the study whose parameters have neither `by` nor `population`",
+        ));
     }
     if study.dependence.is_none() {
         return Ok(());
@@ -259,7 +260,7 @@ fn weigh(
     };
     let parts = calibrate::Parts::of(study, measured, problem)?;
     let centred: Vec<f64> = calibrated.value.outcome.centred().collect();
-    let posterior = parts.posterior(study, problem).with_centred(&centred);
+    let posterior = parts.posterior(study, problem).with_centred(&centred, &[]);
     let predicting = Predicting {
         forward: problem.forward(),
         likelihood: parts.likelihood(),

@@ -23,7 +23,8 @@ pub enum By {
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Division {
-    /// One group for each value of this axis.
+    /// One group for each value of this axis, or for each group of scenarios: with `"target"` one for each target that the labels
+    /// of the scenarios name.
     Axis(String),
     /// Windows of a numeric axis, such as `{ axis = "time", windows = 5 }` or
     /// `{ axis = "time", edges = [2e-4, 5e-4] }`.
@@ -90,6 +91,11 @@ impl Division {
     /// Returns the position of the axis, the class of each of its values, and the names of the classes.
     fn classes(&self, layout: &Layout) -> Result<(usize, Vec<usize>, Vec<String>), String> {
         let Some((position, axis)) = layout.axis(self.axis()) else {
+            let by_labels =
+                of_labels(layout, self.axis()).filter(|_| matches!(self, Self::Axis(_)));
+            if let Some(found) = by_labels {
+                return Ok(by_label(found));
+            }
             let names: Vec<String> = layout.axes.iter().map(|a| format!("`{}`", a.name)).collect();
             let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
             return Err(format!("the response has no axis `{}`; it has {known}", self.axis()));
@@ -102,6 +108,26 @@ impl Division {
         };
         Ok((position, of, names))
     }
+}
+
+/// The axis whose labels belong to groups of this kind, and the group of each.
+fn of_labels<'a>(layout: &'a Layout, kind: &str) -> Option<(usize, &'a [String])> {
+    let mut axes = layout.axes.iter().enumerate();
+    axes.find_map(|(position, axis)| Some((position, axis.groups.get(kind)?.as_slice())))
+}
+
+/// The classes of labels by their groups, in the order of the labels.
+fn by_label((position, groups): (usize, &[String])) -> (usize, Vec<usize>, Vec<String>) {
+    let mut names: Vec<String> = Vec::new();
+    let mut of = Vec::new();
+    for group in groups {
+        let known = names.iter().position(|name| name == group);
+        of.push(known.unwrap_or_else(|| {
+            names.push(group.clone());
+            names.len() - 1
+        }));
+    }
+    (position, of, names)
 }
 
 impl AxisWindows {

@@ -6,9 +6,10 @@ mod measurements;
 
 use std::path::{Path, PathBuf};
 
+use lacuna::data::layouts::SCENARIO;
 use lacuna::data::{Ensemble, Layout, Measurements};
 use lacuna::plugin::reader::{
-    Contents, EnsembleSource, GridSource, MeasurementSource, ReadError, scenario_path,
+    Contents, EnsembleSource, GridSource, Groups, MeasurementSource, ReadError, scenario_path,
 };
 use lacuna::plugin::{Component, Context, Reader};
 use lacuna::text::problem::Complaints;
@@ -16,6 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::cells::LongColumns;
+use super::faults::Faults;
 use super::runs::{self, AllowFailed};
 use super::sheet::Sheet;
 use super::sierra::heartbeat;
@@ -47,7 +49,8 @@ use super::{noise, scenario};
 /// of a text above it.
 ///
 /// **Scenarios**: in a study with `[[scenario]]` sections the column `scenario` of these tables assigns the rows; or
-/// a path contains `{scenario}`, and each scenario has its own file.
+/// a path contains `{scenario}`, and each scenario has its own file. With `groups` the column of that name assigns the rows
+/// of measurements.
 ///
 /// **A single response** of an external simulator: a long table with the axes and the response.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -77,6 +80,11 @@ pub struct Csv {
     /// Number of runs without a complete response that may be left out: a fraction if below 1, a count from 1 on.
     /// More of them stop the study.
     pub allow_failed: AllowFailed,
+    /// Column of the table of measurements whose values divide the rows into groups, such as `target`, in place of the column
+    /// `scenario`. In a study without `[[scenario]]` each value becomes a scenario with this name and the label
+    /// `target = NAME`, so that `by = "target"` of a parameter refers to it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub groups: Option<String>,
     /// Columns of a table of measurements to be ignored. Any other column that the reader does not know is an error,
     /// because it may hold a condition.
     pub ignore: Vec<String>,
@@ -84,9 +92,11 @@ pub struct Csv {
 
 impl Component for Csv {
     fn check(&self, _context: &Context<'_>, complaints: &mut Complaints<'_>) {
-        for (key, given) in
-            [("covariance", self.covariance.is_some()), ("mask", self.mask.is_some())]
-        {
+        for (key, given) in [
+            ("covariance", self.covariance.is_some()),
+            ("mask", self.mask.is_some()),
+            ("groups", self.groups.is_some()),
+        ] {
             if given && self.path.is_none() {
                 complaints
                     .at(key)
@@ -144,7 +154,8 @@ impl Reader for Csv {
                 self.response(file, source.layout)
             });
         };
-        let opened = scenario::sheet(source.directory, responses, source.scenario, &self.ignore)?;
+        let (directory, named) = (source.directory, SCENARIO);
+        let opened = scenario::sheet(directory, responses, source.scenario, &self.ignore, named)?;
         let path = opened.0.path.clone();
         let values = ensemble::responses(opened, &list, source.layout)?;
         runs::ensemble(source, &table, &list, self.allow_failed, |run| {
@@ -160,8 +171,9 @@ impl Reader for Csv {
             ReadError::new(source.directory, "there is no table of measurements")
                 .help("name it with `path`")
         })?;
-        let sheet = scenario::sheet(source.directory, path, source.scenario, &self.ignore)?;
-        let mut data = measurements::measurements(sheet, source.layout, &self.ignore)?;
+        let sheet = self.measured(source.directory, path, source.scenario)?;
+        let known: Vec<String> = self.ignore.iter().chain(&self.groups).cloned().collect();
+        let mut data = measurements::measurements(sheet, source.layout, &known)?;
         let file = |path: &PathBuf| scenario_path(source.directory, path, source.scenario);
         if let Some(mask) = self.mask.as_ref().map(file) {
             noise::apply_mask(&mask, source.layout, &mut data)?;
@@ -181,8 +193,14 @@ impl Reader for Csv {
             ReadError::new(source.directory, "there is no table of measurements")
                 .help("name it with `path`")
         })?;
-        let sheet = scenario::sheet(source.directory, path, source.scenario, &self.ignore)?;
+        let sheet = self.measured(source.directory, path, source.scenario)?;
         measurements::grid(sheet, source.axis, source.unit)
+    }
+
+    fn groups(&self, directory: &Path) -> Result<Option<Groups>, ReadError> {
+        let (Some(label), Some(path)) = (&self.groups, &self.path) else { return Ok(None) };
+        let names = scenario::names(&directory.join(path), label)?;
+        Ok(Some(Groups { label: label.clone(), names }))
     }
 
     fn response(&self, path: &Path, layout: &Layout) -> Result<Vec<f64>, ReadError> {
@@ -212,6 +230,19 @@ impl Reader for Csv {
             files.extend(runs::named_files(&scenario_path(directory, table, scenario)));
         }
         files
+    }
+}
+
+impl Csv {
+    /// The rows of the measurements that belong to a scenario.
+    fn measured(
+        &self,
+        directory: &Path,
+        path: &Path,
+        scenario: Option<&str>,
+    ) -> Result<(Sheet, Faults), ReadError> {
+        let named = self.groups.as_deref().unwrap_or(SCENARIO);
+        scenario::sheet(directory, path, scenario, &self.ignore, named)
     }
 }
 

@@ -96,7 +96,7 @@ fn inputs(call: &Call<'_>) -> Result<[f64; 2], EvalError> {
 
 fn times(layout: &Layout) -> Result<&[f64], EvalError> {
     match &layout.axes[..] {
-        [Axis { name, coordinates: Coordinates::Grid { values, unit } }]
+        [Axis { name, coordinates: Coordinates::Grid { values, unit }, .. }]
             if name == "time" && *unit == second() =>
         {
             Ok(values)

@@ -43,6 +43,12 @@ pub trait Reader: Component {
         Err(ReadError::new(source.directory, text))
     }
 
+    /// Groups by which the measurements are divided, if the options name the column that holds them: each is a scenario of a
+    /// study that writes none.
+    fn groups(&self, _directory: &Path) -> Result<Option<Groups>, ReadError> {
+        Ok(None)
+    }
+
     /// Reads one response from one file, such as the output of an external simulator.
     fn response(&self, path: &Path, _layout: &Layout) -> Result<Vec<f64>, ReadError> {
         Err(ReadError::new(path, "this reader does not read a single response"))
@@ -51,6 +57,15 @@ pub trait Reader: Component {
     /// Files that the options name (for the hash of a stage's inputs) for one scenario (`None` in a study without
     /// scenarios); relative paths are resolved against `directory`. A folder stands for all files directly inside it.
     fn files(&self, directory: &Path, scenario: Option<&str>) -> Vec<PathBuf>;
+}
+
+/// Groups of measurements, such as the targets at which they were taken.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Groups {
+    /// Kind of group: `target`.
+    pub label: String,
+    /// Names of the groups, in the order of the measurements.
+    pub names: Vec<String>,
 }
 
 /// Source of an ensemble.

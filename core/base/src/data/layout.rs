@@ -1,5 +1,7 @@
 //! Layout of a response: named axes with units.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::Unit;
@@ -26,18 +28,24 @@ pub struct Axis {
     pub name: String,
     /// Labels or grid of the axis.
     pub coordinates: Coordinates,
+    /// Groups of the labels, by kind of group: the name of the group to which each label belongs, such as the target at which a
+    /// scenario was measured.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub groups: BTreeMap<String, Vec<String>>,
 }
 
 impl Axis {
     /// An axis of labels.
     pub fn labels<S: Into<String>>(name: &str, labels: impl IntoIterator<Item = S>) -> Self {
         let labels = labels.into_iter().map(Into::into).collect();
-        Self { name: name.to_owned(), coordinates: Coordinates::Labels(labels) }
+        let coordinates = Coordinates::Labels(labels);
+        Self { name: name.to_owned(), coordinates, groups: BTreeMap::new() }
     }
 
     /// An axis of increasing numbers with a unit.
     pub fn grid(name: &str, values: Vec<f64>, unit: Unit) -> Self {
-        Self { name: name.to_owned(), coordinates: Coordinates::Grid { values, unit } }
+        let coordinates = Coordinates::Grid { values, unit };
+        Self { name: name.to_owned(), coordinates, groups: BTreeMap::new() }
     }
 
     /// Number of positions along the axis.

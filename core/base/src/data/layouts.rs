@@ -5,7 +5,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::layout::Group;
-use super::{Axis, Layout, Unit};
+use super::{Axis, Coordinates, Layout, Unit};
 
 /// Name of the axis of scenarios.
 pub const SCENARIO: &str = "scenario";
@@ -41,6 +41,26 @@ impl Layouts {
             layout
         };
         Self { blocks: blocks.into_iter().map(with_axis).collect() }
+    }
+
+    /// States the groups of scenarios: `group` is the group of a scenario, by its name, for a kind of group. A kind is left out of
+    /// a block of which a scenario has no group of it.
+    #[must_use]
+    pub fn grouped<'a>(
+        mut self,
+        kinds: &[&str],
+        group: impl Fn(&str, &str) -> Option<&'a str>,
+    ) -> Self {
+        for axis in self.blocks.iter_mut().filter_map(|block| block.axes.first_mut()) {
+            let Coordinates::Labels(names) = &axis.coordinates else { continue };
+            for kind in kinds {
+                let of = |name: &String| group(name, kind).map(str::to_owned);
+                if let Some(own) = names.iter().map(of).collect::<Option<Vec<String>>>() {
+                    axis.groups.insert((*kind).to_owned(), own);
+                }
+            }
+        }
+        self
     }
 
     /// Name of the response.

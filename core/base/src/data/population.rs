@@ -66,9 +66,7 @@ impl Population {
         };
         let by_scale = (pull * z - 1.0) / scale;
         match self.form {
-            Form::LogNormal => {
-                [-(pull / scale + 1.0) / value, pull / (scale * location), by_scale]
-            }
+            Form::LogNormal => [-(pull / scale + 1.0) / value, pull / (scale * location), by_scale],
             Form::Normal | Form::StudentT(_) => [-pull / scale, pull / scale, by_scale],
         }
     }
@@ -138,7 +136,10 @@ mod tests {
                         of.log_density(x[0], x[1], x[2])
                     };
                     let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
-                    assert!((found - difference).abs() < 1e-7 * (1.0 + found.abs()), "{form:?} {k}");
+                    assert!(
+                        (found - difference).abs() < 1e-7 * (1.0 + found.abs()),
+                        "{form:?} {k}"
+                    );
                 }
             }
         }

@@ -9,7 +9,8 @@ const CODE: &str = "few_groups";
 /// relative to that of its prior from which on it does with more groups.
 const FEW: (usize, f64) = (3, 0.8);
 
-const MORE: &str = "measure more groups, or give the scatter a prior from other knowledge, such as tolerances";
+const MORE: &str =
+    "measure more groups, or give the scatter a prior from other knowledge, such as tolerances";
 
 /// Rules of this module; see [`super::rules`].
 pub fn rules() -> Vec<Rule> {

@@ -2,7 +2,7 @@
 
 use super::{
     bounds, chains, conditions, correlation, emulator, envelope, fit, influence, modes, population,
-    prior,    replicates, residuals, runs, suspicious,
+    prior, replicates, residuals, runs, suspicious,
 };
 
 /// A type of finding.

@@ -101,7 +101,8 @@ fn positive(matrix: Matrix) -> Matrix {
     let Ok(eigen) = lacuna_linalg::symmetric_eigen(&matrix) else { return matrix };
     let count = matrix.rows();
     let entry = |i: usize, j: usize| -> f64 {
-        let of = |k: usize| eigen.values[k].max(0.0) * eigen.vectors[(i, k)] * eigen.vectors[(j, k)];
+        let of =
+            |k: usize| eigen.values[k].max(0.0) * eigen.vectors[(i, k)] * eigen.vectors[(j, k)];
         (0..count).map(of).sum()
     };
     Matrix::from_fn(count, count, entry)

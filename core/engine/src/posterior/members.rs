@@ -21,6 +21,8 @@ struct Member<'a> {
     population: &'a Population,
     place: usize,
     centred: f64,
+    /// Precision of what the data say of it, on the scale of the population; zero before it is known.
+    information: f64,
 }
 
 /// Jacobian of the coordinates that enters a density.
@@ -28,9 +30,11 @@ struct Member<'a> {
 pub(super) enum Jacobian {
     /// That of the coordinates: the density of the coordinates.
     Whole,
-    /// That of location, logarithm of the scale and standardised members, in which a mode exists: the density of the values
-    /// themselves is infinite where all members are equal and the scale is zero.
-    Standardised,
+    /// That for which the maximum is the one of location and logarithm of the scale with the members integrated out (Laplace's
+    /// approximation with the information of the data on each member), and of the members given these. The density of the
+    /// values themselves is infinite where all members are equal and the scale is zero, and that of standardised members is
+    /// largest where the scale is far too large.
+    Marginal,
 }
 
 /// Coordinates of all members; see the module.
@@ -46,7 +50,8 @@ impl<'a> Members<'a> {
         let populations = dependence.populations.as_slice();
         let each = populations.iter().flat_map(|population| {
             let centred = population.centred.unwrap_or(0.0);
-            population.members.iter().map(move |&place| Member { population, place, centred })
+            let member = move |&place| Member { population, place, centred, information: 0.0 };
+            population.members.iter().map(member)
         });
         Self { populations, members: each.collect() }
     }
@@ -56,7 +61,7 @@ impl<'a> Members<'a> {
         self.members.is_empty()
     }
 
-    /// Places of the members and their populations, in the order of [`Self::set_centred`].
+    /// Places of the members and their populations, in the order of [`Self::set`].
     pub(super) fn places(&self) -> impl Iterator<Item = (usize, &'a Population)> {
         self.members.iter().map(|member| (member.place, member.population))
     }
@@ -66,10 +71,14 @@ impl<'a> Members<'a> {
         self.members.iter().map(|member| member.centred).collect()
     }
 
-    /// Sets the degree to which each member is centred, where the study leaves it to the data.
-    pub(super) fn set_centred(&mut self, centred: &[f64]) {
+    /// Sets the information of the data on each member, and the degree to which it is centred, where the study leaves that to
+    /// the data.
+    pub(super) fn set(&mut self, centred: &[f64], information: &[f64]) {
         for (member, &centred) in self.members.iter_mut().zip(centred) {
             member.centred = member.population.centred.unwrap_or(centred);
+        }
+        for (member, &information) in self.members.iter_mut().zip(information) {
+            member.information = information;
         }
     }
 
@@ -103,7 +112,11 @@ impl<'a> Members<'a> {
         let of = |member: &Member<'_>| {
             let scale = (natural[member.population.scale] / member.population.typical).ln();
             let own = if member.is_log() { natural[member.place].ln() } else { 0.0 };
-            member.degree(jacobian) * scale + own
+            let width = match jacobian {
+                Jacobian::Whole => 0.0,
+                Jacobian::Marginal => -0.5 * member.determined(natural).ln_1p(),
+            };
+            member.degree(jacobian) * scale + own + width
         };
         scales + self.members.iter().map(of).sum::<f64>()
     }
@@ -125,6 +138,10 @@ impl<'a> Members<'a> {
             let own = self.populations.iter().position(|p| std::ptr::eq(p, member.population));
             if let Some(k) = own {
                 by_log_scale[k] += by_linear * (1.0 - c) * (u - m) + member.degree(jacobian);
+                if jacobian == Jacobian::Marginal {
+                    let determined = member.determined(natural);
+                    by_log_scale[k] -= determined / (1.0 + determined);
+                }
             }
         }
         for (population, own) in self.populations.iter().zip(by_log_scale) {
@@ -161,7 +178,15 @@ impl Member<'_> {
     fn degree(&self, jacobian: Jacobian) -> f64 {
         match jacobian {
             Jacobian::Whole => 1.0 - self.centred,
-            Jacobian::Standardised => 1.0,
+            Jacobian::Marginal => 1.0,
         }
     }
+
+    /// Information of the data relative to that of the population.
+    fn determined(&self, natural: &[f64]) -> f64 {
+        self.information * natural[self.population.scale].powi(2)
+    }
 }
+
+#[cfg(test)]
+mod tests;

@@ -70,11 +70,12 @@ impl<'a> Posterior<'a> {
     }
 
     /// The same density in coordinates whose members are centred to these degrees, from 0 to 1 and in the order of
-    /// [`Self::centred`], where the study leaves that to the data.
+    /// [`Self::centred`], where the study leaves that to the data. With the information of the data on each member its
+    /// [`Self::mode`] is that with the members integrated out.
     #[must_use]
-    pub fn with_centred(&self, centred: &[f64]) -> Self {
+    pub fn with_centred(&self, centred: &[f64], information: &[f64]) -> Self {
         let mut members = self.members.clone();
-        members.set_centred(centred);
+        members.set(centred, information);
         let (prior, likelihood) = (self.prior, self.likelihood.clone());
         Self { prior, likelihood, region: self.region.clone(), members }
     }
@@ -135,8 +136,8 @@ impl<'a> Posterior<'a> {
     }
 
     /// This density over the same coordinates without the Jacobian of the logarithms: its maximum is the mode of the
-    /// density in natural units. With populations it is the density of locations, logarithms of scales and standardised
-    /// members: that of the members themselves is infinite where a scale is zero.
+    /// density in natural units. With populations the maximum is that of locations and logarithms of scales with the members
+    /// integrated out, and of the members given these: the density of the members themselves is infinite where a scale is zero.
     pub fn mode(&'a self) -> Mode<'a> {
         Mode(self)
     }
@@ -163,7 +164,8 @@ impl<'a> Posterior<'a> {
     /// Log Jacobian of the coordinates: for logarithms the sum of these coordinates, unless only that of the members is asked.
     fn log_jacobian(&self, point: &[f64], natural: &[f64], jacobian: bool) -> f64 {
         let d = self.parameters().len();
-        let logs = self.hyperparameters().iter().zip(&point[d..]).filter(|(h, _)| h.log && jacobian);
+        let logs =
+            self.hyperparameters().iter().zip(&point[d..]).filter(|(h, _)| h.log && jacobian);
         let logs: f64 = logs.map(|(_, &x)| x).sum();
         if self.members.is_empty() {
             return logs;
@@ -296,7 +298,7 @@ impl<'a> Posterior<'a> {
 
 /// Jacobian of the members' coordinates for that of logarithmic ones.
 fn of_members(jacobian: bool) -> Jacobian {
-    if jacobian { Jacobian::Whole } else { Jacobian::Standardised }
+    if jacobian { Jacobian::Whole } else { Jacobian::Marginal }
 }
 
 impl Target for Posterior<'_> {

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::assess::Assessment;
 
 pub use crate::gap::result::GapFindings;
+use crate::stage::calibrate::PopulationOutcome;
 pub use crate::stage::quantities::{InputShare, Propagated, QuantityFindings};
 pub use crate::stage::reliability::RareEvent;
 use crate::stage::screen::FlaggedCurve;
@@ -151,6 +152,8 @@ pub struct CalibrationFindings {
     pub best_draw: Vec<f64>,
     /// Facts about the sampler.
     pub facts: Vec<Fact>,
+    /// Populations from which parameters by group are drawn.
+    pub populations: Vec<PopulationOutcome>,
     /// Evidence of the study.
     pub evidence: Option<Evidence>,
     /// Prediction of each datum from all others.
@@ -197,7 +200,7 @@ pub struct CurvesLeftOutFindings {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
-    /// A parameter of the model.
+    /// A parameter of the model, or location or scale of a population of such parameters.
     Parameter,
     /// An unknown of a discrepancy or effect.
     Hyperparameter,

@@ -198,6 +198,7 @@ fn calibration(
         log_density: (outcome.map_log_density, outcome.best_draw.1),
         best_draw: outcome.best_draw.0.clone(),
         facts: outcome.facts.clone(),
+        populations: outcome.populations.clone(),
         evidence: weighed.and_then(|w| w.evidence.clone()),
         left_out: weighed.and_then(|w| w.left_out.as_ref()).map(|loo| LeftOutFindings {
             elpd: loo.elpd,

@@ -4,8 +4,8 @@ use lacuna::run::Stop;
 
 use super::findings::Findings;
 use super::section::{
-    accuracy_table, banner, evidence, group_word, headline, posterior_table, quantity_table,
-    reliability_table, share_table, view, without_table,
+    accuracy_table, banner, evidence, group_word, headline, population_table, posterior_table,
+    quantity_table, reliability_table, share_table, view, without_table,
 };
 use crate::gap::next::Wanted;
 use crate::gap::report;
@@ -22,6 +22,10 @@ pub fn summary_text(findings: &Findings) -> String {
     parts.push(headline::sentences(findings).join("\n") + "\n");
     if let Some(calibration) = &findings.calibration {
         parts.push(posterior_table(calibration).text());
+        if !calibration.populations.is_empty() {
+            let table = population_table(calibration).text();
+            parts.push(format!("members of populations, and a new member\n{table}"));
+        }
         let evidence = evidence::sentences(findings, calibration);
         if !evidence.is_empty() {
             parts.push(evidence.join("\n") + "\n");

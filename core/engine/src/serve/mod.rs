@@ -175,6 +175,10 @@ fn of_run<R>(
     let (Some(measured), Some(_)) = (&problem.data.value.measured, &study.discrepancy) else {
         return Ok(act(&all));
     };
+    // With populations the log density of the members themselves has no maximum, and no coordinates are those of others.
+    if !study.dependence.populations.is_empty() {
+        return Ok(act(&all));
+    }
     let parts = Parts::of(study, measured, problem)?;
     let posterior = LogPosterior::of(parts.posterior(study, problem));
     all.push(&posterior);

@@ -28,7 +28,7 @@ use crate::stage::inverse_problem::{InverseProblem, Trial};
 use crate::study::Study;
 
 pub use law::Law;
-pub use population::PopulationOutcome;
+pub use population::{MemberOutcome, NewMember, PopulationOutcome};
 
 /// The posterior as draws, with its maximum.
 #[derive(Debug, Clone, PartialEq)]
@@ -255,13 +255,7 @@ fn calibrate(
     let maxima = maxima(posterior, &study.start(), &random.named("optimise"));
     sampling::broken(posterior)?;
     let mut maxima = maxima?;
-    let first = population::look(study, posterior, &maxima[0].point);
-    let adapted = first.as_ref().map(|first| posterior.with_centred(&first.centred));
-    if let Some(adapted) = &adapted {
-        for maximum in &mut maxima {
-            maximum.point = adapted.coordinates(&posterior.natural(&maximum.point));
-        }
-    }
+    let adapted = population::adapted(study, posterior, &mut maxima)?;
     let posterior = adapted.as_ref().unwrap_or(posterior);
     let best = &maxima[0];
     let plan = section.built.plugin.plan(posterior.dimension());

@@ -29,7 +29,9 @@ pub fn by_group(
     let ensemble = data.value.ensemble.map(|own| runs::ensemble(study, trained, own));
     let data = Kept { value: Data { ensemble, ..data.value }, ..data };
     // The same emulator with other groups is another map.
-    let hash = files::hash(json!([fitted.hash, study.parameters.len(), trained.parts]).to_string().as_bytes());
+    let hash = files::hash(
+        json!([fitted.hash, study.parameters.len(), trained.parts]).to_string().as_bytes(),
+    );
     let fitted = Kept { value: runs::fitted(study, trained, fitted.value), hash, ..fitted };
     (data, (fitted, each_group(study, trained, emulator)))
 }
@@ -148,8 +150,7 @@ impl Forward for Grouped {
         let one = points.select_rows(&[0]).select_columns(&first.parameters);
         self.emulator.variance(&one)?;
         let nothing = |own: &Matrix| Matrix::zeros(own.rows(), self.emulator.outputs());
-        let variance =
-            |own: &Matrix| self.emulator.variance(own).unwrap_or_else(|| nothing(own));
+        let variance = |own: &Matrix| self.emulator.variance(own).unwrap_or_else(|| nothing(own));
         Some(self.spread.each(points, variance))
     }
 

@@ -18,7 +18,12 @@ use crate::study::Study;
 pub(super) fn parameters(study: &Study) -> Result<Vec<usize>, Stop> {
     let own = study.surrogate.is_none() || study.design.is_some();
     match Simulator::of(study)?.filter(|_| own) {
-        Some(simulator) => Ok(simulator.idle(study.parameters.len())),
+        Some(simulator) => {
+            // Location and scale of a population act through its members.
+            let mut idle = simulator.idle(study.parameters.len());
+            idle.retain(|&i| !study.unknowns[i].of_population);
+            Ok(idle)
+        }
         None => Ok(Vec::new()),
     }
 }

@@ -30,8 +30,10 @@ pub(super) fn maxima(
     let is_stated = stated.iter().any(Option::is_some);
     if is_stated {
         let middle = posterior.parameters().iter().map(|p| p.prior.quantile(0.5));
-        let point: Vec<f64> = middle.zip(stated).map(|(x, own)| own.unwrap_or(x)).collect();
-        candidates.push_row(&[&point[..], &candidates.row(0)[d..]].concat());
+        let point = middle.zip(stated).map(|(x, own)| own.unwrap_or(x));
+        let hyper = posterior.hyperparameters().iter().map(|h| h.start);
+        let point = &posterior.coordinates(&point.chain(hyper).collect::<Vec<f64>>())[..d];
+        candidates.push_row(&[point, &candidates.row(0)[d..]].concat());
     }
     // A discrepancy supplies a sensible starting value for its own unknowns; a wide prior of a variance does not.
     let starts: Vec<f64> = posterior.hyperparameters().iter().map(|h| h.start).collect();

@@ -17,8 +17,8 @@ use serde::{Deserialize, Serialize};
 
 pub use super::dependence::Prior;
 pub use super::derived::DerivedSection;
-pub use super::hierarchy::{CoordinatesKey, PopulationKeys};
 pub use super::fidelity::{LowFidelitySection, NumericalErrorSection};
+pub use super::hierarchy::{CoordinatesKey, PopulationKeys};
 pub use super::noise::{InstrumentNoise, NoiseSection};
 pub use super::scenario::{FunctionSection, ScenarioSection};
 pub use lacuna::text::quantity::Quantity;

@@ -18,7 +18,7 @@ use super::file::{OPTIONAL, ParameterSection, ResponseSection, StudySection, Val
 use super::forward::forward;
 use super::gap::companion::companion;
 use super::gap::gap;
-use super::hierarchy::{Hierarchy, of_sections, trained};
+use super::hierarchy::{Hierarchy, groups_as_scenarios, of_sections, trained};
 pub use super::libraries::Use;
 use super::libraries::{Libraries, Seen, libraries};
 pub use super::plain::Study;
@@ -96,12 +96,14 @@ fn finish(
     let study = root.and_then(|mut root| {
         overrides::apply(&mut root, arguments, &common_keys, &mut sources, &mut problems);
         take_out(&mut root);
-        as_scenarios(&mut root, &mut problems);
         let named = gives_its_name(path, &root, &sources);
         let libraries = libraries(&root, &directory(path, &root), purpose, &mut problems)?;
         seen.clone_from(&libraries.seen);
         let declared = if purpose == Use::Check { libraries.declared() } else { Vec::new() };
         declaring(declared, || {
+            let folder = directory(path, &root);
+            groups_as_scenarios(&mut root, &folder, &mut problems);
+            as_scenarios(&mut root, &mut problems);
             let mut study = structure(path, text, &root, libraries, &mut problems)?;
             study.named = named;
             if problems.is_empty() {

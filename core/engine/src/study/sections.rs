@@ -1,5 +1,6 @@
 //! The sections of a study file, decoded one by one.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use lacuna::data::{Axis, Layout, Layouts, Scenario, Unit};
@@ -206,7 +207,14 @@ pub(super) fn layouts(
         }
         layouts.push((scenario.name.as_str(), shape(found)));
     }
-    Some(Layouts::of_scenarios(layouts))
+    let kinds: BTreeSet<&str> =
+        scenarios.iter().flat_map(|scenario| scenario.labels.keys().map(String::as_str)).collect();
+    let group = |name: &str, kind: &str| -> Option<&str> {
+        let scenario = scenarios.iter().find(|scenario| scenario.name == name)?;
+        scenario.labels.get(kind).map(String::as_str)
+    };
+    let kinds: Vec<&str> = kinds.into_iter().collect();
+    Some(Layouts::of_scenarios(layouts).grouped(&kinds, group))
 }
 
 /// Source of axis coordinates that are taken from the measurements.

@@ -89,8 +89,7 @@ pub(super) fn unknowns(
         let own = prior(section);
         if section.by.is_some() && (own.is_some() || section.population.is_some()) {
             let places = (&mut *all.0, &mut *all.1);
-            populations
-                .extend(members(section, own.as_ref(), scenarios, places, root, problems));
+            populations.extend(members(section, own.as_ref(), scenarios, places, root, problems));
             continue;
         }
         let Some(prior) = own else {

@@ -7,6 +7,7 @@ mod forward;
 pub mod headline;
 mod measurements;
 mod overview;
+mod populations;
 mod posterior;
 mod quantities;
 mod reliability;
@@ -25,6 +26,7 @@ use crate::page::scale::ShownUnit;
 use crate::page::{Numbers, Section};
 
 pub use forward::share_table;
+pub use populations::population_table;
 pub use posterior::posterior_table;
 pub use quantities::{quantity_table, without_table};
 pub use reliability::reliability_table;
@@ -39,6 +41,7 @@ pub fn all(findings: &Findings, numbers: &mut Numbers) -> Vec<Section> {
         surrogate::section(findings, numbers),
         sampling::section(findings, numbers),
         posterior::section(findings, numbers),
+        populations::section(findings.calibration.as_ref(), numbers),
         evidence::section(findings),
         validation::section(findings, numbers),
         quantities::section(findings, numbers),

@@ -8,6 +8,7 @@
 mod gap;
 mod inputs;
 mod keys;
+mod populations;
 mod posterior;
 mod quantities;
 mod reliability;

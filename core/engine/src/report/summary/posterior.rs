@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::populations::{self, Population};
 use super::value::{ByName, Quantity};
 use crate::report::findings::{
     CalibrationFindings, CoordinateFindings, CurvesLeftOutFindings, Findings, LeftOutFindings, Role,
@@ -16,6 +17,10 @@ pub struct Calibration {
     /// quantities.
     #[schemars(extend("propertyNames" = { "title": "name" }))]
     pub parameters: ByName<Marginal>,
+    /// Populations from which parameters by group are drawn.
+    #[serde(skip_serializing_if = "ByName::is_empty")]
+    #[schemars(extend("propertyNames" = { "title": "name" }))]
+    pub populations: ByName<Population>,
     /// Posterior correlation of the unknowns.
     pub correlation: Correlation,
     /// Acceptance rate over the chains, if the sampler has one.
@@ -170,6 +175,7 @@ impl Calibration {
         let (map, best_draw) = found.log_density;
         Self {
             parameters: named.map(|c| (c.name.clone(), Marginal::of(c))).collect(),
+            populations: populations::by_name(found),
             correlation: Correlation::of(found),
             acceptance: Acceptance::of(&found.acceptance),
             chains: Chains {

@@ -259,6 +259,7 @@ fn calibration() -> CalibrationFindings {
             error: 0.05,
             method: String::from("bridge sampling"),
         }),
+        populations: Vec::new(),
         left_out: Some(crate::report::findings::LeftOutFindings {
             elpd: -1200.0,
             error: 20.0,

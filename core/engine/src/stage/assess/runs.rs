@@ -61,11 +61,12 @@ fn few(
     let middle = |p: &Parameter| (p.prior.quantile(0.005), p.prior.quantile(0.995));
     let whole = || study.parameters.iter().map(middle).collect();
     let intervals: Vec<(f64, f64)> = problem.region().map_or_else(whole, <[_]>::to_vec);
+    let own = inputs(study).swap_remove(0);
     let inside = |point: &&[f64]| {
-        intervals.iter().zip(*point).all(|(&(low, high), &x)| low <= x && x <= high)
+        own.iter().all(|&j| intervals[j].0 <= point[j] && point[j] <= intervals[j].1)
     };
     let inside = points.iter_rows().filter(inside).count();
-    check::few_in_prior(inside, points.rows(), study.parameters.len(), shift)
+    check::few_in_prior(inside, points.rows(), own.len(), shift)
 }
 
 /// Finding about the distance of the posterior mean from its (d + 1)-th nearest training run, for d parameters,
@@ -77,17 +78,33 @@ fn sparse(
     shift: Option<f64>,
 ) -> Option<Finding> {
     let (points, calibrated) = (training(problem)?, calibrated?);
-    let (runs, d) = (points.rows(), points.columns());
+    let draws = calibrated.draws.from_step(calibrated.outcome.burn_in);
+    let mean: Vec<f64> =
+        (0..study.parameters.len()).map(|j| moments::mean(&draws.pooled(j))).collect();
+    let scale = Scale::of(study, &points);
+    let of = |own: Vec<usize>| ratio_of_distances(&points, &mean, &scale, &own);
+    let largest = inputs(study).into_iter().map(of).collect::<Option<Vec<f64>>>()?;
+    check::sparse(largest.into_iter().fold(f64::NEG_INFINITY, f64::max), shift)
+}
+
+/// Places of the parameters of the emulator, once for each set of values with which it is evaluated.
+fn inputs(study: &Study) -> Vec<Vec<usize>> {
+    match &study.hierarchy.trained {
+        Some(trained) => trained.parts.iter().map(|part| part.parameters.clone()).collect(),
+        None => vec![(0..study.parameters.len()).collect()],
+    }
+}
+
+/// Distance of a point from its (d + 1)-th nearest run relative to the median of the same distance between runs, in these d
+/// parameters; `None` for too few runs.
+fn ratio_of_distances(points: &Matrix, mean: &[f64], scale: &Scale, own: &[usize]) -> Option<f64> {
+    let (runs, d) = (points.rows(), own.len());
     if runs <= d + 2 {
         return None;
     }
-    let scale = Scale::of(study, &points);
-    let unit = |point: &[f64]| -> Vec<f64> {
-        point.iter().enumerate().map(|(j, &x)| scale.unit(j, x)).collect()
-    };
+    let unit =
+        |point: &[f64]| -> Vec<f64> { own.iter().map(|&j| scale.unit(j, point[j])).collect() };
     let all: Vec<Vec<f64>> = points.iter_rows().map(unit).collect();
-    let draws = calibrated.draws.from_step(calibrated.outcome.burn_in);
-    let mean: Vec<f64> = (0..d).map(|j| moments::mean(&draws.pooled(j))).collect();
     let distance = |from: &[f64], without: Option<usize>| {
         let others = all.iter().enumerate().filter(|(i, _)| Some(*i) != without);
         let squares: Vec<f64> =
@@ -96,8 +113,7 @@ fn sparse(
     };
     let usual: Vec<f64> =
         all.iter().enumerate().map(|(i, point)| distance(point, Some(i))).collect();
-    let ratio = distance(&unit(&mean), None) / moments::quantile(&moments::sorted(&usual), 0.5);
-    check::sparse(ratio, shift)
+    Some(distance(&unit(mean), None) / moments::quantile(&moments::sorted(&usual), 0.5))
 }
 
 /// Applies a check to each parameter: to its prior, the range of its training runs with their number, and its draws.
@@ -117,7 +133,9 @@ fn by_parameter(
         let high = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         check(parameter, (low, high, column.len()), &draws.pooled(j))
     };
-    study.parameters.iter().enumerate().flat_map(one).collect()
+    // Location and scale of a population are no inputs of the emulator.
+    let inputs = study.parameters.iter().enumerate();
+    inputs.filter(|(j, _)| !study.unknowns[*j].of_population).flat_map(one).collect()
 }
 
 fn share(values: &[f64], is: impl Fn(f64) -> bool) -> f64 {
@@ -202,13 +220,19 @@ fn suspicious(
     } else {
         Fitting::of(study, ensemble)?.training
     };
-    let outputs = ensemble.layouts.len();
-    let step = (rows.len() * outputs).div_ceil(MOST).max(1);
-    let columns: Vec<usize> = (0..outputs).step_by(step).collect();
+    // The runs of all groups are the same runs.
+    let own = inputs(study).swap_remove(0);
+    let outputs: Vec<usize> = match &study.hierarchy.trained {
+        Some(trained) => trained.parts[0].outputs.iter().flat_map(|(_, to)| to.clone()).collect(),
+        None => (0..ensemble.layouts.len()).collect(),
+    };
+    let step = (rows.len() * outputs.len()).div_ceil(MOST).max(1);
+    let columns: Vec<usize> = outputs.into_iter().step_by(step).collect();
     let responses = ensemble.responses.select_rows(&rows).select_columns(&columns);
     let raw = ensemble.points.select_rows(&rows);
     let scale = Scale::of(study, &raw);
-    let points = Matrix::from_fn(raw.rows(), raw.columns(), |i, j| scale.unit(j, raw[(i, j)]));
+    let points =
+        Matrix::from_fn(raw.rows(), own.len(), |i, k| scale.unit(own[k], raw[(i, own[k])]));
     let left_out = problem.refinement().is_none().then(|| {
         let own: Vec<usize> = (0..rows.len()).collect();
         left_out(&fitted.value, &own, &columns)
@@ -216,7 +240,8 @@ fn suspicious(
     let suspects = suspicious::suspects(&points, &responses, left_out.as_ref());
     let told = |suspect: &Suspect| {
         let row = rows[suspect.run];
-        let value = suspect.parameter.map(|(j, unit)| {
+        let value = suspect.parameter.map(|(k, unit)| {
+            let j = own[k];
             (study.parameters[j].name.as_str(), ensemble.points[(row, j)], scale.natural(j, unit))
         });
         suspicious::suspicious(&ensemble.runs[row], suspect, value)

@@ -3,6 +3,10 @@
 
 use lacuna::data::{Draws, Form};
 use lacuna::math::moments;
+use lacuna::plugin::Target;
+use lacuna::run::Stop;
+use lacuna_linalg::Matrix;
+use lacuna_optimise::Optimum;
 use serde::{Deserialize, Serialize};
 
 use crate::posterior::{Posterior, Together};
@@ -58,30 +62,55 @@ pub struct NewMember {
     pub q975: f64,
 }
 
-/// A look at the data at one point.
-pub(super) struct Look {
-    /// Degree to which each member is centred, in the order of the posterior.
-    pub centred: Vec<f64>,
-}
-
 /// Largest number of draws over which the pooling is averaged.
 const DRAWS: usize = 2000;
 
-/// Coordinates for the members from the data at a point of the posterior's coordinates: centred to the degree to which the data
-/// determine them. `None` without populations.
-pub(super) fn look(study: &Study, posterior: &Posterior<'_>, point: &[f64]) -> Option<Look> {
+/// The posterior in coordinates whose members are centred to the degree to which the data determine them, and its maxima in
+/// place of those of the standardised members; `None` without populations.
+pub(super) fn adapted<'a>(
+    study: &Study,
+    posterior: &Posterior<'a>,
+    maxima: &mut Vec<Optimum>,
+) -> Result<Option<Posterior<'a>>, Stop> {
     if study.dependence.populations.is_empty() {
-        return None;
+        return Ok(None);
     }
-    let natural = posterior.natural(point);
-    let together = posterior.information(&natural, &groups(study));
-    let members = study.dependence.populations.iter().flat_map(|p| p.members.iter().copied());
-    let degree = |place: usize| {
-        let pooling = pooling_of(&together, place, &natural).unwrap_or(1.0);
-        if pooling.is_finite() { (1.0 - pooling).clamp(0.0, 1.0) } else { 0.0 }
+    // The standardised members are largest at a large scale, where each has the value of its own data.
+    let information = look(study, posterior, &posterior.natural(&maxima[0].point)).1;
+    let marginal = posterior.with_centred(&posterior.centred(), &information);
+    let starts = Matrix::from_rows(
+        posterior.dimension(),
+        maxima.iter().map(|maximum| maximum.point.as_slice()),
+    );
+    *maxima = lacuna_optimise::maximise(&marginal.mode(), &starts);
+    let Some(best) = maxima.first() else {
+        return Err(Stop::new("no maximum of the posterior density was found"));
     };
-    let centred = members.map(degree).collect();
-    Some(Look { centred })
+    let centred = look(study, &marginal, &marginal.natural(&best.point)).0;
+    let adapted = marginal.with_centred(&centred, &information);
+    for maximum in maxima {
+        maximum.point = adapted.coordinates(&marginal.natural(&maximum.point));
+    }
+    Ok(Some(adapted))
+}
+
+/// Degree to which the data determine each member at natural values, and the precision of what they say of it, in the order
+/// of the posterior.
+fn look(study: &Study, posterior: &Posterior<'_>, natural: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let together = posterior.information(natural, &groups(study));
+    let members = study.dependence.populations.iter().flat_map(|population| {
+        population.members.iter().map(move |&place| (place, natural[population.scale]))
+    });
+    let degree = |place: usize| {
+        let pooling = pooling_of(&together, place, natural).filter(|pooling| pooling.is_finite());
+        1.0 - pooling.unwrap_or(1.0).clamp(1e-12, 1.0)
+    };
+    members
+        .map(|(place, scale)| {
+            let degree = degree(place);
+            (degree, degree / (1.0 - degree) / (scale * scale))
+        })
+        .unzip()
 }
 
 /// Name of the group of each parameter.
@@ -128,7 +157,8 @@ pub(super) fn outcomes(
                 measured: own.any(|&s| !study.scenarios[s].unmeasured),
             }
         };
-        let members: Vec<MemberOutcome> = population.members.iter().enumerate().map(member).collect();
+        let members: Vec<MemberOutcome> =
+            population.members.iter().enumerate().map(member).collect();
         next += members.len();
         let prior = &study.parameters[population.scale].prior;
         let scale = moments::sorted(&draws.pooled(population.scale));

@@ -89,6 +89,7 @@ fn the_linear_form_is_the_same_map() {
     let linear = grouped.linear().unwrap();
     let product = lacuna_linalg::multiply(&linear.basis(&row), linear.coefficients());
     assert_eq!(product.row(0), grouped.mean(&row).row(0));
-    let slopes = lacuna_linalg::transposed_multiply(linear.coefficients(), &linear.basis_gradient(&point));
+    let slopes =
+        lacuna_linalg::transposed_multiply(linear.coefficients(), &linear.basis_gradient(&point));
     assert_eq!(slopes.as_slice(), grouped.jacobian(&point).as_slice());
 }

@@ -45,7 +45,9 @@ pub(in crate::study) fn keys(
         complaints
             .at(&format!("{path}.prior"))
             .say("the values of the groups have their prior from the population")
-            .help("take `prior` out, or `population` for groups that are independent of each other");
+            .help(
+                "take `prior` out, or `population` for groups that are independent of each other",
+            );
     }
     if emulated && section.design.is_none() {
         complaints

@@ -2,12 +2,14 @@
 //!
 //! ```text
 //! keys     the keys of [[parameter]] as written
+//! groups   scenarios from a column of the measurements
 //! members  the parameters and unknowns that they stand for, and the distribution of a member by itself
 //! trained  the study whose runs train the emulator: one value of each parameter, conditions that differ once
 //! check    combinations that are refused
 //! ```
 
 mod check;
+mod groups;
 mod keys;
 mod members;
 mod trained;
@@ -15,10 +17,11 @@ mod trained;
 use super::file::ParameterSection;
 
 pub(super) use check::{check, of_sections};
+pub(super) use groups::groups_as_scenarios;
 pub use keys::{CoordinatesKey, PopulationKeys};
 pub(super) use members::members;
-pub use trained::{Part, Trained};
 pub(super) use trained::trained;
+pub use trained::{Part, Trained};
 
 /// Parameters by group of a study.
 #[derive(Default)]

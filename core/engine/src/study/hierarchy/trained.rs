@@ -55,9 +55,8 @@ pub(in crate::study) fn trained(study: &Study, root: &Node) -> Option<Trained> {
     for (place, scenario) in study.scenarios.iter().enumerate() {
         let (_, to) = study.layouts.of_scenario(&scenario.name)?;
         let (_, from) = layouts.of_scenario(&scenarios[kinds[place]].name)?;
-        let of = |name: &&str| {
-            study.unknowns.iter().position(|u| u.name == **name && u.acts_in(place))
-        };
+        let of =
+            |name: &&str| study.unknowns.iter().position(|u| u.name == **name && u.acts_in(place));
         let own: Vec<usize> = names.iter().map(of).collect::<Option<_>>()?;
         match parts.iter_mut().find(|part| part.parameters == own) {
             Some(part) => part.outputs.push((from, to)),
