@@ -3,8 +3,12 @@
 //! A tolerance is four Monte Carlo errors: of the mean as printed (`mcse_mean`), and of a standard deviation `sd / √(2 n)` with
 //! the effective number of draws `n = (sd / mcse_mean)²`, doubled for the tails of scales.
 
+mod coordinates;
+mod noise;
 mod rats;
+mod simulated;
 mod targets;
+mod trained;
 
 use std::fmt::Write as _;
 use std::fs;

@@ -259,7 +259,7 @@ fn doc_comments_begin_with_their_subject() {
 }
 
 /// Words of the engine that are also names of plugins.
-const WORDS: [(&str, &str); 7] = [
+const WORDS: [(&str, &str); 9] = [
     // The default executor.
     ("core/engine/src/study/table.rs", "local"),
     // Offsets of replicates.
@@ -268,6 +268,9 @@ const WORDS: [(&str, &str); 7] = [
     ("core/engine/src/study/dependence/groups.rs", "student_t"),
     ("core/engine/src/study/dependence/keys.rs", "gaussian"),
     ("core/engine/src/study/dependence/keys.rs", "student_t"),
+    // Populations.
+    ("core/engine/src/study/hierarchy/keys.rs", "student_t"),
+    ("core/engine/src/report/summary/populations.rs", "student_t"),
     // Distribution.
     ("core/base/src/math/distribution/mod.rs", "student_t"),
     ("core/base/src/math/distribution/written.rs", "student_t"),

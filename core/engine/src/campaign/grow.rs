@@ -74,7 +74,7 @@ fn change(
         Stop::new(format!("the study would be wrong with this change:\n{}", complaints.trim_end()))
     })?;
     if let Some(section) = &study.design {
-        design::cube(section, &study)?;
+        design::cube(section, study.trained())?;
     }
     files::write_atomic(&path, grown.as_bytes())?;
     // The run is no longer finished.

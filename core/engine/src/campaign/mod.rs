@@ -24,6 +24,7 @@ pub fn retry(
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<usize, Stop> {
+    let study = study.trained();
     let placed = design::stage(study, run, observer)?;
     let made = simulate::stage(study, placed.as_ref(), run, observer)?;
     let made = made

@@ -100,6 +100,12 @@ impl<'a> Ground<'a> {
         let coordinates = coordinates(study, &hyper, own, noise);
         let fits = fits(study, noise, &base, measured, run, observer)?;
         let mut hash = json!([data.hash, base.problem(0).origin()]);
+        if is_of_runs && study.hierarchy.trained.is_some() {
+            let text = "the truths would be runs, in which all groups have the same values";
+            return Err(
+                Stop::new(text).help("add `[model]`: truths are then drawn from the populations")
+            );
+        }
         let (base, truths, source, candidates) = if is_of_runs {
             let validation = Fitting::of(study, data.value.runs()?)?.validation;
             let (truths, all, parts) =

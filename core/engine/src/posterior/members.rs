@@ -187,6 +187,3 @@ impl Member<'_> {
         self.information * natural[self.population.scale].powi(2)
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use lacuna::data::Layout;
+use lacuna::data::layouts::SCENARIO;
 use lacuna::plugin::effect::{On, Placed};
 use lacuna::plugin::registry::Section;
 use lacuna::plugin::{Context, Effect};
@@ -17,6 +18,15 @@ use super::table::Chosen;
 /// Name of an effect: its own name, or that of its plugin.
 pub(super) fn effect_name(section: &Section<dyn Effect, EffectKeys>) -> &str {
     section.common.name.as_ref().map_or(section.built.name, AsRef::as_ref)
+}
+
+/// The place of an effect inside some scenarios.
+fn within(keys: &EffectKeys, scenarios: &[String]) -> On {
+    let mut on = keys.on.clone();
+    let own = on.remove(SCENARIO);
+    let kept = |name: &&String| own.as_ref().is_none_or(|own| own.contains(name));
+    on.insert(SCENARIO.to_owned(), scenarios.iter().filter(kept).cloned().collect());
+    on
 }
 
 impl Study {
@@ -125,12 +135,39 @@ impl Study {
     pub fn placed_effects<'a>(&'a self) -> Vec<Placed<'a>> {
         let place = |section: &'a Section<dyn Effect, EffectKeys>| {
             let Section { built, common, .. } = section;
-            Placed::new(effect_name(section), &*built.plugin, &self.layouts, &common.on)
+            let placed = |name: &str, on: &On| Placed::new(name, &*built.plugin, &self.layouts, on);
+            let name = effect_name(section);
+            match &common.by {
+                None => vec![placed(name, &common.on)],
+                Some(by) => self
+                    .groups_of(by)
+                    .iter()
+                    .map(|(group, names)| {
+                        placed(&format!("{name}[{group}]"), &within(common, names))
+                    })
+                    .filter(|placed| placed.acts.contains(&true))
+                    .collect(),
+            }
         };
         let inside = self
             .gap
             .added()
             .map(|added| Placed::new(&added.name, &*added.effect, &self.layouts, &On::new()));
-        inside.chain(self.effects.iter().map(place)).collect()
+        inside.chain(self.effects.iter().flat_map(place)).collect()
+    }
+
+    /// Groups of scenarios by a label, or by their names for `scenario`: the name of each group and those of its scenarios. A
+    /// scenario without the label is in none.
+    pub fn groups_of(&self, by: &str) -> Vec<(String, Vec<String>)> {
+        let mut groups: Vec<(String, Vec<String>)> = Vec::new();
+        for scenario in &self.scenarios {
+            let own = if by == SCENARIO { Some(&scenario.name) } else { scenario.labels.get(by) };
+            let Some(own) = own else { continue };
+            match groups.iter_mut().find(|(group, _)| group == own) {
+                Some((_, names)) => names.push(scenario.name.clone()),
+                None => groups.push((own.clone(), vec![scenario.name.clone()])),
+            }
+        }
+        groups
     }
 }

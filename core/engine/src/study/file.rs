@@ -308,6 +308,11 @@ pub struct EffectKeys {
     /// response.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub on: On,
+    /// Label of the scenarios by which the effect has unknowns of its own, such as `target`: they are called
+    /// `damping[T24].rate`, and are independent of each other. `"scenario"` makes each scenario a group. Default: the same
+    /// unknowns everywhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub by: Option<String>,
 }
 
 /// The engine's keys of `[sampler]`.

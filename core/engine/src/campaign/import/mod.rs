@@ -42,6 +42,7 @@ pub fn import(
         return Err(Stop::new("the study takes its runs from files of its own")
             .help("add the runs to the files that `[simulations]` names"));
     }
+    let study = study.trained();
     let rows = rows(study, table)?;
     let folder = free_folder(run);
     let taken = take(study, &rows, &folder, reader).and_then(|runs| {

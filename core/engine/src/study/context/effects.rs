@@ -1,5 +1,6 @@
 //! Effects against the rest of the study: their names, and the places where they act.
 
+use lacuna::data::layouts::SCENARIO;
 use lacuna::data::{Axis, Coordinates};
 use lacuna::plugin::effect::On;
 use lacuna::text::nearest::{nearest, one_of};
@@ -21,7 +22,36 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
                 .help(format!("give one of them a name of its own, such as `name = \"{name}_2\"`"));
         }
         places(study, "on", &section.common.on, &mut complaints);
+        if let Some(by) = &section.common.by {
+            groups(study, by, &mut complaints);
+            if !section.built.plugin.switches().is_empty() {
+                complaints
+                    .at("by")
+                    .say("the effect changes inputs of the model, which are the same in all scenarios")
+                    .help("make the input a `[[parameter]]` with `by`");
+            }
+        }
     }
+}
+
+/// Reports a label that a scenario does not have.
+fn groups(study: &Study, by: &str, complaints: &mut Complaints<'_>) {
+    let unnamed = |scenario: &&lacuna::data::Scenario| scenario.name.is_empty();
+    let without = |scenario: &&lacuna::data::Scenario| {
+        unnamed(scenario) || (by != SCENARIO && !scenario.labels.contains_key(by))
+    };
+    let Some(scenario) = study.scenarios.iter().find(without) else { return };
+    let problem = complaints.at("by").say(if unnamed(&scenario) {
+        "the study has no scenarios that could be grouped".to_owned()
+    } else {
+        format!("the scenario `{}` has no label `{by}`", scenario.name)
+    });
+    let labels = study.scenarios.iter().flat_map(|s| s.labels.keys().map(String::as_str));
+    let mut known: Vec<&str> = labels.chain([SCENARIO]).collect();
+    known.sort_unstable();
+    known.dedup();
+    problem.expected(one_of(known));
+    problem.found(format!("\"{by}\""));
 }
 
 /// Reports axes and labels, written under the key `path`, that no block of scenarios has.

@@ -1,10 +1,11 @@
-#![allow(clippy::unwrap_used)]
+//! The density of members of populations in their coordinates: gradients, Jacobians, pooling and draws of the prior.
+
 use lacuna::data::{Dependence, Form, JointPrior, Parameter, Population};
 use lacuna::math::distribution::Distribution;
 use lacuna::plugin::{Fact, Hyperparameter, Target};
 use lacuna_linalg::Matrix;
 
-use crate::posterior::{LogLikelihood, Posterior};
+use lacuna_engine::posterior::{LogLikelihood, Posterior};
 
 const DATA: [f64; 3] = [1.9, 0.8, 3.1];
 const SD: [f64; 3] = [0.3, 0.5, 0.2];
