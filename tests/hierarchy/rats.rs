@@ -41,7 +41,11 @@ const WEIGHTS: [[u16; 5]; 30] = [
     [153, 200, 244, 286, 324],
 ];
 
+/// ```sh
+/// cargo test -p lacuna-tests --test all -- --ignored --nocapture the_rats_have_their_published_posterior
+/// ```
 #[test]
+#[ignore = "65 unknowns take a minute"]
 fn the_rats_have_their_published_posterior() {
     let folder = tempfile::tempdir().unwrap();
     let mut table = "rat,age [d],weight [g]\n".to_owned();

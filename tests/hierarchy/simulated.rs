@@ -13,7 +13,7 @@ use crate::quick::replace;
 /// cargo test -p lacuna-tests --test all -- --ignored --nocapture truths_of_populations_have_uniform_ranks
 /// ```
 #[test]
-#[ignore = "six hundred calibrations take several minutes"]
+#[ignore = "180 calibrations take several minutes"]
 fn truths_of_populations_have_uniform_ranks() {
     for population in [
         "normal = { mean = { normal = [0.0, 5.0] }, sd = { half_normal = 10.0 } }",
@@ -26,9 +26,9 @@ fn truths_of_populations_have_uniform_ranks() {
         let written = text.lines().find(|line| line.starts_with("population")).unwrap();
         replace(&path, written, &format!("population = {{ {population} }}"));
         let settings =
-            ["sampler.steps=700", "sampler.warm_up=400", "sampler.target_acceptance=0.95"];
+            ["sampler.steps=600", "sampler.warm_up=300", "sampler.target_acceptance=0.95"];
         let out = folder.path().join("out");
-        let found = count(folder.path(), &out, &settings, &asked(200, Some(Noise::Prior))).unwrap();
+        let found = count(folder.path(), &out, &settings, &asked(60, Some(Noise::Prior))).unwrap();
         eprintln!("{population}: {}", found.tally.verdict.text);
         for row in &found.tally.rows {
             let shares: Vec<f64> = row.levels.iter().map(|level| level.share).collect();

@@ -178,8 +178,7 @@ fn count(sets: usize, settings: &[&str]) -> Counted {
 /// them it is that of a posterior that is too narrow.
 #[test]
 fn curves_of_four_targets_are_no_replicates_of_one() {
-    let sets = 10;
-    let counted = count(sets, &[]);
+    let counted = count(6, &["sampler.chains=2"]);
     counted.pooled.told("pooled");
     counted.mean.told("mean");
     counted.members.told("members");
@@ -190,8 +189,8 @@ fn curves_of_four_targets_are_no_replicates_of_one() {
     for tally in [&counted.mean, &counted.members, &counted.new] {
         assert!(square(tally) < 1.0 + 4.0 * error(tally), "{}", square(tally));
     }
-    // Nearly all of four members in ten data sets: fewer have a probability of 3e-5 at 95 %.
-    assert!(counted.members.coverage() > 0.79, "{}", counted.members.coverage());
+    // At 95 % sixteen or fewer of 24 members have a probability of 1.4e-5.
+    assert!(counted.members.coverage() > 0.67, "{}", counted.members.coverage());
 }
 
 /// The numbers of docs/hierarchy.md:
@@ -200,11 +199,11 @@ fn curves_of_four_targets_are_no_replicates_of_one() {
 /// cargo test -p lacuna-tests --test all -- --ignored --nocapture the_table_of_four_targets
 /// ```
 #[test]
-#[ignore = "two hundred data sets take several minutes"]
+#[ignore = "sixty data sets take several minutes"]
 fn the_table_of_four_targets() {
     for settings in [&[][..], &["discrepancy.replicate_error=false"]] {
         eprintln!("{settings:?}");
-        let counted = count(200, settings);
+        let counted = count(60, &[settings, &["sampler.chains=2"]].concat());
         counted.pooled.told("pooled");
         counted.mean.told("mean");
         counted.members.told("members");

@@ -64,8 +64,8 @@ variance = { known = 1e-4 }
 
 [sampler]
 use = "affine_invariant_ensemble"
-walkers = 40
-steps = 800
+walkers = 32
+steps = 300
 "#;
 
 fn measured(seed: u64) -> String {
