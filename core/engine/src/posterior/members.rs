@@ -82,6 +82,11 @@ impl<'a> Members<'a> {
         }
     }
 
+    /// Makes all members standardised.
+    pub(super) fn standardise(&mut self) {
+        self.members.iter_mut().for_each(|member| member.centred = 0.0);
+    }
+
     /// Converts coordinates to natural values, in place.
     pub(super) fn natural(&self, point: &mut [f64]) {
         for population in self.populations {

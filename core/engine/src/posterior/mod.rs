@@ -80,6 +80,15 @@ impl<'a> Posterior<'a> {
         Self { prior, likelihood, region: self.region.clone(), members }
     }
 
+    /// The same density in coordinates whose members are standardised, whatever the study says.
+    #[must_use]
+    pub fn standardised(&self) -> Self {
+        let mut members = self.members.clone();
+        members.standardise();
+        let (prior, likelihood) = (self.prior, self.likelihood.clone());
+        Self { prior, likelihood, region: self.region.clone(), members }
+    }
+
     /// Degree to which the coordinate of each member of a population is centred: population after population.
     pub fn centred(&self) -> Vec<f64> {
         self.members.centred()

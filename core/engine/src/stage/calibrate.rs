@@ -2,6 +2,7 @@
 
 mod kept;
 mod law;
+mod near;
 mod population;
 mod predicting;
 
@@ -339,10 +340,23 @@ fn starts(
         Start::Sobol => {
             inside(posterior, chains, |piece| sobol(posterior, 4 * chains * piece, 4 * chains))
         }
-        Start::Map => match lacuna_optimise::laplace(posterior, best) {
-            Ok(laplace) => lacuna_optimise::scatter(posterior, best, &laplace, chains, &random),
-            Err(_) => lacuna_optimise::scatter_without_bounds(posterior, best, chains, &random),
-        },
+        Start::Map if !posterior.centred().is_empty() => {
+            near::around(posterior, best, |near, best| around(near, best, chains, &random))
+        }
+        Start::Map => around(posterior, best, chains, &random),
+    }
+}
+
+/// Starting points around a maximum.
+fn around(
+    target: &dyn Target,
+    best: &[f64],
+    chains: usize,
+    random: &Stream,
+) -> Result<Matrix, Stop> {
+    match lacuna_optimise::laplace(target, best) {
+        Ok(laplace) => lacuna_optimise::scatter(target, best, &laplace, chains, random),
+        Err(_) => lacuna_optimise::scatter_without_bounds(target, best, chains, random),
     }
 }
 
