@@ -19,12 +19,15 @@ use super::surrogate::Fitted;
 use crate::study::Study;
 use crate::study::hierarchy::{Part, Trained};
 
+/// A fitted surrogate with its emulator.
+type Learned = (Kept<Fitted>, Box<dyn Emulator>);
+
 /// Runs, fitted surrogate and emulator of a study, from those of the study that is trained.
 pub fn by_group(
     study: &Study,
     data: Kept<Data>,
-    (fitted, emulator): (Kept<Fitted>, Box<dyn Emulator>),
-) -> (Kept<Data>, (Kept<Fitted>, Box<dyn Emulator>)) {
+    (fitted, emulator): Learned,
+) -> (Kept<Data>, Learned) {
     let Some(trained) = &study.hierarchy.trained else { return (data, (fitted, emulator)) };
     let ensemble = data.value.ensemble.map(|own| runs::ensemble(study, trained, own));
     let data = Kept { value: Data { ensemble, ..data.value }, ..data };

@@ -210,21 +210,18 @@ fn structure(
     };
     let (scenarios, sections) = scenarios?;
     let margin = plugins.design.as_ref().and_then(|design| design.common.margin);
-    let (parameters, mut dependence_sections) = (parameters?, dependence_sections?);
-    dependence_sections.read_runs(&parameters, &directory, root, problems);
+    let (sections_of_parameters, mut dependence_sections) = (parameters?, dependence_sections?);
+    dependence_sections.read_runs(&sections_of_parameters, &directory, root, problems);
     let prior = |section: &ParameterSection| dependence_sections.prior(section);
-    of_sections(&parameters, plugins.surrogate.is_some(), root, problems);
-    let mut sections_by_group = parameters;
-    let (parameters, unknowns, populations) =
-        unknowns(&sections_by_group, &scenarios, margin, prior, root, problems);
+    of_sections(&sections_of_parameters, plugins.surrogate.is_some(), root, problems);
+    let (parameters, unknowns, drawn) =
+        unknowns(&sections_of_parameters, &scenarios, margin, prior, root, problems);
     if problems.len() > before {
         return None;
     }
-    sections_by_group.retain(|section| section.by.is_some());
     let mut about = about?;
     let own = (parameters.as_slice(), unknowns.as_slice());
-    let dependence =
-        dependence(&dependence_sections, populations, own, about.seed, root, problems)?;
+    let dependence = dependence(&dependence_sections, drawn, own, about.seed, root, problems)?;
     about.directory = None;
     let name = name(&mut about, path, root, problems)?;
     let mut study = Study {
@@ -239,7 +236,7 @@ fn structure(
         scenarios,
         dependence,
         dependence_sections,
-        hierarchy: Hierarchy { sections: sections_by_group, trained: None },
+        hierarchy: Hierarchy::of(sections_of_parameters),
         unknowns,
         given: Vec::new(),
         layouts: layouts?,

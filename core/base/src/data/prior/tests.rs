@@ -52,6 +52,7 @@ fn a_quadrant_of_correlated_normal_numbers_has_the_closed_form() {
         let mut dependence = Dependence {
             groups: vec![Group { members: vec![0, 1], copula }],
             constraints: vec![Constraint::new("x0 > 0 and x1 > 0", |x| x[0] > 0.0 && x[1] > 0.0)],
+            populations: Vec::new(),
             share: None,
         };
         let share = within(&mut dependence, &all, 7);

@@ -118,12 +118,11 @@ fn groups(
             }
             return None;
         };
-        match groups.iter_mut().find(|other| other.group == *group) {
-            Some(other) => other.scenarios.push(i),
-            None => {
-                let (by, group) = (by.to_owned(), group.clone());
-                groups.push(Member { by, group, scenarios: vec![i] });
-            }
+        if let Some(other) = groups.iter_mut().find(|other| other.group == *group) {
+            other.scenarios.push(i);
+        } else {
+            let (by, group) = (by.to_owned(), group.clone());
+            groups.push(Member { by, group, scenarios: vec![i] });
         }
     }
     Some(groups)

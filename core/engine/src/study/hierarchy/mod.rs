@@ -32,6 +32,14 @@ pub struct Hierarchy {
     pub trained: Option<Trained>,
 }
 
+impl Hierarchy {
+    /// Those of some parameters that have groups.
+    pub(super) fn of(mut sections: Vec<ParameterSection>) -> Self {
+        sections.retain(|section| section.by.is_some());
+        Self { sections, trained: None }
+    }
+}
+
 /// Group to which a member belongs.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Member {

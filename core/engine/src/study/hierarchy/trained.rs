@@ -3,6 +3,7 @@
 //! The model has one value of each parameter, whatever the group. Its runs vary these values and are made once for all
 //! scenarios whose conditions, functions and axes are equal.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use lacuna::data::{Dependence, Layouts, Parameter, Scenario};
@@ -64,7 +65,7 @@ pub(in crate::study) fn trained(study: &Study, root: &Node) -> Option<Trained> {
         }
     }
     let scenarios = scenarios.into_iter().map(|scenario| Scenario {
-        labels: Default::default(),
+        labels: BTreeMap::new(),
         unmeasured: false,
         ..scenario.clone()
     });
@@ -85,7 +86,9 @@ fn inputs(study: &Study) -> (Vec<Parameter>, Vec<Unknown>) {
         if let Some(member) = &unknown.member {
             let suffix = format!("[{}]", member.group);
             own.name.clone_from(&unknown.name);
-            own.symbol = own.symbol.strip_suffix(&suffix).unwrap_or(&own.symbol).to_owned();
+            if let Some(plain) = own.symbol.strip_suffix(&suffix) {
+                own.symbol = plain.to_owned();
+            }
             own.prior = own.design.clone();
         }
         parameters.push(own);
