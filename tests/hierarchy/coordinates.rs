@@ -119,9 +119,8 @@ fn determinant(mut rows: Vec<Vec<f64>>) -> f64 {
         product *= rows[k][k];
         for i in k + 1..rows.len() {
             let factor = rows[i][k] / rows[k][k];
-            for j in k..rows.len() {
-                rows[i][j] -= factor * rows[k][j];
-            }
+            let pivot = rows[k].clone();
+            rows[i].iter_mut().zip(pivot).for_each(|(x, p)| *x -= factor * p);
         }
     }
     product

@@ -17,7 +17,7 @@ use crate::quick;
 const TARGETS: [&str; 4] = ["T24", "T26", "T27", "T28"];
 /// Curves of each target.
 const CURVES: usize = 5;
-/// Mean stiffness in GPa, and its scatter from target to target.
+/// Mean stiffness in `GPa`, and its scatter from target to target.
 const STIFFNESS: (f64, f64) = (100.0, 1.0);
 const DAMPING: f64 = 0.1;
 const NOISE: f64 = 0.02;

@@ -18,7 +18,7 @@ use super::file::{OPTIONAL, ParameterSection, ResponseSection, StudySection, Val
 use super::forward::forward;
 use super::gap::companion::companion;
 use super::gap::gap;
-use super::hierarchy::{Hierarchy, groups_as_scenarios, of_sections, trained};
+use super::hierarchy::{Hierarchy, groups_as_scenarios, trained};
 pub use super::libraries::Use;
 use super::libraries::{Libraries, Seen, libraries};
 pub use super::plain::Study;
@@ -209,13 +209,11 @@ fn structure(
         _ => Some(Vec::new()),
     };
     let (scenarios, sections) = scenarios?;
-    let margin = plugins.design.as_ref().and_then(|design| design.common.margin);
     let (sections_of_parameters, mut dependence_sections) = (parameters?, dependence_sections?);
     dependence_sections.read_runs(&sections_of_parameters, &directory, root, problems);
     let prior = |section: &ParameterSection| dependence_sections.prior(section);
-    of_sections(&sections_of_parameters, plugins.surrogate.is_some(), root, problems);
     let (parameters, unknowns, drawn) =
-        unknowns(&sections_of_parameters, &scenarios, margin, prior, root, problems);
+        unknowns(&sections_of_parameters, &scenarios, &plugins, prior, root, problems);
     if problems.len() > before {
         return None;
     }

@@ -3,11 +3,11 @@
 use lacuna::data::{Parameter, Population, Scenario};
 use lacuna::math::distribution::Distribution;
 use lacuna::text::node::Node;
-use lacuna::text::values::Positive;
 use lacuna::text::{Complaints, Problems, nearest};
 
 use super::file::ParameterSection;
-use super::hierarchy::{Member, members};
+use super::hierarchy::{Member, members, of_sections};
+use super::table::PluginSections;
 
 /// Unknown to which a parameter of a study belongs.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -53,11 +53,13 @@ impl Unknown {
 pub(super) fn unknowns(
     sections: &[ParameterSection],
     scenarios: &[Scenario],
-    margin: Option<Positive>,
+    plugins: &PluginSections,
     prior: impl Fn(&ParameterSection) -> Option<Distribution>,
     root: &Node,
     problems: &mut Problems,
 ) -> (Vec<Parameter>, Vec<Unknown>, Vec<Population>) {
+    of_sections(sections, plugins.surrogate.is_some(), root, problems);
+    let margin = plugins.design.as_ref().and_then(|design| design.common.margin);
     let (mut parameters, mut unknowns) = (Vec::new(), Vec::new());
     let mut populations = Vec::new();
     let mut all = (&mut parameters, &mut unknowns);

@@ -144,7 +144,8 @@ fn with_constants(
     if problems.len() > before {
         return None;
     }
-    let (own, names, _) = unknowns(&keys.parameter, &[], None, own, node, problems);
+    let (own, names, _) =
+        unknowns(&keys.parameter, &[], &PluginSections::default(), own, node, problems);
     let mut parameters = study.parameters.clone();
     parameters.extend(own);
     let mut all = study.unknowns.clone();

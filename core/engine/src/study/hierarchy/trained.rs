@@ -87,7 +87,7 @@ fn inputs(study: &Study) -> (Vec<Parameter>, Vec<Unknown>) {
             let suffix = format!("[{}]", member.group);
             own.name.clone_from(&unknown.name);
             if let Some(plain) = own.symbol.strip_suffix(&suffix) {
-                own.symbol = plain.to_owned();
+                own.symbol = String::from(plain);
             }
             own.prior = own.design.clone();
         }
