@@ -16,7 +16,7 @@ extern "C" {
 
 #define LACUNA_MAGIC UINT64_C(0x6c6163756e61706c)
 #define LACUNA_MAJOR 1u
-#define LACUNA_MINOR 1u
+#define LACUNA_MINOR 2u
 
 /* What a function returns. */
 enum {
@@ -652,6 +652,41 @@ typedef struct LacunaSurrogateFunctions {
     int32_t (*sum)(void *plugin, const LacunaSummand *parts, size_t count, LacunaNumbers offset, LacunaEmulator *out, const LacunaAnswer *answer);
 } LacunaSurrogateFunctions;
 
+/* A quantity that is ready to be computed. */
+typedef struct LacunaFunctionalFunctions {
+    /* The size of this table in bytes. */
+    size_t size;
+    /* Ends it. */
+    void (*destroy)(void *functional);
+    /* Answers the unit of the value: a text as in a study, `1` for a number without unit. */
+    int32_t (*unit)(void *functional, const LacunaAnswer *answer);
+    /* The value for each row of `arguments`: the values of a curve, or named numbers; NaN where the quantity is
+     * undefined. */
+    int32_t (*value)(void *functional, LacunaNumbers arguments, double *values, const LacunaAnswer *answer);
+} LacunaFunctionalFunctions;
+
+/* A quantity as a function of certain arguments. */
+typedef struct LacunaFunctional {
+    /* The size of this struct in bytes. */
+    size_t size;
+    /* The first argument of the functions. */
+    void *functional;
+    /* The functions. */
+    const LacunaFunctionalFunctions *functions;
+} LacunaFunctional;
+
+/* A number that follows from one curve of the response, or from named numbers of a study. Since version 1.2. */
+typedef struct LacunaQuantityFunctions {
+    /* The size of this table in bytes. */
+    size_t size;
+    /* Writes 1 for a quantity of a curve, 0 for one of named numbers. */
+    int32_t (*of_curve)(void *plugin, uint8_t *of_curve, const LacunaAnswer *answer);
+    /* The quantity as a function of arguments, which are described as JSON: `{"curve": {"name", "unit", "axis",
+     * "grid", "grid_unit"}}` or `{"numbers": [{"name", "unit"}]}`. `REJECTED` with complaints as from `create`
+     * where the options do not fit the arguments. */
+    int32_t (*bind)(void *plugin, LacunaText arguments, LacunaFunctional *out, const LacunaAnswer *answer);
+} LacunaQuantityFunctions;
+
 /* The program that loads a library. */
 typedef struct LacunaHost {
     /* The size of this struct in bytes. */
@@ -707,7 +742,7 @@ typedef struct LacunaDeclaration {
     int32_t (*start)(const LacunaHost *host);
 } LacunaDeclaration;
 
-#define LACUNA_RECORD_BEGIN "lacuna-plugin-record:1.1\n"
+#define LACUNA_RECORD_BEGIN "lacuna-plugin-record:1.2\n"
 
 /* A text from a string literal. */
 #define LACUNA_TEXT(literal) { (const uint8_t *)(literal), sizeof(literal) - 1 }

@@ -129,7 +129,7 @@ fn quantities() {
     });
 }
 
-/// What does not fit the arguments is told by the library with its key and the place inside the text.
+/// Options that do not fit the arguments are reported by the library, each with its key and the place inside the text.
 #[test]
 fn the_options_of_a_quantity_that_do_not_fit_are_told() {
     let metre = Unit::parse("m").unwrap();
