@@ -108,6 +108,8 @@ fn targets_under_the_same_conditions_share_runs_and_emulator() {
     let [first, of_known] =
         ["T28", "T24"].map(|name| number(&summary, &format!("/quantities/first[{name}]/sd")));
     assert!(first > 5.0 * of_known, "{first}, {of_known}");
+    // Three groups say little about the scatter.
+    assert!(summary["assessment"].to_string().contains("few_groups"), "{}", summary["assessment"]);
     // The written study is the same study.
     let again = quick::load(&out.join("resolved.toml"), &[]);
     let names: Vec<&str> = again.parameters.iter().map(|p| p.name.as_str()).collect();
