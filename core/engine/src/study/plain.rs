@@ -84,17 +84,27 @@ pub struct Study {
     pub resolved: Table,
 }
 
+/// The parts of a study that has neither data nor what follows from them.
+pub(super) struct Parts {
+    /// The unknowns of the model.
+    pub parameters: Vec<Parameter>,
+    /// Name and scenario behind each parameter, in the same order.
+    pub unknowns: Vec<Unknown>,
+    /// The known conditions.
+    pub scenarios: Vec<Scenario>,
+    /// The shapes of the responses to all scenarios.
+    pub layouts: Layouts,
+    /// The sections that choose one plugin.
+    pub plugins: PluginSections,
+    /// `[gap]`.
+    pub gap: Gap,
+}
+
 impl Study {
-    /// The study of a companion: the same conditions and responses, with these parameters, model and candidates, and with
-    /// neither data nor surrogate.
-    pub(super) fn companion_of(
-        &self,
-        parameters: Vec<Parameter>,
-        unknowns: Vec<Unknown>,
-        plugins: PluginSections,
-        gap: Gap,
-    ) -> Self {
-        let mut companion = Self {
+    /// A study of the same file that consists of these parts only: without data, errors, effects and quantities.
+    pub(super) fn reduced_to(&self, parts: Parts) -> Self {
+        let Parts { parameters, unknowns, scenarios, layouts, plugins, gap } = parts;
+        let mut reduced = Self {
             name: self.name.clone(),
             named: self.named,
             file: self.file.clone(),
@@ -103,13 +113,13 @@ impl Study {
             about: self.about.clone(),
             libraries: self.libraries.clone(),
             parameters,
-            scenarios: self.scenarios.clone(),
-            dependence: self.dependence.clone(),
+            scenarios,
+            dependence: Dependence::default(),
             dependence_sections: Sections::default(),
             hierarchy: Hierarchy::default(),
             unknowns,
             given: Vec::new(),
-            layouts: self.layouts.clone(),
+            layouts,
             positions: self.positions.clone(),
             plugins,
             numerical_error: None,
@@ -124,7 +134,22 @@ impl Study {
             gap,
             resolved: Table::new(),
         };
-        companion.given = super::inputs::all_given(&companion);
+        reduced.given = super::inputs::all_given(&reduced);
+        reduced
+    }
+
+    /// The study of a companion: the same conditions and responses, with these parameters, model and candidates, and with
+    /// neither data nor surrogate.
+    pub(super) fn companion_of(
+        &self,
+        parameters: Vec<Parameter>,
+        unknowns: Vec<Unknown>,
+        plugins: PluginSections,
+        gap: Gap,
+    ) -> Self {
+        let (scenarios, layouts) = (self.scenarios.clone(), self.layouts.clone());
+        let parts = Parts { parameters, unknowns, scenarios, layouts, plugins, gap };
+        let mut companion = self.reduced_to(parts);
         companion.give_candidates();
         companion
     }

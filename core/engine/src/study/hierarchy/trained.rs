@@ -6,15 +6,12 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use lacuna::data::{Dependence, Layouts, Parameter, Scenario};
+use lacuna::data::{Layouts, Parameter, Scenario};
 use lacuna::text::{Node, Problems};
 use serde::Serialize;
-use toml::Table;
 
-use crate::study::dependence::Sections;
-use crate::study::file::ValidateSection;
 use crate::study::gap::Gap;
-use crate::study::plain::Study;
+use crate::study::plain::{Parts, Study};
 use crate::study::table::PluginSections;
 use crate::study::unknowns::Unknown;
 
@@ -147,38 +144,8 @@ fn alone(
         surrogate: read.surrogate,
         ..PluginSections::default()
     };
-    let mut trained = Study {
-        name: study.name.clone(),
-        named: study.named,
-        file: study.file.clone(),
-        directory: study.directory.clone(),
-        text: String::new(),
-        about: study.about.clone(),
-        libraries: study.libraries.clone(),
-        parameters,
-        scenarios,
-        dependence: Dependence::default(),
-        dependence_sections: Sections::default(),
-        hierarchy: super::Hierarchy::default(),
-        unknowns,
-        given: Vec::new(),
-        layouts,
-        positions: study.positions.clone(),
-        plugins,
-        numerical_error: None,
-        low_fidelity: None,
-        starts: Vec::new(),
-        derived_sections: Vec::new(),
-        effects: Vec::new(),
-        quantities: Vec::new(),
-        forward: None,
-        reliability: Vec::new(),
-        validate: ValidateSection::default(),
-        gap: Gap::default(),
-        resolved: Table::new(),
-    };
-    trained.given = crate::study::inputs::all_given(&trained);
-    trained
+    let gap = Gap::default();
+    study.reduced_to(Parts { parameters, unknowns, scenarios, layouts, plugins, gap })
 }
 
 impl Study {
