@@ -110,6 +110,12 @@ fn targets_under_the_same_conditions_share_runs_and_emulator() {
     assert!(first > 5.0 * of_known, "{first}, {of_known}");
     // Three groups say little about the scatter.
     assert!(summary["assessment"].to_string().contains("few_groups"), "{}", summary["assessment"]);
+    // The design is shown in the inputs of the model, and not once for each target.
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    let (_, design) = page.split_once("id=\"ensemble\"").unwrap();
+    let (design, _) = design.split_once("id=\"measurements\"").unwrap();
+    assert!(design.contains("stiffness") && !design.contains("stiffness["), "{design}");
+    assert!(!design.contains("stiffness.median"), "{design}");
     // The written study is the same study.
     let again = quick::load(&out.join("resolved.toml"), &[]);
     let names: Vec<&str> = again.parameters.iter().map(|p| p.name.as_str()).collect();

@@ -72,12 +72,25 @@ pub struct Findings {
 pub struct EnsembleFindings {
     /// Parameters of the runs in physical units, `runs x parameters`.
     pub points: Matrix,
+    /// What the runs vary.
+    pub inputs: Vec<RunInput>,
     /// One entry per run, true if it is inside the model's range of validity.
     pub valid: Vec<bool>,
     /// Runs without a response.
     pub failed: Vec<FailedRun>,
     /// Number of runs inside the prior's support.
     pub in_prior: usize,
+}
+
+/// An input that the runs vary: a parameter, or one of which each group has its own value in the calibration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunInput {
+    /// Name, without a group.
+    pub name: String,
+    /// Symbol, without a group.
+    pub symbol: String,
+    /// Places among the parameters.
+    pub places: Vec<usize>,
 }
 
 /// Measured data.

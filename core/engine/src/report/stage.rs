@@ -1,6 +1,6 @@
 //! Stage 8: results for people (`report.html`) and for scripts (`summary.json`).
 
-use lacuna::data::{Draws, Ensemble, Observations};
+use lacuna::data::{Draws, Ensemble, Observations, Parameter};
 use lacuna::diagnose::Diagnosis;
 use lacuna::math::moments::Moments;
 use lacuna::math::{fit, moments};
@@ -13,7 +13,7 @@ use crate::assess::Assessment;
 use crate::gap::result::{GapFindings, GapResult, added};
 use crate::report::findings::{
     CalibrationFindings, CoordinateFindings, CurvesLeftOutFindings, EnsembleFindings, Findings,
-    FittedDistribution, LeftOutFindings, MeasuredFindings, Role, SurrogateFindings,
+    FittedDistribution, LeftOutFindings, MeasuredFindings, Role, RunInput, SurrogateFindings,
 };
 use crate::report::{render, summary};
 use crate::stage::artifacts::Artifacts;
@@ -117,10 +117,30 @@ fn ensemble(study: &Study, e: &Ensemble) -> EnsembleFindings {
     let inside = |point: &&[f64]| study.prior().allows(point);
     EnsembleFindings {
         points: e.points.clone(),
+        inputs: inputs(study),
         valid: e.valid.clone(),
         failed: e.failed.clone(),
         in_prior: e.points.iter_rows().filter(inside).count(),
     }
+}
+
+fn inputs(study: &Study) -> Vec<RunInput> {
+    let trained = study.trained();
+    let by_group = study.hierarchy.trained.is_some();
+    let of = |(i, parameter): (usize, &Parameter)| {
+        let name = &trained.unknowns[i].name;
+        let places = || study.unknowns.iter().enumerate().filter(|(_, u)| !u.of_population);
+        RunInput {
+            name: parameter.name.clone(),
+            symbol: parameter.symbol.clone(),
+            places: if by_group {
+                places().filter(|(_, u)| u.name == *name).map(|(j, _)| j).collect()
+            } else {
+                vec![i]
+            },
+        }
+    };
+    trained.parameters.iter().enumerate().map(of).collect()
 }
 
 fn measurements(study: &Study, measured: &Measured) -> MeasuredFindings {

@@ -8,7 +8,7 @@ use crate::page::number::count;
 use crate::page::scale::ShownUnit;
 use crate::page::table::Table;
 use crate::page::{Caption, Numbers, Section};
-use crate::report::findings::{EnsembleFindings, Findings};
+use crate::report::findings::{EnsembleFindings, Findings, RunInput};
 
 /// Largest number of failed runs that are listed; further ones are only counted.
 const MOST_LISTED: usize = 20;
@@ -32,8 +32,8 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
 }
 
 fn figure(findings: &Findings, ensemble: &EnsembleFindings, numbers: &mut Numbers) -> maud::Markup {
-    let columns = ensemble.points.columns().min(findings.parameters.len());
-    let columns: Vec<DesignColumn> = (0..columns).map(|j| column(findings, ensemble, j)).collect();
+    let column = |input: &RunInput| column(findings, ensemble, input);
+    let columns: Vec<DesignColumn> = ensemble.inputs.iter().filter_map(column).collect();
     let is_valid = |i: &usize| ensemble.valid.get(*i).copied().unwrap_or(true);
     let (valid, invalid): (Vec<usize>, Vec<usize>) =
         (0..ensemble.points.rows()).partition(|i| is_valid(i));
@@ -60,19 +60,24 @@ fn figure(findings: &Findings, ensemble: &EnsembleFindings, numbers: &mut Number
     numbers.figure(&[drawing], &keys, &caption)
 }
 
-fn column(findings: &Findings, ensemble: &EnsembleFindings, j: usize) -> DesignColumn {
+fn column(
+    findings: &Findings,
+    ensemble: &EnsembleFindings,
+    input: &RunInput,
+) -> Option<DesignColumn> {
+    let j = *input.places.first()?;
     let parameter = &findings.parameters[j];
     let values = ensemble.points.column(j);
     let unit = ShownUnit::for_values(&parameter.unit, values.iter().copied());
     let box_ = (parameter.prior.quantile(0.001), parameter.prior.quantile(0.999));
     let logarithmic = matches!(parameter.design.name(), "log_uniform" | "log_normal");
-    DesignColumn {
+    Some(DesignColumn {
         logarithmic,
-        label: unit.label(&titled(&parameter.name, &parameter.symbol)),
+        label: unit.label(&titled(&input.name, &input.symbol)),
         values: values.iter().map(|&v| unit.show(v)).collect(),
         prior: (box_.0.is_finite() && box_.1.is_finite())
             .then(|| (unit.show(box_.0), unit.show(box_.1))),
-    }
+    })
 }
 
 fn failures(ensemble: &EnsembleFindings, numbers: &mut Numbers) -> maud::Markup {

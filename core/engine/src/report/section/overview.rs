@@ -9,17 +9,21 @@ use crate::page::number::{count, exact, rounded};
 use crate::page::scale::printed;
 use crate::page::table::Table;
 use crate::page::{Caption, Numbers, Section, paragraph};
-use crate::report::findings::Findings;
+use crate::report::findings::{Findings, RunInput};
 
 /// The study.
 pub fn section(findings: &Findings, numbers: &mut Numbers) -> Section {
     let mut parameters =
         Table::new(&["parameter", "unit", "design", "prior"], &["reference value"]);
-    for p in &findings.parameters {
+    for (j, p) in findings.parameters.iter().enumerate() {
         parameters.row([
             titled(&p.name, &p.symbol),
             printed(&p.unit),
-            rounded(&p.design.to_string(), 6),
+            if is_varied(findings, j) {
+                rounded(&p.design.to_string(), 6)
+            } else {
+                String::from("–")
+            },
             rounded(&p.prior.to_string(), 6),
             p.reference.map_or_else(|| String::from("–"), exact),
         ]);
@@ -43,6 +47,12 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Section {
             }
         },
     }
+}
+
+/// True if runs may vary a parameter; they do not vary location and scale of a population.
+fn is_varied(findings: &Findings, j: usize) -> bool {
+    let varies = |input: &RunInput| input.places.contains(&j);
+    findings.ensemble.as_ref().is_none_or(|ensemble| ensemble.inputs.iter().any(varies))
 }
 
 fn response(findings: &Findings) -> String {

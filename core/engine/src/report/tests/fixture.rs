@@ -9,7 +9,7 @@ use lacuna_linalg::Matrix;
 
 use crate::report::findings::{
     CalibrationFindings, CoordinateFindings, EnsembleFindings, Findings, FittedDistribution,
-    MeasuredFindings, Role, SurrogateFindings,
+    MeasuredFindings, Role, RunInput, SurrogateFindings,
 };
 use crate::stage::screen::FlaggedCurve;
 use crate::stage::validate::{ValidationCase, ValidationFindings};
@@ -131,7 +131,10 @@ fn ensemble() -> EnsembleFindings {
         ranges[j][0] + (ranges[j][1] - ranges[j][0]) * uniform(&mut rng)
     });
     let valid: Vec<bool> = points.iter_rows().map(|p| p[1] * p[2] < 4.6e7).collect();
+    let input =
+        |(j, p): (usize, Parameter)| RunInput { name: p.name, symbol: p.symbol, places: vec![j] };
     EnsembleFindings {
+        inputs: parameters().into_iter().enumerate().map(input).collect(),
         valid,
         failed: vec![
             FailedRun { run: "run-0231".into(), reason: "exit status 137 after 3 attempts".into() },
