@@ -60,7 +60,7 @@ fn a_library_that_cannot_be_used_says_why() {
         (
             "wrong_major",
             "WRONG_MAJOR",
-            "it is made for version 9.1 of the boundary, and this program speaks 1.2",
+            "it is made for version 9.2 of the boundary, and this program speaks 1.2",
         ),
         ("newer_minor", "NEWER_MINOR", "it is made for version 1.99 of the boundary"),
         ("aborts", "ABORTS", "it is built with `panic = \"abort\"`"),
@@ -290,7 +290,7 @@ fn a_study_says_at_which_line_a_library_is_broken() {
         "[plugins]\nload = [\"libold.so\", \"libnone.so\"]\n\n[study]",
     );
     let complaints = load_for(&study, &[], Use::Run).complaints();
-    let old = "the library of plugins libold.so cannot be used: it is made for version 9.1 of the boundary";
+    let old = "the library of plugins libold.so cannot be used: it is made for version 9.2 of the boundary";
     assert!(complaints.contains(old), "{complaints}");
     let none = "the library of plugins libnone.so cannot be used: no such file or directory";
     assert!(complaints.contains(none), "{complaints}");
