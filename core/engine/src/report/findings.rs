@@ -72,7 +72,7 @@ pub struct Findings {
 pub struct EnsembleFindings {
     /// Parameters of the runs in physical units, `runs x parameters`.
     pub points: Matrix,
-    /// What the runs vary.
+    /// Inputs that the runs vary.
     pub inputs: Vec<RunInput>,
     /// One entry per run, true if it is inside the model's range of validity.
     pub valid: Vec<bool>,
