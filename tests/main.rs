@@ -33,6 +33,7 @@ mod refused;
 mod reliability;
 mod revisions;
 mod schema;
+mod sequential;
 mod skeletons;
 mod slurm;
 mod starts;

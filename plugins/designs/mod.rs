@@ -1,5 +1,6 @@
 //! Designs: the points of parameter space at which the simulator is run.
 
+pub mod ensemble_kalman;
 pub mod latin_hypercube;
 pub mod quadrature;
 pub mod random;

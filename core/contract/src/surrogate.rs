@@ -21,15 +21,18 @@ use crate::judge::{Check, agree, calm, judge, layout, refused, same_on_threads, 
 ///   stated error.
 /// - Sobol' indices are fractions: first-order no larger than total, between 0 and 1.
 /// - A weighted sum of emulators, if implemented, has the sum of their responses and slopes.
+/// - The covariances of its errors between points, if known, are symmetric, and no variance that follows from them
+///   exceeds the one that the emulator states.
 /// - It is restored from its bytes bit for bit, and damaged bytes are rejected.
 /// - The same runs give the same bytes, on any number of threads.
 /// - Runs that are too few, of unequal number or not finite are rejected.
 pub fn surrogate(name: &str, surrogate: &dyn Surrogate) -> Result<(), Vec<String>> {
     let problem = Problem::new();
-    let checks: [Check<'_>; 7] = [
+    let checks: [Check<'_>; 8] = [
         ("emulates", Box::new(|| emulates(surrogate, &problem))),
         ("knows its derivatives", Box::new(|| knows_its_derivatives(surrogate, &problem))),
         ("shares out the variance", Box::new(|| shares_out_the_variance(surrogate, &problem))),
+        ("knows its errors", Box::new(|| knows_its_errors(surrogate, &problem))),
         ("adds up", Box::new(|| adds_up(surrogate, &problem))),
         ("reads back", Box::new(|| reads_back(surrogate, &problem))),
         ("repeats itself", Box::new(|| same_on_threads(|| problem.bytes(surrogate)))),
@@ -211,6 +214,46 @@ fn shares_out_the_variance(surrogate: &dyn Surrogate, problem: &Problem) -> Resu
 }
 
 /// Compares the sum of an emulator of all runs and one of half of them with the sum of their results.
+fn knows_its_errors(surrogate: &dyn Surrogate, problem: &Problem) -> Result<(), String> {
+    let emulator = problem.fit(surrogate)?;
+    let Some(processes) = emulator.processes() else { return Ok(()) };
+    let variance = emulator.variance(&problem.fresh);
+    let variance =
+        variance.ok_or("it knows the covariance of its errors, but states no variance")?;
+    let (directions, noise) = (processes.directions(), processes.noise());
+    let all = processes.covariances(&problem.fresh);
+    if directions.columns() != problem.responses.columns()
+        || [all.len(), noise.len()] != [directions.rows(); 2]
+    {
+        return Err("its errors have directions, covariances and noise of unequal number".into());
+    }
+    for (k, covariance) in all.iter().enumerate() {
+        let largest = (0..covariance.rows()).map(|i| covariance[(i, i)]).fold(0.0, f64::max);
+        for i in 0..covariance.rows() {
+            for j in 0..i {
+                let (a, b) = (covariance[(i, j)], covariance[(j, i)]);
+                if !(a.is_finite() && (a - b).abs() <= 1e-9 * largest) {
+                    return Err(format!(
+                        "covariance {k} between points {i} and {j} is {a} and {b}"
+                    ));
+                }
+            }
+        }
+    }
+    for (i, row) in variance.iter_rows().enumerate() {
+        for (j, stated) in row.iter().enumerate() {
+            let part = |k: usize| (all[k][(i, i)] + noise[k]) * directions[(k, j)].powi(2);
+            let sum: f64 = (0..all.len()).map(part).sum();
+            if sum > stated * (1.0 + 1e-6) + f64::MIN_POSITIVE {
+                return Err(format!(
+                    "its errors have the variance {sum} at output {j}, it states {stated}"
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
 fn adds_up(surrogate: &dyn Surrogate, problem: &Problem) -> Result<(), String> {
     let half: Vec<usize> = (0..RUNS / 2).collect();
     let few = (problem.points.select_rows(&half), problem.responses.select_rows(&half));

@@ -4,7 +4,7 @@
 //! model, any other with the model itself. The stages after the posterior are the same for both.
 //!
 //! ```text
-//! emulated  design  simulate  read  surrogate  calibrate (repeated to refine) ┐
+//! emulated  design  simulate (repeated if sequential)  read  surrogate  calibrate (repeated to refine) ┐
 //! direct                      read             calibrate                      ┴ evidence validate quantities reliability assess gap report
 //! target                                       calibrate                        evidence          quantities reliability assess     report
 //! ```
@@ -27,11 +27,13 @@ use crate::stage::direct::Direct;
 use crate::stage::emulated::Emulated;
 use crate::stage::evidence::Weighed;
 use crate::stage::inverse_problem::InverseProblem;
+use crate::stage::more_runs::within;
 use crate::stage::predictions::Predicting;
 use crate::stage::surrogate::Fitting;
 use crate::stage::{
     assess, calibrate, contents, design, evidence, grouped, inference_data, low_fidelity, manifest,
-    numerical_error, quantities, read, refine, reliability, simulate, surrogate, target, validate,
+    numerical_error, quantities, read, refine, reliability, sequential, simulate, surrogate,
+    target, validate,
 };
 use crate::study::Study;
 
@@ -165,12 +167,17 @@ pub fn emulate(
     let simulated = simulate::stage(trained, placed.as_ref(), run, observer)?;
     let data = read::stage(study, simulated.as_ref(), run, observer)?;
     let data = low_fidelity::stage(study, placed.as_ref(), data, run, observer)?;
-    let fitting = Fitting::of(trained, data.value.runs()?)?;
+    let (data, region) = sequential::stage(study, data, run, observer)?;
+    let near = region.as_ref().map(|place| within(&trained.parameters, place));
+    let fitting = match (&region, &near) {
+        (Some(place), Some(near)) => Fitting::inside(trained, data.value.runs()?, place, near),
+        _ => Fitting::of(trained, data.value.runs()?)?,
+    };
     let fitted = surrogate::stage(trained, &data, &fitting, run, observer)?;
     let (data, fitted) = grouped::by_group(study, data, fitted);
-    let folders = numerical_error::folders();
-    let numerics = numerical_error::stage(study, &data, None, &folders, run, observer)?;
-    let emulated = Emulated::new(study, data, fitted, numerics, None)?;
+    let (folders, place) = (numerical_error::folders(), region.as_deref());
+    let numerics = numerical_error::stage(study, &data, place, &folders, run, observer)?;
+    let emulated = Emulated { region, ..Emulated::new(study, data, fitted, numerics, None)? };
     runs::build_added(study, &emulated.problem(), run, observer)?;
     Ok(emulated)
 }

@@ -1,7 +1,7 @@
 //! Gaussian processes over the components of the outputs.
 
 use lacuna::plugin::forward::Linear;
-use lacuna::plugin::surrogate::FitError;
+use lacuna::plugin::surrogate::{FitError, Processes};
 use lacuna::plugin::{Emulator, Fact, Forward};
 use lacuna::run::Stop;
 use lacuna_linalg::{Matrix, multiply, transposed_multiply};
@@ -179,7 +179,41 @@ impl Forward for Kriging {
     }
 }
 
+impl Processes for Kriging {
+    fn directions(&self) -> Matrix {
+        self.loadings.select_rows(&(1..self.loadings.rows()).collect::<Vec<_>>())
+    }
+
+    fn covariances(&self, points: &Matrix) -> Vec<Matrix> {
+        let standard = standardised(&self.standards, points);
+        let regressors = self.regressors.values(points);
+        let mut all = vec![Matrix::default(); self.scores.columns()];
+        for field in &self.fields {
+            let shared = field.shared_covariance(&standard, &regressors);
+            for (&c, variance) in field.choice.components.iter().zip(field.variances()) {
+                all[c] =
+                    Matrix::from_fn(shared.rows(), shared.rows(), |i, j| variance * shared[(i, j)]);
+            }
+        }
+        all
+    }
+
+    fn noise(&self) -> Vec<f64> {
+        let mut all = vec![0.0; self.scores.columns()];
+        for field in &self.fields {
+            for (&c, variance) in field.choice.components.iter().zip(field.variances()) {
+                all[c] = field.nugget * variance;
+            }
+        }
+        all
+    }
+}
+
 impl Emulator for Kriging {
+    fn processes(&self) -> Option<&dyn Processes> {
+        Some(self)
+    }
+
     fn fit_error(&self) -> &FitError {
         &self.fit_error
     }

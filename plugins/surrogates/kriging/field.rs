@@ -116,6 +116,14 @@ impl Field {
     /// Returns the covariances of the errors of the first component among points (`points x points`), including the
     /// uncertainty of the trend, without the nugget.
     pub fn covariance(&self, points: &Matrix, regressors: &Matrix) -> Matrix {
+        let mut all = self.shared_covariance(points, regressors);
+        all.as_mut_slice().iter_mut().for_each(|c| *c *= self.variances[0]);
+        all
+    }
+
+    /// Returns the covariances of [`Self::covariance`] for a process of variance one; those of a component are its variance
+    /// times these.
+    pub fn shared_covariance(&self, points: &Matrix, regressors: &Matrix) -> Matrix {
         let white = multiply_transposed(&self.correlations(points), &self.factor.lower_inverse);
         let trend = regressors.select_columns(&self.choice.terms);
         let mut unknown = multiply(&trend, &self.factor.r_inverse);
@@ -129,7 +137,7 @@ impl Field {
         let unknown = multiply_transposed(&unknown, &unknown);
         let terms = known.as_slice().iter().zip(unknown.as_slice());
         for (c, (known, unknown)) in all.as_mut_slice().iter_mut().zip(terms) {
-            *c = self.variances[0] * (*c - known + unknown);
+            *c = *c - known + unknown;
         }
         all
     }
@@ -168,6 +176,11 @@ impl Field {
             self.alpha[(0, i)].powi(2) / (p.max(1e-13 * k) * self.variances[0])
         };
         precisions.iter().enumerate().map(square).sum::<f64>() / n
+    }
+
+    /// Variance of the process of each component.
+    pub fn variances(&self) -> &[f64] {
+        &self.variances
     }
 
     fn correlations(&self, points: &Matrix) -> Matrix {

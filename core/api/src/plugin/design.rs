@@ -37,6 +37,47 @@ pub trait Design: Component {
     ) -> Result<Matrix, Stop> {
         Err(fixed_points())
     }
+
+    /// True for a sequential design: its first batch is [`Design::place`], every further one follows from what the runs
+    /// returned ([`Design::next`]).
+    fn is_sequential(&self) -> bool {
+        false
+    }
+
+    /// The next batch of a sequential design, from all batches before it; `stream` is that of the design.
+    ///
+    /// The batches are all that the method knows: it keeps no state of its own, so that an interrupted study goes on
+    /// with the same points.
+    ///
+    /// # Errors
+    /// If the runs that returned are too few to go on.
+    fn next(&self, _batches: &[Batch], _stream: &Stream) -> Result<Next, Stop> {
+        Ok(Next::Complete(String::new()))
+    }
+}
+
+/// One batch of runs of a sequential design, compared with the measurements.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Batch {
+    /// Number of runs that were placed, including those that failed.
+    pub placed: usize,
+    /// Normal scores of the parameters under their design distributions ([`Distribution::score`]) for each run with a
+    /// response, `runs x parameters`.
+    ///
+    /// [`Distribution::score`]: lacuna_base::math::distribution::Distribution::score
+    pub scores: Matrix,
+    /// Difference between the response and the mean of the replicates, in standard deviations of that mean's noise,
+    /// `runs x data`.
+    pub residuals: Matrix,
+}
+
+/// Continuation of a sequential design.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Next {
+    /// Normal scores of the parameters of the next batch, `runs x parameters`.
+    Place(Matrix),
+    /// No further batch; the text says why, for the progress messages.
+    Complete(String),
 }
 
 /// The error of a design that cannot be extended.

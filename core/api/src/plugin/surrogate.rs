@@ -64,6 +64,11 @@ pub trait Emulator: Forward {
         None
     }
 
+    /// The emulator's own errors with their covariance between points, if the method knows it.
+    fn processes(&self) -> Option<&dyn Processes> {
+        None
+    }
+
     /// Goodness of fit, estimated from the training runs.
     fn fit_error(&self) -> &FitError;
 
@@ -72,6 +77,19 @@ pub trait Emulator: Forward {
 
     /// Serialises the emulator, for [`Surrogate::load`].
     fn save(&self) -> Result<Vec<u8>, Stop>;
+}
+
+/// Errors of an emulator as a sum over components, `e(x) = Σ t_c(x) l_c`, with independent Gaussian processes `t_c` of mean
+/// zero and fixed directions `l_c`. Points are in physical units, one per row.
+pub trait Processes: Send + Sync {
+    /// Directions, `components x outputs`.
+    fn directions(&self) -> Matrix;
+
+    /// Covariance of each component among points, `points x points`.
+    fn covariances(&self, points: &Matrix) -> Vec<Matrix>;
+
+    /// Variance of the noise of a new run in each component, in addition to [`Processes::covariances`].
+    fn noise(&self) -> Vec<f64>;
 }
 
 /// Error of a fit, estimated from its own training runs.

@@ -213,11 +213,11 @@ pub fn at_posterior(ratio: f64, count: usize, matters: bool) -> Option<Finding> 
 }
 
 /// Finding about a refinement that ended before it reached the requested ratio.
-pub fn unfinished(rounds: usize, ratio: f64, until: f64, clear: bool) -> Finding {
+/// `of` says in words what the error is compared with.
+pub fn unfinished(rounds: usize, (ratio, of): (f64, &str), until: f64, clear: bool) -> Finding {
     let edge = if clear { "" } else { ", and the posterior extends to the edge of the region" };
     let message = format!(
-        "after {rounds} rounds of refinement the emulator's error at new runs is {} of the discrepancy (requested: \
-         {}){edge}",
+        "after {rounds} rounds of refinement the emulator's error at new runs is {} of {of} (requested: {}){edge}",
         short(ratio),
         short(until)
     );

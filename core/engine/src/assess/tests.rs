@@ -112,7 +112,7 @@ fn errors_that_move_estimates() {
     has(emulator::at_posterior(6.0, 20, true).as_ref(), "emulator_error", Severity::Failure);
     assert_eq!(emulator::at_posterior(6.0, 20, false), None);
     assert_eq!(emulator::at_posterior(1.2, 20, true), None);
-    let unfinished = emulator::unfinished(5, 0.4, 0.1, false);
+    let unfinished = emulator::unfinished(5, (0.4, "the discrepancy"), 0.1, false);
     has(Some(&unfinished), "refinement_unfinished", Severity::Reservation);
     has(Some(&runs::idle("x")), "idle_parameter", Severity::Reservation);
 }

@@ -81,6 +81,12 @@ impl<'a> Ground<'a> {
             return Err(Stop::new("the study has no simulation runs that could be held out")
                 .help("omit `--from-runs`: the truths are then runs of the model"));
         }
+        if study.design.as_ref().is_some_and(|section| section.built.plugin.is_sequential()) {
+            return Err(Stop::new(
+                "the runs of a sequential design lie near the posterior of the study's own data, not near other truths",
+            )
+            .help("count the coverage of a copy of the study with another design, such as `latin_hypercube`"));
+        }
         let base = match study.surrogate {
             Some(_) => Base::Emulated(vec![emulate(study, run, observer)?]),
             None => Base::Direct(direct::Direct::of(study, run, observer)?),

@@ -111,9 +111,9 @@ pub struct MeasuredFindings {
 /// Surrogate and its errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurrogateFindings {
-    /// Number of rounds of refinement, ratio of the emulator's error near the posterior to the discrepancy, and true if
-    /// the target was reached; `None` without refinement.
-    pub refinement: Option<(usize, f64, bool)>,
+    /// Number of rounds of refinement, ratio of the emulator's error near the posterior to the discrepancy, what it is
+    /// compared with in words, and true if the target was reached; `None` without refinement.
+    pub refinement: Option<(usize, f64, &'static str, bool)>,
     /// Facts that the method states of itself.
     pub facts: Vec<Fact>,
     /// Number of training runs.

@@ -176,7 +176,7 @@ fn surrogate(
         s.aggregated.first.row(0).iter().zip(total).map(|(f, t)| (*f, *t)).collect()
     });
     Some(SurrogateFindings {
-        refinement: problem.refinement().map(|r| (r.rounds, r.ratio, r.reached)),
+        refinement: problem.refinement().map(|r| (r.rounds, r.ratio, r.of, r.reached)),
         facts: errors.facts.iter().cloned().chain(of_numerics).collect(),
         training: errors.training,
         validation: errors.validation,

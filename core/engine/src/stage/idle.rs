@@ -5,7 +5,7 @@
 
 use lacuna::data::Parameter;
 use lacuna::plugin::forward::{Linear, SumOfSquares};
-use lacuna::plugin::surrogate::{FitError, Indices};
+use lacuna::plugin::surrogate::{FitError, Indices, Processes};
 use lacuna::plugin::{Emulator, Fact, Forward, Sensitivity};
 use lacuna::run::Stop;
 use lacuna_linalg::Matrix;
@@ -142,7 +142,26 @@ impl Linear for Widened {
     }
 }
 
+impl Processes for Widened {
+    fn directions(&self) -> Matrix {
+        self.emulator.processes().map_or_else(Matrix::default, |inner| inner.directions())
+    }
+
+    fn covariances(&self, points: &Matrix) -> Vec<Matrix> {
+        let points = self.used.points(points);
+        self.emulator.processes().map_or_else(Vec::new, |inner| inner.covariances(&points))
+    }
+
+    fn noise(&self) -> Vec<f64> {
+        self.emulator.processes().map_or_else(Vec::new, |inner| inner.noise())
+    }
+}
+
 impl Emulator for Widened {
+    fn processes(&self) -> Option<&dyn Processes> {
+        self.emulator.processes().map(|_| self as &dyn Processes)
+    }
+
     fn sensitivity(&self) -> Option<Sensitivity> {
         let known = self.emulator.sensitivity()?;
         let spread = |indices: Indices| Indices {

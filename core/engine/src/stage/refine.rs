@@ -6,30 +6,25 @@
 //! the region; and calibrates again.
 
 mod choose;
+mod variance;
 
 use lacuna::data::{Draws, Ensemble, Parameter};
-use lacuna::math::distribution::Distribution;
 use lacuna::math::moments;
 use lacuna::plugin::Emulator;
 use lacuna::plugin::discrepancy::ErrorOrigin;
 use lacuna::run::{Observer, Stop};
 use lacuna_linalg::Matrix;
 use lacuna_run::{Folder, Kept, RunDirectory, Stage};
-use serde_json::json;
 
 use super::calibrate::{self, Calibrated, Parts};
+use super::more_runs::{Intervals, More, bounds, is_inside, within};
 use super::numerical_error::{self, NumericalError};
-use super::read::{self, Data, Runs};
-use super::simulate;
-use super::simulator::Simulator;
 use super::surrogate::{self, Fitting, Purpose};
 use crate::stage::emulated::Emulated;
 use crate::stage::inverse_problem::Trial;
 use crate::study::Study;
-use crate::study::file::{Refine, Region};
-
-/// One interval per parameter.
-type Intervals = Vec<(f64, f64)>;
+use crate::study::file::{Choose, Refine, Region};
+use choose::Sought;
 
 /// Calibrates, and refines as long as the study requests it and it is needed.
 pub fn stage(
@@ -44,22 +39,32 @@ pub fn stage(
     let (Some(refine), Some(mut calibrated)) = (refine, first.clone()) else {
         return Ok((learned, first));
     };
+    let base = learned.region.clone().unwrap_or_else(|| prior_range(study));
     let mut halvings = 0;
     for round in 1..=refine.rounds.get() {
-        let data = data_variance(study, &learned, &calibrated)?;
+        let noise = Noise::of(study, refine, &learned, &calibrated)?;
         halvings += i32::from(is_clear(study, learned.region.as_deref(), &kept(&calibrated)));
-        let place = about(study, &kept(&calibrated), halvings);
-        let (again, error) =
-            next(study, refine, round, learned, &calibrated, place, run, observer)?;
+        let place = about(study, &kept(&calibrated), &base, halvings);
+        let (again, error) = next(
+            study,
+            refine,
+            round,
+            learned,
+            &calibrated,
+            (place, &noise.of_mean),
+            run,
+            observer,
+        )?;
         learned = again;
         let folder = folder(round, Stage::Calibrate);
         let again = calibrate::stage(study, &learned.problem(), &folder, run, observer)?;
         calibrated = again.ok_or_else(|| Stop::new("the study has no measurements"))?;
-        let ratio = error / data.sqrt();
+        let ratio = error / noise.scale;
         let clear = is_clear(study, learned.region.as_deref(), &kept(&calibrated));
         let reached = ratio <= refine.until.get() && clear;
         let until = refine.until.get();
-        let refinement = Refinement { rounds: round, ratio, until, clear, reached };
+        let of = refine.choose.measured_by();
+        let refinement = Refinement { rounds: round, ratio, of, until, clear, reached };
         observer.begin("refine", "round", refine.rounds.get() as u64);
         observer.end("refine", &refinement.summary(refine));
         if reached || round == refine.rounds.get() {
@@ -83,6 +88,8 @@ pub struct Refinement {
     /// Ratio of the emulator's error at the last new runs, before it was trained on them, to the discrepancy: root mean
     /// squares over the outputs.
     pub ratio: f64,
+    /// What the error is compared with, in words.
+    pub of: &'static str,
     /// Ratio that the study requests.
     pub until: f64,
     /// True if the posterior stays clear of the region's own edges.
@@ -101,10 +108,10 @@ impl Refinement {
                 "after {rounds} rounds of refinement the region moved away from the runs{edge}"
             );
         }
-        let ratio = self.ratio;
+        let Self { ratio, of, .. } = self;
         format!(
-            "after {rounds} rounds of refinement the emulator's error at new runs is {ratio:.3} of the discrepancy \
-             (requested: {until}){edge}"
+            "after {rounds} rounds of refinement the emulator's error at new runs is {ratio:.3} of {of} (requested: \
+             {until}){edge}"
         )
     }
 }
@@ -113,25 +120,59 @@ fn kept(calibrated: &Kept<Calibrated>) -> Draws {
     calibrated.value.draws.from_step(calibrated.value.outcome.burn_in)
 }
 
-/// Variance of the discrepancy at the best fit, mean over the outputs, without the errors of emulator and numerics.
-fn data_variance(
-    study: &Study,
-    learned: &Emulated,
-    calibrated: &Kept<Calibrated>,
-) -> Result<f64, Stop> {
-    let problem = learned.problem();
-    let Some(measured) = &learned.data.value.measured else {
-        return Err(Stop::new("the study has no measurements"));
-    };
-    let parts = Parts::of(study, measured, &problem)?;
-    let map = &calibrated.value.outcome.map;
-    let d = study.parameters.len();
-    let own = parts.likelihood().hyperparameters().len();
-    let mean = learned.emulator.mean(&Matrix::from_vec(1, d, map[..d].to_vec()));
-    let spread = parts.likelihood().predictive(mean.row(0), &map[map.len() - own..]);
-    let errors = [ErrorOrigin::Emulator, ErrorOrigin::Numerics];
-    let of_data = spread.iter().filter(|part| !errors.contains(&part.origin));
-    Ok(of_data.map(|part| moments::mean(&part.variance)).sum())
+impl Choose {
+    /// What the emulator's error is compared with, in words.
+    fn measured_by(self) -> &'static str {
+        match self {
+            Self::EmulatorError => "the discrepancy",
+            Self::PosteriorVariance => "the discrepancy of the replicates' mean",
+        }
+    }
+}
+
+/// Discrepancy at the best fit, without the errors of emulator and numerics.
+struct Noise {
+    /// Variance of the mean of the replicates for each output, NaN where nothing was measured.
+    of_mean: Vec<f64>,
+    /// Size that the emulator's error is compared with: a root mean square over the outputs.
+    scale: f64,
+}
+
+impl Noise {
+    fn of(
+        study: &Study,
+        refine: &Refine,
+        learned: &Emulated,
+        calibrated: &Kept<Calibrated>,
+    ) -> Result<Self, Stop> {
+        let problem = learned.problem();
+        let Some(measured) = &learned.data.value.measured else {
+            return Err(Stop::new("the study has no measurements"));
+        };
+        let parts = Parts::of(study, measured, &problem)?;
+        let map = &calibrated.value.outcome.map;
+        let d = study.parameters.len();
+        let own = parts.likelihood().hyperparameters().len();
+        let mean = learned.emulator.mean(&Matrix::from_vec(1, d, map[..d].to_vec()));
+        let spread = parts.likelihood().predictive(mean.row(0), &map[map.len() - own..]);
+        let errors = [ErrorOrigin::Emulator, ErrorOrigin::Numerics];
+        let of_data = || spread.iter().filter(|part| !errors.contains(&part.origin));
+        let counts = measured.likelihood.summaries();
+        let of_output = |(i, count): (usize, f64)| {
+            let one: f64 = of_data().map(|part| part.variance[i]).sum();
+            if count > 0.0 { one / count } else { f64::NAN }
+        };
+        let counts = counts.iter().map(|summary| summary.count as f64).enumerate();
+        let of_mean: Vec<f64> = counts.map(of_output).collect();
+        let scale = match refine.choose {
+            Choose::EmulatorError => of_data().map(|part| moments::mean(&part.variance)).sum(),
+            Choose::PosteriorVariance => {
+                let known = of_mean.iter().copied().filter(|v| v.is_finite());
+                moments::mean(&known.collect::<Vec<f64>>())
+            }
+        };
+        Ok(Self { of_mean, scale: f64::sqrt(scale) })
+    }
 }
 
 /// Central 99.8 % interval of each parameter's draws.
@@ -141,12 +182,6 @@ fn middle(draws: &Draws, parameters: usize) -> Intervals {
         (moments::quantile(&sorted, 0.001), moments::quantile(&sorted, 0.999))
     };
     (0..parameters).map(ends).collect()
-}
-
-/// Bounds within which every region stays: those of design and prior.
-fn bounds(parameter: &Parameter) -> (f64, f64) {
-    let (design, prior) = (parameter.design.support(), parameter.prior.support());
-    (design.0.max(prior.0), design.1.min(prior.1))
 }
 
 /// Returns true if the posterior stays inside the region, except at edges that are those of prior or design.
@@ -160,23 +195,31 @@ fn is_clear(study: &Study, region: Option<&[(f64, f64)]>, draws: &Draws) -> bool
     })
 }
 
-/// A box around the posterior: at least twice as wide as its central interval, and as the range of the prior divided by
-/// `2^halvings`.
-///
-/// A posterior from a poor emulator does not justify a small region, however narrow it is.
-fn about(study: &Study, draws: &Draws, halvings: i32) -> Intervals {
-    let middle = middle(draws, study.parameters.len());
-    let boxed = |(p, (from, to)): (&Parameter, (f64, f64))| {
+/// Central 99.8 % of each prior inside the bounds.
+fn prior_range(study: &Study) -> Intervals {
+    let range = |p: &Parameter| {
         let (lowest, highest) = bounds(p);
         let tails = [0.001, 0.999].map(|q| p.prior.quantile(q));
-        let range = highest.min(tails[1]) - lowest.max(tails[0]);
-        let half = (to - from).max(0.5 * range * 0.5_f64.powi(halvings));
+        (lowest.max(tails[0]), highest.min(tails[1]))
+    };
+    study.parameters.iter().map(range).collect()
+}
+
+/// A box around the posterior: at least twice as wide as its central interval, and as the `base` (the range of the prior,
+/// or the region of a sequential design) divided by `2^halvings`.
+///
+/// A posterior from a poor emulator does not justify a small region, however narrow it is.
+fn about(study: &Study, draws: &Draws, base: &[(f64, f64)], halvings: i32) -> Intervals {
+    let middle = middle(draws, study.parameters.len());
+    let boxed = |((p, (from, to)), &(first, last)): ((&Parameter, (f64, f64)), &(f64, f64))| {
+        let (lowest, highest) = bounds(p);
+        let half = (to - from).max(0.5 * (last - first) * 0.5_f64.powi(halvings));
         let (low, high) = (0.5 * (from + to) - half, 0.5 * (from + to) + half);
         // Shift the interval inside the bounds, then cut it if it is wider than they are.
         let shift = (lowest - low).max(0.0) - (high - highest).max(0.0);
         ((low + shift).max(lowest), (high + shift).min(highest))
     };
-    study.parameters.iter().zip(middle).map(boxed).collect()
+    study.parameters.iter().zip(middle).zip(base).map(boxed).collect()
 }
 
 /// One round: new runs, and a new fit of the surrogate. Also returns the root mean square error of the previous
@@ -188,16 +231,31 @@ fn next(
     round: usize,
     learned: Emulated,
     calibrated: &Kept<Calibrated>,
-    place: Intervals,
+    (place, noise): (Intervals, &[f64]),
     run: &mut RunDirectory,
     observer: &dyn Observer,
 ) -> Result<(Emulated, f64), Stop> {
     let draws = kept(calibrated);
     let trial = learned.trial;
     let random = Trial::stream(trial, study, "refine").at(round as u64);
-    let points = choose::points(&learned, &draws, &place, refine.runs.get(), &random)?;
+    let sought =
+        Sought { learned: &learned, draws: &draws, place: &place, count: refine.runs.get() };
+    let by_variance = match refine.choose {
+        Choose::PosteriorVariance => variance::points(&sought, noise, &random)?,
+        Choose::EmulatorError => None,
+    };
+    let points = match by_variance {
+        Some(points) => points,
+        None => choose::points(&sought, &random)?,
+    };
     let before = learned.data.value.runs()?.runs.len();
-    let data = extended(study, round, learned.data, &points, run, observer)?;
+    let more = More {
+        folder: folder(round, Stage::Simulate),
+        prefix: &format!("refined{round}"),
+        points: &points,
+        may_fail: false,
+    };
+    let data = more.added(study, learned.data, run, observer)?;
     let ensemble = data.value.runs()?;
     let error = error_at_new(ensemble, before, &*learned.emulator, learned.region.as_deref())?;
     let parameters: Vec<Parameter>;
@@ -265,60 +323,4 @@ fn error_at_new(
     let pairs = simulated.as_slice().iter().zip(emulated.as_slice());
     let squares: Vec<f64> = pairs.map(|(a, b)| (a - b).powi(2)).collect();
     Ok(moments::mean(&squares).sqrt())
-}
-
-fn is_inside(place: &[(f64, f64)], point: &[f64]) -> bool {
-    place.iter().zip(point).all(|(&(low, high), &x)| low <= x && x <= high)
-}
-
-/// Parameters with uniform designs in the region.
-fn within(parameters: &[Parameter], place: &[(f64, f64)]) -> Vec<Parameter> {
-    let narrowed = |(p, &(low, high)): (&Parameter, &(f64, f64))| Parameter {
-        design: Distribution::Uniform([low, high]),
-        ..p.clone()
-    };
-    parameters.iter().zip(place).map(narrowed).collect()
-}
-
-/// The data with the runs at further points added.
-fn extended(
-    study: &Study,
-    round: usize,
-    data: Kept<Data>,
-    points: &Matrix,
-    run: &mut RunDirectory,
-    observer: &dyn Observer,
-) -> Result<Kept<Data>, Stop> {
-    let (Some(simulator), Some(section)) = (Simulator::of(study)?, &study.model) else {
-        return Err(Stop::new("the study has no model to run again")
-            .help("remove `refine` from `[surrogate]`, or add `[model]`"));
-    };
-    let stage = folder(round, Stage::Simulate);
-    let names: Vec<String> = simulate::names(points.rows())
-        .into_iter()
-        .map(|name| format!("refined{round}-{name}"))
-        .collect();
-    let model = (section.built.identity(), &section.common);
-    observer.begin("refine", "run", names.len() as u64);
-    let asked = simulate::Asked::new(&names, points);
-    let made = simulate::kept(study, &simulator, &stage, asked, &model, run, observer)?;
-    observer.end("refine", &format!("{} runs near the posterior", names.len()));
-    let folder = run.stage_folder(&stage);
-    let more = read::ensemble(study, Some(Runs { folder: &folder, made: &made.value }))?;
-    let ensemble = data.value.ensemble.map(|first| joined(first, more));
-    let value = Data { ensemble, ..data.value };
-    let hash = lacuna::run::files::hash(json!([data.hash, made.hash]).to_string().as_bytes());
-    Ok(Kept { value, hash, ..data })
-}
-
-/// Combines the runs of two ensembles.
-fn joined(mut first: Ensemble, second: Ensemble) -> Ensemble {
-    for (point, response) in second.points.iter_rows().zip(second.responses.iter_rows()) {
-        first.points.push_row(point);
-        first.responses.push_row(response);
-    }
-    first.runs.extend(second.runs);
-    first.valid.extend(second.valid);
-    first.failed.extend(second.failed);
-    first
 }

@@ -13,6 +13,7 @@ use serde_json::json;
 pub use self::fitted::{Errors, Fitted};
 use super::emulator_error::{self, Curves};
 use super::idle::Used;
+use super::more_runs::is_inside;
 use super::read::Data;
 use super::{low_fidelity, stream};
 use crate::study::Study;
@@ -97,6 +98,25 @@ impl<'a> Fitting<'a> {
             validation: wanted(runs - validation..runs),
             purpose: Purpose::Study,
         })
+    }
+
+    /// All runs in a region, for training; `near` are the parameters with designs in the region.
+    pub fn inside(
+        study: &Study,
+        ensemble: &Ensemble,
+        region: &[(f64, f64)],
+        near: &'a [Parameter],
+    ) -> Self {
+        let inside = |i: &usize| {
+            is_wanted(study, ensemble, *i) && is_inside(region, ensemble.points.row(*i))
+        };
+        Self {
+            folder: Stage::Surrogate.folder(),
+            parameters: near,
+            training: (0..ensemble.runs.len()).filter(inside).collect(),
+            validation: Vec::new(),
+            purpose: Purpose::Study,
+        }
     }
 }
 

@@ -244,13 +244,32 @@ pub struct Refine {
     #[serde(default = "Refine::rounds")]
     pub rounds: Count,
     /// Stopping criterion: refinement ends when the emulator's error at new runs near the posterior, measured before it
-    /// is trained on them, is at most this fraction of the discrepancy, both as root mean squares over the outputs.
-    /// Default: 0.1.
+    /// is trained on them, is at most this fraction of the discrepancy of one replicate, both as root mean squares over
+    /// the outputs. With `choose = "posterior_variance"` it is a fraction of the discrepancy of the mean of the
+    /// replicates, which is smaller by the square root of their number. Default: 0.1.
     #[serde(default = "Refine::until")]
     pub until: Positive,
+    /// Rule by which the points of the new runs are chosen.
+    #[serde(default)]
+    pub choose: Choose,
     /// Region in which the surrogate is fitted in each round.
     #[serde(default)]
     pub region: Region,
+}
+
+/// Rule by which the points of new runs near the posterior are chosen.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Choose {
+    /// One point after the other, each with the largest product of the emulator's error there and its distance from all
+    /// runs, among draws of the posterior and an even cover of the region.
+    #[default]
+    EmulatorError,
+    /// One point after the other, each with the smallest expected variance of the posterior density that the emulator
+    /// leaves, integrated over the posterior: a run counts by what it will do to the posterior (Sürer, Plumlee and Wild,
+    /// Technometrics 66 (2024) 162). It needs a surrogate that knows the covariance of its errors between points, such
+    /// as `gaussian_process`; for others, and where the emulator's error is negligible, the rule is `emulator_error`.
+    PosteriorVariance,
 }
 
 /// Region in which a refined surrogate is fitted.

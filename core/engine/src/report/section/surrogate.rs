@@ -23,10 +23,10 @@ pub fn section(findings: &Findings, numbers: &mut Numbers) -> Option<Section> {
                 design, is what the calibration feels."
             }
         }
-        @if let Some((rounds, ratio, reached)) = surrogate.refinement {
+        @if let Some((rounds, ratio, of, reached)) = surrogate.refinement {
             p {
                 "Refined in " (count(rounds)) " rounds: near the posterior its error is "
-                b { (significant(ratio, 2)) } " of the discrepancy"
+                b { (significant(ratio, 2)) } " of " (of)
                 @if !reached { ", more than the study wants" } "."
             }
         }

@@ -40,7 +40,8 @@ pub struct Refinement {
     /// Number of rounds.
     pub rounds: usize,
     /// Error of the emulator at the last new runs, before it was trained on them, divided by the standard deviation of
-    /// the discrepancy; both are root mean squares over outputs.
+    /// the discrepancy, with `choose = "posterior_variance"` of that of the replicates' mean; both are root mean squares
+    /// over outputs.
     pub ratio: Quantity,
     /// True if that ratio is as small as the study asks and the posterior is clear of the edges of the region in which
     /// the surrogate was trained.
@@ -59,7 +60,7 @@ pub struct Sobol {
 impl Surrogate {
     pub fn of(findings: &Findings, found: &SurrogateFindings) -> Self {
         let refine =
-            |(rounds, ratio, reached)| Refinement { rounds, ratio: Quantity(ratio), reached };
+            |(rounds, ratio, _, reached)| Refinement { rounds, ratio: Quantity(ratio), reached };
         let sobol = |indices: &Vec<(f64, f64)>| -> ByName<Sobol> {
             let named = findings.parameters.iter().zip(indices);
             named

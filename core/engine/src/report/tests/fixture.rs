@@ -203,7 +203,7 @@ fn surrogate(layout: &Layout) -> SurrogateFindings {
         (value, value + 3.2e-5 * normal(&mut rng))
     });
     SurrogateFindings {
-        refinement: Some((2, 0.08, true)),
+        refinement: Some((2, 0.08, "the discrepancy", true)),
         facts: vec![
             Fact::new("basis", "Legendre, hyperbolic truncation q = 0.75"),
             Fact::new("largest degree", 14),

@@ -68,7 +68,7 @@ pub(super) fn of_emulator(problem: &InverseProblem<'_>) -> Vec<Finding> {
     let unfinished = problem
         .refinement()
         .filter(|r| !r.reached)
-        .map(|r| check::unfinished(r.rounds, r.ratio, r.until, r.clear));
+        .map(|r| check::unfinished(r.rounds, (r.ratio, r.of), r.until, r.clear));
     some([left_out, unfinished])
 }
 

@@ -15,7 +15,7 @@
 mod curves;
 mod factor;
 mod kriging;
-mod noise;
+pub(super) mod noise;
 mod pilot;
 mod size;
 mod taper;

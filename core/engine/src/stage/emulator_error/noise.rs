@@ -20,14 +20,24 @@ pub fn of_mean(
     best: &[f64],
     errors: &Matrix,
 ) -> Result<Vec<f64>, Stop> {
-    let summaries = data.summaries();
     let response = forward.mean(&Matrix::from_rows(best.len(), [best]));
+    of_mean_at(study, data, response.row(0), errors)
+}
+
+/// Like [`of_mean`], with the response of the best fit.
+pub fn of_mean_at(
+    study: &Study,
+    data: &Observations,
+    response: &[f64],
+    errors: &Matrix,
+) -> Result<Vec<f64>, Stop> {
+    let summaries = data.summaries();
     let section =
         study.discrepancy.as_ref().ok_or_else(|| Stop::new("the study has no discrepancy"))?;
     let square = |j: usize| errors.column(j).iter().map(|e| e * e).sum::<f64>();
     let mut all = Vec::with_capacity(summaries.len());
     for (layout, range) in study.layouts.parts() {
-        let (own, part) = (&summaries[range.clone()], &response.row(0)[range.clone()]);
+        let (own, part) = (&summaries[range.clone()], &response[range.clone()]);
         let stated = section.built.plugin.stated_noise(layout, part);
         let freedom: f64 = own.iter().map(|s| (s.count as f64 - 1.0).max(0.0)).sum();
         let scatter: f64 = own.iter().map(|s| s.scatter).sum();

@@ -1,7 +1,7 @@
 //! A weighted sum of emulators as one emulator.
 
 use lacuna::plugin::forward::Linear;
-use lacuna::plugin::surrogate::{FitError, Summand};
+use lacuna::plugin::surrogate::{FitError, Processes, Summand};
 use lacuna::plugin::{Emulator, Fact, Forward, Sensitivity, Surrogate};
 use lacuna::run::Stop;
 use lacuna_linalg::{Matrix, multiply};
@@ -229,6 +229,14 @@ impl Forward for Combined {
 }
 
 impl Emulator for Combined {
+    /// Known for a single emulator in the plugin's own form; the parts of a sum have directions of their own.
+    fn processes(&self) -> Option<&dyn Processes> {
+        match &self.form {
+            Form::One(emulator) => emulator.processes(),
+            Form::Several(_) => None,
+        }
+    }
+
     fn sensitivity(&self) -> Option<Sensitivity> {
         match &self.form {
             Form::One(emulator) => emulator.sensitivity(),

@@ -13,14 +13,21 @@ const CANDIDATES: usize = 40;
 /// Number of nearest runs from which the error at a candidate is estimated.
 const NEIGHBOURS: usize = 5;
 
+/// What new points are sought for.
+pub(super) struct Sought<'a> {
+    /// The emulator so far.
+    pub learned: &'a Emulated,
+    /// Draws of the posterior so far.
+    pub draws: &'a Draws,
+    /// Region of the points.
+    pub place: &'a [(f64, f64)],
+    /// Number of points.
+    pub count: usize,
+}
+
 /// Points in the region, one per row, in the order in which they were chosen.
-pub(super) fn points(
-    learned: &Emulated,
-    draws: &Draws,
-    place: &[(f64, f64)],
-    count: usize,
-    stream: &Stream,
-) -> Result<Matrix, Stop> {
+pub(super) fn points(sought: &Sought<'_>, stream: &Stream) -> Result<Matrix, Stop> {
+    let Sought { learned, draws, place, count } = *sought;
     let candidates = candidates(draws, place, CANDIDATES * count, stream);
     let unit = |point: &[f64]| -> Vec<f64> {
         place.iter().zip(point).map(|(&(low, high), x)| (x - low) / (high - low)).collect()
@@ -43,7 +50,13 @@ pub(super) fn points(
     Ok(chosen)
 }
 
-fn candidates(draws: &Draws, place: &[(f64, f64)], count: usize, stream: &Stream) -> Matrix {
+/// Candidates in the region: draws of the posterior, then an even cover.
+pub(super) fn candidates(
+    draws: &Draws,
+    place: &[(f64, f64)],
+    count: usize,
+    stream: &Stream,
+) -> Matrix {
     let mut points = Matrix::zeros(0, place.len());
     let all = draws.points();
     let half = (count / 2).min(all.rows());
