@@ -15,6 +15,7 @@ pub mod metropolis;
 mod moves;
 pub mod nested;
 pub mod no_u_turn;
+pub mod parallel_tempering;
 mod population;
 mod proposal;
 pub mod sequential_monte_carlo;

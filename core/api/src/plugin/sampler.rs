@@ -56,6 +56,12 @@ pub trait Sampler: Component {
         Ok(None)
     }
 
+    /// Evidence that a method whose steps are draws estimates besides them, from its last state; `None` if it estimates
+    /// none.
+    fn evidence(&self, _state: &State) -> Option<Evidence> {
+        None
+    }
+
     /// Statistics of the last step of each chain: the same ones in the same order for every state, including the one
     /// before the first step. They are stored with the draws.
     fn statistics(&self, _state: &State) -> Vec<Statistic> {

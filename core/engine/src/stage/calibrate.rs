@@ -294,8 +294,9 @@ fn calibrate(
         let (doubts, notes) = (sampler.doubts(&sampled.state), sampler.notes(&sampled.state));
         Diagnosis::of(&kept, plan.ensemble).with_notes(notes).with_doubts(doubts)
     };
-    let (harvested, mut evidence) =
+    let (harvested, evidence) =
         sampled.harvest.map_or_else(Default::default, |h| (h.facts, h.evidence));
+    let mut evidence = evidence.or_else(|| section.built.plugin.evidence(&sampled.state));
     if let Some(evidence) = &mut evidence {
         let (log, error) = posterior.log_share();
         evidence.log += log;
