@@ -214,8 +214,9 @@ fn suspicious(
     ensemble: &Ensemble,
 ) -> Result<Vec<Finding>, Stop> {
     let Some(fitted) = problem.fitted() else { return Ok(Vec::new()) };
-    // With refinement the runs of the last fit are no longer those of the design.
-    let rows: Vec<usize> = if problem.refinement().is_some() {
+    // With runs that follow the data, those of the last fit are not those of the design.
+    let follows = problem.refinement().is_some() || problem.region().is_some();
+    let rows: Vec<usize> = if follows {
         (0..ensemble.runs.len()).filter(|&i| ensemble.valid[i]).collect()
     } else {
         Fitting::of(study, ensemble)?.training
@@ -233,7 +234,7 @@ fn suspicious(
     let scale = Scale::of(study, &raw);
     let points =
         Matrix::from_fn(raw.rows(), own.len(), |i, k| scale.unit(own[k], raw[(i, own[k])]));
-    let left_out = problem.refinement().is_none().then(|| {
+    let left_out = (!follows).then(|| {
         let own: Vec<usize> = (0..rows.len()).collect();
         left_out(&fitted.value, &own, &columns)
     });
