@@ -42,7 +42,8 @@ fn founding() -> Case {
         "use = \"gaussian_process\"",
     );
     quick::replace(&path, "walkers = 24\nsteps = 60", "walkers = 24\nsteps = 600");
-    let direct = vec!["surrogate=false", "design=false", "simulations=false"];
+    let direct =
+        vec!["surrogate=false", "design=false", "simulations=false", "validate.emulator_check=0"];
     Case {
         name: "founding study",
         folder,
