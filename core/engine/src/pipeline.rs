@@ -1,10 +1,11 @@
 //! The program in one file: the stages of a study in order, on each of its three routes.
 //!
 //! A study with a `[target]` samples that density. A study with a `[surrogate]` calibrates with an emulator of its
-//! model, any other with the model itself. The stages after the posterior are the same for both.
+//! model, any other with the model itself. The stages after the posterior are the same for both. A sequential design
+//! repeats simulate and read for each of its batches before the surrogate.
 //!
 //! ```text
-//! emulated  design  simulate (repeated if sequential)  read  surrogate  calibrate (repeated to refine) ┐
+//! emulated  design  simulate  read  surrogate  calibrate (repeated to refine) ┐
 //! direct                      read             calibrate                      ┴ evidence validate quantities reliability assess gap report
 //! target                                       calibrate                        evidence          quantities reliability assess     report
 //! ```

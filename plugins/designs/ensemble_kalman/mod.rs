@@ -32,8 +32,8 @@ use update::{moved, step};
 /// size. Otherwise it is an approximation that serves to place runs, and the posterior is never computed from it.
 ///
 /// The noise of a datum is that of the mean of its replicates: as stated by the data or by `[discrepancy]`, from the
-/// scatter of the replicates, or otherwise the residual of the best run so far. Data are taken as independent of each
-/// other. A run that fails is replaced by a draw from the normal distribution of the others.
+/// scatter of the replicates, but at least the residual of the best run so far, so that data which the model cannot
+/// reproduce do not draw all runs to one point. Data are taken as independent of each other. A run that fails is replaced by a draw from the normal distribution of the others.
 ///
 /// References: Iglesias, Law and Stuart, Inverse Problems 29 (2013) 045001; Iglesias and Yang, Inverse Problems 37
 /// (2021) 025008 (the choice of `h`); Bishop, Etherton and Majumdar, Monthly Weather Review 129 (2001) 420

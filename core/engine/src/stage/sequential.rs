@@ -19,9 +19,6 @@ use crate::study::file::Region;
 const REACH: f64 = 4.0;
 /// Number of runs inside the region for each parameter, if there are as many.
 const RUNS: usize = 10;
-/// Smallest variance of the noise as a fraction of the mean square residual of a batch, so that data without noise do
-/// not stop the ensemble.
-const LEAST: f64 = 1e-8;
 
 /// Makes the further batches of a sequential design, and returns the data with the region of the fit; without such a
 /// design the data as they are.
@@ -34,88 +31,118 @@ pub fn stage(
     let sequential = study.design.as_ref().filter(|section| section.built.plugin.is_sequential());
     let Some(section) = sequential else { return Ok((data, None)) };
     let stream = stream(study, "design");
-    let mut placed = section.common.runs.get();
-    let mut batches: Vec<Batch> = Vec::new();
-    let mut first = 0;
-    loop {
-        batches.push(batch(study, &data.value, first, placed)?);
-        match section.built.plugin.next(&batches, &stream)? {
+    let mut sizes = vec![Size { placed: section.common.runs.get(), first: 0 }];
+    let batches = loop {
+        let batches = batches(study, &data.value, &sizes)?;
+        let scores = match section.built.plugin.next(&batches, &stream)? {
+            Next::Place(scores) => scores,
             Next::Complete(why) => {
                 observer.remark(&format!("sequential design: {why}"));
-                break;
+                break batches;
             }
-            Next::Place(scores) => {
-                let points = Matrix::from_fn(scores.rows(), scores.columns(), |i, j| {
-                    study.parameters[j].design.at_score(scores[(i, j)])
-                });
-                let number = batches.len() + 1;
-                let prefix = format!("batch{number}");
-                let more = More {
-                    folder: Stage::Simulate.part(&format!("batch-{number}")),
-                    prefix: &prefix,
-                    points: &points,
-                    may_fail: true,
-                };
-                (first, placed) = (data.value.runs()?.runs.len(), points.rows());
-                data = more.added(study, data, run, observer)?;
-            }
-        }
-    }
+        };
+        let points = Matrix::from_fn(scores.rows(), scores.columns(), |i, j| {
+            study.parameters[j].design.at_score(scores[(i, j)])
+        });
+        let number = batches.len() + 1;
+        let more = More {
+            folder: Stage::Simulate.part(&format!("batch-{number}")),
+            prefix: &format!("batch{number}"),
+            points: &points,
+            may_fail: true,
+        };
+        sizes.push(Size { placed: points.rows(), first: data.value.runs()?.runs.len() });
+        data = more.added(study, data, run, observer)?;
+    };
     let refine = study.surrogate.as_ref().and_then(|s| s.common.refine.as_ref());
     let whole = refine.is_some_and(|refine| refine.region == Region::Design);
     let place = if whole { None } else { Some(around(study, data.value.runs()?, &batches)) };
     Ok((data, place))
 }
 
-/// The runs from `first` on as a batch.
-fn batch(study: &Study, data: &Data, first: usize, placed: usize) -> Result<Batch, Stop> {
+/// Runs of a batch.
+struct Size {
+    /// Number of runs that were placed.
+    placed: usize,
+    /// Index of the first one in the ensemble.
+    first: usize,
+}
+
+/// All batches so far, compared with the data in units of the noise as it is known now: where it is not stated, the best
+/// run limits it, and the parts of the likelihood that earlier batches took are counted again.
+fn batches(study: &Study, data: &Data, sizes: &[Size]) -> Result<Vec<Batch>, Stop> {
     let measured = data.measured.as_ref();
     let measured = measured.ok_or_else(|| Stop::new("the study has no measurements"))?;
     let ensemble = data.runs()?;
-    let rows: Vec<usize> =
-        (first..ensemble.runs.len()).filter(|&i| is_wanted(study, ensemble, i)).collect();
-    let scores = Matrix::from_fn(rows.len(), study.parameters.len(), |i, j| {
-        study.parameters[j].design.score(ensemble.points[(rows[i], j)])
-    });
-    let residuals = if rows.is_empty() {
-        Matrix::default()
-    } else {
-        residuals(study, measured, &ensemble.responses.select_rows(&rows))?
+    let ends = sizes[1..].iter().map(|size| size.first).chain([ensemble.runs.len()]);
+    let wanted = |(size, end): (&Size, usize)| -> Vec<usize> {
+        (size.first..end).filter(|&i| is_wanted(study, ensemble, i)).collect()
     };
-    Ok(Batch { placed, scores, residuals })
+    let rows: Vec<Vec<usize>> = sizes.iter().zip(ends).map(wanted).collect();
+    let all: Vec<usize> = rows.concat();
+    let scale = Scale::of(study, measured, &ensemble.responses.select_rows(&all))?;
+    let batch = |(size, rows): (&Size, &Vec<usize>)| Batch {
+        placed: size.placed,
+        scores: Matrix::from_fn(rows.len(), study.parameters.len(), |i, j| {
+            study.parameters[j].design.score(ensemble.points[(rows[i], j)])
+        }),
+        residuals: scale.residuals(&ensemble.responses.select_rows(rows)),
+    };
+    Ok(sizes.iter().zip(&rows).map(batch).collect())
 }
 
-/// Differences between responses and the mean of the replicates, in standard deviations of its noise.
-fn residuals(study: &Study, measured: &Measured, responses: &Matrix) -> Result<Matrix, Stop> {
-    let data = &measured.likelihood;
-    let summaries = data.summaries();
-    let outputs: Vec<usize> = (0..summaries.len()).filter(|&i| summaries[i].count > 0).collect();
-    let difference = |row: &[f64], i: usize| row[i] - summaries[i].mean;
-    let size = |row: &[f64]| -> f64 {
+/// What responses are compared with.
+struct Scale {
+    /// Indices of the measured outputs.
+    outputs: Vec<usize>,
+    /// Mean of the replicates for each of them, and standard deviation of its noise.
+    data: Vec<(f64, f64)>,
+}
+
+impl Scale {
+    /// The noise of the mean of the replicates. In each layout it is at least the residual of the best run, so that data
+    /// which the model cannot reproduce do not draw all runs to one point.
+    fn of(study: &Study, measured: &Measured, responses: &Matrix) -> Result<Self, Stop> {
+        let data = &measured.likelihood;
+        let summaries = data.summaries();
+        let outputs: Vec<usize> =
+            (0..summaries.len()).filter(|&i| summaries[i].count > 0).collect();
+        let difference = |row: &[f64], i: usize| row[i] - summaries[i].mean;
+        // Mean square residual of each layout with its number of data.
+        let squares = |row: &[f64]| -> Vec<(f64, f64)> {
+            let part = |range: std::ops::Range<usize>| {
+                let own = range.filter(|&i| summaries[i].count > 0);
+                let own: Vec<f64> = own.map(|i| difference(row, i).powi(2)).collect();
+                if own.is_empty() { (0.0, 0.0) } else { (moments::mean(&own), own.len() as f64) }
+            };
+            study.layouts.parts().map(|(_, range)| part(range)).collect()
+        };
         // The likelihood of independent normal data of unknown variance in each layout.
-        let parts = study.layouts.parts().map(|(_, range)| {
-            let own: Vec<f64> = range
-                .filter(|&i| summaries[i].count > 0)
-                .map(|i| difference(row, i).powi(2))
-                .collect();
-            if own.is_empty() { 0.0 } else { own.len() as f64 * moments::mean(&own).ln() }
-        });
-        parts.sum()
-    };
-    let sizes: Vec<f64> = responses.iter_rows().map(size).collect();
-    let best = (0..sizes.len()).reduce(|a, b| if sizes[b] < sizes[a] { b } else { a });
-    let best = responses.row(best.unwrap_or(0));
-    let unknown = Matrix::zeros(0, summaries.len());
-    let noise = noise::of_mean_at(study, data, best, &unknown)?;
-    let squares: Vec<f64> = responses
-        .iter_rows()
-        .flat_map(|row| outputs.iter().map(|&i| difference(row, i).powi(2)).collect::<Vec<_>>())
-        .collect();
-    let least = (LEAST * moments::mean(&squares)).max(f64::MIN_POSITIVE);
-    Ok(Matrix::from_fn(responses.rows(), outputs.len(), |r, k| {
-        let i = outputs[k];
-        difference(responses.row(r), i) / noise[i].max(least).sqrt()
-    }))
+        let size = |row: &[f64]| -> f64 {
+            let parts = squares(row).into_iter().filter(|(_, count)| *count > 0.0);
+            parts.map(|(square, count)| count * square.max(f64::MIN_POSITIVE).ln()).sum()
+        };
+        let sizes: Vec<f64> = responses.iter_rows().map(size).collect();
+        let best = (0..sizes.len()).reduce(|a, b| if sizes[b] < sizes[a] { b } else { a });
+        let best = best.ok_or_else(|| Stop::new("no run of the first batch has a response"))?;
+        let best = responses.row(best);
+        let noise = noise::of_mean_at(study, data, best, &Matrix::zeros(0, summaries.len()))?;
+        let mut least = vec![0.0; summaries.len()];
+        for ((_, range), (square, _)) in study.layouts.parts().zip(squares(best)) {
+            range.for_each(|i| least[i] = square);
+        }
+        let one =
+            |&i: &usize| (summaries[i].mean, noise[i].max(least[i]).max(f64::MIN_POSITIVE).sqrt());
+        Ok(Self { data: outputs.iter().map(one).collect(), outputs })
+    }
+
+    /// Differences between responses and data in standard deviations of the noise, `runs x data`.
+    fn residuals(&self, responses: &Matrix) -> Matrix {
+        Matrix::from_fn(responses.rows(), self.outputs.len(), |r, k| {
+            let (mean, sd) = self.data[k];
+            (responses[(r, self.outputs[k])] - mean) / sd
+        })
+    }
 }
 
 /// Region around the last batch: wide enough for the posterior, and for enough runs to fit an emulator to.
