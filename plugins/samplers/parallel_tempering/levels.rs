@@ -22,19 +22,19 @@ pub struct Levels {
     points: Vec<f64>,
     /// Log prior density of each walker.
     pub log_prior: Vec<f64>,
-    /// Log-likelihood of each walker; the smallest number where it is zero, because files have no infinity.
-    log_likelihood: Vec<f64>,
+    /// Log density of each walker, prior times likelihood; the smallest number where it is zero, because files have no
+    /// infinity.
+    pub log_density: Vec<f64>,
 }
 
 impl Levels {
     /// Walkers of one temperature.
     pub fn new(points: &Matrix, log_density: &[f64], log_prior: &[f64]) -> Self {
-        let likelihood = |(density, prior): (&f64, &f64)| finite(density - prior);
         Self {
             walkers: points.rows(),
             points: points.as_slice().to_vec(),
             log_prior: log_prior.to_vec(),
-            log_likelihood: log_density.iter().zip(log_prior).map(likelihood).collect(),
+            log_density: log_density.iter().map(|density| finite(*density)).collect(),
         }
     }
 
@@ -44,7 +44,7 @@ impl Levels {
             walkers: self.walkers,
             points: self.points.repeat(count),
             log_prior: self.log_prior.repeat(count),
-            log_likelihood: self.log_likelihood.repeat(count),
+            log_density: self.log_density.repeat(count),
         }
     }
 
@@ -52,7 +52,7 @@ impl Levels {
     pub fn append(&mut self, others: &Self) {
         self.points.extend(&others.points);
         self.log_prior.extend(&others.log_prior);
-        self.log_likelihood.extend(&others.log_likelihood);
+        self.log_density.extend(&others.log_density);
     }
 
     /// Takes the walkers of the first temperature out.
@@ -60,12 +60,12 @@ impl Levels {
         let d = self.dimension();
         let rest = self.points.split_off(self.walkers * d);
         let prior = self.log_prior.split_off(self.walkers);
-        let likelihood = self.log_likelihood.split_off(self.walkers);
+        let density = self.log_density.split_off(self.walkers);
         Self {
             walkers: self.walkers,
             points: std::mem::replace(&mut self.points, rest),
             log_prior: std::mem::replace(&mut self.log_prior, prior),
-            log_likelihood: std::mem::replace(&mut self.log_likelihood, likelihood),
+            log_density: std::mem::replace(&mut self.log_density, density),
         }
     }
 
@@ -74,14 +74,15 @@ impl Levels {
         Matrix::from_vec(self.log_prior.len(), self.dimension(), self.points.clone())
     }
 
-    /// Log density of each walker: prior times likelihood.
-    pub fn log_density(&self) -> Vec<f64> {
-        self.log_prior.iter().zip(&self.log_likelihood).map(|(p, l)| p + l).collect()
+    /// Log-likelihoods of the walkers of one temperature.
+    pub fn of_level(&self, level: usize) -> Vec<f64> {
+        let walkers = level * self.walkers..(level + 1) * self.walkers;
+        walkers.map(|walker| self.log_likelihood(walker)).collect()
     }
 
-    /// Log-likelihoods of the walkers of one temperature.
-    pub fn of_level(&self, level: usize) -> &[f64] {
-        &self.log_likelihood[level * self.walkers..(level + 1) * self.walkers]
+    fn log_likelihood(&self, walker: usize) -> f64 {
+        let density = self.log_density[walker];
+        if density > f64::MIN { density - self.log_prior[walker] } else { f64::MIN }
     }
 
     fn dimension(&self) -> usize {
@@ -97,7 +98,7 @@ impl Levels {
         let d = self.dimension();
         self.points[walker * d..(walker + 1) * d].copy_from_slice(from.points.row(row));
         self.log_prior[walker] = from.log_prior[row];
-        self.log_likelihood[walker] = finite(from.log_likelihood(row));
+        self.log_density[walker] = finite(from.log_density[row]);
     }
 
     /// Moves all walkers once; returns the number of evaluations. The temperatures are evaluated together.
@@ -126,7 +127,7 @@ impl Levels {
                 let (level, i) = (row / half, row % half);
                 let walker = level * self.walkers + from + i;
                 let likelihood = tried.log_likelihood(row);
-                let gain = powers[level] * (likelihood - self.log_likelihood[walker]);
+                let gain = powers[level] * (likelihood - self.log_likelihood(walker));
                 let ratio = factors[row] + tried.log_prior[row] - self.log_prior[walker] + gain;
                 if likelihood.is_finite() && decision < ratio {
                     self.put(walker, &tried, row);
@@ -177,7 +178,7 @@ impl Levels {
             let mut count = 0;
             for (i, partner) in partners.into_iter().enumerate() {
                 let (a, b) = ((hot - 1) * self.walkers + i, hot * self.walkers + partner);
-                let gain = self.log_likelihood[b] - self.log_likelihood[a];
+                let gain = self.log_likelihood(b) - self.log_likelihood(a);
                 if uniform(&mut rng).ln() < (powers[hot - 1] - powers[hot]) * gain {
                     self.swap(a, b);
                     count += 1;
@@ -192,7 +193,7 @@ impl Levels {
         let d = self.dimension();
         (0..d).for_each(|k| self.points.swap(a * d + k, b * d + k));
         self.log_prior.swap(a, b);
-        self.log_likelihood.swap(a, b);
+        self.log_density.swap(a, b);
     }
 }
 

@@ -141,7 +141,7 @@ impl Sampler for ParallelTempering {
         }
         memory.steps += 1;
         let cold = all.take_first();
-        (state.points, state.log_density) = (cold.matrix(), cold.log_density());
+        (state.points, state.log_density) = (cold.matrix(), cold.log_density);
         memory.log_prior = cold.log_prior;
         memory.hot = all;
         let moved = (0..self.walkers).map(|i| state.points.row(i) != before.row(i));

@@ -58,7 +58,6 @@ fn evidences_are_the_known_ones_within_their_errors() {
         [("two data", two_data()), ("regression", regression()), ("shells", shells(2))]
     {
         let found = calibration(&with(1100), &target, 20);
-        println!("{name}: {found:?}");
         found.assert_close(name);
     }
 }

@@ -85,7 +85,7 @@ impl<'a> Ground<'a> {
             return Err(Stop::new(
                 "the runs of a sequential design lie near the posterior of the study's own data, not near other truths",
             )
-            .help("count the coverage of a copy of the study with another design, such as `latin_hypercube`"));
+            .help("count the coverage of a copy of the study with a design that does not follow the data"));
         }
         let base = match study.surrogate {
             Some(_) => Base::Emulated(vec![emulate(study, run, observer)?]),

@@ -88,7 +88,7 @@ pub struct Refinement {
     /// Ratio of the emulator's error at the last new runs, before it was trained on them, to the discrepancy: root mean
     /// squares over the outputs.
     pub ratio: f64,
-    /// What the error is compared with, in words.
+    /// Name of the size that the error is compared with.
     pub of: &'static str,
     /// Ratio that the study requests.
     pub until: f64,
@@ -121,7 +121,7 @@ fn kept(calibrated: &Kept<Calibrated>) -> Draws {
 }
 
 impl Choose {
-    /// What the emulator's error is compared with, in words.
+    /// Name of the size that the emulator's error is compared with.
     fn measured_by(self) -> &'static str {
         match self {
             Self::EmulatorError => "the discrepancy",

@@ -91,7 +91,7 @@ fn batches(study: &Study, data: &Data, sizes: &[Size]) -> Result<Vec<Batch>, Sto
     Ok(sizes.iter().zip(&rows).map(batch).collect())
 }
 
-/// What responses are compared with.
+/// Data that responses are compared with, in units of their noise.
 struct Scale {
     /// Indices of the measured outputs.
     outputs: Vec<usize>,

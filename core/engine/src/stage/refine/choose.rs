@@ -13,7 +13,7 @@ const CANDIDATES: usize = 40;
 /// Number of nearest runs from which the error at a candidate is estimated.
 const NEIGHBOURS: usize = 5;
 
-/// What new points are sought for.
+/// Problem of placing new points.
 pub(super) struct Sought<'a> {
     /// The emulator so far.
     pub learned: &'a Emulated,
