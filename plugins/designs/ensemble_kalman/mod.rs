@@ -22,12 +22,13 @@ use update::{moved, step};
 /// Use it if only a few hundred runs can be paid, or if the priors are so wide that a design over all of them would
 /// have hardly any run near the posterior. `runs` is the size of one batch (the ensemble): several times the number of
 /// parameters, at least 20 as a rule. The first batch is a Latin hypercube. The number of batches follows from the
-/// data, usually 4 to 10, and is at most `iterations` more than the first. The surrogate is then fitted to the runs of
+/// data, usually 3 to 7, and is at most `iterations` more than the first. The surrogate is then fitted to the runs of
 /// all batches inside a box around the last one, and the posterior is sampled inside that box; `refine` of
 /// `[surrogate]` goes on from there (calibrate, emulate, sample).
 ///
 /// Each batch multiplies its law by a part of the likelihood, `likelihood^h`; `h` is chosen from the misfits so that no
-/// batch moves too far, and the batches end if the parts add up to the whole likelihood. For a linear model with normal
+/// batch moves too far, larger only if the whole likelihood would otherwise not be reached within `iterations`; the
+/// batches end if the parts add up to it. For a linear model with normal
 /// errors and priors the last batch has the mean and covariance of the posterior, up to the error of a sample of its
 /// size. Otherwise it is an approximation that serves to place runs, and the posterior is never computed from it.
 ///
@@ -42,7 +43,7 @@ use update::{moved, step};
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EnsembleKalman {
-    /// Maximum number of batches after the first.
+    /// Maximum number of batches after the first. More of them move in smaller steps if the misfits are large.
     pub iterations: usize,
     /// Update of the ensemble.
     pub update: Update,
@@ -63,7 +64,7 @@ pub enum Update {
 
 impl Default for EnsembleKalman {
     fn default() -> Self {
-        Self { iterations: 12, update: Update::default() }
+        Self { iterations: 6, update: Update::default() }
     }
 }
 
@@ -108,19 +109,17 @@ impl Design for EnsembleKalman {
             .help("look at the reasons of the failures in the table of the runs, or narrow the `design`"));
         }
         let mut time = 0.0;
-        for batch in &batches[..batches.len() - 1] {
-            time += step(&batch.residuals, time);
+        let count = batches.len();
+        let left = |k: usize| self.iterations.saturating_sub(k);
+        for (k, batch) in batches[..count - 1].iter().enumerate() {
+            time += step(&batch.residuals, time, left(k));
         }
-        let (done, count) = (time >= 1.0 - 1e-12, batches.len());
-        if done {
-            return Ok(Next::Complete(format!("{count} batches, with the whole likelihood")));
-        }
-        if count > self.iterations {
-            let text = format!("{count} batches, with the likelihood to the power {time:.3} only");
-            return Ok(Next::Complete(text));
+        if time >= 1.0 - 1e-12 || count > self.iterations {
+            return Ok(Next::Complete(format!("{count} batches")));
         }
         let own = stream.named("batch").at(count as u64);
-        moved(last, step(&last.residuals, time), self.update, &own).map(Next::Place)
+        moved(last, step(&last.residuals, time, left(count - 1)), self.update, &own)
+            .map(Next::Place)
     }
 }
 

@@ -105,12 +105,18 @@ fn the_steps_end_with_the_whole_likelihood() {
     assert_eq!(all.len(), 2);
     let mut time = 0.0;
     let far = batches(&design, 20, 2, &|z| vec![30.0 * z[0] - 60.0, 20.0 * z[1] + z[0]]);
-    for batch in &far[..far.len() - 1] {
-        let step = super::step(&batch.residuals, time);
+    for (k, batch) in far[..far.len() - 1].iter().enumerate() {
+        let step = super::step(&batch.residuals, time, 6 - k);
         assert!(step > 0.0);
         time += step;
     }
     assert!((time - 1.0).abs() < 1e-12 && far.len() > 3, "{time}, {} batches", far.len());
+    // The number of batches is limited, and the whole likelihood is reached nevertheless.
+    let design = EnsembleKalman { iterations: 2, ..EnsembleKalman::default() };
+    let few = batches(&design, 20, 2, &|z| vec![30.0 * z[0] - 60.0, 20.0 * z[1] + z[0]]);
+    let all: f64 = super::step(&few[0].residuals, 0.0, 2);
+    assert_eq!(few.len(), 3);
+    assert_eq!(all + super::step(&few[1].residuals, all, 1), 1.0);
 }
 
 /// Huang, Huang, Reich and Stuart, Inverse Problems 38 (2022) 125006, section 5.2: the linear problems with two

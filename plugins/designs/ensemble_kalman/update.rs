@@ -17,18 +17,22 @@ const LARGEST: f64 = 6.0;
 
 /// Share of the likelihood of the next step, at most what is left of it: with the misfits `phi = |residuals|^2 / 2` of
 /// the runs and `m` data, `max(m / (2 mean phi), sqrt(m / (2 var phi)))` (Iglesias and Yang 2021, section 3).
-pub fn step(residuals: &Matrix, time: f64) -> f64 {
+///
+/// With `steps` left the time grows at least by the factor that reaches 1 with equal factors.
+pub fn step(residuals: &Matrix, time: f64, steps: usize) -> f64 {
     let misfits: Vec<f64> = residuals.iter_rows().map(|row| 0.5 * dot(row, row)).collect();
     let data = residuals.columns() as f64;
     let by_mean = data / (2.0 * moments::mean(&misfits));
     let by_variance = (data / (2.0 * moments::variance(&misfits))).sqrt();
     let left = 1.0 - time;
+    let least = match steps {
+        0 | 1 => left,
+        _ if time > 0.0 => time * (time.powf(-1.0 / steps as f64) - 1.0),
+        _ => 0.0,
+    };
     // Runs without any misfit give no finite number: nothing limits the step.
-    [by_mean, by_variance]
-        .into_iter()
-        .filter(|h| h.is_finite())
-        .reduce(f64::max)
-        .map_or(left, |h| h.min(left))
+    let sizes = [by_mean, by_variance].into_iter().filter(|h| h.is_finite());
+    sizes.reduce(f64::max).map_or(left, |h| h.max(least).min(left))
 }
 
 /// Scores of the next batch after a step `h`, of as many runs as the last one placed.

@@ -164,7 +164,8 @@ fn around(study: &Study, ensemble: &Ensemble, batches: &[Batch]) -> Intervals {
         };
         study.parameters.iter().zip(&laws).map(interval).collect()
     };
-    let wanted = (RUNS * study.parameters.len()).max(batches.last().map_or(0, |b| b.placed));
+    // An ensemble that is too small states too narrow a law: half of all runs are inside in any case.
+    let wanted = (RUNS * study.parameters.len()).max(points.len().div_ceil(2));
     let mut reach = REACH;
     loop {
         let region = place(reach);
