@@ -71,12 +71,11 @@ impl Default for EnsembleKalman {
 impl Component for EnsembleKalman {
     fn check(&self, context: &Context<'_>, complaints: &mut Complaints<'_>) {
         let least = context.parameters.len() + 2;
-        if let Some(runs) = context.runs.filter(|runs| *runs < least) {
+        if context.runs.is_some_and(|runs| runs < least) {
             complaints
                 .at("runs")
                 .say("the ensemble is too small for the number of parameters")
-                .expected(format!("at least {least}, better several times as many"))
-                .found(runs);
+                .expected(format!("at least {least}, better several times as many"));
         }
         if self.iterations == 0 {
             complaints

@@ -144,7 +144,7 @@ impl Linear for Widened {
 
 impl Processes for Widened {
     fn directions(&self) -> Matrix {
-        self.emulator.processes().map_or_else(Matrix::default, |inner| inner.directions())
+        self.emulator.processes().map_or_else(Matrix::default, Processes::directions)
     }
 
     fn covariances(&self, points: &Matrix) -> Vec<Matrix> {
@@ -153,7 +153,7 @@ impl Processes for Widened {
     }
 
     fn noise(&self) -> Vec<f64> {
-        self.emulator.processes().map_or_else(Vec::new, |inner| inner.noise())
+        self.emulator.processes().map_or_else(Vec::new, Processes::noise)
     }
 }
 

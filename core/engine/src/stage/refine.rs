@@ -211,7 +211,8 @@ fn prior_range(study: &Study) -> Intervals {
 /// A posterior from a poor emulator does not justify a small region, however narrow it is.
 fn about(study: &Study, draws: &Draws, base: &[(f64, f64)], halvings: i32) -> Intervals {
     let middle = middle(draws, study.parameters.len());
-    let boxed = |((p, (from, to)), &(first, last)): ((&Parameter, (f64, f64)), &(f64, f64))| {
+    let boxed = |(j, p): (usize, &Parameter)| {
+        let ((from, to), (first, last)) = (middle[j], base[j]);
         let (lowest, highest) = bounds(p);
         let half = (to - from).max(0.5 * (last - first) * 0.5_f64.powi(halvings));
         let (low, high) = (0.5 * (from + to) - half, 0.5 * (from + to) + half);
@@ -219,7 +220,7 @@ fn about(study: &Study, draws: &Draws, base: &[(f64, f64)], halvings: i32) -> In
         let shift = (lowest - low).max(0.0) - (high - highest).max(0.0);
         ((low + shift).max(lowest), (high + shift).min(highest))
     };
-    study.parameters.iter().zip(middle).zip(base).map(boxed).collect()
+    study.parameters.iter().enumerate().map(boxed).collect()
 }
 
 /// One round: new runs, and a new fit of the surrogate. Also returns the root mean square error of the previous

@@ -117,7 +117,9 @@ impl State {
         }
         // Only differences between the references matter.
         let least = outside.iter().copied().fold(f64::INFINITY, f64::min);
-        outside.iter_mut().for_each(|o| *o -= least);
+        for part in &mut outside {
+            *part -= least;
+        }
         let noise = processes.noise();
         Ok(Some(Self {
             covariances: counted.iter().map(|&k| covariances[k].clone()).collect(),
