@@ -7,7 +7,7 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::path::PathBuf;
+use std::path::Path;
 
 use lacuna::math::moments;
 use lacuna::run::Silent;
@@ -143,7 +143,7 @@ fn cases() -> Vec<Case> {
 }
 
 /// Draws of the posterior of the model itself.
-fn direct(path: &PathBuf, settings: &[&str], out: &PathBuf) -> Vec<Vec<f64>> {
+fn direct(path: &Path, settings: &[&str], out: &Path) -> Vec<Vec<f64>> {
     let study = quick::load(path, settings);
     let mut run = RunDirectory::open(out).unwrap();
     let direct = Direct::of(&study, &mut run, &Silent).unwrap();

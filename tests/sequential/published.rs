@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::path::PathBuf;
+use std::path::Path;
 
 use lacuna::run::Silent;
 use lacuna_engine::pipeline;
@@ -113,7 +113,7 @@ impl Problem {
 }
 
 /// Draws of each parameter, and the number of runs made.
-pub fn draws(path: &PathBuf, settings: &[&str], out: &PathBuf) -> (Vec<Vec<f64>>, usize) {
+pub fn draws(path: &Path, settings: &[&str], out: &Path) -> (Vec<Vec<f64>>, usize) {
     let study = quick::load(path, settings);
     let mut run = RunDirectory::open(out).unwrap();
     let (emulated, kept) = pipeline::calibrate_emulated(&study, &mut run, &Silent).unwrap();

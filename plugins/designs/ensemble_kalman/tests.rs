@@ -80,9 +80,9 @@ fn a_linear_model_ends_at_the_kalman_posterior() {
 /// allowed 4 such standard errors, a variance 4 times `sqrt(2 / runs)` of itself.
 #[test]
 fn perturbed_data_end_at_the_kalman_posterior_up_to_the_ensemble_error() {
+    const RUNS: usize = 2000;
     let (a, y) = linear();
     let design = EnsembleKalman { update: Update::PerturbedData, ..EnsembleKalman::default() };
-    const RUNS: usize = 2000;
     let all = batches(&design, RUNS, 3, &|z| residual(&a, &y, z));
     let unit = Matrix::from_fn(3, 3, |i, j| f64::from(u8::from(i == j)));
     let (mean, covariance) = kalman(&a, &y, &[0.0; 3], &unit);
