@@ -2,6 +2,7 @@
 
 pub mod autoregressive;
 pub mod common;
+pub mod constrained_gaussian_process;
 pub mod gaussian;
 pub mod gaussian_process;
 pub mod multiplicative_gaussian;

@@ -1,6 +1,8 @@
 //! Parts shared by the discrepancies: groups of outputs, known or unknown numbers, replicates, and the normal density
 //! with errors common to all replicates.
 
+mod correlation;
+mod dense;
 mod groups;
 mod noise;
 mod normal;
@@ -9,6 +11,8 @@ mod replicates;
 mod series;
 mod unknown;
 
+pub use correlation::{Correlation, Functional};
+pub use dense::{Dense, DenseSolved};
 pub use groups::{AxisWindows, By, Division, Groups};
 pub use noise::{Noise, Setting, part, start};
 pub use normal::{Normal, conditional, values};
