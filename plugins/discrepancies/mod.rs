@@ -3,9 +3,11 @@
 pub mod autoregressive;
 pub mod common;
 pub mod constrained_gaussian_process;
+pub mod embedded;
 pub mod gaussian;
 pub mod gaussian_process;
 pub mod multiplicative_gaussian;
+pub mod scaled_gaussian_process;
 pub mod student_t;
 
 #[cfg(test)]

@@ -181,7 +181,7 @@ fn discrepancy(_: &str, discrepancy: &dyn Discrepancy, bits: &mut Bits) {
     let factor = Matrix::from_fn(16, 2, |_, _| 0.05 * normal(&mut rng));
     let common = [CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }];
     let slopes = || Ok(Matrix::from_fn(16, 2, |i, j| (0.3 * i as f64 + j as f64).cos()));
-    let known = Known { data: &data, common: &common, slopes: &slopes };
+    let known = Known { data: &data, common: &common, slopes: &slopes, parameters: &[] };
     let likelihood = discrepancy.likelihood(&known).unwrap();
     let hyper: Vec<f64> = likelihood.hyperparameters().iter().map(|h| h.start).collect();
     let y = response(0.05);

@@ -123,7 +123,7 @@ fn likelihood(discrepancy: &dyn Discrepancy, data: &Measurements) -> Box<dyn Lik
         predictive: true,
     };
     let slopes = || Ok(Line::default().jacobian(&[]));
-    let known = Known { data, common: &[emulator], slopes: &slopes };
+    let known = Known { data, common: &[emulator], slopes: &slopes, parameters: &[] };
     discrepancy.likelihood(&known).unwrap_or_else(|stop| panic!("{stop}"))
 }
 

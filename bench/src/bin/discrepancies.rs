@@ -36,7 +36,7 @@ fn main() -> Fallible<()> {
     let error = [CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }];
     let slopes = || Ok(random(OUTPUTS, 3, 1.0, 3));
     let common = if rank > 0 { &error[..] } else { &[] };
-    let known = Known { data: &data, common, slopes: &slopes };
+    let known = Known { data: &data, common, slopes: &slopes, parameters: &[] };
     for (name, options) in cases() {
         let title = format!("{name}: {}", options.replace('\n', ", "));
         if title.contains(&word) {

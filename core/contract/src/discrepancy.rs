@@ -1,6 +1,9 @@
 //! Contract of discrepancies.
 
-use lacuna::data::{Measurements, Replicate};
+use std::sync::OnceLock;
+
+use lacuna::data::{Measurements, Parameter, Replicate};
+use lacuna::math::distribution::Distribution;
 use lacuna::math::random::{Stream, normal};
 use lacuna::plugin::Discrepancy;
 use lacuna::plugin::discrepancy::{CommonError, ErrorPath, Known, Likelihood, VariancePart};
@@ -24,6 +27,8 @@ use crate::judge::{Check, agree, calm, judge, layout, refused, slope, twice};
 ///   five Monte Carlo errors.
 /// - The errors of a new replicate are those of its predicted variance: one path for each origin, with that variance within
 ///   five Monte Carlo errors, and the same from the same stream.
+/// - The errors given the data, if that form is implemented, are finite, one path for each origin, and the same from the
+///   same stream.
 /// - Slopes of the model that are not available do not cause a panic.
 /// - Data without values, with non-finite values or of another layout are rejected.
 pub fn discrepancy(name: &str, discrepancy: &dyn Discrepancy) -> Result<(), Vec<String>> {
@@ -39,7 +44,7 @@ pub fn discrepancy(name: &str, discrepancy: &dyn Discrepancy) -> Result<(), Vec<
     };
     // An error of the data's mean concerns existing data, not a new replicate.
     let (of_data, of_model) = (|| common("replicates", false), || common("numerics", true));
-    let checks: [Check<'_>; 9] = [
+    let checks: [Check<'_>; 10] = [
         ("has sound hyperparameters", Box::new(over(has_sound_hyperparameters, of_data()))),
         ("judges responses", Box::new(over(judges_responses, of_data()))),
         ("knows its derivatives", Box::new(over(knows_its_derivatives, of_data()))),
@@ -48,6 +53,7 @@ pub fn discrepancy(name: &str, discrepancy: &dyn Discrepancy) -> Result<(), Vec<
         ("compresses exactly", Box::new(over(compresses_exactly, of_data()))),
         ("simulates what it predicts", Box::new(over(simulates_what_it_predicts, of_model()))),
         ("draws the errors it predicts", Box::new(over(draws_the_errors_it_predicts, of_model()))),
+        ("draws errors given the data", Box::new(over(draws_errors_given_the_data, of_model()))),
         ("refuses bad data", Box::new(|| refuses_bad_data(discrepancy))),
     ];
     judge("discrepancy", name, &checks)
@@ -87,8 +93,16 @@ fn slopes() -> Result<Matrix, Stop> {
     Ok(Matrix::from_fn(OUTPUTS, 2, |i, j| (0.3 * i as f64).cos() / (1.0 + 100.0 * j as f64)))
 }
 
+/// The parameters of the slopes.
+fn parameters() -> &'static [Parameter] {
+    static BOTH: OnceLock<[Parameter; 2]> = OnceLock::new();
+    BOTH.get_or_init(|| {
+        ["first", "second"].map(|name| Parameter::plain(name, Distribution::Normal([0.0, 2.0])))
+    })
+}
+
 fn known<'a>(data: &'a Measurements, common: &'a [CommonError]) -> Known<'a> {
-    Known { data, common, slopes: &slopes }
+    Known { data, common, slopes: &slopes, parameters: parameters() }
 }
 
 fn start(likelihood: &dyn Likelihood) -> Vec<f64> {
@@ -344,6 +358,25 @@ fn draws_the_errors_it_predicts(likelihood: &dyn Likelihood) -> Result<(), Strin
                 "`{origin}`, output {output}: predicted {predicted}, drawn {mean}"
             ));
         }
+    }
+    Ok(())
+}
+
+fn draws_errors_given_the_data(likelihood: &dyn Likelihood) -> Result<(), String> {
+    let (truth, start) = (truth(), start(likelihood));
+    let parts = likelihood.predictive(&truth, &start);
+    let draw = |k| likelihood.errors_given_data(&truth, &start, &Stream::root(13).at(k));
+    let Some(paths) = draw(0) else { return Ok(()) };
+    if draw(0).as_ref() != Some(&paths) {
+        return Err("the same stream gives other errors".into());
+    }
+    let same = |(path, part): (&ErrorPath, &VariancePart)| {
+        path.origin == part.origin
+            && path.values.len() == OUTPUTS
+            && path.values.iter().all(|e| e.is_finite())
+    };
+    if paths.len() != parts.len() || !paths.iter().zip(&parts).all(same) {
+        return Err("the errors are not finite, one for each origin of the variance".into());
     }
     Ok(())
 }

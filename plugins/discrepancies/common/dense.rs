@@ -6,8 +6,8 @@
 use std::f64::consts::TAU;
 
 use lacuna::data::Measurements;
-use lacuna_linalg::vector::dot;
-use lacuna_linalg::{Cholesky, Matrix};
+use lacuna_linalg::vector::{add_scaled, dot};
+use lacuna_linalg::{Cholesky, Matrix, gram, multiply_vector};
 
 use super::{Noise, Replicates, conditional, values};
 
@@ -105,6 +105,16 @@ impl Dense {
 }
 
 impl DenseSolved {
+    /// Replaces mean and covariance of a normal vector by those given the data; `cross` is its covariance with the means
+    /// of the measured outputs (`size x measured`).
+    pub fn condition(&self, cross: &Matrix, mean: &mut [f64], covariance: &mut Matrix) {
+        add_scaled(mean, 1.0, &multiply_vector(cross, &self.pull));
+        let white = self.cholesky.whiten_matrix(&cross.transposed());
+        let taken = gram(&white);
+        let entries = covariance.as_mut_slice().iter_mut().zip(taken.as_slice());
+        entries.for_each(|(c, t)| *c -= t);
+    }
+
     /// Returns the derivative of the log density with respect to the covariance: `(V^-1 d d' V^-1 - V^-1) / 2`.
     pub fn by_covariance(&self) -> Matrix {
         let mut by = self.cholesky.inverse();

@@ -1,6 +1,7 @@
 //! Parts shared by the discrepancies: groups of outputs, known or unknown numbers, replicates, and the normal density
 //! with errors common to all replicates.
 
+mod biased;
 mod correlation;
 mod dense;
 mod groups;
@@ -11,6 +12,7 @@ mod replicates;
 mod series;
 mod unknown;
 
+pub use biased::{Bias, Biased, normal_draw};
 pub use correlation::{Correlation, Functional};
 pub use dense::{Dense, DenseSolved};
 pub use groups::{AxisWindows, By, Division, Groups};

@@ -1,12 +1,13 @@
 //! Mean square and draws of the bias under its prior.
 
 use lacuna::math::moments::log_sum;
-use lacuna::math::random::{Stream, normal, uniform};
+use lacuna::math::random::{Stream, uniform};
 use lacuna_linalg::vector::dot;
-use lacuna_linalg::{Cholesky, Matrix, multiply, symmetric_eigen};
+use lacuna_linalg::{Cholesky, Matrix, multiply};
 
 use super::orthant::{mean_squares, points, random_points};
-use super::prior::{Joint, Prior};
+use super::prior::Prior;
+use crate::discrepancies::common::normal_draw;
 
 /// Number of proposals from which a draw of the functionals is taken, with the probabilities of their weights.
 const PROPOSALS: usize = 256;
@@ -23,13 +24,15 @@ struct Split {
 }
 
 impl Split {
-    fn of(joint: &Joint, places: usize) -> Option<Self> {
-        let (mean, own) = joint.conditions(places);
+    fn of(mean: &[f64], covariance: &Matrix, places: usize) -> Option<Self> {
+        let mean = &mean[places..];
+        let m = mean.len();
+        let own = Matrix::from_fn(m, m, |a, b| covariance[(places + a, places + b)]);
         let cholesky = Cholesky::new(&own).ok()?;
-        let cross = Matrix::from_fn(mean.len(), places, |k, i| joint.covariance[(places + k, i)]);
+        let cross = Matrix::from_fn(m, places, |k, i| covariance[(places + k, i)]);
         let map = cholesky.solve_matrix(&cross).transposed();
         let taken = multiply(&map, &cross);
-        let rest = Matrix::from_fn(places, places, |i, j| joint.covariance[(i, j)] - taken[(i, j)]);
+        let rest = Matrix::from_fn(places, places, |i, j| covariance[(i, j)] - taken[(i, j)]);
         Some(Self { mean: mean.to_vec(), cholesky, map, rest })
     }
 }
@@ -61,7 +64,7 @@ impl Prior {
             let one = |i: usize| joint.covariance[(i, i)].max(0.0) + joint.mean[i].powi(2);
             return Some((0..n).map(one).collect());
         }
-        let split = Split::of(&joint, n)?;
+        let split = Split::of(&joint.mean, &joint.covariance, n)?;
         let drawn = points(&split.mean, &split.cholesky);
         let squares = mean_squares(&drawn, &split.mean, &split.map, &joint.mean[..n]);
         Some(squares.iter().enumerate().map(|(i, s)| s + split.rest[(i, i)].max(0.0)).collect())
@@ -81,29 +84,34 @@ impl Prior {
 
     fn draw_series(&self, values: (f64, f64), stream: &Stream) -> Option<Vec<f64>> {
         let joint = self.joint(&self.grid, values)?;
-        let n = self.grid.len();
-        let split = Split::of(&joint, n)?;
-        let mut rng = stream.generator();
-        let mut moved = vec![0.0; self.conditions()];
-        if self.conditions() > 0 {
-            let cube = Matrix::from_fn(PROPOSALS, self.conditions(), |_, _| uniform(&mut rng));
-            let proposed = random_points(&split.mean, &split.cholesky, &cube);
-            let total = log_sum(proposed.log_weights.iter().copied());
-            let mut left = uniform(&mut rng);
-            let of = |log: &f64| {
-                left -= (log - total).exp();
-                left <= 0.0
-            };
-            let chosen = proposed.log_weights.iter().position(of).unwrap_or(PROPOSALS - 1);
-            let own = proposed.values.row(chosen).iter().zip(&split.mean);
-            moved.iter_mut().zip(own).for_each(|(d, (c, m))| *d = c - m);
-        }
-        let eigen = symmetric_eigen(&split.rest).ok()?;
-        let weights: Vec<f64> =
-            eigen.values.iter().map(|l| l.max(0.0).sqrt() * normal(&mut rng)).collect();
-        let one = |i: usize| {
-            joint.mean[i] + dot(split.map.row(i), &moved) + dot(eigen.vectors.row(i), &weights)
-        };
-        Some((0..n).map(one).collect())
+        constrained_draw(&joint.mean, &joint.covariance, self.grid.len(), stream)
     }
+}
+
+/// Draws the first `places` components of a normal vector, given that none of the others is negative.
+pub(super) fn constrained_draw(
+    mean: &[f64],
+    covariance: &Matrix,
+    places: usize,
+    stream: &Stream,
+) -> Option<Vec<f64>> {
+    let split = Split::of(mean, covariance, places)?;
+    let mut rng = stream.generator();
+    let m = split.mean.len();
+    let mut moved = vec![0.0; m];
+    if m > 0 {
+        let cube = Matrix::from_fn(PROPOSALS, m, |_, _| uniform(&mut rng));
+        let proposed = random_points(&split.mean, &split.cholesky, &cube);
+        let total = log_sum(proposed.log_weights.iter().copied());
+        let mut left = uniform(&mut rng);
+        let of = |log: &f64| {
+            left -= (log - total).exp();
+            left <= 0.0
+        };
+        let chosen = proposed.log_weights.iter().position(of).unwrap_or(PROPOSALS - 1);
+        let own = proposed.values.row(chosen).iter().zip(&split.mean);
+        moved.iter_mut().zip(own).for_each(|(d, (c, m))| *d = c - m);
+    }
+    let shifted: Vec<f64> = (0..places).map(|i| mean[i] + dot(split.map.row(i), &moved)).collect();
+    normal_draw(&shifted, &split.rest, &stream.named("rest"))
 }

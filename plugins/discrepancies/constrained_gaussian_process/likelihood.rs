@@ -17,8 +17,9 @@ use lacuna_linalg::vector::{add_scaled, dot};
 use lacuna_linalg::{Matrix, multiply, multiply_transposed, multiply_vector};
 
 use super::ConstrainedGaussianProcess;
+use super::draws::constrained_draw;
 use super::knowledge::Knowledge;
-use super::orthant::{Orthant, log_probability, with_gradient};
+use super::orthant::{Orthant, gradient, log_probability};
 use super::prior::{Joint, Prior, blocks};
 use crate::discrepancies::common::{
     Dense, DenseSolved, Groups, Noise, PerGroup, Replicates, Series, Unknown, part, start,
@@ -153,13 +154,9 @@ impl ConstrainedLikelihood {
     fn try_gradient(&self, response: &[f64], hyper: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
         let state = self.state(response, hyper)?;
         let after = if state.mean.is_empty() {
-            Orthant {
-                log_probability: 0.0,
-                by_mean: Vec::new(),
-                by_covariance: Matrix::zeros(0, 0),
-            }
+            Orthant { by_mean: Vec::new(), by_covariance: Matrix::zeros(0, 0) }
         } else {
-            with_gradient(&state.mean, &state.covariance)?
+            gradient(&state.mean, &state.covariance)?
         };
         // By V: those of the normal density, and through mean and covariance of `c`.
         let mut by_bias = state.solved.by_covariance();
@@ -216,7 +213,7 @@ impl ConstrainedLikelihood {
             }
             if let Some((_, count)) = groups.iter().find(|(first, _)| m > 0 && *first == s) {
                 let (mean, own) = joint.conditions(k);
-                let before = with_gradient(mean, &own)?;
+                let before = gradient(mean, &own)?;
                 let count = *count as f64;
                 for a in 0..m {
                     by_own_mean[k + a] -= count * before.by_mean[a];
@@ -246,6 +243,39 @@ impl ConstrainedLikelihood {
             state.covariance[(i, j)] + w[i] * w[j] / precision
         });
         log_probability(&mean, &covariance)
+    }
+}
+
+impl ConstrainedLikelihood {
+    /// Draws the bias of all outputs given the data and the conditions of all series.
+    fn draw_given_data(
+        &self,
+        response: &[f64],
+        hyper: &[f64],
+        stream: &Stream,
+    ) -> Option<Vec<f64>> {
+        let state = self.state(response, hyper)?;
+        let (n, m, places) = (state.solved.pull.len(), self.prior.conditions(), response.len());
+        let size = places + m * self.prior.blocks.len();
+        let (mut mean, mut covariance) = (vec![0.0; size], Matrix::zeros(size, size));
+        let mut cross = Matrix::zeros(size, n);
+        for (s, block) in self.prior.blocks.iter().enumerate() {
+            let values = Prior::of_group(block.group, state.values);
+            let joint = self.prior.joint(&self.prior.grid, values)?;
+            let conditions = (0..m).map(|a| places + s * m + a);
+            let all: Vec<usize> = block.outputs.iter().copied().chain(conditions).collect();
+            for (i, &a) in all.iter().enumerate() {
+                mean[a] = joint.mean[i];
+                for (j, &b) in all.iter().enumerate() {
+                    covariance[(a, b)] = joint.covariance[(i, j)];
+                    if b < places && self.dense.place[b] != usize::MAX {
+                        cross[(a, self.dense.place[b])] = joint.covariance[(i, j)];
+                    }
+                }
+            }
+        }
+        state.solved.condition(&cross, &mut mean, &mut covariance);
+        constrained_draw(&mean, &covariance, places, stream)
     }
 }
 
@@ -302,6 +332,18 @@ impl Likelihood for ConstrainedLikelihood {
         let values = bias.unwrap_or_else(|| vec![f64::NAN; response.len()]);
         let own = [noise, ErrorPath { origin: "model_form".into(), values }];
         own.into_iter().chain(self.noise.setting.drawn_common_errors(stream)).collect()
+    }
+
+    fn errors_given_data(
+        &self,
+        response: &[f64],
+        hyper: &[f64],
+        stream: &Stream,
+    ) -> Option<Vec<ErrorPath>> {
+        let bias = self.draw_given_data(response, hyper, &stream.at(1))?;
+        let mut paths = self.errors(response, hyper, stream);
+        paths[1].values = bias;
+        Some(paths)
     }
 
     fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements> {

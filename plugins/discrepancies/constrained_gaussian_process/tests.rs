@@ -134,6 +134,7 @@ fn it_is_the_mean_over_the_draws_that_satisfy_the_conditions() {
         Matrix::from_fn(8, 8, |i, j| eigen.vectors[(i, j)] * eigen.values[j].max(0.0).sqrt());
     let ys = [0.1, -0.2, -0.1, -0.9];
     let (mut kept, mut sum, mut squares, mut size) = (0.0, 0.0, 0.0, [0.0; 4]);
+    let mut after = [[0.0; 4]; 2];
     for i in 0..DRAWS {
         let mut rng = Stream::root(11).at(i).generator();
         let z: Vec<f64> = (0..8).map(|_| normal(&mut rng)).collect();
@@ -146,7 +147,11 @@ fn it_is_the_mean_over_the_draws_that_satisfy_the_conditions() {
         kept += 1.0;
         sum += density;
         squares += density * density;
-        size.iter_mut().zip(&f).for_each(|(s, b)| *s += b * b);
+        for (i, b) in f[..4].iter().enumerate() {
+            size[i] += b * b;
+            after[0][i] += density * b;
+            after[1][i] += density * b * b;
+        }
     }
     let mean: f64 = sum / kept;
     let error = ((squares / kept - mean * mean) / kept).sqrt() / mean;
@@ -156,5 +161,24 @@ fn it_is_the_mean_over_the_draws_that_satisfy_the_conditions() {
     let told = &likelihood.predictive(&[0.0; 4], &[])[1].variance;
     for (told, size) in told.iter().zip(size) {
         assert!((told / (size / kept) - 1.0).abs() < 0.06, "{told} {}", size / kept);
+    }
+    // Draws given the data: mean and standard deviation of the weighted draws of the prior, whose effective number is
+    // `sum² / squares`.
+    const GIVEN: u64 = 2000;
+    let mut given = [[0.0; 4]; 2];
+    for k in 0..GIVEN {
+        let drawn = likelihood.errors_given_data(&[0.0; 4], &[], &Stream::root(12).at(k)).unwrap();
+        for (i, b) in drawn[1].values.iter().enumerate() {
+            given[0][i] += b / GIVEN as f64;
+            given[1][i] += b * b / GIVEN as f64;
+        }
+    }
+    let share = (squares / (sum * sum) + 1.0 / GIVEN as f64).sqrt();
+    for i in 0..4 {
+        let [mean, square] = [after[0][i] / sum, after[1][i] / sum];
+        let sd = (square - mean * mean).sqrt();
+        let own = (given[1][i] - given[0][i] * given[0][i]).sqrt();
+        assert!((given[0][i] - mean).abs() < 4.0 * sd * share, "{i}: {} {mean} {sd}", given[0][i]);
+        assert!((own / sd - 1.0).abs() < 4.0 * share, "{i}: {own} {sd}");
     }
 }

@@ -26,7 +26,8 @@ fn slopes() -> Result<Matrix, Stop> {
 
 fn build(text: &str, data: &Measurements, common: &[CommonError]) -> BiasedLikelihood {
     let chosen: GaussianProcess = options("gaussian_process", text).unwrap();
-    BiasedLikelihood::new(&chosen, &Known { data, common, slopes: &slopes }).unwrap()
+    BiasedLikelihood::new(&chosen, &Known { data, common, slopes: &slopes, parameters: &[] })
+        .unwrap()
 }
 
 const SHARED: &str = "bias = { half_normal = 1 }\ncorrelation_length = { half_normal = 1 }\n\

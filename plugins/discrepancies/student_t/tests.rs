@@ -104,7 +104,7 @@ fn marginal(likelihood: &dyn Likelihood, slopes: &Matrix, scale: f64) -> (Vec<f6
 fn a_few_directions_do_what_the_whole_covariance_does() {
     let (data, slopes, error) = twelve_directions();
     let of_slopes = || Ok(slopes.clone());
-    let known = Known { data: &data, common: &error, slopes: &of_slopes };
+    let known = Known { data: &data, common: &error, slopes: &of_slopes, parameters: &[] };
     let replicates = Replicates::of(&data, &error).unwrap();
     let text = "scale = { half_normal = 1 }\ndegrees_of_freedom = { known = 1e9 }";
     let likelihood = build(&format!("{text}\ncommon = {{ share = 0.0, most = 0 }}"), &known);
@@ -154,7 +154,7 @@ fn no_error_has_no_weights() {
 fn new_data_have_the_whole_error() {
     let (data, slopes, error) = twelve_directions();
     let of_slopes = || Ok(slopes.clone());
-    let known = Known { data: &data, common: &error, slopes: &of_slopes };
+    let known = Known { data: &data, common: &error, slopes: &of_slopes, parameters: &[] };
     let text = "scale = { known = 0.01 }\ndegrees_of_freedom = { known = 5 }\ncommon = { share = 0.0, most = 1 }";
     let likelihood = build(text, &known);
     let (count, weights) = (20_000, likelihood.hyperparameters().len());

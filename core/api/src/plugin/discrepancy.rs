@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use lacuna_base::data::{Layout, Measurements, Unit};
+use lacuna_base::data::{Layout, Measurements, Parameter, Unit};
 use lacuna_base::math::distribution::Distribution;
 use lacuna_base::math::random::{Stream, normal};
 use lacuna_base::matrix::vector::dot;
@@ -64,12 +64,19 @@ pub struct Known<'a> {
     /// Derivative of each output by each parameter, `outputs x parameters`, per prior standard deviation of the
     /// parameter, where the model fits the data best; computed on demand.
     pub slopes: &'a dyn Fn() -> Result<Matrix, Stop>,
+    /// Parameters of the columns of `slopes`, in their order; empty in a library of plugins, where they are not known.
+    pub parameters: &'a [Parameter],
 }
 
 impl<'a> Known<'a> {
     /// Input from measurements and common errors, for callers that do not need slopes.
     pub fn without_slopes(data: &'a Measurements, common: &'a [CommonError]) -> Self {
-        Self { data, common, slopes: &|| Err(Stop::new("the slopes of the model are not known")) }
+        Self {
+            data,
+            common,
+            slopes: &|| Err(Stop::new("the slopes of the model are not known")),
+            parameters: &[],
+        }
     }
 }
 
@@ -221,6 +228,19 @@ pub trait Likelihood: Send + Sync {
         let parts = self.predictive(response, hyper);
         let draw = |(k, part): (usize, &VariancePart)| part.independent(&stream.at(k as u64));
         parts.iter().enumerate().map(draw).collect()
+    }
+
+    /// Like [`Likelihood::errors`], with whatever the data say about an error that all replicates share, such as a bias of
+    /// the model: drawn given the data, it corrects the response where it was measured. Outputs that were not measured
+    /// and are independent of the measured ones have the errors of [`Likelihood::errors`]. `None` if the discrepancy has
+    /// no such form.
+    fn errors_given_data(
+        &self,
+        _response: &[f64],
+        _hyper: &[f64],
+        _stream: &Stream,
+    ) -> Option<Vec<ErrorPath>> {
+        None
     }
 
     /// Data simulated from this discrepancy: replicates and missing values as in the measurements, new values; one set

@@ -35,4 +35,14 @@ impl Parameter {
             reference: None,
         }
     }
+
+    /// Standard deviation of the prior, or a quarter of its central 95 % range if the standard deviation does not exist.
+    pub fn scale(&self) -> f64 {
+        let sd = self.prior.variance().sqrt();
+        if sd.is_finite() {
+            sd
+        } else {
+            0.25 * (self.prior.quantile(0.975) - self.prior.quantile(0.025))
+        }
+    }
 }

@@ -54,6 +54,25 @@ impl Joint {
     }
 }
 
+impl Joint {
+    /// Puts the errors of the blocks together, by origin; those that a block does not have are zero there.
+    fn merged(&self, drawn: impl Iterator<Item = Vec<ErrorPath>>) -> Vec<ErrorPath> {
+        let outputs = self.blocks.last().map_or(0, |block| block.outputs.end);
+        let mut all: Vec<ErrorPath> = Vec::new();
+        for (block, paths) in self.blocks.iter().zip(drawn) {
+            for own in paths {
+                let place = all.iter().position(|other| other.origin == own.origin);
+                let place = place.unwrap_or_else(|| {
+                    all.push(ErrorPath { origin: own.origin.clone(), values: vec![0.0; outputs] });
+                    all.len() - 1
+                });
+                all[place].values[block.outputs.clone()].copy_from_slice(&own.values);
+            }
+        }
+        all
+    }
+}
+
 impl Likelihood for Joint {
     fn hyperparameters(&self) -> &[Hyperparameter] {
         &self.hyper
@@ -145,20 +164,28 @@ impl Likelihood for Joint {
 
     /// The errors of the blocks are independent of each other.
     fn errors(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<ErrorPath> {
-        let outputs = self.blocks.last().map_or(0, |block| block.outputs.end);
-        let mut all: Vec<ErrorPath> = Vec::new();
-        for (i, block) in self.blocks.iter().enumerate() {
+        let drawn = |(i, block): (usize, &Block)| {
             let part = &response[block.outputs.clone()];
-            for own in block.likelihood.errors(part, &block.own(hyper), &stream.at(i as u64)) {
-                let place = all.iter().position(|other| other.origin == own.origin);
-                let place = place.unwrap_or_else(|| {
-                    all.push(ErrorPath { origin: own.origin.clone(), values: vec![0.0; outputs] });
-                    all.len() - 1
-                });
-                all[place].values[block.outputs.clone()].copy_from_slice(&own.values);
-            }
-        }
-        all
+            block.likelihood.errors(part, &block.own(hyper), &stream.at(i as u64))
+        };
+        self.merged(self.blocks.iter().enumerate().map(drawn))
+    }
+
+    /// Blocks without such a form have their plain errors.
+    fn errors_given_data(
+        &self,
+        response: &[f64],
+        hyper: &[f64],
+        stream: &Stream,
+    ) -> Option<Vec<ErrorPath>> {
+        let drawn = |(i, block): (usize, &Block)| {
+            let (part, own) = (&response[block.outputs.clone()], block.own(hyper));
+            let (likelihood, stream) = (&block.likelihood, stream.at(i as u64));
+            likelihood
+                .errors_given_data(part, &own, &stream)
+                .unwrap_or_else(|| likelihood.errors(part, &own, &stream))
+        };
+        Some(self.merged(self.blocks.iter().enumerate().map(drawn)))
     }
 
     fn simulate(&self, response: &[f64], hyper: &[f64], stream: &Stream) -> Vec<Measurements> {

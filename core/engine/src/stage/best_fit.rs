@@ -1,7 +1,6 @@
 //! Least-squares best fit of the model, before any discrepancy is chosen, and the derivatives of the response there.
 
-use lacuna::data::{JointPrior, Measurements, Observations};
-use lacuna::math::distribution::Distribution;
+use lacuna::data::{JointPrior, Measurements, Observations, Parameter};
 use lacuna::math::random::Stream;
 use lacuna::plugin::Forward;
 use lacuna::plugin::discrepancy::{Hyperparameter, Likelihood, VariancePart};
@@ -52,15 +51,8 @@ pub fn slopes(study: &Study, data: &Observations, forward: &dyn Forward) -> Resu
 /// Derivative of each output by each parameter at a point, per prior standard deviation (`outputs x parameters`).
 pub fn standard_slopes(study: &Study, forward: &dyn Forward, point: &[f64]) -> Matrix {
     let jacobian = forward.jacobian(point);
-    let sd: Vec<f64> = study.parameters.iter().map(|p| scale(&p.prior)).collect();
+    let sd: Vec<f64> = study.parameters.iter().map(Parameter::scale).collect();
     Matrix::from_fn(jacobian.rows(), jacobian.columns(), |i, j| jacobian[(i, j)] * sd[j])
-}
-
-/// Standard deviation of a distribution, or a quarter of its central 95 % range if the standard deviation does not
-/// exist.
-pub fn scale(law: &Distribution) -> f64 {
-    let sd = law.variance().sqrt();
-    if sd.is_finite() { sd } else { 0.25 * (law.quantile(0.975) - law.quantile(0.025)) }
 }
 
 /// Likelihood of independent normal data whose common variance is integrated out.

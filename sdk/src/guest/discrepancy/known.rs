@@ -71,7 +71,7 @@ impl<'a> OwnedKnown<'a> {
     /// Looks at it as discrepancies do.
     pub fn with<R>(&self, look: impl FnOnce(&Known<'_>) -> R) -> R {
         let slopes = || self.slopes().map_err(|refusal| Stop::new(refusal.message));
-        look(&Known { data: &self.data, common: &self.common, slopes: &slopes })
+        look(&Known { data: &self.data, common: &self.common, slopes: &slopes, parameters: &[] })
     }
 
     fn slopes(&self) -> Result<Matrix, Refusal> {

@@ -128,7 +128,8 @@ impl<'a> Law<'a> {
             Ok(rows(self.slopes.get_or_init(made).as_ref().map_err(Clone::clone)?, range.clone()))
         };
         let data = &self.data.blocks[i];
-        make(&discrepancy::Known { data, common: &own, slopes: &slopes })
+        let parameters = &self.study.parameters;
+        make(&discrepancy::Known { data, common: &own, slopes: &slopes, parameters })
     }
 }
 

@@ -1,5 +1,6 @@
 //! Normal approximation of the parameters given the data, before the error is known well.
 
+use lacuna::data::Parameter;
 use lacuna::math::random::normal;
 use lacuna::plugin::Forward;
 use lacuna_linalg::vector::dot;
@@ -7,7 +8,7 @@ use lacuna_linalg::{Cholesky, Matrix, multiply, multiply_transposed};
 
 use super::factor::{Estimate, Shifts};
 use super::size::Size;
-use crate::stage::{best_fit, stream};
+use crate::stage::stream;
 use crate::study::Study;
 
 /// Number of points that represent the region of likely parameters.
@@ -52,8 +53,7 @@ impl Pilot<'_> {
             own[(i, j)] + of_error[(i, j)] + least
         });
         let Ok(root) = Cholesky::new(&covariance) else { return points };
-        let widths: Vec<f64> =
-            self.study.parameters.iter().map(|p| best_fit::scale(&p.prior)).collect();
+        let widths: Vec<f64> = self.study.parameters.iter().map(Parameter::scale).collect();
         let mut rng = stream(self.study, "emulator-error").generator();
         // Rejection of points outside the prior may be frequent at its edges, so the number of tries is limited.
         for _ in 0..20 * POINTS {

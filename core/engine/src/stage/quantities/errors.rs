@@ -52,7 +52,10 @@ impl<'a> Errors<'a> {
     pub fn draw(&self, response: &[f64], point: &[f64], stream: &Stream) -> Vec<ErrorPath> {
         let of_discrepancy = |likelihood: &dyn Likelihood| {
             let hyper = &point[point.len() - likelihood.hyperparameters().len()..];
-            likelihood.errors(response, hyper, &stream.named("discrepancy"))
+            let stream = stream.named("discrepancy");
+            likelihood
+                .errors_given_data(response, hyper, &stream)
+                .unwrap_or_else(|| likelihood.errors(response, hyper, &stream))
         };
         let mut paths = self.likelihood.map(of_discrepancy).unwrap_or_default();
         paths.retain(|path| self.common.iter().all(|error| error.origin != path.origin));
