@@ -220,9 +220,9 @@ fn discrepancies() {
         "bias = { half_normal = 1.0 }\ncorrelation_length = { log_normal = [-8, 1] }\n\
          known = [{ at = 0.0, value = 0.1, slope = 100.0 }]\nvariance = { half_normal = 1.0 }",
         "bias = { half_normal = 1.0 }\ncorrelation_length = { log_normal = [-8, 1] }\nbias_by = \"sensor\"\n\
-         kernel = \"squared_exponential\"\nmonotone = \"increasing\"\nplaces = 3\n\
+         kernel = \"squared_exponential\"\nmonotone = \"increasing\"\nplaces = 2\n\
          variance = { half_normal = 1.0 }\nby = \"sensor\"",
-        "bias = { known = 0.1 }\ncorrelation_length = { known = 3e-4 }\nsign = \"negative\"\nplaces = 4\n\
+        "bias = { known = 0.1 }\ncorrelation_length = { known = 3e-4 }\nsign = \"negative\"\nplaces = 3\n\
          kernel = \"matern_3_2\"\nvariance = { measured = { known = 1 } }",
     ];
     let embedded = &[

@@ -109,6 +109,31 @@ fn the_simple_machine_is_precise_and_wrong() {
     assert!((0.65 - mean) / sd > 100.0);
 }
 
+/// The posterior by quadrature over efficiency, size and length of the bias, with the probabilities of the conditions by
+/// the multivariate normal distribution of SciPy 1.17 (README of the study).
+#[test]
+fn knowledge_of_its_losses_recovers_the_efficiency_of_the_simple_machine() {
+    let folder = tempfile::tempdir().unwrap();
+    let short = [
+        "response.axes.effort.count=11",
+        "measurements.path=\"work_11.csv\"",
+        "sampler.walkers=12",
+        "sampler.steps=500",
+    ];
+    let found = summary("simple_machine/knowledge.toml", &short, folder.path());
+    let efficiency = &found["parameters"]["efficiency"];
+    let number = |key: &str| efficiency[key].as_f64().unwrap();
+    let independent = number("ess_bulk").min(number("ess_tail"));
+    let error = (number("mean") - KNOWLEDGE[0]).abs();
+    assert!(error < 4.0 * KNOWLEDGE[1] / independent.sqrt() + 5e-4, "{error} {efficiency}");
+    let error = (number("sd") / KNOWLEDGE[1] - 1.0).abs();
+    assert!(error < 4.0 / (2.0 * independent).sqrt() + 0.02, "{error} {efficiency}");
+    assert!(number("q025") < 0.65 && 0.65 < number("q975"), "{efficiency}");
+}
+
+/// Mean and standard deviation; the lattice of the conditions adds the last terms of the tolerances.
+const KNOWLEDGE: [f64; 2] = [0.6400, 0.0212];
+
 #[test]
 fn an_oscillator_of_equations_finds_its_truth() {
     let folder = tempfile::tempdir().unwrap();

@@ -10,7 +10,7 @@ use super::prior::Prior;
 use crate::discrepancies::common::normal_draw;
 
 /// Number of proposals from which a draw of the functionals is taken, with the probabilities of their weights.
-const PROPOSALS: usize = 256;
+const PROPOSALS: usize = 100;
 
 /// A prior split into the functionals that are not negative and the values given them.
 struct Split {

@@ -1,6 +1,7 @@
 //! Comparison of finished runs: posteriors, errors, evidences, predictions.
 
 mod show;
+mod weights;
 
 use std::path::{Path, PathBuf};
 
@@ -105,6 +106,10 @@ pub struct Entry {
     pub curves_unreliable: Option<f64>,
     /// Number of data whose predictions are unreliable.
     pub loo_unreliable: Option<f64>,
+    /// Weight in the mixture of the studies that predicts left-out data best: left-out curves if all runs have them.
+    pub stacking: Option<f64>,
+    /// Weight by its own left-out predictions and their uncertainty (pseudo-BMA+), of the same parts.
+    pub pseudo_bma: Option<f64>,
     /// Duration of its stages when they were made, in seconds.
     pub seconds: Value,
 }
@@ -133,6 +138,7 @@ pub fn compare(runs: &[Finished]) -> Comparison {
     if same_data {
         rank_evidences(&mut entries);
         rank_predictions(runs, &mut entries);
+        weigh(runs, &mut entries);
     }
     Comparison { runs: entries, notes }
 }
@@ -165,6 +171,8 @@ fn entry(run: &Finished) -> Entry {
         curves_behind: None,
         curves_unreliable: run.number(&["loo", "curves", "unreliable"]),
         loo_unreliable: run.number(&["loo", "unreliable"]),
+        stacking: None,
+        pseudo_bma: None,
         seconds: part("seconds"),
     }
 }
@@ -181,6 +189,19 @@ fn rank_evidences(entries: &mut [Entry]) {
         let of_difference = if log == best[0] { 0.0 } else { error.hypot(best[1]) };
         entry.evidence_behind = Some([best[0] - log, of_difference]);
         entry.probability = Some((log - best[0]).exp() / total);
+    }
+}
+
+/// Computes the weights of the studies in one prediction.
+fn weigh(runs: &[Finished], entries: &mut [Entry]) {
+    let all = |of: fn(&Finished) -> Option<&LeaveOneOut>| {
+        weights::densities(&runs.iter().map(of).collect::<Option<Vec<_>>>()?)
+    };
+    let curves = all(|run| run.curves_left_out.as_ref());
+    let Some(densities) = curves.or_else(|| all(|run| run.left_out.as_ref())) else { return };
+    let both = weights::stacking(&densities).into_iter().zip(weights::pseudo_bma(&densities));
+    for (entry, (stacking, pseudo_bma)) in entries.iter_mut().zip(both) {
+        (entry.stacking, entry.pseudo_bma) = (Some(stacking), Some(pseudo_bma));
     }
 }
 

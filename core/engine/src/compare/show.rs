@@ -141,6 +141,8 @@ fn weights(comparison: &Comparison, names: &[String]) -> Table {
     row(&mut table, "data with unreliable k-hat", "", runs, |run| {
         run.loo_unreliable.map(|count| format!("{count}"))
     });
+    row(&mut table, "weight by stacking", "", runs, |run| run.stacking.map(percent));
+    row(&mut table, "weight by pseudo-BMA+", "", runs, |run| run.pseudo_bma.map(percent));
     if runs.iter().any(|run| run.curves.is_some()) {
         row(&mut table, "elpd_loo of whole curves", "", runs, |run| pair(run.curves));
         row(&mut table, "below the best", "", runs, |run| pair(run.curves_behind));
