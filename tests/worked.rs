@@ -118,7 +118,7 @@ fn knowledge_of_its_losses_recovers_the_efficiency_of_the_simple_machine() {
         "response.axes.effort.count=11",
         "measurements.path=\"work_11.csv\"",
         "sampler.walkers=12",
-        "sampler.steps=500",
+        "sampler.steps=250",
     ];
     let found = summary("simple_machine/knowledge.toml", &short, folder.path());
     let efficiency = &found["parameters"]["efficiency"];
