@@ -110,7 +110,7 @@ fn the_simple_machine_is_precise_and_wrong() {
 }
 
 /// The posterior by quadrature over efficiency, size and length of the bias, with the probabilities of the conditions by
-/// the multivariate normal distribution of SciPy 1.17 (README of the study).
+/// the multivariate normal distribution of scipy 1.17 (README of the study).
 #[test]
 fn knowledge_of_its_losses_recovers_the_efficiency_of_the_simple_machine() {
     let folder = tempfile::tempdir().unwrap();

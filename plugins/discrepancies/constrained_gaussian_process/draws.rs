@@ -44,14 +44,12 @@ impl Prior {
         let mut squares = vec![0.0; outputs];
         let mut known: Vec<(Option<usize>, Vec<f64>)> = Vec::new();
         for block in &self.blocks {
-            let place = match known.iter().position(|(group, _)| *group == block.group) {
-                Some(place) => place,
-                None => {
-                    let own = self.squares_of(Self::of_group(block.group, values))?;
-                    known.push((block.group, own));
-                    known.len() - 1
-                }
-            };
+            let found = known.iter().position(|(group, _)| *group == block.group);
+            let place = found.unwrap_or(known.len());
+            if found.is_none() {
+                let own = self.squares_of(Self::of_group(block.group, values))?;
+                known.push((block.group, own));
+            }
             block.outputs.iter().zip(&known[place].1).for_each(|(&i, s)| squares[i] = *s);
         }
         Some(squares)

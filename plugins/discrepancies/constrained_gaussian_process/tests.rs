@@ -107,6 +107,7 @@ fn line(values: &[(f64, f64)]) -> Measurements {
 #[test]
 fn it_is_the_mean_over_the_draws_that_satisfy_the_conditions() {
     const DRAWS: u64 = 60_000;
+    const GIVEN: u64 = 2000;
     let xs = [0.5, 1.5, 2.5, 4.0];
     let data = line(&[(0.5, 0.1), (1.5, -0.2), (2.5, -0.1), (4.0, -0.9)]);
     let text = "bias = { known = 0.7 }\ncorrelation_length = { known = 1.5 }\n\
@@ -164,7 +165,6 @@ fn it_is_the_mean_over_the_draws_that_satisfy_the_conditions() {
     }
     // Draws given the data: mean and standard deviation of the weighted draws of the prior, whose effective number is
     // `sum² / squares`.
-    const GIVEN: u64 = 2000;
     let mut given = [[0.0; 4]; 2];
     for k in 0..GIVEN {
         let drawn = likelihood.errors_given_data(&[0.0; 4], &[], &Stream::root(12).at(k)).unwrap();
