@@ -1,4 +1,4 @@
-//! What a study states about a bias, and the places where it holds.
+//! Statements of a study about a bias, and the places where they hold.
 
 use lacuna::text::problem::Complaints;
 use schemars::JsonSchema;
@@ -92,7 +92,7 @@ pub(super) fn check(
 ) {
     let number = |x: &Option<f64>| x.is_none_or(f64::is_finite);
     for (i, point) in options.known.iter().enumerate() {
-        let at = format!("known[{i}]");
+        let at = format!("known.{i}");
         if !(point.at.is_finite() && number(&point.value) && number(&point.slope)) {
             complaints.at(&at).say("place, value and slope must be finite numbers");
         }
