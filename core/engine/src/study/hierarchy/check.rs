@@ -88,6 +88,12 @@ pub(in crate::study) fn check(study: &Study, complaints: &mut Complaints<'_>) {
                 .say(format!("`{key}` does not work with parameters by group"))
                 .help("take it out, or share the parameters between the groups");
         }
+        if study.design.as_ref().is_some_and(|section| section.built.plugin.is_sequential()) {
+            complaints
+                .at("design.plugin")
+                .say("a design that follows the data does not work with parameters by group")
+                .expected("a design that is placed before the runs, such as `sobol`");
+        }
         for unknown in study.unknowns.iter().filter(|unknown| unknown.scenario.is_some()) {
             complaints
                 .at(&format!("parameter.{}.scenario", unknown.name))
