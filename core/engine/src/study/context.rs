@@ -5,6 +5,7 @@ mod effects;
 mod gap;
 mod inputs;
 mod inside;
+mod more_runs;
 mod next;
 mod noise;
 mod outputs;
@@ -40,8 +41,8 @@ pub(super) fn check(study: &Study, root: &Node, problems: &mut Problems) {
     parameters(study, &mut complaints);
     super::hierarchy::check(study, &mut complaints);
     runs(study, &mut complaints);
-    refinement(study, &mut complaints);
-    sequential(study, &mut complaints);
+    more_runs::refinement(study, &mut complaints);
+    more_runs::sequential(study, &mut complaints);
     validation(study, &mut complaints);
     if let Some(model) = &study.model {
         for (place, scenario) in study.scenarios.iter().enumerate() {
@@ -251,56 +252,6 @@ fn inside_design(
             .expected(format!("95 % of the prior inside [{low}, {high}]"))
             .found(format!("[{}, {}]", bulk[0], bulk[1]))
             .help("widen `design`: outside it the surrogate has no runs to learn from");
-    }
-}
-
-fn refinement(study: &Study, complaints: &mut Complaints<'_>) {
-    let refine = study.surrogate.as_ref().and_then(|s| s.common.refine.as_ref());
-    if refine.is_none() {
-        return;
-    }
-    if study.model.is_none() {
-        complaints
-            .at("surrogate.refine")
-            .say("the study has no model to run again")
-            .expected("a `[model]` section, or no `refine`");
-    }
-    if study.sampler.is_none() {
-        complaints
-            .at("surrogate.refine")
-            .say("refinement needs a calibration")
-            .expected("`[measurements]`, `[discrepancy]` and `[sampler]`, or no `refine`");
-    }
-}
-
-/// Reports what a design lacks that places its runs by what earlier ones returned.
-fn sequential(study: &Study, complaints: &mut Complaints<'_>) {
-    let design = study.design.as_ref().filter(|section| section.built.plugin.is_sequential());
-    let (Some(design), Some(surrogate)) = (design, &study.surrogate) else { return };
-    if study.sampler.is_none() {
-        complaints
-            .at("design.use")
-            .say("the runs of this design follow the measurements, and the study has none")
-            .expected("`[measurements]`, `[discrepancy]` and `[sampler]`, or another design");
-    }
-    if !design.common.extended.is_empty() {
-        complaints
-            .at("design.extended")
-            .say("a sequential design is not extended: its batches follow each other")
-            .expected("more `runs`, or `refine` in `[surrogate]`");
-    }
-    if surrogate.common.validation > 0 {
-        complaints
-            .at("surrogate.validation")
-            .say("the last runs of a sequential design are those near the posterior")
-            .expected("`validation = 0`; `emulator_check` in `[validate]` measures the error there")
-            .found(surrogate.common.validation);
-    }
-    if surrogate.common.training.is_some() {
-        complaints
-            .at("surrogate.training")
-            .say("the first runs of a sequential design are the farthest from the posterior")
-            .expected("no `training`: all runs near the posterior are used");
     }
 }
 

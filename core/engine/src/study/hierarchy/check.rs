@@ -90,9 +90,9 @@ pub(in crate::study) fn check(study: &Study, complaints: &mut Complaints<'_>) {
         }
         if study.design.as_ref().is_some_and(|section| section.built.plugin.is_sequential()) {
             complaints
-                .at("design.plugin")
+                .at("design.use")
                 .say("a design that follows the data does not work with parameters by group")
-                .expected("a design that is placed before the runs, such as `sobol`");
+                .expected("a design whose points do not depend on the runs");
         }
         for unknown in study.unknowns.iter().filter(|unknown| unknown.scenario.is_some()) {
             complaints
