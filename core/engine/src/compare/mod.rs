@@ -1,5 +1,6 @@
 //! Comparison of finished runs: posteriors, errors, evidences, predictions.
 
+mod mixture;
 mod show;
 mod weights;
 
@@ -13,6 +14,9 @@ use serde_json::{Map, Value};
 
 use crate::stage::evidence;
 
+use mixture::{Predicted, Weights};
+
+pub use mixture::{Mixed, Spread};
 pub use show::text;
 
 /// Results of one run that are compared.
@@ -26,6 +30,8 @@ pub struct Finished {
     left_out: Option<LeaveOneOut>,
     /// Leave-one-out predictions of curves.
     curves_left_out: Option<LeaveOneOut>,
+    /// Predicted quantities.
+    predicted: Option<Predicted>,
 }
 
 impl Finished {
@@ -39,7 +45,8 @@ impl Finished {
         let folder = directory.join(Stage::Evidence.folder().name());
         let left_out = known.then(|| evidence::left_out(&folder)).transpose()?;
         let curves_left_out = left_out.as_ref().and_then(|_| evidence::curves_left_out(&folder));
-        Ok(Self { directory: directory.to_owned(), summary, left_out, curves_left_out })
+        let predicted = Predicted::read(directory);
+        Ok(Self { directory: directory.to_owned(), summary, left_out, curves_left_out, predicted })
     }
 
     /// A number of the summary, by its path.
@@ -62,6 +69,8 @@ impl Finished {
 pub struct Comparison {
     /// One entry per run, in the given order.
     pub runs: Vec<Entry>,
+    /// Quantities that all runs predict, by the mixture of the studies with their weights.
+    pub mixed: Vec<Mixed>,
     /// Notes on what limits the comparison.
     pub notes: Vec<String>,
 }
@@ -140,7 +149,8 @@ pub fn compare(runs: &[Finished]) -> Comparison {
         rank_predictions(runs, &mut entries);
         weigh(runs, &mut entries);
     }
-    Comparison { runs: entries, notes }
+    let mixed = mixed(runs, &entries);
+    Comparison { runs: entries, mixed, notes }
 }
 
 fn same<T: PartialEq>(runs: &[Finished], value: impl Fn(&Finished) -> Option<T>) -> bool {
@@ -202,6 +212,25 @@ fn weigh(runs: &[Finished], entries: &mut [Entry]) {
     let both = weights::stacking(&densities).into_iter().zip(weights::pseudo_bma(&densities));
     for (entry, (stacking, pseudo_bma)) in entries.iter_mut().zip(both) {
         (entry.stacking, entry.pseudo_bma) = (Some(stacking), Some(pseudo_bma));
+    }
+}
+
+/// Mixes the quantities that all studies predict, where the studies have weights.
+fn mixed(runs: &[Finished], entries: &[Entry]) -> Vec<Mixed> {
+    let all = |of: fn(&Entry) -> Option<f64>| entries.iter().map(of).collect::<Option<Vec<f64>>>();
+    let weights = Weights {
+        stacking: all(|entry| entry.stacking),
+        pseudo_bma: all(|entry| entry.pseudo_bma),
+        probability: all(|entry| entry.probability),
+    };
+    let none = [&weights.stacking, &weights.pseudo_bma, &weights.probability];
+    let predicted: Option<Vec<&Predicted>> =
+        runs.iter().map(|run| run.predicted.as_ref()).collect();
+    match predicted {
+        Some(studies) if none.iter().any(|weights| weights.is_some()) => {
+            mixture::mixed(&studies, &weights)
+        }
+        _ => Vec::new(),
     }
 }
 

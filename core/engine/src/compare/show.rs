@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{Comparison, Entry};
+use super::{Comparison, Entry, Mixed, Spread};
 use crate::page::number::{percent, significant};
 use crate::page::table::Table;
 
@@ -15,6 +15,7 @@ pub fn text(comparison: &Comparison) -> String {
         ("standard deviation of a new replicate by origin", spread(comparison, &names)),
         ("surrogate and fit", errors(comparison, &names)),
         ("evidence and prediction", weights(comparison, &names)),
+        ("quantities predicted by the mixture of the studies", mixed(comparison)),
         ("time", times(comparison, &names)),
     ] {
         if !table.is_empty() {
@@ -151,6 +152,34 @@ fn weights(comparison: &Comparison, names: &[String]) -> Table {
         });
     }
     table
+}
+
+/// Quantities of the mixture: mean and 95 % interval with each kind of weights.
+fn mixed(comparison: &Comparison) -> Table {
+    type Of = fn(&Mixed) -> Option<Spread>;
+    let kinds: [(&str, Of); 3] = [
+        ("by stacking", |mixed| mixed.stacking),
+        ("by pseudo-BMA+", |mixed| mixed.pseudo_bma),
+        ("by probability", |mixed| mixed.probability),
+    ];
+    let there =
+        kinds.into_iter().filter(|(_, of)| comparison.mixed.iter().any(|m| of(m).is_some()));
+    let (heads, of): (Vec<&str>, Vec<Of>) = there.unzip();
+    let mut table = Table::new(&["quantity", "unit"], &heads);
+    for quantity in &comparison.mixed {
+        let cell = |of: &Of| of(quantity).as_ref().map_or_else(String::new, interval);
+        let start = [quantity.name.clone(), quantity.unit.clone()];
+        table.row(start.into_iter().chain(of.iter().map(cell)));
+    }
+    table
+}
+
+fn interval(spread: &Spread) -> String {
+    let size = (spread.q975 - spread.q025).abs();
+    let digits = |value: f64| (value.abs() / size).log10().floor().max(0.0) as usize + 3;
+    let [mean, low, high] =
+        [spread.mean, spread.q025, spread.q975].map(|x| significant(x, digits(x)));
+    format!("{mean} ({low} to {high})")
 }
 
 /// Times of the stages that a choice of components changes.

@@ -16,6 +16,7 @@ fn finished(name: &str, log: f64, error: f64, hash: &str) -> Finished {
         }),
         left_out: None,
         curves_left_out: None,
+        predicted: None,
     }
 }
 
