@@ -1,5 +1,7 @@
 //! Results of each plugin for a small task.
 
+mod options;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -12,101 +14,21 @@ use lacuna::plugin::effect::Situation;
 use lacuna::plugin::model::Call;
 use lacuna::plugin::quantity::{Arguments, Curve, Number};
 use lacuna::plugin::registry::{self, Kind};
+use lacuna::plugin::reliability::LimitState;
 use lacuna::plugin::surrogate::Training;
 use lacuna::plugin::term::{Place, Time};
 use lacuna::plugin::{
-    Context, Density, Design, Discrepancy, Effect, Given, Model, Quantity, Reader, Sampler,
-    Surrogate, Target, Term,
+    Context, Density, Design, Discrepancy, Effect, Given, Model, Quantity, Reader, Reliability,
+    Sampler, Surrogate, Target, Term,
 };
-use lacuna::run::{Progress, Silent};
+use lacuna::run::{Progress, Silent, Stop};
 use lacuna_linalg::Matrix;
 
 use super::{Bits, Made};
+use options::OPTIONS;
 
 /// Plugins that compute nothing themselves, or call other programs, so that their results are not their own.
 const OTHERS: [&str; 3] = ["model.external", "model.python", "model.um_bridge"];
-
-/// Options of plugins without complete defaults, and of those whose defaults take long.
-const OPTIONS: [(&str, &str); 51] = [
-    (
-        "discrepancy.autoregressive",
-        "variance = { half_normal = 1 }\ncorrelation_time = { known = 2 }",
-    ),
-    ("discrepancy.gaussian", "variance = { half_normal = 1 }"),
-    (
-        "discrepancy.gaussian_process",
-        "bias = { half_normal = 1 }\ncorrelation_length = { known = 2 }\nvariance = { half_normal = 1 }",
-    ),
-    (
-        "discrepancy.multiplicative_gaussian",
-        "relative = { half_normal = 1 }\nfloor = { known = 0.2 }",
-    ),
-    ("discrepancy.student_t", "scale = { half_normal = 1 }"),
-    ("effect.crosstalk", "from = \"B\""),
-    ("effect.damping", "rate = { half_normal = 0.2 }"),
-    ("effect.delay", "time = { normal = [0, 0.3] }"),
-    ("effect.drift", "rate = { normal = [0, 0.1] }"),
-    ("effect.echo", "lag = { uniform = [0.5, 3] }"),
-    (
-        "effect.expression",
-        "formula = \"factor * y\"\nabsent = 1\nparameters = [{ name = \"factor\", prior = { normal = [1, 0.1] } }]",
-    ),
-    ("effect.flash", "amplitude = { normal = [0, 1] }\ndecay = { log_uniform = [0.3, 3] }"),
-    ("effect.gas_attenuation", "relaxation_time = { log_uniform = [0.1, 3] }"),
-    ("effect.gauge_length", "length = { half_normal = 1 }\naxis = \"time\""),
-    ("effect.level_jumps", "size = { normal = [0, 1] }\ntime = { uniform = [1, 5] }"),
-    ("effect.low_pass", "time_constant = { half_normal = 1 }"),
-    ("effect.misalignment", "other = { B = \"C\" }"),
-    ("effect.misplacement", "distance = { normal = [0, 1] }\naxis = \"time\""),
-    ("effect.offset", "size = { normal = [0, 1] }"),
-    ("effect.pulse_heating", "rise = { half_normal = 1 }\ntime_constant = { half_normal = 1 }"),
-    ("effect.resonance", "amplitude = { normal = [0, 1] }\nfrequency = { uniform = [0.1, 0.4] }"),
-    ("effect.saturation", "inverse_limit = { half_normal = 1 }"),
-    (
-        "effect.secondary_pulse",
-        "amplitude = { normal = [0, 1] }\ntime = { uniform = [1, 4] }\nwidth = { log_uniform = [0.3, 2] }",
-    ),
-    ("effect.timing_jitter", "deviation = { half_normal = 1 }"),
-    (
-        "model.composed",
-        "[[parts]]\nname = 'load'\nuse = 'equations'\nobserve = 'a + 2 * b'\ngives = { name = 'force' }\n[[parts]]\nname = 'sensor'\nuse = 'equations'\nobserve = 'force * time / 1 {s} + a^2'",
-    ),
-    (
-        "model.equations",
-        "state = { y = \"a + 1\" }\nrate = { y = \"(b - y^2) / 1 {s}\" }\nobserve = \"y\"",
-    ),
-    ("model.mercury_target", "numerics = { mesh = [6, 24] }"),
-    ("model.mercury_target_bubbles", "numerics = { mesh = [6, 24] }"),
-    ("model.mercury_target_equilibrium_gas", "numerics = { mesh = [6, 24] }"),
-    ("quantity.at", "place = 2.5"),
-    ("quantity.band", "frequency = [0.1, 0.4]"),
-    ("quantity.exceedance", "threshold = 2"),
-    ("quantity.expression", "formula = \"a / b\""),
-    (
-        "quantity.rainflow",
-        "fatigue_strength_coefficient = { value = 1e15, unit = \"Pa\" }\nfatigue_strength_exponent = -0.1\nmodulus = { value = 2e11, unit = \"Pa\" }",
-    ),
-    ("reader.sierra", "variable = \"strain_{sensor}\""),
-    ("sampler.affine_invariant_ensemble", "walkers = 20\nsteps = 40"),
-    ("sampler.hamiltonian", "warm_up = 100\nsteps = 140"),
-    ("sampler.nested", "live = 100"),
-    ("sampler.no_u_turn", "warm_up = 100\nsteps = 140"),
-    ("sampler.sequential_monte_carlo", "particles = 100"),
-    ("surrogate.gaussian_process", "nugget = 1e-8"),
-    ("surrogate.polynomial_chaos", "degree = { max = 4 }"),
-    ("surrogate.polynomial_chaos_kriging", "nugget = 1e-8"),
-    (
-        "target.expression",
-        "log_density = 'sum(normal_log_density(y, a + b * x, 1))'\ndata = { x = [0, 1, 2], y = [0.9, 3.1, 5.0] }",
-    ),
-    ("term.cubic_stiffness", "of = \"x\""),
-    ("term.evaporation", "ambient = \"293 {K}\"\nscale = \"16 {K}\""),
-    ("term.expression", "shape = \"v * x\""),
-    ("term.pull", "of = \"x\"\ndistance = \"hypot(x, y)\"\nbeside = { w = \"y\" }"),
-    ("term.quadratic_stiffness", "of = \"x\""),
-    ("term.radiation", "ambient = \"293 {K}\""),
-    ("term.relaxation", "toward = \"1\""),
-];
 
 /// Each plugin of the program with its revision and the hash of its results.
 pub fn all() -> BTreeMap<String, Made> {
@@ -117,6 +39,7 @@ pub fn all() -> BTreeMap<String, Made> {
     add::<dyn Model>(&mut found, model);
     add::<dyn Quantity>(&mut found, quantity);
     add::<dyn Reader>(&mut found, reader);
+    add::<dyn Reliability>(&mut found, reliability);
     add::<dyn Sampler>(&mut found, sampler);
     add::<dyn Surrogate>(&mut found, surrogate);
     add::<dyn Density>(&mut found, target);
@@ -124,7 +47,8 @@ pub fn all() -> BTreeMap<String, Made> {
     // An executor moves runs and computes nothing.
     let kinds: Vec<&str> = registry::kinds().iter().map(|kind| kind.name).collect();
     let known = ["design", "discrepancy", "effect", "executor", "model", "quantity", "reader"];
-    assert_eq!(kinds, [&known[..], &["sampler", "surrogate", "target", "term"]].concat());
+    let others = ["reliability", "sampler", "surrogate", "target", "term"];
+    assert_eq!(kinds, [&known[..], &others].concat());
     found
 }
 
@@ -181,7 +105,8 @@ fn discrepancy(_: &str, discrepancy: &dyn Discrepancy, bits: &mut Bits) {
     let factor = Matrix::from_fn(16, 2, |_, _| 0.05 * normal(&mut rng));
     let common = [CommonError { origin: ErrorOrigin::Emulator, factor, predictive: true }];
     let slopes = || Ok(Matrix::from_fn(16, 2, |i, j| (0.3 * i as f64 + j as f64).cos()));
-    let known = Known { data: &data, common: &common, slopes: &slopes, parameters: &[] };
+    let parameters = parameters();
+    let known = Known { data: &data, common: &common, slopes: &slopes, parameters: &parameters };
     let likelihood = discrepancy.likelihood(&known).unwrap();
     let hyper: Vec<f64> = likelihood.hyperparameters().iter().map(|h| h.start).collect();
     let y = response(0.05);
@@ -258,6 +183,26 @@ fn reader(name: &str, reader: &dyn Reader, bits: &mut Bits) {
         Err(error) => error.to_string(),
     };
     bits.text(&said.replace(&samples.display().to_string(), ""));
+}
+
+/// A curved limit at a distance of 2.5 from the origin.
+struct Curved;
+
+impl LimitState for Curved {
+    fn dimension(&self) -> usize {
+        2
+    }
+    fn values(&self, points: &Matrix) -> Result<Vec<f64>, Stop> {
+        Ok(points.iter_rows().map(|u| 2.5 - u[0] + 0.1 * (u[1] - 0.5).powi(2)).collect())
+    }
+}
+
+fn reliability(_: &str, method: &dyn Reliability, bits: &mut Bits) {
+    let progress = Progress::new(&Silent);
+    let found = method.estimate(&Curved, &Stream::root(4), &progress).unwrap();
+    bits.add(&[found.probability]);
+    found.interval.iter().for_each(|interval| bits.add(interval));
+    found.design_points.iter().for_each(|place| bits.add(&place.point));
 }
 
 /// Two correlated coordinates and a third one between bounds.

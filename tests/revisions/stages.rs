@@ -22,6 +22,7 @@ pub fn all() -> BTreeMap<String, Made> {
         "sampler.steps=30",
         "validate.emulator_check=1",
         "quantity=[{ name = 'peak', use = 'maximum' }, { name = 'largest', use = 'expression', formula = 'max(peak_B, peak_C)' }]",
+        "reliability=[{ name = 'limit', quantity = 'largest', above = 5e-4, use = 'subset_simulation' }]",
         "numerical_error.runs=3",
         "numerical_error.model.numerics.mesh=[10, 40]",
     ];
