@@ -131,3 +131,29 @@ fn targets_under_the_same_conditions_share_runs_and_emulator() {
         ran.made
     );
 }
+
+/// A numerical error that grows with the rate: without its estimate the stiffness of every target is wrong by many
+/// standard deviations, with it the truth lies inside.
+#[test]
+fn the_numerical_error_is_that_of_the_model_in_each_group() {
+    let coarse = "observe = \"exp(-rate * t) / stiffness + 0.02 * rate * t\"";
+    let finer = "[numerical_error]\nruns = 20\norder = 60\nmodel = { observe = \"exp(-rate * t) / stiffness\" }\n";
+    let study = STUDY.replace("observe = \"exp(-rate * t) / stiffness\"", coarse);
+    assert_ne!(study, STUDY);
+    let offs = |text: &str| -> Vec<f64> {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("study.toml"), text).unwrap();
+        fs::write(folder.path().join("strain.csv"), measured(1)).unwrap();
+        run(folder.path(), &[]);
+        let summary = quick::summary(&folder.path().join("out"));
+        let off = |(name, stiffness): (&str, f64)| {
+            let found = &summary["parameters"][format!("stiffness[{name}]")];
+            ((number(found, "/mean") - stiffness) / number(found, "/sd")).abs()
+        };
+        STIFFNESS.into_iter().map(off).collect()
+    };
+    let without = offs(&study);
+    assert!(without.iter().all(|off| *off > 5.0), "{without:?}");
+    let with = offs(&format!("{study}\n{finer}"));
+    assert!(with.iter().all(|off| *off < 3.0), "{with:?}");
+}

@@ -175,9 +175,10 @@ pub fn emulate(
         _ => Fitting::of(trained, data.value.runs()?)?,
     };
     let fitted = surrogate::stage(trained, &data, &fitting, run, observer)?;
-    let (data, fitted) = grouped::by_group(study, data, fitted);
     let (folders, place) = (numerical_error::folders(), region.as_deref());
-    let numerics = numerical_error::stage(study, &data, place, &folders, run, observer)?;
+    let numerics = numerical_error::stage(trained, &data, place, &folders, run, observer)?;
+    let numerics = numerics.map(|own| grouped::numerical_error(study, own));
+    let (data, fitted) = grouped::by_group(study, data, fitted);
     let emulated = Emulated { region, ..Emulated::new(study, data, fitted, numerics, None)? };
     runs::build_added(study, &emulated.problem(), run, observer)?;
     Ok(emulated)

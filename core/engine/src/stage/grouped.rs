@@ -4,6 +4,7 @@
 //! What follows the training sees runs in which all groups have the same values, as they were made: every run has one row with
 //! the value of the model's parameter in the column of each group, and the same response in the scenarios of each.
 
+mod numerics;
 mod runs;
 
 use lacuna::plugin::forward::Linear;
@@ -19,6 +20,8 @@ use super::surrogate::Fitted;
 use crate::study::Study;
 use crate::study::hierarchy::{Part, Trained};
 
+pub use numerics::{numerical_error, of_model};
+
 /// A fitted surrogate with its emulator.
 type Learned = (Kept<Fitted>, Box<dyn Emulator>);
 
@@ -29,23 +32,24 @@ pub fn by_group(
     (fitted, emulator): Learned,
 ) -> (Kept<Data>, Learned) {
     let Some(trained) = &study.hierarchy.trained else { return (data, (fitted, emulator)) };
+    let emulator = each_group(study, emulator);
     let ensemble = data.value.ensemble.map(|own| runs::ensemble(study, trained, own));
     let data = Kept { value: Data { ensemble, ..data.value }, ..data };
     // The same emulator with other groups is another map.
-    let hash = files::hash(
-        json!([fitted.hash, study.parameters.len(), trained.parts]).to_string().as_bytes(),
-    );
+    let hash = hash(study, trained, &fitted.hash);
     let fitted = Kept { value: runs::fitted(study, trained, fitted.value), hash, ..fitted };
-    (data, (fitted, each_group(study, trained, emulator)))
+    (data, (fitted, emulator))
+}
+
+/// Hash of what was learnt from the runs, with the groups.
+fn hash(study: &Study, trained: &Trained, own: &str) -> String {
+    files::hash(json!([own, study.parameters.len(), trained.parts]).to_string().as_bytes())
 }
 
 /// The emulator of a study, from that of the study that is trained.
-fn each_group(study: &Study, trained: &Trained, emulator: Box<dyn Emulator>) -> Box<dyn Emulator> {
-    let spread = Spread {
-        parts: trained.parts.clone(),
-        dimension: study.parameters.len(),
-        outputs: study.layouts.len(),
-    };
+pub fn each_group(study: &Study, emulator: Box<dyn Emulator>) -> Box<dyn Emulator> {
+    let Some(trained) = &study.hierarchy.trained else { return emulator };
+    let spread = Spread::of(study, trained);
     let coefficients = emulator.linear().map(|linear| spread.coefficients(linear.coefficients()));
     let own = emulator.fit_error();
     let fit_error = FitError {
@@ -63,9 +67,17 @@ struct Spread {
 }
 
 impl Spread {
-    /// Values by output of the study.
-    fn curve(&self, own: &[f64]) -> Vec<f64> {
-        let mut all = vec![0.0; self.outputs];
+    fn of(study: &Study, trained: &Trained) -> Self {
+        let (dimension, outputs) = (study.parameters.len(), study.layouts.len());
+        Self { parts: trained.parts.clone(), dimension, outputs }
+    }
+
+    /// Values by output of the study; none if there are none by output of the model.
+    fn curve<T: Copy + Default>(&self, own: &[T]) -> Vec<T> {
+        if own.is_empty() {
+            return Vec::new();
+        }
+        let mut all = vec![T::default(); self.outputs];
         for (from, to) in self.parts.iter().flat_map(|part| &part.outputs) {
             all[to.clone()].copy_from_slice(&own[from.clone()]);
         }

@@ -27,7 +27,7 @@ use super::idle::Used;
 use super::read::{self, Data, Runs};
 use super::simulator::Simulator;
 use super::surrogate::Fitted;
-use super::{low_fidelity, simulate, stream};
+use super::{grouped, low_fidelity, simulate, stream};
 use crate::study::Study;
 use crate::study::fidelity::NumericalError as Asked;
 use crate::study::file::NumericalErrorSection;
@@ -146,24 +146,27 @@ impl NumericalError {
             return Ok(None);
         }
         let whole = section.written.whole();
-        let (mut sources, mut offset) = low_fidelity::sources(study, &fitted.bytes)?;
-        for (j, scale) in prediction.scale.iter().enumerate() {
+        let (scale, own_offset, emulated) = grouped::of_model(study, prediction);
+        let model = study.trained();
+        let (mut sources, mut offset) = low_fidelity::sources(model, &fitted.bytes)?;
+        for (j, scale) in scale.iter().enumerate() {
             let own = 1.0 + whole * (scale - 1.0);
             for source in &mut sources {
                 source.weights[j] *= own;
             }
-            offset[j] = own * offset[j] + whole * prediction.offset[j];
+            offset[j] = own * offset[j] + whole * own_offset[j];
         }
         if let (Some(bytes), Some((plugin, name))) =
             (&prediction.emulator, predictor(study, section))
         {
             let weight = |emulated: &bool| if *emulated { whole } else { 0.0 };
-            let weights = prediction.emulated.iter().map(weight).collect();
+            let weights = emulated.iter().map(weight).collect();
             sources.push(Source { plugin, name, bytes: bytes.clone(), weights });
         }
         // The error estimates of the sum would not be those of the emulator of the ordinary runs; they are never used.
         let sum = Combined::new(&sources, &offset, FitError::default(), Vec::new(), Vec::new())?;
-        Ok(Some(Used::of(study)?.widen(Box::new(sum))))
+        let sum = Used::of(model)?.widen(Box::new(sum));
+        Ok(Some(grouped::each_group(study, sum)))
     }
 
     /// Facts for the report.

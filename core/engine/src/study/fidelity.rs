@@ -140,7 +140,10 @@ impl LowFidelity {
 }
 
 /// `[numerical_error]`: the study's model with some options changed.
-pub(super) fn numerical_error(root: &Node, problems: &mut Problems) -> Option<NumericalError> {
+pub(in crate::study) fn numerical_error(
+    root: &Node,
+    problems: &mut Problems,
+) -> Option<NumericalError> {
     let node = root.get("numerical_error")?;
     problems.within("numerical_error", |problems| {
         let written: NumericalErrorSection = decode(node, problems)?;

@@ -12,7 +12,7 @@ use crate::study::hierarchy::Trained;
 /// The runs with a column for each parameter of the study: the members of a group have the value of the run, location and
 /// scale of a population their prior medians.
 pub(super) fn ensemble(study: &Study, trained: &Trained, own: Ensemble) -> Ensemble {
-    let spread = spread(study, trained);
+    let spread = Spread::of(study, trained);
     Ensemble {
         parameters: study.parameters.iter().map(|p| p.name.clone()).collect(),
         units: study.parameters.iter().map(|p| p.unit.clone()).collect(),
@@ -25,7 +25,7 @@ pub(super) fn ensemble(study: &Study, trained: &Trained, own: Ensemble) -> Ensem
 
 /// The fitted surrogate with the errors of each group.
 pub(super) fn fitted(study: &Study, trained: &Trained, own: Fitted) -> Fitted {
-    let spread = spread(study, trained);
+    let spread = Spread::of(study, trained);
     let curves = Curves {
         points: points(study, trained, &own.curves.points),
         errors: spread.curves(&own.curves.errors),
@@ -45,12 +45,7 @@ pub(super) fn fitted(study: &Study, trained: &Trained, own: Fitted) -> Fitted {
     }
 }
 
-fn spread(study: &Study, trained: &Trained) -> Spread {
-    let (dimension, outputs) = (study.parameters.len(), study.layouts.len());
-    Spread { parts: trained.parts.clone(), dimension, outputs }
-}
-
-fn points(study: &Study, trained: &Trained, own: &Matrix) -> Matrix {
+pub(super) fn points(study: &Study, trained: &Trained, own: &Matrix) -> Matrix {
     let middle: Vec<f64> = study.parameters.iter().map(|p| p.prior.quantile(0.5)).collect();
     let row = |run: &[f64]| {
         let mut row = middle.clone();

@@ -77,11 +77,8 @@ pub(in crate::study) fn keys(
 pub(in crate::study) fn check(study: &Study, complaints: &mut Complaints<'_>) {
     if study.hierarchy.trained.is_some() {
         let refine = study.surrogate.as_ref().is_some_and(|s| s.common.refine.is_some());
-        let refused = [
-            ("surrogate.refine", refine),
-            ("numerical_error", study.numerical_error.is_some()),
-            ("low_fidelity", study.low_fidelity.is_some()),
-        ];
+        let refused =
+            [("surrogate.refine", refine), ("low_fidelity", study.low_fidelity.is_some())];
         for (key, _) in refused.iter().filter(|(_, there)| *there) {
             complaints
                 .at(key)

@@ -10,6 +10,7 @@ use lacuna::data::{Layouts, Parameter, Scenario};
 use lacuna::text::{Node, Problems};
 use serde::Serialize;
 
+use crate::study::fidelity;
 use crate::study::gap::Gap;
 use crate::study::plain::{Parts, Study};
 use crate::study::table::PluginSections;
@@ -145,7 +146,8 @@ fn alone(
         ..PluginSections::default()
     };
     let gap = Gap::default();
-    study.reduced_to(Parts { parameters, unknowns, scenarios, layouts, plugins, gap })
+    let own = study.reduced_to(Parts { parameters, unknowns, scenarios, layouts, plugins, gap });
+    Study { numerical_error: fidelity::numerical_error(root, &mut Problems::new()), ..own }
 }
 
 impl Study {
