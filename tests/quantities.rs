@@ -3,6 +3,8 @@
 //! A tolerance is a multiple of the Monte Carlo error: of the mean as printed (`mcse_mean`), and of a standard deviation
 //! `sd / √(2 n)` with the effective number of draws `n = (sd / mcse_mean)²`.
 
+mod fatigue;
+
 use std::f64::consts::{PI, SQRT_2};
 use std::fs;
 use std::path::Path;
