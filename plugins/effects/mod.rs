@@ -21,4 +21,5 @@ pub mod pulse_heating;
 pub mod resonance;
 pub mod saturation;
 pub mod secondary_pulse;
+pub mod time_warp;
 pub mod timing_jitter;

@@ -8,7 +8,7 @@ mod spline;
 pub use along::{Along, Row, Stations, lagrange};
 pub use filter::Filter;
 pub use line::Line;
-pub use spline::{Knots, shifted, shifted_by};
+pub use spline::{Knots, sampled, shifted, shifted_by};
 
 #[cfg(test)]
 pub(crate) mod testing;

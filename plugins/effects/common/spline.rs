@@ -91,13 +91,25 @@ pub fn shifted_by(
     values: &[f64],
     slopes: &[f64],
     by: impl Fn(f64) -> f64,
+    each: impl FnMut(usize, f64, f64),
+) {
+    sampled(knots, values, slopes, |i| knots.at[i] - by(knots.at[i]), each);
+}
+
+/// Calls `each` for every point of a curve with the spline's value and slope at another time, that of the point's index,
+/// which does not decrease. Before its first point and after its last a curve is at rest.
+pub fn sampled(
+    knots: &Knots<'_>,
+    values: &[f64],
+    slopes: &[f64],
+    time: impl Fn(usize) -> f64,
     mut each: impl FnMut(usize, f64, f64),
 ) {
     let at = knots.at;
     let last = at.len() - 1;
     let mut k = 0;
     for i in 0..at.len() {
-        let t = at[i] - by(at[i]);
+        let t = time(i);
         if last == 0 || t < at[0] {
             each(i, values[0], 0.0);
             continue;
