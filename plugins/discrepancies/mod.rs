@@ -3,6 +3,7 @@
 pub mod autoregressive;
 pub mod common;
 pub mod constrained_gaussian_process;
+pub mod distance;
 pub mod embedded;
 pub mod gaussian;
 pub mod gaussian_process;

@@ -141,7 +141,7 @@ mod tests {
     /// The warps of the simulated curves of Tucker, Wu and Srivastava (Computational Statistics and Data Analysis 61
     /// (2013) 50), after Kneip and Ramsay (2008): `(exp(a u) - 1) / (exp(a) - 1)`. Their logarithmic rate is a straight
     /// line, whose expansion in cosines is `-4 a / π² Σ cos(k π u) / k²` over odd `k`. The rest after `k` = 7 integrates
-    /// to less than `4 a / π³ Σ 1/k³` = 4.4e-4, times the largest rate, 1.6.
+    /// to less than `4 a / π³ Σ 1/k³` = 5.0e-4, times the largest rate, 1.6.
     #[test]
     fn it_contains_the_warps_of_the_literature() {
         let grid: Vec<f64> = (0..=50).map(|i| 0.02 * f64::from(i)).collect();
@@ -153,7 +153,7 @@ mod tests {
             let map = Map::new(&grid, &(1..=7).map(term).collect::<Vec<_>>());
             for (u, found) in grid.iter().zip(&map.to) {
                 let expected = (a * u).exp_m1() / a.exp_m1();
-                assert!((found - expected).abs() < 7e-4, "{a} {u}: {found} {expected}");
+                assert!((found - expected).abs() < 8e-4, "{a} {u}: {found} {expected}");
             }
         }
     }
