@@ -21,6 +21,15 @@ fn they_keep_their_contract() {
         "bias = { known = 0.1 }\ncorrelation_length = { known = 3e-4 }\nsign = \"negative\"\nplaces = 3\n\
          kernel = \"matern_3_2\"\nvariance = { measured = { known = 1 } }",
     ];
+    let distance = &[
+        "tolerance = { known = 0.3 }\nvariance = { half_normal = 1.0 }\nsimulations = 5",
+        "metric = \"energy\"\naxis_weight = 3000.0\ntolerance = { half_normal = 1.0 }\nsimulations = 5\n\
+         variance = { measured = { known = 1 } }\ndistance_by = { axis = \"time\", windows = 2 }",
+        "metric = \"maximum_mean_discrepancy\"\nsample = true\ntolerance = { half_normal = 1.0 }\n\
+         variance = { half_normal = 1.0 }\nsimulations = 5",
+        "metric = \"jensen_shannon\"\ntolerance = { half_normal = 1.0 }\nbandwidth = 0.2\nsimulations = 5\n\
+         variance = { half_normal = 1.0 }\nby = \"sensor\"",
+    ];
     let embedded = &[
         "spread = { first = { half_normal = 1.0 }, second = { known = 0.3 } }\n\
          variance = { half_normal = 1.0 }",
@@ -65,6 +74,7 @@ fn they_keep_their_contract() {
     let table: &Table = &[
         ("autoregressive", autoregressive),
         ("constrained_gaussian_process", constrained_gaussian_process),
+        ("distance", distance),
         ("embedded", embedded),
         ("gaussian", gaussian),
         ("gaussian_process", gaussian_process),
